@@ -16,14 +16,14 @@ REFUSALS = (redis.ResponseError, redis.AuthenticationError, redis.BusyLoadingErr
 """What a Redis says that is there and takes no messages: full, read only, loading, locked."""
 
 
-def send(task: Any, pk: int) -> None:
-    """One message with the key of a row, over a connection that works.
+def send(task: Any, *arguments: str | int) -> None:
+    """One message, over a connection that works; for transaction.on_commit.
 
     Raises:
         QueueFault: No broker, or it refuses.
     """
     with open_broker() as broker:
-        task.apply_async((pk,), connection=broker, retry=False)
+        task.apply_async(arguments, connection=broker, retry=False)
 
 
 def check_broker(*, within_s: float = 5) -> None:

@@ -1,37 +1,38 @@
-"""Celery tasks of augment: doors that carry one id, and what brings lost work back.
+"""Celery tasks: doors that carry the key of a row, and what brings lost work back.
 
 Rows are the truth. A message may come twice (the lease refuses the second) or never (recover
-sends another). Services never enqueue; doors call `enqueue_job` by transaction.on_commit.
+sends another). Services never enqueue; doors do, by transaction.on_commit.
 """
 
 from __future__ import annotations
 
 import logging
 import os
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Mapping
 from datetime import timedelta
+from functools import partial
 from threading import Event, Thread
 from typing import Any
 
-from celery import current_app, shared_task
+from celery import shared_task
 from celery.exceptions import Reject
 from celery.signals import worker_ready, worker_shutdown, worker_shutting_down
 from django.conf import settings
 from django.db import connection
+from django.db.models import Q
 
-from augment import scene_tasks
 from augment.broker import open_broker, send
 from augment.services.clock import DATABASE_TIME, Moment
-from augment.services.endpoints import probing
-from augment.services.judging import marked_pictures, simulations
-from augment.services.running import (
-    intent_readings,
-    jobs,
-    leases,
-    runner,
-    stopping,
-    workers,
-)
+from augment.services.endpoints.probing import PROBES
+from augment.services.judging import marked_pictures
+from augment.services.judging.simulations import DRIVES
+from augment.services.running import stopping, workers
+from augment.services.running.intent_readings import READINGS
+from augment.services.running.runner import AUGMENTATIONS
+from augment.services.scenarios import prompts, scene_pictures
+from augment.services.scenarios.upload_moments import MOMENTS
+from augment.services.scenarios.uploads import UPLOADS
+from augment.services.work import KINDS, WorkKind, register
 
 logger = logging.getLogger(__name__)
 
@@ -45,92 +46,34 @@ BATCH = 100
 """So many messages are sent before the rows say so; a crash between sends them twice."""
 
 
-@shared_task(name="augment.run_augmentation", bind=True, acks_late=True, ignore_result=True)
-def run_augmentation(self: Any, augmentation_pk: int) -> None:
-    """Run one row, unless somebody else has it or it has an outcome."""
+register(AUGMENTATIONS, DRIVES, READINGS, PROBES, UPLOADS, MOMENTS)
+
+DRAWN: Mapping[str, Callable[[int], object]] = {
+    "marks": lambda pk: marked_pictures.draw_marked(augmentation_pk=pk),
+    "scene": scene_pictures.draw_scene,
+    "scenario": scene_pictures.draw_scenario,
+    "prompts": prompts.draw_prompts,
+}
+"""Pictures of the row with that key, as far as they are not there yet."""
+
+
+@shared_task(name="augment.work", bind=True, acks_late=True, ignore_result=True)
+def work(self: Any, kind: str, pk: int) -> None:
+    """Work on one row, unless somebody else has it or it has an outcome."""
     if stopping.is_stop_requested():
         raise Reject("this worker stops", requeue=True)
     worker = f"{self.request.hostname or 'here'} {os.getpid()}"
-    runner.work_on(augmentation_pk=augmentation_pk, worker=worker[:120])
+    KINDS[kind].perform(pk, worker=worker[:120])
 
 
-@shared_task(name="augment.draw_marks", ignore_result=True)
-def draw_marks(augmentation_pk: int) -> None:
-    """Draw the faults that the checks find in one row; a second time nothing is left to do."""
-    marked_pictures.draw_marked(augmentation_pk=augmentation_pk)
+@shared_task(name="augment.draw", acks_late=True, ignore_result=True)
+def draw(what: str, pk: int) -> None:
+    """Draw what is missing; a second time nothing is left to do."""
+    DRAWN[what](pk)
 
 
-@shared_task(name="augment.run_simulation", acks_late=True, ignore_result=True)
-def run_simulation(simulation_pk: int) -> None:
-    """Drive one row, unless somebody else has it or it has an outcome."""
-    if stopping.is_stop_requested():
-        raise Reject("this worker stops", requeue=True)
-    simulations.drive(simulation_pk=simulation_pk)
-
-
-@shared_task(name="augment.read_intent", acks_late=True, ignore_result=True)
-def read_intent(reading_pk: int) -> None:
-    """Have a model read an instruction, unless somebody has done so for this row."""
-    if stopping.is_stop_requested():
-        raise Reject("this worker stops", requeue=True)
-    intent_readings.read_planned(reading_pk)
-
-
-@shared_task(name="augment.make_probe", acks_late=True, ignore_result=True)
-def make_probe(probe_pk: int) -> None:
-    """Ask a model what it can do, unless somebody has done so for this row."""
-    if stopping.is_stop_requested():
-        raise Reject("this worker stops", requeue=True)
-    probing.make_probe(probe_pk)
-
-
-def enqueue_probe(probe_pk: int) -> None:
-    """Have a model probed; for transaction.on_commit.
-
-    Raises:
-        QueueFault: No broker, or it refuses; the probe fails after a while.
-    """
-    with open_broker() as broker:
-        make_probe.apply_async((probe_pk,), connection=broker, retry=False)
-
-
-def enqueue_reading(reading_pk: int) -> None:
-    """Have an instruction read; for transaction.on_commit.
-
-    Raises:
-        QueueFault: No broker, or it refuses; the reading fails after a while.
-    """
-    send(read_intent, reading_pk)
-
-
-def enqueue_simulations(ids: Iterable[int]) -> None:
-    """Have drives driven and remember when; for transaction.on_commit.
-
-    Raises:
-        QueueFault: No broker, or it refuses; the rows wait on and are sent by recover later.
-    """
-    waiting = list(ids)
-    if not waiting:
-        return
-    with open_broker() as broker:
-        for start in range(0, len(waiting), BATCH):
-            batch = waiting[start : start + BATCH]
-            for pk in batch:
-                run_simulation.apply_async((pk,), connection=broker, retry=False)
-            simulations.mark_sent(batch)
-
-
-def enqueue_marks(augmentation_pk: int) -> None:
-    """Have a row's faults drawn; for transaction.on_commit.
-
-    Raises:
-        QueueFault: No broker, or it refuses.
-    """
-    send(draw_marks, augmentation_pk)
-
-
-def enqueue(ids: Iterable[int]) -> int:
-    """Send one message per row and remember when.
+def enqueue(kind: WorkKind[Any], pks: Iterable[int]) -> int:
+    """Send one message per row and remember when; for transaction.on_commit.
 
     Returns:
         How many were sent.
@@ -138,25 +81,45 @@ def enqueue(ids: Iterable[int]) -> int:
     Raises:
         QueueFault: No broker, or it refuses; the rows wait on and are sent by recover later.
     """
-    waiting = list(ids)
+    waiting = list(pks)
     if not waiting:
         return 0
     with open_broker() as broker:
         for start in range(0, len(waiting), BATCH):
             batch = waiting[start : start + BATCH]
             for pk in batch:
-                run_augmentation.apply_async((pk,), connection=broker, retry=False)
-            leases.mark_sent(ids=batch)
+                work.apply_async(
+                    (kind.name, pk),
+                    queue=kind.queue,
+                    shadow=f"work.{kind.name}",  # in logs
+                    connection=broker,
+                    retry=False,
+                )
+            kind.mark_sent(batch)
     return len(waiting)
 
 
 def enqueue_job(job_pk: int) -> int:
-    """Send the messages of a job's rows that have none yet; for transaction.on_commit.
+    """Send the messages of a job's rows that have none yet; as `enqueue`."""
+    unsent = AUGMENTATIONS.find_unsent(older_than=RESEND_AFTER, only=Q(job=job_pk))
+    return enqueue(AUGMENTATIONS, unsent)
 
-    Raises:
-        QueueFault: No broker, or it refuses; the rows wait on and are sent by recover later.
-    """
-    return enqueue(leases.find_unsent(older_than=RESEND_AFTER, job_pk=job_pk))
+
+def sender(kind: WorkKind[Any]) -> Callable[[int], int]:
+    """Return what sends the message of one row; as `enqueue`."""
+    return lambda pk: enqueue(kind, [pk])
+
+
+enqueue_moment = sender(MOMENTS)
+enqueue_probe = sender(PROBES)
+enqueue_reading = sender(READINGS)
+enqueue_upload = sender(UPLOADS)
+enqueue_simulations = partial(enqueue, DRIVES)
+
+enqueue_marks = partial(send, draw, "marks")
+enqueue_prompts = partial(send, draw, "prompts")
+enqueue_scenario = partial(send, draw, "scenario")
+enqueue_scene = partial(send, draw, "scene")
 
 
 def recover(*, now: Moment = DATABASE_TIME, at_start: bool = False) -> None:
@@ -170,17 +133,13 @@ def recover(*, now: Moment = DATABASE_TIME, at_start: bool = False) -> None:
     Raises:
         QueueFault: No broker, or it refuses.
     """
-    stale_after = timedelta(seconds=settings.STALE_AFTER_S)
-    leases.take_back_stale(now=now, older_than=stale_after)
-    jobs.finish_if_over(now=now)
-    intent_readings.give_up_stale(now=now)
-    probing.give_up_stale(now=now)
-    lost_after = timedelta(0) if at_start else _lost_after(run_augmentation)
-    enqueue(leases.find_unsent(now=now, older_than=lost_after))
-    simulations.requeue_stale(now=now, older_than=stale_after)
-    lost_after = timedelta(0) if at_start else _lost_after(run_simulation)
-    enqueue_simulations(simulations.find_unsent(now=now, older_than=lost_after))
-    scene_tasks.resend_lost(now=now)
+    for kind in KINDS.values():
+        kind.take_back_lost(now=now)
+        kind.tidy(now)
+    queues = {kind.queue for kind in KINDS.values()}
+    ages = {queue: timedelta(0) if at_start else _lost_after(queue) for queue in queues}
+    for kind in KINDS.values():
+        enqueue(kind, kind.find_unsent(now=now, older_than=ages[kind.queue]))
 
 
 @worker_ready.connect
@@ -232,12 +191,11 @@ def _be_present(presence: workers.Presence) -> None:
     connection.close()
 
 
-def _lost_after(task: Any) -> timedelta:
-    """How old a message of a task is that must be lost, as its row still waits.
+def _lost_after(queue: str) -> timedelta:
+    """How old a message in a queue is that must be lost, as its row still waits.
 
-    Where nothing waits in its queue, nothing is on its way.
+    Where nothing waits in the queue, nothing is on its way.
     """
-    queue = current_app.amqp.router.route({}, task.name)["queue"].name
     if _messages_waiting({queue, QUEUE_BEFORE}):
         return RESEND_AFTER
     return timedelta(seconds=settings.STALE_AFTER_S)

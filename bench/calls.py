@@ -15,8 +15,9 @@ from augment.llm.patience import Patience
 from augment.models import EndpointModel
 from augment.services.endpoints.contestants import add_contestant
 from augment.services.endpoints.known_endpoints import ensure_endpoint
-from augment.services.running import jobs, leases, runner
+from augment.services.running import jobs, runner
 from augment.services.running.caps import Caps
+from augment.services.running.runner import AUGMENTATIONS
 from augment.services.running.transcripts import RowTranscript
 from augment.variants.recording_client import RecordingClient
 from augment.variants.transcript import ModelRole
@@ -49,7 +50,7 @@ def conversation(base_url: str, model: str) -> Call:
     caps = Caps(usd=Decimal(1000), calls=10**6, tokens=10**12)
     job = jobs.launch(name="Bench", contestants=["bench"], scenarios=["bench"], caps=caps)
     row = only_row(job)
-    held = leases.take_lease(augmentation_pk=row.pk, now=timezone.now(), worker="bench")
+    held = AUGMENTATIONS.take(row.pk, now=timezone.now(), worker="bench")
     assert held is not None
     talk = RecordingClient(
         client=runner.open_wire(endpoint, held).__enter__(),

@@ -18,7 +18,6 @@ from arena.api.views import ApiView, WarnedDocument, keep_and_send
 from arena.queries.scenarios import OWN
 from augment.models import Scenario
 from augment.models.scenes import DENSITIES, GOALS
-from augment.scene_tasks import enqueue_scenario
 from augment.services.scenarios.scenes import (
     INSTRUCTION_LENGTH,
     SLUG_LENGTH,
@@ -26,6 +25,7 @@ from augment.services.scenarios.scenes import (
     read_circumstances,
 )
 from augment.services.scenarios.types import LONGEST_LABEL, LONGEST_TYPE
+from augment.tasks import enqueue_scenario
 
 
 class ScenarioQuery(PageQuery):

@@ -71,6 +71,9 @@ class SnapshotDocument(serializers.ModelSerializer[Snapshot]):
     study = serializers.UUIDField(source="study.code")
     resample = serializers.CharField(source="resampling_unit")
     votes = serializers.IntegerField(source="votes_counted")
+    status = serializers.CharField(
+        source="reason", help_text="why there is no rating, if there is none"
+    )
     table = serializers.SerializerMethodField()
 
     class Meta:
@@ -139,7 +142,7 @@ class SnapshotsView(ApiView):
             return rate(study=study, **wanted)
         plan = partial(plan_snapshot, study=study, **wanted)
         planned, warnings = keep_and_send(plan, tasks.send_snapshot)
-        planned.status = " ".join([planned.status, *warnings]).strip()
+        planned.reason = " ".join([planned.reason, *warnings]).strip()
         return planned
 
 

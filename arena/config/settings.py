@@ -236,16 +236,7 @@ CELERY_TASK_DEFAULT_QUEUE = "models"
 # The last is what messages of earlier releases may still wait in.
 CELERY_TASK_QUEUES: dict[str, dict[str, str]] = {"models": {}, "drawing": {}, "celery": {}}
 CELERY_TASK_ROUTES = {
-    "augment.draw_marks": {"queue": "drawing"},
-    "augment.run_simulation": {"queue": "drawing"},
-    "augment.read_upload": {"queue": "drawing"},
-    "augment.read_moment": {"queue": "drawing"},
-    "augment.draw_scene": {"queue": "drawing"},
-    "augment.draw_scenario": {"queue": "drawing"},
-    "augment.draw_prompts": {"queue": "drawing"},
-    "arena.compute_snapshot": {"queue": "drawing"},
-    "arena.write_scenario_file": {"queue": "drawing"},
-    "arena.write_study_file": {"queue": "drawing"},
+    "augment.draw": {"queue": "drawing"},
     "arena.draw_checks": {"queue": "drawing"},
 }
 CELERY_BROKER_TRANSPORT_OPTIONS = {"visibility_timeout": 3600, "socket_connect_timeout": 5}

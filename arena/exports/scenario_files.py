@@ -9,20 +9,25 @@ from django.core.files.base import ContentFile
 from django.utils.text import slugify
 
 from arena.exports.scenarios import scenario_zip, zip_name
-from arena.exports.written_files import MadeFile, write_row
+from arena.exports.written_files import FileWork, MadeFile
 from arena.models import ScenarioFile
 from augment.services.judging.scenario_export import Exported, export_job
 
 
-def write_file(*, file_pk: int) -> None:
-    """Write the zip of a row, unless it is ready; what is wrong is kept on the row."""
-    write_row(ScenarioFile, file_pk, _made)
+class ScenarioFiles(FileWork[ScenarioFile]):
+    """Zips of jobs."""
+
+    model = ScenarioFile
+    related = ("job",)
+
+    @contextmanager
+    def made(self, row: ScenarioFile) -> Iterator[MadeFile]:
+        """All scenarios of the job in the format."""
+        exported = export_job(row.job, file_format=row.format)
+        yield made_of(exported, slugify(row.job.name) or str(row.job.code))
 
 
-@contextmanager
-def _made(row: ScenarioFile) -> Iterator[MadeFile]:
-    exported = export_job(row.job, file_format=row.format)
-    yield made_of(exported, slugify(row.job.name) or str(row.job.code))
+SCENARIO_FILES = ScenarioFiles()
 
 
 def made_of(exported: Exported, slug: str) -> MadeFile:

@@ -15,7 +15,7 @@ from arena.exports.contact_sheet import contact_sheet, sheet_pdf
 from arena.exports.scenario_files import made_of
 from arena.exports.study_folder.writing import write_study
 from arena.exports.tables import leaderboard_table
-from arena.exports.written_files import MadeFile, write_row
+from arena.exports.written_files import FileWork, MadeFile
 from arena.exports.zips import zip_folder
 from arena.models import Study, StudyFile
 from arena.queries.results import snapshot_to_export
@@ -27,20 +27,25 @@ from augment.services.judging.scenario_export import ExportOrigin, export_rows
 Kind = StudyFile.Kind
 
 
-def write_study_file(*, file_pk: int) -> None:
-    """Write the file of a row, unless it is ready; what is wrong is kept on the row."""
-    write_row(StudyFile, file_pk, _made)
+class StudyFiles(FileWork[StudyFile]):
+    """Files of studies."""
+
+    model = StudyFile
+    related = ("study",)
+
+    @contextmanager
+    def made(self, row: StudyFile) -> Iterator[MadeFile]:
+        """What the row's kind says, unless the study has changed since somebody asked."""
+        if reason := why_not(row.study, row.kind):
+            raise Conflict(reason)
+        slug = slugify(row.study.name) or "study"
+        with tempfile.TemporaryDirectory() as beside:
+            made = _MAKERS[Kind(row.kind)](row.study, slug, Path(beside))
+            with made.content:
+                yield made
 
 
-@contextmanager
-def _made(row: StudyFile) -> Iterator[MadeFile]:
-    if reason := why_not(row.study, row.kind):  # it changed since somebody asked
-        raise Conflict(reason)
-    slug = slugify(row.study.name) or "study"
-    with tempfile.TemporaryDirectory() as beside:
-        made = _MAKERS[Kind(row.kind)](row.study, slug, Path(beside))
-        with made.content:
-            yield made
+STUDY_FILES = StudyFiles()
 
 
 def _whole(study: Study, slug: str, beside: Path) -> MadeFile:

@@ -209,7 +209,7 @@ def leaderboard_table(snapshot: Snapshot) -> LeaderboardTable:
     standings = list(lines.order_by(F("rating").desc(nulls_last=True), "slug"))
     board = snapshot.results.board
     names = {standing.slug: standing.name for standing in standings}
-    reasons = (snapshot.status,) if board.reasons is None else board.reasons
+    reasons = (snapshot.reason,) if board.reasons is None else board.reasons
     last = len(standings)
     standings.sort(key=lambda standing: board.parts.get(standing.slug, last))
     if board.order:

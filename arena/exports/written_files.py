@@ -2,21 +2,16 @@
 
 from __future__ import annotations
 
-import logging
-from collections.abc import Callable
+from abc import abstractmethod
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from typing import TypeVar
 
 from django.core.files import File
 
-from arena.errors import ArenaError
 from arena.models.written_files import WrittenFile
-from arena.services.written_files import begin_file, keep_file, note_failure
-from augment.errors import AugmentError
-from augment.sentences import sentence_of
-
-logger = logging.getLogger(__name__)
+from arena.services.written_files import keep_file
+from augment.services.work import Lease, WorkKind
 
 Row = TypeVar("Row", bound=WrittenFile)
 
@@ -31,31 +26,21 @@ class MadeFile:
     marked: bool = False
 
 
-def write_row(
-    model: type[Row], file_pk: int, make: Callable[[Row], AbstractContextManager[MadeFile]]
-) -> None:
-    """Write the file of a row, unless it is ready; what is wrong is kept on the row.
+class FileWork(WorkKind[Row]):
+    """Files of one kind of row."""
 
-    Args:
-        model: Of the row.
-        file_pk: Its key.
-        make: The file of the row, while it is open.
-    """
-    row = begin_file(model, file_pk)
-    if row is None:
-        return
-    try:
-        with make(row) as made:
+    @abstractmethod
+    def made(self, row: Row) -> AbstractContextManager[MadeFile]:
+        """The file of a row, while it is open."""
+
+    def run(self, row: Row, held: Lease[Row]) -> None:
+        """Make it and keep it."""
+        with self.made(row) as made:
             keep_file(
                 row,
+                held,
                 name=made.name,
                 content=made.content,
                 warnings=made.warnings,
                 marked=made.marked,
             )
-    except (ArenaError, AugmentError) as fault:
-        note_failure(row, sentence_of(fault))
-    except Exception as fault:
-        logger.exception("File %s (%s) failed.", row.code, row)
-        note_failure(row, f"{type(fault).__name__}: {fault}")
-        raise

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import uuid
 from typing import TYPE_CHECKING, Any
 
 from django.conf import settings
@@ -13,7 +12,7 @@ from django.utils import timezone
 from arena.models.studies import Study
 from arena.results.codec import read_results, results_document
 from arena.results.tree import Results
-from augment.models import AppendOnly, Contestant
+from augment.models import AppendOnly, Contestant, Work
 
 if TYPE_CHECKING:
     _JSONField = models.JSONField[Results, Results]
@@ -41,7 +40,7 @@ class ResultsField(_JSONField):
         return self.get_prep_value(self.value_from_object(obj))
 
 
-class Snapshot(models.Model):
+class Snapshot(Work):
     """A frozen rating of a study: which votes, which method, which seed, and what came out.
 
     Pages and files read what stands here; nothing is computed again. Big ones are computed by a
@@ -54,7 +53,7 @@ class Snapshot(models.Model):
         READY = "ready", "Ready"
         FAILED = "failed", "Failed"
 
-    code = models.UUIDField(default=uuid.uuid4, unique=True, editable=False)
+    created_at = None  # type: ignore[assignment]  # it is called made_at
     study = models.ForeignKey(Study, on_delete=models.CASCADE, related_name="snapshots")
     state = models.CharField(max_length=10, choices=State.choices, default=State.READY)
     progress = models.PositiveSmallIntegerField(default=100, help_text="percent")
@@ -79,7 +78,6 @@ class Snapshot(models.Model):
     votes_counted = models.PositiveIntegerField()
     votes_left_out = models.JSONField(default=dict, help_text="how many votes, by reason")
     versions = models.JSONField(default=dict)
-    status = models.TextField(blank=True, help_text="why there is no rating, if there is none")
     degenerate_rounds = models.PositiveIntegerField(
         default=0, help_text="bootstrap rounds that determined no rating; intervals leave them out"
     )

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-import uuid
 from typing import Any, ClassVar, Self
 
 from django.conf import settings
 from django.db import models
 from django.db.models import Q
 
+from augment.models import Work
 
-class WrittenFile(models.Model):
+
+class WrittenFile(Work):
     """One file; of those of the same owner and kind the newest counts.
 
     Attributes:
@@ -28,9 +29,7 @@ class WrittenFile(models.Model):
         READY = "ready", "Ready"
         FAILED = "failed", "Failed"
 
-    code = models.UUIDField(default=uuid.uuid4, unique=True, editable=False)
     state = models.CharField(max_length=10, choices=State.choices, default=State.QUEUED)
-    fault = models.CharField(max_length=500, blank=True, help_text="why it could not be written")
     name = models.CharField(max_length=200, blank=True, help_text="what it is called for people")
     stored = models.CharField(max_length=120, blank=True, help_text="its name in the storage")
     size_bytes = models.PositiveBigIntegerField(default=0)
@@ -42,8 +41,6 @@ class WrittenFile(models.Model):
     asked_by = models.ForeignKey(
         settings.AUTH_USER_MODEL, null=True, blank=True, on_delete=models.SET_NULL
     )
-    created_at = models.DateTimeField(auto_now_add=True)
-    finished_at = models.DateTimeField(null=True, blank=True)
 
     class Meta:
         abstract = True
@@ -51,7 +48,7 @@ class WrittenFile(models.Model):
     @property
     def is_waiting(self) -> bool:
         """Whether a worker has it, or will have it."""
-        return self.state in (self.State.QUEUED, self.State.RUNNING)
+        return self.state in self.UNDER_WAY
 
     def alike(self) -> models.QuerySet[Self]:
         """The rows of the same owner and kind, this one among them."""

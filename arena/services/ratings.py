@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import TypedDict, Unpack
@@ -19,17 +18,16 @@ from arena.rating.bootstrap import Unit
 from arena.rating.leaderboard import Method
 from arena.rating.rules import Intervals, default_intervals, unit_for
 from arena.services.covariates import COVARIATES, WITHOUT_PICTURES
-from arena.services.snapshots import compute, keep, note_progress
+from arena.services.snapshots import compute, keep
 from arena.services.turns import in_turn
-from augment.errors import Conflict, UnknownName
-from augment.sentences import sentence, sentence_of
+from augment.errors import Conflict, LeaseLost, UnknownName
+from augment.sentences import sentence
+from augment.services.clock import Moment
 from augment.services.events import log_event
-
-logger = logging.getLogger(__name__)
+from augment.services.work import Lease, WorkKind
 
 DEFAULT_ROUNDS = 10_000
 MOST_ROUNDS = 100_000
-LONGEST_REASON = 500
 WHILE_WAITING = 20_000
 """Up to so many votes a person waits for the page; more are a worker's job."""
 
@@ -95,31 +93,38 @@ def plan_snapshot(*, study: Study, **choices: Unpack[Choices]) -> Snapshot:
     return snapshot
 
 
-def compute_snapshot(*, snapshot_pk: int) -> Snapshot | None:
-    """Compute a planned snapshot, saying how far it is; twice does no harm.
+class PlannedRatings(WorkKind[Snapshot]):
+    """Planned ratings of many votes."""
 
-    Whatever goes wrong is kept as the snapshot's status and logged: none stays under way for
-    ever, and asking for it again computes it anew.
+    model = Snapshot
+    related = ("study", "made_by")
 
-    Returns:
-        The snapshot, None if it is gone, ready already or could not be computed.
-    """
-    unready = Snapshot.objects.filter(pk=snapshot_pk).exclude(state=Snapshot.State.READY)
-    snapshot = unready.select_related("study").first()
-    if snapshot is None:
-        return None
-    try:
-        computed = compute(
-            snapshot, lambda percent: note_progress(snapshot_pk=snapshot_pk, percent=percent)
+    def run(self, row: Snapshot, held: Lease[Snapshot]) -> None:
+        """Compute it, saying how far it is, and keep it with its lines."""
+        try:
+            computed = compute(row, lambda percent: held.note(progress=percent))
+        except ArithmeticError as error:
+            raise Conflict(str(error)) from error
+        with transaction.atomic():
+            if not held.is_held(lock=True):
+                raise LeaseLost
+            keep(row, computed)
+
+    def ended(self, pk: int, end: str, reason: str, now: Moment) -> None:
+        """Say in the log why there is no rating."""
+        if end != Snapshot.State.FAILED:
+            return
+        row = self.rows.select_related(*self.related).get(pk=pk)
+        log_event(
+            actor=row.made_by,
+            verb="rating failed",
+            object_kind="study",
+            object_code=row.study.code,
+            after={"snapshot": str(row.code), "why": reason},
         )
-        return keep(snapshot, computed)
-    except (UnknownName, Conflict, ArithmeticError) as error:
-        _fail(snapshot, sentence_of(error))
-    except Exception as error:
-        # Unforeseen: the message is done with, so nobody else would ever say so.
-        logger.exception("rating %s of study %s", snapshot.code, snapshot.study.code)
-        _fail(snapshot, f"{type(error).__name__}: {error}")
-    return None
+
+
+RATINGS = PlannedRatings()
 
 
 def is_big(study: Study) -> bool:
@@ -130,21 +135,6 @@ def is_big(study: Study) -> bool:
 
 
 # --- Private -----------------------------------------------------------------------------------
-
-
-def _fail(snapshot: Snapshot, why: str) -> None:
-    """Say on the row and in the log why there is no rating; one that is ready stays so."""
-    with transaction.atomic():
-        unready = Snapshot.objects.filter(pk=snapshot.pk).exclude(state=Snapshot.State.READY)
-        if not unready.update(state=Snapshot.State.FAILED, status=why[:LONGEST_REASON]):
-            return
-        log_event(
-            actor=snapshot.made_by,
-            verb="rating failed",
-            object_kind="study",
-            object_code=snapshot.study.code,
-            after={"snapshot": str(snapshot.code), "why": why[:LONGEST_REASON]},
-        )
 
 
 def _planned(

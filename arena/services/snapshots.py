@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy
 import scipy
 from django.db import transaction
+from django.utils import timezone
 
 from arena.models import Snapshot, Standing
 from arena.queries.judged import AUTOMATIC, Entrant, Judged, is_imported
@@ -31,12 +32,6 @@ from augment.errors import Conflict
 from augment.sentences import sentence
 
 Report = Callable[[int], None]
-
-
-def note_progress(*, snapshot_pk: int, percent: int) -> None:
-    """Say how far a rating is; one that another worker has brought to its end stays ready."""
-    unready = Snapshot.objects.exclude(state=Snapshot.State.READY)
-    unready.filter(pk=snapshot_pk).update(state=Snapshot.State.RUNNING, progress=percent)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -76,27 +71,21 @@ def compute(snapshot: Snapshot, report: Report) -> Computed:
         "results": RESULTS_VERSION,
         "votes": VOTES_VERSION,
     }
-    snapshot.status = board.explanation
+    snapshot.reason = board.explanation
     snapshot.degenerate_rounds = board.degenerate_rounds
     snapshot.includes_simulated = _any_simulated(votes.counted, votes.entrants)
     return Computed(board=board, entrants=votes.entrants)
 
 
+@transaction.atomic
 def keep(snapshot: Snapshot, computed: Computed) -> Snapshot:
-    """Store what was computed.
-
-    Of two workers that were sent the same snapshot the first to end keeps its result, which is
-    that of the other as well.
-    """
-    with transaction.atomic():
-        held = Snapshot.objects.select_for_update().get(pk=snapshot.pk)
-        if held.state == Snapshot.State.READY:
-            return held
-        snapshot.standings.all().delete()
-        snapshot.state = Snapshot.State.READY
-        snapshot.progress = 100
-        snapshot.save()
-        _store_lines(snapshot, computed.board, computed.entrants)
+    """Store what was computed."""
+    snapshot.state = Snapshot.State.READY
+    snapshot.progress = 100
+    snapshot.claim = snapshot.heartbeat_at = None
+    snapshot.finished_at = timezone.now()
+    snapshot.save()
+    _store_lines(snapshot, computed.board, computed.entrants)
     return snapshot
 
 

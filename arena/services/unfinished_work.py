@@ -3,46 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
+from django.apps import apps
 from django.db import models
 
-from arena.models import Snapshot, Study
-from augment.models import (
-    Augmentation,
-    GenerationJob,
-    IntentReading,
-    Probe,
-    SceneUpload,
-    Simulation,
-    UploadMoment,
-)
+from arena.models import Study
+from augment.models import FAILED, Augmentation, GenerationJob, Work
 
 _WHY = "It was under way when the backup was taken. Start it again."
 
+_WORK = [model for model in apps.get_models() if issubclass(model, Work)]
+
 UNFINISHED: Mapping[type[models.Model], tuple[str, ...]] = {
-    Augmentation: Augmentation.UNDER_WAY,
+    **{model: model.UNDER_WAY for model in _WORK},
     GenerationJob: (GenerationJob.State.RUNNING,),
-    IntentReading: (IntentReading.State.RUNNING,),
-    Probe: Probe.UNDER_WAY,
-    SceneUpload: SceneUpload.WAITING,
-    Simulation: Simulation.UNDER_WAY,
-    Snapshot: (Snapshot.State.QUEUED, Snapshot.State.RUNNING),
     Study: (Study.State.OPEN,),
-    UploadMoment: UploadMoment.WAITING,
 }
 """The states of each table in which something is still done with a row."""
-
-_ENDED: Mapping[type[models.Model], dict[str, Any]] = {
-    # They wait in a job that is paused.
-    Augmentation: {"state": "queued", "claim": None, "heartbeat_at": None, "sent_at": None},
-    IntentReading: {"state": "failed", "reason": _WHY},
-    Probe: {"state": "failed", "reason": _WHY},
-    SceneUpload: {"state": "failed", "reason": _WHY, "heartbeat_at": None},
-    Simulation: {"state": "failed", "reason": _WHY, "claim": None, "heartbeat_at": None},
-    Snapshot: {"state": "failed", "status": _WHY},
-    UploadMoment: {"state": "failed", "reason": _WHY, "heartbeat_at": None},
-}
 
 
 def is_unfinished(row: models.Model) -> bool:
@@ -58,6 +35,9 @@ def end_restored_work() -> None:
     waiting = Augmentation.objects.filter(state__in=Augmentation.UNDER_WAY)
     jobs = GenerationJob.objects.exclude(state=GenerationJob.State.CANCELLED)
     jobs.filter(pk__in=waiting.values("job")).update(state=GenerationJob.State.PAUSED)
-    for model, columns in _ENDED.items():
-        rows = model._default_manager.filter(state__in=UNFINISHED[model])
-        rows.update(**columns)
+    for model in _WORK:
+        ended = {"state": FAILED, "reason": _WHY}
+        if model is Augmentation:  # it waits in a job that is paused
+            ended = {"state": Augmentation.State.QUEUED}
+        rows = model._default_manager.filter(state__in=model.UNDER_WAY)
+        rows.update(claim=None, heartbeat_at=None, sent_at=None, **ended)

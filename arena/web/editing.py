@@ -18,14 +18,13 @@ from arena.web.json_text import read_json
 from arena.web.sending import looks_again, send_later
 from augment.errors import AugmentError, Conflict
 from augment.models import Augmentation, Scenario
-from augment.scene_tasks import enqueue_scenario, enqueue_scene
 from augment.sentences import Sentence, sentence
 from augment.services.judging.edits import check_edit
 from augment.services.running import by_hand
 from augment.services.scenarios.editing import PLACED, editor_document
 from augment.services.scenarios.scene_pictures import SceneView, is_drawn, scene_picture
 from augment.services.wording import translate
-from augment.tasks import enqueue_job
+from augment.tasks import enqueue_job, enqueue_scenario, enqueue_scene
 
 LONGEST = 1_000_000
 """Of a modification, in bytes."""

@@ -18,11 +18,11 @@ from arena.web.pictures import picture_response
 from arena.web.sending import looks_again, send_later
 from augment.errors import AugmentError, UnknownName
 from augment.models import Contestant, Scenario
-from augment.scene_tasks import enqueue_prompts
 from augment.services.endpoints.contestant_prompts import asking_contestants, preview_contestant
 from augment.services.endpoints.respondents import respondents_of
 from augment.services.scenarios.prompts import Preview, list_choices, preview_prompt
 from augment.services.wording import translate
+from augment.tasks import enqueue_prompts
 
 
 @allow_only(*STAFF)

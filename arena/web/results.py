@@ -118,6 +118,7 @@ def compute_again(request: HttpRequest, code: uuid.UUID, rating: uuid.UUID) -> H
     """Send a rating that waits or failed to the workers once more; twice does no harm."""
     study = get_readable_study(request, code)
     snapshot = get_object_or_404(Snapshot, study=study, code=rating)
+    snapshot.wait_again(progress=0)
     try:
         tasks.send_snapshot(snapshot.pk)
     except AugmentError as error:

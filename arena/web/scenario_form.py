@@ -22,7 +22,6 @@ from arena.web.sending import looks_again, send_later
 from augment.errors import AugmentError, Conflict
 from augment.models import BaseScene, Scenario
 from augment.models.scenes import DENSITIES, GOALS
-from augment.scene_tasks import enqueue_scenario, enqueue_scene
 from augment.sentences import sentence
 from augment.services.scenarios.bulk import MOST_ROWS_AT_ONCE, BulkReport
 from augment.services.scenarios.bulk_files import MOST_FILES, add_from_files
@@ -45,6 +44,7 @@ from augment.services.scenarios.scenes import (
 )
 from augment.services.scenarios.types import LONGEST_LABEL, LONGEST_TYPE, type_choices
 from augment.services.wording import translate
+from augment.tasks import enqueue_scenario, enqueue_scene
 
 OWN = ""
 LONGEST_INTENT = 200_000

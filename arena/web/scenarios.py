@@ -30,7 +30,6 @@ from augment.models import (
     Simulation,
     UploadMoment,
 )
-from augment.scene_tasks import enqueue_scenario
 from augment.services.judging.displacement import of_augmentation
 from augment.services.judging.findings import Checked, check_augmentation
 from augment.services.running.transcript_export import transcript_of
@@ -46,7 +45,7 @@ from augment.services.scenarios.scene_pictures import (
 )
 from augment.services.scenarios.types import type_choices
 from augment.services.wording import translate
-from augment.tasks import enqueue_marks
+from augment.tasks import enqueue_marks, enqueue_scenario
 
 LOOKS = tuple(str(number) for number in range(6))
 """So often the page of an augmentation looks again for a picture that is being drawn."""

@@ -12,11 +12,11 @@ from arena.queries.scenes import counts_of, scene_rows, upload_rows
 from arena.web.access import STAFF, allow_only
 from arena.web.sending import looks_again, send_later
 from augment.models import BaseScene
-from augment.scene_tasks import enqueue_scene
 from augment.services.scenarios import uploads
 from augment.services.scenarios.scene_notes import notes_of
 from augment.services.scenarios.scene_pictures import SceneView, is_drawn, scene_picture
 from augment.services.wording import translate
+from augment.tasks import enqueue_scene
 
 
 @allow_only(*STAFF)

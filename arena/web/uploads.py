@@ -18,9 +18,9 @@ from arena.web.access import STAFF, allow_only
 from arena.web.sending import looks_again, send_later
 from augment.errors import AugmentError
 from augment.models import SceneUpload, UploadMoment
-from augment.scene_tasks import enqueue_moment, enqueue_upload
 from augment.services.scenarios import upload_moments, uploads
 from augment.services.wording import translate
+from augment.tasks import enqueue_moment, enqueue_upload
 
 
 @allow_only(*STAFF)
@@ -55,7 +55,7 @@ def upload_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """What a file is, what it holds, and the moment that somebody looks at."""
     row = get_object_or_404(SceneUpload.objects.select_related("uploaded_by"), code=code)
     moment = _moment_asked(row, request.GET.get("moment", ""))
-    waits = row.state in row.WAITING or (moment is not None and moment.state in moment.WAITING)
+    waits = row.state in row.UNDER_WAY or (moment is not None and moment.state in moment.UNDER_WAY)
     maps = track_maps(row)
     context = {
         "upload": row,

@@ -61,6 +61,9 @@ class WorkerStopping(Unwanted):
 class LeaseLost(Unwanted):
     """Somebody else works on this row now. Drop the result; the new holder brings its own."""
 
+    def __init__(self) -> None:
+        super().__init__("the row was taken back")
+
 
 class JobCancelled(Unwanted):
     """The job was cancelled while one of its rows was worked on. The row is cancelled with it."""

@@ -1,7 +1,7 @@
 """Rows of augment: scenes, scenarios, contestants, jobs and what they produced.
 
-Rows are the truth; a Celery message carries one id. Every row that a person can see in a URL has
-a random `code`; primary keys stay inside.
+Rows are the truth; a Celery message carries the key of a row. Every row that a person can see in
+a URL has a random `code`; primary keys stay inside.
 """
 
 from augment.models.append_only import AppendOnly
@@ -16,9 +16,11 @@ from augment.models.scenes import SLUG_HELP, BaseScene, Scenario
 from augment.models.simulations import Simulation
 from augment.models.triggers import after_migrations, before_migrations
 from augment.models.uploads import SceneUpload, UploadMoment
+from augment.models.work import FAILED, Work
 from augment.models.workers import Worker
 
 __all__ = [
+    "FAILED",
     "SLUG_HELP",
     "AppendOnly",
     "Attempt",
@@ -38,6 +40,7 @@ __all__ = [
     "Simulation",
     "TranscriptNote",
     "UploadMoment",
+    "Work",
     "Worker",
     "after_migrations",
     "before_migrations",

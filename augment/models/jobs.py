@@ -12,6 +12,7 @@ from django.db.models import F, Q
 from augment.llm.costs import usd_of
 from augment.models.contestants import Contestant
 from augment.models.scenes import Scenario
+from augment.models.work import Work
 
 
 class GenerationJob(models.Model):
@@ -95,7 +96,7 @@ class GenerationJob(models.Model):
         return usd_of(self.spent_nano_usd)
 
 
-class Augmentation(models.Model):
+class Augmentation(Work):
     """One row of a job: scenario x contestant x sample -> modification, image, or why not.
 
     `queued` and `running` are under way; all other states are outcomes. `unreadable` and `refused`
@@ -115,9 +116,6 @@ class Augmentation(models.Model):
     SHOWABLE = (State.DONE, State.UNREADABLE, State.REFUSED)
     """States with a picture that an expert can judge."""
 
-    UNDER_WAY = (State.QUEUED, State.RUNNING)
-
-    code = models.UUIDField(default=uuid.uuid4, unique=True, editable=False)
     job = models.ForeignKey(GenerationJob, on_delete=models.CASCADE, related_name="augmentations")
     scenario = models.ForeignKey(Scenario, on_delete=models.PROTECT, related_name="augmentations")
     contestant = models.ForeignKey(
@@ -132,7 +130,6 @@ class Augmentation(models.Model):
     state = models.CharField(max_length=20, choices=State.choices, default=State.QUEUED)
     modification = models.JSONField(null=True, blank=True)
     notes = models.TextField(blank=True, help_text="what the contestant said about its own work")
-    reason = models.TextField(blank=True, help_text="why there is no modification")
     injected = models.JSONField(
         null=True,
         blank=True,
@@ -159,14 +156,9 @@ class Augmentation(models.Model):
     earlier_images = models.JSONField(
         default=list, blank=True, help_text="names of its pictures in windows of before"
     )
-    claim = models.UUIDField(null=True, blank=True, help_text="who works on it right now")
-    heartbeat_at = models.DateTimeField(null=True, blank=True)
-    sent_at = models.DateTimeField(null=True, blank=True, help_text="last put on the queue")
     asked_anew_at = models.DateTimeField(
         null=True, blank=True, help_text="answers from before are not used again for it"
     )
-    created_at = models.DateTimeField(auto_now_add=True)
-    finished_at = models.DateTimeField(null=True, blank=True)
 
     class Meta:
         ordering = ("scenario__slug", "contestant__slug", "sample")

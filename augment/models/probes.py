@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import uuid
-
 from django.conf import settings
 from django.db import models
 
 from augment.models.endpoints import EndpointModel
+from augment.models.work import Work
 
 
-class Probe(models.Model):
+class Probe(Work):
     """One round of questions to a model; its last report is also kept with the model."""
 
     class State(models.TextChoices):
@@ -19,13 +18,9 @@ class Probe(models.Model):
         DONE = "done", "Done"
         FAILED = "failed", "Failed"
 
-    UNDER_WAY = (State.QUEUED, State.RUNNING)
-
-    code = models.UUIDField(default=uuid.uuid4, unique=True, editable=False)
     model = models.ForeignKey(EndpointModel, on_delete=models.CASCADE, related_name="probes")
     state = models.CharField(max_length=20, choices=State.choices, default=State.QUEUED)
     findings = models.JSONField(default=list, help_text="one a question, as far as they are asked")
-    reason = models.TextField(blank=True, help_text="why it could not be made")
     asked_by = models.ForeignKey(
         settings.AUTH_USER_MODEL,
         null=True,
@@ -33,9 +28,6 @@ class Probe(models.Model):
         on_delete=models.PROTECT,
         related_name="+",
     )
-    created_at = models.DateTimeField(auto_now_add=True)
-    started_at = models.DateTimeField(null=True, blank=True)
-    finished_at = models.DateTimeField(null=True, blank=True)
 
     class Meta:
         ordering = ("-created_at", "-pk")

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import uuid
-
 from django.conf import settings
 from django.db import models
 from django.db.models import Q
 
 from augment.models.endpoints import Endpoint
 from augment.models.scenes import Scenario
+from augment.models.work import Work
 
 
-class IntentReading(models.Model):
+class IntentReading(Work):
     """One reading of a scenario's instruction. It counts for nothing until it is accepted.
 
     Its calls are rows as those of a job are; the caps are of this reading alone.
@@ -24,7 +23,9 @@ class IntentReading(models.Model):
         ACCEPTED = "accepted", "Accepted"
         FAILED = "failed", "Failed"
 
-    code = models.UUIDField(default=uuid.uuid4, unique=True, editable=False)
+    UNDER_WAY = (State.RUNNING,)
+    GIVEN_BACK = {"state": State.RUNNING}
+
     scenario = models.ForeignKey(Scenario, on_delete=models.CASCADE, related_name="readings")
     endpoint = models.ForeignKey(Endpoint, on_delete=models.PROTECT, related_name="readings")
     model = models.CharField(max_length=120)
@@ -32,14 +33,12 @@ class IntentReading(models.Model):
     document = models.JSONField(
         null=True, blank=True, help_text="what was read, in augment.scene.intent_codec's format"
     )
-    reason = models.TextField(blank=True, help_text="why nothing was read")
     cap_nano_usd = models.PositiveBigIntegerField(null=True, blank=True)
     cap_calls = models.PositiveIntegerField(null=True, blank=True)
     cap_tokens = models.PositiveBigIntegerField(null=True, blank=True)
     asked_by = models.ForeignKey(
         settings.AUTH_USER_MODEL, null=True, blank=True, on_delete=models.PROTECT, related_name="+"
     )
-    created_at = models.DateTimeField(auto_now_add=True)
 
     class Meta:
         ordering = ("-pk",)

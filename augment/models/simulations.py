@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-import uuid
-
 from django.db import models
 from django.db.models import Q
 
 from augment.models.jobs import Augmentation
 from augment.models.scenes import Scenario
+from augment.models.work import Work
 
 
-class Simulation(models.Model):
+class Simulation(Work):
     """One closed-loop drive: scenario x what was changed x planner and its options.
 
     The scene as it was and with its reference is driven once for all jobs; each augmentation has
-    drives of its own. A row is claimed by whoever sets it running.
+    drives of its own.
     """
 
     class Subject(models.TextChoices):
@@ -29,9 +28,6 @@ class Simulation(models.Model):
         DONE = "done", "Done"
         FAILED = "failed", "Failed"
 
-    UNDER_WAY = (State.QUEUED, State.RUNNING)
-
-    code = models.UUIDField(default=uuid.uuid4, unique=True, editable=False)
     scenario = models.ForeignKey(Scenario, on_delete=models.PROTECT, related_name="simulations")
     augmentation = models.ForeignKey(
         Augmentation, null=True, blank=True, on_delete=models.CASCADE, related_name="simulations"
@@ -43,18 +39,12 @@ class Simulation(models.Model):
         default=False, help_text="recorded vehicles answer to the ego instead of being replayed"
     )
     state = models.CharField(max_length=20, choices=State.choices, default=State.QUEUED)
-    reason = models.TextField(blank=True, help_text="why there is no score")
     nuplan_score = models.FloatField(null=True, blank=True, help_text="0 to 1")
     interplan_score = models.FloatField(null=True, blank=True, help_text="0 to 1")
     document = models.JSONField(
         null=True, blank=True, help_text="parts of the scores, collisions, criticality"
     )
     trace = models.BinaryField(null=True, blank=True, help_text="the drive to look at: zlib, JSON")
-    claim = models.UUIDField(null=True, blank=True, help_text="who drives it right now")
-    heartbeat_at = models.DateTimeField(null=True, blank=True)
-    sent_at = models.DateTimeField(null=True, blank=True, help_text="last put on the queue")
-    created_at = models.DateTimeField(auto_now_add=True)
-    finished_at = models.DateTimeField(null=True, blank=True)
 
     class Meta:
         ordering = ("scenario__slug", "pk")

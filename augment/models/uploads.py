@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import uuid
-
 from django.conf import settings
 from django.db import models
 from django.db.models import Q
 
 from augment.models.scenes import BaseScene
+from augment.models.work import Work
 
 
-class SceneUpload(models.Model):
+class SceneUpload(Work):
     """A file as it came; a worker finds out what it is and what it holds."""
 
     class State(models.TextChoices):
@@ -20,9 +19,6 @@ class SceneUpload(models.Model):
         READ = "read", "Read"
         FAILED = "failed", "Failed"
 
-    WAITING = (State.QUEUED, State.RUNNING)
-
-    code = models.UUIDField(default=uuid.uuid4, unique=True, editable=False)
     name = models.CharField(max_length=120, help_text="of the file, in plain letters")
     stored = models.CharField(
         max_length=120, blank=True, help_text="name in the media storage; empty once removed"
@@ -32,12 +28,10 @@ class SceneUpload(models.Model):
     asked_format = models.CharField(max_length=40, blank=True, help_text="empty to recognise it")
     format = models.CharField(max_length=40, blank=True, help_text="as it was read")
     state = models.CharField(max_length=10, choices=State.choices, default=State.QUEUED)
-    reason = models.TextField(blank=True, help_text="why it can't be read")
     tracks = models.JSONField(
         default=list, blank=True, help_text="parts with moments, as services.scenarios.uploads"
     )
     is_cut = models.BooleanField(default=False, help_text="it holds more than is offered")
-    attempts = models.PositiveSmallIntegerField(default=0, help_text="workers that began it")
     uploaded_by = models.ForeignKey(
         settings.AUTH_USER_MODEL,
         null=True,
@@ -45,12 +39,6 @@ class SceneUpload(models.Model):
         on_delete=models.SET_NULL,
         related_name="+",
     )
-    sent_at = models.DateTimeField(null=True, blank=True, help_text="last put on the queue")
-    heartbeat_at = models.DateTimeField(
-        null=True, blank=True, help_text="when the worker that reads it was last heard"
-    )
-    created_at = models.DateTimeField(auto_now_add=True)
-    finished_at = models.DateTimeField(null=True, blank=True)
 
     class Meta:
         ordering = ("-pk",)
@@ -65,7 +53,7 @@ class SceneUpload(models.Model):
         return self.name
 
 
-class UploadMoment(models.Model):
+class UploadMoment(Work):
     """A moment of an upload: drawn for whoever chooses, and kept as a scene if they want it."""
 
     class State(models.TextChoices):
@@ -75,21 +63,20 @@ class UploadMoment(models.Model):
         KEPT = "kept", "Kept"
         FAILED = "failed", "Failed"
 
-    WAITING = (State.QUEUED, State.KEEPING)
+    UNDER_WAY = (State.QUEUED, State.KEEPING)
+    STARTED = {}
+    GIVEN_BACK = {}
 
-    code = models.UUIDField(default=uuid.uuid4, unique=True, editable=False)
     upload = models.ForeignKey(SceneUpload, on_delete=models.CASCADE, related_name="moments")
     item = models.CharField(max_length=200, blank=True)
     frame = models.PositiveIntegerField(default=0)
     state = models.CharField(max_length=10, choices=State.choices, default=State.QUEUED)
-    reason = models.TextField(blank=True, help_text="why it can't be read or kept")
     picture = models.CharField(max_length=120, blank=True, help_text="name in the media storage")
     report = models.JSONField(null=True, blank=True, help_text="counts and notes, once read")
     slug = models.CharField(max_length=80, blank=True, help_text="the name it is to be kept under")
     scene = models.ForeignKey(
         BaseScene, null=True, blank=True, on_delete=models.SET_NULL, related_name="+"
     )
-    attempts = models.PositiveSmallIntegerField(default=0, help_text="workers that began it")
     asked_by = models.ForeignKey(
         settings.AUTH_USER_MODEL,
         null=True,
@@ -97,11 +84,6 @@ class UploadMoment(models.Model):
         on_delete=models.SET_NULL,
         related_name="+",
     )
-    sent_at = models.DateTimeField(null=True, blank=True, help_text="last put on the queue")
-    heartbeat_at = models.DateTimeField(
-        null=True, blank=True, help_text="when the worker that reads it was last heard"
-    )
-    created_at = models.DateTimeField(auto_now_add=True)
 
     class Meta:
         ordering = ("pk",)

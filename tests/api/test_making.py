@@ -83,7 +83,7 @@ def test_a_recording_becomes_a_scene(analyst: Client, sent: list[tuple[str, int]
     made = answer.json()
     assert (made["state"], made["tracks"], made["warnings"]) == ("queued", [], [])
     assert sent == [("enqueue_upload", SceneUpload.objects.get().pk)]
-    uploads.read_upload(sent.pop()[1])
+    uploads.UPLOADS.perform(sent.pop()[1])
     path = f"uploads/{made['code']}"
     found = analyst.get(API + path).json()
     assert (found["state"], len(found["tracks"])) == ("read", 1)
@@ -92,13 +92,13 @@ def test_a_recording_becomes_a_scene(analyst: Client, sent: list[tuple[str, int]
     moment = send(analyst, path + "/moments", **asked).json()
     assert send(analyst, path + "/moments", **asked).json()["code"] == moment["code"]
     assert len(sent) == 1, "the same moment twice is drawn once"
-    upload_moments.work_on_moment(sent.pop()[1])
+    upload_moments.MOMENTS.perform(sent.pop()[1])
     here = f"moments/{moment['code']}"
     drawn = analyst.get(API + here).json()
     assert (drawn["state"], drawn["report"]["agents"], drawn["scene"]) == ("drawn", 1, None)
     error_of(send(analyst, here + "/keep", slug="No Slug"), 400, "refused")
     assert send(analyst, here + "/keep", slug="main-street").status_code == 202
-    upload_moments.work_on_moment(sent.pop()[1])
+    upload_moments.MOMENTS.perform(sent.pop()[1])
     assert analyst.get(API + here).json()["scene"] == "main-street"
     assert BaseScene.objects.get().slug == "main-street"
 

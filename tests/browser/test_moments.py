@@ -26,7 +26,7 @@ def shown(what: str) -> str:
 def test_an_older_moment_never_takes_the_place_of_a_newer_one(browser: Browser) -> None:
     street = json.dumps(scene_to_document(scene())).encode()
     row = uploads.keep_upload(name="street.json", content=SimpleUploadedFile("street", street))
-    uploads.read_upload(row.pk)
+    uploads.UPLOADS.perform(row.pk)
     row = SceneUpload.objects.get()
     row.tracks[0]["stops"] *= 3
     row.save()

@@ -17,9 +17,9 @@ from django.core.management.base import CommandError
 from django.test import Client
 from django.urls import reverse
 
+from arena.exports.scenario_files import SCENARIO_FILES
 from arena.models import ScenarioFile
 from arena.services.written_files import keep_file
-from arena.tasks import write_scenario_file
 from augment.formats.writers import WRITERS
 from augment.models import Augmentation, BaseScene, Contestant, GenerationJob
 from augment.scene.catalogue import ScenarioType
@@ -127,7 +127,7 @@ def ask_for(client: Client, job: GenerationJob, form: str) -> None:
     """Press the button, and be the worker that it asks."""
     client.post(reverse("scenarios-write", args=[job.code, form]))
     for row in ScenarioFile.objects.filter(state=ScenarioFile.State.QUEUED):
-        write_scenario_file(row.pk)
+        SCENARIO_FILES.perform(row.pk)
 
 
 def page_of(client: Client, job: GenerationJob) -> str:
@@ -145,7 +145,7 @@ def test_a_worker_writes_the_zip_that_the_jobs_page_offers(
     assert admin_client.get(reverse("scenarios-export", args=[row.code])).status_code == 404
     admin_client.post(reverse("scenarios-write", args=[job.code, "commonroad"]))
     assert ScenarioFile.objects.count() == 1, "one that waits is asked for once more"
-    write_scenario_file(row.pk)
+    SCENARIO_FILES.perform(row.pk)
     page = page_of(admin_client, job)
     assert "Not for commercial use." in page
     assert "must not be used commercially: junction" in page
@@ -165,7 +165,7 @@ def test_a_message_that_comes_twice_changes_nothing_and_a_new_zip_replaces_the_o
 ) -> None:
     ask_for(admin_client, job, "json")
     first = ScenarioFile.objects.get()
-    write_scenario_file(first.pk)
+    SCENARIO_FILES.perform(first.pk)
     assert ScenarioFile.objects.get().finished_at == first.finished_at
     with django_capture_on_commit_callbacks(execute=True):
         ask_for(admin_client, job, "json")
@@ -179,9 +179,12 @@ def test_a_zip_that_a_newer_one_overtook_leaves_no_file(
     job: GenerationJob, django_capture_on_commit_callbacks: Any
 ) -> None:
     slow, fast = (ScenarioFile.objects.create(job=job, format="json") for _ in range(2))
+    held = {row: SCENARIO_FILES.take(row.pk) for row in (slow, fast)}
     with django_capture_on_commit_callbacks(execute=True):
         for row in (fast, slow):
-            keep_file(row, name="a.zip", content=ContentFile(b"zip"))
+            lease = held[row]
+            assert lease is not None
+            keep_file(row, lease, name="a.zip", content=ContentFile(b"zip"))
     (left,) = ScenarioFile.objects.all()
     assert (left, left.is_waiting) == (fast, False)
     assert default_storage.exists(left.stored)

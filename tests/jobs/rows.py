@@ -13,7 +13,9 @@ from augment.scene.intent_words import (
     Shape,
 )
 from augment.scene.modification import Modification
-from augment.services.running import jobs, leases
+from augment.services.running import jobs
+from augment.services.running.runner import AUGMENTATIONS, Held
+from augment.services.work import Settlement
 from tests.intents import cones
 from tests.scenes import cone
 from tests.scenes import scene as street
@@ -66,19 +68,16 @@ def only_row(job: GenerationJob) -> Augmentation:
     return job.augmentations.get()
 
 
-def leased(row: Augmentation, now: datetime = NOON) -> leases.Lease:
-    held = leases.take_lease(augmentation_pk=row.pk, now=now, worker="here")
+def leased(row: Augmentation, now: datetime = NOON) -> Held:
+    held = AUGMENTATIONS.take(row.pk, now=now, worker="here")
     assert held is not None
     return held
 
 
-def failed(reason: str = "the wire broke") -> leases.Settlement:
-    return leases.Settlement(state=Augmentation.State.FAILED, reason=reason)
+def failed(reason: str = "the wire broke") -> Settlement:
+    return Settlement(state=Augmentation.State.FAILED, reason=reason)
 
 
-def done() -> leases.Settlement:
-    return leases.Settlement(
-        state=Augmentation.State.DONE,
-        modification=modification_to_document(TWO_CONES),
-        image="bev/x.png",
-    )
+def done() -> Settlement:
+    made = {"modification": modification_to_document(TWO_CONES), "image": "bev/x.png"}
+    return Settlement(state=Augmentation.State.DONE, columns=made)

@@ -15,7 +15,6 @@ from augment.models import (
     GenerationJob,
     ModelCall,
 )
-from augment.services.running import leases
 from tests.jobs.rows import add_model, done, launch, leased, only_row
 
 pytestmark = pytest.mark.django_db
@@ -32,14 +31,14 @@ def past_job() -> None:
     row = only_row(launch())
     held = leased(row, now=timezone.now())
     ModelCall.objects.create(
-        attempt_id=held.attempt_pk,
+        attempt=row.attempts.get(),
         number=1,
         role="modifier",
         request={},
         started_at=timezone.now(),
         settled_at=timezone.now(),
     )
-    leases.settle(held=held, settlement=done(), now=timezone.now())
+    held.settle(done(), now=timezone.now())
     endpoint = Endpoint.objects.create(label="local", base_url="http://127.0.0.1:9/v1")
     EndpointModel.objects.create(endpoint=endpoint, model="llama3.1")
     add_model("llama", endpoint=endpoint, model="llama3.1")

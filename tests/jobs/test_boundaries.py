@@ -13,8 +13,9 @@ from augment.llm.patience import Patience
 from augment.llm.wire_faults import fault_of_status
 from augment.models import Augmentation, CallLease, Endpoint, GenerationJob
 from augment.services.endpoints import call_limits
-from augment.services.running import budget, leases
+from augment.services.running import budget
 from augment.services.running.budget import Room
+from augment.services.running.runner import AUGMENTATIONS
 from tests.jobs.models import llama_job
 from tests.jobs.rows import NOON, STALE, launch, leased, only_row
 
@@ -125,7 +126,7 @@ def test_when_a_claim_without_a_beat_is_taken_back(
     row = only_row(launch())
     leased(row, now=NOON)
     now = NOON + after_the_beat
-    assert bool(leases.take_back_stale(now=now, older_than=STALE)) is is_taken_back
+    assert bool(AUGMENTATIONS.take_back_lost(now=now)) is is_taken_back
 
 
 @pytest.mark.parametrize(
@@ -133,15 +134,15 @@ def test_when_a_claim_without_a_beat_is_taken_back(
 )
 def test_when_a_message_counts_as_lost(age: timedelta, is_unsent: bool) -> None:
     row = only_row(launch())
-    leases.mark_sent(ids=[row.pk], now=NOON)
-    assert bool(leases.find_unsent(now=NOON + age, older_than=STALE)) is is_unsent
+    AUGMENTATIONS.mark_sent([row.pk], now=NOON)
+    assert bool(AUGMENTATIONS.find_unsent(now=NOON + age, older_than=STALE)) is is_unsent
 
 
 @pytest.mark.parametrize(
     ("lost", "state"),
     [
-        (leases.LOST_LIMIT - 1, Augmentation.State.QUEUED),
-        (leases.LOST_LIMIT, Augmentation.State.FAILED),
+        (AUGMENTATIONS.lost_limit - 1, Augmentation.State.QUEUED),
+        (AUGMENTATIONS.lost_limit, Augmentation.State.FAILED),
     ],
 )
 def test_how_many_workers_may_die_at_one_row(lost: int, state: str) -> None:
@@ -149,7 +150,7 @@ def test_how_many_workers_may_die_at_one_row(lost: int, state: str) -> None:
     for number in range(lost):
         now = NOON + number * 3 * STALE
         leased(row, now=now)
-        leases.take_back_stale(now=now + 2 * STALE, older_than=STALE)
+        AUGMENTATIONS.take_back_lost(now=now + 2 * STALE)
     row.refresh_from_db()
     assert row.state == state
 

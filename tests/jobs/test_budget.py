@@ -11,11 +11,12 @@ from django.utils import timezone
 from augment.errors import EndpointBusy, LeaseLost, ModelFault
 from augment.llm.costs import Price, WorstCase
 from augment.llm.messages import Reply
-from augment.models import Augmentation, Event, GenerationJob, ModelCall
-from augment.services.running import budget, caps, leases, pausing, runner
+from augment.models import Attempt, Augmentation, Event, GenerationJob, ModelCall
+from augment.services.running import budget, caps, pausing, runner
 from augment.services.running.budget import Room
 from augment.services.running.caps import Caps
 from augment.services.running.costs import costs_of
+from augment.services.running.runner import AUGMENTATIONS, Held
 from tests.jobs.models import Model, after_a_second_look, llama_job, reply
 from tests.jobs.rows import NOON, STALE, only_row
 from tests.variants.answers import GOOD
@@ -88,10 +89,10 @@ def test_a_claim_that_is_lost_before_a_call_is_sent_costs_nothing(queue_finds_ou
 
     def lose_the_claim() -> None:
         """Another worker takes the row while the call waits for its place."""
-        leases.take_back_stale(now=timezone.now() + 2 * STALE, older_than=STALE)
+        AUGMENTATIONS.take_back_lost(now=timezone.now() + 2 * STALE)
         assert_nothing_is_counted(job)
         if queue_finds_out:
-            raise LeaseLost("attempt 1 has lost its row")
+            raise LeaseLost
 
     model = Model(waiting=lose_the_claim)
     assert ran(job, model).state == ROW.QUEUED
@@ -99,7 +100,7 @@ def test_a_claim_that_is_lost_before_a_call_is_sent_costs_nothing(queue_finds_ou
     assert_nothing_is_counted(job)
     call = ModelCall.objects.get(attempt__augmentation=row)
     assert (call.sent_at, call.cost_usd, call.is_cost_estimated) == (None, Decimal(0), False)
-    assert call.fault == "not sent: attempt 1 has lost its row"
+    assert call.fault == "not sent: the row was taken back"
 
 
 def assert_nothing_is_counted(job: GenerationJob) -> None:
@@ -120,8 +121,8 @@ def test_a_job_that_has_no_room_for_a_call_asks_nothing_and_is_stopped() -> None
     assert "5 tokens" in attempt.reason
     event = Event.objects.get(verb="stop")
     assert event.after == {"state": "stopped_at_cap", "cap": "5 tokens"}
-    assert leases.take_lease(augmentation_pk=row.pk, now=NOON) is None
-    assert leases.find_unsent(now=NOON, older_than=STALE) == []
+    assert AUGMENTATIONS.take(row.pk, now=NOON) is None
+    assert AUGMENTATIONS.find_unsent(now=NOON, older_than=STALE) == []
 
 
 def test_a_stopped_attempt_is_replayed_from_its_answers_also_in_a_fresh_job() -> None:
@@ -146,10 +147,10 @@ def test_a_call_of_a_dead_worker_counts_with_its_worst_case() -> None:
     job = llama_job(price="1")
     row = only_row(job)
     long_ago = timezone.now() - timedelta(minutes=1)
-    held = leases.take_lease(augmentation_pk=row.pk, now=long_ago)
+    held = AUGMENTATIONS.take(row.pk, now=long_ago)
     assert held is not None
     in_flight(job, held)
-    leases.take_back_stale(now=timezone.now(), older_than=STALE)
+    AUGMENTATIONS.take_back_lost(now=timezone.now())
     job.refresh_from_db()
     assert (job.reserved_calls, job.spent_calls) == (0, 1)
     assert (job.spent_tokens, job.spent_nano_usd) == (1000, 1_000_000)
@@ -160,12 +161,10 @@ def test_a_call_of_a_dead_worker_counts_with_its_worst_case() -> None:
 
 def test_a_call_that_waited_when_its_worker_died_counts_nothing() -> None:
     job = llama_job(price="1")
-    held = leases.take_lease(
-        augmentation_pk=only_row(job).pk, now=timezone.now() - timedelta(minutes=1)
-    )
+    held = AUGMENTATIONS.take(only_row(job).pk, now=timezone.now() - timedelta(minutes=1))
     assert held is not None
     in_flight(job, held, is_sent=False)
-    leases.take_back_stale(now=timezone.now(), older_than=STALE)
+    AUGMENTATIONS.take_back_lost(now=timezone.now())
     assert_nothing_is_counted(job)
     call = ModelCall.objects.get()
     assert (call.cost_usd, call.spent_tokens, call.is_cost_estimated) == (Decimal(0), 0, False)
@@ -176,10 +175,10 @@ def test_a_call_that_waited_when_its_worker_died_counts_nothing() -> None:
 def test_a_worker_that_was_only_slow_corrects_what_its_call_used() -> None:
     job = llama_job(price="1")
     row = only_row(job)
-    held = leases.take_lease(augmentation_pk=row.pk, now=timezone.now() - timedelta(minutes=1))
+    held = AUGMENTATIONS.take(row.pk, now=timezone.now() - timedelta(minutes=1))
     assert held is not None
     call = in_flight(job, held)
-    leases.take_back_stale(now=timezone.now(), older_than=STALE)
+    AUGMENTATIONS.take_back_lost(now=timezone.now())
     used = budget.used_by_reply(reply(), worst=WORST, price=ONE_USD)
     budget.settle(call_pk=call.pk, used=used, now=timezone.now())
     job.refresh_from_db()
@@ -187,10 +186,10 @@ def test_a_worker_that_was_only_slow_corrects_what_its_call_used() -> None:
     assert (job.reserved_calls, job.reserved_tokens) == (0, 0)
 
 
-def in_flight(job: GenerationJob, held: leases.Lease, *, is_sent: bool = True) -> ModelCall:
+def in_flight(job: GenerationJob, held: Held, *, is_sent: bool = True) -> ModelCall:
     assert budget.reserve(job_pk=job.pk, worst=WORST, price=ONE_USD) == Room.TAKEN
     return ModelCall.objects.create(
-        attempt_id=held.attempt_pk,
+        attempt=Attempt.objects.get(augmentation=held.pk),
         number=1,
         role="modifier",
         request={},

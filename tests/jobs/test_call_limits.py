@@ -105,7 +105,7 @@ def test_who_waits_asks_whether_the_call_is_still_wanted() -> None:
     def wanted() -> None:
         asked.append(1)
         if len(asked) == 3:
-            raise LeaseLost("the row is somebody else's")
+            raise LeaseLost
 
     with place_at(endpoint, Queue(longest_s=0.0)):
         waiting = Queue(longest_s=300.0, still_wanted=wanted, sleep=lambda _: None)

@@ -14,7 +14,8 @@ from augment.llm.messages import Message, Request, Speaker
 from augment.llm.openai_wire import OpenAIWire
 from augment.models import Augmentation, CallLease, Endpoint, GenerationJob, ModelCall
 from augment.services.endpoints.call_limits import Queue, place_at
-from augment.services.running import budget, jobs, leases, runner
+from augment.services.running import budget, jobs, runner
+from augment.services.running.runner import AUGMENTATIONS
 from tests.jobs.models import llama_job, reply
 from tests.jobs.rows import only_row
 from tests.jobs.running import Wire, ran
@@ -72,7 +73,7 @@ def test_a_call_in_flight_ends_with_its_job_and_gives_its_place_back(
 def test_a_call_that_waits_when_its_job_is_cancelled_is_not_sent() -> None:
     job = llama_job()
     row = only_row(job)
-    held = leases.take_lease(augmentation_pk=row.pk)
+    held = AUGMENTATIONS.take(row.pk)
     assert held is not None
     endpoint = Endpoint.objects.get()
     Endpoint.objects.update(max_concurrency=1)

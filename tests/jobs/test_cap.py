@@ -9,10 +9,12 @@ from decimal import Decimal
 
 import pytest
 from django.db import connection
+from django.db.models import Q
 
 from augment.models import Augmentation, GenerationJob, ModelCall
-from augment.services.running import caps, leases, pausing, runner
+from augment.services.running import caps, pausing, runner
 from augment.services.running.caps import Caps
+from augment.services.running.runner import AUGMENTATIONS
 from augment.services.running.summary import count_rows
 from tests.jobs.models import (
     COMPLETION_TOKENS,
@@ -67,7 +69,7 @@ class Watcher:
 def run_all(job: GenerationJob, model: Model, watcher: Watcher) -> None:
     """Eight workers, each with what a queue hands it, until nothing is left to hand out."""
     waiting: queue.SimpleQueue[int] = queue.SimpleQueue()
-    for pk in leases.find_unsent(now=NOON, older_than=STALE, job_pk=job.pk):
+    for pk in AUGMENTATIONS.find_unsent(now=NOON, older_than=STALE, only=Q(job=job.pk)):
         waiting.put(pk)
 
     def work(number: int) -> None:
@@ -99,7 +101,7 @@ def test_eight_workers_stay_below_the_cap_and_resume_pays_for_nothing_twice(kind
     assert len(model.requests) == pytest.approx(CALLS / 2, abs=CALLS / 4)
     assert count_rows(job).failed == 0
     assert count_rows(job).queued > 0
-    assert leases.find_unsent(now=NOON, older_than=STALE) == []
+    assert AUGMENTATIONS.find_unsent(now=NOON, older_than=STALE) == []
     asked_before = len(model.requests)
     check_the_books(job)
 

@@ -12,10 +12,10 @@ from augment import tasks
 from augment.models import Augmentation, CallLease
 from augment.services.clock import DATABASE_TIME, database_now
 from augment.services.endpoints import call_limits
-from augment.services.running import leases
+from augment.services.running.runner import AUGMENTATIONS, Held
 from tests.brokers import MEMORY, broker_at
 from tests.jobs.models import add_llama
-from tests.jobs.rows import STALE, launch, only_row
+from tests.jobs.rows import launch, only_row
 
 pytestmark = pytest.mark.django_db
 State = Augmentation.State
@@ -39,9 +39,9 @@ def _broker() -> Iterator[None]:
         yield
 
 
-def taken() -> tuple[Augmentation, leases.Lease]:
+def taken() -> tuple[Augmentation, Held]:
     row = only_row(launch())
-    held = leases.take_lease(augmentation_pk=row.pk, worker="here")
+    held = AUGMENTATIONS.take(row.pk, worker="here")
     assert held is not None
     return row, held
 
@@ -59,10 +59,10 @@ def test_40_s_of_skew_take_no_living_claim_back(skew: Skew, seconds: float, work
     if worker == "holder":
         skew(seconds)
     row, held = taken()
-    assert leases.renew(held=held)
+    assert held.renew()
     skew(seconds if worker == "other" else 0.0)
     tasks.recover()
-    assert leases.is_held(held=held)
+    assert held.is_held()
     row.refresh_from_db()
     assert row.state == State.RUNNING
 
@@ -75,7 +75,7 @@ def test_a_dead_claim_is_taken_back_whatever_the_clock_of_who_looks(
     row, _ = taken()
     silent_for(row, silent_s)
     skew(seconds)
-    leases.take_back_stale(older_than=STALE)
+    AUGMENTATIONS.take_back_lost()
     row.refresh_from_db()
     assert row.state == state
 

@@ -12,10 +12,12 @@ from django.utils import timezone
 
 from augment.errors import Conflict
 from augment.models import GenerationJob
-from augment.services.running import jobs, leases, pausing, retrying, runner
+from augment.services.running import jobs, pausing, retrying, runner
 from augment.services.running.caps import Caps
 from augment.services.running.causes import failure_groups
+from augment.services.running.runner import AUGMENTATIONS
 from augment.services.running.summary import count_rows
+from augment.services.work import change_all
 from tests.jobs.models import Model, llama_job
 from tests.jobs.rows import failed, launch, leased
 from tests.processes import wait_until
@@ -88,7 +90,7 @@ def test_two_who_retry_at_once_wait_for_each_other_and_never_in_a_circle() -> No
 
     with ThreadPoolExecutor(1) as pool:
         with transaction.atomic():
-            leases.change_all(job.augmentations.all(), state="queued", reason="")
+            change_all(job.augmentations.all(), state="queued", reason="")
             second = pool.submit(retry)
             if connection.vendor == "postgresql":
                 wait_until(somebody_waits, what="the second one waits")
@@ -111,7 +113,7 @@ def test_of_many_rows_the_first_is_held_first() -> None:
     job = launch(scenarios=3)
     pks = list(job.augmentations.values_list("pk", flat=True))
     with CaptureQueriesContext(connection) as captured:
-        leases.mark_sent(ids=pks, now=timezone.now())
+        AUGMENTATIONS.mark_sent(pks, now=timezone.now())
     looked, changed = (query["sql"] for query in captured if ROWS in query["sql"])
     assert " ORDER BY 1 ASC" in looked
     assert ("FOR NO KEY UPDATE" in looked) is (connection.vendor == "postgresql")
@@ -123,7 +125,7 @@ def test_who_ends_a_row_of_many_locks_nobody_else_out() -> None:
     job = launch(scenarios=2)
     first, last = job.augmentations.order_by("pk")
     for row, statements in ((first, 1), (last, 6)):
-        leases.settle(held=leased(row, timezone.now()), settlement=failed())
+        leased(row, timezone.now()).settle(failed())
         with CaptureQueriesContext(connection) as captured:
             finished = jobs.finish_if_over(job_pk=job.pk)
         assert len(captured) == statements, [query["sql"] for query in captured]

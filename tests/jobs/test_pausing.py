@@ -7,8 +7,9 @@ from datetime import timedelta
 import pytest
 
 from augment.models import Augmentation, Event, GenerationJob
-from augment.services.running import jobs, leases, pausing, runner
+from augment.services.running import jobs, pausing, runner
 from augment.services.running.caps import Caps
+from augment.services.running.runner import AUGMENTATIONS
 from augment.services.running.summary import count_rows
 from tests.jobs.models import Model, after_a_second_look, llama_job
 from tests.jobs.rows import done, launch, leased, only_row
@@ -27,16 +28,16 @@ def test_a_paused_job_starts_nothing_and_what_is_in_flight_keeps_its_result() ->
     assert Event.objects.get(verb="pause").after == {
         "state": "paused", "waiting": 2, "in_flight": 1,
     }  # fmt: skip
-    assert leases.take_lease(augmentation_pk=second.pk) is None
-    assert leases.find_unsent(older_than=timedelta(0)) == []
+    assert AUGMENTATIONS.take(second.pk) is None
+    assert AUGMENTATIONS.find_unsent(older_than=timedelta(0)) == []
     assert count_rows(job).is_moving, "one is in flight"
-    assert leases.settle(held=held, settlement=done())
+    assert held.settle(done())
     assert not count_rows(job).is_moving
     jobs.finish_if_over()
     job = pausing.resume(job)
     assert job.state == Job.RUNNING
     assert Event.objects.get(verb="resume").before == {"state": "paused"}
-    assert leases.find_unsent(older_than=timedelta(0)) == [second.pk, third.pk]
+    assert AUGMENTATIONS.find_unsent(older_than=timedelta(0)) == [second.pk, third.pk]
     first.refresh_from_db()
     assert first.state == State.DONE
 

@@ -24,9 +24,9 @@ from augment.scene.intent_words import (
 from augment.services.endpoints.known_endpoints import ensure_endpoint
 from augment.services.running.caps import Caps
 from augment.services.running.intent_readings import (
+    READINGS,
     plan_reading,
     read_intent,
-    read_planned,
 )
 from augment.services.scenarios.intents import accept_reading
 from tests.intents import cones, intents
@@ -122,10 +122,9 @@ def test_a_worker_asks_for_a_planned_reading_once() -> None:
     add_scenario("street", intent=None, intent_origin="")
     ensure_endpoint(label="here", base_url="http://127.0.0.1:1/v1")
     row = plan_reading(scenario="street", endpoint="here", model="m")
-    read_planned(row.pk)  # nobody listens there
+    READINGS.perform(row.pk)  # nobody listens there
     row.refresh_from_db()
     assert row.state == State.FAILED
     calls = row.calls.count()
-    IntentReading.objects.update(state=State.RUNNING, reason="")
-    read_planned(row.pk)
-    assert row.calls.count() == calls, "a message that comes twice asks nobody again"
+    assert not READINGS.perform(row.pk), "a message that comes twice asks nobody again"
+    assert row.calls.count() == calls

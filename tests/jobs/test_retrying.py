@@ -9,7 +9,7 @@ from django.test.utils import CaptureQueriesContext
 from arena.services.retrying import retry_cause as retry_unless_shown
 from augment.errors import Conflict
 from augment.models import Augmentation, GenerationJob, ModelCall
-from augment.services.running import jobs, leases, retrying, runner
+from augment.services.running import jobs, retrying, runner
 from augment.services.running.causes import cause_of, failure_groups
 from tests.jobs.models import Model, llama_job, reply
 from tests.jobs.rows import failed, launch, leased, only_row
@@ -44,7 +44,7 @@ def test_reasons_have_one_cause_where_only_numbers_and_ids_differ(
 
 def broken(job: GenerationJob, *reasons: str) -> None:
     for row, reason in zip(job.augmentations.order_by("pk"), reasons, strict=True):
-        leases.settle(held=leased(row), settlement=failed(reason))
+        leased(row).settle(failed(reason))
     jobs.finish_if_over()
 
 

@@ -12,11 +12,10 @@ from augment.llm.client import Sending, watch_nothing
 from augment.llm.messages import Reply, Request
 from augment.models import Augmentation, Endpoint, GenerationJob, ModelCall
 from augment.scene.codec import modification_from_document, modification_to_document
-from augment.services.running import jobs, leases, runner
-from augment.services.running.holding import OutcomeOnCrash
+from augment.services.running import jobs, runner
+from augment.services.running.runner import AUGMENTATIONS
 from tests.jobs.rows import (
     INSTRUCTION,
-    STALE,
     TWO_CONES,
     add_model,
     add_scenario,
@@ -125,11 +124,11 @@ def test_an_answer_that_nobody_can_read_is_an_outcome_with_the_unchanged_picture
 def test_an_attempt_that_was_lost_before_drawing_is_only_drawn_again() -> None:
     row = model_job()
     now = timezone.now()
-    held = leases.take_lease(augmentation_pk=row.pk, now=now - timedelta(minutes=1))
+    held = AUGMENTATIONS.take(row.pk, now=now - timedelta(minutes=1))
     assert held is not None
     document = modification_to_document(TWO_CONES)
-    leases.keep_modification(held=held, modification=document, notes="said before")
-    leases.take_back_stale(now=now, older_than=STALE)
+    held.note(modification=document, notes="said before")
+    AUGMENTATIONS.take_back_lost(now=now)
     wire = Wire()
     row = ran(row, wire)
     assert (row.state, row.notes, row.modification) == (State.DONE, "said before", document)
@@ -138,9 +137,9 @@ def test_an_attempt_that_was_lost_before_drawing_is_only_drawn_again() -> None:
 
 def test_a_worker_whose_claim_was_taken_asks_no_model_and_writes_nothing() -> None:
     row = model_job()
-    held = leases.take_lease(augmentation_pk=row.pk, now=timezone.now() - timedelta(minutes=1))
+    held = AUGMENTATIONS.take(row.pk, now=timezone.now() - timedelta(minutes=1))
     assert held is not None
-    leases.take_back_stale(now=timezone.now(), older_than=STALE)
+    AUGMENTATIONS.take_back_lost(now=timezone.now())
     with pytest.raises(LeaseLost):
         runner.run(row, held=held, connect=Wire(GOOD))
     assert not ModelCall.objects.exists()
@@ -148,24 +147,30 @@ def test_a_worker_whose_claim_was_taken_asks_no_model_and_writes_nothing() -> No
 
 def test_a_claim_that_is_lost_while_drawing_ends_quietly() -> None:
     row = only_row(launch())
-    held = leases.take_lease(augmentation_pk=row.pk, now=timezone.now() - timedelta(minutes=1))
+    held = AUGMENTATIONS.take(row.pk, now=timezone.now() - timedelta(minutes=1))
     assert held is not None
-    leases.take_back_stale(now=timezone.now(), older_than=STALE)
-    with OutcomeOnCrash(held):
-        runner.run(row, held=held)
+    AUGMENTATIONS.take_back_lost(now=timezone.now())
+    AUGMENTATIONS.work(held)
     row.refresh_from_db()
     assert (row.state, row.modification) == (State.QUEUED, None)
 
 
-def test_what_nobody_foresaw_fails_the_row_and_is_raised() -> None:
+def test_what_nobody_foresaw_fails_the_row_and_is_logged(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
     row = model_job()
     wire = Wire()
     wire.client = Stumbling(ZeroDivisionError("division by zero"))
-    with pytest.raises(ZeroDivisionError):
-        runner.work_on(augmentation_pk=row.pk, connect=wire)
+    runner.work_on(augmentation_pk=row.pk, connect=wire)
+    assert "Traceback" in caplog.text
     row.refresh_from_db()
     assert row.state == State.FAILED
     assert row.reason == "unexpected: ZeroDivisionError: division by zero"
     assert row.attempts.get().outcome == "failed"
     row.job.refresh_from_db()
     assert row.job.state == GenerationJob.State.FINISHED
+
+
+def test_notes_that_a_database_can_not_take_are_kept_all_the_same() -> None:
+    row = ran(model_job(), Wire(GOOD.replace("One road", "One\0 road")))
+    assert (row.state, row.notes[:9]) == (State.DONE, "One\u2400 road")

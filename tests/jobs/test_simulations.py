@@ -17,8 +17,8 @@ from pytest_django import Settings
 from augment.errors import UnknownName
 from augment.models import GenerationJob, Simulation
 from augment.services.judging import driving_scores, simulations
-from augment.services.judging.simulations import Options
-from augment.services.running import leases
+from augment.services.judging.simulations import DRIVES, Options
+from augment.services.work import Settlement
 from augment.simulation.planning import Plan, Situation
 from augment.simulation.road import Road
 from augment.simulation.states import EgoBody
@@ -59,13 +59,13 @@ class Broken(Straight):
 def finished_job(scenarios: int = 1) -> GenerationJob:
     job = rows.launch(scenarios=scenarios)
     for row in job.augmentations.all():
-        leases.settle(held=rows.leased(row), settlement=rows.done(), now=rows.NOON)
+        rows.leased(row).settle(rows.done(), now=rows.NOON)
     return job
 
 
 def driven(job: GenerationJob, options: Options = STRAIGHT) -> GenerationJob:
     for pk in simulations.plan_job(job=job, options=options):
-        assert simulations.drive(simulation_pk=pk)
+        assert DRIVES.perform(pk)
     return job
 
 
@@ -98,17 +98,19 @@ def test_a_drive_keeps_both_scores_their_parts_and_the_way() -> None:
 
 def test_a_row_is_driven_once() -> None:
     (first, *_) = simulations.plan_job(job=finished_job(), options=STRAIGHT)
-    assert simulations.drive(simulation_pk=first)
-    assert not simulations.drive(simulation_pk=first)
+    assert DRIVES.perform(first)
+    assert not DRIVES.perform(first)
 
 
 def test_a_planner_that_breaks_is_a_failed_row_that_can_be_driven_again() -> None:
     job = finished_job()
     driven(job, BROKEN)
     assert {row.state for row in Simulation.objects.all()} == {State.FAILED}
-    assert {row.reason for row in Simulation.objects.all()} == {"RuntimeError: no idea"}
+    assert {row.reason for row in Simulation.objects.all()} == {
+        "unexpected: RuntimeError: no idea"
+    }
     table = driving_scores.scores_of_job(job, options=BROKEN, score="nuplan")
-    assert table.failures == (("RuntimeError: no idea", 3),)
+    assert table.failures == (("unexpected: RuntimeError: no idea", 3),)
     assert len(simulations.plan_job(job=job, options=BROKEN)) == 3
 
 
@@ -117,15 +119,12 @@ def test_contestants_are_ranked_by_how_much_they_lower_the_score() -> None:
     for row in job.augmentations.select_related("contestant"):
         settlement = rows.done()
         if row.contestant.slug == "shy":
-            settlement = leases.Settlement(
-                state=settlement.state,
-                modification={
-                    "format": "scenario-arena/modification", "version": 1,
-                    "add": [], "move": [], "remove": [],
-                },
-                image="bev/y.png",
-            )  # fmt: skip
-        leases.settle(held=rows.leased(row), settlement=settlement, now=rows.NOON)
+            nothing: dict[str, Any] = {"add": [], "move": [], "remove": []}
+            nothing |= {"format": "scenario-arena/modification", "version": 1}
+            settlement = Settlement(
+                state=settlement.state, columns={"modification": nothing, "image": "bev/y.png"}
+            )
+        rows.leased(row).settle(settlement, now=rows.NOON)
     table = driving_scores.scores_of_job(driven(job), options=STRAIGHT, score="nuplan")
     shown = [
         (line.name, *(round(value, 1) for value in (line.mean, line.before, line.lowered)))
@@ -157,8 +156,8 @@ def test_a_planner_that_is_not_allowed_is_never_imported(
     evil = "evil_planner.Planner"
     (first, *_) = simulations.plan_job(job=finished_job(), options=STRAIGHT)
     Simulation.objects.update(planner=evil)
-    assert simulations.find_unsent(older_than=timedelta(0)) == [], "left to who named it"
-    assert simulations.drive(simulation_pk=first), "a message came all the same"
+    assert DRIVES.find_unsent(older_than=timedelta(0)) == [], "left to who named it"
+    assert DRIVES.perform(first), "a message came all the same"
     row = Simulation.objects.get(pk=first)
     assert (row.state, evil in row.reason) == (State.FAILED, True)
     with pytest.raises(UnknownName, match="evil_planner"):

@@ -64,7 +64,7 @@ def test_no_row_is_claimed_any_more_and_its_message_goes_back() -> None:
     row = only_row(launch())
     stopping.request_stop()
     with pytest.raises(Reject) as caught:
-        tasks.run_augmentation.run(row.pk)
+        tasks.work.run("augmentation", row.pk)
     assert caught.value.requeue
     row.refresh_from_db()
     assert row.state == State.QUEUED

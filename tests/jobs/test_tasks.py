@@ -13,7 +13,7 @@ from augment.broker import check_broker
 from augment.errors import QueueUnreachable
 from augment.management.commands.generate import Command
 from augment.models import Augmentation, GenerationJob
-from augment.services.running import leases
+from augment.services.running.runner import AUGMENTATIONS
 from augment.services.running.summary import count_rows
 from tests.brokers import Broker
 from tests.jobs.rows import add_scenario, done, launch, leased, only_row
@@ -48,7 +48,7 @@ def test_the_address_of_a_broker_is_named_without_its_password(no_broker: None) 
 
 def test_the_task_runs_its_row() -> None:
     row = only_row(launch())
-    tasks.run_augmentation.run(row.pk)
+    tasks.work.run("augmentation", row.pk)
     row.refresh_from_db()
     assert row.state == State.DONE
     assert row.attempts.get().worker.startswith("here ")
@@ -63,7 +63,7 @@ def test_recover_sends_what_was_never_sent(broker: Broker) -> None:
 def test_recover_takes_back_and_sends_what_a_dead_worker_held(broker: Broker) -> None:
     row = only_row(launch())
     now = timezone.now()
-    leases.mark_sent(ids=[row.pk], now=now - timedelta(minutes=1))
+    AUGMENTATIONS.mark_sent([row.pk], now=now - timedelta(minutes=1))
     leased(row, now=now - timedelta(minutes=1))
     tasks.recover(now=now)
     row.refresh_from_db()
@@ -100,9 +100,7 @@ def test_a_worker_that_starts_sends_all_that_waits(broker: Broker) -> None:
 
 def test_recover_finishes_a_job_whose_last_worker_died_before_it_could(broker: Broker) -> None:
     job = launch()
-    leases.settle(
-        held=leased(only_row(job)), settlement=done(), now=timezone.now() + timedelta(minutes=1)
-    )
+    leased(only_row(job)).settle(done(), now=timezone.now() + timedelta(minutes=1))
     tasks.recover(now=timezone.now())
     job.refresh_from_db()
     assert job.state == GenerationJob.State.FINISHED
@@ -136,7 +134,7 @@ def test_generate_without_a_broker_says_what_to_do_and_launches_nothing(no_broke
 
 def test_waiting_ends_with_the_job() -> None:
     job = launch()
-    leases.settle(held=leased(only_row(job)), settlement=done(), now=timezone.now())
+    leased(only_row(job)).settle(done(), now=timezone.now())
     said = StringIO()
     Command(stdout=said).wait(job, timeout_s=1.0)
     assert said.getvalue() == "1 of 1, 0 running\nOver.\n"

@@ -16,7 +16,7 @@ VOTES = (
     *("a,b,model_a", "b,a,model_b", "b,a,model_a"),
     *("a,c,model_a", "c,a,model_a", "b,c,model_a", "c,b,tie"),
 )
-STATE = "SELECT state, progress, votes_counted, status FROM arena_snapshot"
+STATE = "SELECT state, progress, votes_counted, reason FROM arena_snapshot"
 STANDINGS = "SELECT slug FROM arena_standing ORDER BY rating DESC"
 
 RATE = """
@@ -68,4 +68,4 @@ def test_a_rating_of_many_votes_is_computed_by_a_worker_and_shown_when_it_is_don
         assert "is being computed:" not in said
         assert place.rows(STATE) == [("ready", 100, WHILE_WAITING + 1, "")]
         assert [slug for (slug,) in place.rows(STANDINGS)] == ["a", "b", "c"]
-        assert "arena.compute_snapshot" in worker.said()
+        assert "work.snapshot" in worker.said()

@@ -25,6 +25,7 @@ from arena.config.logs import (
     current_request_id,
     working_for,
 )
+from augment.services.work import KINDS
 
 
 def ask(given: str) -> tuple[str, str]:
@@ -82,10 +83,10 @@ def test_a_line_of_json_says_when_how_bad_who_and_for_which_request(stream: io.S
 def test_a_message_carries_the_id_to_the_task() -> None:
     headers: dict[str, object] = {}
     with working_for("request-1"):
-        before_task_publish.send(sender="augment.run_augmentation", headers=headers)
+        before_task_publish.send(sender="augment.work", headers=headers)
     assert headers[REQUEST_ID] == "request-1"
 
-    task = current_app.tasks["augment.draw_marks"]
+    task = current_app.tasks["augment.draw"]
     task.push_request(**headers)
     try:
         task_prerun.send(sender=task, task_id="1", task=task)
@@ -97,12 +98,7 @@ def test_a_message_carries_the_id_to_the_task() -> None:
 
 
 def test_drawing_and_driving_wait_in_a_queue_of_their_own() -> None:
-    def queue_of(task: str) -> str:
-        return str(current_app.amqp.router.route({}, task)["queue"].name)
-
-    assert queue_of("augment.run_augmentation") == "models"
-    for task in (
-        *("augment.draw_marks", "augment.run_simulation"),
-        *("arena.compute_snapshot", "arena.write_scenario_file", "arena.write_study_file"),
-    ):
-        assert queue_of(task) == "drawing"
+    for task in ("augment.draw", "arena.draw_checks"):
+        assert current_app.amqp.router.route({}, task)["queue"].name == "drawing"
+    asking = {"augmentation", "intentreading", "probe"}
+    assert {name for name, kind in KINDS.items() if kind.queue == "models"} == asking

@@ -23,8 +23,8 @@ from arena.management.backups.taking import take_backup
 from arena.models import Vote
 from arena.services.stored_rows import as_line, columns_of
 from augment.models import GenerationJob, Scenario, Simulation
-from augment.services.judging import simulations
-from augment.services.running import leases
+from augment.services.judging.simulations import DRIVES
+from augment.services.running.runner import AUGMENTATIONS
 from tests.services.backup_rows import (
     NOW,
     PICTURE,
@@ -231,9 +231,9 @@ def test_no_work_of_a_backup_goes_on_by_itself(
     empty()
     default_storage.delete("evil/x.png")
     call_command("restore", str(tmp_path / "b.zip"))
-    assert leases.find_unsent(older_than=timedelta(0)) == []
-    assert simulations.find_unsent(older_than=timedelta(0)) == []
-    assert not simulations.drive(simulation_pk=drive.pk)
+    assert AUGMENTATIONS.find_unsent(older_than=timedelta(0)) == []
+    assert DRIVES.find_unsent(older_than=timedelta(0)) == []
+    assert not DRIVES.perform(drive.pk)
     assert "Start it again" in Simulation.objects.get().reason
     held = GenerationJob.objects.filter(augmentations__state="queued")
     assert set(held.values_list("pk", "state")) == {(first.pk, "paused"), (second.pk, "paused")}

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import zipfile
-from datetime import timedelta
 from io import BytesIO
 from pathlib import Path
 
@@ -11,7 +10,6 @@ import pytest
 from django.contrib.auth.models import User
 from django.core.files.base import ContentFile
 from django.core.files.storage import default_storage
-from django.utils import timezone
 
 from augment.errors import Conflict, InvalidDocument
 from augment.models import BaseScene, Event, SceneUpload, UploadMoment
@@ -35,7 +33,7 @@ def sent(content: bytes, name: str = "log.zip", source: str = "") -> SceneUpload
 
 
 def read(row: SceneUpload) -> SceneUpload:
-    uploads.read_upload(row.pk)
+    uploads.UPLOADS.perform(row.pk)
     row.refresh_from_db()
     return row
 
@@ -43,7 +41,7 @@ def read(row: SceneUpload) -> SceneUpload:
 def looked_at(row: SceneUpload, frame: int) -> UploadMoment:
     moment, is_new = upload_moments.ask_for_moment(row, item="", frame=frame)
     assert is_new
-    upload_moments.work_on_moment(moment.pk)
+    upload_moments.MOMENTS.perform(moment.pk)
     moment.refresh_from_db()
     return moment
 
@@ -63,7 +61,7 @@ def test_a_zip_of_a_log_becomes_a_scene_at_the_moment_that_was_chosen(log: bytes
     assert (moment.report["lanes"], moment.report["recorded_s"]) == (5, 0.2)
     assert any("limit" in str(note) for note in upload_moments.sentences_of(moment))
     upload_moments.ask_to_keep(moment, slug="by-the-page", actor=ada)
-    upload_moments.work_on_moment(moment.pk)
+    upload_moments.MOMENTS.perform(moment.pk)
     moment.refresh_from_db()
     kept = BaseScene.objects.get(slug="by-the-page")
     assert (moment.state, moment.scene) == ("kept", kept)
@@ -78,12 +76,9 @@ def test_a_zip_of_a_log_becomes_a_scene_at_the_moment_that_was_chosen(log: bytes
 def test_a_second_message_finds_nothing_to_do(log: bytes) -> None:
     row = read(sent(log))
     moment = looked_at(row, 0)
-    upload_moments.work_on_moment(moment.pk)
-    uploads.read_upload(row.pk)
-    row.refresh_from_db()
-    assert row.attempts == 1
-    again, is_new = upload_moments.ask_for_moment(row, item="", frame=0)
-    assert (again, is_new, again.attempts) == (moment, False, 1)
+    assert not upload_moments.MOMENTS.perform(moment.pk)
+    assert not uploads.UPLOADS.perform(row.pk)
+    assert upload_moments.ask_for_moment(row, item="", frame=0) == (moment, False)
 
 
 @pytest.mark.parametrize(
@@ -104,34 +99,14 @@ def test_what_can_not_be_read_is_told_and_leaves_no_scene(
     assert not BaseScene.objects.exists()
 
 
-def test_a_file_that_ends_worker_after_worker_is_given_up(log: bytes) -> None:
+def test_a_file_that_failed_is_read_again(log: bytes) -> None:
     row = sent(log)
-    SceneUpload.objects.filter(pk=row.pk).update(state="running", attempts=2)
-    row = read(row)
-    assert row.state == "failed"
-    assert "2 workers ended" in row.reason
+    SceneUpload.objects.filter(pk=row.pk).update(state="failed", reason="2 workers were lost")
     uploads.read_again(row)
-    assert read(row).state == "read"
+    row = read(row)
+    assert (row.state, row.reason) == ("read", "")
     with pytest.raises(Conflict, match="did not fail"):
         uploads.read_again(row)
-
-
-def read_by_another(
-    upload: SceneUpload, *, heard_before: timedelta, sent_before: timedelta
-) -> None:
-    now = timezone.now()
-    marks = {"heartbeat_at": now - heard_before, "sent_at": now - sent_before}
-    SceneUpload.objects.filter(pk=upload.pk).update(state="running", attempts=1, **marks)
-
-
-def test_a_file_whose_worker_ended_is_sent_again_once_and_read(log: bytes) -> None:
-    row = sent(log)
-    read_by_another(row, heard_before=2 * timedelta(minutes=1), sent_before=timedelta(minutes=3))
-    assert uploads.find_lost() == [row.pk]
-    uploads.mark_sent(row.pk)
-    assert uploads.find_lost() == []
-    row = read(row)
-    assert (row.state, row.attempts, row.heartbeat_at) == ("read", 2, None)
 
 
 def test_the_same_scene_is_kept_once_and_a_taken_name_says_so(log: bytes) -> None:
@@ -139,7 +114,7 @@ def test_the_same_scene_is_kept_once_and_a_taken_name_says_so(log: bytes) -> Non
     row = read(sent(log))
     moment = looked_at(row, 0)
     upload_moments.ask_to_keep(moment, slug="taken")
-    upload_moments.work_on_moment(moment.pk)
+    upload_moments.MOMENTS.perform(moment.pk)
     moment.refresh_from_db()
     assert moment.state == "drawn"
     assert "called 'taken' already" in moment.reason
@@ -149,7 +124,7 @@ def test_the_same_scene_is_kept_once_and_a_taken_name_says_so(log: bytes) -> Non
         moment.state = "drawn"
         moment.save()
         upload_moments.ask_to_keep(moment, slug=slug)
-        upload_moments.work_on_moment(moment.pk)
+        upload_moments.MOMENTS.perform(moment.pk)
         moment.refresh_from_db()
         assert moment.scene is not None
         assert moment.scene.slug == "first"

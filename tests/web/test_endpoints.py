@@ -13,6 +13,7 @@ from augment.fake_llm.server import FakeServer, running
 from augment.llm.questions import Ability
 from augment.models import Endpoint, EndpointModel, Event, Probe
 from augment.services.endpoints import editing, probing
+from augment.services.work import Lease
 from tests.web.cast import people, signed_in
 
 pytestmark = pytest.mark.django_db
@@ -146,19 +147,19 @@ def test_a_probe_is_asked_for_on_the_page_and_its_lines_appear_one_by_one(
     assert (shown.count("data-ability"), shown.count("waiting")) == (len(Ability), len(Ability))
     assert "js/live.js" in shown
     seen: list[tuple[int, int]] = []
-    keep = probing._keep
+    note = Lease.note
 
-    def look(row: Probe, found: object) -> None:
-        keep(row, found)  # type: ignore[arg-type]
+    def look(held: Lease[Probe], **columns: object) -> None:
+        note(held, **columns)
         page = admin.get(address).content.decode()
         seen.append((page.count("asked now"), page.count(">waiting")))
 
-    monkeypatch.setattr(probing, "_keep", look)
-    assert probing.make_probe(probe.pk)
+    monkeypatch.setattr(Lease, "note", look)
+    assert probing.PROBES.perform(probe.pk)
     assert [asked for asked, _ in seen] == [*[1] * (len(Ability) - 1), 0], "the next one is asked"
     shown = admin.get(address).content.decode()
     assert "js/live.js" not in shown
     assert "Last report:" in shown
     model.refresh_from_db()
     assert (model.vision, model.native_tools) == (False, True)
-    assert not probing.make_probe(probe.pk), "a second message asks nothing"
+    assert not probing.PROBES.perform(probe.pk), "a second message asks nothing"

@@ -9,7 +9,6 @@ from django.test import Client
 from django.urls import reverse
 
 from augment.models import Augmentation, GenerationJob, Worker
-from augment.services.running import leases
 from augment.services.running.causes import failure_groups
 from augment.services.running.workers import Presence
 from tests.jobs import rows
@@ -40,7 +39,7 @@ def test_a_launched_job_has_a_row_per_contestant_and_scenario(
 def test_the_page_groups_failures_by_their_reason_and_retries_them() -> None:
     job = rows.launch(scenarios=3)
     for row in job.augmentations.all():
-        leases.settle(held=rows.leased(row), settlement=rows.failed(), now=rows.NOON)
+        rows.leased(row).settle(rows.failed(), now=rows.NOON)
     admin, url = signed_in(people()["admin"]), reverse("job", args=[job.code])
     shown = admin.get(url).content.decode()
     assert shown.count("The wire broke") == 1
@@ -70,7 +69,7 @@ def test_a_job_is_paused_says_what_still_runs_and_is_resumed() -> None:
     answer = admin.post(reverse("job-pause", args=[job.code]), follow=True).content.decode()
     assert "Pausing, 1 still runs" in answer
     assert 'id="pause"' not in answer
-    leases.settle(held=held, settlement=rows.done(), now=rows.NOON)
+    held.settle(rows.done(), now=rows.NOON)
     shown = admin.get(url).content.decode()
     assert "Paused" in shown
     assert "js/job.js" not in shown, "nothing moves"
@@ -93,7 +92,7 @@ def test_progress_is_counted_and_not_sent_again_while_nothing_changes() -> None:
     same = admin.get(url, headers={"If-None-Match": first.headers["ETag"]})
     assert (same.status_code, same.content) == (304, b"")
     row = job.augmentations.all()[0]
-    leases.settle(held=rows.leased(row), settlement=rows.done(), now=rows.NOON)
+    rows.leased(row).settle(rows.done(), now=rows.NOON)
     changed = admin.get(url, headers={"If-None-Match": first.headers["ETag"]})
     assert changed.json()["settled"] == 1
 
@@ -101,7 +100,7 @@ def test_progress_is_counted_and_not_sent_again_while_nothing_changes() -> None:
 def test_an_augmentations_page_shows_its_numbers_and_escapes_what_came_from_outside() -> None:
     job = rows.launch()
     row = rows.only_row(job)
-    leases.settle(held=rows.leased(row), settlement=rows.done(), now=rows.NOON)
+    rows.leased(row).settle(rows.done(), now=rows.NOON)
     Augmentation.objects.filter(pk=row.pk).update(notes="<script>alert(1)</script>")
     shown = signed_in(people()["analyst"]).get(reverse("augmentation", args=[row.code]))
     page = shown.content.decode()

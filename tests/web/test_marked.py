@@ -14,7 +14,6 @@ from augment.models import Augmentation
 from augment.scene.intent_codec import intent_to_document
 from augment.services.judging.findings import check_augmentation
 from augment.services.judging.marked_pictures import draw_marked
-from augment.services.running import leases
 from tests.intents import parked
 from tests.jobs import rows
 from tests.web.cast import people, signed_in
@@ -34,7 +33,7 @@ def _media(settings: LazySettings, tmp_path: Path) -> None:
 def row() -> Augmentation:
     """Two cones where a parked car is asked for."""
     found = rows.only_row(rows.launch())
-    leases.settle(held=rows.leased(found), settlement=rows.done(), now=rows.NOON)
+    rows.leased(found).settle(rows.done(), now=rows.NOON)
     found.scenario.intent = FAR
     found.scenario.save(update_fields=["intent"])
     return Augmentation.objects.select_related("contestant", "scenario__base_scene").get()

@@ -5,17 +5,16 @@ from __future__ import annotations
 import pytest
 from django.utils.translation import override
 
-from arena import tasks
 from arena.errors import StudyStillOpen
 from arena.models import Snapshot
 from arena.queries.vote_sets import Filters
 from arena.services.handing_over import hand_over
 from arena.services.invitations import invite
-from arena.services.ratings import plan_snapshot
+from arena.services.ratings import RATINGS, plan_snapshot
 from augment.errors import Conflict, InvalidDocument, UnknownName
 from augment.models import Event
 from augment.sentences import sentence
-from augment.services.running import caps, jobs, leases
+from augment.services.running import caps, jobs
 from augment.services.running.caps import Caps
 from augment.services.wording import translate
 from tests import study_rows
@@ -79,16 +78,14 @@ def test_nothing_that_is_stored_is_german() -> None:
             caps=Caps(calls=5, tokens=900),
         )
         caps.raise_cap(capped, caps=Caps(calls=50))
-        leases.settle(
-            held=rows.leased(rows.only_row(job)), settlement=rows.failed(), now=rows.NOON
-        )
+        rows.leased(rows.only_row(job)).settle(rows.failed(), now=rows.NOON)
         invite(study=study, expert=study.experts.get(username="eva"))
         hand_over(study=study, username="eva", to=["finn"])
         snapshot = plan_snapshot(study=study, early=True, filters=Filters(experts=("nobody",)))
-        tasks.compute_snapshot(snapshot.pk)
+        RATINGS.perform(snapshot.pk)
     snapshot.refresh_from_db()
     assert snapshot.state == Snapshot.State.FAILED
-    assert snapshot.status.startswith("Unknown expert 'nobody'. Known: ")
+    assert snapshot.reason.startswith("Unknown expert 'nobody'. Known: ")
     raised = Event.objects.get(verb="raise cap")
     assert raised.before == {"cap": "5 calls, 900 tokens"}
     assert raised.after == {"cap": "50 calls, 900 tokens"}

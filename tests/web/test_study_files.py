@@ -14,11 +14,11 @@ from django.test import Client
 from django.urls import reverse
 from pytest_django import Settings
 
+from arena.exports.study_files import STUDY_FILES
 from arena.models import EarlyLook, Study, StudyFile
 from arena.services.ending import cancel_study
 from arena.services.ratings import rate
 from arena.services.studies import close_study
-from arena.tasks import write_study_file
 from augment.models import Augmentation, Event, GenerationJob
 from augment.scene.codec import modification_to_document
 from augment.scene.modification import Modification
@@ -51,7 +51,7 @@ def write(client: Client, study: Study, kind: str) -> StudyFile:
     """Press the button, and be the worker that it asks."""
     client.post(reverse("study-write", args=[study.code, kind]))
     row = StudyFile.objects.get(study=study, kind=kind)
-    write_study_file(row.pk)
+    STUDY_FILES.perform(row.pk)
     row.refresh_from_db()
     return row
 
@@ -92,7 +92,7 @@ def test_a_making_that_fails_says_why(closed: Study) -> None:
     GenerationJob.objects.update(state=GenerationJob.State.FINISHED)
     admin.post(reverse("study-write", args=[closed.code, "study"]))
     newest = StudyFile.objects.latest("pk")
-    write_study_file(newest.pk)
+    STUDY_FILES.perform(newest.pk)
     assert StudyFile.objects.get().state == "ready", "and the failed one is gone"
 
 
@@ -142,6 +142,6 @@ def test_what_became_impossible_meanwhile_is_not_written(closed: Study) -> None:
     client.post(reverse("study-write", args=[closed.code, "contact-sheet"]))
     cancel_study(study=closed)
     row = StudyFile.objects.get()
-    write_study_file(row.pk)
+    STUDY_FILES.perform(row.pk)
     row.refresh_from_db()
-    assert (row.state, "cancelled" in row.fault) == ("failed", True)
+    assert (row.state, "cancelled" in row.reason) == ("failed", True)

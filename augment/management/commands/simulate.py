@@ -5,10 +5,8 @@ from __future__ import annotations
 import time
 from argparse import ArgumentParser
 from collections.abc import Collection
-from datetime import timedelta
 from typing import Any, Final
 
-from django.conf import settings
 from django.core.management.base import CommandError
 from django.db import transaction
 from django.db.models import Q
@@ -146,11 +144,12 @@ class Command(TerminalCommand):
 
 def _finished(pk: int, also: Collection[str]) -> Simulation:
     """Drive a row, or wait until the worker that has it is done or has fallen silent."""
+    drives = simulations.Drives(also)
     rows = Simulation.objects.select_related("scenario", "augmentation__contestant")
     while True:
-        simulations.drive(simulation_pk=pk, also=also)
+        drives.perform(pk)
         row = rows.get(pk=pk)
         if row.state not in Simulation.UNDER_WAY:
             return row
         time.sleep(POLL_S)
-        simulations.requeue_stale(older_than=timedelta(seconds=settings.STALE_AFTER_S))
+        drives.take_back_lost()

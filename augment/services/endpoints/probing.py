@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import asdict
-from datetime import timedelta
 
-from django.conf import settings
 from django.contrib.auth.models import User
 from django.db import IntegrityError, transaction
-from django.utils import timezone
 
-from augment.errors import AugmentError, Conflict
+from augment.errors import Conflict
 from augment.llm.questions import Ability
 from augment.models import EndpointModel, Probe
 from augment.sentences import sentence
-from augment.services.clock import DATABASE_TIME, Moment
 from augment.services.endpoints.probe import ProbeFinding, probe
-from augment.services.texts import LONGEST_REASON, make_document_storable, make_storable
+from augment.services.texts import make_document_storable
+from augment.services.work import Lease, Settlement, WorkKind
 
 State = Probe.State
 ABILITIES = tuple(ability.value for ability in Ability)
@@ -38,55 +35,29 @@ def plan_probe(model: EndpointModel, *, actor: User | None = None) -> Probe:
         ) from None
 
 
-def make_probe(probe_pk: int) -> bool:
-    """What a worker does: ask, unless somebody has asked for this row already.
+class Probes(WorkKind[Probe]):
+    """Probes that somebody asked for; what each question showed stands in the row at once."""
 
-    Why nothing could be asked stands in the row.
+    model = Probe
+    queue = "models"
+    lost_limit = 1  # it may have been paid for
+    related = ("model__endpoint", "asked_by")
 
-    Returns:
-        Whether it was this call that asked.
-    """
-    waiting = Probe.objects.filter(pk=probe_pk, state=State.QUEUED)
-    if not waiting.update(state=State.RUNNING, started_at=timezone.now()):
-        return False
-    row = Probe.objects.select_related("model__endpoint", "asked_by").get(pk=probe_pk)
-    try:
+    def run(self, row: Probe, held: Lease[Probe]) -> Settlement:
+        """Ask every question."""
+
+        def keep(found: ProbeFinding) -> None:
+            row.findings.append(make_document_storable(asdict(found)))
+            held.note(findings=row.findings)
+
+        row.findings = []
         probe(
             label=row.model.endpoint.label,
             model=row.model.model,
             actor=row.asked_by,
-            on_finding=lambda found: _keep(row, found),
+            on_finding=keep,
         )
-    except AugmentError as fault:
-        _end(row, State.FAILED, str(fault))
-    except Exception as error:
-        _end(row, State.FAILED, f"unexpected: {type(error).__name__}: {error}")
-        raise
-    else:
-        _end(row, State.DONE)
-    return True
+        return Settlement(state=State.DONE)
 
 
-def give_up_stale(*, now: Moment = DATABASE_TIME) -> int:
-    """Fail probes whose worker must be dead, or whose message was lost; returns how many."""
-    longest = timedelta(
-        seconds=len(ABILITIES) * (settings.LLM_QUEUE_S + 2 * settings.LLM_TIMEOUT_S)
-    )
-    stale = Probe.objects.filter(state__in=Probe.UNDER_WAY, created_at__lt=now - longest)
-    return stale.update(
-        state=State.FAILED, finished_at=now, reason="The worker ended, or none ever took it."
-    )
-
-
-# --- Private -----------------------------------------------------------------------------------
-
-
-def _keep(row: Probe, found: ProbeFinding) -> None:
-    row.findings = [*row.findings, make_document_storable(asdict(found))]
-    Probe.objects.filter(pk=row.pk, state=State.RUNNING).update(findings=row.findings)
-
-
-def _end(row: Probe, state: State, reason: str = "") -> None:
-    Probe.objects.filter(pk=row.pk, state=State.RUNNING).update(
-        state=state, reason=make_storable(reason)[:LONGEST_REASON], finished_at=timezone.now()
-    )
+PROBES = Probes()

@@ -1,32 +1,26 @@
-"""Drives as rows: planned once, claimed by one worker, driven, scored, kept."""
+"""Drives as rows: planned once, driven, scored, kept."""
 
 from __future__ import annotations
 
 import json
-import logging
-import time
 import zlib
-from collections.abc import Callable, Collection, Iterable
+from collections.abc import Callable, Collection
 from dataclasses import asdict, dataclass
-from datetime import timedelta
-from types import TracebackType
 from typing import Any
-from uuid import UUID, uuid4
 
 from django.conf import settings
 from django.db import transaction
-from django.db.models import Q, QuerySet
-from django.utils import timezone
+from django.db.models import QuerySet
 
-from augment.errors import AugmentError, Conflict, LeaseLost
+from augment.errors import Conflict
 from augment.models import Augmentation, GenerationJob, Scenario, Simulation
 from augment.scene.codec import modification_from_document
 from augment.scene.modification import Modification
 from augment.scene.recording_codec import recording_from_document
 from augment.sentences import sentence
-from augment.services.clock import DATABASE_TIME, Moment
 from augment.services.scenarios.scenes import reference_of, scene_of
 from augment.services.scenarios.types import type_of
+from augment.services.work import Lease, Settlement, WorkKind
 from augment.simulation.criticality import criticality
 from augment.simulation.drive import Drive, run
 from augment.simulation.expert import expert_of
@@ -38,10 +32,7 @@ from augment.simulation.score import Score, ScoreKind, score_drive
 from augment.simulation.setting import DriveSetting
 from augment.simulation.trace import trace_of
 
-logger = logging.getLogger(__name__)
-
 State, Subject = Simulation.State, Simulation.Subject
-BEAT_EVERY_S = 5.0
 NUPLAN, INTERPLAN = ScoreKind.NUPLAN.value, ScoreKind.INTERPLAN.value
 SCORES = {NUPLAN: "nuplan_score", INTERPLAN: "interplan_score"}
 """Which column a score is in."""
@@ -122,46 +113,30 @@ def plan_scenario(
     return [row.pk for row in _of_scenario(scenario, options) if row.state == State.QUEUED]
 
 
-def drive(*, simulation_pk: int, also: Collection[str] = ()) -> bool:
-    """Claim a row, drive it and write its outcome. A row that nobody may claim is left alone.
+class Drives(WorkKind[Simulation]):
+    """Planned drives.
 
     Args:
-        simulation_pk: Which.
         also: Planners that may be loaded, as `load_planner` takes them.
-
-    Returns:
-        Whether the row was claimed.
     """
-    claim = uuid4()
-    mine = Simulation.objects.filter(pk=simulation_pk, state=State.QUEUED)
-    if not mine.update(state=State.RUNNING, claim=claim, heartbeat_at=DATABASE_TIME):
-        return False
-    rows = Simulation.objects.select_related("scenario__base_scene", "augmentation")
-    row = rows.get(pk=simulation_pk)
-    with _Settling(row, claim) as settling:
-        settling.outcome = _driven(row, _Beating(simulation_pk, claim), also)
-    return True
+
+    model = Simulation
+    related = ("scenario__base_scene", "augmentation")
+
+    def __init__(self, also: Collection[str] = ()) -> None:
+        self._also = also
+
+    def sendable(self) -> QuerySet[Simulation]:
+        """None of a planner that no worker may load: they wait for the command that named it."""
+        return super().sendable().filter(planner__in=allowed_planners())
+
+    def run(self, row: Simulation, held: Lease[Simulation]) -> Settlement:
+        """Drive and score; a planner from outside may raise anything."""
+        columns = _driven(row, lambda step: held.insist(), self._also)
+        return Settlement(state=State.DONE, columns=columns)
 
 
-def requeue_stale(*, older_than: timedelta, now: Moment = DATABASE_TIME) -> int:
-    """Let drives wait again whose worker gave no sign of life for so long."""
-    silent = Simulation.objects.filter(state=State.RUNNING, heartbeat_at__lt=now - older_than)
-    return silent.update(state=State.QUEUED, claim=None, heartbeat_at=None, sent_at=None)
-
-
-def find_unsent(*, older_than: timedelta, now: Moment = DATABASE_TIME) -> list[int]:
-    """Return the keys of waiting rows without a message, or with one sent so long ago.
-
-    Rows of a planner that no worker may load wait for the command that named it.
-    """
-    waiting = Simulation.objects.filter(state=State.QUEUED, planner__in=allowed_planners())
-    old = Q(sent_at=None) | Q(sent_at__lt=now - older_than)
-    return list(waiting.filter(old).order_by("pk").values_list("pk", flat=True))
-
-
-def mark_sent(ids: Iterable[int]) -> None:
-    """Remember that a message was sent for these."""
-    Simulation.objects.filter(pk__in=list(ids)).update(sent_at=DATABASE_TIME)
+DRIVES = Drives()
 
 
 def document_of(drove: Drive, scores: dict[ScoreKind, Score]) -> dict[str, Any]:
@@ -209,56 +184,6 @@ def trace_document(row: Simulation) -> dict[str, Any]:
 # Private
 
 
-class _Settling:
-    """Writes the outcome of a claimed drive, whatever becomes of it.
-
-    A planner from outside may raise anything: that is an outcome of its drive, and is logged. A
-    worker that is told to stop gives the row back. A lost lease ends quietly.
-    """
-
-    def __init__(self, row: Simulation, claim: UUID) -> None:
-        self._row = row
-        self._held = Simulation.objects.filter(pk=row.pk, claim=claim)
-        self.outcome: dict[str, Any] = {"state": State.QUEUED}
-
-    def __enter__(self) -> _Settling:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> bool:
-        if isinstance(error, LeaseLost):
-            return True
-        if isinstance(error, AugmentError):
-            self.outcome = {"state": State.FAILED, "reason": str(error)}
-        elif isinstance(error, Exception):
-            logger.error("Drive %s failed", self._row.code, exc_info=error)
-            said = f"{type(error).__name__}: {error}"[:500]
-            self.outcome = {"state": State.FAILED, "reason": said}
-        is_over = self.outcome["state"] != State.QUEUED
-        ended = {"finished_at": timezone.now()} if is_over else {}
-        self._held.update(claim=None, heartbeat_at=None, **ended, **self.outcome)
-        return isinstance(error, Exception)
-
-
-class _Beating:
-    """Told after each step; now and then it shows that the drive is alive, and asks if it may."""
-
-    def __init__(self, pk: int, claim: UUID) -> None:
-        self._rows = Simulation.objects.filter(pk=pk, claim=claim)
-        self._last = time.monotonic()
-
-    def __call__(self, step: int) -> None:
-        if time.monotonic() - self._last < BEAT_EVERY_S:
-            return
-        self._last = time.monotonic()
-        if not self._rows.update(heartbeat_at=DATABASE_TIME):
-            raise LeaseLost
-
-
 def _of_scenario(scenario: Scenario, options: Options) -> list[Simulation]:
     made = [_row(scenario, Subject.UNMODIFIED, options)]
     if scenario.reference is not None:
@@ -276,20 +201,18 @@ def _row(
     row, _ = Simulation.objects.get_or_create(
         scenario=scenario, subject=subject, augmentation=augmentation, **options.columns
     )
-    if row.state == State.FAILED:
-        row.state, row.reason, row.sent_at = State.QUEUED, "", None
-        row.save(update_fields=["state", "reason", "sent_at"])
+    row.wait_again()
     return row
 
 
 def _driven(
-    row: Simulation, beating: Callable[[int], None], also: Collection[str]
+    row: Simulation, after_step: Callable[[int], None], also: Collection[str]
 ) -> dict[str, Any]:
     """The columns of a row's outcome."""
     setting = setting_of(row)
     road = Road(setting.scene, setting.recording)
     planner = load_planner(row, also=also)
-    drove = run(setting, planner, road=road, after_step=beating)
+    drove = run(setting, planner, road=road, after_step=after_step)
     expert = expert_of(setting, road)
     kind = type_of(row.scenario.type)
     scores = {
@@ -304,8 +227,6 @@ def _driven(
     }
     trace = json.dumps(trace_of(setting, drove, scores[ScoreKind.NUPLAN]), separators=(",", ":"))
     return {
-        "state": State.DONE,
-        "reason": "",
         "nuplan_score": scores[ScoreKind.NUPLAN].value,
         "interplan_score": scores[ScoreKind.INTERPLAN].value,
         "document": document_of(drove, scores),

@@ -129,8 +129,8 @@ def settle(*, call_pk: int, used: Used, now: Moment, answer: dict[str, Any] | No
 
 
 @transaction.atomic
-def settle_unseen(*, now: Moment, attempt_pk: int | None = None, row_pk: int | None = None) -> int:
-    """Settle the calls in flight of an attempt, or of a row, that nobody will see the end of.
+def settle_unseen(*, now: Moment, row_pk: int) -> int:
+    """Settle the calls in flight of a row that nobody will see the end of.
 
     What was sent may have been answered and billed, so its worst case counts. What still waited
     for its place was not sent, and can't be any more: see `RowTranscript.sending`.
@@ -140,11 +140,7 @@ def settle_unseen(*, now: Moment, attempt_pk: int | None = None, row_pk: int | N
     """
     # Locked, so that none is sent between the look at it and its settlement.
     calls = ModelCall.objects.select_for_update(of=("self",)).filter(settled_at=None)
-    if attempt_pk is not None:
-        calls = calls.filter(attempt=attempt_pk)
-    else:
-        calls = calls.filter(attempt__augmentation=row_pk)
-    unseen = list(calls.only(*_COUNTED))
+    unseen = list(calls.filter(attempt__augmentation=row_pk).only(*_COUNTED))
     for call in unseen:
         fault = "nobody saw the end: its worker stopped"
         if call.sent_at is None:

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from contextlib import AbstractContextManager, suppress
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
-from datetime import timedelta
 from typing import Any
 
 from django.conf import settings
 from django.contrib.auth.models import User
+from django.db import transaction
 from django.utils import timezone
 
 from augment.errors import (
-    AugmentError,
     BudgetSpent,
     Conflict,
     ModelFault,
@@ -26,7 +25,6 @@ from augment.llm.fingerprint import image_reference, request_hash
 from augment.llm.messages import Reply, Request
 from augment.models import Endpoint, IntentReading, ModelCall, Scenario
 from augment.scene.intent_codec import intent_to_document
-from augment.services.clock import DATABASE_TIME, Moment
 from augment.services.endpoints.call_limits import Queue
 from augment.services.endpoints.client import EndpointClient
 from augment.services.endpoints.prices import price_of
@@ -36,6 +34,7 @@ from augment.services.running import answers, budget
 from augment.services.running.caps import Caps
 from augment.services.running.transcripts import sentence_of
 from augment.services.texts import make_document_storable, make_storable
+from augment.services.work import Lease, Settlement, WorkKind
 from augment.variants.intent_reader import ask_for_intent
 from augment.variants.transcript import ModelRole, NoteKind
 
@@ -68,12 +67,17 @@ def read_intent(
     Raises:
         UnknownName: No such scenario or endpoint.
         Conflict: A cap can't be, or there is one in USD and nobody knows the price.
-        KeyMissing: The key's variable is not set here.
     """
-    reading = plan_reading(
-        scenario=scenario, endpoint=endpoint, model=model, caps=caps, actor=actor
-    )
-    return ask_planned(reading, is_fresh=is_fresh, client=client)
+    kind = Readings(client, is_fresh=is_fresh)
+    with transaction.atomic():  # taken before any worker sees it
+        reading = plan_reading(
+            scenario=scenario, endpoint=endpoint, model=model, caps=caps, actor=actor
+        )
+        held = kind.take(reading.pk)
+    assert held is not None
+    kind.work(held)
+    reading.refresh_from_db()
+    return reading
 
 
 def plan_reading(
@@ -98,52 +102,64 @@ def plan_reading(
     )
 
 
-def ask_planned(
-    reading: IntentReading,
-    *,
-    is_fresh: bool = False,
-    client: AbstractContextManager[ChatClient] | None = None,
-) -> IntentReading:
-    """Ask the model; why nothing was read stands in the row.
+class Readings(WorkKind[IntentReading]):
+    """Readings that somebody asked for.
 
-    Raises:
-        KeyMissing: The key's variable is not set here, where a client has to be made.
+    Args:
+        client: How the endpoint is reached; None over the wire.
+        is_fresh: Ask anew what was answered before.
     """
-    site = reading.endpoint
-    if client is None:
+
+    model = IntentReading
+    queue = "models"
+    lost_limit = 1  # it may have been paid for
+    related = ("scenario", "endpoint", "asked_by")
+
+    def __init__(
+        self,
+        client: AbstractContextManager[ChatClient] | None = None,
+        *,
+        is_fresh: bool = False,
+    ) -> None:
+        self._client = client
+        self._is_fresh = is_fresh
+
+    def run(self, row: IntentReading, held: Lease[IntentReading]) -> Settlement:
+        """Ask the model; every foreseen fault is a failed reading with a sentence."""
+        site = row.endpoint
+        client = self._client or EndpointClient(
+            wire_to(site), site, Queue(longest_s=settings.LLM_QUEUE_S)
+        )
+        transcript = ReadingTranscript(row, price_of(site, row.model), is_fresh=self._is_fresh)
         try:
-            wire = wire_to(site)
-        except AugmentError as fault:
-            reading.state, reading.reason = State.FAILED, make_storable(str(fault))
-            reading.save(update_fields=["state", "reason"])
-            raise
-        client = EndpointClient(wire, site, Queue(longest_s=settings.LLM_QUEUE_S))
-    _ask(reading, client, price_of(site, reading.model), is_fresh=is_fresh)
-    log_event(
-        actor=reading.asked_by,
-        verb="read intent",
-        object_kind="scenario",
-        object_code=reading.scenario.code,
-        after={"model": reading.model, "endpoint": site.label, "state": reading.state},
-    )
-    return reading
+            with client as opened:
+                intent = ask_for_intent(
+                    row.scenario.instruction,
+                    client=opened,
+                    model=row.model,
+                    transcript=transcript,
+                )
+        except ModelFault as fault:
+            return Settlement(state=State.FAILED, reason=sentence_of(fault))
+        except ReplyUnreadable as unreadable:
+            return Settlement(state=State.FAILED, reason=str(unreadable))
+        except BudgetSpent as spent:
+            return Settlement(state=State.FAILED, reason=f"The cap is reached: {spent.limit}")
+        return Settlement(state=State.READ, columns={"document": intent_to_document(intent)})
+
+    def over(self, row: IntentReading, outcome: Settlement | None) -> None:
+        """Log who was asked, and whether it was of use."""
+        row.refresh_from_db(fields=["state"])
+        log_event(
+            actor=row.asked_by,
+            verb="read intent",
+            object_kind="scenario",
+            object_code=row.scenario.code,
+            after={"model": row.model, "endpoint": row.endpoint.label, "state": row.state},
+        )
 
 
-def read_planned(reading_pk: int) -> None:
-    """What a worker does: ask, unless somebody has asked for this reading already."""
-    rows = IntentReading.objects.select_related("scenario", "endpoint", "asked_by")
-    reading = rows.filter(pk=reading_pk, state=State.RUNNING, calls=None).first()
-    if reading is None:
-        return
-    with suppress(AugmentError):  # it stands in the row
-        ask_planned(reading)
-
-
-def give_up_stale(*, now: Moment = DATABASE_TIME) -> int:
-    """Fail readings whose worker must be dead, or whose message was lost; returns how many."""
-    longest = timedelta(seconds=settings.LLM_QUEUE_S + 6 * settings.LLM_TIMEOUT_S)
-    stale = IntentReading.objects.filter(state=State.RUNNING, created_at__lt=now - longest)
-    return stale.update(state=State.FAILED, reason="The worker ended, or none ever took it.")
+READINGS = Readings()
 
 
 class ReadingTranscript:
@@ -159,7 +175,7 @@ class ReadingTranscript:
         self._reading = reading
         self._price = price
         self._is_fresh = is_fresh
-        self._number = 0
+        self._number = reading.calls.count()  # of a worker that was told to stop
         self._open: dict[int, _Open] = {}
 
     def known(self, role: ModelRole, request: Request, prompt_version: str) -> Reply | None:
@@ -255,35 +271,6 @@ class _Open:
 
     pk: int
     worst: WorstCase
-
-
-def _ask(
-    reading: IntentReading,
-    client: AbstractContextManager[ChatClient],
-    price: Price | None,
-    *,
-    is_fresh: bool,
-) -> None:
-    """Every foreseen fault is a failed reading with a sentence."""
-    try:
-        with client as opened:
-            intent = ask_for_intent(
-                reading.scenario.instruction,
-                client=opened,
-                model=reading.model,
-                transcript=ReadingTranscript(reading, price, is_fresh=is_fresh),
-            )
-    except ModelFault as fault:
-        reading.state, reading.reason = State.FAILED, make_storable(sentence_of(fault))
-    except ReplyUnreadable as unreadable:
-        reading.state, reading.reason = State.FAILED, make_storable(str(unreadable))
-    except BudgetSpent as spent:
-        reading.state, reading.reason = State.FAILED, f"The cap is reached: {spent.limit}"
-    except AugmentError as fault:
-        reading.state, reading.reason = State.FAILED, make_storable(str(fault))
-    else:
-        reading.state, reading.document = State.READ, intent_to_document(intent)
-    reading.save(update_fields=["state", "reason", "document"])
 
 
 def _settle(call: _Open, used: budget.Used, answer: dict[str, Any]) -> None:

@@ -19,8 +19,8 @@ from augment.services.events import log_event
 from augment.services.running.budget import limit_of
 from augment.services.running.caps import NO_CAPS, Caps, check_caps, over_already
 from augment.services.running.feasible import refuse_impossible
-from augment.services.running.leases import change_all
 from augment.services.texts import one_line
+from augment.services.work import change_all
 from augment.variants.options import MOST_SAMPLES
 
 State = Augmentation.State

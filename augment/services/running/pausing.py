@@ -10,7 +10,7 @@ from augment.models import Augmentation, GenerationJob
 from augment.sentences import sentence, word
 from augment.services.events import log_event
 from augment.services.running.caps import NO_CAPS, Caps, over_already, raise_cap
-from augment.services.running.leases import change_all
+from augment.services.work import change_all
 
 State = GenerationJob.State
 

@@ -12,7 +12,7 @@ from augment.services.clock import database_now
 from augment.services.events import log_event
 from augment.services.running.causes import rows_of_cause
 from augment.services.running.jobs import open_again
-from augment.services.running.leases import change_all
+from augment.services.work import change_all
 
 State = Augmentation.State
 

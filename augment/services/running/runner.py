@@ -10,9 +10,11 @@ import logging
 from collections.abc import Callable
 from contextlib import AbstractContextManager, ExitStack
 from dataclasses import dataclass, replace
+from typing import Any
 
 from django.conf import settings
 from django.db import Error, OperationalError
+from django.db.models import QuerySet
 
 from augment.baselines import simulated
 from augment.baselines.registry import PLACERS, RULE_PLACER, PlaceIntent
@@ -23,26 +25,35 @@ from augment.errors import (
     DatabaseLocked,
     InvalidModification,
     JobCancelled,
-    LeaseLost,
     ModelFault,
     Unwanted,
 )
 from augment.llm.client import ChatClient
+from augment.llm.cutting import shorten
 from augment.models import Augmentation, Contestant, Endpoint
 from augment.scene.codec import modification_from_document, modification_to_document
 from augment.scene.entities import Scene
 from augment.scene.modification import Modification
+from augment.services.clock import Moment
 from augment.services.endpoints.call_limits import Queue
 from augment.services.endpoints.client import EndpointClient
 from augment.services.endpoints.respondents import Respondent, respondents_of
 from augment.services.endpoints.treatments import Treatment, treatment_of
 from augment.services.endpoints.wires import wire_to
-from augment.services.running import jobs, leases, stopping
-from augment.services.running.holding import OutcomeOnCrash, heartbeat
+from augment.services.running import jobs, stopping
+from augment.services.running.attempts import (
+    CANCELLED,
+    CLOSED,
+    close_attempt,
+    insist_wanted,
+    open_attempt,
+)
 from augment.services.running.transcripts import RowTranscript, sentence_of
 from augment.services.scenarios.pictures import camera_of, original_picture, picture_of
 from augment.services.scenarios.redrawing import redraw
 from augment.services.scenarios.scenes import intent_of, reference_of, scene_of, seed_of
+from augment.services.texts import LONGEST_NOTES, make_document_storable, make_storable
+from augment.services.work import Lease, Settlement, WorkKind, change_all
 from augment.variants import pipeline
 from augment.variants.options import ToolProtocol, recipe_with
 from augment.variants.recipes import find_recipe
@@ -54,6 +65,7 @@ logger = logging.getLogger(__name__)
 Kind = Contestant.Kind
 State = Augmentation.State
 Connect = Callable[[Endpoint], AbstractContextManager[ChatClient]]
+Held = Lease[Augmentation]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -67,7 +79,7 @@ class Answer:
 
 
 def open_wire(
-    endpoint: Endpoint, held: leases.Lease, treatment: Treatment | None = None
+    endpoint: Endpoint, held: Held, treatment: Treatment | None = None
 ) -> AbstractContextManager[ChatClient]:
     """A client for the endpoint, with the key that its variable holds right now.
 
@@ -87,52 +99,89 @@ def open_wire(
     )
 
 
-def work_on(*, augmentation_pk: int, worker: str = "", connect: Connect | None = None) -> bool:
-    """Lease a row, run it and write its outcome. A row that nobody may lease is left alone.
+class Augmentations(WorkKind[Augmentation]):
+    """Rows of jobs.
 
     Args:
-        augmentation_pk: The row.
-        worker: Who works, for the attempt's record.
         connect: How an endpoint is reached; None over the wire.
-
-    Returns:
-        Whether the row was leased.
     """
-    held = leases.take_lease(augmentation_pk=augmentation_pk, worker=worker)
-    if held is None:
-        return False
-    row = _row(held)
-    is_new_change = False
-    try:
-        with heartbeat(held, every_s=settings.HEARTBEAT_S), OutcomeOnCrash(held):
-            settlement = run(row, held=held, connect=connect)
-            is_settled = leases.settle(held=held, settlement=settlement)
-            is_new_change = is_settled and settlement.modification is not None
-        if is_new_change:
-            redraw(row.scenario)
-    finally:
-        jobs.finish_if_over(job_pk=row.job_id)
-    return True
+
+    model = Augmentation
+    queue = "models"
+    lost_limit = 5
+    related = ("job", "scenario__base_scene", "contestant__endpoint")
+
+    def __init__(self, connect: Connect | None = None) -> None:
+        self._connect = connect
+
+    def waiting(self) -> QuerySet[Augmentation]:
+        """None of a job that was cancelled, is paused or stopped at its cap."""
+        return super().waiting().exclude(job__in=CLOSED)
+
+    def run(self, row: Augmentation, held: Held) -> Settlement:
+        """Ask, keep, draw."""
+        return run(row, held=held, connect=self._connect)
+
+    def begun(self, pk: int, worker: str, now: Moment) -> None:
+        """Open the next attempt."""
+        open_attempt(pk, worker, now)
+
+    def ended(self, pk: int, end: str, reason: str, now: Moment) -> None:
+        """Close the attempt and settle its calls."""
+        close_attempt(pk, end, reason, now)
+
+    def over(self, row: Augmentation, outcome: Settlement | None) -> None:
+        """Draw the others anew where a change needs a wider window; finish the job."""
+        try:
+            if outcome is not None and outcome.columns.get("modification") is not None:
+                redraw(row.scenario)
+        finally:
+            jobs.finish_if_over(job_pk=row.job_id)
+
+    def outcome_of_loss(self, row: Augmentation) -> Settlement | None:
+        """A row of a cancelled job is cancelled."""
+        if CANCELLED.filter(pk=row.job_id).exists():
+            return Settlement(state=State.CANCELLED)
+        return super().outcome_of_loss(row)
+
+    def tidy(self, now: Moment) -> None:
+        """Cancel what was given back in a cancelled job; finish the jobs that are over."""
+        orphans = self.rows.filter(state=State.QUEUED, job__in=CANCELLED)
+        change_all(orphans, state=State.CANCELLED, finished_at=now)
+        jobs.finish_if_over(now=now)
 
 
-def run(
-    row: Augmentation, *, held: leases.Lease, connect: Connect | None = None
-) -> leases.Settlement:
+AUGMENTATIONS = Augmentations()
+
+
+def work_on(*, augmentation_pk: int, worker: str = "", connect: Connect | None = None) -> bool:
+    """Lease a row, run it and write its outcome. Returns whether it could be leased."""
+    return Augmentations(connect).perform(augmentation_pk, worker=worker)
+
+
+def run(row: Augmentation, *, held: Held, connect: Connect | None = None) -> Settlement:
     """How the row ends. Every foreseen fault is a failed outcome with a sentence.
 
     Raises:
-        Unwanted: The row was taken back or its job cancelled meanwhile, or this worker stops.
+        LeaseLost, WorkerStopping: The row was taken back meanwhile, or this worker stops.
         BudgetSpent: The job has no room for the next call.
     """
     try:
         scene = scene_of(row.scenario)
         unchanged = original_picture(row.scenario)
         answer = _kept(row) or _asked(row, scene, held, connect)
+        if answer.state == State.FAILED:
+            return _failed(answer.reason)
         if answer.modification is None:
-            return _settlement(answer, image=unchanged)
-        _keep(held, answer)
+            return Settlement(
+                state=answer.state, reason=answer.reason, columns={"image": unchanged}
+            )
+        columns = _columns(answer, answer.modification)
+        held.note(**columns)
         image = picture_of(scene, answer.modification, camera_of(row.scenario))
-        return _settlement(answer, image=image)
+        return Settlement(state=answer.state, columns=columns | {"image": image})
+    except JobCancelled as cancelled:
+        return Settlement(state=State.CANCELLED, reason=str(cancelled))
     except (Unwanted, BudgetSpent):
         raise
     except ModelFault as fault:
@@ -149,32 +198,18 @@ def run(
 # --- Private -----------------------------------------------------------------------------------
 
 
-def _insist(held: leases.Lease) -> None:
-    if not leases.is_held(held=held):
-        raise LeaseLost(f"attempt {held.attempt_number} has lost its row")
-    if leases.is_cancelled(held=held):
-        raise JobCancelled
-
-
-def _insist_before_sending(held: leases.Lease) -> None:
+def _insist_before_sending(held: Held) -> None:
     """A worker that is to stop sends nothing more; what it has sent it waits for."""
     stopping.insist_on_going_on()
-    _insist(held)
+    insist_wanted(held)
 
 
-def _insist_if_told(held: leases.Lease) -> None:
+def _insist_if_told(held: Held) -> None:
     """The same while a call is in flight: a database that can't say ends no call that is paid."""
     try:
-        _insist(held)
+        insist_wanted(held)
     except Error as error:
         logger.warning("Nobody could say whether a call is still wanted: %s", error)
-
-
-def _row(held: leases.Lease) -> Augmentation:
-    rows = Augmentation.objects.select_related(
-        "job", "scenario__base_scene", "contestant__endpoint"
-    )
-    return rows.get(pk=held.augmentation_pk)
 
 
 def _kept(row: Augmentation) -> Answer | None:
@@ -185,14 +220,14 @@ def _kept(row: Augmentation) -> Answer | None:
     return Answer(state=State.DONE, modification=modification, notes=row.notes)
 
 
-def _keep(held: leases.Lease, answer: Answer) -> None:
-    assert answer.modification is not None
-    document = modification_to_document(answer.modification)
-    if not leases.keep_modification(held=held, modification=document, notes=answer.notes):
-        raise LeaseLost(f"attempt {held.attempt_number} has lost its row")
+def _columns(answer: Answer, modification: Modification) -> dict[str, Any]:
+    """What is stored before it is drawn, so that a second try only has to draw."""
+    notes = {"notes": shorten(make_storable(answer.notes), LONGEST_NOTES)} if answer.notes else {}
+    document = make_document_storable(modification_to_document(modification))
+    return {"modification": document, **notes}
 
 
-def _asked(row: Augmentation, scene: Scene, held: leases.Lease, connect: Connect | None) -> Answer:
+def _asked(row: Augmentation, scene: Scene, held: Held, connect: Connect | None) -> Answer:
     """What the contestant says now."""
     match row.contestant.kind:
         case Kind.REFERENCE:
@@ -233,9 +268,7 @@ def _drawn(row: Augmentation, what: str) -> str:
     return what if row.sample == 1 else f"{what}#{row.sample}"
 
 
-def _from_errors(
-    row: Augmentation, scene: Scene, rates: dict[str, object], held: leases.Lease
-) -> Answer:
+def _from_errors(row: Augmentation, scene: Scene, rates: dict[str, object], held: Held) -> Answer:
     """The reference with the errors of a simulated contestant; their label is kept apart."""
     reference = reference_of(row.scenario)
     if reference is None:
@@ -247,8 +280,7 @@ def _from_errors(
         seed=seed_of(_drawn(row, f"{row.contestant.slug}/{row.scenario.slug}")),
     )
     label = {"class": made.fault_class, "fault": made.fault}
-    if not leases.note_injected(held=held, injected=label):
-        raise LeaseLost(f"attempt {held.attempt_number} has lost its row")
+    held.note(injected=label)
     if made.modification is None:
         return Answer(state=State.UNREADABLE, reason=made.reason)
     return Answer(state=State.DONE, modification=made.modification)
@@ -258,14 +290,13 @@ def _from_model(
     row: Augmentation,
     endpoint: Endpoint,
     scene: Scene,
-    held: leases.Lease,
+    held: Held,
     connect: Connect | None,
 ) -> Answer:
     respondents = respondents_of(row.contestant)
     treatment = treatment_of(row.contestant, respondents)
     options = treatment.options
-    if not leases.note_options(held=held, options=options.to_document()):
-        raise LeaseLost(f"attempt {held.attempt_number} has lost its row")
+    held.note(options=options.to_document())
     sites = {respondent.endpoint.pk: respondent.endpoint for respondent in respondents.values()}
     with ExitStack() as opened:
         clients = {
@@ -314,20 +345,5 @@ def _client_for(respondent: Respondent, clients: dict[int, ChatClient]) -> Respo
     )
 
 
-def _settlement(answer: Answer, *, image: str) -> leases.Settlement:
-    if answer.state == State.FAILED:
-        return _failed(answer.reason)
-    document = None
-    if answer.modification is not None:
-        document = modification_to_document(answer.modification)
-    return leases.Settlement(
-        state=answer.state,
-        reason=answer.reason,
-        modification=document,
-        notes=answer.notes,
-        image=image,
-    )
-
-
-def _failed(reason: str) -> leases.Settlement:
-    return leases.Settlement(state=State.FAILED, reason=reason)
+def _failed(reason: str) -> Settlement:
+    return Settlement(state=State.FAILED, reason=reason)

@@ -43,7 +43,7 @@ class JobCounts:
     @property
     def under_way(self) -> int:
         """What still waits or runs."""
-        return sum(self.by_state[state] for state in Augmentation.UNDER_WAY)
+        return sum(self.by_state[state] for state in (State.QUEUED, State.RUNNING))
 
     @property
     def is_moving(self) -> bool:

@@ -18,7 +18,6 @@ from django.utils import timezone
 from augment.errors import (
     BudgetSpent,
     DatabaseLocked,
-    JobCancelled,
     LeaseLost,
     ModelFault,
     NotSent,
@@ -28,9 +27,11 @@ from augment.llm.fingerprint import image_reference, request_hash
 from augment.llm.messages import Reply, Request
 from augment.models import Augmentation, Endpoint, GenerationJob, ModelCall, TranscriptNote
 from augment.services.endpoints.prices import price_of
-from augment.services.running import answers, budget, leases, stopping
+from augment.services.running import answers, budget, stopping
+from augment.services.running.attempts import insist_wanted
 from augment.services.scenarios.pictures import store
 from augment.services.texts import make_document_storable, make_storable
+from augment.services.work import Lease
 from augment.variants.transcript import ModelRole, NoteKind
 
 IMAGES = "asked"
@@ -71,7 +72,7 @@ class RowTranscript:
 
     def __init__(
         self,
-        held: leases.Lease,
+        held: Lease[Augmentation],
         row: Augmentation,
         endpoint: Endpoint,
         *,
@@ -80,6 +81,7 @@ class RowTranscript:
         sleep: Callable[[float], None] = time.sleep,
     ) -> None:
         self._held = held
+        self._attempt = row.attempts.latest("number")
         self._row = row
         self._endpoint = endpoint
         self._others = dict(others or {})
@@ -101,14 +103,14 @@ class RowTranscript:
         earlier = answers.find_earlier_answer(
             request_hash=columns["request_hash"],
             augmentation_pk=self._row.pk,
-            attempt_pk=self._held.attempt_pk,
+            attempt_pk=self._attempt.pk,
             is_fresh=self._row.job.is_fresh,
             since=self._row.asked_anew_at,
         )
         if earlier is None:
             return None
         with transaction.atomic():
-            self._insist_on_claim()
+            insist_wanted(self._held, lock=True)
             ModelCall.objects.create(
                 **columns,
                 **answers.columns_of_copy(earlier, now=timezone.now()),
@@ -158,7 +160,7 @@ class RowTranscript:
         stopping.insist_on_going_on()
         call = ModelCall.objects.filter(pk=self._open[number].pk, settled_at=None)
         if not call.update(sent_at=timezone.now()):
-            raise LeaseLost(f"attempt {self._held.attempt_number} has lost its row")
+            raise LeaseLost
 
     def answered(self, number: int, reply: Reply, fault: ModelFault | None = None) -> None:
         """Store the raw answer to that call and what it used.
@@ -185,7 +187,7 @@ class RowTranscript:
         """Store what happened since the last call."""
         self._notes += 1
         TranscriptNote.objects.create(
-            attempt_id=self._held.attempt_pk,
+            attempt=self._attempt,
             number=self._notes,
             after_call=self._numbers,
             kind=kind,
@@ -222,7 +224,7 @@ class RowTranscript:
             return self._last[3]
         document = make_document_storable(request.to_document(image_url=image_reference))
         columns = {
-            "attempt_id": self._held.attempt_pk,
+            "attempt": self._attempt,
             "role": role,
             "request": document,
             "request_hash": request_hash(
@@ -241,7 +243,7 @@ class RowTranscript:
         self, columns: dict[str, Any], worst: WorstCase, price: Price | None
     ) -> tuple[budget.Room, int]:
         """Take room and write the row in one transaction, or nothing of both."""
-        self._insist_on_claim()
+        insist_wanted(self._held, lock=True)
         room = budget.reserve(job_pk=self._row.job_id, worst=worst, price=price)
         if room != budget.Room.TAKEN:
             return room, 0
@@ -253,12 +255,6 @@ class RowTranscript:
             reserved_nano_usd=worst.nano_usd(price),
         )
         return room, call.pk
-
-    def _insist_on_claim(self) -> None:
-        if not leases.is_held(held=self._held, lock=True):
-            raise LeaseLost(f"attempt {self._held.attempt_number} has lost its row")
-        if leases.is_cancelled(held=self._held):
-            raise JobCancelled
 
     def _at(self, role: ModelRole) -> Endpoint:
         return self._others.get(role, self._endpoint)

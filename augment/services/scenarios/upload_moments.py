@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import logging
 from pathlib import Path
 from typing import Any
 
 from django.contrib.auth.models import User
 from django.db import transaction
-from django.db.models import F
 
 from augment.errors import AugmentError, Conflict
 from augment.formats.reading import Reading
@@ -18,21 +16,12 @@ from augment.render.camera import camera_for
 from augment.scene.modification import Modification
 from augment.scene.notes import notes_from_document, notes_to_document
 from augment.sentences import Sentence, sentence
-from augment.services.clock import DATABASE_TIME, Moment
 from augment.services.scenarios.pictures import store_as
 from augment.services.scenarios.scene_imports import keep_reading
 from augment.services.scenarios.scene_notes import said_of
 from augment.services.scenarios.scenes import check_slug
-from augment.services.scenarios.upload_heartbeat import heartbeat, is_silent, lost_since
-from augment.services.scenarios.uploads import (
-    LONGEST_REASON,
-    MOST_ATTEMPTS,
-    OUR_FAULT,
-    open_upload,
-)
-from augment.services.texts import make_storable
-
-logger = logging.getLogger(__name__)
+from augment.services.scenarios.uploads import open_upload
+from augment.services.work import Lease, Settlement, WorkKind
 
 State = UploadMoment.State
 PREVIEWS = "previews"
@@ -54,13 +43,7 @@ def ask_for_moment(
     row, is_new = UploadMoment.objects.get_or_create(
         upload=upload, item=item, frame=frame, defaults={"asked_by": actor}
     )
-    if row.state == State.FAILED:
-        UploadMoment.objects.filter(pk=row.pk, state=State.FAILED).update(
-            state=State.QUEUED, reason="", attempts=0, sent_at=None
-        )
-        row.refresh_from_db()
-        is_new = True
-    return row, is_new
+    return row, row.wait_again(state=State.QUEUED) or is_new
 
 
 @transaction.atomic
@@ -73,20 +56,28 @@ def ask_to_keep(row: UploadMoment, *, slug: str, actor: User | None = None) -> N
     """
     check_slug(slug, what="scene")
     drawn = UploadMoment.objects.filter(pk=row.pk, state=State.DRAWN)
-    asked = drawn.update(
-        state=State.KEEPING, slug=slug, reason="", attempts=0, asked_by=actor, sent_at=None
-    )
+    asked = drawn.update(state=State.KEEPING, slug=slug, reason="", asked_by=actor, sent_at=None)
     if not asked:
         raise Conflict(sentence("This moment can't be kept now: look at its state."))
 
 
-def work_on_moment(moment_pk: int) -> None:
-    """What a worker does: draw a moment, or keep it; a second time nothing is left to do."""
-    row = _begin(moment_pk)
-    if row is None:
-        return
-    with heartbeat(row):
-        _draw_or_keep(row)
+class Moments(WorkKind[UploadMoment]):
+    """Moments of recordings: drawn, or kept as scenes."""
+
+    model = UploadMoment
+    related = ("upload", "asked_by")
+
+    def run(self, row: UploadMoment, held: Lease[UploadMoment]) -> Settlement:
+        """Draw it, or keep it; what can't be kept stays drawn."""
+        if row.state == State.QUEUED:
+            return _drawn(row)
+        try:
+            return _kept(row)
+        except AugmentError as error:
+            return Settlement(state=State.DRAWN, reason=str(error))
+
+
+MOMENTS = Moments()
 
 
 def sentences_of(row: UploadMoment) -> list[Sentence]:
@@ -94,57 +85,27 @@ def sentences_of(row: UploadMoment) -> list[Sentence]:
     return [said_of(note) for note in notes_from_document((row.report or {}).get("notes", []))]
 
 
-def find_lost(*, now: Moment = DATABASE_TIME) -> list[int]:
-    """Moments whose message never came, or whose worker ended over them."""
-    lost = UploadMoment.objects.filter(lost_since(now), state__in=UploadMoment.WAITING)
-    return list(lost.values_list("pk", flat=True))
-
-
-def mark_sent(moment_pk: int, *, now: Moment = DATABASE_TIME) -> None:
-    """Remember when the message of a moment was sent."""
-    UploadMoment.objects.filter(pk=moment_pk).update(sent_at=now)
-
-
 # --- Private -----------------------------------------------------------------------------------
 
 
-def _begin(moment_pk: int) -> UploadMoment | None:
-    waiting = UploadMoment.objects.filter(pk=moment_pk, state__in=UploadMoment.WAITING)
-    begun = {"attempts": F("attempts") + 1, "heartbeat_at": DATABASE_TIME}
-    if not waiting.filter(is_silent()).update(**begun):
-        return None
-    row = UploadMoment.objects.select_related("upload", "asked_by").get(pk=moment_pk)
-    if row.attempts > MOST_ATTEMPTS:
-        _end(row, state=State.FAILED, reason=f"{MOST_ATTEMPTS} workers ended while reading it.")
-        return None
-    return row
+def _drawn(row: UploadMoment) -> Settlement:
+    _, reading = _read(row, "preview")
+    picture = f"{PREVIEWS}/{row.code}.png"
+    store_as(picture, draw(reading.scene, Modification(), camera_for(reading.scene, None)))
+    columns = {"picture": picture, "report": _report(reading)}
+    return Settlement(state=State.DRAWN, columns=columns)
 
 
-def _draw_or_keep(row: UploadMoment) -> None:
-    wants_scene = row.state == State.KEEPING
-    try:
-        name = row.slug if wants_scene else "preview"
-        with open_upload(row.upload) as file:
-            source, reading = file.read(item=row.item or None, frame=row.frame, name=name)
-        if wants_scene:
-            path = Path(row.upload.name)
-            scene, _ = keep_reading(reading, source=source, path=path, actor=row.asked_by)
-            _end(row, state=State.KEPT, scene=scene)
-            return
-        picture = f"{PREVIEWS}/{row.code}.png"
-        camera = camera_for(reading.scene, None)
-        store_as(picture, draw(reading.scene, Modification(), camera))
-        _end(row, state=State.DRAWN, picture=picture, report=_report(reading))
-    except AugmentError as error:
-        reason = make_storable(str(error))[:LONGEST_REASON]
-        _end(row, state=State.DRAWN if wants_scene else State.FAILED, reason=reason)
-    except Exception:
-        logger.exception("A moment of upload %s could not be read", row.upload.code)
-        _end(row, state=State.FAILED, reason=OUR_FAULT)
+def _kept(row: UploadMoment) -> Settlement:
+    source, reading = _read(row, row.slug)
+    path = Path(row.upload.name)
+    scene, _ = keep_reading(reading, source=source, path=path, actor=row.asked_by)
+    return Settlement(state=State.KEPT, columns={"scene": scene})
 
 
-def _end(row: UploadMoment, **columns: Any) -> None:
-    UploadMoment.objects.filter(pk=row.pk, state=row.state).update(heartbeat_at=None, **columns)
+def _read(row: UploadMoment, name: str) -> tuple[str, Reading]:
+    with open_upload(row.upload) as file:
+        return file.read(item=row.item or None, frame=row.frame, name=name)
 
 
 def _report(reading: Reading) -> dict[str, Any]:

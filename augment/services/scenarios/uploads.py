@@ -1,14 +1,8 @@
-"""Recordings that came by a page: kept as files, read by workers, kept as scenes.
-
-A worker that ends over a file leaves its row under way, and is not heard from any more; the row is
-begun again, and given up once `MOST_ATTEMPTS` workers ended over it, so that no file can kill one
-worker after the other.
-"""
+"""Recordings that came by a page: kept as files, read by workers, kept as scenes."""
 
 from __future__ import annotations
 
 import hashlib
-import logging
 import re
 import shutil
 import tempfile
@@ -22,28 +16,19 @@ from django.contrib.auth.models import User
 from django.core.files.base import File
 from django.core.files.storage import default_storage
 from django.db import transaction
-from django.db.models import F
-from django.utils import timezone
 
-from augment.errors import AugmentError, Conflict, InvalidDocument
+from augment.errors import Conflict, InvalidDocument
 from augment.formats.apart import UntrustedInput
 from augment.formats.readers import READERS, reader_of
 from augment.formats.timeline import RecordingPart, Timeline
 from augment.models import SceneUpload
 from augment.sentences import sentence
-from augment.services.clock import DATABASE_TIME, Moment
 from augment.services.events import log_event
-from augment.services.scenarios.upload_heartbeat import heartbeat, is_silent, lost_since
-from augment.services.texts import make_storable
-
-logger = logging.getLogger(__name__)
+from augment.services.work import Lease, Settlement, WorkKind
 
 State = SceneUpload.State
 
 FOLDER = "uploads"
-MOST_ATTEMPTS = 2
-LONGEST_REASON = 2_000
-OUR_FAULT = "The program itself failed on this file; the worker's log says more."
 
 FORMATS = {reader.name: reader.title for reader in READERS.values()}
 """By name, what can be read."""
@@ -107,25 +92,29 @@ def remove_upload(row: SceneUpload, actor: User | None = None) -> None:
         transaction.on_commit(lambda name=name: default_storage.delete(name))  # type: ignore[misc]
 
 
-@transaction.atomic
 def read_again(row: SceneUpload) -> None:
     """Let a failed upload wait once more.
 
     Raises:
         Conflict: It did not fail.
     """
-    again = SceneUpload.objects.filter(pk=row.pk, state=State.FAILED)
-    if not again.update(state=State.QUEUED, reason="", attempts=0, sent_at=None):
+    if not row.wait_again():
         raise Conflict(sentence("“%(name)s” did not fail.", name=row.name))
 
 
-def read_upload(upload_pk: int) -> None:
-    """What a worker does: find out what a file is and holds; a second time nothing is left."""
-    row = _begin(upload_pk)
-    if row is None:
-        return
-    with heartbeat(row):
-        _find_out(row)
+class Uploads(WorkKind[SceneUpload]):
+    """Recordings that were sent: what each is, and what it holds."""
+
+    model = SceneUpload
+
+    def run(self, row: SceneUpload, held: Lease[SceneUpload]) -> Settlement:
+        """Look into the file."""
+        with open_upload(row) as source:
+            name, timeline = source.look()
+        return Settlement(state=State.READ, columns={"format": name, **_columns(timeline)})
+
+
+UPLOADS = Uploads()
 
 
 @contextmanager
@@ -152,47 +141,7 @@ def plain_name(name: str) -> str:
     return plain if len(plain) <= 100 else plain[:60] + plain[-40:]
 
 
-def find_lost(*, now: Moment = DATABASE_TIME) -> list[int]:
-    """Uploads whose message never came, or whose worker ended over them."""
-    lost = SceneUpload.objects.filter(lost_since(now), state__in=SceneUpload.WAITING)
-    return list(lost.values_list("pk", flat=True))
-
-
-def mark_sent(upload_pk: int, *, now: Moment = DATABASE_TIME) -> None:
-    """Remember when the message of an upload was sent."""
-    SceneUpload.objects.filter(pk=upload_pk).update(sent_at=now)
-
-
 # --- Private -----------------------------------------------------------------------------------
-
-
-def _begin(upload_pk: int) -> SceneUpload | None:
-    waiting = SceneUpload.objects.filter(pk=upload_pk, state__in=SceneUpload.WAITING)
-    begun = {"state": State.RUNNING, "attempts": F("attempts") + 1, "heartbeat_at": DATABASE_TIME}
-    if not waiting.filter(is_silent()).update(**begun):
-        return None
-    row = SceneUpload.objects.get(pk=upload_pk)
-    if row.attempts > MOST_ATTEMPTS:
-        _end(row, state=State.FAILED, reason=f"{MOST_ATTEMPTS} workers ended while reading it.")
-        return None
-    return row
-
-
-def _find_out(row: SceneUpload) -> None:
-    try:
-        with open_upload(row) as source:
-            name, timeline = source.look()
-        _end(row, state=State.READ, reason="", format=name, **_columns(timeline))
-    except AugmentError as error:
-        _end(row, state=State.FAILED, reason=make_storable(str(error))[:LONGEST_REASON])
-    except Exception:
-        logger.exception("Upload %s could not be read", row.code)
-        _end(row, state=State.FAILED, reason=OUR_FAULT)
-
-
-def _end(row: SceneUpload, **columns: Any) -> None:
-    running = SceneUpload.objects.filter(pk=row.pk, state=State.RUNNING)
-    running.update(finished_at=timezone.now(), heartbeat_at=None, **columns)
 
 
 def _columns(found: Timeline) -> dict[str, Any]:

@@ -1,0 +1,335 @@
+"""How workers work: a row is taken, kept by a heartbeat, brought to an outcome, or given back.
+
+In: the key of a `Work` row, by a message that may come twice or never. Out: its outcome. One
+conditional UPDATE decides who works on a row, never a message. A lease without a heartbeat is
+taken back, so that the row waits again. What time it is says the database, so that workers whose
+clocks differ judge a lease alike.
+"""
+
+from __future__ import annotations
+
+import logging
+import uuid
+from abc import ABC, abstractmethod
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from datetime import timedelta
+from enum import StrEnum
+from threading import Event
+from typing import Any, Generic, TypeVar
+
+from django.conf import settings
+from django.db import Error, connection, transaction
+from django.db.models import Q, QuerySet
+
+from augment.errors import AugmentError, BudgetSpent, LeaseLost, WorkerStopping
+from augment.llm.cutting import shorten
+from augment.models import FAILED, Work
+from augment.services.clock import DATABASE_TIME, Moment
+from augment.services.repeating import repeating
+from augment.services.texts import LONGEST_REASON, make_storable
+
+logger = logging.getLogger(__name__)
+
+Row = TypeVar("Row", bound=Work)
+
+FREE: Mapping[str, Any] = {"claim": None, "heartbeat_at": None}
+
+
+class TryEnd(StrEnum):
+    """How a worker's try can end beside the outcomes of its row."""
+
+    LOST = "lost"
+    RELEASED = "released"
+    STOPPED = "stopped at cap"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Settlement:
+    """What became of a row.
+
+    Attributes:
+        state: One that is not under way.
+        reason: Why there is no result, as a sentence; empty where there is one.
+        columns: What else is written.
+    """
+
+    state: str
+    reason: str = ""
+    columns: Mapping[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Lease(Generic[Row]):
+    """The right to write one row, as long as it carries the token."""
+
+    kind: WorkKind[Row]
+    pk: int
+    token: uuid.UUID
+    _is_lost: Event = field(default_factory=Event, repr=False, compare=False)
+
+    @property
+    def row(self) -> QuerySet[Row]:
+        """The row, if it is still the holder's."""
+        return self.kind.rows.filter(pk=self.pk, claim=self.token)
+
+    def renew(self, *, now: Moment = DATABASE_TIME) -> bool:
+        """Say that the holder is alive; False when the lease is lost."""
+        return bool(self.row.update(heartbeat_at=now))
+
+    def is_held(self, *, lock: bool = False) -> bool:
+        """Whether the row still carries the token; locked, it does until the transaction ends."""
+        if lock:
+            return self.row.select_for_update().values_list("pk").first() is not None
+        return self.row.exists()
+
+    def insist(self) -> None:
+        """Raise LeaseLost if a heartbeat has found the lease taken back; asks no database."""
+        if self._is_lost.is_set():
+            raise LeaseLost
+
+    def note(self, **columns: Any) -> None:
+        """Write what is known before the outcome.
+
+        Raises:
+            LeaseLost: The row is somebody else's now.
+        """
+        if not self.row.update(**columns):
+            raise LeaseLost
+
+    @transaction.atomic
+    def settle(self, outcome: Settlement, *, now: Moment = DATABASE_TIME) -> bool:
+        """Write the outcome; False when the lease is lost, and then nothing is written."""
+        reason = shorten(make_storable(outcome.reason), LONGEST_REASON)
+        ended = {"state": outcome.state, "reason": reason, "finished_at": now, "lost": 0, **FREE}
+        if not self.row.update(**ended, **outcome.columns):
+            logger.warning("Dropped the result of %s: its lease was taken back.", self)
+            return False
+        self.kind.ended(self.pk, outcome.state, reason, now)
+        return True
+
+    @transaction.atomic
+    def release(
+        self, *, now: Moment = DATABASE_TIME, end: TryEnd = TryEnd.RELEASED, reason: str = ""
+    ) -> bool:
+        """Let the unfinished row wait again; False when the lease is lost already."""
+        again = {**self.kind.model.GIVEN_BACK, **FREE, "sent_at": None, "lost": 0}
+        if not self.row.update(**again):
+            return False
+        self.kind.ended(self.pk, end, shorten(make_storable(reason), LONGEST_REASON), now)
+        return True
+
+    @contextmanager
+    def kept_alive(self) -> Iterator[None]:
+        """Beat until the block is left, or until the lease is lost."""
+        with repeating(self._beat, every_s=settings.HEARTBEAT_S, name="heartbeat"):
+            yield
+
+    def _beat(self) -> bool:
+        """One beat; a database that can't take it now gets the next one."""
+        try:
+            is_ours = self.renew()
+        except Error as error:
+            logger.warning("No heartbeat for %s: %s", self, error)
+            connection.close()
+            return True
+        if not is_ours:
+            self._is_lost.set()
+            logger.warning("%s is somebody else's now.", self)
+        return is_ours
+
+    def __str__(self) -> str:
+        return f"{self.kind.name} {self.pk}"
+
+
+class WorkKind(ABC, Generic[Row]):
+    """One kind of work: its rows, what is done with one, and the machine that all kinds share.
+
+    Attributes:
+        model: The rows.
+        queue: Where its messages wait.
+        lost_limit: So many workers in a row may be lost over one row; then it fails, so that no
+            row kills one worker after the other.
+        related: What is read together with a row.
+    """
+
+    model: type[Row]
+    queue = "drawing"
+    lost_limit = 2
+    related: tuple[str, ...] = ()
+
+    # --- What a kind says of itself ---
+
+    @abstractmethod
+    def run(self, row: Row, held: Lease[Row]) -> Settlement | None:
+        """Do the work. Returns the outcome; None where it is written already.
+
+        Raises:
+            AugmentError: Why the row fails.
+            LeaseLost: The row is somebody else's now.
+            WorkerStopping, BudgetSpent: Nothing more is done now; the row waits again.
+        """
+
+    def waiting(self) -> QuerySet[Row]:
+        """The rows that may be taken."""
+        return self.rows.filter(state__in=self.model.UNDER_WAY, claim=None)
+
+    def sendable(self) -> QuerySet[Row]:
+        """The rows that workers are told of."""
+        return self.waiting()
+
+    def begun(self, pk: int, worker: str, now: Moment) -> None:
+        """Note that a worker has taken a row; in the same transaction."""
+
+    def ended(self, pk: int, end: str, reason: str, now: Moment) -> None:
+        """Note how a try ended: with an outcome or a TryEnd; in the same transaction."""
+
+    def over(self, row: Row, outcome: Settlement | None) -> None:
+        """Follow up a try, whose outcome is committed if there is one."""
+
+    def outcome_of_loss(self, row: Row) -> Settlement | None:
+        """What becomes of a row that has lost its worker; None where it waits again."""
+        if row.lost + 1 < self.lost_limit:
+            return None
+        if self.lost_limit == 1:
+            return Settlement(state=FAILED, reason="Its worker was lost; start it again.")
+        lost = f"Lost {row.lost + 1} workers in a row at this one"
+        return Settlement(state=FAILED, reason=f"{lost}; look for the cause, then retry.")
+
+    def tidy(self, now: Moment) -> None:
+        """Bring in order what else a lost worker may leave behind."""
+
+    # --- What all kinds share ---
+
+    @property
+    def name(self) -> str:
+        """As messages and logs say it."""
+        return str(self.model._meta.model_name)
+
+    @property
+    def rows(self) -> QuerySet[Row]:
+        """All of them."""
+        return self.model._default_manager.all()
+
+    @transaction.atomic
+    def take(self, pk: int, *, now: Moment = DATABASE_TIME, worker: str = "") -> Lease[Row] | None:
+        """Take a waiting row.
+
+        Returns:
+            The lease, or None where the row does not wait (any more): a second delivery of a
+            message does nothing therefore.
+        """
+        token = uuid.uuid4()
+        taken = {**self.model.STARTED, "claim": token, "heartbeat_at": now, "finished_at": None}
+        if not self.waiting().filter(pk=pk).update(**taken):
+            return None
+        self.begun(pk, worker, now)
+        return Lease(kind=self, pk=pk, token=token)
+
+    def perform(self, pk: int, *, worker: str = "") -> bool:
+        """Take a row and work on it. Returns whether it could be taken."""
+        held = self.take(pk, worker=worker)
+        if held is None:
+            return False
+        self.work(held)
+        return True
+
+    def work(self, held: Lease[Row]) -> None:
+        """Work on a row that was taken."""
+        row = self.rows.select_related(*self.related).get(pk=held.pk)
+        settled = None
+        try:
+            with held.kept_alive(), outcome_on_crash(held):
+                outcome = self.run(row, held)
+                if outcome is not None and held.settle(outcome):
+                    settled = outcome
+        finally:
+            self.over(row, settled)
+
+    def take_back_lost(self, *, now: Moment = DATABASE_TIME) -> list[int]:
+        """Take back every lease that has gone silent; returns the rows that wait again."""
+        return [row.pk for row in self._silent(now) if self._take_back(row, now)]
+
+    def find_unsent(
+        self, *, older_than: timedelta, now: Moment = DATABASE_TIME, only: Q | None = None
+    ) -> list[int]:
+        """Waiting rows without a message, or with one that old."""
+        is_lost = Q(sent_at=None) | Q(sent_at__lte=now - older_than)
+        unsent = self.sendable().filter(is_lost, only or Q())
+        return list(unsent.order_by("pk").values_list("pk", flat=True))
+
+    def mark_sent(self, pks: Iterable[int], *, now: Moment = DATABASE_TIME) -> None:
+        """Remember when the messages of these rows were sent."""
+        change_all(self.rows.filter(pk__in=list(pks)), sent_at=now)
+
+    def _silent(self, now: Moment) -> QuerySet[Row]:
+        """Rows whose holders have not been heard for too long."""
+        since = now - timedelta(seconds=settings.STALE_AFTER_S)
+        return self.rows.filter(claim__isnull=False, heartbeat_at__lt=since)
+
+    @transaction.atomic
+    def _take_back(self, seen: Row, now: Moment) -> bool:
+        """End a silent lease, unless its holder was heard since; True when the row waits again."""
+        outcome = self.outcome_of_loss(seen)
+        changes: dict[str, Any] = {**self.model.GIVEN_BACK, "sent_at": None, "lost": seen.lost + 1}
+        if outcome is not None:
+            changes = {"state": outcome.state, "finished_at": now, "lost": 0, **outcome.columns}
+            changes |= {"reason": outcome.reason}
+        row = self._silent(now).filter(pk=seen.pk, claim=seen.claim)
+        if not row.update(**FREE, **changes):
+            return False
+        self.ended(seen.pk, TryEnd.LOST, "The worker stopped without a word.", now)
+        logger.warning("Took back %s %d: silent since %s.", self.name, seen.pk, seen.heartbeat_at)
+        return outcome is None
+
+
+KINDS: dict[str, WorkKind[Any]] = {}
+"""Every kind by its name, as far as this process has loaded them."""
+
+
+def register(*kinds: WorkKind[Any]) -> None:
+    """Let workers take these kinds, and bring back what is lost of them."""
+    KINDS.update({kind.name: kind for kind in kinds})
+
+
+@contextmanager
+def outcome_on_crash(held: Lease[Any]) -> Iterator[None]:
+    """Leave no row hanging when the work on it breaks.
+
+    An error with a sentence fails the row with it, one that nobody foresaw with its class and
+    text. A worker that is told to stop (WorkerStopping, SystemExit, KeyboardInterrupt) gives the
+    row back, and so does one whose job has no room for the next call. A lost lease ends quietly:
+    the new holder brings the outcome.
+    """
+    try:
+        yield
+    except LeaseLost as error:
+        logger.warning("Stopped work on %s: %s", held, error)
+    except WorkerStopping as error:
+        logger.info("Gave %s back: %s.", held, error)
+        held.release(reason=str(error))
+    except BudgetSpent as error:
+        held.release(end=TryEnd.STOPPED, reason=str(error))
+    except AugmentError as error:
+        held.settle(Settlement(state=FAILED, reason=str(error)))
+    except Exception as error:
+        logger.exception("Work on %s broke.", held)
+        reason = f"unexpected: {type(error).__name__}: {error}"
+        held.settle(Settlement(state=FAILED, reason=reason))
+    except BaseException:
+        held.release()
+        raise
+
+
+@transaction.atomic
+def change_all(rows: QuerySet[Any], **changes: Any) -> int:
+    """Write the same into many rows; how many there were.
+
+    Held in the order of their numbers, so that of two who change the same rows none waits for the
+    other in a circle: an UPDATE takes them as they lie. Who also changes their job does that
+    afterwards, as those do who settle a single row.
+    """
+    held = rows.order_by("pk").select_for_update(no_key=True)
+    list(held.values_list("pk", flat=True))
+    return rows.update(**changes)

@@ -1,0 +1,262 @@
+"""The machine that all kinds of work share, over every kind; on PostgreSQL as well."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from datetime import timedelta
+from threading import Barrier
+from typing import Any
+
+import pytest
+from django.apps import apps
+from django.db import connection
+from django.utils import timezone
+from pytest_django import Settings
+
+from arena import tasks
+from arena.models import ScenarioFile, StudyFile
+from arena.services.ratings import plan_snapshot
+from arena.services.studies import close_study
+from augment.errors import BudgetSpent, Conflict, LeaseLost, WorkerStopping
+from augment.models import SceneUpload, Simulation, UploadMoment, Work
+from augment.services.endpoints.known_endpoints import ensure_endpoint
+from augment.services.endpoints.known_models import model_at
+from augment.services.endpoints.probing import plan_probe
+from augment.services.judging import simulations
+from augment.services.running.intent_readings import plan_reading
+from augment.services.work import KINDS, Lease, Settlement, WorkKind
+from tests.jobs.rows import NOON, add_scenario, launch, only_row
+from tests.processes import wait_until
+from tests.study_rows import a_study
+
+pytestmark = pytest.mark.django_db
+LATER = NOON + timedelta(seconds=30)
+MINUTE = timedelta(minutes=1)
+
+
+def an_upload(**columns: Any) -> SceneUpload:
+    return SceneUpload.objects.create(name="log.zip", size_bytes=1, digest="0", **columns)
+
+
+def a_drive() -> Work:
+    scenario, options = add_scenario("street"), simulations.Options()
+    pks = simulations.plan_scenario(scenario=scenario, options=options)
+    return Simulation.objects.get(pk=pks[0])
+
+
+def a_reading() -> Work:
+    add_scenario("street")
+    ensure_endpoint(label="here", base_url="http://127.0.0.1:1/v1")
+    return plan_reading(scenario="street", endpoint="here", model="m")
+
+
+def a_probe() -> Work:
+    return plan_probe(
+        model_at(endpoint=ensure_endpoint(label="h", base_url="http://h"), model="m")
+    )
+
+
+WAITING: dict[str, Callable[[], Work]] = {
+    "augmentation": lambda: only_row(launch()),
+    "intentreading": a_reading,
+    "probe": a_probe,
+    "scenariofile": lambda: ScenarioFile.objects.create(job=launch(), format="json"),
+    "sceneupload": an_upload,
+    "simulation": a_drive,
+    "snapshot": lambda: plan_snapshot(study=close_study(study=a_study()), rounds=10),
+    "studyfile": lambda: StudyFile.objects.create(study=a_study(), kind="study"),
+    "uploadmoment": lambda: UploadMoment.objects.create(upload=an_upload(state="read")),
+}
+"""How a row of each kind comes to wait."""
+
+
+def test_every_kind_is_known_to_workers() -> None:
+    assert tasks is not None
+    assert KINDS.keys() == WAITING.keys()
+    every = {model for model in apps.get_models() if issubclass(model, Work)}
+    assert {kind.model for kind in KINDS.values()} == every
+
+
+@pytest.fixture(params=sorted(WAITING))
+def kind(request: pytest.FixtureRequest) -> WorkKind[Any]:
+    return KINDS[request.param]
+
+
+@pytest.fixture
+def row(kind: WorkKind[Any]) -> Work:
+    return WAITING[kind.name]()
+
+
+def taken(kind: WorkKind[Any], row: Work, now: Any = NOON) -> Lease[Any]:
+    held = kind.take(row.pk, now=now)
+    assert held is not None
+    row.refresh_from_db()
+    return held
+
+
+def test_a_waiting_row_is_taken_once_and_settled_once(kind: WorkKind[Any], row: Work) -> None:
+    held = taken(kind, row)
+    assert (row.state in row.UNDER_WAY, row.claim, row.heartbeat_at) == (True, held.token, NOON)
+    assert kind.take(row.pk, now=NOON) is None
+    assert kind.take(row.pk + 1000, now=NOON) is None
+    assert held.settle(Settlement(state="failed", reason="no\0 luck"), now=LATER)
+    assert not held.settle(Settlement(state="failed", reason="twice"), now=LATER)
+    row.refresh_from_db()
+    assert (row.state, row.reason, row.finished_at) == ("failed", "no\u2400 luck", LATER)
+    assert (row.claim, row.heartbeat_at) == (None, None)
+    assert kind.take(row.pk, now=LATER) is None
+
+
+def test_a_heartbeat_keeps_a_lease(kind: WorkKind[Any], row: Work) -> None:
+    held = taken(kind, row)
+    assert held.renew(now=NOON + timedelta(seconds=15))
+    assert kind.take_back_lost(now=LATER) == []
+    assert held.is_held()
+
+
+def test_who_lost_a_lease_writes_nothing(
+    kind: WorkKind[Any], row: Work, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(kind, "lost_limit", 5)
+    kind.mark_sent([row.pk], now=NOON)
+    slow = taken(kind, row)
+    assert kind.take_back_lost(now=LATER) == [row.pk]
+    row.refresh_from_db()
+    assert (row.claim, row.heartbeat_at, row.sent_at, row.lost) == (None, None, None, 1)
+    current = taken(kind, row, LATER)
+    assert not slow.renew(now=LATER)
+    assert not slow.is_held()
+    assert not slow.settle(Settlement(state="failed"), now=LATER)
+    assert not slow.release(now=LATER)
+    with pytest.raises(LeaseLost):
+        slow.note(reason="mine")
+    assert current.settle(Settlement(state="failed"), now=LATER)
+
+
+def test_a_row_that_ends_worker_after_worker_fails_and_may_be_tried_again(
+    kind: WorkKind[Any], row: Work
+) -> None:
+    for number in range(1, kind.lost_limit + 1):
+        now = NOON + number * MINUTE
+        taken(kind, row, now)
+        waits_again = kind.take_back_lost(now=now + timedelta(seconds=30))
+        assert bool(waits_again) == (number < kind.lost_limit)
+    row.refresh_from_db()
+    assert (row.state, row.claim, row.lost, "ost" in row.reason) == ("failed", None, 0, True)
+    assert row.wait_again(**({"state": "queued"} if kind.name == "uploadmoment" else {}))
+    assert (row.state in row.UNDER_WAY, row.reason, row.sent_at) == (True, "", None)
+    assert not row.wait_again()
+
+
+def test_a_row_that_is_given_back_waits_without_a_message(kind: WorkKind[Any], row: Work) -> None:
+    before = row.state
+    kind.mark_sent([row.pk], now=NOON)
+    assert taken(kind, row).release(now=LATER)
+    row.refresh_from_db()
+    assert (row.state, row.claim, row.sent_at) == (before, None, None)
+
+
+def test_rows_without_a_message_or_with_an_old_one_are_unsent(
+    kind: WorkKind[Any], row: Work
+) -> None:
+    age = timedelta(minutes=10)
+    assert row.pk in kind.find_unsent(now=NOON, older_than=age)
+    kind.mark_sent([row.pk], now=NOON - MINUTE)
+    assert row.pk not in kind.find_unsent(now=NOON, older_than=age)
+    kind.mark_sent([row.pk], now=NOON - 11 * MINUTE)
+    assert row.pk in kind.find_unsent(now=NOON, older_than=age)
+    taken(kind, row)
+    assert row.pk not in kind.find_unsent(now=NOON, older_than=age)
+
+
+@pytest.mark.parametrize(
+    ("error", "state", "reason"),
+    [
+        (Conflict("It changed."), "failed", "It changed."),
+        (KeyError("nobody foresaw this"), "failed", "unexpected: KeyError: 'nobody foresaw this'"),
+        (WorkerStopping("it stops"), None, ""),
+        (BudgetSpent("5 calls"), None, ""),
+        (LeaseLost(), "held", ""),
+    ],
+)
+def test_no_row_hangs_when_the_work_breaks(
+    kind: WorkKind[Any],
+    row: Work,
+    error: Exception,
+    state: str | None,
+    reason: str,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def run(row: Work, held: object) -> None:
+        raise error
+
+    before = row.state
+    monkeypatch.setattr(kind, "run", run)
+    assert kind.perform(row.pk)
+    row.refresh_from_db()
+    assert (row.claim is not None) == (state == "held")
+    if state != "held":
+        assert (row.state, row.reason) == (state or before, reason)
+
+
+def test_a_worker_that_is_killed_gently_gives_its_row_back(
+    kind: WorkKind[Any], row: Work, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def run(row: Work, held: object) -> None:
+        raise SystemExit
+
+    monkeypatch.setattr(kind, "run", run)
+    with pytest.raises(SystemExit):
+        kind.perform(row.pk)
+    row.refresh_from_db()
+    assert (row.claim, row.state in row.UNDER_WAY) == (None, True)
+
+
+# --- Threads -------------------------------------------------------------------------------------
+
+
+@pytest.mark.django_db(transaction=True)
+def test_the_heart_beats_while_the_work_goes_on(settings: Settings) -> None:
+    settings.HEARTBEAT_S = 0.05
+    uploads, row, before = KINDS["sceneupload"], an_upload(), timezone.now() - MINUTE
+    held = taken(uploads, row, before)
+
+    def has_beaten() -> bool:
+        row.refresh_from_db()
+        return row.heartbeat_at is not None and row.heartbeat_at > before
+
+    with held.kept_alive():
+        wait_until(has_beaten, what="the heart has beaten")
+        assert uploads.take_back_lost() == []
+
+
+@pytest.mark.django_db(transaction=True)
+def test_the_heart_stops_with_the_lease_and_the_work_is_told(settings: Settings) -> None:
+    settings.HEARTBEAT_S = 0.01
+    uploads, row = KINDS["sceneupload"], an_upload()
+    held = taken(uploads, row, timezone.now() - MINUTE)
+    held.insist()
+    uploads.take_back_lost()
+    with held.kept_alive():
+        wait_until(lambda: held._is_lost.is_set(), what="it is given up")
+    with pytest.raises(LeaseLost):
+        held.insist()
+
+
+@pytest.mark.django_db(transaction=True)
+def test_of_eight_workers_that_reach_for_one_row_one_gets_it() -> None:
+    row = only_row(launch())
+    start = Barrier(8)
+
+    def reach() -> bool:
+        start.wait()
+        try:
+            return KINDS["augmentation"].take(row.pk) is not None
+        finally:
+            connection.close()
+
+    with ThreadPoolExecutor(8) as pool:
+        got = [future.result() for future in [pool.submit(reach) for _ in range(8)]]
+    assert sorted(got) == [False] * 7 + [True]
+    assert row.attempts.count() == 1
