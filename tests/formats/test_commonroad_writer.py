@@ -12,7 +12,7 @@ import pytest
 from augment.formats.commonroad.writer import write
 from augment.formats.writing import Cell
 from augment.geometry.polyline import Polyline
-from augment.scene.entities import Lane, LaneConnector, TurnType
+from augment.scene.entities import Lane, LaneConnector
 from tests.formats.cells import OF_EACH_TYPE, cell, crossing, recorded_street
 from tests.formats.receivers import told_by
 from tests.recorded import recorded
@@ -90,34 +90,6 @@ def test_a_recorded_edge_keeps_all_its_points() -> None:
     points = [(float(p[0].text or ""), float(p[1].text or "")) for p in bound]
     assert points == [(0.0, 2.0), (30.0, 2.5), (60.0, 2.0)]
     assert any("Lane1 by 0.25 m" in line for line in lines(given))
-
-
-def test_what_is_lost_has_a_line() -> None:
-    u_turn = replace(crossing().connectors[1], turn_type=TurnType.U_TURN, from_lane=None)
-    given = cell(
-        replace(crossing(), connectors=(crossing().connectors[0], u_turn)), added=OF_EACH_TYPE
-    )
-    said = lines(given)
-    for words in (
-        "Area2: left out: a carpark area",
-        "Area3: left out: a walkway area",
-        "Connector2: a U-turn becomes",
-        "Connector2: its turn type is not said",
-        "a sign becomes a constructionZone",
-        "obstacle of unknown type",
-        "only start and end are written; its box of 5.176 x 2.297 m",
-        "drive on the left",
-        "names become numbers",
-        "lights stay as they are",
-    ):
-        assert any(words in line for line in said), (words, said)
-
-
-def test_who_appears_later_is_left_out_by_name() -> None:
-    before, recording = recorded_street()
-    given = cell(before, recording=recording, keeps_traffic=True, added=())
-    assert any("Agent3 is left out: it appears after t0" in line for line in lines(given))
-    assert len(document(given).findall("dynamicObstacle")) == 1
 
 
 def test_a_scene_without_lanes_is_refused_and_the_others_are_written() -> None:

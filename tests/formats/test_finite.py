@@ -18,8 +18,7 @@ from augment.formats.writers import WRITERS, writer_named
 from augment.formats.writing import Cell, Written
 from augment.scene.motion import MotionSource
 from augment.scene.recording import Recording
-from tests.fixtures.shelf import entry, whole_scene
-from tests.formats.cells import OF_EACH_TYPE, cell, crossing, recorded_street
+from tests.formats.cells import cell, crossing, recorded_street
 from tests.formats.receivers import told_by
 from tests.formats.sanity import check_sanity, loaded
 from tests.scenes import curve, junction, scene, vehicle
@@ -70,17 +69,6 @@ def test_no_file_says_nan_whatever_of_the_ego_and_the_others_was_recorded(
     assert not written.refused
     check_finite_files(written)
     assert np.isfinite(made.motion.ego.states).all()
-
-
-@pytest.mark.parametrize("form", sorted(WRITERS))
-def test_scenes_of_the_catalogue_and_of_each_type_say_no_nan(form: str) -> None:
-    authored = entry("roadworks-market-crossing")
-    cells = [
-        cell(stem="street"),
-        cell(crossing(), added=OF_EACH_TYPE, stem="crossing"),
-        cell(whole_scene(authored.scene), stem="whole", added=()),
-    ]
-    check_finite_files(writer_named(form)(cells))
 
 
 @pytest.mark.parametrize("form", sorted(WRITERS))
