@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from augment.sentences import sentence
-
 
 class ArenaError(Exception):
     """The root of arena's own errors: its text is a sentence for the person who caused it."""
@@ -56,11 +54,7 @@ class DatabaseBusy(ArenaError):
 
     def __init__(self) -> None:
         super().__init__(
-            sentence(
-                "The database can't be written just now (it is busy, or its disk is full), so "
-                "nothing was saved. Try again in %(seconds)s s.",
-                seconds=self.retry_after_s,
-            )
+            "The database can't be written just now: it is busy, or its disk is full."
         )
 
 
@@ -103,11 +97,8 @@ class StudyStillOpen(ArenaError):
     def __init__(self, name: str) -> None:
         self.name = name
         super().__init__(
-            sentence(
-                "The study '%(name)s' is still open. Close it first, or look early on purpose: "
-                "that is written to the log.",
-                name=name,
-            )
+            f"The study '{name}' is still open. Close it first, or look early on purpose: "
+            "that is written to the log."
         )
 
 
@@ -142,10 +133,6 @@ class TooManyRequests(ArenaError):
     def __init__(self, most: int, retry_after_s: int) -> None:
         self.retry_after_s = retry_after_s
         super().__init__(
-            sentence(
-                "More than %(most)s requests within %(seconds)s s came with this token. Try again "
-                "in %(seconds)s s.",
-                most=most,
-                seconds=retry_after_s,
-            )
+            f"More than {most} requests within {retry_after_s} s came with this token. Try "
+            f"again in {retry_after_s} s."
         )

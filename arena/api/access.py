@@ -13,7 +13,6 @@ from arena.errors import TokenOver
 from arena.models import ApiToken
 from arena.queries.people import role_of
 from arena.services.api_tokens import use_api_token
-from augment.sentences import sentence
 
 SCHEME = "bearer"
 ADMINS = ("admin",)
@@ -35,7 +34,7 @@ class BearerToken(BaseAuthentication):
         if scheme.lower() != SCHEME:
             return None
         if not secret.strip():
-            raise TokenOver(sentence("No token follows the word Bearer."))
+            raise TokenOver("No token follows the word Bearer.")
         return use_api_token(secret.strip())
 
     def authenticate_header(self, request: Request) -> str:

@@ -33,7 +33,6 @@ from arena.errors import (
 )
 from arena.models import OUTCOME_LETTERS
 from augment.errors import AugmentError, Conflict
-from augment.services.wording import translate
 
 STATUS: tuple[tuple[type[Exception], int, str], ...] = (
     (TokenOver, 401, "signed_out"),
@@ -87,6 +86,15 @@ def fault(status: int, code: str, message: str) -> JsonResponse:
     return JsonResponse({"error": {"code": code, "message": message}}, status=status)
 
 
+def busy_message() -> str:
+    """Say that the database can't be written, in the language of the request."""
+    text = _(
+        "The database can't be written just now (it is busy, or its disk is full), so nothing "
+        "was saved. Try again in %(seconds)s s."
+    )
+    return text % {"seconds": DatabaseBusy.retry_after_s}
+
+
 # --- Private -----------------------------------------------------------------------------------
 
 
@@ -103,7 +111,9 @@ def _message(exc: Exception) -> str:
         return _("There is nothing at this address.")
     if isinstance(exc, PermissionDenied):
         return _("Your account may not do this.")
-    return translate(exc)
+    if isinstance(exc, DatabaseBusy):
+        return busy_message()
+    return str(exc)
 
 
 def _extras(exc: Exception) -> dict[str, Any]:
@@ -112,7 +122,7 @@ def _extras(exc: Exception) -> dict[str, Any]:
     if isinstance(exc, exceptions.ValidationError):
         return {"fields": exc.detail}
     if isinstance(exc, (InvalidVote, InvalidPreference)):
-        return {"fields": {name: [translate(sentence)] for name, sentence in exc.fields.items()}}
+        return {"fields": {name: [sentence] for name, sentence in exc.fields.items()}}
     if isinstance(exc, exceptions.ParseError):
         return {"fields": {"body": [str(exc.detail)]}}
     return {}

@@ -26,7 +26,6 @@ from arena.rating.bootstrap import Unit
 from arena.rating.leaderboard import Intervals, Method
 from arena.services.ratings import DEFAULT_ROUNDS, MOST_ROUNDS, is_big, plan_snapshot, rate
 from augment.services.scenarios.types import type_choices
-from augment.services.wording import translate
 
 
 class StandingDocument(serializers.Serializer[Any]):
@@ -62,7 +61,7 @@ class TableDocument(serializers.Serializer[Any]):
 
     def get_warnings(self, table: LeaderboardTable) -> list[str]:
         """Return them as sentences."""
-        return [translate(one) for one in table.warnings]
+        return list(table.warnings)
 
 
 class SnapshotDocument(serializers.ModelSerializer[Snapshot]):

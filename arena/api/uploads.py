@@ -19,7 +19,6 @@ from arena.api.views import ApiView, WarnedDocument, keep_and_send
 from arena.services.sent_files import was_too_large
 from augment.models import SceneUpload, UploadMoment
 from augment.services.scenarios import upload_moments, uploads
-from augment.services.wording import translate
 from augment.tasks import enqueue_moment, enqueue_upload
 
 HIGHEST_FRAME = 2**31 - 1
@@ -98,7 +97,7 @@ class MomentDocument(serializers.ModelSerializer[UploadMoment], WarnedDocument):
 
     def get_notes(self, row: UploadMoment) -> list[str]:
         """Return them as sentences."""
-        return [translate(note) for note in upload_moments.sentences_of(row)]
+        return upload_moments.sentences_of(row)
 
 
 class UploadsView(ApiView):

@@ -22,7 +22,6 @@ from arena.api.access import RoleAllowed
 from arena.api.errors import error_response
 from arena.api.fields import SoundJSONParser
 from augment.errors import QueueFault
-from augment.services.wording import translate
 
 Row = TypeVar("Row", bound=Model)
 
@@ -121,4 +120,4 @@ def _send(warnings: list[str], send: Callable[[int], object], pk: int) -> None:
     try:
         send(pk)
     except QueueFault as error:
-        warnings.append(translate(error))
+        warnings.append(str(error))

@@ -33,7 +33,6 @@ from arena.services.preferences import keep_voting
 from arena.services.replanning import next_pairs
 from arena.services.reports import SIDES, Complaint, report
 from arena.services.votes import receive_vote
-from augment.services.wording import translate_all
 
 PNG = "image/png"
 OUTCOMES = {letter: outcome for outcome, letter in OUTCOME_LETTERS.items()}
@@ -173,7 +172,7 @@ class MatchupsView(ApiView):
         if study.state != Study.State.OPEN:
             raise StudyNotOpen(f"The study {study.name!r} takes no votes: it is {study.state}.")
         matchups = next_pairs(study=study, expert=self.user, n=given["n"])
-        return Response([as_shown(matchup, translate_all) for matchup in matchups])
+        return Response([as_shown(matchup) for matchup in matchups])
 
 
 class VotesView(ApiView):
@@ -198,7 +197,7 @@ class VotesView(ApiView):
                 "skipped": now.progress.skipped,
                 "total": now.progress.total,
                 "minutes_left": now.progress.minutes_left,
-                "next": [as_shown(matchup, translate_all) for matchup in coming],
+                "next": [as_shown(matchup) for matchup in coming],
             }
         )
 

@@ -5,10 +5,9 @@ from __future__ import annotations
 from django.http import HttpRequest, HttpResponse
 from django.views.defaults import bad_request
 
-from arena.api.errors import fault
+from arena.api.errors import busy_message, fault
 from arena.errors import DatabaseBusy
 from arena.web import faults as pages
-from augment.services.wording import translate
 
 
 def answer_unreadable(request: HttpRequest, exception: Exception) -> HttpResponse:
@@ -49,7 +48,7 @@ def answer_broken(request: HttpRequest) -> HttpResponse:
 def answer_busy(request: HttpRequest) -> HttpResponse:
     """Answer 503: the database can't be written at the moment."""
     if _wants_json(request):
-        answer: HttpResponse = fault(503, "busy", translate(DatabaseBusy()))
+        answer: HttpResponse = fault(503, "busy", busy_message())
     else:
         answer = pages.answer_busy(request)
     answer.headers["Retry-After"] = str(DatabaseBusy.retry_after_s)

@@ -14,7 +14,6 @@ from typing import Any
 
 from arena.exports.parquet import NUMBER, TEXT, WHOLE, YES_NO
 from arena.exports.tables import LeaderboardTable, Row
-from augment.sentences import Sentence, sentence
 
 ELO_POINTS, VOTES, PLACE, PERCENT = "Elo points", "votes", "place", "%"
 
@@ -41,7 +40,7 @@ class Column:
     name: str = ""
     key: str = ""
     printed: str = ""
-    page: Sentence | None = None
+    page: str | None = None
     text: Callable[[Row], str] = str
     identifies: bool = False
     of_table: bool = False
@@ -59,21 +58,21 @@ def _column(name: str, kind: str = TEXT, field: str = "", **more: Any) -> Column
 
 
 COLUMNS = (
-    _column("rank", WHOLE, unit=PLACE, printed="Rank", page=sentence("Rank"),
+    _column("rank", WHOLE, unit=PLACE, printed="Rank", page="Rank",
             text=attrgetter("rank_text")),
-    _column("model", printed="Model", page=sentence("Contestant"), identifies=True),
-    _column("elo", NUMBER, unit=ELO_POINTS, key="rating", printed="Elo", page=sentence("Elo"),
+    _column("model", printed="Model", page="Contestant", identifies=True),
+    _column("elo", NUMBER, unit=ELO_POINTS, key="rating", printed="Elo", page="Elo",
             text=attrgetter("elo_text")),
     _column("lower", NUMBER, unit=ELO_POINTS),
     _column("upper", NUMBER, unit=ELO_POINTS),
     Column(value=attrgetter("interval_text"), unit=ELO_POINTS, printed="95% CI",
-           page=sentence("95 %% CI"), text=attrgetter("interval_text")),
-    _column("votes", WHOLE, unit=VOTES, printed="Votes", page=sentence("Votes")),
-    Column(value=attrgetter("score_percent"), unit=PERCENT, page=sentence("Score"),
+           page="95 % CI", text=attrgetter("interval_text")),
+    _column("votes", WHOLE, unit=VOTES, printed="Votes", page="Votes"),
+    Column(value=attrgetter("score_percent"), unit=PERCENT, page="Score",
            text=lambda row: f"{row.score_percent} %" if row.votes else "–"),
-    _column("wins", WHOLE, unit=VOTES, page=sentence("Won")),
-    _column("ties", WHOLE, unit=VOTES, page=sentence("Tied")),
-    _column("losses", WHOLE, unit=VOTES, page=sentence("Lost")),
+    _column("wins", WHOLE, unit=VOTES, page="Won"),
+    _column("ties", WHOLE, unit=VOTES, page="Tied"),
+    _column("losses", WHOLE, unit=VOTES, page="Lost"),
     _column("slug", identifies=True),
     _column("kind", identifies=True),
     _column("simulated", YES_NO, identifies=True),

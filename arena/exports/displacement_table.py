@@ -8,7 +8,6 @@ from dataclasses import dataclass
 
 from arena.exports.published import BY_VARIANT, PublishedBox
 from augment.models import GenerationJob, Scenario
-from augment.sentences import sentence
 from augment.services.judging.displacement import (
     PLACED_EXACTLY,
     By,
@@ -47,11 +46,11 @@ class DisplacementTable:
     def types_text(self) -> str:
         """Which scenario types count, in words."""
         if self.types == tuple(Scenario.Type.values):
-            return sentence("All five scenario types")
+            return "All five scenario types"
         own = {one.row.scenario.type: one.row.scenario.type_label for one in self.measured}
         known = own | {one.value: str(one.label) for one in Scenario.Type}
         labels = tuple(known[name] for name in self.types)
-        return sentence("Scenario types: %(types)s", types=labels)
+        return f"Scenario types: {', '.join(labels)}"
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -62,34 +61,24 @@ class DisplacementTable:
     def remarks(self) -> tuple[str, ...]:
         """The same but for the scenario types."""
         said: list[str] = [
-            sentence(
+            (
                 "Distances between centres, in metres, of objects matched within their class so "
                 "that their sum is smallest; each matched object counts once."
             ),
-            sentence(
+            (
                 "Missing and surplus objects are counted and have no distance; an unreadable or "
                 "refused answer misses all."
             ),
         ]
         if self.by is By.VARIANT and self.is_papers_choice:
             said.append(
-                sentence(
-                    "As in the paper, construction zone and accident site are left out: their "
-                    "objects can lie in many places that all follow the instruction."
-                )
+                "As in the paper, construction zone and accident site are left out: their "
+                "objects can lie in many places that all follow the instruction."
             )
         for why, number in self.left_out.items():
-            said.append(
-                sentence(
-                    "Augmentations not measured: %(number)s (%(reasons)s).",
-                    number=number,
-                    reasons=(why,),
-                )
-            )
+            said.append(f"Augmentations not measured: {number} ({', '.join((why,))}).")
         if self.simulated:
-            said.append(
-                sentence("Simulated contestants are marked; they say nothing about a real one.")
-            )
+            said.append("Simulated contestants are marked; they say nothing about a real one.")
         return tuple(said)
 
     @property

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from augment.sentences import sentence
 from augment.services.judging.driving_scores import CLOSE_M, DrivingLine, DrivingScores
 from augment.services.scenarios.types import type_choices
 
@@ -18,16 +17,16 @@ REPORTED = (
 )
 """The paper's table "Mean driving score of PDM-Closed"; nothing of it was measured here."""
 DIFFERENCES = (
-    sentence(
-        "Measured in this project's own simulator, by nuPlan's rules as far as a scene knows what "
-        "they need: compare contestants and the effect of a change, not absolute numbers with the "
-        "paper's."
+    (
+        "Measured in this project's own simulator, by nuPlan's rules as far as a scene knows "
+        "what they need: compare contestants and the effect of a change, not absolute numbers "
+        "with the paper's."
     ),
-    sentence(
+    (
         "Where nobody recorded the ego, progress is measured by an IDM drive at the speed limit "
         "without the change; where the map ends before 15 s, the drive ends there."
     ),
-    sentence(
+    (
         "Traffic that was not recorded drives its lanes by the IDM; what stands stays; lights "
         "keep the colour that they have at the start."
     ),
@@ -75,11 +74,7 @@ class DrivingTable:
         """Sentences that belong beneath every form of it."""
         said = [self._what, *DIFFERENCES]
         for reason, number in self.scores.failures:
-            said.append(
-                sentence(
-                    "Drives that failed: %(number)s (%(reason)s).", number=number, reason=reason
-                )
-            )
+            said.append(f"Drives that failed: {number} ({reason}).")
         if self.scores.outlasting:
             said.append(
                 f"The recording ends before the drive in {self.scores.outlasting} of "
@@ -92,26 +87,17 @@ class DrivingTable:
                 "score, which takes nothing off for them."
             )
         if self.scores.under_way:
-            said.append(
-                sentence(
-                    "Not complete: %(number)s drives wait or run.", number=self.scores.under_way
-                )
-            )
+            said.append(f"Not complete: {self.scores.under_way} drives wait or run.")
         if self.simulated:
-            said.append(
-                sentence("Simulated contestants are marked; they say nothing about a real one.")
-            )
+            said.append("Simulated contestants are marked; they say nothing about a real one.")
         return tuple(said)
 
     @property
     def _what(self) -> str:
         how = self.scores.options
         score = "nuPlan" if self.scores.score == "nuplan" else "interPlan"
-        return sentence(
-            "Mean of %(score)s's score over 15 s drives of the planner %(planner)s (offsets: "
-            "%(offsets)s; recorded traffic %(traffic)s); contestants by how much they lower it.",
-            score=score,
-            planner=how.planner,
-            offsets=how.offsets,
-            traffic="reactive" if how.is_reactive else "replayed",
+        traffic = "reactive" if how.is_reactive else "replayed"
+        return (
+            f"Mean of {score}'s score over 15 s drives of the planner {how.planner} (offsets: "
+            f"{how.offsets}; recorded traffic {traffic}); contestants by how much they lower it."
         )

@@ -8,14 +8,13 @@ from dataclasses import dataclass
 
 from arena.exports.tables import LeaderboardTable, Row
 from arena.models import Snapshot
-from augment.sentences import Sentence, sentence
 
-ELO = sentence("Elo with 95 %% interval")
-METRES = sentence("Median displacement (m)")
-USD = sentence("USD per scenario")
-TOKENS = sentence("Tokens per scenario")
-VOTES = sentence("Votes")
-HALF_WIDTH = sentence("Half-width of the interval (Elo)")
+ELO = "Elo with 95 % interval"
+METRES = "Median displacement (m)"
+USD = "USD per scenario"
+TOKENS = "Tokens per scenario"
+VOTES = "Votes"
+HALF_WIDTH = "Half-width of the interval (Elo)"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -54,8 +53,8 @@ class Plot:
         falls: Draws the curve `falls` / sqrt(x) behind the points, None without one.
     """
 
-    across: Sentence
-    up: Sentence
+    across: str
+    up: str
     points: Sequence[Given]
     unit: str = ""
     is_log: bool = False

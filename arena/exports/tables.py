@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 from django.db.models import F
 
@@ -22,11 +20,10 @@ from arena.rating.printed import (
 from arena.rating.rules import METHOD_TEXTS, UNIT_TEXTS, Intervals
 from arena.services.hypotheses import Answered, answer_hypotheses
 from arena.services.preregistration import preregistration_sha256
-from augment.sentences import Sentence, sentence
 
 SIMULATED = " (simulated)"
 SIMULATED_TABLE = "Simulated: votes or contestants of this table are made by the machine."
-EARLY_LOOK = sentence("Early look: the study was still open.")
+EARLY_LOOK = "Early look: the study was still open."
 NOT_RANKED = "Not enough votes to rank: no contestant can be told from any other."
 APART = -1
 """The part of those who are rated with nobody."""
@@ -208,7 +205,6 @@ def leaderboard_table(snapshot: Snapshot) -> LeaderboardTable:
     lines = snapshot.standings.select_related("contestant")
     standings = list(lines.order_by(F("rating").desc(nulls_last=True), "slug"))
     board = snapshot.results.board
-    names = {standing.slug: standing.name for standing in standings}
     reasons = (snapshot.reason,) if board.reasons is None else board.reasons
     last = len(standings)
     standings.sort(key=lambda standing: board.parts.get(standing.slug, last))
@@ -236,10 +232,10 @@ def leaderboard_table(snapshot: Snapshot) -> LeaderboardTable:
         votes_sha256=snapshot.votes_sha256,
         experts=board.experts,
         scenarios=board.scenarios,
-        reasons=sentences_of(reasons, names),
+        reasons=tuple(filter(None, reasons)),
         simulated=snapshot.includes_simulated,
         early=snapshot.is_early,
-        notes=sentences_of(board.warnings, names),
+        notes=tuple(filter(None, board.warnings)),
         covariates=_covariates(snapshot),
         preregistration=preregistration_sha256(snapshot.study),
         hypotheses=answer_hypotheses(snapshot),
@@ -255,30 +251,10 @@ def for_experts(table: LeaderboardTable) -> LeaderboardTable:
     return replace(table, left_out=left_out)
 
 
-def sentences_of(kept: Sequence[str], names: Mapping[str, str]) -> tuple[str, ...]:
-    """Sentences that a snapshot keeps, with names instead of slugs; older ones are plain text."""
-    return tuple(
-        sentence(one.text, **{place: _named(value, names) for place, value in one.values.items()})
-        if isinstance(one, Sentence)
-        else one
-        for one in kept
-        if one
-    )
-
-
 def _covariates(snapshot: Snapshot) -> tuple[str, ...]:
     """None where the votes do not determine what these are worth."""
     found = snapshot.results.adjustment
     return tuple(one.name for one in found.effects) if found else ()
-
-
-def _named(value: Any, names: Mapping[str, str]) -> Any:
-    """Tuples are of slugs, or of tuples of them."""
-    if not isinstance(value, tuple):
-        return value
-    return tuple(
-        _named(one, names) if isinstance(one, tuple) else names.get(one, one) for one in value
-    )
 
 
 def _options(standing: Standing) -> str:

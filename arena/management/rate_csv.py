@@ -19,7 +19,7 @@ from arena.rating.leaderboard import Intervals, Leaderboard, Method, Order, rate
 from arena.rating.rules import TooManyContestants, default_intervals, unit_for
 from arena.rating.votes_file import VotesFile, read_votes
 from arena.rating.votes_table import SIDE, VotesFileUnreadable, columns_of
-from augment.sentences import escape_controls
+from augment.escaping import escape_controls
 
 HELP = (
     "Rate votes from a file (CSV, JSON lines, Parquet): columns model_a, model_b, winner, and "

@@ -27,7 +27,7 @@ from arena.rating.printed import (
 from arena.rating.ranking import Separation
 from arena.rating.rules import METHOD_TEXTS
 from arena.services.cells import csv_text
-from augment.sentences import escape_controls
+from augment.escaping import escape_controls
 
 COLUMNS = ("model", "rank", "elo", "lower", "upper", "votes", "note", "rank_best", "rank_worst")
 """Those of CSV and JSON; a new one comes at the end."""

@@ -8,13 +8,12 @@ from arena.errors import NothingToPlan
 from arena.pairing.arrays import IntArray
 from arena.pairing.rules import Grid, PlanRules
 from arena.pairing.targets import votes_by_appearances
-from augment.sentences import Sentence, sentence
 
 MOST_OVERLAP = 0.8
 """More can't be brought together where all pairs and scenarios stay balanced for everybody."""
 
 MOST_CHECKS = 0.5
-ATTENTION_CHECKS = sentence("attention checks")
+ATTENTION_CHECKS = "attention checks"
 
 
 def check_rules(rules: PlanRules, grid: Grid) -> None:
@@ -24,24 +23,17 @@ def check_rules(rules: PlanRules, grid: Grid) -> None:
         NothingToPlan: They do not; the text has the numbers.
     """
     if rules.seed < 0:
-        raise NothingToPlan(sentence("The seed must be 0 or more, not %(seed)s.", seed=rules.seed))
+        raise NothingToPlan(f"The seed must be 0 or more, not {rules.seed}.")
     if rules.votes_per_expert < 1:
-        raise NothingToPlan(
-            sentence(
-                "Votes per expert must be 1 or more, not %(votes)s.", votes=rules.votes_per_expert
-            )
-        )
+        raise NothingToPlan(f"Votes per expert must be 1 or more, not {rules.votes_per_expert}.")
     if not rules.experts:
-        raise NothingToPlan(sentence("There is nobody to vote: name at least one expert."))
+        raise NothingToPlan("There is nobody to vote: name at least one expert.")
     if len(set(rules.experts)) < len(rules.experts):
-        raise NothingToPlan(sentence("An expert is named twice."))
+        raise NothingToPlan("An expert is named twice.")
     if not grid.pairs:
         contestants = len({entry.contestant for entry in rules.entries})
         raise NothingToPlan(
-            sentence(
-                "A comparison needs two contestants with pictures, not %(number)s.",
-                number=contestants,
-            )
+            f"A comparison needs two contestants with pictures, not {contestants}."
         )
     _check_extras(rules, grid)
     units = int(grid.showable.sum())
@@ -65,16 +57,8 @@ def pair_totals(rules: PlanRules, grid: Grid) -> IntArray:
     for pair, wanted, most in zip(grid.pairs, totals, capacity, strict=True):
         if wanted > most:
             raise NothingToPlan(
-                sentence(
-                    "%(first)s against %(second)s is to get %(wanted)s votes, but %(experts)s "
-                    "experts on %(scenarios)s scenarios can give %(most)s.",
-                    first=pair[0],
-                    second=pair[1],
-                    wanted=int(wanted),
-                    experts=experts,
-                    scenarios=int(most) // experts,
-                    most=int(most),
-                )
+                f"{pair[0]} against {pair[1]} is to get {int(wanted)} votes, but {experts} "
+                f"experts on {int(most) // experts} scenarios can give {int(most)}."
             )
     return totals
 
@@ -82,70 +66,48 @@ def pair_totals(rules: PlanRules, grid: Grid) -> IntArray:
 # --- Private -----------------------------------------------------------------------------------
 
 
-def _too_few(rules: PlanRules, grid: Grid, units: int) -> Sentence:
-    values = {"scenarios": len(grid.scenarios), "pairs": units, "votes": rules.votes_per_expert}
-    if not grid.identical:
-        return sentence(
-            "Nobody sees the same pair of a scenario twice: %(scenarios)s scenarios have "
-            "%(pairs)s different pairs to show, but each expert is to judge %(votes)s.",
-            **values,
-        )
-    return sentence(
-        "Nobody sees the same pair of a scenario twice: %(scenarios)s scenarios have %(pairs)s "
-        "different pairs to show (and %(same)s with identical pictures), but each expert is to "
-        "judge %(votes)s.",
-        same=len(grid.identical),
-        **values,
+def _too_few(rules: PlanRules, grid: Grid, units: int) -> str:
+    identical = f" (and {len(grid.identical)} with identical pictures)" if grid.identical else ""
+    return (
+        f"Nobody sees the same pair of a scenario twice: {len(grid.scenarios)} scenarios have "
+        f"{units} different pairs to show{identical}, but each expert is to judge "
+        f"{rules.votes_per_expert}."
     )
 
 
-def check_share(part: Sentence, share: float, most: float) -> None:
+def check_share(part: str, share: float, most: float) -> None:
     """Do nothing for a share from 0 to the most that there can be.
 
     Raises:
         NothingToPlan: It is none.
     """
     if not 0 <= share <= most:
-        raise NothingToPlan(
-            sentence(
-                "The share of %(part)s goes from 0 to %(most)s, not %(share)s.",
-                part=part,
-                most=f"{most:.0%}",
-                share=f"{share:.1%}",
-            )
-        )
+        raise NothingToPlan(f"The share of {part} goes from 0 to {most:.0%}, not {share:.1%}.")
 
 
 def _check_shares(rules: PlanRules) -> None:
-    check_share(sentence("repeats"), rules.repeat_share, 0.5)
-    check_share(sentence("what two experts judge"), rules.overlap_share, MOST_OVERLAP)
+    check_share("repeats", rules.repeat_share, 0.5)
+    check_share("what two experts judge", rules.overlap_share, MOST_OVERLAP)
     check_share(ATTENTION_CHECKS, rules.check_share, MOST_CHECKS)
-    check_share(sentence("the adaptive part"), rules.adaptive_share, 0.9)
+    check_share("the adaptive part", rules.adaptive_share, 0.9)
     if not 0.2 <= rules.uniform_share <= 1:
         raise NothingToPlan(
-            sentence(
-                "At least 20 %% of the adaptive draws are uniform, else no vote could be "
-                "weighted; not %(share)s.",
-                share=f"{rules.uniform_share:.0%}",
-            )
+            "At least 20 % of the adaptive draws are uniform, else no vote could be "
+            f"weighted; not {rules.uniform_share:.0%}."
         )
 
 
 def _check_extras(rules: PlanRules, grid: Grid) -> None:
     _check_shares(rules)
     if rules.overlap_share and len(rules.experts) < 2:
-        raise NothingToPlan(sentence("For pairs that two experts judge there must be two."))
+        raise NothingToPlan("For pairs that two experts judge there must be two.")
     if rules.appearances and rules.pair_votes:
-        raise NothingToPlan(sentence("Targets are given by contestant or by pair, not both."))
+        raise NothingToPlan("Targets are given by contestant or by pair, not both.")
     if rules.adaptive_share and (rules.appearances or rules.pair_votes):
-        raise NothingToPlan(
-            sentence("Targets fix every vote, so none are left for an adaptive part.")
-        )
+        raise NothingToPlan("Targets fix every vote, so none are left for an adaptive part.")
     places = [given.scenario for given in rules.checks]
     if set(places) - set(grid.scenarios) or len(set(places)) < len(places):
-        raise NothingToPlan(
-            sentence("Each check is on a scenario of its own out of those of the study.")
-        )
+        raise NothingToPlan("Each check is on a scenario of its own out of those of the study.")
 
 
 def _by_pair(rules: PlanRules, grid: Grid, votes: int) -> IntArray:
@@ -154,21 +116,11 @@ def _by_pair(rules: PlanRules, grid: Grid, votes: int) -> IntArray:
     for first, second, wanted in rules.pair_votes:
         row = places.get((first, second), places.get((second, first)))
         if row is None:
-            raise NothingToPlan(
-                sentence(
-                    "%(first)s against %(second)s is no pair of this study.",
-                    first=first,
-                    second=second,
-                )
-            )
+            raise NothingToPlan(f"{first} against {second} is no pair of this study.")
         totals[row] += wanted
     if totals.sum() != votes:
         raise NothingToPlan(
-            sentence(
-                "The targets add up to %(given)s votes, but the experts' quotas to %(needed)s.",
-                given=f"{totals.sum():,}",
-                needed=f"{votes:,}",
-            )
+            f"The targets add up to {totals.sum():,} votes, but the experts' quotas to {votes:,}."
         )
     return totals
 
@@ -177,19 +129,13 @@ def _by_contestant(rules: PlanRules, grid: Grid, votes: int, capacity: IntArray)
     names = sorted({name for pair in grid.pairs for name in pair})
     wanted = dict(rules.appearances)
     if set(wanted) != set(names) or len(wanted) < len(rules.appearances):
-        odd = tuple(sorted(set(wanted) ^ set(names))) or (sentence("one is named twice"),)
-        raise NothingToPlan(
-            sentence("Each contestant of the study needs one target: %(odd)s.", odd=odd)
-        )
+        odd = tuple(sorted(set(wanted) ^ set(names))) or ("one is named twice",)
+        raise NothingToPlan(f"Each contestant of the study needs one target: {', '.join(odd)}.")
     given = sum(wanted.values())
     if given != 2 * votes:
         raise NothingToPlan(
-            sentence(
-                "The targets add up to %(given)s appearances, but the experts' quotas to "
-                "%(needed)s.",
-                given=f"{given:,}",
-                needed=f"{2 * votes:,}",
-            )
+            f"The targets add up to {given:,} appearances, but the experts' quotas to "
+            f"{2 * votes:,}."
         )
     most = np.zeros((len(names), len(names)), dtype=np.int64)
     rows, columns = np.triu_indices(len(names), 1)  # in the order of the pairs

@@ -17,7 +17,6 @@ from arena.errors import NothingToPlan
 from arena.pairing.arrays import IntArray
 from arena.pairing.order import MAIN
 from arena.pairing.rules import Grid, PlannedMatchup
-from augment.sentences import sentence
 
 Unit = tuple[int, int]
 """A row and a column of the grid: a pair on a scenario."""
@@ -114,10 +113,6 @@ def _elsewhere(
             return name, best
     first, second = grid.pairs[unit.pair]
     raise NothingToPlan(
-        sentence(
-            "Everybody who could take over has judged %(first)s against %(second)s on every "
-            "scenario. Hand over to more experts.",
-            first=first,
-            second=second,
-        )
+        f"Everybody who could take over has judged {first} against {second} on every "
+        "scenario. Hand over to more experts."
     )

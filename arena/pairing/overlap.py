@@ -17,7 +17,6 @@ import numpy as np
 
 from arena.errors import NothingToPlan
 from arena.pairing.arrays import BoolArray, IntArray
-from augment.sentences import Sentence, sentence
 
 _MOST_AT_ONCE = 250
 """Units of an expert that are held against each other at a time."""
@@ -95,13 +94,10 @@ def _exchange(
     return True
 
 
-def _out_of_reach(chosen: BoolArray, share: float) -> Sentence:
+def _out_of_reach(chosen: BoolArray, share: float) -> str:
     judged, shared = overlap_of(chosen)
-    return sentence(
-        "Of the pairs that are judged, %(share)s are to be judged by two experts or more; with "
-        "these experts, votes and pictures %(shared)s of %(judged)s are reached. Ask for less, or "
-        "for more votes per expert.",
-        share=f"{share:.0%}",
-        shared=shared,
-        judged=judged,
+    return (
+        f"Of the pairs that are judged, {share:.0%} are to be judged by two experts or more; "
+        f"with these experts, votes and pictures {shared} of {judged} are reached. Ask for less, "
+        "or for more votes per expert."
     )

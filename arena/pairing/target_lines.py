@@ -6,7 +6,6 @@ import re
 from collections.abc import Iterable
 
 from arena.errors import NothingToPlan
-from augment.sentences import sentence
 
 _OF_ONE = re.compile(r"([a-z0-9-]+)\s*[=:\s]\s*(\d+)")
 _OF_TWO = re.compile(r"([a-z0-9-]+)\s+(?:vs\.?|against)\s+([a-z0-9-]+)\s*[=:\s]\s*(\d+)")
@@ -32,10 +31,7 @@ def read_targets(lines: Iterable[str]) -> tuple[Appearances, PairVotes]:
             of_one.append((match[1], int(match[2])))
         else:
             raise NothingToPlan(
-                sentence(
-                    "'%(text)s' is no target: write CONTESTANT NUMBER, or CONTESTANT vs "
-                    "CONTESTANT NUMBER.",
-                    text=text,
-                )
+                f"'{text}' is no target: write CONTESTANT NUMBER, or CONTESTANT vs "
+                "CONTESTANT NUMBER."
             )
     return tuple(of_one), tuple(of_two)

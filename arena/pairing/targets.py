@@ -13,7 +13,6 @@ import numpy as np
 from arena.errors import NothingToPlan
 from arena.pairing.arrays import BoolArray, FloatArray, IntArray
 from arena.pairing.units import even_out, quotas
-from augment.sentences import sentence
 
 ROUNDS = 2000
 """Of the proportional fitting; it stops earlier when it is exact."""
@@ -46,12 +45,9 @@ def votes_by_appearances(
     while lacking.any():
         if not _mend(votes, lacking, wanted, capacity):
             left = np.flatnonzero(lacking).tolist()
+            short = ", ".join(f"{names[i]} {appearances[i]}" for i in left)
             raise NothingToPlan(
-                sentence(
-                    "These appearances can't be reached with the pairs that can be shown: "
-                    "%(short)s.",
-                    short=tuple(f"{names[i]} {appearances[i]}" for i in left),
-                )
+                f"These appearances can't be reached with the pairs that can be shown: {short}."
             )
     return votes
 

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
+from functools import cache
 from typing import Any
 
+from django.utils.translation import get_language, gettext
 from django.utils.translation import gettext_noop as _
 
 _KINDS = {
@@ -38,22 +40,21 @@ _ALL = (
 )
 
 Words = Mapping[str, str]
-Wording = Callable[[tuple[str, ...]], Words]
 
 
-def describe_in_words(lines: Sequence[Mapping[str, Any]], wording: Wording) -> list[str]:
-    """One sentence for each line.
-
-    Args:
-        lines: As they are kept with a matchup.
-        wording: Gives our texts in the language of whoever reads; doors have it from
-            augment.services.wording.
-    """
-    words = wording(_ALL)
+def describe_in_words(lines: Sequence[Mapping[str, Any]]) -> list[str]:
+    """One sentence in the reader's language for each line, as they are kept with a matchup."""
+    words = _words_in(get_language())
     return [_sentence(line, words) for line in lines] or [words[_NOTHING]]
 
 
 # Private
+
+
+@cache
+def _words_in(language: str | None) -> Words:
+    """All texts in the active language: looking one up is slow where a page describes many."""
+    return {text: gettext(text) for text in _ALL}
 
 
 def _sentence(line: Mapping[str, Any], words: Words) -> str:

@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from itertools import pairwise
 from typing import Any
 from uuid import UUID
 
 from django.contrib.auth.models import User
+from django.utils.translation import gettext as _
 
 from arena.errors import NotYours
 from arena.models import Matchup
 from arena.queries.people import role_of
 from arena.queries.showings import view_shown
-from augment.services.judging.measures import LaneEdges, lane_edges_of, measures_of
+from augment.services.judging.measures import LaneEdges, MeasureLine, lane_edges_of, measures_of
 
 _Point = list[float]
 
@@ -22,9 +22,7 @@ _MARGIN_PX = 24.0
 """Labels stay so far within the picture."""
 
 
-def measures_of_pair(
-    *, user: User, code: UUID, say: Callable[[str], str]
-) -> dict[str, Any] | None:
+def measures_of_pair(*, user: User, code: UUID) -> dict[str, Any] | None:
     """What may be drawn over both pictures of one of the user's own pairs; admins may look at all.
 
     It follows from the scenario alone. None where the study has no such aid.
@@ -32,7 +30,6 @@ def measures_of_pair(
     Args:
         user: Who looks.
         code: Of the matchup.
-        say: Puts a label into the reader's language.
 
     Raises:
         NotYours: The pair is somebody else's or there is none; the text does not say which.
@@ -45,11 +42,10 @@ def measures_of_pair(
     reach_m = math.hypot(view["width"], view["height"]) / view["px_per_m"]
     found = measures_of(matchup.scenario, reach_m=reach_m)
     lines = [
-        ([_pixels(point, view) for point in line.points_m], say(line.label))
-        for line in found.lines
+        ([_pixels(point, view) for point in line.points_m], _label(line)) for line in found.lines
     ]
     rings = [
-        (_pixels(ring.centre_m, view), ring.radius_m * view["px_per_m"], say(ring.label))
+        (_pixels(ring.centre_m, view), ring.radius_m * view["px_per_m"], f"{ring.radius_m:.4g} m")
         for ring in found.rings
     ]
     return {
@@ -104,6 +100,16 @@ def _measured(user: User, code: UUID) -> Matchup | None:
     if matchup is None or (matchup.expert_id != user.pk and role_of(user) != "admin"):
         raise NotYours("This pair is not shown to you.")
     return matchup if matchup.study.allow_measures else None
+
+
+def _label(line: MeasureLine) -> str:
+    if line.ahead_m is not None:
+        text = _("{} m ahead") if line.ahead_m >= 0.0 else _("{} m behind")
+        return text.format(f"{abs(line.ahead_m):.4g}")
+    if not line.left_m:
+        return _("centre of the lane")
+    text = _("{} m left") if line.left_m > 0.0 else _("{} m right")
+    return text.format(f"{abs(line.left_m):.4g}")
 
 
 def _pixels(point_m: tuple[float, float], view: dict[str, Any]) -> _Point:

@@ -10,7 +10,7 @@ from django.urls import reverse
 
 from arena.errors import NotYours
 from arena.models import LabelTask, Matchup, PracticePair
-from arena.queries.descriptions import Wording, describe_in_words
+from arena.queries.descriptions import describe_in_words
 from arena.queries.people import role_of
 from augment.models import Augmentation
 from augment.services.scenarios.pictures import window_of
@@ -63,13 +63,8 @@ def view_shown(matchup: Matchup) -> dict[str, Any]:
     return {name: value for name, value in kept.items() if name != LEGEND}
 
 
-def as_shown(matchup: Matchup, wording: Wording) -> dict[str, Any]:
-    """All that an expert's browser learns of a matchup: tokens, never contestants.
-
-    Args:
-        matchup: With its scenario.
-        wording: For the text description, where the study has one.
-    """
+def as_shown(matchup: Matchup) -> dict[str, Any]:
+    """All that an expert's browser learns of a matchup: tokens, never contestants."""
     original = matchup.original_token if matchup.original_image else None
     legend = (matchup.view or {}).get(LEGEND)
     shown = {
@@ -86,8 +81,8 @@ def as_shown(matchup: Matchup, wording: Wording) -> dict[str, Any]:
     if matchup.descriptions is not None:
         left, right = matchup.descriptions
         shown["text"] = {
-            "a": describe_in_words(left, wording),
-            "b": describe_in_words(right, wording),
+            "a": describe_in_words(left),
+            "b": describe_in_words(right),
         }
     return shown
 

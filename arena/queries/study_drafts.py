@@ -10,7 +10,6 @@ from django.db.models import QuerySet
 from arena.models import StudyDraft
 from arena.queries.people import experts
 from augment.models import Contestant, GenerationJob, Scenario
-from augment.sentences import sentence
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -36,7 +35,7 @@ def find_drafts(search: str = "") -> QuerySet[StudyDraft]:
 
 def missing_of(draft: StudyDraft) -> list[Missing]:
     """What the draft chooses and nobody could choose now, by field."""
-    retired = sentence("the contestant was retired")
+    retired = "the contestant was retired"
     offered = Contestant.objects.exclude(kind=Contestant.Kind.CHECK)
     active = set(offered.filter(retired_at=None).values_list("slug", flat=True))
     known = set(offered.values_list("slug", flat=True))
@@ -44,7 +43,7 @@ def missing_of(draft: StudyDraft) -> list[Missing]:
         Missing(
             field="contestants",
             name=name,
-            why=retired if name in known else sentence("there is no such contestant any more"),
+            why=retired if name in known else "there is no such contestant any more",
         )
         for name in draft.names_in("contestants")
         if name not in active
@@ -52,9 +51,9 @@ def missing_of(draft: StudyDraft) -> list[Missing]:
     accounts = {user.username for user in experts()}
     scenarios = set(Scenario.objects.values_list("slug", flat=True))
     jobs = {str(code) for code in GenerationJob.objects.values_list("code", flat=True)}
-    found += _gone(draft, "experts", accounts, sentence("no active expert has this name any more"))
-    found += _gone(draft, "scenarios", scenarios, sentence("there is no such scenario any more"))
-    found += _gone(draft, "jobs", jobs, sentence("there is no such job any more"))
+    found += _gone(draft, "experts", accounts, "no active expert has this name any more")
+    found += _gone(draft, "scenarios", scenarios, "there is no such scenario any more")
+    found += _gone(draft, "jobs", jobs, "there is no such job any more")
     return found
 
 

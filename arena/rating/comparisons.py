@@ -42,6 +42,7 @@ class Comparisons:
 
     Attributes:
         names: (C,) of the contestants.
+        shown: (C,) what remarks call them; by default their names.
         first, second: Who was compared; `first` was shown on the left.
         score: What `first` scored: 1, 0.5 or 0.
         expert, scenario: Whose vote it is, and on what.
@@ -57,14 +58,17 @@ class Comparisons:
     scenario: IntArray
     count: IntArray = field(default_factory=lambda: np.empty(0, dtype=np.int64))
     covariates: FloatArray = field(default_factory=lambda: np.empty((0, 0)))
+    shown: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         if len(self.score) and not len(self.count):
             object.__setattr__(self, "count", np.ones(len(self.score), dtype=np.int64))
         if len(self.covariates) != len(self.score):
             object.__setattr__(self, "covariates", np.empty((len(self.score), 0)))
-        for column in fields(self)[1:]:
-            getattr(self, column.name).flags.writeable = False
+        if not self.shown:
+            object.__setattr__(self, "shown", self.names)
+        for name in _array_names():
+            getattr(self, name).flags.writeable = False
 
     def __len__(self) -> int:
         """Rows, not votes."""
@@ -155,10 +159,13 @@ def as_arrays(names: Sequence[str], votes: Iterable[Comparison]) -> Comparisons:
     )
 
 
+def _array_names() -> list[str]:
+    return [one.name for one in fields(Comparisons) if one.name not in ("names", "shown")]
+
+
 def select_votes(votes: Comparisons, rows: BoolArray | IntArray) -> Comparisons:
     """Some of the rows, of the same contestants."""
-    columns = {column.name: getattr(votes, column.name)[rows] for column in fields(votes)[1:]}
-    return replace(votes, **columns)
+    return replace(votes, **{name: getattr(votes, name)[rows] for name in _array_names()})
 
 
 def restrict_to(votes: Comparisons, members: Sequence[int]) -> Comparisons:
@@ -171,6 +178,7 @@ def restrict_to(votes: Comparisons, members: Sequence[int]) -> Comparisons:
     return replace(
         inside,
         names=tuple(votes.names[member] for member in members),
+        shown=tuple(votes.shown[member] for member in members),
         first=number[inside.first],
         second=number[inside.second],
     )
@@ -198,6 +206,7 @@ def split_votes(votes: Comparisons, groups: Sequence[Sequence[int]]) -> Iterator
         yield replace(
             some,
             names=tuple(votes.names[member] for member in members),
+            shown=tuple(votes.shown[member] for member in members),
             first=number[some.first],
             second=number[some.second],
         )

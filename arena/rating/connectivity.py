@@ -8,23 +8,19 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
-from typing import TypeVar
 
 import numpy as np
 
 from arena.rating.chains import Chains, chains_among
 from arena.rating.comparisons import PairCounts
-from augment.sentences import Sentence, sentence
-
-_Named = TypeVar("_Named")
 
 NAMED = 3
 """A sentence names so many contestants at most."""
 
 
-def few_of(names: tuple[_Named, ...], *, mark: _Named) -> tuple[_Named, ...]:
-    """The first names, and a mark where there are more."""
-    return names if len(names) <= NAMED else (*names[:NAMED], mark)
+def few_of(names: Sequence[str]) -> Sequence[str]:
+    """The first names, and an ellipsis where there are more."""
+    return names if len(names) <= NAMED else (*names[:NAMED], "…")
 
 
 class Status(StrEnum):
@@ -52,9 +48,9 @@ class Diagnosis:
     """
 
     status: Status
-    explanation: tuple[Sentence, ...] = ()
+    explanation: tuple[str, ...] = ()
     chains: Chains = field(default_factory=Chains.of_nobody, compare=False)
-    notes: tuple[Sentence | str, ...] = ()
+    notes: tuple[str, ...] = ()
 
 
 def diagnose(
@@ -68,7 +64,7 @@ def diagnose(
         bounded_anyway: The method rates also those who won or lost everything.
     """
     if not len(names) or not counts.outcomes.sum():
-        said = sentence("There are no votes to rate.")
+        said = "There are no votes to rate."
         return Diagnosis(status=Status.NO_VOTES, explanation=(said,))
     chains = chains_among(len(names), counts)
     groups = chains.groups()
@@ -89,7 +85,7 @@ def diagnose(
         return Diagnosis(
             status=Status.ALL_TIES,
             explanation=(
-                sentence(
+                (
                     "Every vote is a tie: all are rated alike, and the votes do not say how sure "
                     "that is."
                 ),
@@ -99,17 +95,17 @@ def diagnose(
     return Diagnosis(status=Status.RATED, chains=chains)
 
 
-def _who_is_apart(names: tuple[str, ...], groups: tuple[tuple[int, ...], ...]) -> Sentence:
-    return sentence(
-        "These groups were never compared with each other: %(groups)s. Each is rated by itself; "
-        "ratings across them have no meaning.",
-        groups=few_of(tuple(_listed(names, group) for group in groups), mark=("…",)),
+def _who_is_apart(names: tuple[str, ...], groups: tuple[tuple[int, ...], ...]) -> str:
+    listed = _joined([_listed(names, group) for group in groups])
+    return (
+        f"These groups were never compared with each other: {listed}. Each is rated by itself; "
+        "ratings across them have no meaning."
     )
 
 
-def _notes(parts: tuple[tuple[int, ...], ...], chains: Chains) -> tuple[Sentence | str, ...]:
+def _notes(parts: tuple[tuple[int, ...], ...], chains: Chains) -> tuple[str, ...]:
     """(C,) why those who are alone in their part have no rating."""
-    notes: list[Sentence | str] = [""] * len(chains.part_of)
+    notes: list[str] = [""] * len(chains.part_of)
     for part in parts:
         if len(part) == 1:
             lower, upper = bool(chains.scored[part[0]]), bool(chains.conceded[part[0]])
@@ -118,15 +114,15 @@ def _notes(parts: tuple[tuple[int, ...], ...], chains: Chains) -> tuple[Sentence
 
 
 _LIMITS = {
-    (True, True): sentence("no limits among equals"),
-    (True, False): sentence("no upper limit"),
-    (False, True): sentence("no lower limit"),
-    (False, False): sentence("no lower limit and no upper limit"),
+    (True, True): "no limits among equals",
+    (True, False): "no upper limit",
+    (False, True): "no lower limit",
+    (False, False): "no lower limit and no upper limit",
 }
 """By whether there is a lower and an upper one."""
 
 
-def _who_is_unbounded(names: tuple[str, ...], chains: Chains) -> list[Sentence]:
+def _who_is_unbounded(names: tuple[str, ...], chains: Chains) -> list[str]:
     """Sentences about those who won or lost everything against the rest that they met."""
     members, group_of_part = chains.parts(), chains.group_of[chains.first_of_parts]
     has_rest = np.bincount(group_of_part)[group_of_part] > 1
@@ -139,26 +135,18 @@ def _who_is_unbounded(names: tuple[str, ...], chains: Chains) -> list[Sentence]:
     sentences = []
     if unbeaten:
         sentences.append(
-            sentence(
-                "Nobody else scored against %(names)s: there is no upper limit.",
-                names=_groups_or_one(unbeaten),
-            )
+            f"Nobody else scored against {_joined(unbeaten)}: there is no upper limit."
         )
     if scoreless:
         sentences.append(
-            sentence(
-                "%(names)s scored against nobody else: there is no lower limit.",
-                names=_groups_or_one(scoreless),
-            )
+            f"{_joined(scoreless)} scored against nobody else: there is no lower limit."
         )
     return sentences
 
 
-def _groups_or_one(
-    groups: list[tuple[str, ...]],
-) -> tuple[str, ...] | tuple[tuple[str, ...], ...]:
-    return groups[0] if len(groups) == 1 else few_of(tuple(groups), mark=("…",))
+def _joined(groups: Sequence[str]) -> str:
+    return "; ".join(few_of(groups))
 
 
-def _listed(names: tuple[str, ...], group: Sequence[int]) -> tuple[str, ...]:
-    return few_of(tuple(names[index] for index in group), mark="…")
+def _listed(names: tuple[str, ...], group: Sequence[int]) -> str:
+    return ", ".join(few_of([names[index] for index in group]))

@@ -46,7 +46,6 @@ from arena.rating.rules import (
     default_intervals,
 )
 from arena.rating.tiers import standing_order, tiers
-from augment.sentences import Sentence, sentence
 
 __all__ = ["Intervals", "Leaderboard", "Line", "Method", "Order", "Unit", "anchor_board", "rate"]
 
@@ -84,8 +83,8 @@ class Leaderboard:
     lines: tuple[Line, ...]
     order: tuple[int, ...]
     status: Status
-    reasons: tuple[Sentence, ...]
-    warnings: tuple[Sentence | str, ...] = ()
+    reasons: tuple[str, ...]
+    warnings: tuple[str, ...] = ()
     method: Method
     unit: Unit
     intervals: Intervals
@@ -276,14 +275,11 @@ def _diagnose(votes: Comparisons, counting: Comparisons, method: Method) -> Diag
         return Diagnosis(
             status=Status.ONE_CONTESTANT,
             explanation=(
-                sentence(
-                    "There is only one contestant, %(names)s: nobody to compare with.",
-                    names=votes.names,
-                ),
+                f"There is only one contestant, {votes.shown[0]}: nobody to compare with.",
             ),
         )
     # Online Elo's steps of at most K points stay finite whoever wins.
-    return diagnose(counting.names, count_pairs(counting), bounded_anyway=method is Method.ELO)
+    return diagnose(counting.shown, count_pairs(counting), bounded_anyway=method is Method.ELO)
 
 
 def _once(*said: tuple[T, ...]) -> tuple[T, ...]:

@@ -14,9 +14,8 @@ from arena.rating.connectivity import Diagnosis
 from arena.rating.parts import Rated
 from arena.rating.rules import Method, Rules
 from arena.rating.tiers import Tiers, outer_bounds, ranks_across
-from augment.sentences import sentence
 
-_NO_VOTES = sentence("no votes")
+_NO_VOTES = "no votes"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -26,7 +26,6 @@ from arena.rating.ranking import (
 )
 from arena.rating.rules import Intervals, Method, Rules
 from arena.rating.simultaneous import judge_pairs
-from augment.sentences import Sentence
 
 _SAME = 1e-6
 """Points. Rounds that all lie within this say nothing about the spread."""
@@ -56,9 +55,9 @@ class Rated:
     tie_strength: float | None = None
     coefficients: tuple[Coefficient, ...] = ()
     degenerate: int = 0
-    notes: tuple[Sentence | str, ...] = ()
-    explanation: tuple[Sentence, ...] = ()
-    warnings: tuple[Sentence | str, ...] = ()
+    notes: tuple[str, ...] = ()
+    explanation: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
 
     @property
     def is_open(self) -> bool:
@@ -99,7 +98,7 @@ def rate_part(votes: Comparisons, rules: Rules, status: Status) -> Rated:
         bounds = open_interval(everywhere.values)
     if np.isnan(bounds).all():
         lost = found.loose.values.shape[1]
-        said = remarks.why_no_interval(votes.names, rules, lost=lost)
+        said = remarks.why_no_interval(votes.shown, rules, lost=lost)
         return _without_intervals(found, rules, remarks.TOO_FEW, (said,))
     if spread is not None:
         return _in_closed_form(votes, rules, found, everywhere, bounds, spread)
@@ -121,7 +120,7 @@ def _are_all_the_same(values: FloatArray) -> bool:
 
 
 def _without_intervals(
-    fit: Fitted, rules: Rules, note: Sentence, explanation: tuple[Sentence, ...]
+    fit: Fitted, rules: Rules, note: str, explanation: tuple[str, ...]
 ) -> Rated:
     return Rated(
         rating=fit.rating,
@@ -229,7 +228,7 @@ def _with_intervals(
         coefficients=fit.coefficients or (),
         degenerate=degenerate,
         notes=notes,
-        explanation=_on_covariates(votes, fit) + remarks.who_is_open(votes.names, notes),
+        explanation=_on_covariates(votes, fit) + remarks.who_is_open(votes.shown, notes),
         warnings=_notes_on_method(rules)
         + remarks.warnings(votes, rules=rules, rounds=drawn, degenerate=degenerate),
     )
@@ -248,10 +247,10 @@ def _separation(rating: FloatArray, everywhere: Placed) -> Separation | None:
     return found.among(members, len(rating))
 
 
-def _on_covariates(votes: Comparisons, fit: Fitted) -> tuple[Sentence, ...]:
+def _on_covariates(votes: Comparisons, fit: Fitted) -> tuple[str, ...]:
     missing = votes.covariates.shape[1] > 0 and fit.coefficients is None
     return (remarks.NOT_ADJUSTED,) if missing else ()
 
 
-def _notes_on_method(rules: Rules) -> tuple[Sentence, ...]:
+def _notes_on_method(rules: Rules) -> tuple[str, ...]:
     return (remarks.ELO_NOTE,) if rules.method is Method.ELO else ()

@@ -9,7 +9,6 @@ from arena.rating.bootstrap import Unit
 from arena.rating.comparisons import Comparisons, FloatArray, IntArray, renumber_codes
 from arena.rating.connectivity import few_of
 from arena.rating.rules import Intervals, Rules
-from augment.sentences import Sentence, sentence
 
 FEWEST = {"expert": 5, "scenario": 10}
 """A table that rests on fewer says so: docs/rating.md."""
@@ -32,7 +31,7 @@ def few_clusters(votes: Comparisons, unit: Unit) -> int | None:
     return smallest if smallest < sandwich.FEW_CLUSTERS else None
 
 
-def why_no_interval(names: tuple[str, ...], rules: Rules, *, lost: int) -> Sentence:
+def why_no_interval(names: tuple[str, ...], rules: Rules, *, lost: int) -> str:
     """Why nobody of a part has a bound.
 
     Args:
@@ -40,36 +39,30 @@ def why_no_interval(names: tuple[str, ...], rules: Rules, *, lost: int) -> Sente
         rules: How it was rated.
         lost: Rounds that did not determine everybody.
     """
-    named = few_of(names, mark="…")
+    named = ", ".join(few_of(names))
     if rules.intervals is not Intervals.RESAMPLES:
-        return sentence(
-            "Among %(names)s no intervals can be given: there are too few votes, or hardly any "
-            "against some contestant.",
-            names=named,
+        return (
+            f"Among {named} no intervals can be given: there are too few votes, or "
+            "hardly any against some contestant."
         )
-    return sentence(
-        "Among %(names)s the votes determined no ratings in %(lost)s of %(rounds)s "
-        "resamples, so intervals can't be given: there are too few votes, or hardly "
-        "any against some contestant.",
-        names=named,
-        lost=lost,
-        rounds=rules.rounds,
+    return (
+        f"Among {named} the votes determined no ratings in {lost} of {rules.rounds} "
+        "resamples, so intervals can't be given: there are too few votes, or hardly any against "
+        "some contestant."
     )
 
 
-def why_no_spread(rules: Rules) -> Sentence:
+def why_no_spread(rules: Rules) -> str:
     """Why the votes leave no width for an interval."""
     if rules.intervals is Intervals.RESAMPLES:
         return _ALL_THE_SAME[rules.unit]
-    return sentence(
+    return (
         "The votes do not vary between what they are clustered by, so intervals can't be given: "
         "there is too little that could have come out otherwise."
     )
 
 
-def notes_on_bounds(
-    lower: FloatArray, upper: FloatArray, rank: IntArray
-) -> tuple[Sentence | str, ...]:
+def notes_on_bounds(lower: FloatArray, upper: FloatArray, rank: IntArray) -> tuple[str, ...]:
     """(C,) which bounds or ranks are missing and why; bounds NaN and ranks 0 are missing."""
     return tuple(
         _MISSING[no_lower, no_upper, no_rank]
@@ -79,9 +72,7 @@ def notes_on_bounds(
     )
 
 
-def why_too_few(
-    votes: Comparisons, unit: Unit, notes: tuple[Sentence | str, ...]
-) -> tuple[Sentence | str, ...]:
+def why_too_few(votes: Comparisons, unit: Unit, notes: tuple[str, ...]) -> tuple[str, ...]:
     """Say what is too few where neither bound is known: votes, experts or scenarios.
 
     Args:
@@ -110,34 +101,21 @@ _FEWEST_CLUSTERS = 6
 """Six independent comparisons are the fewest that tell two apart."""
 
 
-def who_is_open(names: tuple[str, ...], notes: tuple[Sentence | str, ...]) -> tuple[Sentence, ...]:
+def who_is_open(names: tuple[str, ...], notes: tuple[str, ...]) -> tuple[str, ...]:
     """That some lack bounds, and who; nothing if nobody does."""
     lacking = tuple(name for name, note in zip(names, notes, strict=True) if note)
     if not lacking:
         return ()
-    if len(lacking) == len(names):
-        names = few_of(names, mark="…")
-        return (
-            sentence(
-                "The votes set no two bounds for %(names)s: too few votes, or hardly any score on "
-                "one side. The lines say what is missing.",
-                names=names,
-            ),
-        )
+    rest = "; the others' intervals do not rest on them" if len(lacking) < len(names) else ""
     return (
-        sentence(
-            "The votes set no two bounds for %(names)s: too few votes, or hardly any score on "
-            "one side. The lines say what is missing; the others' intervals do not rest on them.",
-            names=few_of(lacking, mark="…"),
-        ),
+        f"The votes set no two bounds for {', '.join(few_of(lacking))}: too few votes, or hardly "
+        f"any score on one side. The lines say what is missing{rest}.",
     )
 
 
-def warnings(
-    votes: Comparisons, *, rules: Rules, rounds: int, degenerate: int
-) -> tuple[Sentence | str, ...]:
+def warnings(votes: Comparisons, *, rules: Rules, rounds: int, degenerate: int) -> tuple[str, ...]:
     """What to keep in mind with intervals by these rules."""
-    said: list[Sentence | str] = []
+    said: list[str] = []
     unit = rules.unit
     clusters = _clusters(votes, unit)
     few = False
@@ -156,76 +134,72 @@ def warnings(
         said.append(_WIDENED[unit])
     if degenerate and rules.intervals is Intervals.RESAMPLES:
         said.append(
-            sentence(
-                "In %(lost)s of %(rounds)s resamples the votes did not determine everybody's "
-                "rating; there it counts as far above or below the others, as the votes say.",
-                lost=degenerate,
-                rounds=rounds,
-            )
+            f"In {degenerate} of {rounds} resamples the votes did not determine everybody's "
+            "rating; there it counts as far above or below the others, as the votes say."
         )
     return tuple(said)
 
 
-ELO_NOTE = sentence(elo.INTERVAL_NOTE)
+ELO_NOTE = elo.INTERVAL_NOTE
 
-NO_DAVIDSON = sentence(
+NO_DAVIDSON = (
     "Davidson's model has no finite ratings for these votes: some score one way by ties only. "
     "Bradley-Terry rates them."
 )
 
-NOT_ADJUSTED = sentence(
-    "The votes do not determine what was to be adjusted for: it is the same in all votes, or says "
-    "no more than who was shown. The ratings stand without it."
+NOT_ADJUSTED = (
+    "The votes do not determine what was to be adjusted for: it is the same in all votes, or "
+    "says no more than who was shown. The ratings stand without it."
 )
 
 _ALL_THE_SAME = {
-    Unit.VOTE: sentence(
+    Unit.VOTE: (
         "Every resample by vote gave the same ratings, so intervals can't be given: there is too "
         "little that could have come out otherwise."
     ),
-    Unit.EXPERT: sentence(
+    Unit.EXPERT: (
         "Every resample by expert gave the same ratings, so intervals can't be given: there is "
         "too little that could have come out otherwise."
     ),
-    Unit.SCENARIO: sentence(
+    Unit.SCENARIO: (
         "Every resample by scenario gave the same ratings, so intervals can't be given: there is "
         "too little that could have come out otherwise."
     ),
-    Unit.TWO_WAY: sentence(
+    Unit.TWO_WAY: (
         "Every resample by expert and scenario gave the same ratings, so intervals can't be "
         "given: there is too little that could have come out otherwise."
     ),
 }
 
 
-def note_with_rank(note: Sentence | str, rank: int | None) -> Sentence | str:
+def note_with_rank(note: str, rank: int | None) -> str:
     """The note of a line whose rank over all parts is decided, or None, unlike within its part."""
     if rank is None:
         return _UNRANKED.get(note, note or _NO_RANK_ACROSS)
     return _RANKED.get(note, note)
 
 
-NO_SPREAD = sentence("no interval and no rank: the votes leave no spread")
-ONLY_TIES = sentence("no interval and no rank: every vote is a tie")
-TOO_FEW = sentence("no interval and no rank: too few votes")
-NOT_RATED = sentence("no rating by this model")
-_NO_RANK_ACROSS = sentence("no rank: too few votes against those above")
+NO_SPREAD = "no interval and no rank: the votes leave no spread"
+ONLY_TIES = "no interval and no rank: every vote is a tie"
+TOO_FEW = "no interval and no rank: too few votes"
+NOT_RATED = "no rating by this model"
+_NO_RANK_ACROSS = "no rank: too few votes against those above"
 
-_UNRANKED: dict[str, Sentence] = {
-    "no upper limit": sentence("no upper limit; no rank: too few votes say that it is above"),
-    "no lower limit": sentence("no lower limit; no rank: too few votes say that it is below"),
-    "no limits among equals": sentence("no limits among equals; no rank"),
+_UNRANKED: dict[str, str] = {
+    "no upper limit": "no upper limit; no rank: too few votes say that it is above",
+    "no lower limit": "no lower limit; no rank: too few votes say that it is below",
+    "no limits among equals": "no limits among equals; no rank",
 }
 """Notes of those without a rating, where the votes decide no rank either."""
 
-_MISSING: dict[tuple[bool, bool, bool], Sentence | str] = {
+_MISSING: dict[tuple[bool, bool, bool], str] = {
     (False, False, False): "",
-    (True, False, False): sentence("no lower bound: hardly any score"),
-    (False, True, False): sentence("no upper bound: hardly anybody scored"),
-    (True, False, True): sentence(
+    (True, False, False): "no lower bound: hardly any score",
+    (False, True, False): "no upper bound: hardly anybody scored",
+    (True, False, True): (
         "no lower bound: hardly any score; no rank, because the upper bound tells it from nobody"
     ),
-    (False, True, True): sentence(
+    (False, True, True): (
         "no upper bound: hardly anybody scored; no rank, because the lower bound is not above "
         "the average"
     ),
@@ -239,22 +213,22 @@ _RANKED = {
 }
 
 _ONLY_ONE = {
-    "expert": sentence(
+    "expert": (
         "All votes belong to one expert: how much experts differ can't be seen, and the "
         "intervals hold for this expert only."
     ),
-    "scenario": sentence(
+    "scenario": (
         "All votes belong to one scenario: how much scenarios differ can't be seen, and the "
         "intervals hold for this scenario only."
     ),
 }
 
-_BY_T = sentence("Such intervals are widened by Student's t.")
+_BY_T = "Such intervals are widened by Student's t."
 
 _WIDENED = {
     Unit.EXPERT: _BY_T,
     Unit.SCENARIO: _BY_T,
-    Unit.TWO_WAY: sentence(
+    Unit.TWO_WAY: (
         "Drawing both ways is too wide where votes are independent and too narrow where few "
         "experts differ much; intervals in closed form are neither."
     ),

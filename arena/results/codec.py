@@ -11,7 +11,6 @@ from pydantic import TypeAdapter, ValidationError
 
 from arena.results.tree import VERSION, Results
 from augment.errors import InvalidDocument
-from augment.sentences import Sentence
 
 
 def read_results(document: Mapping[str, Any]) -> Results:
@@ -45,8 +44,6 @@ def _adapter() -> TypeAdapter[Results]:
 
 
 def _document(value: Any, version: int) -> Any:
-    if isinstance(value, Sentence):
-        return value.as_document()
     if is_dataclass(value):
         return {
             field.name: _document(found, version)

@@ -19,7 +19,6 @@ from arena.queries.people import ROLES, forgotten_name, has_admin, is_forgotten,
 from arena.services.enrolments import give_up_places
 from arena.services.study_drafts import rename_in_drafts
 from augment.errors import Conflict, InvalidDocument, UnknownName
-from augment.sentences import sentence
 from augment.services.events import log_event
 
 
@@ -34,7 +33,7 @@ def make_welcome_token(user: User, *, actor: User) -> str:
         Conflict: The account is paused or simulated.
     """
     if not user.is_active or user.person.is_simulated:
-        raise Conflict(sentence("%(name)s can't sign in.", name=user.get_username()))
+        raise Conflict(f"{user.get_username()} can't sign in.")
     _end_links(user)
     _log(user, actor, "make link", None, None)
     return f"{user.person.code.hex}-{default_token_generator.make_token(user)}"
@@ -100,7 +99,7 @@ def set_active(*, user: User, is_active: bool, actor: User) -> None:
     if user.is_active == is_active:
         return
     if is_active and is_forgotten(user):
-        raise Conflict(sentence("This account is forgotten; nobody can sign in to it again."))
+        raise Conflict("This account is forgotten; nobody can sign in to it again.")
     _end_links(user)
     user.is_active = is_active
     user.save(update_fields=["is_active"])
@@ -189,12 +188,12 @@ def _hold_admins(actor: User) -> None:
     Group.objects.get_or_create(name="admin")
     Group.objects.select_for_update(no_key=True).get(name="admin")
     if role_of(User.objects.get(pk=actor.pk)) != "admin":
-        raise Conflict(sentence("You are not an admin any more."))
+        raise Conflict("You are not an admin any more.")
 
 
 def _keep_an_admin() -> None:
     if not has_admin():
-        raise Conflict(sentence("Nobody would be left to administrate."))
+        raise Conflict("Nobody would be left to administrate.")
 
 
 def _end_links(user: User) -> None:
@@ -206,7 +205,7 @@ def _end_links(user: User) -> None:
 
 def _must_be_another(user: User, actor: User) -> None:
     if user.pk == actor.pk:
-        raise Conflict(sentence("This is your own account; ask another admin."))
+        raise Conflict("This is your own account; ask another admin.")
 
 
 def _sign_out(user: User) -> None:

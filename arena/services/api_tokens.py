@@ -10,13 +10,13 @@ from django.contrib.auth.models import User
 from django.db import transaction
 from django.db.models import Case, F, Q, Value, When
 from django.utils import timezone
+from django.utils.translation import gettext as _
 
 from arena.errors import TokenOver, TooManyRequests
 from arena.models import ApiToken, token_digest
 from arena.queries.api_tokens import api_token_by_secret, effective_role, roles_offered
 from arena.queries.people import role_of
 from augment.errors import Conflict, UnknownName
-from augment.sentences import sentence
 from augment.services.events import log_event
 from augment.services.texts import one_line
 
@@ -65,7 +65,7 @@ def make_api_token(*, owner: User, name: str, role: str, days: int) -> FreshToke
     if days not in DAYS:
         allowed = ", ".join(map(str, DAYS))
         raise Conflict(
-            sentence("A token works for %(allowed)s days, not %(n)s.", allowed=allowed, n=days)
+            _("A token works for %(allowed)s days, not %(n)s.") % {"allowed": allowed, "n": days}
         )
     now = timezone.now()
     if (
@@ -73,7 +73,7 @@ def make_api_token(*, owner: User, name: str, role: str, days: int) -> FreshToke
         >= MOST_ALIVE
     ):
         raise Conflict(
-            sentence("You have %(n)s tokens already; revoke one of them first.", n=MOST_ALIVE)
+            _("You have %(n)s tokens already; revoke one of them first.") % {"n": MOST_ALIVE}
         )
     secret = PREFIX + secrets.token_urlsafe(32)
     token = ApiToken.objects.create(
@@ -105,7 +105,7 @@ def use_api_token(secret: str) -> tuple[User, ApiToken]:
     token = api_token_by_secret(secret)
     role = None if token is None else effective_role(token.role, role_of(token.owner))
     if token is None or role is None:
-        raise TokenOver(sentence("This token opens nothing: it is unknown, expired or revoked."))
+        raise TokenOver("This token opens nothing: it is unknown, expired or revoked.")
     _count(token, REQUESTS[role])
     owner = token.owner
     owner.token_role = role  # type: ignore[attr-defined]

@@ -14,7 +14,6 @@ from arena.pairing.rules import place_of
 from arena.services.frames import Cells
 from arena.services.showable import find_showable, with_picture
 from augment.models import Augmentation, Contestant, Scenario
-from augment.sentences import sentence
 from augment.services.scenarios.pictures import window_of
 
 Kind = Contestant.Kind
@@ -72,22 +71,14 @@ def enough_checks(
     missing = [row.slug for row in with_reference if row.slug not in ready]
     if len(ready) + len(missing) >= wanted:
         raise NothingToPlan(
-            sentence(
-                "Attention checks wanted for each expert: %(wanted)s; scenarios with pictures for "
-                "one: %(found)s. Generate the contestant reference and press “Draw missing "
-                "attention checks” on the page of a new study, then open it; or ask for 0 %%.",
-                wanted=wanted,
-                found=len(checks),
-            )
+            f"Attention checks wanted for each expert: {wanted}; scenarios with pictures for "
+            f"one: {len(checks)}. Generate the contestant reference and press “Draw missing "
+            "attention checks” on the page of a new study, then open it; or ask for 0 %."
         )
     raise NothingToPlan(
-        sentence(
-            "Attention checks wanted for each expert: %(wanted)s; each needs a scenario of its "
-            "own with a reference, and the study has %(most)s. Ask for fewer, or choose more "
-            "scenarios.",
-            wanted=wanted,
-            most=len(ready) + len(missing),
-        )
+        f"Attention checks wanted for each expert: {wanted}; each needs a scenario of its "
+        f"own with a reference, and the study has {len(ready) + len(missing)}. Ask for "
+        "fewer, or choose more scenarios."
     )
 
 

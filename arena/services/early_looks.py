@@ -8,7 +8,6 @@ from django.db import transaction
 from arena.models import EarlyLook, Study
 from arena.queries.results import votes_in
 from augment.errors import Conflict
-from augment.sentences import sentence, word
 from augment.services.events import log_event
 
 
@@ -20,13 +19,7 @@ def open_early(*, study: Study, actor: User) -> None:
         Conflict: The study is not open: there is nothing to open early.
     """
     if study.state != Study.State.OPEN:
-        raise Conflict(
-            sentence(
-                "The study '%(name)s' is %(state)s: nothing is opened early.",
-                name=study.name,
-                state=word(study.state),
-            )
-        )
+        raise Conflict(f"The study '{study.name}' is {study.state}: nothing is opened early.")
     _, is_new = EarlyLook.objects.get_or_create(study=study, user=actor)
     if is_new:
         ends_voting = votes_in(actor, study)

@@ -10,7 +10,6 @@ from django.utils import timezone
 
 from arena.errors import StudyNotOpen
 from arena.models import Study
-from augment.sentences import sentence
 from augment.services.events import log_event
 from augment.services.texts import check_prose
 
@@ -30,11 +29,7 @@ def close_study(*, study: Study, actor: User | None = None) -> Study:
     if study.state == Study.State.CLOSED:
         return study
     if study.state != Study.State.OPEN:
-        raise StudyNotOpen(
-            sentence(
-                "The study '%(name)s' was cancelled: there is nothing to close.", name=study.name
-            )
-        )
+        raise StudyNotOpen(f"The study '{study.name}' was cancelled: there is nothing to close.")
     return _end(study, Study.State.CLOSED, verb="close", actor=actor)
 
 
@@ -60,10 +55,7 @@ def cancel_study(*, study: Study, why: str = "", actor: User | None = None) -> S
         return study
     if study.state != Study.State.OPEN:
         raise StudyNotOpen(
-            sentence(
-                "The study '%(name)s' is closed: it has results and can't be cancelled.",
-                name=study.name,
-            )
+            f"The study '{study.name}' is closed: it has results and can't be cancelled."
         )
     more = {"why": why} if why else {}
     return _end(study, Study.State.CANCELLED, verb="cancel", actor=actor, **more)

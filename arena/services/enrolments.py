@@ -10,6 +10,7 @@ from django.contrib.auth.models import User
 from django.db import transaction
 from django.db.models import Count
 from django.utils import timezone
+from django.utils.translation import gettext
 
 from arena.errors import EnrolmentOver, NothingToPlan
 from arena.models import EnrolledVoter, Enrolment, Matchup, Study
@@ -29,11 +30,10 @@ from arena.services.handing_over import undecided_rows
 from arena.services.people import create_person
 from arena.services.plans import next_batch, pictures_of, rules_of, store
 from augment.errors import Conflict
-from augment.sentences import sentence
 from augment.services.events import log_event
 from augment.services.texts import one_line
 
-LONGEST_CONSENT = 5_000
+LONGEST_CONSENT, LONGEST_ID = 5_000, 120
 
 
 @transaction.atomic
@@ -68,15 +68,11 @@ def set_enrolment(
     """
     study = Study.objects.select_for_update().get(pk=study.pk)
     if study.state != Study.State.OPEN:
-        raise Conflict(
-            sentence("The study '%(name)s' is not open: nobody can enrol.", name=study.name)
-        )
+        raise Conflict(f"The study '{study.name}' is not open: nobody can enrol.")
     consent = consent.replace("\r\n", "\n").strip()
     if not 0 < len(consent) <= LONGEST_CONSENT:
-        raise Conflict(
-            sentence("What people agree to has 1 to %(most)s characters.", most=LONGEST_CONSENT)
-        )
-    asks_for = one_line("asks_for", asks_for, what="enrolment", longest=120)
+        raise Conflict(f"What people agree to has 1 to {LONGEST_CONSENT} characters.")
+    asks_for = one_line("asks_for", asks_for, what="enrolment", longest=LONGEST_ID)
     values = {
         "consent": consent,
         "asks_for": asks_for,
@@ -116,28 +112,28 @@ def enrol(*, token: str, external_id: str, agreed_sha256: str) -> EnrolledVoter:
         Conflict: The id is enrolled already, or another text was agreed to than holds now.
         InvalidDocument: The id is empty, too long or no line.
     """
-    external_id = one_line("id", external_id, what="enrolment", longest=120)
+    external_id = one_line("id", external_id, what="enrolment", longest=LONGEST_ID)
     found = enrolment_by_token(token)
     # What holds since the opening is read before the study is held: others wait only for the rest.
     fixed = _read_plan(found.study) if found.is_open else None
     study = Study.objects.select_for_update().get(pk=found.study_id)
     enrolment = Enrolment.objects.get(pk=found.pk)
     if fixed is None or not enrolment.is_open or study.state != Study.State.OPEN:
-        raise EnrolmentOver(sentence("This study takes on nobody any more."))
+        raise EnrolmentOver("This study takes on nobody any more.")
     if agreed_sha256 != enrolment.consent_sha256:
         raise Conflict(
-            sentence("The text was changed meanwhile. Please read it again before you agree.")
+            gettext("The text was changed meanwhile. Please read it again before you agree.")
         )
     if enrolment.voters.filter(external_id__iexact=external_id).exists():
         raise Conflict(
-            sentence(
-                "“%(id)s” takes part already. Go on where you began, in the same "
-                "browser, or ask who runs the study for a link of your own.",
-                id=external_id,
+            gettext(
+                "“%(id)s” takes part already. Go on where you began, in the same browser, or ask "
+                "who runs the study for a link of your own."
             )
+            % {"id": external_id}
         )
     if not has_free_place(enrolment) and not drop_silent(enrolment=enrolment):
-        raise EnrolmentOver(sentence("Every place of this study is taken."))
+        raise EnrolmentOver("Every place of this study is taken.")
     return _take_on(study, enrolment, external_id, *fixed)
 
 
@@ -218,7 +214,7 @@ def _take_on(
     rng = np.random.default_rng([rules.seed, number])
     units = choose_units(grid, _judges(study, grid), enrolment.votes_each, rng)
     if not units:
-        raise NothingToPlan(sentence("The study has no pair that could be shown."))
+        raise NothingToPlan(gettext("The study has no pair that could be shown."))
     planned, _ = follow_on(rules, grid, person.username, [], units, rng)
     store(study, planned, cells, [person], batch=number)
     study.experts.add(person)

@@ -16,7 +16,6 @@ from arena.models import FaultLabel, LabellingRound, LabelTask
 from arena.queries.people import experts as expert_accounts
 from augment.errors import Conflict, UnknownName
 from augment.models import Augmentation, GenerationJob
-from augment.sentences import sentence
 from augment.services.events import log_event
 from augment.services.judging.fault_guess import FaultClass, guess_faults
 from augment.services.texts import make_storable, one_line
@@ -59,7 +58,7 @@ def open_labelling(
     labelling.experts.set(people)
     tasks = [task for expert in people for task in _planned(labelling, expert)]
     if not tasks:
-        raise NothingToPlan(sentence("These experts have nothing left to label in this job."))
+        raise NothingToPlan("These experts have nothing left to label in this job.")
     LabelTask.objects.bulk_create(tasks)
     log_event(
         actor=actor,
@@ -86,9 +85,7 @@ def close_labelling(*, labelling: LabellingRound, actor: User | None = None) -> 
     """
     now = timezone.now()
     if not LabellingRound.objects.filter(pk=labelling.pk, closed_at=None).update(closed_at=now):
-        raise LabellingClosed(
-            sentence("The labelling '%(name)s' is closed already.", name=labelling.name)
-        )
+        raise LabellingClosed(f"The labelling '{labelling.name}' is closed already.")
     labelling.closed_at = now
     log_event(
         actor=actor,
@@ -130,9 +127,7 @@ def _insert(name: str, job: GenerationJob, seed: int) -> LabellingRound:
 
 
 def _taken(name: str) -> Conflict:
-    return Conflict(
-        sentence("There is a labelling called '%(name)s' already; choose another name.", name=name)
-    )
+    return Conflict(f"There is a labelling called '{name}' already; choose another name.")
 
 
 def _experts(usernames: Sequence[str]) -> list[User]:
@@ -143,9 +138,7 @@ def _experts(usernames: Sequence[str]) -> list[User]:
     experts = [known[username] for username in sorted(set(usernames))]
     simulated = [user.username for user in experts if user.person.is_simulated]
     if simulated:
-        raise Conflict(
-            sentence("Simulated experts label nothing: %(names)s.", names=tuple(simulated))
-        )
+        raise Conflict(f"Simulated experts label nothing: {', '.join(simulated)}.")
     return experts
 
 
@@ -176,14 +169,10 @@ def _save(
     known = FaultLabel.objects.filter(task=task).first()
     if known is not None:
         if any(getattr(known, name) != value for name, value in said.items()):
-            raise AlreadyLabelled(
-                sentence("You had labelled that picture before; your first label counts.")
-            )
+            raise AlreadyLabelled("You had labelled that picture before; your first label counts.")
         return known
     if task.labelling.closed_at is not None:
-        raise LabellingClosed(
-            sentence("The labelling '%(name)s' is closed.", name=task.labelling.name)
-        )
+        raise LabellingClosed(f"The labelling '{task.labelling.name}' is closed.")
     guessed = guess_faults(task.augmentation)
     return FaultLabel.objects.create(
         augmentation=task.augmentation,

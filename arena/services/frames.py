@@ -14,7 +14,6 @@ from arena.pairing.plan import PlannedMatchup
 from arena.pairing.rules import scenario_of
 from arena.queries.showings import VIEW_OF_OLD
 from augment.models import Augmentation, Scenario
-from augment.sentences import sentence
 from augment.services.scenarios.pictures import camera_of, view_of, window_of
 
 Cells = dict[tuple[str, str], Augmentation]
@@ -113,12 +112,9 @@ def _frame(place: Scenario, window: str, cell: Augmentation) -> ScenarioFrame:
 
 def _other_windows(scenarios: list[str]) -> NothingToPlan:
     return NothingToPlan(
-        sentence(
-            "The pictures of %(scenarios)s show different windows, so they can’t stand side "
-            "by side. They are drawn anew when the program starts; restart it, or choose other "
-            "scenarios.",
-            scenarios=tuple(scenarios[:MOST_NAMED]),
-        )
+        f"The pictures of {', '.join(scenarios[:MOST_NAMED])} show different windows, so "
+        "they can’t stand side by side. They are drawn anew when the program starts; restart "
+        "it, or choose other scenarios."
     )
 
 

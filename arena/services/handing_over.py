@@ -24,7 +24,6 @@ from arena.services.plans import (
     votes_left,
 )
 from augment.errors import Conflict, UnknownName
-from augment.sentences import sentence, word
 from augment.services.events import log_event
 
 
@@ -67,7 +66,7 @@ def hand_over(
     units = units_of(grid, [_as_planned(row) for row in open_rows])
     later = _shares(votes_left(study, giver), names)
     if not units and not any(later.values()):
-        raise NothingToPlan(sentence("%(name)s has nothing left to hand over.", name=username))
+        raise NothingToPlan(f"{username} has nothing left to hand over.")
     dealt = deal(grid, known, names, units, rng)
     planned = [
         one
@@ -94,13 +93,7 @@ def hand_over(
 
 
 def _not_open(study: Study) -> StudyNotOpen:
-    return StudyNotOpen(
-        sentence(
-            "The study '%(name)s' is %(state)s: nothing is handed over.",
-            name=study.name,
-            state=word(study.state),
-        )
-    )
+    return StudyNotOpen(f"The study '{study.name}' is {study.state}: nothing is handed over.")
 
 
 def _giver(study: Study, username: str) -> User:
@@ -114,20 +107,16 @@ def _giver(study: Study, username: str) -> User:
 def _takers(study: Study, username: str, to: Sequence[str]) -> list[User]:
     known = {user.username: user for user in expert_accounts()}
     if not to:
-        raise Conflict(sentence("Name at least one expert who takes over."))
+        raise Conflict("Name at least one expert who takes over.")
     if username in to:
-        raise Conflict(sentence("%(name)s can't take over their own pairs.", name=username))
+        raise Conflict(f"{username} can't take over their own pairs.")
     for name in to:
         if name not in known:
             raise UnknownName("expert", name, sorted(known))
     takers = [known[name] for name in sorted(set(to))]
     simulated = [user.username for user in takers if user.person.is_simulated]
     if simulated and not study.allow_simulated:
-        raise Conflict(
-            sentence(
-                "Simulated: %(names)s. This study does not allow them.", names=tuple(simulated)
-            )
-        )
+        raise Conflict(f"Simulated: {', '.join(simulated)}. This study does not allow them.")
     return takers
 
 

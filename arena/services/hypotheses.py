@@ -10,7 +10,6 @@ from typing import Any
 
 from arena.errors import NothingToPlan
 from arena.models import Snapshot, Study
-from augment.sentences import sentence
 
 MOST = 100
 LONGEST = 500
@@ -73,9 +72,7 @@ def read_hypotheses(lines: Sequence[str], contestants: Sequence[str]) -> tuple[H
     """
     found = [" ".join(line.split()) for line in lines if line.strip()]
     if len(found) > MOST or len(set(found)) < len(found):
-        raise NothingToPlan(
-            sentence("At most %(most)s hypotheses, each once, are allowed.", most=MOST)
-        )
+        raise NothingToPlan(f"At most {MOST} hypotheses, each once, are allowed.")
     return tuple(_read(line, contestants) for line in found)
 
 
@@ -106,8 +103,7 @@ def answer_hypotheses(snapshot: Snapshot) -> tuple[Answered, ...]:
 def _read(line: str, contestants: Sequence[str]) -> Hypothesis:
     if len(line) > LONGEST:
         raise NothingToPlan(
-            sentence("A hypothesis has at most %(most)s signs: “%(line)s…”.",
-                     most=LONGEST, line=line[:40])
+            f"A hypothesis has at most {LONGEST} signs: “{line[:40]}…”."
         )  # fmt: skip
     found = _PAIR.fullmatch(line)
     if found is None:
@@ -116,15 +112,11 @@ def _read(line: str, contestants: Sequence[str]) -> Hypothesis:
     for slug in (better, other):
         if slug not in contestants:
             raise NothingToPlan(
-                sentence(
-                    "“%(line)s”: %(slug)s is no contestant of this study; allowed are %(known)s.",
-                    line=line,
-                    slug=slug,
-                    known=tuple(sorted(contestants)),
-                )
+                f"“{line}”: {slug} is no contestant of this study; allowed are "
+                f"{', '.join(sorted(contestants))}."
             )
     if better == other:
-        raise NothingToPlan(sentence("“%(line)s” names one contestant twice.", line=line))
+        raise NothingToPlan(f"“{line}” names one contestant twice.")
     return Hypothesis(text=line, above=(better, other))
 
 

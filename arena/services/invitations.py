@@ -16,7 +16,6 @@ from arena.models import Invitation, Study, token_digest
 from arena.queries.invitations import invitation_by_token, may_be_let_in
 from arena.services.people import must_take_part
 from augment.errors import Conflict
-from augment.sentences import sentence
 from augment.services.events import log_event
 
 LINK_LIVES = timedelta(days=14)
@@ -46,16 +45,11 @@ def invite(*, study: Study, expert: User, actor: User | None = None) -> FreshLin
     """
     must_take_part(study=study, expert=expert)
     if study.state == Study.State.CANCELLED:
-        raise Conflict(
-            sentence("The study '%(name)s' was cancelled; nobody is invited.", name=study.name)
-        )
+        raise Conflict(f"The study '{study.name}' was cancelled; nobody is invited.")
     if not may_be_let_in(expert):
         raise Conflict(
-            sentence(
-                "%(name)s can't be invited by a link: links are for active experts who are "
-                "neither simulated nor analysts or admins.",
-                name=expert.get_username(),
-            )
+            f"{expert.get_username()} can't be invited by a link: links are for active "
+            "experts who are neither simulated nor analysts or admins."
         )
     # Held, so that of two links made at once the second one sees the first, which it replaces.
     Study.objects.select_for_update(no_key=True).get(pk=study.pk)

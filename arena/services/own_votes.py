@@ -38,7 +38,7 @@ def with_and_without(
         return None
     others = [vote for vote in votes.with_own if not is_own_vote(vote, filters)]
     rest = votes.with_own if filters.leave_out_own else others
-    arrays = vote_arrays([entrant.slug for entrant in votes.entrants], rest)
+    arrays = vote_arrays(votes.entrants, rest)
     other = rate(
         with_covariates(arrays.comparisons, rest, covariates),
         method=board.method,

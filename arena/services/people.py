@@ -11,7 +11,6 @@ from arena.models import Person, Study
 from arena.queries.people import ROLES
 from arena.queries.results import votes_in
 from augment.errors import Conflict, InvalidDocument, UnknownName
-from augment.sentences import sentence
 from augment.services.events import log_event
 from augment.services.texts import one_line
 
@@ -84,13 +83,7 @@ def must_take_part(*, study: Study, expert: User) -> None:
         NotYours: It does not take part.
     """
     if not votes_in(expert, study):
-        raise NotYours(
-            sentence(
-                "%(expert)s does not take part in '%(study)s'.",
-                expert=expert.get_username(),
-                study=study.name,
-            )
-        )
+        raise NotYours(f"{expert.get_username()} does not take part in '{study.name}'.")
 
 
 def _check_username(username: str) -> None:

@@ -18,7 +18,6 @@ from arena.errors import InvalidVote, NothingToPlan, StudyNotOpen
 from arena.models import PracticePair, Study, Vote
 from arena.services.showable import find_showable
 from augment.models import Augmentation, Contestant, Scenario
-from augment.sentences import sentence
 from augment.services.scenarios.pictures import window_of
 
 PAIRS = 5
@@ -95,12 +94,10 @@ def require_practice_pictures() -> None:
     """
     if not has_practice():
         raise NothingToPlan(
-            sentence(
-                "There is nothing to practise on yet: no scenario has a picture of its reference "
-                "and a broken one. Generate the contestant reference and press “Draw missing "
-                "attention checks” on the page of a new study, or open it without a practice "
-                "round."
-            )
+            "There is nothing to practise on yet: no scenario has a picture of its reference "
+            "and a broken one. Generate the contestant reference and press “Draw missing "
+            "attention checks” on the page of a new study, or open it without a practice "
+            "round."
         )
 
 

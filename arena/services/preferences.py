@@ -7,6 +7,7 @@ from collections.abc import Mapping
 
 from django.contrib.auth.models import User
 from django.db import transaction
+from django.utils.translation import gettext as _
 
 from arena.errors import InvalidPreference
 from arena.models import Person
@@ -19,7 +20,6 @@ from arena.queries.voting_keys import (
     VotingPreferences,
     read_voting,
 )
-from augment.sentences import sentence, word
 
 
 @transaction.atomic
@@ -69,7 +69,7 @@ def keep_voting(
 
 
 def _person(user: User) -> Person:
-    person, _ = Person.objects.select_for_update().get_or_create(
+    person, _is_new = Person.objects.select_for_update().get_or_create(
         user=user, defaults={"pseudonym": user.get_username()}
     )
     return person
@@ -95,11 +95,8 @@ def _chosen(keys: Mapping[str, str]) -> dict[str, str]:
         if len(key) != 1 or not key.isprintable() or key.isspace():
             raise InvalidPreference(
                 "keys",
-                sentence(
-                    "“%(action)s” needs one character, not '%(key)s'.",
-                    action=word(KEY_LABELS[action]),
-                    key=key,
-                ),
+                _("“%(action)s” needs one character, not '%(key)s'.")
+                % {"action": _(KEY_LABELS[action]), "key": key},
             )
     shown = {
         action: lower.get(action, usual[0])
@@ -108,10 +105,8 @@ def _chosen(keys: Mapping[str, str]) -> dict[str, str]:
     }
     for key, times in Counter(shown.values()).items():
         if times > 1:
-            both = tuple(
-                word(KEY_LABELS[action]) for action, chosen in shown.items() if chosen == key
-            )
+            both = ", ".join(_(KEY_LABELS[one]) for one, chosen in shown.items() if chosen == key)
             raise InvalidPreference(
-                "keys", sentence("'%(key)s' would do two things: %(both)s.", key=key, both=both)
+                "keys", _("'%(key)s' would do two things: %(both)s.") % {"key": key, "both": both}
             )
     return {action: key for action, key in lower.items() if key != USUAL_KEYS[action][0]}

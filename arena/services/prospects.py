@@ -102,7 +102,7 @@ def _may_read(study: Study, reader: User | None) -> bool:
 
 def _of_results(snapshot: Snapshot) -> dict[str, Any]:
     votes = votes_of(snapshot)
-    comparisons = vote_arrays([one.slug for one in votes.entrants], votes.counted).comparisons
+    comparisons = vote_arrays(votes.entrants, votes.counted).comparisons
     ratings = snapshot.standings.exclude(rating=None).values_list("rating", flat=True)
     found = [rating for rating in ratings if rating is not None]
     effects = estimate_effects(comparisons)

@@ -21,7 +21,6 @@ from arena.services.covariates import COVARIATES, WITHOUT_PICTURES
 from arena.services.snapshots import compute, keep
 from arena.services.turns import in_turn
 from augment.errors import Conflict, LeaseLost, UnknownName
-from augment.sentences import sentence
 from augment.services.clock import Moment
 from augment.services.events import log_event
 from augment.services.work import Lease, WorkKind
@@ -151,9 +150,7 @@ def _planned(
     actor: User | None = None,
 ) -> Snapshot:
     if study.state == Study.State.CANCELLED:
-        raise Conflict(
-            sentence("The study '%(name)s' was cancelled: it is not rated.", name=study.name)
-        )
+        raise Conflict(f"The study '{study.name}' was cancelled: it is not rated.")
     is_early = study.state == Study.State.OPEN
     if is_early and not early:
         raise StudyStillOpen(study.name)
@@ -224,10 +221,8 @@ def _intervals(
     if covariates:
         if method is not Method.BRADLEY_TERRY or name == Intervals.RESAMPLES:
             raise Conflict(
-                sentence(
-                    "Only Bradley-Terry with intervals in closed form can be adjusted for what "
-                    "was shown."
-                )
+                "Only Bradley-Terry with intervals in closed form can be adjusted for what "
+                "was shown."
             )
         return Intervals.CLOSED_FORM
     if name is None:
@@ -235,7 +230,7 @@ def _intervals(
     if name not in list(Intervals):
         raise UnknownName("kind of intervals", name, [one.value for one in Intervals])
     if method is Method.ELO and name != Intervals.RESAMPLES:
-        raise Conflict(sentence("Online Elo has no intervals in closed form, only resamples."))
+        raise Conflict("Online Elo has no intervals in closed form, only resamples.")
     return Intervals(name)
 
 
@@ -251,18 +246,8 @@ def _default_unit(study: Study, method: Method) -> Unit:
 
 def _check_draws(method: Method, unit: Unit, rounds: int, seed: int) -> None:
     if not 1 <= rounds <= MOST_ROUNDS:
-        raise Conflict(
-            sentence(
-                "Bootstrap rounds go from 1 to %(most)s, not %(rounds)s.",
-                most=MOST_ROUNDS,
-                rounds=rounds,
-            )
-        )
+        raise Conflict(f"Bootstrap rounds go from 1 to {MOST_ROUNDS}, not {rounds}.")
     if not 0 <= seed < 2**63:
-        raise Conflict(sentence("A seed goes from 0 to 2^63 - 1, not %(seed)s.", seed=seed))
+        raise Conflict(f"A seed goes from 0 to 2^63 - 1, not {seed}.")
     if method is Method.ELO and unit is not Unit.VOTE:
-        raise Conflict(
-            sentence(
-                "Online Elo resamples single votes only; '%(unit)s' needs bt.", unit=unit.value
-            )
-        )
+        raise Conflict(f"Online Elo resamples single votes only; '{unit.value}' needs bt.")

@@ -8,7 +8,6 @@ from django.db import transaction
 from arena.services.redrawing import find_judged_now
 from augment.errors import Conflict
 from augment.models import Scenario
-from augment.sentences import sentence
 from augment.services.scenarios import references
 
 
@@ -56,9 +55,6 @@ def _hold_unjudged(scenario: Scenario) -> None:
 def _refuse_judged(scenario: Scenario) -> None:
     if needed_by := find_judged_now(scenario.pk):
         raise Conflict(
-            sentence(
-                "“%(name)s” is open and shows this scenario: its reference stays until that is "
-                "over.",
-                name=needed_by,
-            )
+            f"“{needed_by}” is open and shows this scenario: its reference stays until that "
+            "is over."
         )

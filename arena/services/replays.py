@@ -9,7 +9,6 @@ from arena.errors import NothingToPlan
 from arena.pairing.rules import scenario_of
 from arena.services.frames import MOST_NAMED, Cells
 from augment.models import Simulation
-from augment.sentences import sentence
 from augment.services.judging.simulations import Options
 
 Way = tuple[str, str, bool]
@@ -68,15 +67,9 @@ def _driven(pictures: set[int]) -> dict[Way, set[int]]:
 
 def _nothing_driven(cells: Cells, driven: set[int]) -> NothingToPlan:
     missing = sorted(names for names, cell in cells.items() if cell.pk not in driven)
+    named = ", ".join(f"{who} on {where}" for where, who in missing[:MOST_NAMED])
     return NothingToPlan(
-        sentence(
-            "No scenario can be played: each needs a drive of every picture that takes part. "
-            "Not driven: %(cells)s; %(number)s in all. Simulate their jobs first, or open the "
-            "study without drives.",
-            cells=tuple(
-                sentence("%(contestant)s on %(scenario)s", contestant=who, scenario=where)
-                for where, who in missing[:MOST_NAMED]
-            ),
-            number=len(missing),
-        )
+        "No scenario can be played: each needs a drive of every picture that takes part. "
+        f"Not driven: {named}; {len(missing)} in all. Simulate their jobs first, or open the "
+        "study without drives."
     )

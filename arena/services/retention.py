@@ -22,7 +22,6 @@ from django.db.models.functions import Cast, Coalesce, Length
 from arena.models import Matchup, Study
 from augment.errors import Conflict, InvalidDocument
 from augment.models import Augmentation, GenerationJob, ModelCall
-from augment.sentences import sentence
 from augment.services.events import log_event
 from augment.services.running.jobs import OPEN
 from augment.services.running.shown_images import delete_unnamed, images_named_by
@@ -151,9 +150,7 @@ def _empty(keys: list[int], *, before: datetime, now: datetime) -> None:
     rows = list(ModelCall.objects.select_for_update().filter(pk__in=keys).order_by("pk"))
     if _removable(before).filter(pk__in=keys).count() != len(keys):
         raise Conflict(
-            sentence(
-                "A job went on or a study was opened meanwhile; the rest is kept. Run it again."
-            )
+            "A job went on or a study was opened meanwhile; the rest is kept. Run it again."
         )
     for row in rows:
         row.request = {name: said for name, said in row.request.items() if name != "messages"}

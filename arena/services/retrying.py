@@ -8,7 +8,6 @@ from django.db.models import Q, QuerySet
 
 from augment.errors import Conflict
 from augment.models import Augmentation, GenerationJob, Scenario
-from augment.sentences import sentence
 from augment.services.running import retrying
 from augment.services.running.causes import rows_of_cause
 
@@ -41,12 +40,8 @@ def retry_cause(job: GenerationJob, *, key: str, actor: User | None = None) -> G
     )
     if shown:
         raise Conflict(
-            sentence(
-                "Experts are shown %(shown)s of these %(number)s in a study or a labelling: what "
-                "is judged stays as it is. Launch a new job instead.",
-                shown=shown,
-                number=len(pks),
-            )
+            f"Experts are shown {shown} of these {len(pks)} in a study or a labelling: what "
+            "is judged stays as it is. Launch a new job instead."
         )
     return retrying.retry_cause(job, key=key, actor=actor)
 

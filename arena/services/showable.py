@@ -11,7 +11,6 @@ from arena.pairing.plan import Entry
 from arena.pairing.rules import scenario_of
 from arena.services.frames import MOST_NAMED
 from augment.models import Augmentation, Contestant, Scenario
-from augment.sentences import Sentence, sentence
 from augment.services.scenarios.pictures import window_of
 
 
@@ -52,9 +51,7 @@ def refuse_missing(
         NothingToPlan: Pictures are missing; the text names them.
     """
     missing = [
-        sentence(
-            "%(contestant)s on %(scenario)s", contestant=contestant.slug, scenario=scenario.slug
-        )
+        f"{contestant.slug} on {scenario.slug}"
         for contestant in contestants
         for scenario in scenarios
         if (scenario.slug, contestant.slug) not in cells
@@ -74,13 +71,10 @@ def windows_of(entries: Iterable[Entry]) -> dict[str, str]:
 # --- Private -----------------------------------------------------------------------------------
 
 
-def _no_pictures(missing: list[Sentence]) -> Sentence:
+def _no_pictures(missing: list[str]) -> str:
     if len(missing) <= MOST_NAMED:
-        return sentence(
-            "There is no picture yet of %(cells)s. Generate them first.", cells=tuple(missing)
-        )
-    return sentence(
-        "There is no picture yet of %(cells)s and %(number)s more. Generate them first.",
-        cells=tuple(missing[:MOST_NAMED]),
-        number=len(missing) - MOST_NAMED,
+        return f"There is no picture yet of {', '.join(missing)}. Generate them first."
+    return (
+        f"There is no picture yet of {', '.join(missing[:MOST_NAMED])} and "
+        f"{len(missing) - MOST_NAMED} more. Generate them first."
     )

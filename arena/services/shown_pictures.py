@@ -22,7 +22,6 @@ from arena.services.frames import Cells
 from arena.services.showable import find_showable, refuse_missing
 from augment.errors import Conflict
 from augment.models import Augmentation, Contestant, GenerationJob, Scenario
-from augment.sentences import Sentence, sentence
 
 
 class SampleRule(StrEnum):
@@ -120,12 +119,7 @@ def _all(latest: _Latest, contestants: list[Contestant]) -> Cells:
     for (scenario, _), found in latest.items():
         most[scenario] |= found.keys()
     missing = [
-        sentence(
-            "%(contestant)s on %(scenario)s, sample %(sample)s",
-            contestant=who.slug,
-            scenario=scenario,
-            sample=sample,
-        )
+        f"{who.slug} on {scenario}, sample {sample}"
         for who in contestants
         for scenario, samples in sorted(most.items())
         for sample in sorted(samples - latest.get((scenario, who.slug), {}).keys())
@@ -133,11 +127,8 @@ def _all(latest: _Latest, contestants: list[Contestant]) -> Cells:
     ]
     if missing:
         raise NothingToPlan(
-            sentence(
-                "All samples are to be shown, and there is no picture of %(cells)s. Generate "
-                "them, or show one sample of each scenario.",
-                cells=tuple(missing[:8]),
-            )
+            "All samples are to be shown, and there is no picture of "
+            f"{', '.join(missing[:8])}. Generate them, or show one sample of each scenario."
         )
     return {
         (place_of(scenario, sample), contestant): row
@@ -156,17 +147,16 @@ def _refuse_mixed(cells: Cells) -> None:
             raise Conflict(_mixed(slug, sets))
 
 
-def _mixed(slug: str, sets: dict[str, list[Augmentation]]) -> Sentence:
+def _mixed(slug: str, sets: dict[str, list[Augmentation]]) -> str:
     documents = [json.loads(key) or {} for key in sets]
     names = sorted({name for one in documents for name in one})
     differing = [
         name for name in names if len({json.dumps(one.get(name)) for one in documents}) > 1
     ]
     jobs = sorted({row.job.name for rows in sets.values() for row in rows})
-    return sentence(
-        "The pictures of %(contestant)s were made with different options (%(names)s), in the jobs "
-        "%(jobs)s. Name the jobs whose augmentations the study is to show, or run it anew.",
-        contestant=slug,
-        names=tuple(differing) or ("unknown",),
-        jobs=tuple(jobs),
+    options = ", ".join(differing) or "unknown"
+    return (
+        f"The pictures of {slug} were made with different options ({options}), in the jobs "
+        f"{', '.join(jobs)}. Name the jobs whose augmentations the study is to show, or run it "
+        "anew."
     )

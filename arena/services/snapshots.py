@@ -29,7 +29,6 @@ from arena.services.vote_arrays import VoteArrays, vote_arrays
 from arena.services.vote_rows import VERSION as VOTES_VERSION
 from arena.services.vote_rows import digest_of, vote_rows, votes_csv
 from augment.errors import Conflict
-from augment.sentences import sentence
 
 Report = Callable[[int], None]
 
@@ -51,7 +50,7 @@ def compute(snapshot: Snapshot, report: Report) -> Computed:
     """
     report(5)
     votes = _vote_set(snapshot)
-    arrays = vote_arrays([entrant.slug for entrant in votes.entrants], votes.counted)
+    arrays = vote_arrays(votes.entrants, votes.counted)
     report(20)
     plain = board = _rate(snapshot, arrays.comparisons)
     if snapshot.covariates:
@@ -99,10 +98,8 @@ def votes_of(snapshot: Snapshot) -> VoteSet:
     rows = vote_rows(votes.counted, snapshot.results.judges)
     if digest_of(votes_csv(rows, votes_version_of(snapshot))) != snapshot.votes_sha256:
         raise Conflict(
-            sentence(
-                "The votes of '%(name)s' are not those of this rating any more. Rate again.",
-                name=snapshot.study.name,
-            )
+            f"The votes of '{snapshot.study.name}' are not those of this rating any more. "
+            "Rate again."
         )
     return votes
 

@@ -28,7 +28,6 @@ from arena.services.showable import windows_of
 from arena.services.shown_pictures import SampleRule, StudyPictures, choose_pictures
 from augment.errors import Conflict, UnknownName
 from augment.models import Contestant, Scenario
-from augment.sentences import sentence
 from augment.services.events import log_event
 from augment.services.judging.alike import alike_pairs
 from augment.services.running.choosing import find_job
@@ -116,7 +115,7 @@ def _free_name(name: str) -> str:
 def check_seed(seed: int) -> None:
     """Refuse what is no seed of a plan."""
     if not 0 <= seed < 2**63:
-        raise Conflict(sentence("A seed goes from 0 to 2^63 - 1, not %(seed)s.", seed=seed))
+        raise Conflict(f"A seed goes from 0 to 2^63 - 1, not {seed}.")
 
 
 def _contestants(slugs: Sequence[str]) -> list[Contestant]:
@@ -149,20 +148,13 @@ def _has_simulated(
     contestants: list[Contestant], experts: list[User], *, are_allowed: bool
 ) -> bool:
     """Return whether a simulated contestant or expert takes part; refused where none may."""
-    simulated = [
-        sentence("contestant %(name)s", name=row.slug) for row in contestants if row.is_simulated
-    ] + [
-        sentence("expert %(name)s", name=user.username)
-        for user in experts
-        if user.person.is_simulated
+    simulated = [f"contestant {row.slug}" for row in contestants if row.is_simulated] + [
+        f"expert {user.username}" for user in experts if user.person.is_simulated
     ]
     if simulated and not are_allowed:
         raise Conflict(
-            sentence(
-                "Simulated: %(names)s. They never mix into a rating unless the study allows "
-                "simulated contestants and votes.",
-                names=tuple(simulated),
-            )
+            f"Simulated: {', '.join(simulated)}. They never mix into a rating unless the "
+            "study allows simulated contestants and votes."
         )
     return bool(simulated)
 
@@ -271,7 +263,7 @@ def _conclude_opening(study: Study, *, matchups: int, actor: User | None) -> Non
 
 
 def _taken(name: str) -> Conflict:
-    return Conflict(sentence("There is a study named '%(name)s' already.", name=name))
+    return Conflict(f"There is a study named '{name}' already.")
 
 
 def _frozen_rules(

@@ -13,7 +13,6 @@ from arena.models import Study, StudyDraft
 from arena.services.hypotheses import hypotheses_of
 from arena.services.studies import open_study
 from augment.errors import Conflict, InvalidDocument, UnknownName
-from augment.sentences import sentence
 from augment.services.events import log_event
 from augment.services.texts import make_storable
 
@@ -156,9 +155,7 @@ def settings_of(study: Study) -> Entered:
     """
     rules = study.rules
     if "entries" not in rules:
-        raise Conflict(
-            sentence("The votes of '%(name)s' came from a file: it has no rules.", name=study.name)
-        )
+        raise Conflict(f"The votes of '{study.name}' came from a file: it has no rules.")
     shares = ("repeat_share", "check_share", "overlap_share", "adaptive_share")
     names = ("repeats", "checks", "overlap", "adaptive")
     given: dict[str, object] = {
@@ -221,11 +218,9 @@ def _fault(name: str, value: object) -> str:
 def _hold(draft: StudyDraft, revision: int) -> StudyDraft:
     held = StudyDraft.objects.select_for_update().filter(pk=draft.pk).first()
     if held is None:
-        raise Conflict(sentence("Somebody opened or discarded this draft meanwhile."))
+        raise Conflict("Somebody opened or discarded this draft meanwhile.")
     if held.revision != revision:
-        raise Conflict(
-            sentence("Somebody else saved this draft meanwhile; nothing of yours was kept.")
-        )
+        raise Conflict("Somebody else saved this draft meanwhile; nothing of yours was kept.")
     return held
 
 

@@ -9,7 +9,6 @@ from arena.models import Snapshot, Study, StudyFile
 from arena.queries.judged import is_imported
 from arena.services.written_files import waiting_row
 from augment.errors import Conflict, UnknownName
-from augment.sentences import sentence
 from augment.services.events import log_event
 
 Kind = StudyFile.Kind
@@ -30,21 +29,17 @@ def why_not(study: Study, kind: str) -> str:
         raise UnknownName("file of a study", kind, list(Kind.values))
     if kind == Kind.STUDY:
         if study.state == Study.State.OPEN:
-            return sentence(
-                "It is written once the study is closed: what still changes is no whole."
-            )
+            return "It is written once the study is closed: what still changes is no whole."
         if study.state == Study.State.CANCELLED:
-            return sentence(
-                "A cancelled study is not written as a whole; its votes can be exported."
-            )
+            return "A cancelled study is not written as a whole; its votes can be exported."
         return ""
     if is_imported(study):
-        return sentence("Votes from a file have no pictures.")
+        return "Votes from a file have no pictures."
     if kind == Kind.CONTACT_SHEET:
         if study.state == Study.State.CANCELLED:
-            return sentence("The study was cancelled: it has no results.")
+            return "The study was cancelled: it has no results."
         if not study.snapshots.filter(state=Snapshot.State.READY).exists():
-            return sentence("Rate the study first: the sheet has the votes of a rating.")
+            return "Rate the study first: the sheet has the votes of a rating."
     return ""
 
 

@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 
 from arena.models import Vote
-from arena.queries.judged import Judged
+from arena.queries.judged import Entrant, Judged
 from arena.rating.comparisons import LOSS, TIE, WIN, Comparisons, FloatArray, IntArray
 
 SCORES = {
@@ -38,21 +38,22 @@ class VoteArrays:
     ms: FloatArray
 
 
-def vote_arrays(names: Sequence[str], votes: Sequence[Judged]) -> VoteArrays:
+def vote_arrays(entrants: Sequence[Entrant], votes: Sequence[Judged]) -> VoteArrays:
     """Number everything, in the order in which it occurs.
 
     Args:
-        names: Slugs of the contestants, also of those without votes.
+        entrants: The contestants, also those without votes.
         votes: Each compares two of them.
     """
-    number = {name: index for index, name in enumerate(names)}
+    number = {entrant.slug: index for index, entrant in enumerate(entrants)}
     judges: dict[str, int] = {}
     items: dict[str, int] = {}
     types: dict[str, int] = {}
     whole = partial(np.array, dtype=np.int64)
     type_of = whole([types.setdefault(vote.type, len(types)) for vote in votes])
     comparisons = Comparisons(
-        names=tuple(names),
+        names=tuple(entrant.slug for entrant in entrants),
+        shown=tuple(entrant.name for entrant in entrants),
         first=whole([number[vote.left] for vote in votes]),
         second=whole([number[vote.right] for vote in votes]),
         score=np.array([SCORES[vote.outcome] for vote in votes], dtype=np.float64),

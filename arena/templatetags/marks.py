@@ -12,7 +12,6 @@ from arena.models import Study
 from augment.models import Augmentation, GenerationJob
 from augment.services.judging.findings import Finding
 from augment.services.running.summary import JobCounts
-from augment.services.wording import translate
 
 register = template.Library()
 
@@ -125,13 +124,7 @@ def segments(by_state: dict[Augmentation.State, int]) -> list[BarSegment]:
 @register.filter
 def say_finding(finding: Finding) -> str:
     """What a check found, with its numbers; agents and lanes go by their ids."""
-    return finding.sentence(say=translate)
-
-
-@register.filter
-def told_sentence(sentence: str) -> str:
-    """What a service tells, in the language of whoever reads it."""
-    return translate(sentence)
+    return finding.sentence()
 
 
 @register.filter

@@ -15,7 +15,6 @@ from arena.rating.printed import interval_text, rating_text, whole_percent, with
 from augment.models import Scenario
 from augment.services.judging.driving_scores import clearance_text
 from augment.services.scenarios.types import type_label as own_label
-from augment.services.wording import translate
 
 register = template.Library()
 
@@ -87,9 +86,6 @@ def counted(number: int, forms: str) -> str:
     """Fill in the singular or the plural, as in `3|counted:"{} vote | {} votes"`."""
     one, many = forms.split(" | ")
     return (one if number == 1 else many).format(number)
-
-
-register.filter("said", translate)
 
 
 @register.filter

@@ -21,7 +21,6 @@ from arena.services.api_tokens import DAYS, REQUESTS, make_api_token, revoke_api
 from arena.web.access import ADMIN, ANALYST, EXPERT, STAFF, allow_only
 from arena.web.people import ROLE_NAMES
 from augment.errors import AugmentError
-from augment.services.wording import translate
 
 USUAL_DAYS = 30
 
@@ -55,7 +54,7 @@ def tokens_page(request: HttpRequest) -> HttpResponse:
         try:
             fresh = make_api_token(owner=user, **form.cleaned_data)
         except AugmentError as error:
-            form.add_error(None, translate(error))
+            form.add_error(None, str(error))
         else:
             form = TokenForm(roles=roles)
     context = {

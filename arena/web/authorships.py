@@ -18,7 +18,6 @@ from arena.queries.people import by_pseudonym
 from arena.services.authorships import mark_author, take_back_author
 from arena.web.access import ADMIN, allow_only
 from augment.errors import AugmentError
-from augment.services.wording import translate
 
 
 class AuthorForm(forms.Form):
@@ -63,7 +62,7 @@ def mark(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
             actor=cast(User, request.user),
         )
     except (ArenaError, AugmentError) as error:
-        messages.error(request, translate(error))
+        messages.error(request, str(error))
     else:
         named = {"name": row.expert.person.pseudonym, "contestant": row.contestant.name}
         done = "{name} is marked as author of {contestant}.".format(**named)

@@ -14,7 +14,6 @@ from arena.web.access import ADMIN, allow_only
 from augment.errors import AugmentError
 from augment.services.endpoints.contestants import ensure_builtin
 from augment.services.scenarios.catalogue import load_own_catalogue
-from augment.services.wording import translate
 
 
 @allow_only(ADMIN)
@@ -29,7 +28,7 @@ def load_scenarios(request: HttpRequest) -> HttpResponse:
             actor=actor,
         )
     except AugmentError as error:
-        messages.error(request, translate(error))
+        messages.error(request, str(error))
     else:
         ensure_builtin()
         done = "Scenarios: %(added)s added, %(changed)s changed, %(unchanged)s as they were."

@@ -23,7 +23,6 @@ from augment.services.endpoints.entering import (
     EnteredEndpoint,
     enter_contestant,
 )
-from augment.services.wording import translate
 
 NEW = ""
 """What the choice of an endpoint says where a new one is entered."""
@@ -114,7 +113,7 @@ def new_contestant_page(request: HttpRequest) -> HttpResponse:
                 actor=cast(User, request.user),
             )
         except AugmentError as error:
-            form.add_error(None, translate(error))
+            form.add_error(None, str(error))
         else:
             messages.success(request, f"“{row.name}” is added.")
             return redirect("contestant", code=row.code)

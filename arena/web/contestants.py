@@ -21,7 +21,6 @@ from augment.errors import AugmentError
 from augment.models import Augmentation, Contestant, GenerationJob
 from augment.services.endpoints.respondents import respondents_of
 from augment.services.retirement import retire, take_back
-from augment.services.wording import translate
 
 CONTESTANTS_AT_ONCE = 50
 
@@ -66,7 +65,7 @@ def contestant_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     try:
         context |= {"asking": asking_of(row), "respondents": respondents_of(row)}
     except AugmentError as error:  # a role's endpoint is gone, or the variant
-        messages.warning(request, translate(error))
+        messages.warning(request, str(error))
     return render(request, "contestants/contestant.html", context)
 
 

@@ -35,7 +35,6 @@ from augment.services.judging.driving_scores import (
     scores_of_job,
 )
 from augment.services.judging.simulations import NUPLAN, SCORES, Options
-from augment.services.wording import translate
 from augment.tasks import enqueue_simulations
 
 LABELS = {"nuplan": "nuPlan", "interplan": "interPlan"}
@@ -62,7 +61,7 @@ def simulate_job(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
             waiting = simulations.plan_job(job=job, options=options)
             transaction.on_commit(partial(_send, request, waiting))
     except AugmentError as error:
-        messages.error(request, translate(error))
+        messages.error(request, str(error))
     else:
         number = len(waiting)
         messages.success(
@@ -264,4 +263,4 @@ def _send(request: HttpRequest, waiting: list[int]) -> None:
     try:
         enqueue_simulations(waiting)
     except QueueFault as error:
-        messages.warning(request, translate(error))
+        messages.warning(request, str(error))

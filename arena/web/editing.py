@@ -18,18 +18,16 @@ from arena.web.json_text import read_json
 from arena.web.sending import looks_again, send_later
 from augment.errors import AugmentError, Conflict
 from augment.models import Augmentation, Scenario
-from augment.sentences import Sentence, sentence
 from augment.services.judging.edits import check_edit
 from augment.services.running import by_hand
 from augment.services.scenarios.editing import PLACED, editor_document
 from augment.services.scenarios.scene_pictures import SceneView, is_drawn, scene_picture
-from augment.services.wording import translate
 from augment.tasks import enqueue_job, enqueue_scenario, enqueue_scene
 
 LONGEST = 1_000_000
 """Of a modification, in bytes."""
 
-NO_JSON = sentence("The change is no JSON.")
+NO_JSON = "The change is no JSON."
 
 
 @allow_only(*STAFF)
@@ -43,13 +41,13 @@ def reference_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
             given = _document(request.POST.get("modification", ""))
             set_reference(scenario, given, actor=cast(User, request.user))
         except AugmentError as error:
-            problem = translate(error)
+            problem = str(error)
         else:
             send_later(request, enqueue_scenario, scenario.pk)
             messages.success(request, "The reference is kept; a worker draws it.")
             return redirect("scenario", code=code)
     context = _context(request, scenario, given, problem)
-    context["refusal"] = translate(why_not_editable(scenario))
+    context["refusal"] = why_not_editable(scenario)
     return render(request, "scenarios/edit.html", context, status=422 if problem else 200)
 
 
@@ -61,7 +59,7 @@ def drop(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     try:
         drop_reference(scenario, actor=cast(User, request.user))
     except AugmentError as error:
-        messages.error(request, translate(error))
+        messages.error(request, str(error))
     else:
         messages.success(request, f"“{scenario.slug}” has no reference now.")
     return redirect("scenario", code=code)
@@ -72,13 +70,13 @@ def drop(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
 def check(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """What the checks find in a change that is being made; nothing is kept."""
     scenario = _scenario(code)
-    no_json = sentence("This is no JSON of a change.")
+    no_json = "This is no JSON of a change."
     try:
         asked = _document(request.body, otherwise=no_json)
         if not isinstance(asked, dict):
             raise Conflict(no_json)
     except Conflict as error:
-        return JsonResponse({"problem": translate(error)}, status=422)
+        return JsonResponse({"problem": str(error)}, status=422)
     snapped = asked.get("snap")
     found = check_edit(
         scenario,
@@ -89,13 +87,13 @@ def check(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         {
             "severity": line.severity,
             "label": "measured" if line.severity == "fact" else line.severity,
-            "sentence": line.finding.sentence(say=translate),
+            "sentence": line.finding.sentence(),
         }
         for line in found.lines
     ]
     answer = {
         "modification": found.modification,
-        "problem": translate(found.problem),
+        "problem": found.problem,
         "lines": lines,
         "is_against_intent": found.is_against_intent,
     }
@@ -120,7 +118,7 @@ def correct_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
                 actor=cast(User, request.user),
             )
         except AugmentError as error:
-            problem = translate(error)
+            problem = str(error)
         else:
             send_later(request, enqueue_job, made.job_id)
             messages.success(request, "The correction is kept; a worker draws it.")
@@ -165,12 +163,12 @@ def _as_text(document: object) -> str:
     return "" if document is None else json.dumps(document, indent=2)
 
 
-def _document(text: str | bytes, *, otherwise: Sentence = NO_JSON) -> object:
+def _document(text: str | bytes, *, otherwise: str = NO_JSON) -> object:
     """What was typed.
 
     Raises:
         Conflict: It is too long, or no JSON.
     """
     if len(text) > LONGEST:
-        raise Conflict(sentence("The change is too long."))
+        raise Conflict("The change is too long.")
     return read_json(text, otherwise=otherwise)

@@ -11,7 +11,6 @@ from augment.errors import InvalidDocument
 from augment.models import Endpoint, EndpointModel
 from augment.services.endpoints.editing import FACTS, EndpointFacts, ModelFacts
 from augment.services.endpoints.entering import REASONING_EFFORTS
-from augment.services.wording import translate
 
 _UNKNOWN = [("", "unknown"), ("yes", "yes"), ("no", "no")]
 
@@ -124,4 +123,4 @@ _ABILITIES = ("vision", "native_tools", "json_schema", "temperature")
 def place_problems(form: forms.Form, error: InvalidDocument) -> None:
     """Put each fault at its field; at the top where the form has no such field."""
     for path, text in error.problems:
-        form.add_error(path if path in form.fields else None, capfirst(translate(text)))
+        form.add_error(path if path in form.fields else None, capfirst(text))

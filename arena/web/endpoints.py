@@ -25,7 +25,6 @@ from augment.services.endpoints import editing
 from augment.services.endpoints.keys import is_key_here, list_key_variables
 from augment.services.endpoints.probing import plan_probe
 from augment.services.running.workers import workforce
-from augment.services.wording import translate
 from augment.tasks import enqueue_probe
 
 
@@ -83,7 +82,7 @@ def add_model(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
             endpoint, model=request.POST.get("model", ""), actor=cast(User, request.user)
         )
     except AugmentError as error:
-        messages.error(request, translate(error))
+        messages.error(request, str(error))
         return redirect("endpoint", code=code)
     return redirect("endpoint-model", code=row.code)
 
@@ -131,7 +130,7 @@ def probe_model(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
             probe = plan_probe(row, actor=cast(User, request.user))
             transaction.on_commit(partial(_send, request, probe.pk))
     except AugmentError as error:
-        messages.error(request, translate(error))
+        messages.error(request, str(error))
     return redirect("endpoint-model", code=code)
 
 
@@ -179,11 +178,11 @@ def _tell(form: EndpointPageForm | ModelPageForm, error: AugmentError) -> None:
     if isinstance(error, InvalidDocument):
         place_problems(form, error)
     else:
-        form.add_error(None, translate(error))
+        form.add_error(None, str(error))
 
 
 def _send(request: HttpRequest, probe_pk: int) -> None:
     try:
         enqueue_probe(probe_pk)
     except QueueFault as error:
-        messages.warning(request, translate(error))
+        messages.warning(request, str(error))

@@ -24,11 +24,16 @@ from arena.errors import ArenaError, EnrolmentOver, NotYours
 from arena.models import EnrolledVoter, Enrolment, Study
 from arena.queries.enrolments import code_told, enrolled_voters, enrolment_by_token, state_of
 from arena.services.cells import csv_text
-from arena.services.enrolments import LONGEST_CONSENT, drop_silent, enrol, set_enrolment
+from arena.services.enrolments import (
+    LONGEST_CONSENT,
+    LONGEST_ID,
+    drop_silent,
+    enrol,
+    set_enrolment,
+)
 from arena.web.access import ADMIN, allow_only
 from arena.web.invitations import BACKEND, GONE, SESSION_S
 from augment.errors import AugmentError
-from augment.services.wording import translate
 
 PAGE = 100
 VOTER_COOKIE, ENROLMENT_COOKIE = "arena_voter", "arena_enrolment"
@@ -65,12 +70,20 @@ class NewcomerForm(forms.Form):
     """What somebody enters who takes part."""
 
     external_id = forms.CharField(
-        max_length=120, error_messages={"required": gettext_lazy("Please enter it.")}
+        max_length=LONGEST_ID, error_messages={"required": gettext_lazy("Please enter it.")}
     )
     agreed = forms.BooleanField(
         error_messages={"required": gettext_lazy("You take part only if you agree.")}
     )
     agreed_sha256 = forms.CharField(max_length=64)
+
+    def clean_external_id(self) -> str:
+        """Return the id if it can be shown on one line."""
+        text: str = self.cleaned_data["external_id"]
+        if not text.isprintable():
+            wanted = _("1 to %(most)s printable characters are needed.")
+            raise forms.ValidationError(wanted % {"most": LONGEST_ID})
+        return text
 
 
 @login_not_required
@@ -91,7 +104,7 @@ def enrol_page(request: HttpRequest, token: str) -> HttpResponse:
         return _sign_in(request, returning)
     if returning is not None:
         return render(request, "enrol_again.html", {"study": enrolment.study})
-    form = NewcomerForm(request.POST or None, initial={"external_id": given[:120]})
+    form = NewcomerForm(request.POST or None, initial={"external_id": given[:LONGEST_ID]})
     if request.method == "POST" and form.is_valid():
         try:
             voter = enrol(
@@ -102,7 +115,7 @@ def enrol_page(request: HttpRequest, token: str) -> HttpResponse:
         except EnrolmentOver:
             return _over(request, enrolment)
         except (ArenaError, AugmentError) as error:
-            form.add_error("external_id", translate(error))
+            form.add_error("external_id", str(error))
             enrolment.refresh_from_db()
         else:
             return _sign_in(request, voter)
@@ -125,7 +138,7 @@ def enrolment_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         try:
             set_enrolment(study=study, actor=actor, **form.cleaned_data)
         except (ArenaError, AugmentError) as error:
-            form.add_error(None, translate(error))
+            form.add_error(None, str(error))
         else:
             messages.success(request, _("Saved. What the link says holds from now on."))
             return redirect("enrolment", code=code)

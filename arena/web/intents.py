@@ -16,10 +16,8 @@ from arena.web.access import ADMIN, STAFF, allow_only
 from arena.web.json_text import read_json
 from augment.errors import AugmentError, Conflict, QueueFault
 from augment.models import EndpointModel, Scenario
-from augment.sentences import sentence
 from augment.services.running.intent_readings import plan_reading
 from augment.services.scenarios.intents import accept_reading, enter_intent
-from augment.services.wording import translate
 from augment.tasks import enqueue_reading
 
 LONGEST_FILE = 200_000
@@ -49,7 +47,7 @@ def set_intent(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         else:
             enter_intent(scenario=scenario.slug, document=_document(request), actor=actor)
     except AugmentError as error:
-        messages.error(request, translate(error))
+        messages.error(request, str(error))
     else:
         messages.success(request, "The intent is set. It counts from now on.")
     return redirect("scenario", code=code)
@@ -76,7 +74,7 @@ def read_instruction(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
             )
         enqueue_reading(reading.pk)
     except (AugmentError, QueueFault) as error:
-        messages.error(request, translate(error))
+        messages.error(request, str(error))
     else:
         messages.success(request, f"{reader.model} reads it now.")
     return redirect("scenario", code=code)
@@ -97,7 +95,7 @@ def _document(request: HttpRequest) -> object:
     """
     file = request.FILES.get("file")
     if file is None:
-        raise Conflict(sentence("Choose a JSON file."))
+        raise Conflict("Choose a JSON file.")
     if file.size is None or file.size > LONGEST_FILE:
-        raise Conflict(sentence("The file is too long for an intent."))
-    return read_json(file.read(), otherwise=sentence("The file is no JSON."))
+        raise Conflict("The file is too long for an intent.")
+    return read_json(file.read(), otherwise="The file is no JSON.")

@@ -25,7 +25,6 @@ from arena.web.access import ADMIN, allow_only
 from arena.web.authorships import AuthorForm
 from arena.web.sign_in import with_own_language
 from augment.errors import AugmentError
-from augment.services.wording import translate
 
 SESSION_S = 30 * 24 * 3600
 BACKEND = "arena.queries.accounts.AccountBackend"
@@ -92,7 +91,7 @@ def invite_experts(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
             for line in chosen
         ]
     except (ArenaError, AugmentError) as error:
-        messages.error(request, translate(error))
+        messages.error(request, str(error))
         return redirect("experts", code=study.code)
     return render(request, "studies/links.html", {"study": study, "links": made})
 

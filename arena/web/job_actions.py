@@ -24,7 +24,6 @@ from augment.services.running import jobs as service
 from augment.services.running import pausing
 from augment.services.running.causes import rows_of_cause
 from augment.services.running.summary import count_rows
-from augment.services.wording import translate
 from augment.tasks import enqueue_job
 
 State = Augmentation.State
@@ -40,7 +39,7 @@ def retry_job(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
             service.retry_failed(job=job, actor=cast(User, request.user))
             transaction.on_commit(partial(send_rows, request, job.pk))
     except AugmentError as error:
-        messages.error(request, translate(error))
+        messages.error(request, str(error))
     else:
         messages.success(request, "What failed is queued again.")
     return redirect("job", code=code)
@@ -59,7 +58,7 @@ def retry_cause(request: HttpRequest, code: uuid.UUID, key: str) -> HttpResponse
             retry_one_cause(job, key=key, actor=cast(User, request.user))
             transaction.on_commit(partial(send_rows, request, job.pk))
     except AugmentError as error:
-        messages.error(request, translate(error))
+        messages.error(request, str(error))
     else:
         messages.success(request, f"Queued again: {len(pks)} with this cause.")
     return redirect("job", code=code)
@@ -73,7 +72,7 @@ def pause_job(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     try:
         pausing.pause(job, actor=cast(User, request.user))
     except AugmentError as error:
-        messages.error(request, translate(error))
+        messages.error(request, str(error))
     else:
         messages.success(request, "Paused: nothing new is started; what is in flight ends.")
     return redirect("job", code=code)
@@ -91,7 +90,7 @@ def cancel_job(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     try:
         service.cancel(job=job, actor=cast(User, request.user))
     except AugmentError as error:
-        messages.error(request, translate(error))
+        messages.error(request, str(error))
     else:
         messages.success(request, "Cancelled. What is done stays.")
     return redirect("job", code=code)
@@ -111,7 +110,7 @@ def resume_job(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
             pausing.resume(job, higher=form.caps(), actor=cast(User, request.user))
             transaction.on_commit(partial(send_rows, request, job.pk))
     except AugmentError as error:
-        messages.error(request, translate(error))
+        messages.error(request, str(error))
     else:
         messages.success(request, "What is left is queued again.")
     return redirect("job", code=code)
@@ -122,7 +121,7 @@ def send_rows(request: HttpRequest, job_pk: int) -> None:
     try:
         enqueue_job(job_pk)
     except QueueFault as error:
-        messages.warning(request, translate(error))
+        messages.warning(request, str(error))
 
 
 # --- Private -----------------------------------------------------------------------------------

@@ -6,10 +6,9 @@ import json
 from typing import Any
 
 from augment.errors import Conflict
-from augment.sentences import Sentence
 
 
-def read_json(text: str | bytes, *, otherwise: Sentence) -> Any:
+def read_json(text: str | bytes, *, otherwise: str) -> Any:
     """The value.
 
     Args:

@@ -28,7 +28,6 @@ from arena.web.questions import ask, is_sure, wants_to_change
 from augment.errors import AugmentError, UnknownName
 from augment.models import GenerationJob
 from augment.services.judging.fault_guess import FaultClass
-from augment.services.wording import translate
 
 
 @allow_only(EXPERT)
@@ -102,7 +101,7 @@ def close(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     try:
         close_labelling(labelling=labelling, actor=cast(User, request.user))
     except ArenaError as error:
-        messages.error(request, translate(error))
+        messages.error(request, str(error))
     else:
         messages.success(request, f"“{labelling.name}” is closed; its labels stay.")
     return redirect("faults", code=labelling.job.code)
@@ -124,9 +123,9 @@ def _save(request: HttpRequest, expert: User, code: uuid.UUID) -> HttpResponse:
             note=form.cleaned_data["note"],
         )
     except AlreadyLabelled as error:
-        messages.info(request, translate(error))
+        messages.info(request, str(error))
     except LabellingClosed as error:
-        messages.error(request, translate(error))
+        messages.error(request, str(error))
     else:
         messages.success(request, " ".join(("Saved.", _guess(label))))
     return redirect("label", code=code)
@@ -154,7 +153,7 @@ def _open(request: HttpRequest, job: GenerationJob, form: LabellingForm) -> Http
             return ask(request, opening(job, **given))
         labelling = open_labelling(job=job, **given, actor=cast(User, request.user))
     except (ArenaError, AugmentError) as error:
-        form.add_error(None, translate(error))
+        form.add_error(None, str(error))
         return None
     messages.success(request, f"“{labelling.name}” is open; its experts can label now.")
     return redirect("faults", code=job.code)

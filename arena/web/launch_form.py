@@ -16,7 +16,6 @@ from augment.services.running.cells import ChosenCells, MatrixCell, matrix_of, r
 from augment.services.running.estimates import JobEstimate, estimate_rows
 from augment.services.running.feasible import find_obstacle, keys_missing
 from augment.services.running.jobs import HIGHEST_SAMPLES
-from augment.services.wording import translate
 
 OF_CELLS = (
     *("temperature", "seed", "reasoning_effort", "max_output_tokens"),
@@ -92,7 +91,7 @@ class LaunchForm(ChoiceForm, CapsForm):
         try:
             cleaned["chosen_cells"] = read_cells(cleaned.get("cells", []), options)
         except AugmentError as error:
-            self.add_error(None, translate(error))
+            self.add_error(None, str(error))
         return cleaned
 
     @property
@@ -117,9 +116,7 @@ class LaunchForm(ChoiceForm, CapsForm):
             OfferedRow(
                 label=row.label,
                 cells=tuple(
-                    OfferedCell(
-                        cell=cell, obstacle=translate(why_not), is_chosen=cell.key in chosen
-                    )
+                    OfferedCell(cell=cell, obstacle=why_not, is_chosen=cell.key in chosen)
                     for cell, why_not in row.cells
                 ),
             )
@@ -169,4 +166,4 @@ class LaunchForm(ChoiceForm, CapsForm):
 def _offer(row: Contestant) -> Offer:
     why_not = find_obstacle(row)
     missing = () if why_not else tuple(keys_missing(row))
-    return Offer(row=row, obstacle=translate(why_not), keys_missing=missing)
+    return Offer(row=row, obstacle=why_not, keys_missing=missing)

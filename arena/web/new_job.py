@@ -23,7 +23,6 @@ from augment.models import Contestant, EndpointModel, GenerationJob
 from augment.services.running import jobs as service
 from augment.services.running.cells import add_cells
 from augment.services.running.matrix import matrix_text, read_matrix
-from augment.services.wording import translate
 
 LONGEST_FILE = 1_000_000
 LONGEST_NAME = 120
@@ -44,7 +43,7 @@ def new_job_page(request: HttpRequest) -> HttpResponse:
         try:
             job = _launch(request, form)
         except AugmentError as error:
-            form.add_error(None, translate(error))
+            form.add_error(None, str(error))
         else:
             messages.success(request, f"“{job.name}” is launched.")
             return redirect("job", code=job.code)
@@ -106,7 +105,7 @@ def _estimated(request: HttpRequest, form: LaunchForm) -> HttpResponse:
     try:
         found = form.estimated()
     except AugmentError as error:
-        form.add_error(None, translate(error))
+        form.add_error(None, str(error))
     else:
         cap = form.cleaned_data.get("cap_usd")
         more |= {"estimate": found, "cap_usd": cap}
@@ -148,7 +147,7 @@ def _read(request: HttpRequest) -> HttpResponse:
         except UnicodeDecodeError:
             problem = "The file is not UTF-8."
         except AugmentError as error:
-            problem = translate(error)
+            problem = str(error)
     if problem:
         return _page(request, _form(request, None), status=422, file_problem=problem)
     for slug in found.made:

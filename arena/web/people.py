@@ -35,7 +35,6 @@ from arena.web.access import ADMIN, allow_only
 from arena.web.invitations import BACKEND, GONE
 from arena.web.questions import Confirmation, ask, is_sure
 from augment.errors import AugmentError
-from augment.services.wording import translate
 
 PAGES = ["GET", "HEAD", "POST"]
 ROLE_NAMES = {
@@ -81,7 +80,7 @@ def people_page(request: HttpRequest) -> HttpResponse:
                 actor=cast(User, request.user),
             )
         except (ArenaError, AugmentError) as error:
-            form.add_error(None, translate(error))
+            form.add_error(None, str(error))
         else:
             return _link_page(request, user)
     lines = [(line, ROLE_NAMES.get(line.role or "", "")) for line in list_accounts()]
@@ -109,7 +108,7 @@ def change_person(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         else:
             set_role(user=user, role=request.POST.get("role", ""), actor=actor)
     except (ArenaError, AugmentError) as error:
-        messages.error(request, translate(error))
+        messages.error(request, str(error))
     else:
         messages.success(request, _("%(name)s is changed.") % {"name": user.person.pseudonym})
     return redirect("people")
@@ -139,7 +138,7 @@ def forget_person(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     try:
         forget_identity(user=user, actor=cast(User, request.user))
     except (ArenaError, AugmentError) as error:
-        messages.error(request, translate(error))
+        messages.error(request, str(error))
     else:
         messages.success(request, _("%(name)s is forgotten.") % {"name": name})
     return redirect("people")
@@ -163,7 +162,7 @@ def first_page(request: HttpRequest, token: str) -> HttpResponse:
     except LinkOver:
         return _keep_secret(render(request, "people/link_over.html", status=GONE))
     except (ArenaError, AugmentError) as error:
-        form.add_error("username", translate(error))
+        form.add_error("username", str(error))
     context = {"form": form, "is_first": True}
     return _keep_secret(render(request, "people/welcome.html", context))
 
@@ -209,7 +208,7 @@ def _link_page(request: HttpRequest, user: User) -> HttpResponse:
     try:
         token = make_welcome_token(user, actor=cast(User, request.user))
     except (ArenaError, AugmentError) as error:
-        messages.error(request, translate(error))
+        messages.error(request, str(error))
         return redirect("people")
     address = request.build_absolute_uri(reverse("welcome", args=[token]))
     return render(request, "people/link.html", {"made": user, "address": address})

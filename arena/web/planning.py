@@ -19,7 +19,6 @@ from arena.services.prospects import Known, known_of, usual_seconds
 from arena.web.access import STAFF, allow_only
 from arena.web.planning_form import EXPECTED, ON_TOP, WANTED, WHO, PlanningForm, filled_in
 from augment.errors import AugmentError
-from augment.services.wording import translate
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -47,7 +46,7 @@ def planning_page(request: HttpRequest) -> HttpResponse:
         try:
             known = known_of(study, cast(User, request.user))
         except AugmentError as error:
-            fault = translate(error)
+            fault = str(error)
     else:
         seconds = usual_seconds()
         known = Known(values={} if seconds is None else {"seconds": seconds})

@@ -20,8 +20,12 @@ from arena.queries.studies import voting_study
 from arena.services.practice import answer_practice, practice_pairs, skip_practice
 from arena.web.access import EXPERT, allow_only
 from arena.web.screen import over_context
-from augment.services.judging.findings import check_augmentation
-from augment.services.wording import translate
+from augment.services.judging.findings import (
+    EGO_ID,
+    Finding,
+    FindingKind,
+    check_augmentation,
+)
 
 MOST_REASONS = 3
 
@@ -75,7 +79,20 @@ def _answer(request: HttpRequest, study: Study, expert: User) -> HttpResponse:
 
 
 def _reasons(pair: PracticePair) -> list[str]:
-    """What the checks find wrong in the broken picture, the worst first."""
+    """Which objects overlap in the broken picture, the worst first: it heaps all on the ego."""
     checked = check_augmentation(pair.broken)
-    worst = checked.faults[:MOST_REASONS] if checked else []
-    return [line.finding.sentence(say=translate) for line in worst]
+    faults = [line.finding for line in checked.faults] if checked else []
+    overlaps = [one for one in faults if one.kind is FindingKind.OVERLAP]
+    return [_overlap_in_words(one) for one in overlaps[:MOST_REASONS]]
+
+
+def _overlap_in_words(finding: Finding) -> str:
+    text = (
+        _("{0} and the ego overlap by {share:.0%} of the smaller box, {depth:.2f} m deep.")
+        if EGO_ID in finding.agents
+        else _("{0} and {1} overlap by {share:.0%} of the smaller box, {depth:.2f} m deep.")
+    )
+    measured = finding.measured
+    return text.format(
+        *finding.agents, share=measured["share_of_smaller"], depth=measured["depth_m"]
+    )

@@ -21,7 +21,6 @@ from augment.models import Contestant, Scenario
 from augment.services.endpoints.contestant_prompts import asking_contestants, preview_contestant
 from augment.services.endpoints.respondents import respondents_of
 from augment.services.scenarios.prompts import Preview, list_choices, preview_prompt
-from augment.services.wording import translate
 from augment.tasks import enqueue_prompts
 
 
@@ -34,7 +33,7 @@ def prompts_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     try:
         found = _preview(request, scenario)
     except AugmentError as error:
-        problem = translate(error)
+        problem = str(error)
     look = looks_again(request, waits=found.shown is None and not problem)
     if look == 1:
         send_later(request, enqueue_prompts, scenario.pk)
@@ -84,7 +83,7 @@ def prompt_file(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     except UnknownName as error:
         raise Http404 from error
     except AugmentError as error:
-        return HttpResponse(translate(error), status=422, content_type="text/plain; charset=utf-8")
+        return HttpResponse(str(error), status=422, content_type="text/plain; charset=utf-8")
     if found.shown is None:
         raise Http404
     answer = HttpResponse(_written(found), content_type="application/json")

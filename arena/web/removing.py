@@ -19,7 +19,6 @@ from arena.web.questions import Confirmation, ask, is_sure
 from augment.errors import AugmentError
 from augment.models import BaseScene, Scenario
 from augment.services.retirement import retire, take_back
-from augment.services.wording import translate
 
 
 @allow_only(ADMIN)
@@ -32,7 +31,7 @@ def delete_scenario_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     try:
         delete_scenario(scenario, actor=cast(User, request.user))
     except AugmentError as error:
-        messages.error(request, translate(error))
+        messages.error(request, str(error))
         return redirect("scenario", code=code)
     messages.success(request, f"“{scenario.slug}” is deleted.")
     return redirect("scenarios")
@@ -48,7 +47,7 @@ def delete_scene_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     try:
         delete_scene(scene, actor=cast(User, request.user))
     except AugmentError as error:
-        messages.error(request, translate(error))
+        messages.error(request, str(error))
         return redirect("scene", code=code)
     messages.success(request, f"“{scene.slug}” is deleted.")
     return redirect("scenes")
@@ -82,7 +81,7 @@ def rename_scene_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     try:
         rename_scene(row, request.POST.get("slug", "").strip(), actor=cast(User, request.user))
     except AugmentError as error:
-        messages.error(request, translate(error))
+        messages.error(request, str(error))
     return redirect("scene", code=code)
 
 

@@ -37,7 +37,6 @@ from arena.web.results_authors import both_versions
 from arena.web.results_tabs import TABS, Tab
 from arena.web.study_files import export_place
 from augment.errors import AugmentError
-from augment.services.wording import translate
 
 SHOWN = 12
 """So many ratings can be chosen on the page; the log lists all."""
@@ -108,7 +107,7 @@ def rate_study(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
             actor=cast(User, request.user),
         )
     except (ArenaError, AugmentError) as error:
-        messages.error(request, translate(error))
+        messages.error(request, str(error))
     return redirect("results", code=code)
 
 
@@ -122,7 +121,7 @@ def compute_again(request: HttpRequest, code: uuid.UUID, rating: uuid.UUID) -> H
     try:
         tasks.send_snapshot(snapshot.pk)
     except AugmentError as error:
-        messages.error(request, translate(error))
+        messages.error(request, str(error))
     return redirect("results", code=code)
 
 
@@ -134,7 +133,7 @@ def open_results_early(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     try:
         open_early(study=study, actor=cast(User, request.user))
     except AugmentError as error:
-        messages.error(request, translate(error))
+        messages.error(request, str(error))
     return redirect("results", code=code)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from arena.exports.tables import LeaderboardTable, Row, sentences_of
+from arena.exports.tables import LeaderboardTable, Row
 from arena.models import Snapshot
 from arena.queries.vote_sets import Filters
 from arena.rating.printed import rating_text
@@ -26,7 +26,7 @@ def both_versions(snapshot: Snapshot, table: LeaderboardTable) -> Context | None
     return {
         "kept": own_votes,
         "lines": [in_both_versions(lines[row.slug], row) for row in table.rows],
-        "reasons": sentences_of(own_votes.reasons, names),
+        "reasons": own_votes.reasons,
         "places": own_votes.largest and own_votes.largest.places,
         "who": [names[slug] for slug in own_votes.largest.slugs] if own_votes.largest else [],
     }

@@ -23,7 +23,6 @@ from arena.queries.results import snapshot_to_export
 from arena.web.access import STAFF, allow_only
 from arena.web.results import asked_rating, get_readable_study
 from augment.errors import Conflict, UnknownName
-from augment.services.wording import translate
 
 
 @allow_only(*STAFF)
@@ -36,7 +35,7 @@ def export(request: HttpRequest, code: uuid.UUID, form: str) -> HttpResponse:
         try:
             content = bundle(snapshot)
         except Conflict as error:
-            messages.error(request, translate(error))
+            messages.error(request, str(error))
             return redirect("results", code=code)
         return _file(content, CONTENT_TYPE, f"{_slug(study)}-rating.zip")
     try:
@@ -74,7 +73,7 @@ def export_votes(request: HttpRequest, code: uuid.UUID, form: str) -> HttpRespon
     except UnknownName as error:
         raise Http404 from error
     except Conflict as error:
-        messages.error(request, translate(error))
+        messages.error(request, str(error))
         return redirect("results", code=code)
     name = f"{_slug(study)}-votes.{chosen.suffix}"
     return _file(chosen.write(rows), chosen.content_type, name)

@@ -9,7 +9,7 @@ from typing import Any
 
 from arena.exports.columns import ON_PAGE
 from arena.exports.heat import heat_map
-from arena.exports.tables import LeaderboardTable, Row, sentences_of
+from arena.exports.tables import LeaderboardTable, Row
 from arena.models import Snapshot
 from arena.results.tree import Bounds, OnlinePlace, PairRecord, TypeStanding
 from arena.web.charts import bars, interval_chart
@@ -71,7 +71,6 @@ def types(snapshot: Snapshot, table: LeaderboardTable) -> Context:
     lines = [line for part in snapshot.results.types for line in part.lines]
     ends = [end for line in lines for end in (line.lower, line.upper) if end is not None]
     span = (min(ends), max(ends)) if ends else None
-    by_name = {row.slug: row.name for row in table.rows}
     parts: list[Context] = []
     for part in snapshot.results.types:
         rows = [_row(line, names[line.slug]) for line in part.lines if line.votes]
@@ -83,7 +82,7 @@ def types(snapshot: Snapshot, table: LeaderboardTable) -> Context:
                 "kept": part,
                 "rows": rows,
                 "chart": interval_chart(rows, span),
-                "reasons": sentences_of(reasons, by_name),
+                "reasons": reasons,
             }
         )
     return {

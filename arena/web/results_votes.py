@@ -27,7 +27,6 @@ from arena.web.listing import page_asked
 from arena.web.pictures import sized_picture_response
 from arena.web.results import asked_rating, get_readable_study
 from arena.web.vote_search_form import VoteSearchForm
-from augment.services.wording import translate_all
 
 
 @allow_only(*STAFF)
@@ -76,9 +75,7 @@ def single_vote_page(request: HttpRequest, code: uuid.UUID, vote: uuid.UUID) -> 
     if found is None:
         raise Http404
     matchup = found.vote.matchup
-    described = matchup.descriptions and [
-        describe_in_words(side, translate_all) for side in matchup.descriptions
-    ]
+    described = matchup.descriptions and [describe_in_words(side) for side in matchup.descriptions]
     context = _context(study, snapshot, form) | {
         "search": search,
         "query": _query(snapshot, search),

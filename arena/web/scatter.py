@@ -12,7 +12,6 @@ from arena.exports.badges import badge_places
 from arena.exports.plot_axes import axes, curve_points
 from arena.exports.plots import Plot
 from arena.web.charts import Tick
-from augment.sentences import Sentence
 
 HEIGHT = 404.0
 LEFT, TOP, BOTTOM = 82.0, 14.0, 342.0
@@ -69,8 +68,8 @@ class Scatter:
     points: list[Point]
     across: list[Tick]
     up: list[Tick]
-    across_label: Sentence
-    up_label: Sentence
+    across_label: str
+    up_label: str
     curve: str
 
     @property

@@ -23,7 +23,6 @@ from arena.web.sending import send_later
 from augment.errors import AugmentError
 from augment.models import GenerationJob
 from augment.services.judging.scenario_export import FORMATS
-from augment.services.wording import translate
 
 
 def rows_of(job: GenerationJob) -> list[tuple[str, ScenarioFile | None]]:
@@ -44,7 +43,7 @@ def ask(request: HttpRequest, code: uuid.UUID, form: str) -> HttpResponse:
             row = ask_for_file(job=job, file_format=form, actor=cast(User, request.user))
             send_later(request, tasks.send_scenario_file, row.pk)
     except AugmentError as error:
-        messages.error(request, translate(error))
+        messages.error(request, str(error))
     else:
         messages.success(request, "A worker writes the file; it is offered here when ready.")
     return redirect(reverse("job", args=[code]) + "#scenario-files")

@@ -22,7 +22,6 @@ from arena.web.sending import looks_again, send_later
 from augment.errors import AugmentError, Conflict
 from augment.models import BaseScene, Scenario
 from augment.models.scenes import DENSITIES, GOALS
-from augment.sentences import sentence
 from augment.services.scenarios.bulk import MOST_ROWS_AT_ONCE, BulkReport
 from augment.services.scenarios.bulk_files import MOST_FILES, add_from_files
 from augment.services.scenarios.intent_fields import (
@@ -43,7 +42,6 @@ from augment.services.scenarios.scenes import (
     read_circumstances,
 )
 from augment.services.scenarios.types import LONGEST_LABEL, LONGEST_TYPE, type_choices
-from augment.services.wording import translate
 from augment.tasks import enqueue_scenario, enqueue_scene
 
 OWN = ""
@@ -110,7 +108,7 @@ def new_scenario_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
                 actor=cast(User, request.user),
             )
         except AugmentError as error:
-            form.add_error(None, translate(error))
+            form.add_error(None, str(error))
         else:
             send_later(request, enqueue_scenario, made.pk)
             messages.success(request, f"“{made.slug}” is added.")
@@ -134,7 +132,7 @@ def edit_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         try:
             change_scenario(scenario, **_wanted(form.cleaned_data), actor=cast(User, request.user))
         except AugmentError as error:
-            form.add_error(None, translate(error))
+            form.add_error(None, str(error))
         else:
             send_later(request, enqueue_scenario, scenario.pk)
             messages.success(request, f"“{scenario.slug}” is changed.")
@@ -165,7 +163,7 @@ def intent_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
                 messages.success(request, "The intent is set. It counts from now on.")
                 return redirect("scenario", code=code)
         except AugmentError as error:
-            form.add_error(None, translate(error))
+            form.add_error(None, str(error))
     else:
         reading = waiting_reading(scenario) if "reading" in request.GET else None
         document = scenario.intent if reading is None else reading.document
@@ -184,7 +182,7 @@ def bulk_page(request: HttpRequest) -> HttpResponse:
         try:
             report = _bulk(request)
         except AugmentError as error:
-            problem = translate(error)
+            problem = str(error)
         if report is not None and report.is_kept:
             text = f"{len(report.rows)} scenarios are added."
             messages.success(request, text)
@@ -252,7 +250,7 @@ def _rearrange(request: HttpRequest) -> tuple[IntentFields, dict[str, Any], str]
             kept = [row for n, row in enumerate(fields.rows) if act != f"drop-{n}"]
             fields = replace(fields, rows=tuple(kept) or (NEW_ROW,))
     except AugmentError as error:
-        problem = translate(error)
+        problem = str(error)
     return fields, initial, problem
 
 
@@ -293,7 +291,7 @@ def _read_json(text: str) -> dict[str, Any]:
     Raises:
         Conflict: The text is no JSON object.
     """
-    no_json = sentence("The intent is no JSON.")
+    no_json = "The intent is no JSON."
     found = read_json(text, otherwise=no_json)
     if not isinstance(found, dict):
         raise Conflict(no_json)
@@ -313,9 +311,9 @@ def _bulk(request: HttpRequest) -> BulkReport:
     """
     table, others = request.FILES.get("file"), request.FILES.getlist("documents")
     if was_too_large(request.META) or len(others) > MOST_FILES:
-        raise Conflict(sentence("The files are too large, or too many."))
+        raise Conflict("The files are too large, or too many.")
     if table is None:
-        raise Conflict(sentence("Choose a CSV or YAML file."))
+        raise Conflict("Choose a CSV or YAML file.")
     return add_from_files(
         table, others, keeps="try" not in request.POST, actor=cast(User, request.user)
     )

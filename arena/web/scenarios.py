@@ -44,7 +44,6 @@ from augment.services.scenarios.scene_pictures import (
     scene_picture,
 )
 from augment.services.scenarios.types import type_choices
-from augment.services.wording import translate
 from augment.tasks import enqueue_marks, enqueue_scenario
 
 LOOKS = tuple(str(number) for number in range(6))
@@ -102,18 +101,16 @@ def scenario_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         "has_picture": is_drawn(reference_picture(scenario)),
         "reference_version": reference_picture(scenario)[-16:-4],
         "look": look,
-        "why_not_editable": translate(why_not_editable(scenario)),
+        "why_not_editable": why_not_editable(scenario),
         "lines": modification_lines(scenario.reference),
-        "statements": [translate(one) for one in statements_of(scenario.intent)],
+        "statements": statements_of(scenario.intent),
         "reading": reading,
-        "reading_statements": [
-            translate(one) for one in statements_of(None if reading is None else reading.document)
-        ],
+        "reading_statements": statements_of(None if reading is None else reading.document),
         "last_reading": last_reading(scenario),
         "readers": EndpointModel.objects.select_related("endpoint").order_by(
             "endpoint__label", "model"
         ),
-        "notes": [translate(note) for note in notes_of(scenario.base_scene)],
+        "notes": notes_of(scenario.base_scene),
         "augmentations": scenarios.augmentations_of(scenario),
     }
     return render(request, "scenarios/scenario.html", context)
@@ -200,7 +197,7 @@ def _send_marks(request: HttpRequest, augmentation_pk: int) -> None:
     try:
         enqueue_marks(augmentation_pk)
     except QueueFault as error:
-        messages.warning(request, translate(error))
+        messages.warning(request, str(error))
 
 
 def _augmentation(code: uuid.UUID) -> Augmentation:

@@ -15,7 +15,6 @@ from augment.models import BaseScene
 from augment.services.scenarios import uploads
 from augment.services.scenarios.scene_notes import notes_of
 from augment.services.scenarios.scene_pictures import SceneView, is_drawn, scene_picture
-from augment.services.wording import translate
 from augment.tasks import enqueue_scene
 
 
@@ -44,7 +43,7 @@ def scene_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     context = {
         "scene": row,
         "counts": counts_of(row),
-        "notes": [translate(note) for note in notes_of(row)],
+        "notes": notes_of(row),
         "scenarios": row.scenarios.only("base_scene", "code", "slug", "instruction"),
         "is_drawn": drawn,
         "look": look,

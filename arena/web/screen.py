@@ -26,7 +26,6 @@ from arena.queries.voting_keys import (
 )
 from arena.services.replanning import next_pairs
 from arena.services.reports import SIDES
-from augment.services.wording import translate_all
 
 AHEAD = 5
 """The pair on the screen and four that are decoded ahead."""
@@ -98,7 +97,7 @@ def vote_context(study: Study, expert: User, *, change: str) -> dict[str, Any] |
             to show it again; anything else shows the next pair.
     """
     matchups = next_pairs(study=study, expert=expert, n=AHEAD)
-    pairs = [as_shown(matchup, translate_all) for matchup in matchups]
+    pairs = [as_shown(matchup) for matchup in matchups]
     context = over_context(study, expert)
     last = context["last"]
     changed = next((vote for vote in last if str(vote.key) == change), None)
@@ -163,7 +162,7 @@ def _as_last(vote: Vote) -> LastVote:
         both_miss=vote.both_miss,
         comment=vote.comment,
         word=_word(vote),
-        shown=as_shown(vote.matchup, translate_all),
+        shown=as_shown(vote.matchup),
     )
 
 

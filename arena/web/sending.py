@@ -10,7 +10,6 @@ from django.db import transaction
 from django.http import HttpRequest
 
 from augment.errors import QueueFault
-from augment.services.wording import translate
 
 LOOKS = 40
 """So often a page looks again for something that a worker makes."""
@@ -37,4 +36,4 @@ def _send(request: HttpRequest, send: Callable[[int], object], pk: int) -> None:
     try:
         send(pk)
     except QueueFault as error:
-        messages.warning(request, translate(error))
+        messages.warning(request, str(error))

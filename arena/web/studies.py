@@ -33,7 +33,6 @@ from arena.web.study_files import export_place
 from arena.web.study_forms import HandOverForm
 from arena.web.study_questions import cancelling, closing, handing_over
 from augment.errors import AugmentError
-from augment.services.wording import translate
 
 STUDIES_AT_ONCE = 25
 
@@ -120,7 +119,7 @@ def hand_over_pairs(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
             return ask(request, handing_over(study, giver, takers))
         taken = hand_over(study=study, username=giver, to=takers, actor=cast(User, request.user))
     except (ArenaError, AugmentError) as error:
-        messages.error(request, translate(error))
+        messages.error(request, str(error))
     else:
         shares = ", ".join(f"{name} {votes}" for name, votes in taken.items())
         messages.success(request, f"Handed over: {shares}.")
@@ -142,7 +141,7 @@ def close(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         if study.state == Study.State.OPEN:  # not pressed twice
             rate_or_send(request, closed, actor=actor)
     except (ArenaError, AugmentError) as error:
-        messages.error(request, translate(error))
+        messages.error(request, str(error))
         return redirect("study", code=code)
     return redirect("results", code=code)
 
@@ -160,7 +159,7 @@ def cancel(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         why = request.POST.get(WHY, "")
         cancel_study(study=study, why=why, actor=cast(User, request.user))
     except (ArenaError, AugmentError) as error:
-        messages.error(request, translate(error))
+        messages.error(request, str(error))
     else:
         messages.success(request, "Cancelled. Its votes stay.")
     return redirect("study", code=code)

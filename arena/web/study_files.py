@@ -29,7 +29,6 @@ from arena.services.study_files import (
 from arena.web.access import STAFF, allow_only
 from arena.web.sending import send_later
 from augment.errors import AugmentError
-from augment.services.wording import translate
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -100,7 +99,7 @@ def ask(request: HttpRequest, code: uuid.UUID, kind: str) -> HttpResponse:
             row = ask_for_study_file(study=study, kind=kind, actor=cast(User, request.user))
             send_later(request, tasks.send_study_file, row.pk)
     except AugmentError as error:
-        messages.error(request, translate(error))
+        messages.error(request, str(error))
     else:
         messages.success(request, "A worker writes the file; it is offered here when ready.")
     if is_imported(study):
@@ -139,7 +138,7 @@ def _study_for(request: HttpRequest, code: uuid.UUID, kind: str) -> Study:
 
 def _obstacle(study: Study, kind: StudyFile.Kind, access: ResultsAccess) -> str:
     if reason := why_not(study, kind):
-        return translate(reason)
+        return reason
     if kind in SHOWS_RESULTS and access is not ResultsAccess.FULL:
         return "It shows results, which you have not opened."
     return ""

@@ -14,7 +14,6 @@ from arena.services.shown_pictures import SampleRule
 from arena.services.studies import PlanOptions
 from arena.web.forms import ChoiceForm
 from augment.models import GenerationJob
-from augment.services.wording import translate
 
 
 def _percent(*, initial: int, most: int) -> forms.FloatField:
@@ -74,7 +73,7 @@ class StudyForm(ChoiceForm):
         try:
             return read_targets(self.cleaned_data["targets"].splitlines())
         except NothingToPlan as error:
-            raise forms.ValidationError(translate(error)) from error
+            raise forms.ValidationError(str(error)) from error
 
     def rules(self) -> dict[str, Any]:
         """What the study is opened with, once the form is valid."""

@@ -36,7 +36,6 @@ from arena.web.study_forms import StudyForm
 from arena.web.study_questions import discarding, opening
 from augment.errors import AugmentError
 from augment.models import Contestant, GenerationJob
-from augment.services.wording import translate
 
 KEEP = "keep"
 """What the button sends that saves a draft."""
@@ -80,7 +79,7 @@ def use_again(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     try:
         draft = draft_like(study=study, actor=cast(User, request.user))
     except AugmentError as error:
-        messages.error(request, translate(error))
+        messages.error(request, str(error))
         return redirect("study", code=code)
     messages.success(request, f"A draft with the settings of “{study.name}”.")
     return redirect("study-draft", code=draft.code)
@@ -93,7 +92,7 @@ def draw_checks(request: HttpRequest) -> HttpResponse:
     try:
         tasks.send_checks(cast(User, request.user).pk)
     except AugmentError as error:
-        messages.error(request, translate(error))
+        messages.error(request, str(error))
     else:
         messages.success(
             request, "Attention checks are being drawn. Reload this page in a moment."
@@ -114,7 +113,7 @@ def _set_up(request: HttpRequest, draft: StudyDraft | None) -> HttpResponse:
                 return ask(request, opening(form.rules(), draft))
             study = _open(request, draft, form)
         except (ArenaError, AugmentError) as error:
-            form.add_error(None, translate(error))
+            form.add_error(None, str(error))
         else:
             messages.success(request, f"“{study.name}” is open; its experts can vote now.")
             return redirect("study", code=study.code)
@@ -141,7 +140,7 @@ def _keep(request: HttpRequest, draft: StudyDraft | None) -> HttpResponse:
             )
     except AugmentError as error:
         draft = draft and StudyDraft.objects.filter(pk=draft.pk).first()
-        messages.error(request, translate(error))
+        messages.error(request, str(error))
         if draft is not None:
             messages.info(
                 request, "What you entered stands below; saving it again replaces theirs."

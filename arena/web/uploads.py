@@ -19,7 +19,6 @@ from arena.web.sending import looks_again, send_later
 from augment.errors import AugmentError
 from augment.models import SceneUpload, UploadMoment
 from augment.services.scenarios import upload_moments, uploads
-from augment.services.wording import translate
 from augment.tasks import enqueue_moment, enqueue_upload
 
 
@@ -43,7 +42,7 @@ def send_file(request: HttpRequest) -> HttpResponse:
             actor=cast(User, request.user),
         )
     except AugmentError as error:
-        messages.error(request, translate(error))
+        messages.error(request, str(error))
         return redirect("scenes")
     send_later(request, enqueue_upload, row.pk)
     return redirect("upload", code=row.code)
@@ -62,9 +61,7 @@ def upload_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         "maps": maps,
         "moment": moment,
         "chosen": None if moment is None else place_of(maps, item=moment.item, frame=moment.frame),
-        "notes": []
-        if moment is None
-        else [translate(one) for one in upload_moments.sentences_of(moment)],
+        "notes": [] if moment is None else upload_moments.sentences_of(moment),
         "kept": row.moments.filter(state=UploadMoment.State.KEPT).select_related("scene"),
         "look": looks_again(request, waits=waits),
     }
@@ -83,7 +80,7 @@ def show_moment(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
             row, item=item, frame=frame, actor=cast(User, request.user)
         )
     except AugmentError as error:
-        messages.error(request, translate(error))
+        messages.error(request, str(error))
         return redirect(page)
     except (ValueError, LookupError):
         messages.error(request, "This recording has no such moment.")
@@ -103,7 +100,7 @@ def keep_moment(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
             moment, slug=request.POST.get("slug", "").strip(), actor=cast(User, request.user)
         )
     except AugmentError as error:
-        messages.error(request, translate(error))
+        messages.error(request, str(error))
     else:
         send_later(request, enqueue_moment, moment.pk)
     page = reverse("upload", args=[moment.upload.code])
@@ -118,7 +115,7 @@ def read_again(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     try:
         uploads.read_again(row)
     except AugmentError as error:
-        messages.error(request, translate(error))
+        messages.error(request, str(error))
     else:
         send_later(request, enqueue_upload, row.pk)
     return redirect("upload", code=code)

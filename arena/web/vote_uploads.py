@@ -20,7 +20,6 @@ from arena.services.sent_files import was_too_large
 from arena.services.vote_imports import ImportedVotes, import_votes
 from arena.web.access import ADMIN, allow_only
 from augment.errors import AugmentError
-from augment.services.wording import translate
 
 MOST_MB = 20
 """Some 200,000 votes, read while the page waits; more goes by `manage.py import_votes`."""
@@ -59,7 +58,7 @@ def upload_votes_page(request: HttpRequest) -> HttpResponse:
         try:
             imported = _import(form, cast(User, request.user))
         except (ArenaError, AugmentError) as error:
-            form.add_error(None, translate(error))
+            form.add_error(None, str(error))
         else:
             messages.success(
                 request,

@@ -30,7 +30,6 @@ from arena.web.pictures import picture_response
 from arena.web.screen import over_context, vote_context
 from augment.errors import Conflict
 from augment.services.judging.measures import LaneEdges
-from augment.services.wording import translate
 
 
 @allow_only(EXPERT)
@@ -133,7 +132,7 @@ def measures(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
             found = lane_edges_of_pair(user=user, code=code, x_px=x_px, y_px=y_px)
             answer = None if found is None else {"words": _edges(found[0])}
         else:
-            answer = measures_of_pair(user=user, code=code, say=translate)
+            answer = measures_of_pair(user=user, code=code)
     except NotYours as error:
         raise Http404 from error
     except ValueError:

@@ -13,7 +13,6 @@ from augment.scene.ego_route import EgoRoute
 from augment.scene.entities import Scene, TrafficAgent, TrafficSide
 from augment.scene.intent_words import Facing
 from augment.scene.modification import Modification
-from augment.sentences import Sentence, word
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -75,18 +74,18 @@ def severity_of(*, fits: bool) -> Severity:
     return Severity.FACT if fits else Severity.WRONG
 
 
-def facing_words(facing: Facing | None) -> Sentence:
+def facing_words(facing: Facing | None) -> str:
     """Which way something is to face, as its lane leads where nothing is said."""
     return _FACING[facing or Facing.WITH_LANE]
 
 
-def side_of(left: float) -> Sentence:
+def side_of(left: float) -> str:
     """The side of a number whose left is positive."""
-    return word("left") if left >= 0.0 else word("right")
+    return "left" if left >= 0.0 else "right"
 
 
 _FACING = {
-    Facing.WITH_LANE: word("facing with the lane"),
-    Facing.AGAINST_LANE: word("facing against the lane"),
-    Facing.ACROSS: word("facing across the lane"),
+    Facing.WITH_LANE: "facing with the lane",
+    Facing.AGAINST_LANE: "facing against the lane",
+    Facing.ACROSS: "facing across the lane",
 }

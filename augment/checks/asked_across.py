@@ -31,7 +31,6 @@ from augment.scene.intent_words import (
     Shape,
 )
 from augment.scene.sizes import LENGTH_WIDTH_M
-from augment.sentences import sentence, word
 
 _SLIGHT_M = 1.5
 """The end of the paper's range for a slight offset."""
@@ -79,7 +78,7 @@ def asked_across(asked: Asked) -> Iterator[Finding]:
             left_m = asked.left_m(first) - band.left_m
             others = (one for one in party.everyone if one is not first)
             yield _in_lane(
-                asked, (first, *others), left_m, band, word("The first of the crashed vehicles")
+                asked, (first, *others), left_m, band, "The first of the crashed vehicles"
             )
         elif isinstance(request, ConesRequest):
             yield from _cones(asked, party, request, band)
@@ -116,29 +115,22 @@ def _vehicle(
     belongs_m = band.left_m + min(max(left_m, wanted.low_m), wanted.high_m)
     lane = _LANES[choice]
     if wanted.low_m == wanted.high_m == 0.0:
-        words = sentence("the lane centre is asked for")
+        words = "the lane centre is asked for"
     elif wanted.low_m == wanted.high_m:
-        words = sentence(
-            "{asked_low_m:.2g} m to the %(side)s is asked for", side=side_of(wanted.low_m)
-        )
+        words = f"{{asked_low_m:.2g}} m to the {side_of(wanted.low_m)} is asked for"
     else:
         low, high = ("low", "high") if wanted.low_m >= 0.0 else ("high", "low")
-        words = sentence(
-            "%(from)s to %(to)s m to the %(side)s is asked for",
-            **{"from": f"{{asked_{low}_m:.2g}}", "to": f"{{asked_{high}_m:.2g}}"},
-            side=side_of(wanted.low_m + wanted.high_m),
-        )
+        side = side_of(wanted.low_m + wanted.high_m)
+        words = f"{{asked_{low}_m:.2g}} to {{asked_{high}_m:.2g}} m to the {side} is asked for"
     return Finding(
         kind=FindingKind.ASKED_ACROSS,
         severity=severity_of(fits=wanted.off_m(left_m) <= wanted.allowed_m),
         agents=(agent.id,),
         belongs_m=asked.route.position(asked.ahead_m(agent), belongs_m),
         measured={"left_m": left_m, "asked_low_m": wanted.low_m, "asked_high_m": wanted.high_m},
-        template=sentence(
-            "{agents[0]} is {left_m:.2f} m to the %(side)s of the centre of %(lane)s; %(words)s.",
-            side=side_of(left_m),
-            lane=lane,
-            words=words,
+        template=(
+            f"{{agents[0]}} is {{left_m:.2f}} m to the {side_of(left_m)} of the centre of "
+            f"{lane}; {words}."
         ),
     )
 
@@ -182,15 +174,14 @@ def _cones(asked: Asked, party: Party, request: ConesRequest, band: Band) -> Ite
             severity=severity_of(fits=wanted.off_m(middle_m) <= across_m),
             agents=tuple(agent.id for agent in everyone),
             measured={"left_m": middle_m, "asked_low_m": edge_m, "asked_high_m": edge_m},
-            template=sentence(
-                "The line of cones is {left_m:.2f} m to the %(side)s of the lane centre; the "
-                "%(asked)s boundary, {asked_low_m:.2f} m off, is asked for.",
-                side=side_of(middle_m),
-                asked=side_of(edge_m),
+            template=(
+                f"The line of cones is {{left_m:.2f}} m to the {side_of(middle_m)} of the lane "
+                f"centre; the {side_of(edge_m)} boundary, {{asked_low_m:.2f}} m off, is asked "
+                "for."
             ),
         )
         return
-    yield _in_lane(asked, everyone, middle_m, band, word("The middle of the cones"))
+    yield _in_lane(asked, everyone, middle_m, band, "The middle of the cones")
     if request.ends_in_middle and party.is_exact:
         yield _last_in_middle(asked, cones, lefts[-1])
     if request.shape is Shape.TAPER and abs(lefts[0] - lefts[-1]) > _TAPER_M:
@@ -204,10 +195,9 @@ def _last_in_middle(asked: Asked, cones: Sequence[TrafficAgent], left_m: float) 
         severity=severity_of(fits=abs(left_m) <= asked.tolerances.middle_m),
         agents=(cones[-1].id,),
         measured={"left_m": left_m},
-        template=sentence(
-            "The last cone, {agents[0]}, is {left_m:.2f} m to the %(side)s of the lane centre, "
-            "where the taper is to end.",
-            side=side_of(left_m),
+        template=(
+            f"The last cone, {{agents[0]}}, is {{left_m:.2f}} m to the {side_of(left_m)} of the "
+            "lane centre, where the taper is to end."
         ),
     )
 
@@ -219,11 +209,9 @@ def _taper_side(cones: Sequence[TrafficAgent], lefts: Sequence[float], start: fl
         severity=severity_of(fits=begins * start > 0.0),
         agents=tuple(cone.id for cone in cones),
         measured={"first_left_m": lefts[0], "last_left_m": lefts[-1]},
-        template=sentence(
-            "The taper begins at the %(side)s of the lane with {agents[0]}; the %(asked)s is "
-            "asked for.",
-            side=side_of(begins),
-            asked=side_of(start),
+        template=(
+            f"The taper begins at the {side_of(begins)} of the lane with {{agents[0]}}; the "
+            f"{side_of(start)} is asked for."
         ),
     )
 
@@ -237,26 +225,23 @@ def _in_lane(
         severity=severity_of(fits=beyond_m <= asked.tolerances.edge_m),
         agents=tuple(agent.id for agent in agents),
         measured={"left_m": left_m, "lane_width_m": band.width_m},
-        template=sentence(
-            "%(what)s is {left_m:.2f} m to the %(side)s of the centre of the lane that is asked "
-            "for, which is {lane_width_m:.1f} m wide.",
-            what=what,
-            side=side_of(left_m),
+        template=(
+            f"{what} is {{left_m:.2f}} m to the {side_of(left_m)} of the centre of the lane that "
+            "is asked for, which is {lane_width_m:.1f} m wide."
         ),
     )
 
 
 def _other_side(agents: Sequence[TrafficAgent], left_m: float, wanted: _Wanted) -> Finding:
+    asked = side_of(wanted.low_m + wanted.high_m)
     return Finding(
         kind=FindingKind.ASKED_SIDE,
         severity=severity_of(fits=False),
         agents=tuple(agent.id for agent in agents),
         measured={"left_m": left_m, "asked_low_m": wanted.low_m, "asked_high_m": wanted.high_m},
-        template=sentence(
-            "{agents[0]} is {left_m:.2f} m to the %(side)s of the lane centre; the same to the "
-            "%(asked)s is asked for: left and right are exchanged.",
-            side=side_of(left_m),
-            asked=side_of(wanted.low_m + wanted.high_m),
+        template=(
+            f"{{agents[0]}} is {{left_m:.2f}} m to the {side_of(left_m)} of the lane centre; the "
+            f"same to the {asked} is asked for: left and right are exchanged."
         ),
     )
 
@@ -283,8 +268,8 @@ _KERB_SIGNS = {
     LateralTarget.LANE_CENTRE: 0.0,
 }
 _LANES = {
-    LaneChoice.OWN: word("the ego's lane"),
-    LaneChoice.LEFT: word("the lane on the left"),
-    LaneChoice.RIGHT: word("the lane on the right"),
-    LaneChoice.ONCOMING: word("the oncoming lane"),
+    LaneChoice.OWN: "the ego's lane",
+    LaneChoice.LEFT: "the lane on the left",
+    LaneChoice.RIGHT: "the lane on the right",
+    LaneChoice.ONCOMING: "the oncoming lane",
 }

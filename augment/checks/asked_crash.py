@@ -18,7 +18,6 @@ from augment.scene.intent import (
 from augment.scene.intent_words import (
     Facing,
 )
-from augment.sentences import sentence
 
 
 def asked_crash(asked: Asked) -> Iterator[Finding]:
@@ -45,16 +44,15 @@ def asked_crash(asked: Asked) -> Iterator[Finding]:
 
 def _turn(pair: Pair, asked: Asked) -> Finding:
     asked_deg, off_deg = pair.asked.turn_deg or 0.0, pair.off_deg or 0.0
-    side = sentence(" to the %(side)s", side=side_of(asked_deg)) if pair.asked.is_signed else ""
+    side = f" to the {side_of(asked_deg)}" if pair.asked.is_signed else ""
     return Finding(
         kind=FindingKind.ASKED_HEADING,
         severity=severity_of(fits=off_deg <= asked.tolerances.heading_deg),
         agents=(pair.other.id, pair.one.id),
         measured={"turn_deg": pair.turn_deg, "asked_deg": asked_deg, "off_deg": off_deg},
-        template=sentence(
+        template=(
             "{agents[0]} is turned {turn_deg:.0f} degrees against {agents[1]}; {asked_deg:.0f} "
-            "degrees%(side)s are asked for.",
-            side=side,
+            f"degrees{side} are asked for."
         ),
     )
 
@@ -65,21 +63,19 @@ def _gap(pair: Pair, asked: Asked) -> Finding:
     longest_m = max(CRASH_M, pair.one.length_m, pair.other.length_m)
     if wanted is None:
         fits = pair.gap_m <= longest_m
-        words = sentence("vehicles that have crashed are within {asked_m:.1f} m")
+        words = "vehicles that have crashed are within {asked_m:.1f} m"
         asked_m = longest_m
     else:
         allowed_m = max(asked.tolerances.spacing_m, asked.tolerances.spacing_share * wanted.high_m)
         fits = (pair.off_m or 0.0) <= allowed_m
-        words = sentence("{asked_m:.1f} m is asked for")
+        words = "{asked_m:.1f} m is asked for"
         asked_m = (wanted.low_m + wanted.high_m) / 2.0
     return Finding(
         kind=FindingKind.ASKED_SPACING,
         severity=severity_of(fits=fits),
         agents=(pair.other.id, pair.one.id),
         measured={"gap_m": pair.gap_m, "asked_m": asked_m},
-        template=sentence(
-            "{agents[0]} is {gap_m:.1f} m from {agents[1]}; %(words)s.", words=words
-        ),
+        template=f"{{agents[0]}} is {{gap_m:.1f}} m from {{agents[1]}}; {words}.",
     )
 
 
@@ -94,9 +90,9 @@ def _facing(asked: Asked, request: CrashRequest, first: TrafficAgent) -> Iterato
         severity=severity_of(fits=abs(turn_deg - wanted_deg) <= _ROUGHLY_DEG),
         agents=(first.id,),
         measured={"turn_deg": turn_deg, "asked_deg": wanted_deg},
-        template=sentence(
-            "{agents[0]} is turned {turn_deg:.0f} degrees from its lane; %(words)s is asked for.",
-            words=facing_words(request.facing),
+        template=(
+            "{agents[0]} is turned {turn_deg:.0f} degrees from its lane; "
+            f"{facing_words(request.facing)} is asked for."
         ),
     )
 

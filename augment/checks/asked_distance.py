@@ -21,7 +21,6 @@ from augment.scene.intent import (
 from augment.scene.intent_words import (
     Shape,
 )
-from augment.sentences import sentence, word
 
 
 def asked_distance(asked: Asked) -> Iterator[Finding]:
@@ -45,9 +44,10 @@ def _finding(asked: Asked, party: Party, span_m: tuple[float, float]) -> Finding
     allowed_m = asked.tolerances.distance_m
     if math.isfinite(high_m):
         allowed_m = max(allowed_m, asked.tolerances.distance_share * high_m) + _to_next_m(party)
-    side = word("ahead of") if measured_m * sign >= 0.0 else word("behind")
+    side = "ahead of" if measured_m * sign >= 0.0 else "behind"
     what, place = _words(party, low_m, high_m)
     belongs_m = sign * min(max(measured_m, low_m), high_m)
+    words = f"{place} ahead is asked for" if sign > 0.0 else f"{place} behind is asked for"
     return Finding(
         kind=FindingKind.ASKED_DISTANCE,
         severity=severity_of(fits=off_m <= allowed_m),
@@ -59,14 +59,7 @@ def _finding(asked: Asked, party: Party, span_m: tuple[float, float]) -> Finding
             "asked_high_m": high_m if math.isfinite(high_m) else None,
             "off_m": off_m,
         },
-        template=sentence(
-            "%(what)s is {along_m:.1f} m %(side)s the ego along its lane; %(words)s.",
-            what=what,
-            side=side,
-            words=sentence("%(place)s ahead is asked for", place=place)
-            if sign > 0.0
-            else sentence("%(place)s behind is asked for", place=place),
-        ),
+        template=f"{what} is {{along_m:.1f}} m {side} the ego along its lane; {words}.",
     )
 
 
@@ -122,17 +115,17 @@ def _words(party: Party, low_m: float, high_m: float) -> tuple[str, str]:
     request = party.request
     what: str
     if isinstance(request, CrashRequest):
-        what = word("The first of the crashed vehicles, {agents[0]},")
+        what = "The first of the crashed vehicles, {agents[0]},"
     elif isinstance(request, ConesRequest):
         is_ring = request.shape is Shape.RING
-        first = word("The first cone, {agents[0]},")
-        what = word("The middle of the cones") if is_ring else first
+        first = "The first cone, {agents[0]},"
+        what = "The middle of the cones" if is_ring else first
     elif isinstance(request, WalkRequest):
-        what = word("The walk of {agents[0]}")
+        what = "The walk of {agents[0]}"
     else:
         what = "{agents[0]}"
     if not math.isfinite(high_m):
-        return what, word("a place")
+        return what, "a place"
     if high_m > low_m:
-        return what, word("{asked_low_m:.4g} to {asked_high_m:.4g} m")
+        return what, "{asked_low_m:.4g} to {asked_high_m:.4g} m"
     return what, "{asked_low_m:.4g} m"

@@ -16,7 +16,6 @@ from augment.scene.intent_words import (
     Body,
     Facing,
 )
-from augment.sentences import sentence, word
 
 
 def asked_heading(asked: Asked) -> Iterator[Finding]:
@@ -39,6 +38,7 @@ def _vehicle(asked: Asked, request: VehicleRequest, agent: TrafficAgent) -> Iter
     turns = (turn_deg, turn_deg + 180.0) if _facing(request) is Facing.ACROSS else (turn_deg,)
     wanted_deg = _FACING_DEG[_facing(request)] + request.turn_deg
     off_deg = min(abs(_difference_deg(turn, wanted_deg)) for turn in turns)
+    usual = "" if request.facing else ", as nothing else is said,"
     yield Finding(
         kind=FindingKind.ASKED_HEADING,
         severity=severity_of(fits=off_deg <= asked.tolerances.heading_deg),
@@ -48,13 +48,9 @@ def _vehicle(asked: Asked, request: VehicleRequest, agent: TrafficAgent) -> Iter
             "asked_deg": _difference_deg(wanted_deg, 0.0),
             "off_deg": off_deg,
         },
-        template=sentence(
-            "{agents[0]} is turned {turn_deg:.0f} degrees to the %(side)s of its lane; "
-            "%(words)s%(usual)s%(turn)s is asked for.",
-            side=side_of(turn_deg),
-            words=facing_words(request.facing),
-            usual="" if request.facing else word(", as nothing else is said,"),
-            turn=_turn(request),
+        template=(
+            f"{{agents[0]}} is turned {{turn_deg:.0f}} degrees to the {side_of(turn_deg)} of its "
+            f"lane; {facing_words(request.facing)}{usual}{_turn(request)} is asked for."
         ),
     )
 
@@ -62,11 +58,7 @@ def _vehicle(asked: Asked, request: VehicleRequest, agent: TrafficAgent) -> Iter
 def _turn(request: VehicleRequest) -> str:
     if not request.turn_deg:
         return ""
-    return sentence(
-        ", turned %(degrees)s degrees to the %(side)s",
-        degrees=f"{abs(request.turn_deg):g}",
-        side=side_of(request.turn_deg),
-    )
+    return f", turned {abs(request.turn_deg):g} degrees to the {side_of(request.turn_deg)}"
 
 
 def _facing(request: VehicleRequest) -> Facing:

@@ -13,7 +13,6 @@ from augment.checks.parties import Party
 from augment.checks.tolerances import WORKER_M
 from augment.scene.entities import TrafficAgent
 from augment.scene.intent import ConesRequest, Length, Side, VehicleRequest
-from augment.sentences import sentence, word
 
 
 def asked_spacing(asked: Asked) -> Iterator[Finding]:
@@ -85,9 +84,7 @@ def _worker(worker: TrafficAgent, party: Party) -> Finding:
         severity=severity_of(fits=apart_m(worker, nearest) <= WORKER_M),
         agents=(worker.id, nearest.id),
         measured={"gap_m": apart_m(worker, nearest)},
-        template=sentence(
-            "The worker {agents[0]} is {gap_m:.1f} m from the nearest cone, {agents[1]}."
-        ),
+        template="The worker {agents[0]} is {gap_m:.1f} m from the nearest cone, {agents[1]}.",
     )
 
 
@@ -99,14 +96,12 @@ def _worker_side(asked: Asked, worker: TrafficAgent, party: Party, side: Side) -
         severity=severity_of(fits=side_of(left_m) == side.value),
         agents=(worker.id, nearest.id),
         measured={"left_m": left_m},
-        template=sentence(
-            "The worker {agents[0]} stands to the %(side)s of {agents[1]}; the %(asked)s is asked "
-            "for.",
-            side=side_of(left_m),
-            asked=word(side.value),
+        template=(
+            f"The worker {{agents[0]}} stands to the {side_of(left_m)} of {{agents[1]}}; the "
+            f"{side.value} is asked for."
         ),
     )
 
 
-_CONES = sentence("The cones stand {gap_m:.1f} m apart; {asked_m:.1f} m are asked for.")
-_VEHICLES = sentence("The vehicles stand {gap_m:.1f} m apart; {asked_m:.1f} m are asked for.")
+_CONES = "The cones stand {gap_m:.1f} m apart; {asked_m:.1f} m are asked for."
+_VEHICLES = "The vehicles stand {gap_m:.1f} m apart; {asked_m:.1f} m are asked for."

@@ -11,7 +11,6 @@ from augment.checks.situation import STOPPED_BELOW_MPS
 from augment.checks.size import name_type
 from augment.checks.tolerances import SPEED_MPS, SPEED_SHARE
 from augment.scene.intent import CrashRequest, VehicleRequest
-from augment.sentences import sentence, word
 
 
 def asked_count(asked: Asked) -> Iterator[Finding]:
@@ -25,9 +24,8 @@ def asked_count(asked: Asked) -> Iterator[Finding]:
                 agents=here,
                 belongs_m=None if here else middle_of(party.request.spot, asked.lanes),
                 measured={"missing": float(number)},
-                template=sentence(
-                    "{missing:.0f} %(things)s asked for and not there.",
-                    things=_COUNTED[role][number != 1],
+                template=(
+                    f"{{missing:.0f}} {_COUNTED[role][number != 1]} asked for and not there."
                 ),
             )
     for agent in asked.matching.surplus:
@@ -36,10 +34,7 @@ def asked_count(asked: Asked) -> Iterator[Finding]:
             severity=Severity.WRONG,
             agents=(agent.id,),
             measured={"surplus": 1.0},
-            template=sentence(
-                "{agents[0]}, %(a_thing)s, is more than was asked for.",
-                a_thing=name_type(agent.type),
-            ),
+            template=f"{{agents[0]}}, {name_type(agent.type)}, is more than was asked for.",
         )
 
 
@@ -51,11 +46,7 @@ def asked_type(asked: Asked) -> Iterator[Finding]:
                 kind=FindingKind.ASKED_TYPE,
                 severity=Severity.WRONG,
                 agents=(agent.id,),
-                template=sentence(
-                    "{agents[0]} is %(a_thing)s; %(asked)s is asked for.",
-                    a_thing=name_type(agent.type),
-                    asked=_A[role],
-                ),
+                template=f"{{agents[0]}} is {name_type(agent.type)}; {_A[role]} is asked for.",
             )
 
 
@@ -77,9 +68,7 @@ def asked_motion(asked: Asked) -> Iterator[Finding]:
                 severity=severity_of(fits=off_mps <= allowed_mps),
                 agents=(agent.id,),
                 measured={"speed_mps": agent.speed_mps, "asked_mps": wanted_mps},
-                template=sentence(
-                    "{agents[0]} moves at {speed_mps:.1f} m/s; %(words)s.", words=words
-                ),
+                template=f"{{agents[0]}} moves at {{speed_mps:.1f}} m/s; {words}.",
             )
 
 
@@ -94,9 +83,7 @@ def find_unasked(asked: Asked) -> Iterator[Finding]:
             kind=FindingKind.UNASKED,
             severity=Severity.WRONG,
             agents=(name,),
-            template=sentence(
-                "{agents[0]} was in the scene and is %(done)s; nobody asked for that.", done=done
-            ),
+            template=f"{{agents[0]}} was in the scene and is {done}; nobody asked for that.",
         )
 
 
@@ -111,7 +98,7 @@ def asked_changes(asked: Asked) -> Iterator[Finding]:
             kind=FindingKind.ASKED_COUNT,
             severity=Severity.WRONG,
             agents=(name,),
-            template=sentence("{agents[0]} is to be %(wanted)s and is not.", wanted=wanted),
+            template=f"{{agents[0]}} is to be {wanted} and is not.",
         )
 
 
@@ -124,37 +111,35 @@ def find_attempted(asked: Asked) -> Iterator[Finding]:
             kind=FindingKind.UNASKED,
             severity=Severity.WRONG,
             agents=tuple(touched),
-            template=sentence(
-                "The wish can't be met, and {agents[0]} is changed: %(why)s", why=why
-            ),
+            template=f"The wish can't be met, and {{agents[0]}} is changed: {why}",
         )
 
 
 # Private
 
 
-_MOVED, _REMOVED = word("moved"), word("removed")
-_DRIVES, _STANDS = word("{asked_mps:.1f} m/s is asked for"), word("it is to stand")
+_MOVED, _REMOVED = "moved", "removed"
+_DRIVES, _STANDS = "{asked_mps:.1f} m/s is asked for", "it is to stand"
 _A = {
-    Role.VEHICLE: word("a vehicle"),
-    Role.CAR: word("a car"),
-    Role.BUS: word("a bus"),
-    Role.BICYCLE: word("a bicycle"),
-    Role.WALKER: word("a pedestrian"),
-    Role.CONE: word("a cone"),
-    Role.WORKER: word("a worker"),
-    Role.BARRIER: word("a barrier"),
-    Role.SIGN: word("a construction sign"),
+    Role.VEHICLE: "a vehicle",
+    Role.CAR: "a car",
+    Role.BUS: "a bus",
+    Role.BICYCLE: "a bicycle",
+    Role.WALKER: "a pedestrian",
+    Role.CONE: "a cone",
+    Role.WORKER: "a worker",
+    Role.BARRIER: "a barrier",
+    Role.SIGN: "a construction sign",
 }
 _COUNTED = {
-    Role.VEHICLE: (word("vehicle is"), word("vehicles are")),
-    Role.CAR: (word("car is"), word("cars are")),
-    Role.BUS: (word("bus is"), word("buses are")),
-    Role.BICYCLE: (word("bicycle is"), word("bicycles are")),
-    Role.WALKER: (word("pedestrian is"), word("pedestrians are")),
-    Role.CONE: (word("cone is"), word("cones are")),
-    Role.WORKER: (word("worker is"), word("workers are")),
-    Role.BARRIER: (word("barrier is"), word("barriers are")),
-    Role.SIGN: (word("construction sign is"), word("construction signs are")),
+    Role.VEHICLE: ("vehicle is", "vehicles are"),
+    Role.CAR: ("car is", "cars are"),
+    Role.BUS: ("bus is", "buses are"),
+    Role.BICYCLE: ("bicycle is", "bicycles are"),
+    Role.WALKER: ("pedestrian is", "pedestrians are"),
+    Role.CONE: ("cone is", "cones are"),
+    Role.WORKER: ("worker is", "workers are"),
+    Role.BARRIER: ("barrier is", "barriers are"),
+    Role.SIGN: ("construction sign is", "construction signs are"),
 }
 """One, and several or none."""

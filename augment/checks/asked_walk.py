@@ -12,7 +12,6 @@ from augment.checks.finding import Finding, FindingKind
 from augment.checks.walk_crossing import end_of_walk
 from augment.scene.entities import TrafficAgent
 from augment.scene.intent import Side, WalkRequest
-from augment.sentences import Sentence, sentence, word
 
 _ON_ROAD_M = 1.0
 """Who begins so near the middle of the ego's lane comes from no side of it."""
@@ -60,11 +59,9 @@ def _drift(asked: Asked, agent: TrafficAgent, wanted_m: float | None) -> Iterato
         severity=severity_of(fits=abs(drift_m - wanted_m) <= asked.tolerances.drift_m),
         agents=(agent.id,),
         measured={"drift_m": drift_m, "asked_m": wanted_m},
-        template=sentence(
-            "The walk of {agents[0]} ends {drift_m:.1f} m %(drift)s along the lane; {asked_m:.1f} "
-            "m %(asked)s is asked for.",
-            drift=_along(drift_m),
-            asked=_along(wanted_m),
+        template=(
+            f"The walk of {{agents[0]}} ends {{drift_m:.1f}} m {_along(drift_m)} along the lane; "
+            f"{{asked_m:.1f}} m {_along(wanted_m)} is asked for."
         ),
     )
 
@@ -90,8 +87,8 @@ def _in_file(
         )
 
 
-def _along(drift_m: float) -> Sentence:
-    return word("further") if drift_m >= 0.0 else word("back")
+def _along(drift_m: float) -> str:
+    return "further" if drift_m >= 0.0 else "back"
 
 
 def _finding(asked: Asked, agent: TrafficAgent, start: float) -> Finding:
@@ -103,22 +100,19 @@ def _finding(asked: Asked, agent: TrafficAgent, start: float) -> Finding:
     goes = math.copysign(1.0, to_left_m) if abs(to_left_m) > _ON_ROAD_M else 0.0
     is_other_side = place.left_m * start < -_ON_ROAD_M and goes == start
     measured = {"start_left_m": place.left_m, "end_left_m": end_left_m}
-    hands = {"begins": side_of(start), "ends": side_of(-start)}
+    begins, ends = side_of(start), side_of(-start)
     if is_other_side:
         return _fault(
             FindingKind.ASKED_SIDE, agent, measured,
-            sentence(
-                "{agents[0]} crosses from the %(ends)s to the %(begins)s; from the %(begins)s is "
-                "asked for.",
-                **hands,
-            ),
+            f"{{agents[0]}} crosses from the {ends} to the {begins}; from the {begins} is asked "
+            "for.",
         )  # fmt: skip
     looks_away = across * start > -_ALONG_SHARE
     if looks_away or goes == start:
         measured |= {"turn_deg": math.degrees(math.asin(across))}
         return _fault(
             FindingKind.ASKED_HEADING, agent, measured,
-            _away(hands["ends"], looks=looks_away),
+            _away(ends, looks=looks_away),
         )  # fmt: skip
     crosses = end_left_m is not None and place.left_m * start > -_ON_ROAD_M
     if crosses and end_left_m is not None and end_left_m * start < 0.0:
@@ -127,28 +121,18 @@ def _finding(asked: Asked, agent: TrafficAgent, start: float) -> Finding:
             severity=severity_of(fits=True),
             agents=(agent.id,),
             measured=measured,
-            template=sentence(
-                "{agents[0]} crosses the ego's way from the %(begins)s, as asked for.",
-                begins=hands["begins"],
-            ),
+            template=f"{{agents[0]}} crosses the ego's way from the {begins}, as asked for.",
         )
     return _fault(
         FindingKind.ASKED_CROSSING, agent, measured,
-        sentence(
-            "{agents[0]} does not cross the ego's way from the %(begins)s to the %(ends)s.",
-            **hands,
-        ),
+        f"{{agents[0]}} does not cross the ego's way from the {begins} to the {ends}.",
     )  # fmt: skip
 
 
-def _away(side: Sentence, *, looks: bool) -> Sentence:
+def _away(side: str, *, looks: bool) -> str:
     if looks:
-        return sentence(
-            "{agents[0]} looks away from its way to the %(side)s side of the road.", side=side
-        )
-    return sentence(
-        "{agents[0]} walks away from its way to the %(side)s side of the road.", side=side
-    )
+        return f"{{agents[0]}} looks away from its way to the {side} side of the road."
+    return f"{{agents[0]}} walks away from its way to the {side} side of the road."
 
 
 def _fault(
@@ -163,7 +147,4 @@ def _fault(
     )
 
 
-_BEHIND = sentence(
-    "{agents[0]} is {gap_m:.1f} m from {agents[1]}; %(words)s.",
-    words=word("{asked_m:.1f} m is asked for"),
-)
+_BEHIND = "{agents[0]} is {gap_m:.1f} m from {agents[1]}; {asked_m:.1f} m is asked for."

@@ -9,7 +9,6 @@ from augment.checks.finding import Finding, FindingKind, Severity
 from augment.checks.situation import ChangedScene
 from augment.geometry.angles import difference
 from augment.scene.entities import AgentType, TrafficAgent
-from augment.sentences import sentence
 
 ROUND_DEG = 5
 EXACT_RAD = 6e-4
@@ -62,28 +61,28 @@ def _wanted_rad(agent: TrafficAgent, situation: ChangedScene) -> list[float]:
 
 
 def _beyond(agent: TrafficAgent) -> Finding:
+    minus = "" if agent.heading_rad >= 0.0 else "-"
     return Finding(
         kind=FindingKind.DEGREES,
         severity=Severity.WRONG,
         agents=(agent.id,),
         measured={"heading_rad": agent.heading_rad},
-        template=sentence(
-            "{agents[0]} has a heading of %(minus)s{heading_rad:.3g}, more than a full turn: it "
-            "looks like degrees, radians are meant.",
-            minus="" if agent.heading_rad >= 0.0 else "-",
+        template=(
+            f"{{agents[0]}} has a heading of {minus}{{heading_rad:.3g}}, more than a full turn: "
+            "it looks like degrees, radians are meant."
         ),
     )
 
 
 def _suspicious(agent: TrafficAgent, degrees: int) -> Finding:
+    minus = "-" if degrees < 0 else ""
     return Finding(
         kind=FindingKind.DEGREES,
         severity=Severity.DOUBTFUL,
         agents=(agent.id,),
         measured={"heading_rad": agent.heading_rad, "read_as_deg": float(degrees)},
-        template=sentence(
-            "The heading of {agents[0]} looks like %(minus)s{read_as_deg:.0f} degrees that were "
-            "given as radians: read as degrees it would fit.",
-            minus="-" if degrees < 0 else "",
+        template=(
+            f"The heading of {{agents[0]}} looks like {minus}{{read_as_deg:.0f}} degrees that "
+            "were given as radians: read as degrees it would fit."
         ),
     )

@@ -7,7 +7,6 @@ from collections.abc import Iterator
 
 from augment.checks.finding import Finding, FindingKind, Severity
 from augment.checks.situation import ChangedScene
-from augment.sentences import sentence
 
 SAME_SPOT_SHARE = 0.1
 """Of the longer box: centres nearer than half a metre for cars, five centimetres for cones."""
@@ -28,7 +27,7 @@ def duplicate(situation: ChangedScene) -> Iterator[Finding]:
                     severity=Severity.WRONG,
                     agents=(agent.id, other.id),
                     measured={"apart_m": apart_m},
-                    template=sentence(
+                    template=(
                         "{agents[0]} and {agents[1]} are on the same spot, {apart_m:.2f} m apart."
                     ),
                 )

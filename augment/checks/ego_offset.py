@@ -7,7 +7,6 @@ from collections.abc import Iterator
 
 from augment.checks.finding import Finding, FindingKind, Severity
 from augment.checks.situation import ChangedScene
-from augment.sentences import sentence, word
 
 
 def ego_offset(situation: ChangedScene) -> Iterator[Finding]:
@@ -15,8 +14,8 @@ def ego_offset(situation: ChangedScene) -> Iterator[Finding]:
     ego = situation.ground.scene.ego.pose
     for agent in situation.changed:
         seen = ego.pose_to_local(agent.pose)
-        along = word("ahead of") if seen.x_m >= 0.0 else word("behind")
-        side = word("left") if seen.y_m >= 0.0 else word("right")
+        along = "ahead of" if seen.x_m >= 0.0 else "behind"
+        side = "left" if seen.y_m >= 0.0 else "right"
         yield Finding(
             kind=FindingKind.EGO_OFFSET,
             severity=Severity.FACT,
@@ -26,10 +25,8 @@ def ego_offset(situation: ChangedScene) -> Iterator[Finding]:
                 "ahead_m": seen.x_m,
                 "left_m": seen.y_m,
             },
-            template=sentence(
-                "{agents[0]} is {straight_m:.1f} m from the ego in a straight line: {ahead_m:.1f} "
-                "m %(along)s it and {left_m:.1f} m to its %(side)s.",
-                along=along,
-                side=side,
+            template=(
+                "{agents[0]} is {straight_m:.1f} m from the ego in a straight line: "
+                f"{{ahead_m:.1f}} m {along} it and {{left_m:.1f}} m to its {side}."
             ),
         )

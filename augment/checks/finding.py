@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 from types import MappingProxyType
@@ -98,8 +98,7 @@ class Finding:
             measure. Left and counter-clockwise are positive.
         belongs_m: Where what was asked for would be, None where that is no one place.
         template: Our own words with fields for `agents`, `lanes` and the numbers. A number's sign
-            is told by the words: a field shows its size alone. As a `Sentence` it can be said in
-            other languages.
+            is told by the words: a field shows its size alone.
     """
 
     kind: FindingKind
@@ -123,19 +122,16 @@ class Finding:
         """The class of fault that it speaks for if it is more than a fact."""
         return FAULT_OF[self.kind]
 
-    def sentence(
-        self, names: Mapping[str, str] | None = None, *, say: Callable[[str], str] = str
-    ) -> str:
+    def sentence(self, names: Mapping[str, str] | None = None) -> str:
         """The finding in words.
 
         Args:
             names: What to call agents and lanes instead of their ids, such as the short names of
                 a prompt; an id that is not in it stays.
-            say: Puts the template into the reader's language; in English without.
         """
         known = {} if names is None else names
         sizes = {name: abs(value) for name, value in self.measured.items() if value is not None}
-        return say(self.template).format(
+        return self.template.format(
             agents=[known.get(agent, agent) for agent in self.agents],
             lanes=[known.get(lane, lane) for lane in self.lanes],
             **sizes,

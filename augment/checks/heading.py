@@ -10,7 +10,6 @@ from augment.checks.lane_index import Beside
 from augment.checks.situation import ChangedScene, is_stopped
 from augment.geometry.angles import difference
 from augment.scene.entities import AgentType, TrafficAgent
-from augment.sentences import sentence, word
 
 ALONG_BELOW_DEG = 30.0
 OPPOSITE_ABOVE_DEG = 150.0
@@ -35,26 +34,24 @@ def heading(situation: ChangedScene) -> Iterator[Finding]:
 def _finding(agent: TrafficAgent, place: Beside, situation: ChangedScene) -> Finding:
     turn_deg = math.degrees(difference(agent.heading_rad, place.tangent_rad))
     if abs(turn_deg) > OPPOSITE_ABOVE_DEG:
-        words = word("against the direction of {lanes[0]} (turned by {turn_deg:.0f} degrees)")
+        words = "against the direction of {lanes[0]} (turned by {turn_deg:.0f} degrees)"
     elif abs(turn_deg) < 0.5:
-        words = word("along {lanes[0]}")
+        words = "along {lanes[0]}"
     else:
-        words = sentence(
-            "{turn_deg:.0f} degrees to the %(side)s of the direction of {lanes[0]}",
-            side=word("left") if turn_deg >= 0.0 else word("right"),
-        )
+        side = "left" if turn_deg >= 0.0 else "right"
+        words = f"{{turn_deg:.0f}} degrees to the {side} of the direction of {{lanes[0]}}"
     severity = _severity(agent, abs(turn_deg), situation)
     there = ""
     if severity is not Severity.FACT:
         minus = "-" if place.tangent_rad < 0.0 else ""
-        there = sentence(", which is %(minus)s{lane_heading_rad:.3f} rad there", minus=minus)
+        there = f", which is {minus}{{lane_heading_rad:.3f}} rad there"
     return Finding(
         kind=FindingKind.HEADING,
         severity=severity,
         agents=(agent.id,),
         lanes=(place.lane_id,),
         measured={"turn_deg": turn_deg, "lane_heading_rad": place.tangent_rad},
-        template=sentence("{agents[0]} faces %(words)s%(there)s.", words=words, there=there),
+        template=f"{{agents[0]}} faces {words}{there}.",
     )
 
 

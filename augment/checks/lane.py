@@ -7,7 +7,6 @@ from collections.abc import Iterator
 from augment.checks.finding import Finding, FindingKind, Severity
 from augment.checks.lane_index import Beside
 from augment.checks.situation import ChangedScene
-from augment.sentences import sentence, word
 
 
 def lane(situation: ChangedScene) -> Iterator[Finding]:
@@ -23,15 +22,15 @@ def lane(situation: ChangedScene) -> Iterator[Finding]:
 
 def _on(agent_id: str, place: Beside) -> Finding:
     if abs(place.d_m) < 0.005:
-        words = sentence(
+        words = (
             "{agents[0]} is on {lanes[0]}, {along_m:.1f} m along it and on its centre line; the "
             "lane is {lane_width_m:.1f} m wide."
         )
     else:
-        words = sentence(
+        side = "left" if place.d_m >= 0.0 else "right"
+        words = (
             "{agents[0]} is on {lanes[0]}, {along_m:.1f} m along it and {left_m:.2f} m to the "
-            "%(side)s of its centre line; the lane is {lane_width_m:.1f} m wide.",
-            side=word("left") if place.d_m >= 0.0 else word("right"),
+            f"{side} of its centre line; the lane is {{lane_width_m:.1f}} m wide."
         )
     return _fact(agent_id, place, 0.0, words)
 
@@ -41,7 +40,7 @@ def _off(agent_id: str, place: Beside) -> Finding:
         agent_id,
         place,
         place.off_m,
-        sentence(
+        (
             "{agents[0]} is {off_m:.1f} m off every lane; the nearest lane is {lanes[0]} at "
             "{along_m:.1f} m along it."
         ),

@@ -8,7 +8,6 @@ from augment.checks.finding import Finding, FindingKind, Severity
 from augment.checks.lane_index import Beside
 from augment.checks.situation import ChangedScene
 from augment.scene.entities import TrafficAgent
-from augment.sentences import sentence, word
 
 FAR_M = 15.0
 """Further than this beside the ego's lanes a distance along them says nothing."""
@@ -35,21 +34,18 @@ def _finding(agent: TrafficAgent, situation: ChangedScene) -> Finding:
             severity=Severity.FACT,
             agents=(agent.id,),
             measured={"along_lanes_m": None, "level_m": None, "beside_m": None},
-            template=sentence("No lane leads from the ego to the place of {agents[0]}."),
+            template="No lane leads from the ego to the place of {agents[0]}.",
         )
     place, along_m = reached
-    side = word("ahead of") if along_m >= 0.0 else word("behind")
+    side = "ahead of" if along_m >= 0.0 else "behind"
     if place.covers:
-        words = sentence(
-            "{agents[0]} is {along_lanes_m:.1f} m %(side)s the ego along the lanes.", side=side
-        )
+        words = f"{{agents[0]}} is {{along_lanes_m:.1f}} m {side} the ego along the lanes."
     else:
-        words = sentence(
+        hand = "left" if place.d_m >= 0.0 else "right"
+        words = (
             "No lane leads from the ego to the place of {agents[0]}: it is level with a point "
-            "{level_m:.1f} m %(side)s the ego along the lanes, {beside_m:.1f} m to the %(hand)s "
-            "of the centre of {lanes[0]}.",
-            side=side,
-            hand=word("left") if place.d_m >= 0.0 else word("right"),
+            f"{{level_m:.1f}} m {side} the ego along the lanes, {{beside_m:.1f}} m to the {hand} "
+            "of the centre of {lanes[0]}."
         )
     return Finding(
         kind=FindingKind.LANE_DISTANCE,

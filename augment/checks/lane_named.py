@@ -7,7 +7,6 @@ from collections.abc import Iterator
 from augment.checks.finding import Finding, FindingKind, Severity
 from augment.checks.situation import ChangedScene
 from augment.scene.entities import TrafficAgent
-from augment.sentences import sentence, word
 
 TOLERANCE_M = 0.5
 """Beyond the lane's edge: whoever stands on the line may name either side."""
@@ -28,9 +27,7 @@ def _finding(agent: TrafficAgent, named: str, situation: ChangedScene) -> Findin
             severity=Severity.WRONG,
             agents=(agent.id,),
             lanes=(named,),
-            template=sentence(
-                "{agents[0]} names {lanes[0]} as its lane, which the map does not have."
-            ),
+            template="{agents[0]} names {lanes[0]} as its lane, which the map does not have.",
         )
     near = [one.off_m for one in situation.beside[agent.id] if one.lane_id == named]
     far_m = lane.centerline.project(agent.x_m, agent.y_m).distance_m - lane.width_m / 2.0
@@ -38,16 +35,15 @@ def _finding(agent: TrafficAgent, named: str, situation: ChangedScene) -> Findin
     if off_m <= TOLERANCE_M:
         return None
     under = situation.under(agent)
-    really = word("on no lane") if under is None else word("on {lanes[1]}")
+    really = "on no lane" if under is None else "on {lanes[1]}"
     return Finding(
         kind=FindingKind.LANE_NAMED,
         severity=Severity.DOUBTFUL,
         agents=(agent.id,),
         lanes=(named,) if under is None else (named, under.lane_id),
         measured={"off_named_lane_m": off_m},
-        template=sentence(
+        template=(
             "{agents[0]} names {lanes[0]} as its lane but is {off_named_lane_m:.1f} m off it, "
-            "%(really)s.",
-            really=really,
+            f"{really}."
         ),
     )

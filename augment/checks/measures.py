@@ -19,7 +19,6 @@ from augment.checks.lanes_across import LanesAcross
 from augment.geometry.angles import difference
 from augment.scene.entities import Point
 from augment.scene.intent import Intent, LaneChoice, Spot, WalkRequest, resolve_anchors
-from augment.sentences import Sentence, sentence
 
 RING_STEP_M = 10.0
 _BESIDE_M = 1.0
@@ -35,10 +34,17 @@ _STEP_M = 1.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MeasureLine:
-    """A line of two points or more, with its number in words."""
+    """A line of two points or more: across the road, or along a lane.
+
+    Attributes:
+        points_m: Of the line.
+        ahead_m: Of a line across: its place along the ego's route, negative behind the ego.
+        left_m: Of a line along: its place left of the lane's centre, negative right of it.
+    """
 
     points_m: tuple[Point, ...]
-    label: Sentence
+    ahead_m: float | None = None
+    left_m: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -47,7 +53,6 @@ class MeasureRing:
 
     centre_m: Point
     radius_m: float
-    label: Sentence
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -81,9 +86,7 @@ def find_measures(ground: Ground, intent: Intent | None, *, reach_m: float) -> M
     """
     ego = (ground.scene.ego.x_m, ground.scene.ego.y_m)
     rings = tuple(
-        MeasureRing(
-            centre_m=ego, radius_m=number * RING_STEP_M, label=_metres(number * RING_STEP_M)
-        )
+        MeasureRing(centre_m=ego, radius_m=number * RING_STEP_M)
         for number in range(1, int(reach_m / RING_STEP_M) + 1)
     )
     lanes = None if intent is None else LanesAcross.of(ground, intent.route)
@@ -133,13 +136,8 @@ def _across(spot: Spot, lanes: LanesAcross, ahead_m: float, *, is_walk: bool) ->
     ] or [-2.0, 2.0]
     beyond_m = _WALK_M if is_walk else _BESIDE_M
     low_m, high_m = min(edges_m) - beyond_m, max(edges_m) + beyond_m
-    label = (
-        sentence("%(metres)s m ahead", metres=f"{ahead_m:.4g}")
-        if ahead_m >= 0.0
-        else sentence("%(metres)s m behind", metres=f"{-ahead_m:.4g}")
-    )
     ends = tuple(lanes.route.position(ahead_m, left_m) for left_m in (high_m, low_m))
-    return MeasureLine(points_m=ends, label=label)
+    return MeasureLine(points_m=ends, ahead_m=ahead_m)
 
 
 def _along(spot: Spot, lanes: LanesAcross, ends_m: list[float]) -> Iterator[MeasureLine]:
@@ -161,16 +159,4 @@ def _along(spot: Spot, lanes: LanesAcross, ends_m: list[float]) -> Iterator[Meas
             lanes.route.position(low_m - _ALONG_M + step * _STEP_M, band.left_m + offset_m)
             for step in range(steps + 1)
         )
-        yield MeasureLine(points_m=points, label=_beside(offset_m))
-
-
-def _beside(offset_m: float) -> Sentence:
-    if offset_m > 0.0:
-        return sentence("%(metres)s m left", metres=f"{offset_m:.4g}")
-    if offset_m < 0.0:
-        return sentence("%(metres)s m right", metres=f"{-offset_m:.4g}")
-    return sentence("centre of the lane")
-
-
-def _metres(metres: float) -> Sentence:
-    return sentence("%(metres)s m", metres=f"{metres:.4g}")
+        yield MeasureLine(points_m=points, left_m=offset_m)

@@ -7,7 +7,6 @@ from collections.abc import Iterator
 from augment.checks.finding import Finding, FindingKind, Severity
 from augment.checks.situation import VEHICLES, ChangedScene
 from augment.scene.entities import AgentType, TrafficAgent
-from augment.sentences import sentence, word
 
 SEEN_SHARE = 0.02
 KERB_SHARE = 0.15
@@ -52,15 +51,15 @@ def _vehicle(agent: TrafficAgent, situation: ChangedScene) -> Finding | None:
     if share > KERB_SHARE:
         severity = Severity.DOUBTFUL if share <= MOST_SHARE else Severity.WRONG
     gap_m = situation.ground.road.distance_m(agent.x_m, agent.y_m)
+    place = "{gap_m:.1f} m off it" if gap_m > 0.0 else "on it"
     return Finding(
         kind=FindingKind.OFF_ROAD,
         severity=severity,
         agents=(agent.id,),
         measured={"outside_share": share, "gap_m": gap_m},
-        template=sentence(
-            "{outside_share:.0%%} of {agents[0]} is outside the drivable area; its centre is "
-            "%(place)s.",
-            place=word("{gap_m:.1f} m off it") if gap_m > 0.0 else word("on it"),
+        template=(
+            "{outside_share:.0%} of {agents[0]} is outside the drivable area; its centre is "
+            f"{place}."
         ),
     )
 
@@ -74,7 +73,7 @@ def _cone(agent: TrafficAgent, situation: ChangedScene) -> Finding | None:
         severity=Severity.DOUBTFUL if gap_m <= NEAR_ROAD_M else Severity.WRONG,
         agents=(agent.id,),
         measured={"outside_share": 1.0, "gap_m": gap_m},
-        template=sentence("{agents[0]} is {gap_m:.1f} m off the road and its edge."),
+        template="{agents[0]} is {gap_m:.1f} m off the road and its edge.",
     )
 
 
@@ -92,5 +91,5 @@ def _on_foot(agent: TrafficAgent, situation: ChangedScene) -> Finding | None:
         severity=severity,
         agents=(agent.id,),
         measured={"outside_share": share, "gap_m": gap_m},
-        template=sentence("{agents[0]} is {gap_m:.1f} m off everything that the map shows."),
+        template="{agents[0]} is {gap_m:.1f} m off everything that the map shows.",
     )

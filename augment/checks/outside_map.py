@@ -6,7 +6,6 @@ from collections.abc import Iterator
 
 from augment.checks.finding import Finding, FindingKind, Severity
 from augment.checks.situation import ChangedScene
-from augment.sentences import sentence
 
 TOLERANCE_M = 2.0
 
@@ -24,5 +23,5 @@ def outside_map(situation: ChangedScene) -> Iterator[Finding]:
                 severity=Severity.WRONG,
                 agents=(agent.id,),
                 measured={"outside_m": outside_m},
-                template=sentence("{agents[0]} is {outside_m:.1f} m outside the mapped region."),
+                template="{agents[0]} is {outside_m:.1f} m outside the mapped region.",
             )

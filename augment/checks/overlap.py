@@ -9,7 +9,6 @@ from augment.checks.finding import Finding, FindingKind, Severity
 from augment.checks.situation import VEHICLES, ChangedScene, is_stopped
 from augment.geometry import boxes
 from augment.scene.entities import AgentType, TrafficAgent
-from augment.sentences import sentence
 
 TOUCH_M = 0.01
 """Depths below this are rounding."""
@@ -69,11 +68,11 @@ def _severity(one: TrafficAgent, other: TrafficAgent, share: float) -> Severity:
     return Severity.DOUBTFUL if share <= doubtful else Severity.WRONG
 
 
-_WITH_EGO = sentence(
-    "{agents[0]} and the ego overlap by {share_of_smaller:.0%%} of the smaller box, {depth_m:.2f} "
+_WITH_EGO = (
+    "{agents[0]} and the ego overlap by {share_of_smaller:.0%} of the smaller box, {depth_m:.2f} "
     "m deep."
 )
-_WITH_OTHER = sentence(
-    "{agents[0]} and {agents[1]} overlap by {share_of_smaller:.0%%} of the smaller box, "
+_WITH_OTHER = (
+    "{agents[0]} and {agents[1]} overlap by {share_of_smaller:.0%} of the smaller box, "
     "{depth_m:.2f} m deep."
 )

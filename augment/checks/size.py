@@ -8,7 +8,6 @@ from typing import NamedTuple
 from augment.checks.finding import Finding, FindingKind, Severity
 from augment.checks.situation import ChangedScene
 from augment.scene.entities import AgentType, TrafficAgent
-from augment.sentences import Sentence, sentence, word
 
 
 class Range(NamedTuple):
@@ -53,36 +52,34 @@ def _factor(value_m: float, usual_m: tuple[float, float]) -> float:
 def _finding(agent: TrafficAgent, off: float, *, swapped: bool) -> Finding:
     words = unusual_words(agent.type)
     if swapped:
-        words = word("wider than long: its length and width look swapped.")
+        words = "wider than long: its length and width look swapped."
     return Finding(
         kind=FindingKind.SIZE,
         severity=Severity.WRONG if swapped or off > FAR_OFF else Severity.DOUBTFUL,
         agents=(agent.id,),
         measured={"length_m": agent.length_m, "width_m": agent.width_m},
-        template=sentence(
-            "{agents[0]} is {length_m:.2f} m long and {width_m:.2f} m wide, %(words)s", words=words
-        ),
+        template=f"{{agents[0]}} is {{length_m:.2f}} m long and {{width_m:.2f}} m wide, {words}",
     )
 
 
-def unusual_words(kind: AgentType) -> Sentence:
+def unusual_words(kind: AgentType) -> str:
     """That something is unusual for its type."""
-    return sentence("which is unusual for %(a_thing)s.", a_thing=name_type(kind))
+    return f"which is unusual for {name_type(kind)}."
 
 
-def name_type(kind: AgentType) -> Sentence:
+def name_type(kind: AgentType) -> str:
     """One of a type, with its article."""
     return _NAMES[kind]
 
 
 _NAMES = {
-    AgentType.EGO_VEHICLE: word("an ego vehicle"),
-    AgentType.VEHICLE: word("a vehicle"),
-    AgentType.BUS: word("a bus"),
-    AgentType.BICYCLE: word("a bicycle"),
-    AgentType.PEDESTRIAN: word("a pedestrian"),
-    AgentType.TRAFFIC_CONE: word("a traffic cone"),
-    AgentType.BARRIER: word("a barrier"),
-    AgentType.CONSTRUCTION_SIGN: word("a construction sign"),
-    AgentType.GENERIC_OBJECT: word("a generic object"),
+    AgentType.EGO_VEHICLE: "an ego vehicle",
+    AgentType.VEHICLE: "a vehicle",
+    AgentType.BUS: "a bus",
+    AgentType.BICYCLE: "a bicycle",
+    AgentType.PEDESTRIAN: "a pedestrian",
+    AgentType.TRAFFIC_CONE: "a traffic cone",
+    AgentType.BARRIER: "a barrier",
+    AgentType.CONSTRUCTION_SIGN: "a construction sign",
+    AgentType.GENERIC_OBJECT: "a generic object",
 }

@@ -8,7 +8,6 @@ from augment.checks.finding import Finding, FindingKind, Severity
 from augment.checks.situation import STOPPED_BELOW_MPS, ChangedScene
 from augment.checks.size import unusual_words
 from augment.scene.entities import AgentType, TrafficAgent
-from augment.sentences import sentence, word
 
 USUAL_MPS: dict[AgentType, float] = {
     AgentType.VEHICLE: 36.0,
@@ -35,10 +34,10 @@ def speed(situation: ChangedScene) -> Iterator[Finding]:
             is_wrong = off > FAR_OFF or agent.type not in USUAL_MPS
             yield _finding(agent, unusual_words(agent.type), is_wrong=is_wrong)
         elif limit_mps is not None and agent.speed_mps > OVER_LIMIT * limit_mps:
-            words = sentence("where the limit is %(limit)s m/s.", limit=f"{limit_mps:.1f}")
+            words = f"where the limit is {limit_mps:.1f} m/s."
             yield _finding(agent, words, is_wrong=False)
         elif agent.speed_mps < -STOPPED_BELOW_MPS:
-            yield _finding(agent, word("backwards."), is_wrong=False)
+            yield _finding(agent, "backwards.", is_wrong=False)
 
 
 def _limit_mps(agent: TrafficAgent, situation: ChangedScene) -> float | None:
@@ -54,5 +53,5 @@ def _finding(agent: TrafficAgent, words: str, *, is_wrong: bool) -> Finding:
         severity=Severity.WRONG if is_wrong else Severity.DOUBTFUL,
         agents=(agent.id,),
         measured={"speed_mps": agent.speed_mps},
-        template=sentence("{agents[0]} moves at {speed_mps:.1f} m/s, %(words)s", words=words),
+        template=f"{{agents[0]}} moves at {{speed_mps:.1f}} m/s, {words}",
     )

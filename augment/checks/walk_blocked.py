@@ -11,7 +11,6 @@ from augment.checks.situation import ChangedScene, is_stopped
 from augment.checks.walk_crossing import end_of_walk
 from augment.geometry.boxes import Box
 from augment.scene.entities import AgentType, Point, TrafficAgent
-from augment.sentences import sentence
 
 GRAZED_M = 0.1
 """Whoever walks through less than this of a box passes its corner."""
@@ -57,5 +56,5 @@ def _finding(agent: TrafficAgent, other: TrafficAgent, inside_m: float) -> Findi
         severity=Severity.DOUBTFUL,
         agents=(agent.id, other.id),
         measured={"inside_m": inside_m},
-        template=sentence("The walk of {agents[0]} leads {inside_m:.1f} m through {agents[1]}."),
+        template="The walk of {agents[0]} leads {inside_m:.1f} m through {agents[1]}.",
     )

@@ -12,7 +12,6 @@ from augment.checks.finding import Finding, FindingKind, Severity
 from augment.checks.situation import ChangedScene, is_stopped
 from augment.geometry.polyline import Polyline
 from augment.scene.entities import AgentType, Point, TrafficAgent
-from augment.sentences import sentence, word
 
 CORRIDOR_M = 150.0
 """How far ahead of the ego a walk is held against its lane."""
@@ -51,21 +50,19 @@ def _finding(agent: TrafficAgent, end: Point, line: Polyline, width_m: float) ->
     crosses_at_m = _meeting(np.array(start), np.array(end), line)
     first, last = line.project(*start), line.project(*end)
     steps_into = min(first.distance_m, last.distance_m) <= width_m / 2.0
-    assumed = "" if agent.walk_to_m is not None else word(", keeping its heading,")
+    assumed = "" if agent.walk_to_m is not None else ", keeping its heading,"
     if crosses_at_m is not None:
-        hands = (word("left"), word("right"))
+        hands = ("left", "right")
         if first.d_m <= last.d_m:
             hands = hands[::-1]
-        words = sentence(
-            "crosses the ego's lane from %(start)s to %(end)s, {crosses_at_m:.1f} m ahead of the "
-            "ego along the lanes.",
-            start=hands[0],
-            end=hands[1],
+        words = (
+            f"crosses the ego's lane from {hands[0]} to {hands[1]}, {{crosses_at_m:.1f}} m ahead "
+            "of the ego along the lanes."
         )
     elif steps_into:
-        words = sentence("starts or ends in the ego's lane and does not cross its middle.")
+        words = "starts or ends in the ego's lane and does not cross its middle."
     else:
-        words = sentence("does not cross the ego's lane.")
+        words = "does not cross the ego's lane."
     return Finding(
         kind=FindingKind.WALK_CROSSING,
         severity=Severity.FACT,
@@ -75,9 +72,7 @@ def _finding(agent: TrafficAgent, end: Point, line: Polyline, width_m: float) ->
             "start_left_m": first.d_m,
             "end_left_m": last.d_m,
         },
-        template=sentence(
-            "The walk of {agents[0]}%(assumed)s %(words)s", assumed=assumed, words=words
-        ),
+        template=f"The walk of {{agents[0]}}{assumed} {words}",
     )
 
 

@@ -9,7 +9,6 @@ from augment.checks.finding import Finding, FindingKind, Severity
 from augment.checks.situation import ChangedScene
 from augment.geometry.angles import difference
 from augment.scene.entities import TrafficAgent
-from augment.sentences import sentence, word
 
 ALONG_BELOW_DEG = 30.0
 BACKWARDS_ABOVE_DEG = 90.0
@@ -39,22 +38,20 @@ def _finding(agent: TrafficAgent, to_x_m: float, to_y_m: float) -> Finding:
             severity=Severity.FACT,
             agents=(agent.id,),
             measured={"turn_deg": None, "walk_m": walk_m},
-            template=sentence("{agents[0]} has a walk that ends where it starts."),
+            template="{agents[0]} has a walk that ends where it starts.",
         )
     turn_deg = math.degrees(difference(agent.heading_rad, math.atan2(dy, dx)))
     severity = Severity.FACT
     if walk_m > SHORT_M and abs(turn_deg) > ALONG_BELOW_DEG:
         backwards = abs(turn_deg) > BACKWARDS_ABOVE_DEG
         severity = Severity.WRONG if backwards else Severity.DOUBTFUL
-    side = word("left") if turn_deg >= 0.0 else word("right")
-    turned = sentence("{turn_deg:.0f} degrees to the %(side)s of it", side=side)
-    words = word("along it") if abs(turn_deg) < 0.5 else turned
+    side = "left" if turn_deg >= 0.0 else "right"
+    turned = f"{{turn_deg:.0f}} degrees to the {side} of it"
+    words = "along it" if abs(turn_deg) < 0.5 else turned
     return Finding(
         kind=FindingKind.WALK_HEADING,
         severity=severity,
         agents=(agent.id,),
         measured={"turn_deg": turn_deg, "walk_m": walk_m},
-        template=sentence(
-            "{agents[0]} has a walk of {walk_m:.1f} m and faces %(words)s.", words=words
-        ),
+        template=f"{{agents[0]}} has a walk of {{walk_m:.1f}} m and faces {words}.",
     )

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from augment.sentences import Sentence, sentence, word
-
 
 class AugmentError(Exception):
     """The root of augment's own errors: its text is a sentence for the person who caused it."""
@@ -20,22 +18,9 @@ class InvalidDocument(AugmentError):
     def __init__(self, what: str, problems: list[tuple[str, str]]) -> None:
         self.what = what
         self.problems = problems
-        shown = tuple((_problem(path, text),) for path, text in problems[:8])
-        super().__init__(
-            sentence("This %(what)s can't be read: %(problems)s", what=word(what), problems=shown)
-            if len(problems) <= 8
-            else sentence(
-                "This %(what)s can't be read: %(problems)s (and %(number)s more)",
-                what=word(what),
-                problems=shown,
-                number=len(problems) - 8,
-            )
-        )
-
-
-def _problem(path: str, text: str) -> Sentence:
-    plain = "%(path)s: %(text)s"
-    return sentence(plain, path=word(path or "(document)"), text=text)
+        shown = "; ".join(f"{path or '(document)'}: {text}" for path, text in problems[:8])
+        more = f" (and {len(problems) - 8} more)" if len(problems) > 8 else ""
+        super().__init__(f"This {what} can't be read: {shown}{more}")
 
 
 class InvalidModification(AugmentError):
@@ -56,16 +41,9 @@ class UnknownName(AugmentError):
         self.name = name
         self.allowed = allowed
         super().__init__(
-            sentence(
-                "Unknown %(kind)s '%(name)s'. Known: %(known)s.",
-                kind=word(kind),
-                name=name,
-                known=tuple(allowed),
-            )
+            f"Unknown {kind} '{name}'. Known: {', '.join(allowed)}."
             if allowed
-            else sentence(
-                "Unknown %(kind)s '%(name)s'. Known: none yet.", kind=word(kind), name=name
-            )
+            else f"Unknown {kind} '{name}'. Known: none yet."
         )
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from augment.errors.answers import ModelFault
 from augment.errors.inputs import AugmentError
-from augment.sentences import sentence
 
 
 class QueueFault(AugmentError):
@@ -23,12 +22,8 @@ class QueueRefused(QueueFault):
         self.address = address
         self.said = said
         super().__init__(
-            sentence(
-                "Redis at %(address)s takes no messages: %(said)s. "
-                "What was queued is kept and runs as soon as Redis takes messages again.",
-                address=address,
-                said=said.rstrip("."),
-            )
+            f"Redis at {address} takes no messages: {said.rstrip('.')}. What was queued is "
+            "kept and runs as soon as Redis takes messages again."
         )
 
 
@@ -42,11 +37,8 @@ class QueueUnreachable(QueueFault):
     def __init__(self, address: str) -> None:
         self.address = address
         super().__init__(
-            sentence(
-                "No Redis at %(address)s: start `manage.py serve` or set REDIS_URL. "
-                "What was queued is kept and runs as soon as a worker starts.",
-                address=address,
-            )
+            f"No Redis at {address}: start `manage.py serve` or set REDIS_URL. What was "
+            "queued is kept and runs as soon as a worker starts."
         )
 
 

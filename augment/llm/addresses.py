@@ -15,7 +15,6 @@ from typing import Any
 from urllib.parse import SplitResult, urlsplit
 
 from augment.errors import InvalidDocument
-from augment.sentences import sentence
 
 Resolve = Callable[..., list[Any]]
 """What `socket.getaddrinfo` does."""
@@ -105,17 +104,14 @@ def _problem(base_url: str) -> str | None:
     """What is wrong with the address, None when nothing is."""
     parts = _split(base_url)
     if parts is None or parts.scheme not in {"http", "https"} or not parts.hostname:
-        return sentence("an address such as https://api.openai.com/v1 is needed")
+        return "an address such as https://api.openai.com/v1 is needed"
     if parts.username or parts.password or parts.query or parts.fragment:
-        return sentence(
-            "keys and passwords don't belong into the address; name a variable for the key"
-        )
+        return "keys and passwords don't belong into the address; name a variable for the key"
     host = parts.hostname.rstrip(".").lower()
     if _is_forbidden_host(host):
-        return sentence(
-            "%(host)s is a link-local or metadata address, or one that stands for another; no "
-            "model is served from there",
-            host=host,
+        return (
+            f"{host} is a link-local or metadata address, or one that stands for another; no "
+            "model is served from there"
         )
     return None
 

@@ -34,49 +34,46 @@ from augment.scene.intent_words import (
     Shape,
 )
 from augment.scene.landmark_statements import LANES, MARKS, state_pick
-from augment.sentences import Sentence, sentence
 
 
-def list_statements(intent: Intent) -> tuple[Sentence, ...]:
+def list_statements(intent: Intent) -> tuple[str, ...]:
     """All that the intent says, in the order of its requests."""
     made = [
-        sentence("%(what)s: %(fact)s", what=_thing(request), fact=fact)
-        for request in intent.requests
-        for fact in _facts(request)
+        f"{_thing(request)}: {fact}" for request in intent.requests for fact in _facts(request)
     ]
     for move in intent.moves:
         who = state_pick(move.who)
-        made += [sentence("%(what)s: %(fact)s", what=who, fact=one) for one in _move_facts(move)]
-    made += [sentence("%(who)s: goes", who=state_pick(removal)) for removal in intent.removals]
+        made += [f"{who}: {one}" for one in _move_facts(move)]
+    made += [f"{state_pick(removal)}: goes" for removal in intent.removals]
     if intent.route in _ROUTES:
         made.append(_ROUTES[intent.route])
     if intent.unmet:
-        made.append(sentence("can't be met: %(why)s", why=intent.unmet))
-    made += [sentence("not in any field: “%(words)s”", words=words) for words in intent.beyond]
+        made.append(f"can't be met: {intent.unmet}")
+    made += [f"not in any field: “{words}”" for words in intent.beyond]
     return tuple(made)
 
 
 # Private
 
 
-def _thing(request: Request) -> Sentence:
+def _thing(request: Request) -> str:
     match request:
         case VehicleRequest():
             thing = _BODIES[request.body]
         case WalkRequest():
-            thing = sentence("pedestrian")
+            thing = "pedestrian"
         case ConesRequest():
-            thing = sentence("cones")
+            thing = "cones"
         case CrashRequest():
-            thing = sentence("crashed %(body)s", body=_BODIES[request.body])
+            thing = f"crashed {_BODIES[request.body]}"
     if not request.name:
         return thing
-    return sentence("%(thing)s “%(name)s”", thing=thing, name=request.name)
+    return f"{thing} “{request.name}”"
 
 
-def _facts(request: Request) -> Iterator[Sentence]:
+def _facts(request: Request) -> Iterator[str]:
     if request.count is not None:
-        yield sentence("number %(count)s", count=request.count)
+        yield f"number {request.count}"
     yield from _place_facts(request.spot)
     match request:
         case VehicleRequest():
@@ -91,18 +88,15 @@ def _facts(request: Request) -> Iterator[Sentence]:
                 yield from _crashed_facts(number, other)
 
 
-def _place_facts(spot: Spot) -> Iterator[Sentence]:
+def _place_facts(spot: Spot) -> Iterator[str]:
     anchor = _counted_from(spot)
     if spot.relation is not None:
-        end = {Relation.AHEAD: sentence("ahead of"), Relation.BEHIND: sentence("behind")}
+        end = {Relation.AHEAD: "ahead of", Relation.BEHIND: "behind"}
         where = end[spot.relation]
         if spot.distance is None:
-            yield sentence("%(where)s %(anchor)s", where=where, anchor=anchor)
+            yield f"{where} {anchor}"
         else:
-            yield sentence(
-                "%(distance)s %(where)s %(anchor)s",
-                distance=_length(spot.distance), where=where, anchor=anchor,
-            )  # fmt: skip
+            yield f"{_length(spot.distance)} {where} {anchor}"  # fmt: skip
     if spot.lane is not None:
         yield LANES[spot.lane]
     if spot.lateral is not None:
@@ -111,200 +105,190 @@ def _place_facts(spot: Spot) -> Iterator[Sentence]:
         yield _SETTINGS[setting]
 
 
-def _counted_from(spot: Spot) -> Sentence:
+def _counted_from(spot: Spot) -> str:
     if spot.landmark is not None:
         return state_pick(spot.landmark)
     if spot.mark is not None:
         return MARKS[spot.mark]
-    return sentence("the ego") if spot.anchor is None else sentence("“%(name)s”", name=spot.anchor)
+    return "the ego" if spot.anchor is None else f"“{spot.anchor}”"
 
 
-def _move_facts(move: Move) -> Iterator[Sentence]:
-    yield sentence("goes elsewhere")
+def _move_facts(move: Move) -> Iterator[str]:
+    yield "goes elsewhere"
     yield from _place_facts(move.spot)
     yield from _facing_facts(move.facing, move.turn_deg)
     if move.speed_mps is not None:
         yield _motion(move.speed_mps)
 
 
-def _lateral_facts(lateral: Lateral) -> Iterator[Sentence]:
+def _lateral_facts(lateral: Lateral) -> Iterator[str]:
     target = _TARGETS[lateral.target]
     if lateral.offset is not None:
-        yield sentence(
-            "%(offset)s from the lane centre towards the %(target)s",
-            offset=_length(lateral.offset), target=target,
-        )  # fmt: skip
+        yield f"{_length(lateral.offset)} from the lane centre towards the {target}"  # fmt: skip
     elif lateral.nearness is not None:
         how = _NEARNESSES[lateral.nearness]
-        yield sentence("%(how)s, towards the %(target)s", how=how, target=target)
+        yield f"{how}, towards the {target}"
     else:
-        yield sentence("at the %(target)s", target=target)
+        yield f"at the {target}"
     if lateral.on_shoulder:
-        yield sentence("partly on the shoulder")
+        yield "partly on the shoulder"
 
 
-def _vehicle_facts(request: VehicleRequest) -> Iterator[Sentence]:
+def _vehicle_facts(request: VehicleRequest) -> Iterator[str]:
     yield from _facing_facts(request.facing, request.turn_deg)
     if request.speed_mps is not None:
         yield _motion(request.speed_mps)
     if request.spacing is not None:
-        yield sentence("%(gap)s from one to the next", gap=_length(request.spacing))
+        yield f"{_length(request.spacing)} from one to the next"
 
 
-def _walk_facts(request: WalkRequest) -> Iterator[Sentence]:
+def _walk_facts(request: WalkRequest) -> Iterator[str]:
     if request.start is Side.LEFT:
-        yield sentence("crosses from the left to the right")
+        yield "crosses from the left to the right"
     elif request.start is Side.RIGHT:
-        yield sentence("crosses from the right to the left")
+        yield "crosses from the right to the left"
     if request.speed_mps is not None:
         yield _motion(request.speed_mps)
     if request.drift_m is not None:
         drift = f"{abs(request.drift_m):g}"
         if request.drift_m >= 0.0:
-            yield sentence("ends %(drift)s m further along the lane", drift=drift)
+            yield f"ends {drift} m further along the lane"
         else:
-            yield sentence("ends %(drift)s m back along the lane", drift=drift)
+            yield f"ends {drift} m back along the lane"
     if request.is_file:
-        yield sentence("one behind the other")
+        yield "one behind the other"
     for number, gap in enumerate(request.behind, start=2):
-        yield sentence(
-            "number %(number)s is %(gap)s behind the first", number=number, gap=_length(gap)
-        )
+        yield f"number {number} is {_length(gap)} behind the first"
     if request.on_road:
-        yield sentence("the first is on the road already")
+        yield "the first is on the road already"
 
 
-def _cone_facts(request: ConesRequest) -> Iterator[Sentence]:
+def _cone_facts(request: ConesRequest) -> Iterator[str]:
     if request.shape is not None:
         yield _SHAPES[request.shape]
     if request.spacing is not None:
-        yield sentence("%(gap)s from one to the next", gap=_length(request.spacing))
+        yield f"{_length(request.spacing)} from one to the next"
     if request.reach_m is not None:
-        yield sentence("over %(reach)s m along the lane", reach=f"{request.reach_m:g}")
+        yield f"over {request.reach_m:g} m along the lane"
     if request.start is not None:
-        yield sentence("begins at the %(side)s lane boundary", side=_SIDES[request.start])
+        yield f"begins at the {_SIDES[request.start]} lane boundary"
     if request.ends_in_middle:
-        yield sentence("ends in the middle of the lane")
+        yield "ends in the middle of the lane"
     if request.both_sides:
-        yield sentence("as many along each boundary of the lane")
+        yield "as many along each boundary of the lane"
     if request.has_worker:
-        yield sentence("with a worker")
+        yield "with a worker"
     if request.post is not None:
-        yield sentence("the worker stands %(post)s", post=_POSTS[request.post])
+        yield f"the worker stands {_POSTS[request.post]}"
     if request.post_side is not None:
-        yield sentence("the worker is on the %(side)s of them", side=_SIDES[request.post_side])
+        yield f"the worker is on the {_SIDES[request.post_side]} of them"
 
 
-def _crashed_facts(number: int, car: CrashedCar) -> Iterator[Sentence]:
+def _crashed_facts(number: int, car: CrashedCar) -> Iterator[str]:
     if car.bearing is not None:
-        yield sentence(
-            "number %(number)s is %(bearing)s the one before",
-            number=number, bearing=_BEARINGS[car.bearing],
-        )  # fmt: skip
+        yield f"number {number} is {_BEARINGS[car.bearing]} the one before"  # fmt: skip
     if car.gap is not None:
-        yield sentence(
-            "number %(number)s is %(gap)s from the one before", number=number, gap=_length(car.gap)
-        )
+        yield f"number {number} is {_length(car.gap)} from the one before"
     if car.turn_deg is not None:
         turn = _turn(car.turn_deg) if car.is_signed else _angle(car.turn_deg)
-        yield sentence("number %(number)s is %(turn)s", number=number, turn=turn)
+        yield f"number {number} is {turn}"
 
 
-def _facing_facts(facing: Facing | None, turn_deg: float) -> Iterator[Sentence]:
+def _facing_facts(facing: Facing | None, turn_deg: float) -> Iterator[str]:
     if facing is not None:
         yield _FACINGS[facing]
     if turn_deg:
         yield _turn(turn_deg)
 
 
-def _turn(turn_deg: float) -> Sentence:
+def _turn(turn_deg: float) -> str:
     side = _SIDES[Side.LEFT if turn_deg > 0.0 else Side.RIGHT]
-    return sentence("turned %(angle)s degrees to the %(side)s", angle=_number(turn_deg), side=side)
+    return f"turned {_number(turn_deg)} degrees to the {side}"
 
 
-def _angle(turn_deg: float) -> Sentence:
-    return sentence("turned %(angle)s degrees, to either side", angle=_number(turn_deg))
+def _angle(turn_deg: float) -> str:
+    return f"turned {_number(turn_deg)} degrees, to either side"
 
 
-def _motion(speed_mps: float) -> Sentence:
+def _motion(speed_mps: float) -> str:
     if speed_mps == 0.0:
-        return sentence("stands")
-    return sentence("moves at %(speed)s m/s", speed=f"{speed_mps:g}")
+        return "stands"
+    return f"moves at {speed_mps:g} m/s"
 
 
 def _number(value: float) -> str:
     return f"{abs(value):g}"
 
 
-def _length(length: Length) -> Sentence:
+def _length(length: Length) -> str:
     low, high = f"{length.low_m:g}", f"{length.high_m:g}"
     if length.is_range:
-        return sentence("%(low)s to %(high)s m", low=low, high=high)
+        return f"{low} to {high} m"
     if length.is_approximate:
-        return sentence("about %(low)s m", low=low)
-    return sentence("%(low)s m", low=low)
+        return f"about {low} m"
+    return f"{low} m"
 
 
 _BODIES = {
-    Body.VEHICLE: sentence("vehicle"),
-    Body.CAR: sentence("car"),
-    Body.VAN: sentence("van"),
-    Body.TRUCK: sentence("truck"),
-    Body.BUS: sentence("bus"),
-    Body.BICYCLE: sentence("bicycle"),
-    Body.BARRIER: sentence("barrier"),
-    Body.CONSTRUCTION_SIGN: sentence("construction sign"),
+    Body.VEHICLE: "vehicle",
+    Body.CAR: "car",
+    Body.VAN: "van",
+    Body.TRUCK: "truck",
+    Body.BUS: "bus",
+    Body.BICYCLE: "bicycle",
+    Body.BARRIER: "barrier",
+    Body.CONSTRUCTION_SIGN: "construction sign",
 }
 _ROUTES = {
-    TurnType.LEFT: sentence("distances run along the way that turns left"),
-    TurnType.RIGHT: sentence("distances run along the way that turns right"),
-    TurnType.U_TURN: sentence("distances run along the way that turns back"),
+    TurnType.LEFT: "distances run along the way that turns left",
+    TurnType.RIGHT: "distances run along the way that turns right",
+    TurnType.U_TURN: "distances run along the way that turns back",
 }
-_SIDES = {Side.LEFT: sentence("left"), Side.RIGHT: sentence("right")}
+_SIDES = {Side.LEFT: "left", Side.RIGHT: "right"}
 _TARGETS = {
-    LateralTarget.LANE_CENTRE: sentence("lane centre"),
-    LateralTarget.LEFT_BOUNDARY: sentence("left lane boundary"),
-    LateralTarget.RIGHT_BOUNDARY: sentence("right lane boundary"),
-    LateralTarget.KERB: sentence("kerb"),
-    LateralTarget.CENTRE_LINE: sentence("centre line of the road"),
+    LateralTarget.LANE_CENTRE: "lane centre",
+    LateralTarget.LEFT_BOUNDARY: "left lane boundary",
+    LateralTarget.RIGHT_BOUNDARY: "right lane boundary",
+    LateralTarget.KERB: "kerb",
+    LateralTarget.CENTRE_LINE: "centre line of the road",
 }
 _NEARNESSES = {
-    Nearness.SLIGHTLY: sentence("slightly"),
-    Nearness.AT_EDGE: sentence("at the edge of the lane"),
-    Nearness.HALF_OUT: sentence("half outside the lane"),
-    Nearness.OUTSIDE: sentence("outside the lane"),
+    Nearness.SLIGHTLY: "slightly",
+    Nearness.AT_EDGE: "at the edge of the lane",
+    Nearness.HALF_OUT: "half outside the lane",
+    Nearness.OUTSIDE: "outside the lane",
 }
 _SETTINGS = {
-    Setting.BEFORE_INTERSECTION: sentence("before the intersection"),
-    Setting.IN_INTERSECTION: sentence("in the intersection"),
-    Setting.AT_INTERSECTION: sentence("at the intersection"),
-    Setting.AFTER_INTERSECTION: sentence("past the intersection"),
-    Setting.IN_BEND: sentence("in the bend"),
-    Setting.ON_CROSSWALK: sentence("on the crosswalk"),
-    Setting.OFF_CROSSWALK: sentence("away from the crosswalk"),
-    Setting.BY_PARKED: sentence("beside parked vehicles"),
-    Setting.BY_PARKED_LEFT: sentence("between parked vehicles on the left"),
-    Setting.BY_PARKED_RIGHT: sentence("between parked vehicles on the right"),
+    Setting.BEFORE_INTERSECTION: "before the intersection",
+    Setting.IN_INTERSECTION: "in the intersection",
+    Setting.AT_INTERSECTION: "at the intersection",
+    Setting.AFTER_INTERSECTION: "past the intersection",
+    Setting.IN_BEND: "in the bend",
+    Setting.ON_CROSSWALK: "on the crosswalk",
+    Setting.OFF_CROSSWALK: "away from the crosswalk",
+    Setting.BY_PARKED: "beside parked vehicles",
+    Setting.BY_PARKED_LEFT: "between parked vehicles on the left",
+    Setting.BY_PARKED_RIGHT: "between parked vehicles on the right",
 }
 _FACINGS = {
-    Facing.WITH_LANE: sentence("faces with the lane"),
-    Facing.AGAINST_LANE: sentence("faces against the lane"),
-    Facing.ACROSS: sentence("stands across the lane"),
+    Facing.WITH_LANE: "faces with the lane",
+    Facing.AGAINST_LANE: "faces against the lane",
+    Facing.ACROSS: "stands across the lane",
 }
 _SHAPES = {
-    Shape.TAPER: sentence("in a taper"),
-    Shape.LINE: sentence("in a line"),
-    Shape.RING: sentence("in a ring"),
-    Shape.ROW: sentence("in a row across the lane"),
+    Shape.TAPER: "in a taper",
+    Shape.LINE: "in a line",
+    Shape.RING: "in a ring",
+    Shape.ROW: "in a row across the lane",
 }
 _POSTS = {
-    Post.BEHIND: sentence("behind the cones"),
-    Post.BESIDE: sentence("beside the cones"),
-    Post.AT_LAST: sentence("beside the last cones"),
+    Post.BEHIND: "behind the cones",
+    Post.BESIDE: "beside the cones",
+    Post.AT_LAST: "beside the last cones",
 }
 _BEARINGS = {
-    Bearing.AHEAD: sentence("in front of"),
-    Bearing.BEHIND: sentence("behind"),
-    Bearing.LEFT: sentence("left of"),
-    Bearing.RIGHT: sentence("right of"),
+    Bearing.AHEAD: "in front of",
+    Bearing.BEHIND: "behind",
+    Bearing.LEFT: "left of",
+    Bearing.RIGHT: "right of",
 }

@@ -3,45 +3,41 @@
 from __future__ import annotations
 
 from augment.scene.landmarks import LaneChoice, MapPlace, Pick, Relation, Side, Sight
-from augment.sentences import Sentence, sentence
 
 MARKS = {
-    MapPlace.JUNCTION_START: sentence("the start of the junction"),
-    MapPlace.JUNCTION_END: sentence("the end of the junction"),
-    MapPlace.CROSSWALK: sentence("the crosswalk"),
+    MapPlace.JUNCTION_START: "the start of the junction",
+    MapPlace.JUNCTION_END: "the end of the junction",
+    MapPlace.CROSSWALK: "the crosswalk",
 }
 
 
-def state_pick(pick: Pick) -> Sentence:
+def state_pick(pick: Pick) -> str:
     """Who is meant: "parked vehicle 2 ahead of the ego, on its left"."""
     kind, where = _KINDS[pick.kind], _RELATIONS[pick.relation]
     if pick.every:
-        words = sentence("every %(kind)s %(where)s the ego", kind=kind, where=where)
+        words = f"every {kind} {where} the ego"
     else:
-        words = sentence(
-            "%(kind)s %(ordinal)s %(where)s the ego",
-            kind=kind, ordinal=pick.ordinal, where=where,
-        )  # fmt: skip
+        words = f"{kind} {pick.ordinal} {where} the ego"  # fmt: skip
     if pick.side is not None:
-        words = sentence("%(who)s, %(side)s", who=words, side=_SIDES[pick.side])
+        words = f"{words}, {_SIDES[pick.side]}"
     if pick.lane is not None:
-        words = sentence("%(who)s, %(lane)s", who=words, lane=LANES[pick.lane])
+        words = f"{words}, {LANES[pick.lane]}"
     return words
 
 
 LANES = {
-    LaneChoice.OWN: sentence("in the ego's lane"),
-    LaneChoice.LEFT: sentence("in the lane on the left"),
-    LaneChoice.RIGHT: sentence("in the lane on the right"),
-    LaneChoice.ONCOMING: sentence("in the oncoming lane"),
+    LaneChoice.OWN: "in the ego's lane",
+    LaneChoice.LEFT: "in the lane on the left",
+    LaneChoice.RIGHT: "in the lane on the right",
+    LaneChoice.ONCOMING: "in the oncoming lane",
 }
 _KINDS = {
-    Sight.VEHICLE: sentence("vehicle"),
-    Sight.PARKED: sentence("parked vehicle"),
-    Sight.MOVING: sentence("moving vehicle"),
-    Sight.BUS: sentence("bus"),
-    Sight.BICYCLE: sentence("bicycle"),
-    Sight.PEDESTRIAN: sentence("pedestrian"),
+    Sight.VEHICLE: "vehicle",
+    Sight.PARKED: "parked vehicle",
+    Sight.MOVING: "moving vehicle",
+    Sight.BUS: "bus",
+    Sight.BICYCLE: "bicycle",
+    Sight.PEDESTRIAN: "pedestrian",
 }
-_RELATIONS = {Relation.AHEAD: sentence("ahead of"), Relation.BEHIND: sentence("behind")}
-_SIDES = {Side.LEFT: sentence("on its left"), Side.RIGHT: sentence("on its right")}
+_RELATIONS = {Relation.AHEAD: "ahead of", Relation.BEHIND: "behind"}
+_SIDES = {Side.LEFT: "on its left", Side.RIGHT: "on its right"}

@@ -12,7 +12,7 @@ from typing import Any
 
 from django.core.management.base import BaseCommand, OutputWrapper
 
-from augment.sentences import escape_controls
+from augment.escaping import escape_controls
 
 
 class TerminalOutput(OutputWrapper):

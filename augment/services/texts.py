@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any
 
 from augment.errors import InvalidDocument
-from augment.sentences import sentence
 
 
 def make_storable(text: str) -> str:
@@ -45,7 +44,7 @@ def one_line(field: str, value: str, *, what: str, longest: int = 120) -> str:
     """
     value = value.strip()
     if not value or len(value) > longest or not value.isprintable():
-        rule = sentence("1 to %(most)s printable characters are needed", most=longest)
+        rule = f"1 to {longest} printable characters are needed"
         raise InvalidDocument(what, [(field, rule)])
     return value
 

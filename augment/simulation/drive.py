@@ -8,7 +8,6 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from augment.errors import CannotDrive
-from augment.sentences import sentence
 from augment.simulation.objects import Objects
 from augment.simulation.planning import Plan, Planner, Situation
 from augment.simulation.road import Road
@@ -119,10 +118,7 @@ def _poses(plan: Plan) -> FloatArray:
     poses = np.asarray(plan.poses, dtype=np.float64)
     if poses.ndim != 2 or poses.shape[1] != 3 or len(poses) < 2 or not np.isfinite(poses).all():
         raise CannotDrive(
-            sentence(
-                "The planner's poses have the shape %(shape)s; they must be (T, 3), T at least 2,"
-                " and finite.",
-                shape=str(poses.shape),
-            )
+            f"The planner's poses have the shape {poses.shape}; they must be (T, 3), T "
+            "at least 2, and finite."
         )
     return poses

@@ -7,7 +7,6 @@ from collections.abc import Callable, Collection
 from functools import partial
 
 from augment.errors import CannotDrive, UnknownName
-from augment.sentences import sentence
 from augment.simulation.idm_planner import IdmPlanner
 from augment.simulation.pdm_closed import PdmClosed
 from augment.simulation.planning import Planner
@@ -55,19 +54,11 @@ def _of_path(path: str) -> Planner:
         made = getattr(importlib.import_module(module), attribute)()
     except (ImportError, AttributeError, TypeError, ValueError) as error:
         raise CannotDrive(
-            sentence(
-                "The planner %(path)s can't be made: %(why)s. It is the dotted path of a class"
-                " without arguments.",
-                path=path,
-                why=str(error),
-            )
+            f"The planner {path} can't be made: {error}. It is the dotted path of a "
+            "class without arguments."
         ) from error
     if not isinstance(made, Planner):
         raise CannotDrive(
-            sentence(
-                "%(path)s is no planner: it needs the methods start(road, body) and"
-                " plan(situation).",
-                path=path,
-            )
+            f"{path} is no planner: it needs the methods start(road, body) and plan(situation)."
         )
     return made

@@ -13,7 +13,6 @@ from augment.scene.ego_route import find_ego_lane
 from augment.scene.entities import Lane, Scene, TurnType
 from augment.scene.lane_graph import LaneGraph
 from augment.scene.recording import Recording
-from augment.sentences import sentence
 
 ROUTE_M = 600.0
 """Collected ahead of the ego, as far as the map goes: 15 s at 20 m/s, and what a planner sees."""
@@ -118,12 +117,8 @@ def _start(scene: Scene, graph: LaneGraph) -> str:
     nearest = graph.nearest(ego.x_m, ego.y_m, among=aligned)
     if nearest is None:
         raise CannotDrive(
-            sentence(
-                "Scene %(scene)s can't be driven: no lane leads the ego's way within %(metres)s m"
-                " of it.",
-                scene=scene.name,
-                metres=f"{_NEAR_M:g}",
-            )
+            f"Scene {scene.name} can't be driven: no lane leads the ego's way within "
+            f"{_NEAR_M:g} m of it."
         )
     return nearest[0]
 

@@ -169,7 +169,7 @@ def a_vote_set(votes: tuple[Judged, ...], filters: Filters) -> VoteSet:
 
 def compared(votes: tuple[Judged, ...], filters: Filters) -> OwnVotes | None:
     found = a_vote_set(votes, filters)
-    board = rate_votes(vote_arrays(SLUGS, found.counted).comparisons, rounds=30, seed=1)
+    board = rate_votes(vote_arrays(found.entrants, found.counted).comparisons, rounds=30, seed=1)
     return with_and_without(found, filters, board)
 
 

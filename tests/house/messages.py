@@ -11,23 +11,18 @@ from django.utils.translation.template import templatize
 from tests.house.source import ROOT
 
 VOTER_MODULES = (
-    *("arena/errors.py", "arena/models/votes.py", "arena/templatetags/shell.py"),
-    *("arena/api/errors.py",),
-    *("arena/queries/descriptions.py", "arena/queries/voting_keys.py"),
-    *("arena/services/accounts.py", "arena/services/api_tokens.py"),
+    *("arena/api/errors.py", "arena/models/votes.py", "arena/templatetags/shell.py"),
+    *("arena/queries/descriptions.py", "arena/queries/measures.py"),
+    *("arena/queries/voting_keys.py", "arena/services/api_tokens.py"),
     *("arena/services/enrolments.py", "arena/services/preferences.py"),
     *("arena/web/api_tokens.py", "arena/web/enrolments.py", "arena/web/forms.py"),
     *("arena/web/people.py", "arena/web/practice.py"),
     *("arena/web/screen.py", "arena/web/voting.py"),
-    *("augment/checks", "augment/errors/inputs.py"),
-    *("augment/services/texts.py", "augment/services/wording.py"),
 )
-"""Modules and packages whose messages stand on pages that voters are shown."""
+"""Modules whose messages stand on pages that voters are shown."""
 
 POSITIONS: dict[str, tuple[int | None, int, int | None]] = {
-    **dict.fromkeys(
-        ("_", "gettext", "gettext_lazy", "gettext_noop", "sentence", "word"), (None, 0, None)
-    ),
+    **dict.fromkeys(("_", "gettext", "gettext_lazy", "gettext_noop"), (None, 0, None)),
     **dict.fromkeys(("ngettext", "ngettext_lazy"), (None, 0, 1)),
     **dict.fromkeys(("pgettext", "pgettext_lazy"), (0, 1, None)),
     **dict.fromkeys(("npgettext", "npgettext_lazy"), (0, 1, 2)),
@@ -45,9 +40,7 @@ def marked_messages() -> set[Message]:
         if path.suffix in {".html", ".svg"}:
             found.update(_in_template(templatize(path.read_text(), origin=str(path))))
     for name in VOTER_MODULES:
-        place = ROOT / name
-        for path in [place] if place.is_file() else place.rglob("*.py"):
-            found.update(_in_python(path.read_text()))
+        found.update(_in_python((ROOT / name).read_text()))
     return found
 
 

@@ -82,7 +82,15 @@ def two_crowds(each: int, votes: int, *, unbeaten: int) -> Comparisons:
         "scenario": [crowds[0].scenario, crowds[1].scenario, prey % 50],
     }
     joined = {name: np.concatenate(parts) for name, parts in columns.items()}
-    return Comparisons(names=tuple(f"c{number}" for number in range(2 * each + 1)), **joined)
+    names = tuple(f"c{number}" for number in range(2 * each + 1))
+    return Comparisons(
+        names=names,
+        first=joined["first"],
+        second=joined["second"],
+        score=joined["score"],
+        expert=joined["expert"],
+        scenario=joined["scenario"],
+    )
 
 
 def test_each_of_two_crowds_is_rated_by_itself_and_the_unbeaten_one_is_bounded() -> None:

@@ -14,27 +14,39 @@ from django.urls import reverse
 from arena.exports import bundle
 from arena.models import Snapshot
 from arena.results.codec import read_results, results_document
+from arena.results.kept import read_text
 from arena.results.tree import VERSION, Results
 from arena.web.results_tabs import TABS
 from augment.errors import InvalidDocument
-from augment.sentences import Sentence
 from tests.results.old import OLD, stored
 from tests.web.cast import people, signed_in
 
 
 def _still_kept() -> dict[str, Any]:
-    """The old document without bets against experts, which are not computed any more."""
-    document: dict[str, Any] = copy.deepcopy(OLD["snapshot"]["results"])
+    """The old document as it is written now: sentences as text, and no bets against experts."""
+    document: dict[str, Any] = _with_plain_text(OLD["snapshot"]["results"])
     for line in document["trust"]["raters"]:
         del line["bet"]
     return document
+
+
+def _with_plain_text(value: Any) -> Any:
+    if isinstance(value, list):
+        return [_with_plain_text(one) for one in value]
+    if not isinstance(value, dict):
+        return value
+    if value.keys() == {"text", "values"}:
+        return value["text"] % value["values"]
+    return {key: _with_plain_text(one) for key, one in value.items()}
 
 
 def test_an_old_document_is_written_as_it_was_read_but_for_what_was_dropped() -> None:
     found = read_results(OLD["snapshot"]["results"])
     assert results_document(found) == _still_kept()
     assert (found.version, found.board.order, found.types[0].lines[0].note) == (1, (), None)
-    assert isinstance(found.board.warnings[0], Sentence)
+    assert found.board.warnings[0] == (
+        "Only 4 experts: intervals that rest on fewer than 20 of them are rough."
+    )
     assert found.trust.removal is not None
     assert found.trust.removal.rival == "gpt-4o-otm"
 
@@ -48,6 +60,12 @@ def test_what_a_version_brought_is_a_key_of_it_also_when_it_is_empty() -> None:
     }
     assert (read_results(document), read_results({})) == (Results(version=VERSION), Results())
     assert results_document(Results()) == {}
+
+
+def test_names_in_an_older_sentence_are_joined_and_groups_told_apart() -> None:
+    values = {"groups": [["a", "b"], ["c"]], "names": ["d", "e"], "number": 2}
+    stored = {"text": "%(number)s of %(groups)s and %(names)s", "values": values}
+    assert read_text(stored) == "2 of a, b; c and d, e"
 
 
 @pytest.mark.parametrize(

@@ -43,7 +43,7 @@ def test_the_adjusted_table_stands_with_its_effects_and_the_table_as_voted(study
     snapshot = ratings.rate(study=study, seed=2, rounds=300, covariates=["objects", "side"])
     assert snapshot.covariates == ["side", "objects"]
     votes = vote_set(study, filters=Filters(), last=snapshot.last_vote)
-    plain = vote_arrays([one.slug for one in votes.entrants], votes.counted).comparisons
+    plain = vote_arrays(votes.entrants, votes.counted).comparisons
     objects = {
         str(row.code): len((row.modification or {})["add"]) for row in Augmentation.objects.all()
     }

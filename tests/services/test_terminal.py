@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from arena.management.commands.rate_csv import Command as RateCsv
 from arena.management.rate_csv import main as rate_csv
-from augment.sentences import escape_controls
+from augment.escaping import escape_controls
 from augment.services.terminal import TerminalOutput
 
 CLEAR = "\x1b[2J"

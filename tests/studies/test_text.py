@@ -11,7 +11,6 @@ from arena.queries.showings import as_shown
 from arena.services.handing_over import hand_over
 from arena.services.replanning import plan_batch
 from augment.models import Augmentation
-from augment.services.wording import translate_all
 from tests.described import a_described_study, draw_changes, said_of, with_text
 from tests.study_rows import cast_of, matchups_of, vote
 
@@ -21,7 +20,7 @@ pytestmark = pytest.mark.django_db
 def read_by(study: Study, username: str) -> list[tuple[list[str], list[str]]]:
     return [
         (shown["text"]["a"], shown["text"]["b"])
-        for shown in (as_shown(row, translate_all) for row in matchups_of(study, username))
+        for shown in (as_shown(row) for row in matchups_of(study, username))
     ]
 
 
@@ -116,6 +115,6 @@ def test_a_line_is_said_in_both_languages(
     changes: dict[str, object], english: str, german: str
 ) -> None:
     with override("en"):
-        assert describe_in_words([LINE | changes], translate_all) == [english]
+        assert describe_in_words([LINE | changes]) == [english]
     with override("de"):
-        assert describe_in_words([LINE | changes], translate_all) == [german]
+        assert describe_in_words([LINE | changes]) == [german]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 from xml.etree import ElementTree as ET
 
-from augment.sentences import escape_controls
+from augment.escaping import escape_controls
 
 DECIMALS = 9
 

@@ -15,10 +15,10 @@ from typing import Any, Final
 import yaml
 
 from augment.checks.ground import Ground
+from augment.escaping import escape_controls
 from augment.scene.catalogue import ScenarioType
 from augment.scene.entities import SceneOptions, TrafficDensity, TurnType
 from augment.scene.modification import Modification
-from augment.sentences import escape_controls
 
 STANDING_WALK_M: Final = 1.5
 """A walk up to here is a worker's: interPlan's construction workers step 1.0 m."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from augment.errors import Conflict
 from augment.models import Contestant, Scenario
-from augment.sentences import sentence
 from augment.services.endpoints.respondents import respondents_of
 from augment.services.endpoints.treatments import options_of, other_prompts
 from augment.services.scenarios.prompts import Preview, preview_prompt
@@ -31,7 +30,7 @@ def preview_contestant(scenario: Scenario, contestant: Contestant, *, role: str)
         UnknownName: Its variant is none of ours any more, or there is no such role.
     """
     if not respondents_of(contestant):
-        raise Conflict(sentence("%(name)s asks no model.", name=contestant.slug))
+        raise Conflict(f"{contestant.slug} asks no model.")
     options = options_of(contestant)
     if (unlike := other_prompts(contestant.slug, options)) is not None:
         raise Conflict(unlike)

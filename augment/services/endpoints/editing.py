@@ -14,7 +14,6 @@ from django.db import models, transaction
 from augment.errors import Conflict, InvalidDocument
 from augment.llm.addresses import check_base_url
 from augment.models import Endpoint, EndpointModel
-from augment.sentences import sentence
 from augment.services.endpoints.keys import check_key_variable, log_move, move_of
 from augment.services.endpoints.known_models import facts_of, model_at
 from augment.services.events import log_event
@@ -81,11 +80,7 @@ def add_endpoint(
     """
     check_slug(label, what="endpoint")
     if Endpoint.objects.filter(label=label).exists():
-        raise Conflict(
-            sentence(
-                "There is an endpoint “%(label)s” already; choose another label.", label=label
-            )
-        )
+        raise Conflict(f"There is an endpoint “{label}” already; choose another label.")
     row = Endpoint(label=label, is_simulated=is_simulated, **check_facts(facts))
     row.save()
     log_event(
@@ -117,13 +112,8 @@ def change_endpoint(
     move = move_of(endpoint=row, base_url=wanted["base_url"], key_variable=facts.key_variable)
     if move is not None and not may_move_key:
         raise Conflict(
-            sentence(
-                "The key in %(variable)s went to %(before)s and would go to %(after)s. Say that "
-                "it may, if that is meant.",
-                variable=facts.key_variable,
-                before=move[0],
-                after=move[1],
-            )
+            f"The key in {facts.key_variable} went to {move[0]} and would go to {move[1]}. "
+            "Say that it may, if that is meant."
         )
     before = facts_of(row)
     for name, value in wanted.items():
@@ -145,11 +135,7 @@ def add_model(endpoint: Endpoint, *, model: str, actor: User | None = None) -> E
     model = one_line("model", model, what="endpoint")
     before = facts_of(endpoint)
     if endpoint.models.filter(model=model).exists():
-        raise Conflict(
-            sentence(
-                "%(label)s has the model %(model)s already.", label=endpoint.label, model=model
-            )
-        )
+        raise Conflict(f"{endpoint.label} has the model {model} already.")
     row = model_at(endpoint=endpoint, model=model)
     _log_change(endpoint, before, actor)
     return row
@@ -203,9 +189,7 @@ def check_facts(facts: EndpointFacts) -> dict[str, Any]:
     ):
         value = getattr(facts, name)
         if value is not None and not 1 <= value <= highest:
-            problems.append(
-                (name, sentence("a whole number from 1 to %(highest)s", highest=highest))
-            )
+            problems.append((name, f"a whole number from 1 to {highest}"))
     if problems:
         raise InvalidDocument("endpoint", problems)
     return {
@@ -227,7 +211,7 @@ def _refuse_broken(row: models.Model, what: str) -> None:
         raise InvalidDocument(what, problems) from None
     price = [getattr(row, name) for name in ("price_in_usd", "price_out_usd")]
     if any(part is not None and part < 0 for part in price):
-        raise InvalidDocument(what, [("price_in_usd", sentence("a price is 0 or more"))])
+        raise InvalidDocument(what, [("price_in_usd", "a price is 0 or more")])
 
 
 def _log_change(endpoint: Endpoint, before: dict[str, Any], actor: User | None) -> None:

@@ -10,7 +10,6 @@ from django.db import transaction
 
 from augment.errors import Conflict
 from augment.models import Contestant, Endpoint
-from augment.sentences import sentence
 from augment.services.endpoints.contestants import add_contestant
 from augment.services.endpoints.known_endpoints import ensure_endpoint
 from augment.variants.options import EFFORTS, NAMES, ToolProtocol, options_from_document
@@ -86,9 +85,6 @@ def _refuse_known(label: str) -> None:
     """Raise Conflict where an endpoint is called so: others ask it at the address it has."""
     if Endpoint.objects.filter(label=label).exists():
         raise Conflict(
-            sentence(
-                "There is an endpoint “%(label)s” already. Choose it from the list, or give the "
-                "new one another label.",
-                label=label,
-            )
+            f"There is an endpoint “{label}” already. Choose it from the list, or give the "
+            "new one another label."
         )

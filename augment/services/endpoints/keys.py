@@ -15,7 +15,6 @@ from django.contrib.auth.models import User
 
 from augment.errors import InvalidDocument, KeyMissing, KeyNotAllowed
 from augment.models import Endpoint
-from augment.sentences import sentence
 from augment.services.events import log_event
 
 _A_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,79}")
@@ -40,12 +39,11 @@ def check_key_variable(variable: str) -> None:
         return
     problem = ""
     if not _A_NAME.fullmatch(variable):
-        problem = sentence("the name of an environment variable is needed, not the key")
+        problem = "the name of an environment variable is needed, not the key"
     elif not may_hold_key(variable):
-        problem = sentence(
-            "%(variable)s may not be sent to an endpoint: a variable whose name ends in _API_KEY, "
-            "or one that ARENA_KEY_VARIABLES lists is needed",
-            variable=variable,
+        problem = (
+            f"{variable} may not be sent to an endpoint: a variable whose name ends in _API_KEY, "
+            "or one that ARENA_KEY_VARIABLES lists is needed"
         )
     if problem:
         raise InvalidDocument("endpoint", [("key_variable", problem)])

@@ -10,7 +10,6 @@ from django.db import IntegrityError, transaction
 from augment.errors import Conflict
 from augment.llm.questions import Ability
 from augment.models import EndpointModel, Probe
-from augment.sentences import sentence
 from augment.services.endpoints.probe import ProbeFinding, probe
 from augment.services.texts import make_document_storable
 from augment.services.work import Lease, Settlement, WorkKind
@@ -30,9 +29,7 @@ def plan_probe(model: EndpointModel, *, actor: User | None = None) -> Probe:
         with transaction.atomic():
             return Probe.objects.create(model=model, asked_by=actor)
     except IntegrityError:
-        raise Conflict(
-            sentence("%(model)s is being probed already; wait for its end.", model=model.model)
-        ) from None
+        raise Conflict(f"{model.model} is being probed already; wait for its end.") from None
 
 
 class Probes(WorkKind[Probe]):

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 from augment.errors import Conflict, InvalidDocument
 from augment.models import Contestant, Endpoint, EndpointModel
-from augment.sentences import sentence, word
 from augment.variants.recipes import Recipe, find_recipe
 from augment.variants.showing import roles_of
 from augment.variants.transcript import ModelRole
@@ -105,13 +104,8 @@ def _respondents(
         endpoint = endpoints.get(chosen["endpoint"])
         if endpoint is None:
             raise Conflict(
-                sentence(
-                    "The %(role)s of %(contestant)s sits at endpoint '%(endpoint)s', which does "
-                    "not exist any more.",
-                    role=word(name),
-                    contestant=contestant.slug,
-                    endpoint=chosen["endpoint"],
-                )
+                f"The {name} of {contestant.slug} sits at endpoint '{chosen['endpoint']}', "
+                "which does not exist any more."
             )
         respondents[ModelRole(name)] = Respondent(endpoint=endpoint, model=chosen["model"])
     return respondents

@@ -20,7 +20,6 @@ from augment.llm.messages import LengthName
 from augment.llm.profile import ModelProfile
 from augment.models import Augmentation, Contestant, Endpoint, ModelCall
 from augment.prompts.texts import prompt_version
-from augment.sentences import Sentence, sentence
 from augment.services.endpoints.known_models import profile_of, profiles_of
 from augment.services.endpoints.respondents import Respondent, respondents_of_each
 from augment.services.events import log_event
@@ -138,17 +137,14 @@ def options_of(contestant: Contestant) -> ContestantOptions:
     return _completed(contestant)
 
 
-def other_prompts(slug: str, options: ContestantOptions) -> Sentence | None:
+def other_prompts(slug: str, options: ContestantOptions) -> str | None:
     """What to say of options that name prompts which are not installed; None where they are."""
     wanted, installed = options.prompt_version, prompt_version()
     if wanted is None or wanted == installed:
         return None
-    return sentence(
-        "%(contestant)s asks with prompts of version %(wanted)s, and version %(installed)s is "
-        "installed. Add another contestant like it, which asks with the installed ones",
-        contestant=slug,
-        wanted=wanted,
-        installed=installed,
+    return (
+        f"{slug} asks with prompts of version {wanted}, and version {installed} is installed. "
+        "Add another contestant like it, which asks with the installed ones"
     )
 
 

@@ -11,7 +11,6 @@ from augment.checks.against_intent import check_against_intent
 from augment.errors import InvalidDocument, InvalidModification
 from augment.models import Scenario
 from augment.scene.entities import Scene
-from augment.sentences import sentence_of
 from augment.services.judging.findings import FindingLine, list_lines
 from augment.services.scenarios.editing import (
     edit_to_document,
@@ -54,7 +53,7 @@ def check_edit(scenario: Scenario, document: object, *, snapped: str = "") -> Ch
         intent = intent_of(scenario)
         findings = check_against_intent(ground, modification, intent)
     except (InvalidDocument, InvalidModification) as error:
-        return CheckedEdit(modification=None, problem=sentence_of(error))
+        return CheckedEdit(modification=None, problem=str(error))
     return CheckedEdit(
         modification=edit_to_document(modification),
         lines=list_lines(findings),

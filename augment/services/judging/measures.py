@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from augment.checks.measures import LaneEdges as LaneEdges
+from augment.checks.measures import MeasureLine as MeasureLine
 from augment.checks.measures import Measures, find_measures, lane_edges_at
 from augment.models import Scenario
 from augment.services.judging.edits import ground_of

@@ -17,7 +17,6 @@ from augment.models import Augmentation, GenerationJob, Scenario, Simulation
 from augment.scene.codec import modification_from_document
 from augment.scene.modification import Modification
 from augment.scene.recording_codec import recording_from_document
-from augment.sentences import sentence
 from augment.services.scenarios.scenes import reference_of, scene_of
 from augment.services.scenarios.types import type_of
 from augment.services.work import Lease, Settlement, WorkKind
@@ -91,9 +90,7 @@ def plan_job(*, job: GenerationJob, options: Options, also: Collection[str] = ()
     load_planner(options, also=also)
     rows = job.augmentations.filter(state__in=Augmentation.SHOWABLE).select_related("scenario")
     if not rows:
-        raise Conflict(
-            sentence("“%(name)s” has no result yet that could be driven.", name=job.name)
-        )
+        raise Conflict(f"“{job.name}” has no result yet that could be driven.")
     made: list[Simulation] = []
     for scenario in {row.scenario_id: row.scenario for row in rows}.values():
         made += _of_scenario(scenario, options)

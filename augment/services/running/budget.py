@@ -20,7 +20,6 @@ from augment.errors import Conflict, ModelFault, NotSent
 from augment.llm.costs import Price, WorstCase, usd_of
 from augment.llm.messages import Reply
 from augment.models import GenerationJob, ModelCall
-from augment.sentences import Sentence, sentence
 from augment.services.clock import Moment
 from augment.services.events import log_event
 
@@ -181,17 +180,17 @@ def limit_of(job: GenerationJob) -> str:
     return ", ".join(limits_of(job))
 
 
-def limits_of(job: GenerationJob) -> tuple[Sentence, ...]:
+def limits_of(job: GenerationJob) -> tuple[str, ...]:
     """Each cap of a job, to be said in any language."""
     parts = []
     if job.cap_nano_usd is not None:
         usd = f"{usd_of(job.cap_nano_usd).normalize():f}"
-        parts.append(sentence("%(usd)s USD", usd=usd))
+        parts.append(f"{usd} USD")
     if job.cap_calls is not None:
-        parts.append(sentence("%(calls)s calls", calls=job.cap_calls))
+        parts.append(f"{job.cap_calls} calls")
     if job.cap_tokens is not None:
-        parts.append(sentence("%(tokens)s tokens", tokens=job.cap_tokens))
-    return tuple(parts) or (sentence("nothing"),)
+        parts.append(f"{job.cap_tokens} tokens")
+    return tuple(parts) or ("nothing",)
 
 
 # --- Private -----------------------------------------------------------------------------------

@@ -13,7 +13,6 @@ from augment.errors import Conflict
 from augment.models import Augmentation, Contestant, GenerationJob
 from augment.scene.codec import modification_from_document
 from augment.scene.modification import Modification
-from augment.sentences import sentence
 from augment.services.events import log_event
 from augment.services.scenarios.editing import edit_to_document, read_edit
 from augment.services.scenarios.scenes import check_slug
@@ -88,11 +87,11 @@ def starting_document(original: Augmentation) -> dict[str, object]:
 def _corrected(original: Augmentation, document: object) -> Modification:
     modification = read_edit(original.scenario, document)
     if modification.is_empty:
-        raise Conflict(sentence("Nothing is added, moved or removed: there is nothing to keep."))
+        raise Conflict("Nothing is added, moved or removed: there is nothing to keep.")
     if original.modification is not None:
         before = read_edit(original.scenario, original.modification)
         if modification == before:
-            raise Conflict(sentence("Nothing was corrected: it is as it was."))
+            raise Conflict("Nothing was corrected: it is as it was.")
     return modification
 
 
@@ -118,9 +117,9 @@ def _person(slug: str, name: str) -> Contestant:
         shown = one_line("name", name or (NAME if slug == BY_HAND else slug), what="contestant")
         return Contestant.objects.create(slug=slug, name=shown, kind=Kind.HUMAN)
     if found.kind != Kind.HUMAN:
-        raise Conflict(sentence("“%(name)s” is no person; choose another slug.", name=found.name))
+        raise Conflict(f"“{found.name}” is no person; choose another slug.")
     if found.retired_at is not None:
         raise Conflict(
-            sentence("“%(name)s” is retired; choose another slug.", name=found.name),
+            f"“{found.name}” is retired; choose another slug.",
         )
     return found

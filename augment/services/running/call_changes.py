@@ -9,7 +9,6 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from augment.models import ModelCall, TranscriptNote
-from augment.sentences import Sentence, sentence
 from augment.variants.options import ToolProtocol
 from augment.variants.transcript import ModelRole, NoteKind
 
@@ -23,7 +22,7 @@ def changes_of(
     options: Mapping[str, Any] | None,
     before: ModelCall | None,
     notes: Sequence[TranscriptNote],
-) -> tuple[Sentence, ...]:
+) -> tuple[str, ...]:
     """What of a call was not as chosen.
 
     Args:
@@ -44,25 +43,21 @@ def changes_of(
 # --- Private -----------------------------------------------------------------------------------
 
 
-def _refused(call: ModelCall, before: ModelCall | None) -> list[Sentence]:
+def _refused(call: ModelCall, before: ModelCall | None) -> list[str]:
     """What the same request had before it was refused."""
     if before is None or before.role != call.role or not before.fault or before.answer is not None:
         return []
     if before.request.get("messages") != call.request.get("messages"):
         return []
     gone = [name for name in before.request if name not in call.request]
-    return [
-        sentence("Sent again without %(parameter)s, which the endpoint refused.", parameter=name)
-        for name in gone
-    ]
+    return [f"Sent again without {name}, which the endpoint refused." for name in gone]
 
 
-def _not_sent(request: Mapping[str, Any], options: Mapping[str, Any]) -> list[Sentence]:
+def _not_sent(request: Mapping[str, Any], options: Mapping[str, Any]) -> list[str]:
     found = [
-        sentence(
-            "%(parameter)s was to be %(value)s and is not sent: the model does not take it.",
-            parameter=name,
-            value=_written(options[name]),
+        (
+            f"{name} was to be {_written(options[name])} and is not sent: the model does not "
+            "take it."
         )
         for name in _SENT
         if name in options and name not in request
@@ -70,67 +65,48 @@ def _not_sent(request: Mapping[str, Any], options: Mapping[str, Any]) -> list[Se
     effort = request.get("reasoning_effort")
     if effort is not None and "reasoning_effort" not in options:
         found.append(
-            sentence(
-                "reasoning_effort %(value)s is sent because it is entered for the model, not "
-                "because it was chosen.",
-                value=str(effort),
-            )
+            f"reasoning_effort {effort} is sent because it is entered for the model, "
+            "not because it was chosen."
         )
     return found
 
 
-def _of_length(request: Mapping[str, Any], options: Mapping[str, Any]) -> list[Sentence]:
+def _of_length(request: Mapping[str, Any], options: Mapping[str, Any]) -> list[str]:
     found = []
     if _OLD_NAME in request:
         found.append(
-            sentence(
-                "The limit of the answer is sent as %(old)s: the endpoint refused %(new)s.",
-                old=_OLD_NAME,
-                new=_NEW_NAME,
-            )
+            f"The limit of the answer is sent as {_OLD_NAME}: the endpoint refused {_NEW_NAME}."
         )
     wanted, sent = options.get("max_output_tokens"), request.get(_NEW_NAME, request.get(_OLD_NAME))
     if wanted is not None and sent is not None and sent < wanted:
         found.append(
-            sentence(
-                "An answer may have %(sent)s tokens, not %(wanted)s: more the model does not "
-                "give.",
-                sent=int(sent),
-                wanted=int(wanted),
-            )
+            f"An answer may have {int(sent)} tokens, not {int(wanted)}: more the model does "
+            "not give."
         )
     return found
 
 
 def _of_protocol(
     call: ModelCall, options: Mapping[str, Any], notes: Sequence[TranscriptNote]
-) -> list[Sentence]:
+) -> list[str]:
     if call.role != ModelRole.MODIFIER:
         return []
     is_offered = bool(call.request.get("tools"))
     if options.get("protocol") == ToolProtocol.NATIVE and not is_offered:
-        return [sentence("The function was to be called natively and was not offered so.")]
+        return ["The function was to be called natively and was not offered so."]
     has_called = any(note.kind == NoteKind.TOOL_CALL for note in notes)
     if is_offered and has_called and not (call.extras or {}).get("tool_calls"):
         return [
-            sentence(
-                "The function was offered natively, and the model wrote its call into the answer."
-            )
+            ("The function was offered natively, and the model wrote its call into the answer.")
         ]
     return []
 
 
-def _of_model(call: ModelCall) -> list[Sentence]:
+def _of_model(call: ModelCall) -> list[str]:
     asked, answered = str(call.request.get("model", "")), call.model_returned
     if not answered or asked.lower() in answered.lower() or answered.lower() in asked.lower():
         return []
-    return [
-        sentence(
-            "%(asked)s was asked and the endpoint says that %(answered)s answered.",
-            asked=asked,
-            answered=answered,
-        )
-    ]
+    return [f"{asked} was asked and the endpoint says that {answered} answered."]
 
 
 def _written(value: object) -> str:

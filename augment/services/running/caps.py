@@ -12,7 +12,6 @@ from django.db import transaction
 from augment.errors import Conflict
 from augment.llm.costs import nano_usd_of
 from augment.models import Contestant, GenerationJob
-from augment.sentences import Sentence, sentence, word
 from augment.services.endpoints.prices import list_unpriced_models
 from augment.services.events import log_event
 from augment.services.running.budget import limit_of, limits_of
@@ -41,27 +40,16 @@ class Caps:
         given: dict[str, int] = {}
         if self.usd is not None:
             if not (self.usd.is_finite() and Decimal(0) < self.usd <= HIGHEST_USD):
-                raise Conflict(
-                    sentence(
-                        "A cap in USD is more than 0 and at most %(highest)s.",
-                        highest=str(HIGHEST_USD),
-                    )
-                )
+                raise Conflict(f"A cap in USD is more than 0 and at most {HIGHEST_USD}.")
             given["cap_nano_usd"] = nano_usd_of(self.usd)
         for name, value, highest in (
-            (sentence("calls"), self.calls, HIGHEST_CALLS),
-            (sentence("tokens"), self.tokens, HIGHEST_TOKENS),
+            ("calls", self.calls, HIGHEST_CALLS),
+            ("tokens", self.tokens, HIGHEST_TOKENS),
         ):
             if value is None:
                 continue
             if not 0 < value <= highest:
-                raise Conflict(
-                    sentence(
-                        "A cap in %(unit)s is more than 0 and at most %(highest)s.",
-                        unit=name,
-                        highest=highest,
-                    )
-                )
+                raise Conflict(f"A cap in {name} is more than 0 and at most {highest}.")
             given[f"cap_{name}"] = value
         return given
 
@@ -79,19 +67,16 @@ def check_caps(caps: Caps, contestants: Sequence[Contestant]) -> dict[str, int]:
     unknown = list_unpriced_models(contestants) if caps.usd is not None else []
     if unknown:
         raise Conflict(
-            sentence(
-                "A cap in USD needs prices, and nobody knows that of %(models)s: cap the job by "
-                "calls or tokens instead, or enter the price at the endpoint.",
-                models=tuple(unknown),
-            )
+            f"A cap in USD needs prices, and nobody knows that of {', '.join(unknown)}: cap "
+            "the job by calls or tokens instead, or enter the price at the endpoint."
         )
     return columns
 
 
-def over_already(job: GenerationJob) -> Sentence:
+def over_already(job: GenerationJob) -> str:
     """Why nothing can be changed at a job that has ended."""
-    state = word(job.get_state_display().lower())
-    return sentence("Job '%(name)s' is %(state)s already.", name=job.name, state=state)
+    state = job.get_state_display().lower()
+    return f"Job '{job.name}' is {state} already."
 
 
 @transaction.atomic
@@ -103,7 +88,7 @@ def raise_cap(job: GenerationJob, *, caps: Caps, actor: User | None = None) -> G
     """
     columns = caps.columns()
     if not columns:
-        raise Conflict(sentence("Say which cap to raise, and to what."))
+        raise Conflict("Say which cap to raise, and to what.")
     job = GenerationJob.objects.select_for_update().get(pk=job.pk)
     if job.state not in (State.RUNNING, *GenerationJob.HELD):
         raise Conflict(over_already(job))
@@ -111,17 +96,9 @@ def raise_cap(job: GenerationJob, *, caps: Caps, actor: User | None = None) -> G
     for name, value in columns.items():
         held = getattr(job, name)
         if held is None:
-            raise Conflict(
-                sentence(
-                    "Job '%(name)s' has no such cap; its cap is %(limits)s.",
-                    name=job.name,
-                    limits=limits,
-                )
-            )
+            raise Conflict(f"Job '{job.name}' has no such cap; its cap is {', '.join(limits)}.")
         if value <= held:
-            raise Conflict(
-                sentence("The new cap must be higher than the one of %(limits)s.", limits=limits)
-            )
+            raise Conflict(f"The new cap must be higher than the one of {', '.join(limits)}.")
         setattr(job, name, value)
     job.save(update_fields=list(columns))
     log_event(

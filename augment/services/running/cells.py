@@ -14,7 +14,6 @@ from django.db import transaction
 
 from augment.errors import UnknownName
 from augment.models import Contestant, Endpoint, EndpointModel
-from augment.sentences import sentence
 from augment.services.endpoints.contestants import LONGEST_NAME, add_contestant
 from augment.services.endpoints.keys import may_hold_key
 from augment.services.running.matrix import ContestantDocument, pick_slug
@@ -174,9 +173,9 @@ def _contestant(cell: MatrixCell, options: ContestantOptions) -> Contestant:
 def _obstacle(known: EndpointModel, recipe: Recipe) -> str:
     variable = known.endpoint.key_variable
     if variable and not may_hold_key(variable):
-        return sentence("%(variable)s may not hold a key", variable=variable)
+        return f"{variable} may not hold a key"
     if recipe.review is not Review.VISUAL or known.vision:
         return ""
     if known.vision is None:
-        return sentence("nobody knows whether it sees pictures: probe it")
-    return sentence("needs vision, and it sees text alone")
+        return "nobody knows whether it sees pictures: probe it"
+    return "needs vision, and it sees text alone"

@@ -9,7 +9,6 @@ from django.db.models import Q
 from augment.baselines.registry import PLACERS
 from augment.errors import AugmentError, Conflict, KeyMissing, KeyNotAllowed
 from augment.models import Contestant, Scenario
-from augment.sentences import Sentence, sentence, sentence_of
 from augment.services.endpoints.keys import key_of, may_hold_key
 from augment.services.endpoints.respondents import Respondent, respondents_of, sight_of, viewer_of
 from augment.services.endpoints.treatments import options_of, other_prompts
@@ -36,29 +35,27 @@ def find_obstacle(contestant: Contestant) -> str:
     To be said by a door in the language of whoever reads it.
     """
     if not is_runnable(contestant):
-        return sentence("made by people or by an outside program, and imported")
+        return "made by people or by an outside program, and imported"
     try:
         respondents_of(contestant)
     except AugmentError as error:
-        return sentence_of(error)
+        return str(error)
     forbidden = _forbidden_keys(contestant)
     if forbidden:
-        return sentence(
-            "the variable %(names)s may not hold a key; its name has to end in _API_KEY, or "
-            "ARENA_KEY_VARIABLES has to list it",
-            names=forbidden,
+        return (
+            f"the variable {', '.join(forbidden)} may not hold a key; its name has to end in "
+            "_API_KEY, or ARENA_KEY_VARIABLES has to list it"
         )
     unaskable = _unaskable(contestant)
     if unaskable is not None:
         return unaskable
     viewer = viewer_of(contestant)
     if viewer is not None and sight_of(viewer) is False:
-        return sentence("its viewer sees text alone; visual QA needs vision")
+        return "its viewer sees text alone; visual QA needs vision"
     if viewer is not None and sight_of(viewer) is None:
-        return sentence(
-            "nobody knows whether its viewer %(viewer)s sees pictures, which visual QA needs: "
-            "probe it on its page, or say there what you know",
-            viewer=str(viewer),
+        return (
+            f"nobody knows whether its viewer {viewer} sees pictures, which visual QA "
+            "needs: probe it on its page, or say there what you know"
         )
     return ""
 
@@ -86,16 +83,14 @@ def refuse_impossible(who: Sequence[Contestant], where: Sequence[Scenario]) -> N
         Conflict: Nothing is chosen, or a contestant can't run, or not on these scenarios.
     """
     if not who:
-        raise Conflict(sentence("Choose at least one contestant."))
+        raise Conflict("Choose at least one contestant.")
     if not where:
-        raise Conflict(sentence("Choose at least one scenario."))
+        raise Conflict("Choose at least one scenario.")
     strangers = [row.slug for row in who if not is_runnable(row)]
     if strangers:
         raise Conflict(
-            sentence(
-                "A job can't run %(names)s: what humans or outside programs made is imported.",
-                names=tuple(strangers),
-            )
+            f"A job can't run {', '.join(strangers)}: what humans or outside programs made "
+            "is imported."
         )
     _refuse_forbidden_keys(who)
     for row in who:
@@ -109,19 +104,15 @@ def refuse_impossible(who: Sequence[Contestant], where: Sequence[Scenario]) -> N
     without = [row.slug for row in where if row.reference is None]
     if references and without:
         raise Conflict(
-            sentence(
-                "%(contestant)s can't run on scenarios without a reference modification: "
-                "%(scenarios)s.",
-                contestant=references[0],
-                scenarios=tuple(without),
-            )
+            f"{references[0]} can't run on scenarios without a reference modification: "
+            f"{', '.join(without)}."
         )
 
 
 # --- Private -----------------------------------------------------------------------------------
 
 
-def _unaskable(contestant: Contestant) -> Sentence | None:
+def _unaskable(contestant: Contestant) -> str | None:
     """Why nobody can ask with a contestant's options; None where it can be tried."""
     if contestant.endpoint is None:
         return None
@@ -130,11 +121,10 @@ def _unaskable(contestant: Contestant) -> Sentence | None:
         modifier = respondents_of(contestant)[ModelRole.MODIFIER]
         known = modifier.known
         if contestant.frozen_options is None and known is not None and known.native_tools is False:
-            return sentence(
-                "%(contestant)s is to call its function natively, and %(model)s has no native "
-                "calls. Add a contestant with the protocol prompt, or probe the model anew.",
-                contestant=contestant.slug,
-                model=str(modifier),
+            return (
+                f"{contestant.slug} is to call its function natively, and {modifier} has no "
+                "native calls. Add a contestant with the protocol prompt, or probe the model "
+                "anew."
             )
     return other_prompts(contestant.slug, options)
 
@@ -152,13 +142,9 @@ def _refuse_forbidden_keys(who: Sequence[Contestant]) -> None:
         forbidden = _forbidden_keys(row)
         if forbidden:
             raise Conflict(
-                sentence(
-                    "The endpoint of %(contestant)s names %(names)s, which may not hold a key: a "
-                    "variable is needed whose name ends in _API_KEY or that ARENA_KEY_VARIABLES "
-                    "lists.",
-                    contestant=row.slug,
-                    names=forbidden,
-                )
+                f"The endpoint of {row.slug} names {', '.join(forbidden)}, which may not "
+                "hold a key: a variable is needed whose name ends in _API_KEY or that "
+                "ARENA_KEY_VARIABLES lists."
             )
 
 
@@ -170,19 +156,15 @@ def _refuse_without_sight(who: Sequence[Contestant]) -> None:
         if respondent is not None:
             lacking[sight_of(respondent)].append((slug, respondent))
     if lacking[False]:
+        names = ", ".join(f"{slug} ({respondent})" for slug, respondent in lacking[False])
         raise Conflict(
-            sentence(
-                "Visual QA needs a viewer that sees, and these see text alone: %(names)s. "
-                "Give the contestant another viewer or another variant.",
-                names=tuple(f"{slug} ({respondent})" for slug, respondent in lacking[False]),
-            )
+            f"Visual QA needs a viewer that sees, and these see text alone: {names}. Give "
+            "the contestant another viewer or another variant."
         )
     if lacking[None]:
+        names = ", ".join(f"{slug} ({respondent})" for slug, respondent in lacking[None])
         raise Conflict(
-            sentence(
-                "Visual QA needs a viewer that sees, and of these nobody knows whether they do: "
-                "%(names)s. Probe the model on the page of its endpoint, or say there what you "
-                "know.",
-                names=tuple(f"{slug} ({respondent})" for slug, respondent in lacking[None]),
-            )
+            "Visual QA needs a viewer that sees, and of these nobody knows whether they do: "
+            f"{names}. Probe the model on the page of its endpoint, or say there what you "
+            "know."
         )

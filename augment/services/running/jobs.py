@@ -12,7 +12,6 @@ from django.utils import timezone
 
 from augment.errors import Conflict, UnknownName
 from augment.models import Augmentation, Contestant, GenerationJob, Scenario
-from augment.sentences import sentence
 from augment.services.clock import DATABASE_TIME, Moment
 from augment.services.endpoints.treatments import loosen_unanswered
 from augment.services.events import log_event
@@ -136,11 +135,7 @@ def retry_failed(job: GenerationJob, actor: User | None = None) -> GenerationJob
     again = change_all(failed, state=State.QUEUED, reason="", finished_at=None, sent_at=None)
     open_again(job)
     if not again:
-        raise Conflict(
-            sentence(
-                "Nothing in job '%(name)s' failed; there is nothing to try again.", name=job.name
-            )
-        )
+        raise Conflict(f"Nothing in job '{job.name}' failed; there is nothing to try again.")
     log_event(
         actor=actor,
         verb="retry",
@@ -164,9 +159,7 @@ def open_again(job: GenerationJob) -> None:
     kept = Case(When(state__in=GenerationJob.HELD, then=F("state")), default=Value(states.RUNNING))
     not_cancelled = GenerationJob.objects.filter(pk=job.pk).exclude(state=states.CANCELLED)
     if not not_cancelled.update(state=kept, finished_at=None):
-        raise Conflict(
-            sentence("Job '%(name)s' was cancelled; launch a new one instead.", name=job.name)
-        )
+        raise Conflict(f"Job '{job.name}' was cancelled; launch a new one instead.")
     loosen_unanswered(job.contestants.all())
 
 
@@ -232,13 +225,7 @@ def _log_launch(
 def check_samples(samples: int) -> None:
     """Refuse what a job can't ask for, with a Conflict."""
     if not 1 <= samples <= MOST_SAMPLES:
-        raise Conflict(
-            sentence(
-                "Samples go from 1 to %(most)s, not %(samples)s.",
-                most=MOST_SAMPLES,
-                samples=samples,
-            )
-        )
+        raise Conflict(f"Samples go from 1 to {MOST_SAMPLES}, not {samples}.")
 
 
 def _contestants(slugs: Sequence[str]) -> list[Contestant]:

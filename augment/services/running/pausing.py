@@ -7,7 +7,6 @@ from django.db import transaction
 
 from augment.errors import Conflict
 from augment.models import Augmentation, GenerationJob
-from augment.sentences import sentence, word
 from augment.services.events import log_event
 from augment.services.running.caps import NO_CAPS, Caps, over_already, raise_cap
 from augment.services.work import change_all
@@ -27,11 +26,8 @@ def pause(job: GenerationJob, *, actor: User | None = None) -> GenerationJob:
         job.refresh_from_db()
         if job.state in GenerationJob.HELD:
             raise Conflict(
-                sentence(
-                    "Job '%(name)s' is %(state)s already: it starts nothing until it is resumed.",
-                    name=job.name,
-                    state=word(job.get_state_display().lower()),
-                )
+                f"Job '{job.name}' is {job.get_state_display().lower()} already: it starts "
+                "nothing until it is resumed."
             )
         raise Conflict(over_already(job))
     log_event(
@@ -75,12 +71,8 @@ def resume(
     if not held.update(state=State.RUNNING):
         job.refresh_from_db()
         raise Conflict(
-            sentence(
-                "Job '%(name)s' is %(state)s; only one that is paused or stopped at its cap can "
-                "be resumed.",
-                name=job.name,
-                state=word(job.get_state_display().lower()),
-            )
+            f"Job '{job.name}' is {job.get_state_display().lower()}; only one that is paused "
+            "or stopped at its cap can be resumed."
         )
     log_event(
         actor=actor,

@@ -7,7 +7,6 @@ from django.db import transaction
 
 from augment.errors import Conflict
 from augment.models import Augmentation, GenerationJob
-from augment.sentences import sentence
 from augment.services.clock import database_now
 from augment.services.events import log_event
 from augment.services.running.causes import rows_of_cause
@@ -39,7 +38,7 @@ def retry_cause(job: GenerationJob, *, key: str, actor: User | None = None) -> G
     state, cause, pks = rows_of_cause(job, key)
     if state not in RETRIED:
         raise Conflict(
-            sentence("Who refused has answered: it is not asked again. Launch a new job instead.")
+            "Who refused has answered: it is not asked again. Launch a new job instead."
         )
     waiting: dict[str, object] = {
         "state": State.QUEUED,

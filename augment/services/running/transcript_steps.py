@@ -15,7 +15,6 @@ from django.db.models import Prefetch
 from augment.llm.cutting import shorten
 from augment.llm.fingerprint import IMAGE_SCHEME
 from augment.models import Attempt, Augmentation, ModelCall, TranscriptNote
-from augment.sentences import Sentence
 from augment.services.running.call_changes import changes_of
 
 LONGEST_SHOWN = 100_000
@@ -49,7 +48,7 @@ class TranscriptStep:
 
     call: ModelCall | None = None
     note: TranscriptNote | None = None
-    changes: tuple[Sentence, ...] = ()
+    changes: tuple[str, ...] = ()
 
     @property
     def messages(self) -> list[SaidMessage]:

@@ -10,7 +10,6 @@ from django.contrib.auth.models import User
 from django.core.files.base import File
 
 from augment.errors import Conflict
-from augment.sentences import sentence
 from augment.services.scenarios.bulk import MOST_ROWS_AT_ONCE, BulkReport, read_rows, report_rows
 from augment.services.scenarios.uploads import plain_name
 
@@ -43,12 +42,8 @@ def add_from_files(
         rows = read_rows(write_plain(table, folder))
         if len(rows) > MOST_ROWS_AT_ONCE:
             raise Conflict(
-                sentence(
-                    "%(number)s rows are too many for a page, at most %(most)s: use manage.py "
-                    "add_scenario --file.",
-                    number=len(rows),
-                    most=MOST_ROWS_AT_ONCE,
-                )
+                f"{len(rows)} rows are too many for a page, at most {MOST_ROWS_AT_ONCE}: use "
+                "manage.py add_scenario --file."
             )
         return report_rows(rows, folder=folder, keeps=keeps, actor=actor)
 

@@ -14,7 +14,6 @@ from augment.scene.intent_statements import list_statements
 from augment.scene.intent_words import (
     IntentOrigin,
 )
-from augment.sentences import Sentence, sentence
 from augment.services.events import log_event
 from augment.services.scenarios.scenes import placeable_intent
 
@@ -33,10 +32,7 @@ def enter_intent(*, scenario: str, document: object, actor: User | None = None) 
     row = _scenario(scenario)
     if row.in_catalogue:
         raise Conflict(
-            sentence(
-                "The intent of '%(scenario)s' is the catalogue's own; change it in its file.",
-                scenario=row.slug,
-            )
+            f"The intent of '{row.slug}' is the catalogue's own; change it in its file."
         )
     return _set(row, placeable_intent(document), IntentOrigin.ENTERED, actor)
 
@@ -53,15 +49,10 @@ def accept_reading(*, scenario: str, actor: User | None = None) -> Scenario:
     row = _scenario(scenario)
     reading = waiting_reading(row)
     if reading is None:
-        raise Conflict(
-            sentence("No reading of '%(scenario)s' waits to be accepted.", scenario=row.slug)
-        )
+        raise Conflict(f"No reading of '{row.slug}' waits to be accepted.")
     if row.in_catalogue:
         raise Conflict(
-            sentence(
-                "The intent of '%(scenario)s' is the catalogue's own; change it in its file.",
-                scenario=row.slug,
-            )
+            f"The intent of '{row.slug}' is the catalogue's own; change it in its file."
         )
     document = placeable_intent(reading.document)
     IntentReading.objects.filter(pk=reading.pk).update(state=State.ACCEPTED)
@@ -79,7 +70,7 @@ def last_reading(scenario: Scenario) -> IntentReading | None:
     return scenario.readings.select_related("endpoint").first()
 
 
-def statements_of(document: object) -> tuple[Sentence, ...]:
+def statements_of(document: object) -> tuple[str, ...]:
     """What an intent document says, as short statements; none where there is no document.
 
     Raises:

@@ -8,7 +8,6 @@ from django.db import transaction
 from augment.errors import Conflict
 from augment.models import Scenario
 from augment.scene.codec import modification_to_document
-from augment.sentences import sentence
 from augment.services.events import log_event
 from augment.services.scenarios.editing import read_edit
 from augment.services.scenarios.scenes import intent_of
@@ -29,10 +28,8 @@ def set_reference(scenario: Scenario, document: object, *, actor: User | None = 
     intent = intent_of(row)
     if modification.is_empty and not (intent and intent.unmet):
         raise Conflict(
-            sentence(
-                "Nothing is added, moved or removed. An empty reference is for wishes that can't "
-                "be met, whose intent says so."
-            )
+            "Nothing is added, moved or removed. An empty reference is for wishes that can't "
+            "be met, whose intent says so."
         )
     return _set(row, modification_to_document(modification), actor)
 
@@ -47,7 +44,7 @@ def drop_reference(scenario: Scenario, *, actor: User | None = None) -> Scenario
     row = Scenario.objects.select_for_update(of=("self",)).get(pk=scenario.pk)
     refuse_catalogue(row)
     if row.reference is None:
-        raise Conflict(sentence("'%(scenario)s' has no reference.", scenario=row.slug))
+        raise Conflict(f"'{row.slug}' has no reference.")
     return _set(row, None, actor)
 
 
@@ -55,10 +52,7 @@ def refuse_catalogue(row: Scenario) -> None:
     """Raise Conflict for a scenario whose files alone change it."""
     if row.in_catalogue:
         raise Conflict(
-            sentence(
-                "The reference of '%(scenario)s' is the catalogue's own; change it in its file.",
-                scenario=row.slug,
-            )
+            f"The reference of '{row.slug}' is the catalogue's own; change it in its file."
         )
 
 

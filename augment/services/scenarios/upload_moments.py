@@ -15,7 +15,6 @@ from augment.render.bev import draw
 from augment.render.camera import camera_for
 from augment.scene.modification import Modification
 from augment.scene.notes import notes_from_document, notes_to_document
-from augment.sentences import Sentence, sentence
 from augment.services.scenarios.pictures import store_as
 from augment.services.scenarios.scene_imports import keep_reading
 from augment.services.scenarios.scene_notes import said_of
@@ -38,7 +37,7 @@ def ask_for_moment(
     offered = {(stop["item"], stop["frame"]) for track in upload.tracks for stop in track["stops"]}
     if (item, frame) not in offered:
         raise Conflict(
-            sentence("“%(name)s” offers no such moment.", name=upload.name),
+            f"“{upload.name}” offers no such moment.",
         )
     row, is_new = UploadMoment.objects.get_or_create(
         upload=upload, item=item, frame=frame, defaults={"asked_by": actor}
@@ -58,7 +57,7 @@ def ask_to_keep(row: UploadMoment, *, slug: str, actor: User | None = None) -> N
     drawn = UploadMoment.objects.filter(pk=row.pk, state=State.DRAWN)
     asked = drawn.update(state=State.KEEPING, slug=slug, reason="", asked_by=actor, sent_at=None)
     if not asked:
-        raise Conflict(sentence("This moment can't be kept now: look at its state."))
+        raise Conflict("This moment can't be kept now: look at its state.")
 
 
 class Moments(WorkKind[UploadMoment]):
@@ -80,7 +79,7 @@ class Moments(WorkKind[UploadMoment]):
 MOMENTS = Moments()
 
 
-def sentences_of(row: UploadMoment) -> list[Sentence]:
+def sentences_of(row: UploadMoment) -> list[str]:
     """What the source left open at this moment."""
     return [said_of(note) for note in notes_from_document((row.report or {}).get("notes", []))]
 

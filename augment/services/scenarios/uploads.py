@@ -22,7 +22,6 @@ from augment.formats.apart import UntrustedInput
 from augment.formats.readers import READERS, reader_of
 from augment.formats.timeline import RecordingPart, Timeline
 from augment.models import SceneUpload
-from augment.sentences import sentence
 from augment.services.events import log_event
 from augment.services.work import Lease, Settlement, WorkKind
 
@@ -62,7 +61,7 @@ def keep_upload(
         digest.update(piece)
         size += len(piece)
     if not size:
-        raise Conflict(sentence("The file is empty."))
+        raise Conflict("The file is empty.")
     row = SceneUpload(
         name=plain_name(name),
         size_bytes=size,
@@ -99,7 +98,7 @@ def read_again(row: SceneUpload) -> None:
         Conflict: It did not fail.
     """
     if not row.wait_again():
-        raise Conflict(sentence("“%(name)s” did not fail.", name=row.name))
+        raise Conflict(f"“{row.name}” did not fail.")
 
 
 class Uploads(WorkKind[SceneUpload]):
@@ -130,7 +129,7 @@ def open_upload(row: SceneUpload) -> Iterator[UntrustedInput]:
             with default_storage.open(row.stored) as source, path.open("wb") as file:
                 shutil.copyfileobj(source, file)
         except FileNotFoundError:
-            raise Conflict(sentence("The file of “%(name)s” is gone.", name=row.name)) from None
+            raise Conflict(f"The file of “{row.name}” is gone.") from None
         yield UntrustedInput(path=path, format=row.asked_format or None)
 
 
