@@ -13,21 +13,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from augment.baselines import quantised, rule_placer
-from augment.baselines.quantised import allowed_by, places_of
-from augment.baselines.quantised_code import Code, Direction, Quadrant, code_of
+from augment.baselines.quantised_code import Code, Direction, code_of
 from augment.baselines.registry import PLACERS
-from augment.errors import CannotPlace
 from augment.scene.entities import AgentType, TrafficAgent
-from augment.scene.intent import (
-    Intent,
-    Side,
-)
-from augment.scene.intent_words import (
-    Shape,
-)
 from bench.displacement import made, measured
 from tests.fixtures.shelf import SLUGS
-from tests.intents import cones, parked, walk
+from tests.intents import parked
 from tests.scenes import scene as street
 
 PARKED = parked(22.0)
@@ -46,22 +37,6 @@ def vehicle(x_m: float, y_m: float, heading_rad: float = 0.0, speed_mps: float =
         speed_mps=speed_mps,
     )
     return code_of(agent, bin_m=5.0)
-
-
-@pytest.mark.parametrize(
-    ("x_m", "y_m", "quadrant"),
-    [
-        (10.0, 1.0, Quadrant.FRONT_LEFT),
-        (-10.0, 1.0, Quadrant.BACK_LEFT),
-        (-10.0, -1.0, Quadrant.BACK_RIGHT),
-        (10.0, -1.0, Quadrant.FRONT_RIGHT),
-        (10.0, 0.0, Quadrant.FRONT_RIGHT),
-    ],
-)
-def test_quadrants_are_counted_as_in_the_prompts(
-    x_m: float, y_m: float, quadrant: Quadrant
-) -> None:
-    assert vehicle(x_m, y_m).quadrant is quadrant
 
 
 @pytest.mark.parametrize(
@@ -117,27 +92,6 @@ def test_the_seed_alone_decides_where() -> None:
     assert x_m(1) == x_m(1)
     assert len({x_m(seed) for seed in range(8)}) > 4
     assert all(20.0 <= x_m(seed) <= 40.0 for seed in range(8))
-
-
-@pytest.mark.parametrize(
-    ("intent", "named"),
-    [
-        (walk(15.0, Side.LEFT), "pedestrians"),
-        (cones(20.0, 6, Shape.TAPER), "cones"),
-    ],
-)
-def test_what_is_no_vehicle_is_refused_by_name(intent: Intent, named: str) -> None:
-    with pytest.raises(CannotPlace, match=f"vehicles alone, and {named} are asked"):
-        quantised.place(street(), intent, bin_m=5.0)
-
-
-def test_what_has_no_place_gives_up_side_and_direction_before_the_distance() -> None:
-    places = places_of(street())
-    code = vehicle(-22.0, 30.0, math.pi / 2.0)
-    allowed, said = allowed_by(code, places, bin_m=5.0)
-    assert said
-    away_m = np.hypot(*places.points_m[allowed].T)
-    assert ((away_m >= 35.0) & (away_m < 40.0)).all()
 
 
 @cache

@@ -8,7 +8,6 @@ from dataclasses import replace
 
 import pytest
 
-from augment.baselines.rule_placer import place
 from augment.geometry.polyline import Polyline
 from augment.scene.entities import AgentType, Lane, Scene, TrafficSide
 from augment.scene.intent import (
@@ -75,13 +74,6 @@ def test_on_a_curve_the_distance_runs_along_the_arc() -> None:
     assert car.heading_rad == pytest.approx(angle, abs=math.radians(1.0))
 
 
-def test_across_a_junction_it_goes_straight_on() -> None:
-    (on_connector,) = added(junction(), parked(30.0))
-    (beyond,) = added(junction(), parked(45.0))
-    assert (on_connector.x_m, on_connector.y_m, on_connector.lane_id) == (30.0, 0.0, "Connector1")
-    assert (beyond.x_m, beyond.lane_id) == (45.0, "Lane2")
-
-
 def test_the_papers_offset_is_drawn_from_its_range_by_the_seed() -> None:
     offsets = [added(scene(), PAPER, seed=seed)[0].y_m for seed in range(40)]
     assert len(set(offsets)) > 30
@@ -122,18 +114,6 @@ def test_a_car_in_the_oncoming_lane_faces_as_its_lane_leads() -> None:
     (car,) = added(scene(), parked(50.0, lane=LaneChoice.ONCOMING, speed_mps=10.0))
     assert (car.x_m, car.y_m, car.lane_id, car.speed_mps) == (50.0, 3.5, "Lane2", 10.0)
     assert abs(car.heading_rad) == pytest.approx(math.pi, abs=1e-4)
-
-
-@pytest.mark.parametrize(("side", "y_m"), [(LaneChoice.LEFT, 3.0), (LaneChoice.RIGHT, -3.0)])
-def test_neighbouring_lanes_are_found_on_the_map(side: LaneChoice, y_m: float) -> None:
-    (car,) = added(three_lanes(), parked(lane=side))
-    assert (car.x_m, car.y_m) == (21.4, y_m)
-
-
-def test_what_stands_in_the_way_is_avoided_by_a_small_shift() -> None:
-    busy = scene(agents=(vehicle("Agent2", 16.4, 0.0),))
-    (car,) = added(busy, parked(21.0, about=True))
-    assert (car.id, car.x_m) == ("Agent3", 21.25)
 
 
 def test_a_place_that_is_taken_is_refused() -> None:
@@ -204,13 +184,3 @@ def test_a_distance_from_another_object_runs_from_where_that_one_is() -> None:
     )
     _, crossing = added(scene(), Intent(requests=(bus, walker)))
     assert crossing.x_m == 26.0
-
-
-def test_notes_say_what_was_placed_by_convention_and_not_at_all() -> None:
-    intent = replace(opened(parked(24.0), spot=spot(24.0, lane=None)), beyond=("a red one",))
-    assert place(scene(), intent).notes == (
-        "A car, standing, 24.0 m ahead of the ego along its lane, in the ego's lane, on the lane "
-        "centre. Left open, so by convention: in the ego's lane; in the middle of the lane; "
-        "facing as the lane leads. Asked for beyond the intent's fields, and not placed: “a red "
-        "one”."
-    )

@@ -9,16 +9,14 @@ import numpy as np
 import pytest
 
 from augment.geometry.boxes import Box, overlap
-from augment.geometry.polyline import Polyline
-from augment.scene.entities import AgentType, Area, AreaKind, Lane
+from augment.scene.entities import AgentType
 from augment.scene.intent import (
     Side,
 )
 from augment.scene.intent_words import (
-    Setting,
     Shape,
 )
-from tests.baselines.placing import added, refusal
+from tests.baselines.placing import added
 from tests.intents import LEFT_EDGE, cones, crash, metres, towards, walk
 from tests.scenes import curve, scene
 
@@ -40,30 +38,6 @@ def test_a_pedestrian_crosses_from_edge_to_edge(
     assert walker.walk_to_m == pytest.approx(end, abs=0.26)
     assert walker.heading_rad == pytest.approx(heading_rad, abs=1e-4)
     assert walker.speed_mps == pytest.approx(math.dist(start, end) / 15.0, abs=0.03)
-
-
-def test_a_walk_ends_at_the_egos_road_where_a_side_road_opens() -> None:
-    mouth = Area(
-        id="Area9",
-        kind=AreaKind.DRIVABLE,
-        boundary_m=((10.0, 5.0), (26.0, 5.0), (26.0, 60.0), (10.0, 60.0)),
-    )
-    side_road = Lane(id="Side", centerline=Polyline([(18.0, 60.0), (18.0, 5.0)]), width_m=3.5)
-    road = scene()
-    opened = scene(lanes=(*road.lanes, side_road), areas=(road.areas[0], road.areas[1], mouth))
-    (walker,) = added(opened, walk(18.0, Side.RIGHT))
-    assert walker.walk_to_m == pytest.approx((18.0, 5.75), abs=0.26)
-
-
-def test_a_parking_lane_belongs_to_the_road() -> None:
-    parking = Area(
-        id="Area9",
-        kind=AreaKind.DRIVABLE,
-        boundary_m=((-50.0, -4.0), (100.0, -4.0), (100.0, -1.75), (-50.0, -1.75)),
-    )
-    wide = scene(areas=(scene().areas[0], parking))
-    (walker,) = added(wide, walk(18.0, Side.RIGHT))
-    assert walker.y_m == pytest.approx(-4.5, abs=0.26)
 
 
 def test_a_taper_closes_the_lane_and_a_worker_stands_behind_it() -> None:
@@ -104,15 +78,3 @@ def test_crashed_cars_touch_at_most_and_leave_little_room(count: int) -> None:
         assert all(overlap(first, second).depth_m == 0.0 for second in boxes[i + 1 :])
     for a, b in itertools.pairwise(cars):
         assert 3.3 < math.dist((a.x_m, a.y_m), (b.x_m, b.y_m)) < 6.0
-
-
-def test_away_from_the_crosswalk_is_checked_along_the_whole_walk() -> None:
-    crosswalk = Area(
-        id="Area9",
-        kind=AreaKind.CROSSWALK,
-        boundary_m=((17.0, 2.0), (19.0, 2.0), (19.0, 4.0), (17.0, 4.0)),
-    )
-    marked = scene(areas=(*scene().areas, crosswalk))
-    near, further = (walk(at_m, Side.RIGHT, Setting.OFF_CROSSWALK) for at_m in (18.0, 24.0))
-    assert "away from the crosswalk" in refusal(marked, near)
-    assert len(added(marked, further)) == 1

@@ -13,7 +13,6 @@ from pyarrow import parquet
 from arena.exports.tables import LeaderboardTable, leaderboard_table
 from arena.exports.writers import FORMATS, plain_text
 from arena.services.cells import csv_text
-from augment.models import Contestant
 from tests.results.old import OLD, stored
 
 pytestmark = pytest.mark.django_db
@@ -64,20 +63,3 @@ def test_best_and_worst_rank_stand_in_every_file(table: LeaderboardTable) -> Non
     for best, worst in wanted:
         assert f" & {best}--{worst}\\\\\n" in tex
         assert f" {best}–{worst}\n" in text
-
-
-def test_the_options_of_each_contestant_stand_in_every_file_with_columns() -> None:
-    snapshot = stored(OLD["snapshot"]["results"])
-    first, *rest = snapshot.standings.order_by("pk")
-    fixed = {"temperature": 0.7, "seed": 3, "protocol": "native"}
-    who = Contestant.objects.create(
-        slug="fixed", name="Fixed", kind=Contestant.Kind.RULE, frozen_options=fixed
-    )
-    snapshot.standings.filter(pk=first.pk).update(contestant=who)
-    table = leaderboard_table(snapshot)
-    wanted = {first.slug: json.dumps(fixed, sort_keys=True)} | {one.slug: "" for one in rest}
-    of_csv = csv.DictReader(io.StringIO(FORMATS["csv"].write(table).decode()))
-    of_json = json.loads(FORMATS["json"].write(table))["standings"]
-    of_parquet = parquet.read_table(io.BytesIO(FORMATS["parquet"].write(table))).to_pylist()
-    for lines in (of_csv, of_json, of_parquet):
-        assert {line["slug"]: line["options"] for line in lines} == wanted

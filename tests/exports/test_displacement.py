@@ -2,14 +2,13 @@ from __future__ import annotations
 
 import csv
 import io
-import json
 from pathlib import Path
 
 import pytest
 from django.core.management import call_command
 
 from arena.exports.displacement_table import DisplacementTable, displacement_table
-from arena.exports.displacement_writers import COLUMNS, FORMATS, csv_bytes, json_bytes
+from arena.exports.displacement_writers import COLUMNS, FORMATS, csv_bytes
 from augment.models import Augmentation, Contestant, GenerationJob
 from augment.scene.catalogue import ScenarioType
 from augment.scene.codec import modification_to_document
@@ -72,22 +71,6 @@ def test_csv_has_a_line_per_type_and_contestant_and_leaves_the_unknown_empty() -
     ann, sim = found[:2]
     assert (ann["median_m"], ann["n"], ann["missing"], ann["surplus"]) == ("2.000", "1", "1", "0")
     assert (sim["median_m"], sim["n"], sim["missing"], sim["simulated"]) == ("", "0", "2", "yes")
-
-
-def test_json_holds_every_single_distance() -> None:
-    document = json.loads(json_bytes(table()))
-    assert document["simulated"] is True
-    single = document["augmentations"][0]
-    assert (single["contestant"], single["scenario"]) == ("ann", "parked")
-    assert single["matches"] == [
-        {
-            "reference": "Agent2",
-            "generated": "Agent2",
-            "class": "traffic cone",
-            "distance_m": 2.0,
-        }
-    ]
-    assert single["missing"] == ["Agent3"]
 
 
 def test_by_object_there_is_a_row_for_each_object_with_both_places() -> None:

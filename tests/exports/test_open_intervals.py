@@ -13,7 +13,7 @@ from django.core.management import call_command
 from pyarrow import parquet
 
 from arena.exports.tables import leaderboard_table
-from arena.exports.writers import FORMATS, plain_text
+from arena.exports.writers import FORMATS
 from arena.models import Snapshot, Study
 from arena.services.ratings import rate
 
@@ -68,17 +68,3 @@ def test_tables_of_every_format_have_the_same_order_bounds_and_reasons(
             "few": FEW,
             "weak": "no lower bound: hardly any score",
         }
-
-
-def test_latex_and_terminal_print_open_ends_and_the_reasons_beneath(snapshot: Snapshot) -> None:
-    table = leaderboard_table(snapshot)
-    latex = FORMATS["latex"].write(table).decode()
-    rows = [line.strip() for line in latex.splitlines() if " & " in line and "textbf" not in line]
-    assert [row.split(" & ")[1] for row in rows] == ["1", "--", "2", "2", "2", "2", "7"]
-    assert rows[0].startswith(r"best & 1 & -- & $\geq$ ")
-    assert r"/+$\infty$ & 6 & " in rows[1]
-    assert r" & -$\infty$/+" in rows[-1]
-    assert rf"\footnotesize few: {FEW}}}\\" in latex
-    text = plain_text(table)
-    assert f"few: {FEW}." in text
-    assert "+∞" in text

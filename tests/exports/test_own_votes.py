@@ -88,23 +88,6 @@ def test_they_count_unless_a_rating_leaves_them_out_and_are_counted_by_reason(
     assert any(vote.judge == code_of(AUTHOR) for vote in votes_of(left).counted)
 
 
-def test_both_versions_are_those_of_the_two_ratings_themselves(study: Study) -> None:
-    mark(study)
-    mark(study, "expert-2", "llama-fc")
-    counted, left = (rate(study=study, rounds=200, seed=3, filters=f) for f in (None, WITHOUT))
-    for version, snapshot in (("with", counted), ("without", left)):
-        itself = {slug: line[:2] for slug, line in table_of(snapshot).items()}
-        assert shown(counted, version) == itself == shown(left, version)
-    found = own_votes(counted)
-    assert (found.left_out, own_votes(left).left_out) == (False, True)
-    assert found.votes == left.votes_left_out["own"] == sum(found.by_judge.values())
-    assert (found.experts, found.of_experts) == (2, 4)
-    moves = {slug: abs(rank - shown(left, "without")[slug][0]) for slug, (rank, _) in
-             shown(counted, "with").items()}  # fmt: skip
-    assert found.largest is not None
-    assert found.largest.places == max(moves.values())
-
-
 def test_the_zip_has_both_versions_but_never_who_is_author(study: Study) -> None:
     mark(study)
     snapshot = rate(study=study, rounds=20, filters=WITHOUT)

@@ -8,7 +8,7 @@ from augment.fake_llm.careless import lay_straight
 from augment.fake_llm.misreading import misread
 from augment.scene.entities import TurnType
 from augment.scene.intent import Intent
-from tests.fixtures.shelf import HARD_SLUGS, SLUGS, entry, shown_scene
+from tests.fixtures.shelf import SLUGS, entry, shown_scene
 
 
 def intent_of(slug: str) -> Intent:
@@ -38,18 +38,5 @@ def test_a_turn_is_passed_over_or_taken_the_other_way(slug: str) -> None:
     assert len(routes) == 3  # straight, the other way, and right but counted from the ego
 
 
-def test_a_distance_from_somebody_is_taken_from_the_ego_or_from_the_first() -> None:
-    spots = [one.requests[0].spot for one in heard("lime-street-between")]
-    assert any(spot.landmark is None for spot in spots)
-    assert any(spot.landmark is not None and spot.landmark.ordinal == 1 for spot in spots)
-
-
 def test_what_can_t_be_met_is_done_anyway_at_times() -> None:
     assert {bool(one.unmet) for one in heard("hairpin-hill-no-bus")} == {True, False}
-
-
-def test_what_lies_past_a_real_turn_is_laid_out_straight_ahead() -> None:
-    slug = "hairpin-hill-van"
-    (van,) = lay_straight(shown_scene(slug), entry(slug).reference).added
-    assert (van.x_m, van.y_m) == pytest.approx((38.0, -0.9), abs=0.05)
-    assert any(slug.startswith("hairpin") for slug in HARD_SLUGS)

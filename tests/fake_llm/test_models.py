@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import math
-
 import pytest
 
 from augment.errors import ContextTruncated, ModelFault
 from augment.fake_llm.models import MODELS
-from augment.fake_llm.server import FakeServer, running
+from augment.fake_llm.server import running
 from augment.variants.transcript import MemoryTranscript
 from tests.fake_llm.asking import outcome
 from tests.intents import intents
-from tests.scenes import curve, scene
+from tests.scenes import scene
 
 WISH = "Add a parked vehicle 21.4 m ahead of the ego in its lane."
 KEY = "sk-planted-4f7a9c0d1e2b3a"
@@ -79,28 +77,3 @@ def test_each_model_comes_to_its_outcome_in_so_many_calls(model: str) -> None:
     else:
         assert all((call.reply is None) != (call.fault is None) for call in transcript.calls)
     assert KEY not in shown + repr(transcript.calls)
-
-
-@pytest.mark.parametrize("distance_m", [13.7, 26.2, 44.9])
-def test_an_unseen_sentence_is_placed_right_on_an_unseen_curve(
-    server: FakeServer, distance_m: float
-) -> None:
-    radius_m = 33.0
-    wish = f"Add a parked vehicle {distance_m} m ahead of the ego in its lane."
-    made = outcome(server, "fake-good", curve(radius_m), wish)
-    assert made.modification is not None
-    (car,) = made.modification.added
-    turned = (distance_m - 10.0) / radius_m
-    true = 10.0 + radius_m * math.sin(turned), radius_m * (1.0 - math.cos(turned))
-    assert math.dist((car.x_m, car.y_m), true) < 0.3
-    assert car.heading_rad == pytest.approx(turned, abs=math.radians(3.0))
-    assert (car.id, car.lane_id, car.speed_mps) == ("Agent2", "Lane1", 0.0)
-
-
-@pytest.mark.parametrize("model", ["fake-good", "fake-careless"])
-def test_what_is_not_understood_is_said_and_changes_nothing(
-    server: FakeServer, model: str
-) -> None:
-    made = outcome(server, model, scene(), "Paint the sky green.")
-    assert (made.status, made.modification) == ("refused", None)
-    assert "I did not understand the instruction" in made.reason

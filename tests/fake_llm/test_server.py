@@ -36,14 +36,6 @@ def test_it_answers_a_conversation_and_the_same_one_the_same(server: FakeServer)
     assert set(answer) == {"id", "object", "created", "model", "choices", "usage"}
 
 
-def test_an_unknown_model_is_a_404_that_names_the_known(server: FakeServer) -> None:
-    status, answer = chat(server, model="gpt")
-    assert status == 404
-    assert isinstance(answer["error"], dict)
-    assert answer["error"]["code"] == "model_not_found"
-    assert "fake-careless" in answer["error"]["message"]
-
-
 def test_a_bad_request_is_a_400_that_names_the_field(server: FakeServer) -> None:
     status, answer = chat(server, colour="red")
     assert status == 400

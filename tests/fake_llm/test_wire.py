@@ -1,12 +1,11 @@
 from __future__ import annotations
 
 import json
-from dataclasses import replace
 
 import pytest
 
-from augment.fake_llm.requests import BadRequest, chat_request, signature_of
-from augment.llm.messages import Message, Request, Speaker, Tool, ToolCall, ToolChoice, data_url
+from augment.fake_llm.requests import BadRequest, chat_request
+from augment.llm.messages import Message, Request, Speaker, data_url
 from augment.render.camera import camera_for
 from tests.render.pictures import draw_original
 from tests.scenes import scene
@@ -70,50 +69,3 @@ def test_a_request_that_breaks_the_rules_is_refused(sent: bytes, param: str | No
     assert str(raised.value)
     if param is not None:
         assert raised.value.param == param
-
-
-TOOL = Tool(name="look", description="Looks.", parameters={"type": "object"})
-CALL = ToolCall(
-    id="call_1",
-    name="look",
-    arguments="{}",
-    extra=json.dumps({"extra_content": {"fake": {"signature": signature_of("call_1")}}}),
-)
-ASKED = Message(speaker=Speaker.USER, text="Where?")
-CALLED = Message(speaker=Speaker.ASSISTANT, text="", calls=(CALL,))
-TOLD = Message(speaker=Speaker.TOOL, text="There.", answers="call_1")
-
-
-def sent_with(*messages: Message, tools: tuple[Tool, ...] = (TOOL,)) -> bytes:
-    request = Request(
-        model="fake-good", messages=messages, tools=tools, tool_choice=ToolChoice.NONE
-    )
-    return json.dumps(request.to_document()).encode()
-
-
-def test_calls_and_their_answers_are_accepted_as_our_client_sends_them() -> None:
-    request = chat_request(sent_with(ASKED, CALLED, TOLD))
-    assert [message.role for message in request.messages] == ["user", "assistant", "tool"]
-    assert request.tool_choice == "none"
-
-
-@pytest.mark.parametrize(
-    ("messages", "said"),
-    [
-        ((ASKED, CALLED), "the call 'call_1' is not answered"),
-        ((ASKED, CALLED, ASKED), "the call 'call_1' is not answered"),
-        ((ASKED, TOLD), "there is no such call"),
-        ((ASKED, CALLED, TOLD, TOLD), "there is no such call"),
-        ((ASKED, replace(CALLED, calls=(replace(CALL, extra=""),)), TOLD), "extra_content"),
-        (
-            (ASKED, replace(CALLED, calls=(replace(CALL, id="call_2"),))),
-            "the signature of a call is missing",
-        ),
-        ((ASKED, replace(CALLED, speaker=Speaker.USER), TOLD), "only an assistant calls tools"),
-    ],
-)
-def test_a_call_is_answered_once_and_comes_back_as_it_was(
-    messages: tuple[Message, ...], said: str
-) -> None:
-    with pytest.raises(BadRequest, match=said):
-        chat_request(sent_with(*messages))

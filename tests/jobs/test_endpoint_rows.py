@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-from datetime import date
 from typing import Any
 
 import pytest
-from django.contrib.auth.models import User
-from django.test import Client
-from django.urls import reverse
 
-from augment.models import Endpoint, EndpointModel, Event
+from augment.models import EndpointModel
 from augment.services.endpoints import contestants
 from augment.services.endpoints.known_endpoints import ensure_endpoint
 
@@ -35,12 +31,6 @@ def form(*models: dict[str, Any], **changes: Any) -> dict[str, Any]:
     return sent
 
 
-@pytest.fixture
-def office(client: Client) -> Client:
-    client.force_login(User.objects.create_superuser("admin", password="x"))
-    return client
-
-
 def problems(page: Any) -> str:
     errors = [str(page.context["adminform"].form.errors)]
     errors += [str(inline.formset.errors) for inline in page.context["inline_admin_formsets"]]
@@ -58,31 +48,3 @@ def test_a_contestant_brings_its_model_which_is_unknown() -> None:
     abilities = (known.native_tools, known.vision, known.json_schema, known.temperature)
     assert abilities == (None, None, None, None)
     assert (known.price_in_usd, known.price_out_usd) == (None, None)
-
-
-def test_an_admin_adds_an_endpoint_with_a_model_and_it_is_logged(office: Client) -> None:
-    model = {
-        "model": "llama3.1",
-        "model_class": "open_weight",
-        "vision": "false",
-        "native_tools": "unknown",
-        "price_in_usd": "0.34",
-        "price_out_usd": "0.39",
-        "price_as_of": "2026-11-20",
-        "price_source": "the host's page",
-    }
-    sent = form(model, base_url="http://vllm:8000/v1/", requests_per_minute="60")
-    page = office.post(reverse("admin:augment_endpoint_add"), sent)
-    assert page.status_code == 302, problems(page)
-    endpoint = Endpoint.objects.get()
-    assert (endpoint.base_url, endpoint.requests_per_minute) == ("http://vllm:8000/v1", 60)
-    known = endpoint.models.get()
-    assert (known.vision, known.native_tools, known.price_as_of) == (
-        False,
-        None,
-        date(2026, 11, 20),
-    )
-    event = Event.objects.get()
-    assert (event.verb, event.actor) == ("add", User.objects.get())
-    assert event.after is not None
-    assert event.after["models"][0]["price_in_usd"] == "0.340000"

@@ -7,7 +7,6 @@ from django.db import connection
 from django.test.utils import CaptureQueriesContext
 
 from arena.services.retrying import retry_cause as retry_unless_shown
-from augment.errors import Conflict
 from augment.models import Augmentation, GenerationJob, ModelCall
 from augment.services.running import jobs, retrying, runner
 from augment.services.running.causes import cause_of, failure_groups
@@ -65,20 +64,6 @@ def test_an_unreadable_answer_is_asked_for_anew_and_not_served_again() -> None:
     assert (row.state, len(model.requests)) == (State.DONE, 3)
     assert not ModelCall.objects.exclude(served_from=None).exists()
     assert list(row.attempts.values_list("outcome", flat=True)) == ["unreadable", "done"]
-
-
-def test_who_refused_is_not_asked_again_and_a_cancelled_job_stays_over() -> None:
-    job = launch(scenarios=2)
-    job.augmentations.update(state=State.REFUSED, reason="It is not safe.")
-    (group,) = failure_groups(job)
-    with pytest.raises(Conflict, match="Who refused has answered"):
-        retrying.retry_cause(job, key=group.key)
-    job.augmentations.update(state=State.FAILED)
-    GenerationJob.objects.update(state=GenerationJob.State.CANCELLED)
-    (group,) = failure_groups(job)
-    with pytest.raises(Conflict, match="was cancelled"):
-        retrying.retry_cause(job, key=group.key)
-    assert job.augmentations.filter(state=State.FAILED).count() == 2, "nothing is half done"
 
 
 def test_the_scenarios_are_held_before_somebody_looks_who_is_shown_a_row() -> None:

@@ -22,7 +22,6 @@ from augment.errors import QueueRefused, QueueUnreachable
 from augment.models import Worker
 from augment.services.clock import DATABASE_TIME
 from augment.services.running.workers import (
-    FAULT_LENGTH,
     Presence,
     RecoveryRounds,
     is_silent,
@@ -123,19 +122,6 @@ def test_the_first_round_that_works_sends_what_waits() -> None:
     for _ in range(3):
         rounds.go_on()
     assert round_.first == [True, True, False]
-
-
-def test_a_fault_is_kept_for_the_pages_until_a_round_works() -> None:
-    rounds = RecoveryRounds(Round(None, KeyError("x" * 1000), None), Presence("here 1"))
-    rounds.go_on()
-    worked_at = Worker.objects.get().recovered_at
-    rounds.go_on()
-    found = workforce()
-    assert (found.living, found.not_recovered_since) == (1, worked_at)
-    assert found.fault.startswith("'xxx")
-    assert len(found.fault) == FAULT_LENGTH
-    rounds.go_on()
-    assert workforce().not_recovered_since is None
 
 
 def test_a_worker_that_hangs_in_a_round_is_noticed() -> None:

@@ -28,7 +28,6 @@ from augment.services.scenarios.catalogue_rules import (
     has_traffic,
     is_hidden,
 )
-from augment.services.scenarios.way_past import WayPast, way_past
 from tests import scenes
 from tests.fixtures.shelf import whole_scene
 from tests.intents import parked, walk
@@ -172,21 +171,3 @@ def test_seven_of_ten_overtakes_meet_oncoming_traffic(busy: int, reasons: int) -
     full = staged(OVERTAKE, vehicle("A", 25.0, 0.0), scene=scenes.scene(agents=others))
     empty = staged(OVERTAKE, vehicle("A", 25.0, 0.0))
     assert len([*find_sparse([full] * busy + [empty] * (10 - busy))]) == reasons
-
-
-@pytest.mark.parametrize(
-    ("added", "way"),
-    [
-        ([pedestrian("W", 18.0, -4.3, (18.0, 6.0))], WayPast.OWN),
-        ([vehicle("A", 20.0, 0.0)], WayPast.ONCOMING),
-        ([vehicle("A", 20.0, -1.65)], WayPast.OWN),
-        ([vehicle("A", 20.0, -1.6)], WayPast.ONCOMING),
-        ([vehicle("A", 20.0, 0.0), vehicle("B", 20.0, 3.5)], WayPast.NONE),
-        ([vehicle("A", 20.0, -2.2), vehicle("B", 20.0, 2.75)], WayPast.OWN),
-        ([vehicle("A", 20.0, -2.2), vehicle("B", 20.0, 2.65)], WayPast.NONE),
-    ],
-)
-def test_the_way_past_is_the_first_lane_that_is_wide_enough(
-    added: list[TrafficAgent], way: WayPast
-) -> None:
-    assert way_past(scenes.scene(), Modification(added=tuple(added))) is way

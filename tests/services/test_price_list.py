@@ -5,16 +5,10 @@ from decimal import Decimal
 
 import pytest
 
-from augment.models import EndpointModel
-from augment.services.endpoints import contestants
 from augment.services.endpoints.price_list import listed_price
 
 NOW = datetime(2026, 11, 20, tzinfo=UTC)
 OPENAI = "https://api.openai.com/v1"
-
-
-def add(slug: str) -> None:
-    contestants.add_contestant(slug=slug, variant="otm", endpoint="openai", model="gpt-4o")
 
 
 def test_a_listed_model_has_a_price_and_a_source() -> None:
@@ -45,20 +39,3 @@ def test_a_price_is_that_of_its_day() -> None:
 )
 def test_what_is_not_listed_is_unknown(base_url: str, model: str) -> None:
     assert listed_price(base_url=base_url, model=model, now=NOW) is None
-
-
-@pytest.mark.django_db
-def test_a_new_contestant_brings_the_listed_price_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("OPENAI_API_KEY", "sk-planted")
-    add("gpt-4o-otm")
-    row = EndpointModel.objects.get()
-    assert (row.price_in_usd, row.price_out_usd) == (Decimal("2.5"), Decimal(10))
-    assert row.price_as_of is not None
-    assert "openai/gpt-4o" in row.price_source
-
-    row.price_in_usd = Decimal(1)
-    row.price_source = "our contract"
-    row.save()
-    add("gpt-4o-again")
-    row.refresh_from_db()
-    assert (row.price_in_usd, row.price_source) == (Decimal(1), "our contract")

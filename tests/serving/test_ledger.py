@@ -105,12 +105,3 @@ def test_the_list_holds_who_lives_and_their_mark(
     assert ledger.environment == {MARK: kept["secret"]}
     again.kill()
     again.wait()
-
-
-def test_a_list_that_can_not_be_read_is_named_and_kept(tmp_path: Path) -> None:
-    path = tmp_path / "serving-1.json"
-    path.write_text("{")
-    said: list[str] = []
-    assert end_orphans(tmp_path, said.append) == 0
-    assert str(path) in said[0]
-    assert path.exists()

@@ -13,7 +13,7 @@ import psutil
 import pytest
 
 from arena.serving.child import Program
-from arena.serving.supervisor import ALIVE_EVERY_S, ChildFailed, Supervisor, wait_s
+from arena.serving.supervisor import ALIVE_EVERY_S, ChildFailed, Supervisor
 from tests.processes import wait_until
 
 SLEEP = "import time; print('up', flush=True); time.sleep(600)"
@@ -158,24 +158,6 @@ def test_who_keeps_crashing_waits_longer_each_time_and_the_others_live_on(clock:
     supervisor.stop()
 
 
-@pytest.mark.parametrize(
-    ("crashes", "seconds"), [(1, 0.0), (2, 1.0), (3, 2.0), (7, 32.0), (8, 60.0), (5000, 60.0)]
-)
-def test_no_wait_is_longer_than_a_minute(crashes: int, seconds: float) -> None:
-    assert wait_s(crashes) == seconds
-
-
-@pytest.mark.parametrize(("ran_s", "crashes"), [(59.9, 4), (60.0, 1)])
-def test_who_ran_for_a_minute_begins_anew(clock: Clock, ran_s: float, crashes: int) -> None:
-    supervisor = Supervisor([program("worker", SLEEP)], Said(), clock=clock)
-    supervisor.start()
-    supervisor._places[0].crashes = 3
-    clock.now += ran_s
-    crash(supervisor, 0)
-    assert supervisor._places[0].crashes == crashes
-    supervisor.stop()
-
-
 DRAINS = """
 import os, signal, sys, time
 def drain(*_):
@@ -204,17 +186,6 @@ def draining(said: Said, may_end: Path) -> tuple[Supervisor, threading.Thread]:
     stopping.start()
     wait_until(lambda: ("worker", "draining") in said.lines, what="it was told to stop")
     return supervisor, stopping
-
-
-def test_a_second_request_to_stop_ends_it_at_once(tmp_path: Path) -> None:
-    said = Said()
-    supervisor, stopping = draining(said, tmp_path / "may-end")
-    with supervisor.signals():
-        for _ in range(2):
-            signal.raise_signal(signal.SIGINT)
-        stopping.join(60)
-    assert not stopping.is_alive()
-    assert ("worker", "drained") not in said.lines
 
 
 def test_a_program_that_does_not_listen_is_killed_with_everything_it_started() -> None:

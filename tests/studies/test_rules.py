@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 from collections import Counter
-from io import StringIO
 
 import pytest
-from django.core.management import CommandError, call_command
 
 from arena.models import Study
 from arena.services.handing_over import hand_over
@@ -86,32 +84,6 @@ def test_a_study_opened_before_these_rules_is_read_without_them() -> None:
     old = ("entries", "experts", "votes_per_expert", "seed", "scenario_gap")
     study.rules = {name: study.rules[name] for name in old}
     assert (rules_of(study).repeat_share, rules_of(study).checks) == (0.0, ())
-
-
-def test_the_command_opens_a_study_with_its_rules_and_says_what_it_planned() -> None:
-    cast = with_checks()
-    out = StringIO()
-    given = ["open_study", "Round 1", "--votes-per-expert", "12", "--seed", "1"]
-    for option, names in cast.items():
-        given += [f"--{option}", *names]  # type: ignore[misc]
-    targets = ["ann vs bob=14", "bob vs cid = 10"]
-    call_command(
-        *given,
-        "--targets",
-        *targets,
-        "--repeats",
-        "25",
-        "--checks",
-        "10",
-        "--both-miss",
-        stdout=out,
-    )
-    said = "24 votes, 6 hidden repeats, 2 attention checks; 0 votes are planned later."
-    assert said in out.getvalue()
-    assert Study.objects.get().allow_both_miss
-    assert not Study.objects.get().allow_text
-    with pytest.raises(CommandError, match="is no target"):
-        call_command(*given, "--targets", "ann lots")
 
 
 def test_checks_drawn_in_another_window_stay_out_of_an_open_study() -> None:

@@ -10,9 +10,8 @@ from django.urls import reverse
 from django.utils import timezone
 
 from arena.models import Matchup, Study
-from arena.pairing.plan import plan
-from arena.services.shown_pictures import SampleRule, draw_sample
-from arena.services.studies import PlanOptions, open_study, rules_of
+from arena.services.shown_pictures import draw_sample
+from arena.services.studies import PlanOptions, open_study
 from augment.errors import Conflict
 from augment.models import Augmentation, Contestant, GenerationJob, Scenario
 from tests.jobs.scripted import Scripted, add, run
@@ -78,26 +77,6 @@ def test_one_sample_of_each_scenario_is_drawn_by_the_seed() -> None:
     sampled()
     found = shown(opened())
     assert found == {(f"place-{n}", DRAWN[n] + 1, DRAWN[n] + 1) for n in range(6)}
-
-
-def test_the_same_rules_give_the_same_plan_with_all_samples_kept_apart() -> None:
-    sampled()
-    study = Study.objects.get(pk=opened(votes=27, samples=SampleRule.ALL).pk)
-    assert shown(study) == {(f"place-{n}", k, k) for n in range(6) for k in (1, 2, 3)}
-    stored = study.matchups.order_by("expert__username", "position")
-    assert [
-        (row.expert.username, f"{row.scenario.slug}#{row.left.sample}", row.left.contestant.slug)
-        for row in stored.select_related("expert", "scenario", "left__contestant")
-    ] == [(one.expert, one.scenario, one.left) for one in plan(rules_of(study)).matchups]
-    # One scenario is one scenario, whichever of its samples is shown.
-    kept = study.rules["scenario_gap_kept"]
-    assert kept == 4
-    for username in ("eva", "finn"):
-        order = list(
-            stored.filter(expert__username=username).values_list("scenario__slug", flat=True)
-        )
-        for width in range(1, kept + 1):
-            assert all(a != b for a, b in zip(order, order[width:], strict=False))
 
 
 def test_options_are_not_mixed_under_one_contestant() -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from django.urls import reverse
 
-from augment.models import Contestant, EndpointModel, Event
+from augment.models import Contestant, Event
 from augment.services.endpoints import contestants
 from augment.services.endpoints.known_endpoints import ensure_endpoint
 from augment.services.running.choosing import resolve_contestants
@@ -25,28 +25,6 @@ def add(slug: str = "one") -> Contestant:
         name=slug.upper(),
         options=ContestantOptions(temperature=0.7, rounds=2),
     )
-
-
-def test_the_page_says_how_it_asks_and_what_is_not_sent() -> None:
-    row = add()
-    EndpointModel.objects.update(temperature=False)
-    admin = signed_in(people()["admin"])
-    shown = admin.get(reverse("contestant", args=[row.code])).content.decode()
-    for words in (
-        "<dt>Temperature</dt><dd>0.7",
-        "Not sent: the model of this role does not take it (modifier, reviewer).",
-        "<dt>Rounds at most</dt><dd>2</dd>",
-        "<dt>Radius</dt><dd>80 m",
-        "in the answer",
-        "It has not run yet",
-    ):
-        assert words in shown
-    assert "<dt>Seed</dt>" not in shown
-    Contestant.objects.update(frozen_options={"seed": 3, "protocol": "native"})
-    shown = admin.get(reverse("contestant", args=[row.code])).content.decode()
-    assert "Fixed at its first run" in shown
-    assert "natively" in shown
-    assert "ONE" in admin.get(reverse("contestants")).content.decode()
 
 
 def test_a_retired_contestant_is_offered_no_more_and_keeps_its_page() -> None:

@@ -62,17 +62,3 @@ def test_a_row_that_cannot_be_read_says_so_instead_of_breaking_its_page() -> Non
     shown = page_of(row)
     assert "The checks could not run." in shown
     assert "its stored modification can&#x27;t be read" in shown
-
-
-def test_the_page_offers_one_row_an_object_and_its_files_open() -> None:
-    job = a_job()
-    analyst = signed_in(people()["analyst"])
-    shown = analyst.get(reverse("job", args=[job.code])).content.decode()
-    for form, kind in (("csv", "text/csv"), ("json", "application/json"), ("parquet", "parquet")):
-        url = reverse("displacement-export", args=[job.code, form]) + "?by=object"
-        assert url in shown
-        answer = analyst.get(url)
-        assert kind in answer["Content-Type"]
-        assert f"displacement-objects.{form}" in answer["Content-Disposition"]
-    missing = reverse("displacement-export", args=[job.code, "pdf"]) + "?by=object"
-    assert analyst.get(missing).status_code == 404

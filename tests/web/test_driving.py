@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import json
 from collections.abc import Callable
 
 import pytest
@@ -62,19 +61,6 @@ def test_the_jobs_page_shows_scores_and_on_request_the_papers() -> None:
     assert "reported in the paper" in shown
     assert "51.9" in shown
     assert "compare contestants" in shown
-
-
-def test_a_drive_stands_beside_the_scene_before_its_change() -> None:
-    before, *_, row = driven(launched())
-    analyst = signed_in(people()["analyst"])
-    shown = analyst.get(reverse("drive", args=[row.code])).content.decode()
-    assert shown.count("<canvas") == 2
-    for one in (before, row):
-        assert reverse("drive-file", args=[one.code, "json"]) in shown
-    trace = json.loads(analyst.get(reverse("drive-file", args=[row.code, "json"])).content)
-    assert trace["format"] == "scenario-arena/drive"
-    assert len(trace["plans"][0]["scores"]) == 10
-    assert analyst.get(reverse("drive", args=[before.code])).content.decode().count("<canvas") == 1
 
 
 @pytest.mark.parametrize(

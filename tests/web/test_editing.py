@@ -63,28 +63,6 @@ def test_a_drawn_reference_is_kept_and_shown(analyst: Client) -> None:
     assert here.reference is None
 
 
-def test_the_checks_answer_while_one_draws(analyst: Client) -> None:
-    here = busy()
-    url = reverse("edit-check", args=[here.code])
-
-    def ask(**body: object) -> dict[str, object]:
-        answer = analyst.post(url, json.dumps(body), content_type="application/json")
-        found: dict[str, object] = answer.json()
-        return found
-
-    found = ask(modification=json.loads(CAR), snap="Added1")
-    assert found["problem"] == ""
-    assert found["modification"]["add"][0]["y_m"] == 0.0  # type: ignore[index]
-    assert "lines" in found
-    assert "Agent8" in str(ask(modification={**json.loads(CAR), "remove": ["Agent8"]})["problem"])
-    assert "expected an object" in str(ask()["problem"])
-    for body in ("", "[]", "[" * 100_000):
-        answer = analyst.post(url, body, content_type="application/json")
-        assert (answer.status_code, "no JSON" in answer.json()["problem"]) == (422, True)
-    here.refresh_from_db()
-    assert here.reference is None
-
-
 def test_an_augmentation_is_corrected_and_both_say_so(analyst: Client) -> None:
     row = launch().augmentations.get()
     runner.work_on(augmentation_pk=row.pk)

@@ -98,25 +98,3 @@ def test_every_row_is_found_by_its_word(admin: Client, name: str) -> None:
     assert nothing.count(mark) == 0
     assert "Nothing is like that." in nothing
     assert page(admin, name, "?q=%00").count(mark) == LISTS[name][1]
-
-
-@pytest.mark.parametrize(
-    ("name", "query", "found"),
-    [
-        ("jobs", "?state=running", 0),
-        ("jobs", "?state=finished&q=00", 11),
-        ("jobs", "?state=no-state&q=00", 11),
-        ("studies", "?state=open&q=00", 11),
-        ("studies", "?state=cancelled", 0),
-        ("contestants", "?kind=rule&q=who-00", 10),
-        ("contestants", "?kind=llm&q=who-00", 0),
-        ("contestants", "?offered=retired", 0),
-        ("scenarios", f"?type={Scenario.Type.JAYWALKER.value}&q=street-00", 5),
-        ("scenarios", "?set=own&q=street-00", 10),
-        ("scenarios", "?set=paper&q=street-00", 0),
-        ("scenarios", "?q=Place 77 cones", 1),
-    ],
-)
-def test_filters_narrow_a_list(admin: Client, name: str, query: str, found: int) -> None:
-    add_many()
-    assert page(admin, name, query).count(LISTS[name][0]) == found

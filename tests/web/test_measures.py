@@ -69,21 +69,6 @@ def test_they_are_the_same_bytes_whoever_drew_the_pictures() -> None:
     assert all(len(answers) == 1 for answers in by_scenario.values())
 
 
-def test_the_ruler_learns_the_edges_of_the_lane_in_the_language_of_the_page() -> None:
-    first = matchups_of(measured_study(), "eva")[0]
-    eva = signed_in(User.objects.get(username="eva"))
-    view = view_shown(first)
-    (ego_x, ego_y), scale = view["ego_px"], view["px_per_m"]
-    place = {"x": ego_x + 10.0 * scale, "y": ego_y - 1.35 * scale}
-    said = eva.get(address(first), place).json()
-    assert said == {"words": "0.4 m from the left edge of its lane, 3.1 m from the right"}
-    german = eva.get(address(first), place, HTTP_ACCEPT_LANGUAGE="de").json()["words"]
-    assert german == "0.4 m vom linken Rand seines Fahrstreifens, 3.1 m vom rechten"
-    assert eva.get(address(first), place | {"y": 1e6}).json() == {"words": "on no lane"}
-    for wrong in ({"x": "1"}, {"x": "1", "y": "nan"}, {"x": "a", "y": "1"}):
-        assert eva.get(address(first), wrong).status_code == 422
-
-
 def test_a_pair_is_measured_by_its_expert_alone() -> None:
     first = matchups_of(measured_study(), "eva")[0]
     assert signed_in(User.objects.get(username="finn")).get(address(first)).status_code == 404

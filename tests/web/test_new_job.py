@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from decimal import Decimal
 from typing import Any
 
 import pytest
@@ -11,12 +10,10 @@ from django.core.files.uploadedfile import SimpleUploadedFile
 from django.test import Client
 from django.urls import reverse
 
-from augment.models import Contestant, Endpoint, EndpointModel, GenerationJob, ModelCall
-from augment.services.running import jobs, runner
+from augment.models import Contestant, Endpoint, EndpointModel, GenerationJob
+from augment.services.running import jobs
 from augment.services.running.caps import Caps
-from augment.services.running.estimates import estimate
 from tests.jobs import rows
-from tests.jobs.models import COMPLETION_TOKENS, PROMPT_TOKENS, Model, llama_job
 from tests.web.cast import people, signed_in
 
 pytestmark = pytest.mark.django_db
@@ -90,29 +87,6 @@ def test_what_can_not_be_launched_is_said_and_nothing_is_made(
     assert words in send(admin, **given)
     assert not GenerationJob.objects.exists()
     assert not Contestant.objects.filter(endpoint=models).exists()
-
-
-def ran() -> GenerationJob:
-    """Two scenarios answered by llama, at 2 seconds a call."""
-    job = llama_job(scenarios=2, price="1")
-    for row in job.augmentations.all():
-        runner.work_on(augmentation_pk=row.pk, connect=Model())
-    ModelCall.objects.update(latency_s=2.0)
-    return job
-
-
-def test_what_is_answered_already_is_reused_and_counts_for_nothing() -> None:
-    ran()
-    rows.add_scenario("street-3")
-    where = ["street-1", "street-2", "street-3"]
-    found = estimate(["llama"], where)
-    assert (found.rows, found.answered, found.calls[1]) == (3, 2, 1)
-    assert (found.tokens_in, found.tokens_out) == (PROMPT_TOKENS, COMPLETION_TOKENS)
-    assert found.usd == Decimal(PROMPT_TOKENS + COMPLETION_TOKENS) / 10**6
-    twice = estimate(["llama"], where, samples=2)
-    assert (twice.answered, twice.calls[1]) == (2, 4), "a second sample was never asked"
-    ModelCall.objects.update(prompt_version="000000000000")
-    assert estimate(["llama"], where).answered == 0, "other prompts, other requests"
 
 
 def test_one_scenario_is_tried_first_and_the_rest_is_remembered(

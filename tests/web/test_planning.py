@@ -45,20 +45,6 @@ def test_the_page_is_usable_without_any_study() -> None:
     assert "No number of votes reaches it" in shown  # ±25 with effects so large
 
 
-def test_it_leads_to_a_new_study_that_is_filled_in() -> None:
-    study = study_rows.a_study()
-    admin = signed_in(people()["admin"])
-    asked: dict[str, str | int] = {"study": str(study.code), "votes_per_expert": 12, "repeats": 10}
-    shown = admin.get(reverse("study-plan"), asked).content.decode()
-    start = shown.index(reverse("study-new"))
-    address = shown[start : shown.index('"', start)].replace("&amp;", "&")
-    form = admin.get(address).content.decode()
-    assert 'name="votes_per_expert" type="number" min="1" max="10000" required value="12"' in form
-    assert 'name="repeats" type="number" min="0" max="50" step="any" value="10"' in form
-    for kind, slug in (("contestants", "ann"), ("experts", "eva"), ("scenarios", "place-0")):
-        assert f'name="{kind}" value="{slug}" checked' in form
-
-
 def test_an_open_study_gives_its_numbers_but_nothing_of_its_results() -> None:
     study = _voted()
     rate(study=study, early=True)

@@ -92,18 +92,6 @@ def test_scenarios_outside_of_the_study_come_first_and_its_own_where_those_are_t
     assert len(set(slugs)) == 5
 
 
-def test_who_skips_the_practice_is_not_asked_again() -> None:
-    study = opened()
-    client = signed_in(eva())
-    client.get(page(study))
-    answered = client.post(practice(study), {"skip": "1"})
-    assert answered.headers["Location"] == page(study)
-    assert client.get(page(study)).status_code == 200
-    assert client.get(practice(study)).status_code == 302
-    finn = signed_in(User.objects.get(username="finn"))
-    assert finn.get(page(study)).status_code == 302, "that was only eva's round"
-
-
 def test_a_second_answer_to_a_pair_changes_nothing() -> None:
     study = opened()
     client = signed_in(eva())

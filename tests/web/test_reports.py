@@ -38,22 +38,6 @@ def test_the_studys_page_names_side_and_mark_and_leads_an_admin_to_the_pair() ->
     assert address(row) not in signed_in(cast["analyst"]).get(page).content.decode()
 
 
-@pytest.mark.parametrize(("side", "marked"), [("left", [0]), ("right", [1]), ("both", [0, 1])])
-def test_the_mark_lies_in_the_pictures_that_the_report_names(side: str, marked: list[int]) -> None:
-    here = world()
-    row = told(here, side=side, mark=(0.25, 0.5))
-    shown = signed_in(people()["admin"]).get(address(row)).content.decode()
-    pictures = re.findall(r'<figure class="picture reported">.*?</figure>', shown, re.S)
-    tokens = row.matchup.left_token, row.matchup.right_token
-    for place, (picture, token) in enumerate(zip(pictures, tokens, strict=True)):
-        assert f"/i/{token}" in picture
-        # The window of the rows of tests is 1200 by 800 pixels.
-        assert ('cx="300.0" cy="400.0"' in picture) == (place in marked)
-        assert ("badge is-warn" in picture) == (place in marked)
-    assert "The truck is cut off." in shown
-    assert row.matchup.scenario.instruction in shown
-
-
 def test_an_admin_who_votes_in_the_open_study_is_not_told_who_made_it() -> None:
     here = world()
     row = told(here)

@@ -12,19 +12,15 @@ from django.urls import reverse
 from arena.queries.scenarios import by_type
 from augment.models import BaseScene, GenerationJob, Scenario
 from augment.scene.codec import modification_to_document
-from augment.scene.intent_codec import intent_to_document
-from augment.scene.intent_words import Shape
 from augment.scene.modification import Modification
 from augment.services.running.choosing import resolve_scenarios
 from augment.services.scenarios.scene_pictures import draw_scenario, draw_scene
-from tests.intents import cones
 from tests.jobs.rows import add_scenario
 from tests.scenes import cone
 from tests.study_rows import a_study
 from tests.web.cast import people, signed_in
 
 pytestmark = pytest.mark.django_db
-RING = json.dumps(intent_to_document(cones(25.0, 8, Shape.RING)))
 CHANGE = json.dumps(modification_to_document(Modification(added=(cone("Added1", 9.0, 0.0),))))
 ROWS = """scene,type,type_label,instruction,slug,reference
 street-scene,cut_in,Cut-in,Let a car cut in.,one,
@@ -51,17 +47,6 @@ def send(client: Client, scene: BaseScene, **fields: str) -> tuple[str, Scenario
     answer = client.post(reverse("scenario-new", args=[scene.code]), given, follow=True)
     made = Scenario.objects.exclude(slug="street").first()
     return answer.content.decode(), made
-
-
-def test_the_picture_of_the_scene_stands_beside_the_form(
-    analyst: Client, scene: BaseScene
-) -> None:
-    url = reverse("scenario-new", args=[scene.code])
-    assert "A worker is drawing it." in analyst.get(url).content.decode()
-    shown = analyst.get(url).content.decode()
-    for view in ("kept", "cleared"):
-        assert reverse("picture", args=[view, scene.code]) in shown
-    assert url in analyst.get(reverse("scene", args=[scene.code])).content.decode()
 
 
 def test_a_scenario_of_a_type_of_one_s_own_with_an_intent_by_fields(
@@ -137,21 +122,6 @@ def test_a_file_is_tried_then_added(analyst: Client) -> None:
     change.seek(0)
     assert "2 scenarios are added." in upload(analyst, ROWS, documents=change)
     assert Scenario.objects.get(slug="two").reference is not None
-
-
-def test_an_intent_is_changed_by_fields(analyst: Client, scene: BaseScene) -> None:
-    _, made = send(analyst, scene, type="jaywalking_pedestrian", intent=RING)
-    assert made is not None
-    page = reverse("intent-edit", args=[made.code])
-    assert 'name="i_shape"' in analyst.get(page).content.decode()
-    row = {"i_kind": "vehicles", "i_count": "1", "i_distance_m": "30", "i_relation": "ahead"}
-    refused = analyst.post(page, row).content.decode()
-    assert "leaves open whether they stand" in refused
-    assert 'value="30"' in refused
-    analyst.post(page, row | {"i_speed_mps": "0"})
-    made.refresh_from_db()
-    assert made.intent is not None
-    assert [one["kind"] for one in made.intent["requests"]] == ["vehicles"]
 
 
 def test_what_nothing_needs_is_deleted_and_else_is_said_what_needs_it(scene: BaseScene) -> None:

@@ -87,24 +87,6 @@ def test_a_study_is_opened_with_all_its_rules() -> None:
     assert study.rules["appearances"] == [["ann", 20], ["bob", 15], ["cid", 13]]
 
 
-@pytest.mark.parametrize(
-    ("rules", "sentence"),
-    [
-        ({"targets": "ann lots"}, "is no target: write CONTESTANT NUMBER"),
-        ({"targets": "ann 20"}, "Each contestant of the study needs one target: bob, cid."),
-        ({"targets": "ann vs bob 9"}, "The targets add up to 9 votes"),
-        ({"repeats": "80"}, "less than or equal to 50"),
-        ({"adaptive": "50", "targets": "ann vs bob 24"}, "none are left for an adaptive part"),
-    ],
-)
-def test_rules_that_make_no_sense_are_said_on_the_form(
-    rules: dict[str, str], sentence: str
-) -> None:
-    status, shown = opened(**rules)
-    assert (status, sentence in shown) == (422, True), shown
-    assert not Study.objects.exists()
-
-
 def test_an_admin_hands_over_what_an_expert_has_not_judged() -> None:
     study = study_rows.a_study(experts=("eva", "finn", "gus"))
     admin = signed_in(people()["admin"])
