@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import uuid
+from collections.abc import Callable
+from dataclasses import fields
 from functools import partial
 from typing import Any
 
@@ -19,13 +21,22 @@ from arena.api.studies import HIGHEST_SEED, get_study
 from arena.api.views import ApiView, keep_and_send
 from arena.exports.tables import LeaderboardTable, leaderboard_table
 from arena.models import Snapshot, Study
+from arena.models.ratings import STORED
 from arena.pairing.order import MAIN, REPEAT
 from arena.queries.results import must_read_results
 from arena.queries.vote_sets import Filters
 from arena.rating.bootstrap import Unit
-from arena.rating.leaderboard import Intervals, Method
+from arena.rating.leaderboard import Intervals, Line, Method
 from arena.services.ratings import DEFAULT_ROUNDS, MOST_ROUNDS, is_big, plan_snapshot, rate
 from augment.services.scenarios.types import type_choices
+
+_FIELDS: dict[str, Callable[[], serializers.Field[Any, Any, Any, Any]]] = {
+    "str": serializers.CharField,
+    "int": serializers.IntegerField,
+    "int | None": partial(serializers.IntegerField, allow_null=True),
+    "float | None": partial(serializers.FloatField, allow_null=True),
+}
+"""By the type of a line's field."""
 
 
 class StandingDocument(serializers.Serializer[Any]):
@@ -35,20 +46,17 @@ class StandingDocument(serializers.Serializer[Any]):
     name = serializers.CharField()
     kind = serializers.CharField()
     simulated = serializers.BooleanField()
-    rank = serializers.IntegerField(allow_null=True)
-    rank_best = serializers.IntegerField(allow_null=True)
-    rank_worst = serializers.IntegerField(allow_null=True)
-    elo = serializers.FloatField(allow_null=True)
-    lower = serializers.FloatField(allow_null=True)
-    upper = serializers.FloatField(allow_null=True)
-    votes = serializers.IntegerField()
-    wins = serializers.IntegerField()
-    ties = serializers.IntegerField()
-    losses = serializers.IntegerField()
-    note = serializers.CharField()
     part = serializers.IntegerField(
         help_text="Ratings compare only those with the same number here."
     )
+
+    def get_fields(self) -> dict[str, serializers.Field[Any, Any, Any, Any]]:
+        """Return these and all stored fields of a line."""
+        kinds = {column.name: _FIELDS[str(column.type)] for column in fields(Line)}
+        stored = {name: kinds[name]() for name in STORED}
+        stored["elo"] = serializers.FloatField(source="rating", allow_null=True)
+        del stored["rating"]
+        return {**super().get_fields(), **stored}
 
 
 class TableDocument(serializers.Serializer[Any]):

@@ -33,7 +33,7 @@ def interval_chart(table: LeaderboardTable, *, file_format: str) -> bytes:
             label.set_color(SIMULATED if row.simulated else INK)
         axes.set_xlabel(_label(table), color=INK)
         rating_axis(axes, len(table.rows))
-        ratings = [row.elo for row in table.rows if row.elo is not None]
+        ratings = [row.rating for row in table.rows if row.rating is not None]
         span = (min(ratings), max(ratings)) if ratings else None
         marks = interval_ticks((row.interval for row in table.rows), span)
         if marks:

@@ -2,7 +2,7 @@
 
 In: a table and a row of it. Out: the value of each column, with its name wherever it stands. A new
 column is an entry at the end of COLUMNS, so that what reads files by position goes on; one that is
-stored needs a field of `Standing` with its migration, of `arena.rating.lines.Line` and of `Row`.
+stored needs a field of `arena.rating.lines.Line` and, with a migration, of `Standing`.
 """
 
 from __future__ import annotations
@@ -61,8 +61,8 @@ COLUMNS = (
     _column("rank", WHOLE, unit=PLACE, printed="Rank", page="Rank",
             text=attrgetter("rank_text")),
     _column("model", printed="Model", page="Contestant", identifies=True),
-    _column("elo", NUMBER, unit=ELO_POINTS, key="rating", printed="Elo", page="Elo",
-            text=attrgetter("elo_text")),
+    _column("elo", NUMBER, "rating", unit=ELO_POINTS, key="rating", printed="Elo",
+            page="Elo", text=attrgetter("elo_text")),
     _column("lower", NUMBER, unit=ELO_POINTS),
     _column("upper", NUMBER, unit=ELO_POINTS),
     Column(value=attrgetter("interval_text"), unit=ELO_POINTS, printed="95% CI",

@@ -103,7 +103,7 @@ def _displacement(snapshot: Snapshot, table: LeaderboardTable) -> Plot:
     points = [
         _rated(n, row, far)
         for n, row in enumerate(table.rows, start=1)
-        if row.elo is not None and (far := metres.get(row.slug)) is not None
+        if row.rating is not None and (far := metres.get(row.slug)) is not None
     ]
     return Plot(across=METRES, up=ELO, points=points, unit=" m")
 
@@ -121,7 +121,9 @@ def _cost(snapshot: Snapshot, table: LeaderboardTable) -> dict[str, Plot]:
         by_name[f"elo-{what}"] = Plot(
             across=label,
             up=ELO,
-            points=[_rated(n, row, x, group) for n, row, x, group in rows if row.elo is not None],
+            points=[
+                _rated(n, row, x, group) for n, row, x, group in rows if row.rating is not None
+            ],
             unit=unit,
             is_log=True,
         )
@@ -141,8 +143,8 @@ def _cost(snapshot: Snapshot, table: LeaderboardTable) -> dict[str, Plot]:
 
 
 def _rated(number: int, row: Row, x: float, group: str = "") -> Given:
-    assert row.elo is not None
-    return _given(number, row, x=x, y=row.elo, interval=(row.lower, row.upper), group=group)
+    assert row.rating is not None
+    return _given(number, row, x=x, y=row.rating, interval=(row.lower, row.upper), group=group)
 
 
 def _given(

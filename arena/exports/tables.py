@@ -8,15 +8,10 @@ from dataclasses import dataclass, replace
 from django.db.models import F
 
 from arena.models import Snapshot, Standing
+from arena.models.ratings import stored_values
 from arena.queries.vote_sets import LeftOut
-from arena.rating.printed import (
-    interval_text,
-    notes_by_reason,
-    places_text,
-    rank_text,
-    rating_text,
-    whole_percent,
-)
+from arena.rating.lines import Line
+from arena.rating.printed import notes_by_reason
 from arena.rating.rules import METHOD_TEXTS, UNIT_TEXTS, Intervals
 from arena.services.hypotheses import Answered, answer_hypotheses
 from arena.services.preregistration import preregistration_sha256
@@ -35,77 +30,24 @@ def shown_name(name: str, is_simulated: bool) -> str:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Row:
-    """One contestant's line.
+class Row(Line):
+    """One contestant's line, and who that is; `name` is what people know.
 
     Attributes:
-        model: The name people know, with "(simulated)" where that is so.
-        variant: The recipe's name as it ends the model's name, empty without.
-        rank, elo, lower, upper: None where the votes do not determine them; each bound can stand
-            without the other one and without a rating.
-        note: Why one of these is missing.
+        variant: The recipe's name as it ends the contestant's name, empty without.
         options: How it asked, a JSON object with sorted names; empty for who asks no model.
-        part: Ratings and ranks compare only those with the same number here.
     """
 
-    model: str
-    variant: str
     slug: str
     kind: str
     simulated: bool
-    rank: int | None
-    elo: float | None
-    lower: float | None
-    upper: float | None
-    votes: int
-    wins: int
-    ties: int
-    losses: int
-    note: str
-    rank_best: int | None = None
-    rank_worst: int | None = None
-    part: int = 0
+    variant: str = ""
     options: str = ""
 
     @property
-    def name(self) -> str:
-        """The name alone, for pages that mark what is simulated by a badge."""
-        return self.model.removesuffix(SIMULATED)
-
-    @property
-    def interval(self) -> tuple[float | None, float | None, float | None]:
-        """Lower bound, rating and upper bound, each None where it is not determined."""
-        return self.lower, self.elo, self.upper
-
-    @property
-    def score_percent(self) -> int:
-        """The mean score of a vote in percent, a tie half; 0 without votes."""
-        return whole_percent((self.wins + self.ties / 2) / self.votes) if self.votes else 0
-
-    @property
-    def rank_text(self) -> str:
-        """The rank, or two hyphens without one."""
-        return rank_text(self.rank)
-
-    @property
-    def ranks_text(self) -> str:
-        """The places that are left with all pairs judged at once: 1–3, or 1 alone."""
-        return places_text(self.rank_best, self.rank_worst)
-
-    @property
-    def elo_text(self) -> str:
-        """The rating as a whole number."""
-        return rating_text(self.elo)
-
-    @property
-    def interval_text(self) -> str:
-        """The interval: ±55, or -9/+11 around the printed rating."""
-        return interval_text(self.elo, self.lower, self.upper)
-
-    @property
-    def has_bound(self) -> bool:
-        """Whether there is an interval, be it open on one side."""
-        return self.lower is not None or self.upper is not None
+    def model(self) -> str:
+        """The name, with "(simulated)" where that is so."""
+        return shown_name(self.name, self.simulated)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -189,7 +131,7 @@ class LeaderboardTable:
     @property
     def has_parts(self) -> bool:
         """Whether there are groups that can't be compared with each other."""
-        return len({row.part for row in self.rows if row.elo is not None}) > 1
+        return len({row.part for row in self.rows if row.rating is not None}) > 1
 
 
 def intervals_text(table: LeaderboardTable) -> str:
@@ -268,22 +210,12 @@ def _row(standing: Standing, part: int) -> Row:
     name, variant = standing.name, standing.variant
     last_word = name.rpartition(" ")[2]
     return Row(
-        model=shown_name(name, standing.is_simulated),
+        name=name,
         variant=last_word if variant and last_word.lower() == variant.lower() else "",
         slug=standing.slug,
         kind=standing.kind,
         simulated=standing.is_simulated,
-        rank=standing.rank,
-        elo=standing.rating,
-        lower=standing.lower,
-        upper=standing.upper,
-        votes=standing.votes,
-        wins=standing.wins,
-        ties=standing.ties,
-        losses=standing.losses,
-        note=standing.note,
-        rank_best=standing.rank_best,
-        rank_worst=standing.rank_worst,
         part=part,
         options=_options(standing),
+        **stored_values(standing),
     )

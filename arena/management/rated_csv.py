@@ -17,12 +17,8 @@ from arena.rating.printed import HEADS as PAPERS_HEADS
 from arena.rating.printed import (
     caption_text,
     escape,
-    interval_text,
     latex_table,
     notes_by_reason,
-    places_text,
-    rank_text,
-    rating_text,
 )
 from arena.rating.ranking import Separation
 from arena.rating.rules import METHOD_TEXTS
@@ -110,11 +106,11 @@ def _cells(rated: RatedCsv) -> Iterator[tuple[str, ...]]:
     for line in rated.standings:
         yield (
             line.name,
-            rank_text(line.rank),
-            rating_text(line.rating),
-            interval_text(line.rating, line.lower, line.upper),
+            line.rank_text,
+            line.elo_text,
+            line.interval_text,
             str(line.votes),
-            places_text(line.rank_best, line.rank_worst),
+            line.ranks_text,
         )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
 from typing import TYPE_CHECKING, Any
 
 from django.conf import settings
@@ -10,6 +11,7 @@ from django.db.models import F, Q
 from django.utils import timezone
 
 from arena.models.studies import Study
+from arena.rating.lines import Line
 from arena.results.codec import read_results, results_document
 from arena.results.tree import Results
 from augment.models import AppendOnly, Contestant, Work
@@ -114,7 +116,8 @@ class Snapshot(Work):
 class Standing(models.Model):
     """One line of a snapshot. Null ratings mean that the votes do not determine them.
 
-    Names are kept as they were; without a contestant the votes came from elsewhere.
+    Names are kept as they were; without a contestant the votes came from elsewhere. What is called
+    as a field of `arena.rating.lines.Line` holds its value.
     """
 
     snapshot = models.ForeignKey(Snapshot, on_delete=models.CASCADE, related_name="standings")
@@ -150,6 +153,18 @@ class Standing(models.Model):
 
     def __str__(self) -> str:
         return f"{self.rank} {self.slug}"
+
+
+_COLUMNS = {column.name for column in Standing._meta.local_fields}
+STORED = tuple(
+    name for column in fields(Line) if (name := column.name) != "name" and name in _COLUMNS
+)
+"""The fields of a line that a snapshot stores; names in a board are slugs."""
+
+
+def stored_values(line: Line | Standing) -> dict[str, Any]:
+    """Return what a line says in the fields that are stored."""
+    return {name: getattr(line, name) for name in STORED}
 
 
 class EarlyLook(AppendOnly):

@@ -93,7 +93,7 @@ def resample(
 
 def rounds_to_draw(votes: Comparisons, counts: PairCounts, rounds: int) -> int:
     """How many of the rounds: fewer where one takes long, 200 at least."""
-    each = len(votes) + 3 * len(counts.low) + len(votes.names) ** 2
+    each = max(len(votes) + 3 * len(counts.low), len(votes.names) ** 2)
     return min(rounds, max(FEWEST_ROUNDS, _WORK // max(each, 1)))
 
 

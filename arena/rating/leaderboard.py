@@ -14,13 +14,15 @@ Votes that were grouped elsewhere go into `Comparisons` directly, with their `co
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+import math
+from dataclasses import dataclass, field, fields, replace
 from typing import Any, TypeVar
 
 import numpy as np
 
-from arena.rating import elo
+from arena.rating import elo, remarks
 from arena.rating.bootstrap import Unit
+from arena.rating.bradley_terry import MEAN_ELO
 from arena.rating.comparisons import (
     Comparisons,
     FloatArray,
@@ -31,7 +33,7 @@ from arena.rating.comparisons import (
     tally,
 )
 from arena.rating.connectivity import Diagnosis, Status, diagnose
-from arena.rating.lines import Line, blank_lines, fill, rank_across
+from arena.rating.lines import Line
 from arena.rating.logistic import Coefficient
 from arena.rating.parts import Rated, rate_part
 from arena.rating.ranking import Separation
@@ -45,7 +47,7 @@ from arena.rating.rules import (
     TooManyContestants,
     default_intervals,
 )
-from arena.rating.tiers import standing_order, tiers
+from arena.rating.tiers import Tiers, outer_bounds, ranks_across, standing_order, tiers
 
 __all__ = ["Intervals", "Leaderboard", "Line", "Method", "Order", "Unit", "anchor_board", "rate"]
 
@@ -53,6 +55,7 @@ T = TypeVar("T", bound=str)
 
 ROUNDS = 10_000
 PAPER_ROUNDS = 1000
+_NO_VOTES = "no votes"
 FEWEST_TO_JUDGE = 5
 """With three experts equals were told apart in up to 9 % of simulated studies."""
 
@@ -209,11 +212,11 @@ def _rate(votes: Comparisons, rules: Rules) -> Leaderboard:
         key=lambda part: (chains.group_of[part[0]], above[part[0]], part),
     )
     rated = [rate_part(inside, rules, diagnosis.status) for inside in split_votes(counting, parts)]
-    lines = blank_lines(votes.names, counted.tolist(), present, diagnosis)
+    lines = _blank_lines(votes.names, counted.tolist(), present, diagnosis)
     for number, (part, found) in enumerate(zip(parts, rated, strict=True)):
-        fill(lines, [present[member] for member in part], number, found)
+        _fill(lines, [present[member] for member in part], number, found)
     if len(chains.sizes) > len(chains.groups()):
-        rank_across(lines, present, across, rules)
+        _rank_across(lines, present, across, rules)
     order = standing_order(across, [lines[index] for index in present])
     whole = rated[0] if len(rated) == 1 and len(parts[0]) == len(present) else None
     return Leaderboard(
@@ -308,3 +311,73 @@ def _joined(
         if found.covariance is not None:
             joined[np.ix_(members, members)] = found.covariance
     return joined
+
+
+# --- Lines, filled part by part ------------------------------------------------------------------
+
+
+def _blank_lines(
+    names: tuple[str, ...], counted: list[list[int]], present: list[int], diagnosis: Diagnosis
+) -> list[Line]:
+    """The lines without ratings; whoever is alone in a part keeps the note that says why."""
+    notes = dict(zip(present, diagnosis.notes, strict=False))
+    return [
+        Line(
+            name=name,
+            votes=sum(row),
+            wins=row[0],
+            ties=row[1],
+            losses=row[2],
+            part=-1,
+            note=notes.get(index, "") if any(row) else _NO_VOTES,
+        )
+        for index, (name, row) in enumerate(zip(names, counted, strict=True))
+    ]
+
+
+def _fill(lines: list[Line], members: list[int], number: int, found: Rated) -> None:
+    """Put the numbers of a part into its lines."""
+    names = [column.name for column in fields(Line)]
+    columns = {name: getattr(found, name, None) for name in names}
+    known = {name: column for name, column in columns.items() if column is not None}
+    for place, index in enumerate(members):
+        values: dict[str, Any] = {
+            name: _known(name, column[place].item()) for name, column in known.items()
+        }
+        note = found.notes[place] if found.notes else ""
+        lines[index] = replace(lines[index], part=number, note=note, **values)
+
+
+def _known(column: str, value: float) -> float | None:
+    """None for a bound that is not a number and a withheld rank."""
+    missing = value == 0 if column.startswith("rank") else math.isnan(value)
+    return None if missing else value
+
+
+def _rank_across(lines: list[Line], present: list[int], across: Tiers, rules: Rules) -> None:
+    """Ranks over all parts that met, and what the votes say of those who are alone in theirs."""
+    counting = [lines[index] for index in present]
+    inner = np.array([line.rank or 0 for line in counting])
+    lower, upper = (
+        np.array([_from_mean(line, bound) for line in counting]) for bound in ("lower", "upper")
+    )
+    ranks = ranks_across(across, inner, lower, upper).tolist()
+    least, most = outer_bounds(across)
+    for place, (index, line) in enumerate(zip(present, counting, strict=True)):
+        rank = ranks[place] or None
+        note = remarks.note_with_rank(line.note, rank)
+        moved: dict[str, Any] = {
+            "rank": rank, "rank_best": None, "rank_worst": None, "note": note
+        }  # fmt: skip
+        if line.rating is None and rules.method is Method.BRADLEY_TERRY:
+            moved["lower"] = _known("lower", MEAN_ELO + least[place].item())
+            moved["upper"] = _known("upper", MEAN_ELO + most[place].item())
+        lines[index] = replace(line, **moved)
+
+
+def _from_mean(line: Line, bound: str) -> float:
+    """How far a bound is from the mean of its part; zero for who is alone in one."""
+    if line.part < 0:
+        return 0.0
+    value: float | None = getattr(line, bound)
+    return math.nan if value is None else value - MEAN_ELO

@@ -1,21 +1,20 @@
-"""The lines of a board: one a contestant, filled part by part."""
+"""A line of the rated table, the same everywhere.
+
+A snapshot stores the fields that `arena.models.Standing` has as well; files, pages and the API
+show them.
+"""
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import dataclass
 
-import numpy as np
-
-from arena.rating import remarks
-from arena.rating.bradley_terry import MEAN_ELO
-from arena.rating.connectivity import Diagnosis
-from arena.rating.parts import Rated
-from arena.rating.rules import Method, Rules
-from arena.rating.tiers import Tiers, outer_bounds, ranks_across
-
-_NO_VOTES = "no votes"
+from arena.rating.printed import (
+    interval_text,
+    places_text,
+    rank_text,
+    rating_text,
+    whole_percent,
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -51,68 +50,37 @@ class Line:
     part: int = 0
     note: str = ""
 
+    @property
+    def interval(self) -> tuple[float | None, float | None, float | None]:
+        """Lower bound, rating and upper bound, each None where it is not determined."""
+        return self.lower, self.rating, self.upper
 
-def blank_lines(
-    names: tuple[str, ...], counted: list[list[int]], present: list[int], diagnosis: Diagnosis
-) -> list[Line]:
-    """The lines without ratings; whoever is alone in a part keeps the note that says why."""
-    notes = dict(zip(present, diagnosis.notes, strict=False))
-    return [
-        Line(
-            name=name,
-            votes=sum(row),
-            wins=row[0],
-            ties=row[1],
-            losses=row[2],
-            part=-1,
-            note=notes.get(index, "") if any(row) else _NO_VOTES,
-        )
-        for index, (name, row) in enumerate(zip(names, counted, strict=True))
-    ]
+    @property
+    def score_percent(self) -> int:
+        """The mean score of a vote in percent, a tie half; 0 without votes."""
+        return whole_percent((self.wins + self.ties / 2) / self.votes) if self.votes else 0
 
+    @property
+    def rank_text(self) -> str:
+        """The rank, or two hyphens without one."""
+        return rank_text(self.rank)
 
-def fill(lines: list[Line], members: list[int], number: int, found: Rated) -> None:
-    """Put the numbers of a part into its lines."""
-    for place, index in enumerate(members):
-        values: dict[str, Any] = {
-            column: _known(column, values[place].item())
-            for column, values in found.columns().items()
-            if values is not None
-        }
-        note = found.notes[place] if found.notes else ""
-        lines[index] = replace(lines[index], part=number, note=note, **values)
+    @property
+    def ranks_text(self) -> str:
+        """The places that are left with all pairs judged at once: 1–3, or 1 alone."""
+        return places_text(self.rank_best, self.rank_worst)
 
+    @property
+    def elo_text(self) -> str:
+        """The rating as a whole number."""
+        return rating_text(self.rating)
 
-def _known(column: str, value: float) -> float | None:
-    """None for a bound that is not a number and a withheld rank."""
-    missing = value == 0 if column.startswith("rank") else math.isnan(value)
-    return None if missing else value
+    @property
+    def interval_text(self) -> str:
+        """The interval: ±55, or -9/+11 around the printed rating."""
+        return interval_text(self.rating, self.lower, self.upper)
 
-
-def rank_across(lines: list[Line], present: list[int], across: Tiers, rules: Rules) -> None:
-    """Ranks over all parts that met, and what the votes say of those who are alone in theirs."""
-    counting = [lines[index] for index in present]
-    inner = np.array([line.rank or 0 for line in counting])
-    lower, upper = (
-        np.array([_from_mean(line, bound) for line in counting]) for bound in ("lower", "upper")
-    )
-    ranks = ranks_across(across, inner, lower, upper).tolist()
-    least, most = outer_bounds(across)
-    for place, (index, line) in enumerate(zip(present, counting, strict=True)):
-        rank = ranks[place] or None
-        note = remarks.note_with_rank(line.note, rank)
-        moved: dict[str, Any] = {
-            "rank": rank, "rank_best": None, "rank_worst": None, "note": note
-        }  # fmt: skip
-        if line.rating is None and rules.method is Method.BRADLEY_TERRY:
-            moved["lower"] = _known("lower", MEAN_ELO + least[place].item())
-            moved["upper"] = _known("upper", MEAN_ELO + most[place].item())
-        lines[index] = replace(line, **moved)
-
-
-def _from_mean(line: Line, bound: str) -> float:
-    """How far a bound is from the mean of its part; zero for who is alone in one."""
-    if line.part < 0:
-        return 0.0
-    value: float | None = getattr(line, bound)
-    return math.nan if value is None else value - MEAN_ELO
+    @property
+    def has_bound(self) -> bool:
+        """Whether there is an interval, be it open on one side."""
+        return self.lower is not None or self.upper is not None

@@ -35,6 +35,8 @@ _SAME = 1e-6
 class Rated:
     """What came out for contestants rated together; arrays are (C,), None where undetermined.
 
+    What is called as a field of `lines.Line` goes into the lines of the table.
+
     Attributes:
         lower, upper: NaN where the votes set no such bound.
         rank: 0 where it is withheld.
@@ -63,12 +65,6 @@ class Rated:
     def is_open(self) -> bool:
         """Whether somebody has an interval without one of its ends, or none beside others'."""
         return self.lower is not None and any(self.notes)
-
-    def columns(self) -> dict[str, np.ndarray | None]:
-        """What goes into the lines of the table, by the name that it has there."""
-        names = ("rating", "lower", "upper", "rank", "rank_best", "rank_worst")
-        checks = ("check_lower", "check_upper")
-        return {name: getattr(self, name) for name in names + checks}
 
 
 def rate_part(votes: Comparisons, rules: Rules, status: Status) -> Rated:

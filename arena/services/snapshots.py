@@ -12,6 +12,7 @@ from django.db import transaction
 from django.utils import timezone
 
 from arena.models import Snapshot, Standing
+from arena.models.ratings import stored_values
 from arena.queries.judged import AUTOMATIC, Entrant, Judged, is_imported
 from arena.queries.vote_sets import Filters, VoteSet, vote_set
 from arena.rating.bootstrap import Unit
@@ -187,17 +188,7 @@ def _store_lines(snapshot: Snapshot, board: Leaderboard, entrants: tuple[Entrant
             variant=one.variant,
             kind=one.kind,
             is_simulated=one.is_simulated,
-            rank=line.rank,
-            rank_best=line.rank_best,
-            rank_worst=line.rank_worst,
-            rating=line.rating,
-            lower=line.lower,
-            upper=line.upper,
-            votes=line.votes,
-            wins=line.wins,
-            ties=line.ties,
-            losses=line.losses,
-            note=line.note,
+            **stored_values(line),
         )
         for one, line in zip(entrants, board.lines, strict=True)
     )

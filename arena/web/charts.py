@@ -108,11 +108,11 @@ def interval_chart(table: Sequence[Row], span: Span | None = None) -> IntervalCh
                 name=shorten_name(line.name, LONGEST_NAME),
                 y=TOP + ROW * (n + 0.5),
                 low_x=LEFT if line.lower is None else at(line.lower),
-                x=None if line.elo is None else at(line.elo),
+                x=None if line.rating is None else at(line.rating),
                 high_x=RIGHT if line.upper is None else at(line.upper),
                 is_open_low=line.lower is None,
                 is_open_high=line.upper is None,
-                value=line.interval_text if line.elo is None else line.elo_text,
+                value=line.interval_text if line.rating is None else line.elo_text,
                 title=_title(line),
                 is_simulated=line.simulated,
             )
@@ -162,12 +162,12 @@ def bars(
 
 def _title(line: Row) -> str:
     """What the chart says of a line when asked."""
-    if line.elo is None or line.lower is None or line.upper is None:
+    if line.rating is None or line.lower is None or line.upper is None:
         numbers = f"{with_minus(line.elo_text)} ({with_minus(line.interval_text)})"
         return f"{line.model}: {numbers}"
     return "{name}: {rating}, 95 % from {low} to {high}".format(
         name=line.model,
-        rating=with_minus(f"{line.elo:.0f}"),
+        rating=with_minus(f"{line.rating:.0f}"),
         low=with_minus(f"{line.lower:.0f}"),
         high=with_minus(f"{line.upper:.0f}"),
     )

@@ -29,7 +29,7 @@ def standings(snapshot: Snapshot, table: LeaderboardTable) -> Context:
     claims, check = snapshot.results.claims, _cross_check(snapshot, table)
     return {
         "columns": ON_PAGE,
-        "bars": bars([(row.slug, row.lower, row.elo, row.upper) for row in table.rows]),
+        "bars": bars([(row.slug, row.lower, row.rating, row.upper) for row in table.rows]),
         "largest_move": max(moves, default=None),
         "removal": removal,
         "rival": removal and names[removal.rival].name,
@@ -75,7 +75,7 @@ def types(snapshot: Snapshot, table: LeaderboardTable) -> Context:
     for part in snapshot.results.types:
         rows = [_row(line, names[line.slug]) for line in part.lines if line.votes]
         if not snapshot.results.board.order:  # of an earlier version
-            rows.sort(key=lambda row: (row.elo is None, -(row.elo or 0.0), row.slug))
+            rows.sort(key=lambda row: (row.rating is None, -(row.rating or 0.0), row.slug))
         reasons = (part.status,) if part.reasons is None else part.reasons
         parts.append(
             {
@@ -136,7 +136,7 @@ def _row(line: TypeStanding, row: Row) -> Row:
         rank=line.rank,
         rank_best=None,
         rank_worst=None,
-        elo=line.rating,
+        rating=line.rating,
         lower=line.lower,
         upper=line.upper,
         votes=line.votes,

@@ -86,7 +86,7 @@ def test_the_table_reads_back_from_parquet(snapshot: Snapshot) -> None:
     assert (first["model"], first["rank"], first["elo"]) == (
         table.rows[0].model,
         table.rows[0].rank,
-        table.rows[0].elo,
+        table.rows[0].rating,
     )
 
 

@@ -20,13 +20,13 @@ PAPER = (
 
 def row(model: str, variant: str = "", **changes: object) -> Row:
     made = Row(
-        model=model,
+        name=model,
         variant=variant,
         slug=model.lower(),
         kind="llm",
         simulated=False,
         rank=1,
-        elo=1000.0,
+        rating=1000.0,
         lower=990.0,
         upper=1010.0,
         votes=10,
@@ -62,7 +62,7 @@ def papers_rows() -> list[Row]:
             name,
             variant,
             rank=rank,
-            elo=elo + 0.2,
+            rating=elo + 0.2,
             lower=float(elo - low),
             upper=float(elo + up),
             votes=votes,
@@ -141,7 +141,7 @@ def test_no_cell_is_a_formula(start: str) -> None:
 
 
 def test_a_negative_rating_is_a_number_not_a_formula() -> None:
-    assert parsed(table(row("x", elo=-12.5)))[0]["elo"] == "-12.50"
+    assert parsed(table(row("x", rating=-12.5)))[0]["elo"] == "-12.50"
 
 
 def test_json_has_everything_that_makes_the_table_again() -> None:
@@ -168,5 +168,5 @@ def test_json_has_everything_that_makes_the_table_again() -> None:
 
 @pytest.mark.parametrize("name", FORMATS)
 def test_every_format_is_byte_identical_for_the_same_table(name: str) -> None:
-    given = table(*papers_rows(), row("No $votes", elo=None, lower=None, upper=None, rank=None))
+    given = table(*papers_rows(), row("No $votes", rating=None, lower=None, upper=None, rank=None))
     assert FORMATS[name].write(given) == FORMATS[name].write(given)

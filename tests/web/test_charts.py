@@ -13,8 +13,8 @@ from arena.web.charts import LEFT, RIGHT, interval_chart
 def line(name: str, elo: float | None, spread: float = 20.0) -> Row:
     lower, upper = (None, None) if elo is None else (elo - spread, elo + spread)
     return Row(
-        model=name, variant="", slug=name.lower(), kind="rule", simulated=False, rank=1,
-        elo=elo, lower=lower, upper=upper, votes=3, wins=1, ties=1, losses=1, note="",
+        name=name, variant="", slug=name.lower(), kind="rule", simulated=False, rank=1,
+        rating=elo, lower=lower, upper=upper, votes=3, wins=1, ties=1, losses=1, note="",
     )  # fmt: skip
 
 

@@ -98,7 +98,7 @@ def test_bars_share_one_axis_and_stay_on_it() -> None:
 def test_the_heat_map_mirrors_scores_and_marks_what_is_few() -> None:
     def row(slug: str) -> Row:
         return Row(
-            model=slug, variant="", slug=slug, kind="rule", simulated=False, rank=1, elo=1000.0,
+            name=slug, variant="", slug=slug, kind="rule", simulated=False, rank=1, rating=1000.0,
             lower=None, upper=None, votes=1, wins=0, ties=1, losses=0, note="",
         )  # fmt: skip
 
