@@ -13,14 +13,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import cache
 
-from augment.baselines.simulated_faults import (
-    HEADING_KINDS,
-    LOGIC_KINDS,
-    POSITION_KINDS,
-    FaultKind,
-    inject_fault,
-)
-from augment.baselines.simulated_road import jitter, move_along
 from augment.checks import Ground
 from augment.checks.against_intent import check_against_intent
 from augment.checks.finding import FaultClass
@@ -28,7 +20,15 @@ from augment.metrics.fault_guess import first_guess
 from augment.scene.ego_route import EgoRoute
 from augment.scene.intent import Intent
 from augment.scene.modification import Modification
+from bench.faults import (
+    HEADING_KINDS,
+    LOGIC_KINDS,
+    POSITION_KINDS,
+    FaultKind,
+    inject_fault,
+)
 from bench.report import table
+from bench.shifts import jitter, move_along
 from tests.fixtures.shelf import SLUGS, entry, shown_scene
 
 LABELS = {

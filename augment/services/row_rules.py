@@ -11,7 +11,6 @@ from typing import Any
 
 from django.db import models
 
-from augment.baselines.simulated import Rates
 from augment.errors import InvalidDocument
 from augment.models import (
     Augmentation,
@@ -87,8 +86,6 @@ def _check_contestant(row: Contestant) -> None:
     for role, chosen in row.roles.items():
         ModelRole(role)
         one_line(f"roles.{role}", chosen["model"], what="contestant")
-    if row.error_rates is not None:
-        Rates(**row.error_rates)
 
 
 def _check_job(row: GenerationJob) -> None:

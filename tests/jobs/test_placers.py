@@ -6,6 +6,7 @@ from typing import Any
 
 import pytest
 
+from augment.errors import Conflict
 from augment.models import Augmentation, Contestant
 from augment.scene.codec import modification_to_document
 from augment.scene.intent import Intent
@@ -59,3 +60,11 @@ def test_the_quantised_baselines_place_vehicles_and_tell_their_codes(slug: str) 
     assert row.state == State.DONE
     assert "Agent2: front right, 20 to " in row.notes
     assert "direction same, stands" in row.notes
+
+
+def test_simulated_errors_of_an_earlier_version_run_no_more() -> None:
+    add_kind("someone", Contestant.Kind.SIMULATED)
+    Contestant.objects.filter(slug="someone").update(error_rates={"position": 0.1})
+    add_scenario("street")
+    with pytest.raises(Conflict, match="A job can't run someone"):
+        jobs.launch(name="R", contestants=["someone"], scenarios=["street"])

@@ -6,9 +6,9 @@ import inspect
 
 import pytest
 
-from augment.baselines.simulated_faults import FaultKind
 from augment.checks.against_intent import check_against_intent
 from augment.checks.finding import FaultClass
+from bench.faults import FaultKind
 from bench.injected_faults import Tally, measure, shifted_share
 
 COUNT = 150

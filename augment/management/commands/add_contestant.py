@@ -1,4 +1,4 @@
-"""Register a language model that runs one variant, or simulated errors."""
+"""Register a language model that runs one variant."""
 
 from __future__ import annotations
 
@@ -8,14 +8,12 @@ from typing import Any
 from django.core.management.base import CommandError
 from django.db import transaction
 
-from augment.baselines.simulated import PRESETS, Rates, rates_of
-from augment.errors import AugmentError, InvalidDocument
+from augment.errors import AugmentError
 from augment.management.arguments import add_option_arguments, options_of_arguments
 from augment.models import Contestant
 from augment.services.endpoints.contestants import (
     add_contestant,
     add_like,
-    add_simulated,
     ensure_builtin,
 )
 from augment.services.endpoints.known_endpoints import ensure_endpoint
@@ -25,10 +23,6 @@ from augment.variants.transcript import ModelRole
 
 ROLES = (ModelRole.REVIEWER, ModelRole.ENGINEER, ModelRole.VIEWER)
 
-_OF_MODELS = (
-    *("variant", "endpoint", "model", *(role.value for role in ROLES)),
-    *("base_url", "key_variable", "simulated", "move_key", "like"),
-)
 _COPIED = ("variant", "endpoint", "model")
 
 
@@ -37,8 +31,7 @@ class Command(TerminalCommand):
 
     help = (
         "Register a language model that runs one variant. With --base-url the endpoint is made "
-        "in the same call; `--endpoint openai` needs no address where OPENAI_API_KEY is set. "
-        "With --errors instead of all that: the reference with simulated errors at set rates."
+        "in the same call; `--endpoint openai` needs no address where OPENAI_API_KEY is set."
     )
 
     def add_arguments(self, parser: ArgumentParser) -> None:
@@ -52,11 +45,6 @@ class Command(TerminalCommand):
             metavar="SLUG",
             help="take variant, endpoint, model, roles and options from this contestant, but for "
             "what is given beside it; with the prompts that are installed",
-        )
-        parser.add_argument(
-            "--errors",
-            metavar="RATES",
-            help=f"{', '.join(PRESETS)}, or shares: position=0.1,heading=0.05,logic=0.1,format=0",
         )
         parser.add_argument("--name", help="what people read; default: model and variant")
         for role in ROLES:
@@ -87,14 +75,8 @@ class Command(TerminalCommand):
     def handle(self, *args: Any, **options: Any) -> None:
         """Make the endpoint if an address is given, then the contestant."""
         needed = [name for name in ("variant", "endpoint", "model") if not options[name]]
-        if options["errors"] is None and options["like"] is None and needed:
-            raise CommandError(f"Name {_flags(needed)} for a language model, or --errors instead.")
-        given = [name for name in _OF_MODELS if options[name]]
-        given += [name for name in options if name.startswith("option_") and options[name]]
-        if options["errors"] is not None and given:
-            raise CommandError(
-                f"--errors asks no language model, so it goes without {_flags(given)}."
-            )
+        if options["like"] is None and needed:
+            raise CommandError(f"Name {_flags(needed)}, or a contestant by --like.")
         of_endpoints = [
             name for name in ("key_variable", "simulated", "move_key") if options[name]
         ]
@@ -115,9 +97,6 @@ class Command(TerminalCommand):
     def _add(self, options: dict[str, Any]) -> Contestant:
         """Endpoint and contestant, or neither of them."""
         ensure_builtin()
-        if options["errors"] is not None:
-            rates = _rates(options["errors"])
-            return add_simulated(slug=options["slug"], rates=rates, name=options["name"])
         if options["base_url"]:
             ensure_endpoint(
                 label=options["endpoint"],
@@ -150,25 +129,6 @@ class Command(TerminalCommand):
 
 def _flags(names: list[str]) -> str:
     return ", ".join(f"--{name.removeprefix('option_').replace('_', '-')}" for name in names)
-
-
-def _rates(written: str) -> Rates:
-    """A preset by its name, or shares by the names of their classes.
-
-    Raises:
-        InvalidDocument: It is neither.
-    """
-    if written in PRESETS:
-        return PRESETS[written]
-    shares: dict[str, object] = {}
-    for part in written.split(","):
-        name, _, value = part.partition("=")
-        try:
-            shares[name.strip()] = float(value)
-        except ValueError:
-            problem = f"{value!r} is no number; presets: {', '.join(PRESETS)}"
-            raise InvalidDocument("set of error rates", [(name.strip(), problem)]) from None
-    return rates_of(shares)
 
 
 def _seat(written: str) -> tuple[str | None, str]:

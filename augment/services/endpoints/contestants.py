@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict
 
 from django.contrib.auth.models import User
 from django.db import transaction
 
 from augment.baselines.registry import PLACERS
-from augment.baselines.simulated import Rates
 from augment.errors import Conflict, UnknownName
 from augment.models import Contestant, Endpoint
 from augment.services.endpoints.known_endpoints import find_endpoint
@@ -165,46 +163,6 @@ def add_like(
         spoken=chosen,
         actor=actor,
     )
-
-
-@transaction.atomic
-def add_simulated(
-    *, slug: str, rates: Rates, name: str | None = None, actor: User | None = None
-) -> Contestant:
-    """A contestant that knows the reference and gets it wrong at set rates.
-
-    Args:
-        slug: Lower-case letters, digits and hyphens.
-        rates: How often it makes which class of error.
-        name: What people read; it says that the errors are simulated when None.
-        actor: Who adds it.
-
-    Raises:
-        InvalidDocument: The slug or the name can't be used.
-        Conflict: The slug belongs to another contestant.
-    """
-    check_slug(slug, what="contestant")
-    shares = ", ".join(f"{share:.0%} {kind}" for kind, share in asdict(rates).items() if share)
-    title = f"Simulated errors ({shares or 'none'})"[:LONGEST_NAME]
-    if name is not None:
-        title = one_line("name", name, what="contestant")
-    wanted: dict[str, object] = {
-        "name": title,
-        "kind": Kind.SIMULATED,
-        "error_rates": asdict(rates),
-    }
-    contestant, made = Contestant.objects.get_or_create(slug=slug, defaults=wanted)
-    if made:
-        log_event(
-            actor=actor,
-            verb="add",
-            object_kind="contestant",
-            object_code=contestant.code,
-            after={"slug": slug, **wanted},
-        )
-    else:
-        _refuse_another(contestant, wanted, named=name is not None)
-    return contestant
 
 
 # --- Private -----------------------------------------------------------------------------------

@@ -19,14 +19,15 @@ Kind = Contestant.Kind
 
 _KINDS = (Kind.REFERENCE, Kind.RULE, Kind.LLM, Kind.SIMULATED)
 
-RUNNABLE = Q(kind__in=_KINDS) | Q(kind=Kind.BASELINE, slug__in=PLACERS)
-"""Whom a job can run; what humans and outside baselines made is imported."""
+RUNNABLE = Q(kind__in=_KINDS, error_rates=None) | Q(kind=Kind.BASELINE, slug__in=PLACERS)
+"""Whom a job can run. What humans and outside baselines made is imported; the simulated errors of
+earlier versions are kept, but run no more."""
 
 
 def is_runnable(contestant: Contestant) -> bool:
     """Whether it is one of RUNNABLE."""
     is_ours = contestant.kind == Kind.BASELINE and contestant.slug in PLACERS
-    return contestant.kind in _KINDS or is_ours
+    return (contestant.kind in _KINDS and contestant.error_rates is None) or is_ours
 
 
 def find_obstacle(contestant: Contestant) -> str:
@@ -98,9 +99,7 @@ def refuse_impossible(who: Sequence[Contestant], where: Sequence[Scenario]) -> N
         if unaskable is not None:
             raise Conflict(unaskable)
     _refuse_without_sight(who)
-    references = [
-        row.slug for row in who if row.kind == Kind.REFERENCE or row.error_rates is not None
-    ]
+    references = [row.slug for row in who if row.kind == Kind.REFERENCE]
     without = [row.slug for row in where if row.reference is None]
     if references and without:
         raise Conflict(

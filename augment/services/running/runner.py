@@ -16,7 +16,6 @@ from django.conf import settings
 from django.db import Error, OperationalError
 from django.db.models import QuerySet
 
-from augment.baselines import simulated
 from augment.baselines.registry import PLACERS, RULE_PLACER, PlaceIntent
 from augment.errors import (
     AugmentError,
@@ -236,8 +235,6 @@ def _asked(row: Augmentation, scene: Scene, held: Held, connect: Connect | None)
             return _from_placer(row, PLACERS[RULE_PLACER].place, scene)
         case Kind.BASELINE if row.contestant.slug in PLACERS:
             return _from_placer(row, PLACERS[row.contestant.slug].place, scene)
-        case Kind.SIMULATED if row.contestant.error_rates is not None:
-            return _from_errors(row, scene, row.contestant.error_rates, held)
         case Kind.LLM | Kind.SIMULATED if row.contestant.endpoint is not None:
             return _from_model(row, row.contestant.endpoint, scene, held, connect)
     return Answer(
@@ -266,24 +263,6 @@ def _from_placer(row: Augmentation, place: PlaceIntent, scene: Scene) -> Answer:
 def _drawn(row: Augmentation, what: str) -> str:
     """What a draw depends on: each sample has one of its own, and the first is as ever."""
     return what if row.sample == 1 else f"{what}#{row.sample}"
-
-
-def _from_errors(row: Augmentation, scene: Scene, rates: dict[str, object], held: Held) -> Answer:
-    """The reference with the errors of a simulated contestant; their label is kept apart."""
-    reference = reference_of(row.scenario)
-    if reference is None:
-        return Answer(state=State.FAILED, reason="The scenario has no reference modification.")
-    made = simulated.simulate(
-        scene,
-        reference,
-        simulated.rates_of(rates),
-        seed=seed_of(_drawn(row, f"{row.contestant.slug}/{row.scenario.slug}")),
-    )
-    label = {"class": made.fault_class, "fault": made.fault}
-    held.note(injected=label)
-    if made.modification is None:
-        return Answer(state=State.UNREADABLE, reason=made.reason)
-    return Answer(state=State.DONE, modification=made.modification)
 
 
 def _from_model(
