@@ -108,6 +108,8 @@ def settle(*, call_pk: int, used: Used, now: Moment, answer: dict[str, Any] | No
         settled_at=now,
         **(answer or {}),
     )
+    if call.attempt_id is None:
+        return  # a reading sums up its calls itself
     job = GenerationJob.objects.filter(augmentations__attempts=call.attempt_id)
     if call.settled_at is None:
         job.update(
@@ -132,7 +134,7 @@ def settle_unseen(*, now: Moment, row_pk: int) -> int:
     """Settle the calls in flight of a row that nobody will see the end of.
 
     What was sent may have been answered and billed, so its worst case counts. What still waited
-    for its place was not sent, and can't be any more: see `RowTranscript.sending`.
+    for its place was not sent, and can't be any more: see `CallTranscript.sending`.
 
     Returns:
         How many there were.

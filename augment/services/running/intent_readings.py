@@ -3,26 +3,21 @@
 from __future__ import annotations
 
 from contextlib import AbstractContextManager
-from dataclasses import dataclass
-from typing import Any
 
 from django.conf import settings
 from django.contrib.auth.models import User
 from django.db import transaction
-from django.utils import timezone
 
 from augment.errors import (
     BudgetSpent,
     Conflict,
+    LeaseLost,
     ModelFault,
-    NotSent,
     ReplyUnreadable,
     UnknownName,
 )
 from augment.llm.client import ChatClient
-from augment.llm.costs import Price, WorstCase, worst_case
-from augment.llm.fingerprint import image_reference, request_hash
-from augment.llm.messages import Reply, Request
+from augment.llm.costs import Price, WorstCase
 from augment.models import Endpoint, IntentReading, ModelCall, Scenario
 from augment.scene.intent_codec import intent_to_document
 from augment.services.endpoints.call_limits import Queue
@@ -32,11 +27,10 @@ from augment.services.endpoints.wires import wire_to
 from augment.services.events import log_event
 from augment.services.running import answers, budget
 from augment.services.running.caps import Caps
-from augment.services.running.transcripts import sentence_of
-from augment.services.texts import make_document_storable, make_storable
+from augment.services.running.transcripts import CallTranscript, sentence_of
 from augment.services.work import Lease, Settlement, WorkKind
 from augment.variants.intent_reader import ask_for_intent
-from augment.variants.transcript import ModelRole, NoteKind
+from augment.variants.transcript import NoteKind
 
 State = IntentReading.State
 USUAL_CAPS = Caps(calls=6)
@@ -130,7 +124,7 @@ class Readings(WorkKind[IntentReading]):
         client = self._client or EndpointClient(
             wire_to(site), site, Queue(longest_s=settings.LLM_QUEUE_S)
         )
-        transcript = ReadingTranscript(row, price_of(site, row.model), is_fresh=self._is_fresh)
+        transcript = ReadingTranscript(held, row, is_fresh=self._is_fresh)
         try:
             with client as opened:
                 intent = ask_for_intent(
@@ -162,125 +156,60 @@ class Readings(WorkKind[IntentReading]):
 READINGS = Readings()
 
 
-class ReadingTranscript:
-    """The calls of one reading as rows; one after the other, within its caps.
+class ReadingTranscript(CallTranscript):
+    """The calls of one reading, within its own caps.
 
     Args:
+        held: The lease on the reading.
         reading: Whose calls they are.
-        price: Of the model, None where nobody knows it.
         is_fresh: Whether nothing is served from earlier answers.
     """
 
-    def __init__(self, reading: IntentReading, price: Price | None, *, is_fresh: bool) -> None:
+    def __init__(
+        self, held: Lease[IntentReading], reading: IntentReading, *, is_fresh: bool
+    ) -> None:
+        self._held = held
         self._reading = reading
-        self._price = price
         self._is_fresh = is_fresh
-        self._number = reading.calls.count()  # of a worker that was told to stop
-        self._open: dict[int, _Open] = {}
+        self._limit = ""
+        # A worker that was told to stop may have asked already.
+        numbers = reading.calls.count()
+        super().__init__({"reading": reading}, reading.endpoint, numbers=numbers)
 
-    def known(self, role: ModelRole, request: Request, prompt_version: str) -> Reply | None:
-        """The answer that this request had before, recorded as a call that cost nothing."""
+    def insist(self) -> None:  # noqa: D102
+        if not self._held.is_held(lock=True):
+            raise LeaseLost
+
+    def earlier_answer(self, request_hash: str) -> ModelCall | None:  # noqa: D102
         if self._is_fresh:
             return None
-        columns = self._columns(role, request, prompt_version)
-        earlier = answers.find_earlier_answer(
-            request_hash=columns["request_hash"], augmentation_pk=0, attempt_pk=0, is_fresh=False
+        return answers.find_earlier_answer(
+            request_hash=request_hash, augmentation_pk=0, attempt_pk=0, is_fresh=False
         )
-        if earlier is None:
-            return None
-        self._number += 1
-        copied = answers.columns_of_copy(earlier, now=timezone.now())
-        ModelCall.objects.create(**columns, **copied, number=self._number)
-        return answers.reply_of(earlier)
 
-    def asked(self, role: ModelRole, request: Request, prompt_version: str) -> int:
-        """Store a request with its worst case; returns its number, from 1.
+    def reserve(self, worst: WorstCase, price: Price | None) -> budget.Room:  # noqa: D102
+        sent = self._reading.calls.exclude(sent_at=None)
+        used = {
+            "calls": sent.count(),
+            "tokens": sum(call.spent_tokens or 0 for call in sent),
+            "nano_usd": sum(call.cost_nano_usd or 0 for call in sent),
+        }
+        needs = {"calls": 1, "tokens": worst.tokens, "nano_usd": worst.nano_usd(price) or 0}
+        for name, needed in needs.items():
+            cap = getattr(self._reading, f"cap_{name}")
+            if cap is not None and used[name] + needed > cap:
+                self._limit = f"{cap} {name}"
+                return budget.Room.SPENT
+        return budget.Room.TAKEN
 
-        Raises:
-            BudgetSpent: The worst case would pass a cap.
-        """
-        worst = worst_case(request)
-        self._insist_on_room(worst)
-        self._number += 1
-        call = ModelCall.objects.create(
-            **self._columns(role, request, prompt_version),
-            number=self._number,
-            started_at=timezone.now(),
-            reserved_tokens=worst.tokens,
-            reserved_nano_usd=worst.nano_usd(self._price),
-        )
-        self._open[self._number] = _Open(pk=call.pk, worst=worst)
-        return self._number
-
-    def sending(self, number: int) -> None:
-        """Store that the call is sent now; from here on it may be billed."""
-        ModelCall.objects.filter(pk=self._open[number].pk).update(sent_at=timezone.now())
-
-    def answered(self, number: int, reply: Reply, fault: ModelFault | None = None) -> None:
-        """Store the raw answer to that call and what it used."""
-        call = self._open.pop(number)
-        used = budget.used_by_reply(reply, worst=call.worst, price=self._price)
-        answer = answers.columns_of(reply)
-        answer["fault"] = "" if fault is None else make_storable(sentence_of(fault))
-        _settle(call, used, answer)
-
-    def broke(self, number: int, fault: ModelFault) -> None:
-        """Store why there was no answer to that call, and what it may have used."""
-        call = self._open.pop(number)
-        used = budget.used_by_fault(fault, worst=call.worst, price=self._price)
-        broken: dict[str, Any] = {"fault": make_storable(sentence_of(fault))}
-        if isinstance(fault, NotSent):
-            broken["sent_at"] = None
-        _settle(call, used, broken)
+    def limit(self) -> str:  # noqa: D102
+        return self._limit
 
     def note(self, kind: NoteKind, document: dict[str, object]) -> None:
         """A reading has no rounds, tools or reviews to note."""
 
-    def _insist_on_room(self, worst: WorstCase) -> None:
-        sent = self._reading.calls.exclude(sent_at=None)
-        used = {
-            "calls": sent.count(),
-            "tokens": sum(one.spent_tokens or 0 for one in sent),
-            "nano_usd": sum(one.cost_nano_usd or 0 for one in sent),
-        }
-        needs = {"calls": 1, "tokens": worst.tokens, "nano_usd": worst.nano_usd(self._price) or 0}
-        for name, needed in needs.items():
-            cap = getattr(self._reading, f"cap_{name}")
-            if cap is not None and used[name] + needed > cap:
-                raise BudgetSpent(f"{cap} {name}")
-
-    def _columns(self, role: ModelRole, request: Request, version: str) -> dict[str, Any]:
-        document = make_document_storable(request.to_document(image_url=image_reference))
-        return {
-            "reading": self._reading,
-            "role": role,
-            "request": document,
-            "request_hash": request_hash(
-                base_url=self._reading.endpoint.base_url, document=document, prompt_version=version
-            ),
-            "prompt_version": version,
-        }
-
 
 # --- Private -----------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Open:
-    """A call in flight."""
-
-    pk: int
-    worst: WorstCase
-
-
-def _settle(call: _Open, used: budget.Used, answer: dict[str, Any]) -> None:
-    ModelCall.objects.filter(pk=call.pk).update(
-        spent_tokens=used.tokens,
-        cost_nano_usd=used.nano_usd,
-        is_cost_estimated=used.is_estimated,
-        settled_at=timezone.now(),
-        **answer,
-    )
 
 
 def _scenario(slug: str) -> Scenario:

@@ -1,4 +1,4 @@
-"""Every call to a language model as a row, within the budget of its job.
+"""Every call to a language model as a row, within a budget.
 
 The request is stored and its worst case reserved before it is sent, the answer stored before it
 is read, each in a transaction of its own: a crash in between loses nothing that was paid for.
@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import logging
 import time
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -55,43 +56,66 @@ class _Open:
     price: Price | None
 
 
-class RowTranscript:
-    """A transcript that writes rows of one attempt.
-
-    Nothing more is asked for an attempt whose lease was taken back (its result would be dropped)
-    or whose job has no room for the call.
+class CallTranscript(ABC):
+    """A transcript that writes calls as rows, one after the other.
 
     Args:
-        held: The lease on the row.
-        row: The augmentation, with its job.
+        owner: The column that says whose calls they are, with its value.
         endpoint: Who is asked.
         others: Who is asked in the roles that have an endpoint of their own.
         key: What keeps its answers apart from those of other options and samples.
+        numbers: How many calls the owner has already.
         sleep: Waits for that many seconds.
     """
 
     def __init__(
         self,
-        held: Lease[Augmentation],
-        row: Augmentation,
+        owner: Mapping[str, object],
         endpoint: Endpoint,
         *,
         others: Mapping[ModelRole, Endpoint] | None = None,
         key: Mapping[str, object] | None = None,
+        numbers: int = 0,
         sleep: Callable[[float], None] = time.sleep,
     ) -> None:
-        self._held = held
-        self._attempt = row.attempts.latest("number")
-        self._row = row
+        self._owner = owner
         self._endpoint = endpoint
         self._others = dict(others or {})
         self._key = key
+        self._numbers = numbers
         self._sleep = sleep
-        self._numbers = 0
-        self._notes = 0
         self._open: dict[int, _Open] = {}
         self._prices: dict[tuple[int, str], Price | None] = {}
         self._last: tuple[ModelRole, Request, str, dict[str, Any]] | None = None
+
+    @abstractmethod
+    def insist(self) -> None:
+        """Return while the calls are wanted; the row is locked until the transaction ends.
+
+        Raises:
+            LeaseLost: The row is somebody else's now.
+            JobCancelled: Its job is cancelled.
+        """
+
+    @abstractmethod
+    def earlier_answer(self, request_hash: str) -> ModelCall | None:
+        """The call whose answer serves that request again."""
+
+    @abstractmethod
+    def reserve(self, worst: WorstCase, price: Price | None) -> budget.Room:
+        """Take room for a call.
+
+        Raises:
+            Conflict: There is a cap in USD and the price is unknown.
+        """
+
+    @abstractmethod
+    def limit(self) -> str:
+        """The cap that leaves no room, as a person reads it."""
+
+    @abstractmethod
+    def note(self, kind: NoteKind, document: dict[str, object]) -> None:
+        """Store what happened since the last call."""
 
     def known(self, role: ModelRole, request: Request, prompt_version: str) -> Reply | None:
         """The answer that this request had before, recorded as a call that cost nothing.
@@ -100,17 +124,11 @@ class RowTranscript:
             LeaseLost: The row is somebody else's now.
         """
         columns = self._columns(role, request, prompt_version)
-        earlier = answers.find_earlier_answer(
-            request_hash=columns["request_hash"],
-            augmentation_pk=self._row.pk,
-            attempt_pk=self._attempt.pk,
-            is_fresh=self._row.job.is_fresh,
-            since=self._row.asked_anew_at,
-        )
+        earlier = self.earlier_answer(columns["request_hash"])
         if earlier is None:
             return None
         with transaction.atomic():
-            insist_wanted(self._held, lock=True)
+            self.insist()
             ModelCall.objects.create(
                 **columns,
                 **answers.columns_of_copy(earlier, now=timezone.now()),
@@ -145,8 +163,7 @@ class RowTranscript:
                 self._open[self._numbers] = _Open(pk=pk, worst=worst, price=price)
                 return self._numbers
             if room == budget.Room.SPENT:
-                job = GenerationJob.objects.get(pk=self._row.job_id)
-                raise BudgetSpent(budget.limit_of(job))
+                raise BudgetSpent(self.limit())
             self._sleep(wait_s)
             wait_s = min(1.5 * wait_s, LONGEST_WAIT_S)
 
@@ -183,17 +200,6 @@ class RowTranscript:
             broken["sent_at"] = None
         self._settle(call, used, broken)
 
-    def note(self, kind: NoteKind, document: dict[str, object]) -> None:
-        """Store what happened since the last call."""
-        self._notes += 1
-        TranscriptNote.objects.create(
-            attempt=self._attempt,
-            number=self._notes,
-            after_call=self._numbers,
-            kind=kind,
-            document=make_document_storable(document),
-        )
-
     def _settle(self, call: _Open, used: budget.Used, answer: dict[str, Any]) -> None:
         """Store how a call ended. It was paid for, so a locked database is waited out.
 
@@ -224,7 +230,7 @@ class RowTranscript:
             return self._last[3]
         document = make_document_storable(request.to_document(image_url=image_reference))
         columns = {
-            "attempt": self._attempt,
+            **self._owner,
             "role": role,
             "request": document,
             "request_hash": request_hash(
@@ -243,8 +249,8 @@ class RowTranscript:
         self, columns: dict[str, Any], worst: WorstCase, price: Price | None
     ) -> tuple[budget.Room, int]:
         """Take room and write the row in one transaction, or nothing of both."""
-        insist_wanted(self._held, lock=True)
-        room = budget.reserve(job_pk=self._row.job_id, worst=worst, price=price)
+        self.insist()
+        room = self.reserve(worst, price)
         if room != budget.Room.TAKEN:
             return room, 0
         call = ModelCall.objects.create(
@@ -264,6 +270,63 @@ class RowTranscript:
         if asked not in self._prices:
             self._prices[asked] = price_of(endpoint, model)
         return self._prices[asked]
+
+
+class RowTranscript(CallTranscript):
+    """The calls of one attempt at an augmentation, within the budget of its job.
+
+    Nothing more is asked for an attempt whose lease was taken back (its result would be dropped)
+    or whose job has no room for the call.
+
+    Args:
+        held: The lease on the row.
+        row: The augmentation, with its job.
+        endpoint: As for every transcript, and so are the others.
+    """
+
+    def __init__(
+        self,
+        held: Lease[Augmentation],
+        row: Augmentation,
+        endpoint: Endpoint,
+        *,
+        others: Mapping[ModelRole, Endpoint] | None = None,
+        key: Mapping[str, object] | None = None,
+        sleep: Callable[[float], None] = time.sleep,
+    ) -> None:
+        self._held = held
+        self._row = row
+        self._attempt = row.attempts.latest("number")
+        self._notes = 0
+        super().__init__({"attempt": self._attempt}, endpoint, others=others, key=key, sleep=sleep)
+
+    def insist(self) -> None:  # noqa: D102
+        insist_wanted(self._held, lock=True)
+
+    def earlier_answer(self, request_hash: str) -> ModelCall | None:  # noqa: D102
+        return answers.find_earlier_answer(
+            request_hash=request_hash,
+            augmentation_pk=self._row.pk,
+            attempt_pk=self._attempt.pk,
+            is_fresh=self._row.job.is_fresh,
+            since=self._row.asked_anew_at,
+        )
+
+    def reserve(self, worst: WorstCase, price: Price | None) -> budget.Room:  # noqa: D102
+        return budget.reserve(job_pk=self._row.job_id, worst=worst, price=price)
+
+    def limit(self) -> str:  # noqa: D102
+        return budget.limit_of(GenerationJob.objects.get(pk=self._row.job_id))
+
+    def note(self, kind: NoteKind, document: dict[str, object]) -> None:  # noqa: D102
+        self._notes += 1
+        TranscriptNote.objects.create(
+            attempt=self._attempt,
+            number=self._notes,
+            after_call=self._numbers,
+            kind=kind,
+            document=make_document_storable(document),
+        )
 
 
 def sentence_of(fault: ModelFault) -> str:
