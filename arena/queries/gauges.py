@@ -8,10 +8,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+from django.apps import apps
 from django.db.models import Count, QuerySet, Sum
 
-from arena.models import Matchup, Snapshot, Study, Vote
-from augment.models import Augmentation, GenerationJob, ModelCall, Simulation
+from arena.models import Matchup, Study, Vote
+from augment.models import GenerationJob, ModelCall, Work
 from augment.services.running.workers import workforce
 
 NANO = 1e9
@@ -31,21 +32,26 @@ class Gauge:
 
 
 def read_gauges() -> list[Gauge]:
-    """All of them: ten queries."""
+    """All of them: sixteen queries."""
     found = workforce()
     votes = Vote.objects.exclude(outcome=Vote.Outcome.SKIP)
     return [
         Gauge("arena_workers", "Workers heard a moment ago", "", (("", found.living),)),
         Gauge("arena_recovery", "1 where lost work is brought back", "", (("", found.works),)),
         _count("arena_jobs", "Generation jobs", GenerationJob.objects.all(), "state"),
-        _count("arena_augmentations", "Rows of jobs", Augmentation.objects.all(), "state"),
-        _count("arena_simulations", "Drives", Simulation.objects.all(), "state"),
-        _count("arena_snapshots", "Ratings", Snapshot.objects.all(), "state"),
+        *(_work(model) for model in apps.get_models() if issubclass(model, Work)),
         _count("arena_studies", "Studies", Study.objects.all(), "state"),
         _count("arena_matchups", "Planned pairs", Matchup.objects.all(), "study__state"),
         _count("arena_votes", "Votes kept", votes, "matchup__study__state"),
         *_calls(),
     ]
+
+
+def _work(model: type[Work]) -> Gauge:
+    """Rows of one kind of work."""
+    plural = str(model._meta.verbose_name_plural)
+    name = f"arena_{plural.replace(' ', '_')}"
+    return _count(name, plural.capitalize(), model._default_manager.all(), "state")
 
 
 def _count(name: str, text: str, rows: QuerySet[Any], field: str) -> Gauge:

@@ -21,7 +21,7 @@ from arena.web.questions import Confirmation, ask, is_sure
 from augment.errors import AugmentError, QueueFault
 from augment.models import Augmentation, GenerationJob
 from augment.services.running import jobs as service
-from augment.services.running import pausing
+from augment.services.running import pausing, retrying
 from augment.services.running.causes import rows_of_cause
 from augment.services.running.summary import count_rows
 from augment.tasks import enqueue_job
@@ -36,7 +36,7 @@ def retry_job(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     job = get_object_or_404(GenerationJob, code=code)
     try:
         with transaction.atomic():
-            service.retry_failed(job=job, actor=cast(User, request.user))
+            retrying.retry_failed(job=job, actor=cast(User, request.user))
             transaction.on_commit(partial(send_rows, request, job.pk))
     except AugmentError as error:
         messages.error(request, str(error))

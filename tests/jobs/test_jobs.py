@@ -5,7 +5,7 @@ from django.contrib.auth.models import User
 
 from augment.errors import Conflict, UnknownName
 from augment.models import Augmentation, Contestant, Event, GenerationJob
-from augment.services.running import jobs
+from augment.services.running import jobs, retrying
 from augment.services.running.runner import AUGMENTATIONS
 from augment.services.running.summary import count_rows
 from tests.jobs.rows import NOON, add_kind, add_scenario, done, failed, launch, leased
@@ -88,7 +88,7 @@ def test_retry_queues_failed_rows_alone_and_opens_the_job_again() -> None:
     leased(first).settle(failed(), now=NOON)
     leased(second).settle(done(), now=NOON)
     jobs.finish_if_over(now=NOON)
-    jobs.retry_failed(job)
+    retrying.retry_failed(job)
     assert (job.state, job.finished_at) == (GenerationJob.State.RUNNING, None)
     first.refresh_from_db()
     second.refresh_from_db()

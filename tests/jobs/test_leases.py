@@ -6,7 +6,7 @@ import pytest
 from django.db import IntegrityError, transaction
 
 from augment.models import Attempt, Augmentation, GenerationJob
-from augment.services.running import jobs
+from augment.services.running import jobs, retrying
 from augment.services.running.runner import AUGMENTATIONS
 from tests.jobs.rows import NOON, done, failed, launch, leased, only_row
 
@@ -113,7 +113,7 @@ def test_workers_lost_before_an_outcome_are_forgiven() -> None:
         AUGMENTATIONS.take_back_lost(now=now + timedelta(seconds=30))
     late = NOON + timedelta(hours=1)
     leased(row, now=late).settle(failed(), now=late)
-    jobs.retry_failed(job)
+    retrying.retry_failed(job)
     leased(row, now=late)
     assert AUGMENTATIONS.take_back_lost(now=late + timedelta(minutes=1)) == [row.pk]
 

@@ -68,7 +68,7 @@ def all_failed() -> GenerationJob:
 
 def test_who_retries_holds_the_rows_before_the_job() -> None:
     job = all_failed()
-    assert held(lambda: jobs.retry_failed(job)) == [ROWS, JOB]
+    assert held(lambda: retrying.retry_failed(job)) == [ROWS, JOB]
     job.augmentations.update(state="failed", reason="the wire broke")
     (cause,) = failure_groups(job)
     assert held(lambda: retrying.retry_cause(job, key=cause.key)) == [ROWS, JOB]
@@ -81,7 +81,7 @@ def test_two_who_retry_at_once_wait_for_each_other_and_never_in_a_circle() -> No
 
     def retry() -> str:
         try:
-            jobs.retry_failed(job)
+            retrying.retry_failed(job)
         except Conflict as refused:
             return str(refused)
         finally:

@@ -122,31 +122,6 @@ def cancel(job: GenerationJob, actor: User | None = None) -> GenerationJob:
     return job
 
 
-@transaction.atomic
-def retry_failed(job: GenerationJob, actor: User | None = None) -> GenerationJob:
-    """Let every failed row wait again; outcomes of the contestants themselves stay.
-
-    In a job that is paused or stopped at its cap they wait, with the others, until it is resumed.
-
-    Raises:
-        Conflict: The job was cancelled, or nothing in it failed.
-    """
-    failed = Augmentation.objects.filter(job=job, state=State.FAILED)
-    again = change_all(failed, state=State.QUEUED, reason="", finished_at=None, sent_at=None)
-    open_again(job)
-    if not again:
-        raise Conflict(f"Nothing in job '{job.name}' failed; there is nothing to try again.")
-    log_event(
-        actor=actor,
-        verb="retry",
-        object_kind="job",
-        object_code=str(job.code),
-        after={"queued": again},
-    )
-    job.refresh_from_db()
-    return job
-
-
 def open_again(job: GenerationJob) -> None:
     """Let a job run on with what is about to wait again; one that is held stays so.
 

@@ -1,9 +1,10 @@
-"""Letting the rows of one cause wait again, and only those."""
+"""Letting rows of a job wait again: what failed, or the rows of one cause alone."""
 
 from __future__ import annotations
 
 from django.contrib.auth.models import User
 from django.db import transaction
+from django.db.models import QuerySet
 
 from augment.errors import Conflict
 from augment.models import Augmentation, GenerationJob
@@ -40,22 +41,50 @@ def retry_cause(job: GenerationJob, *, key: str, actor: User | None = None) -> G
         raise Conflict(
             "Who refused has answered: it is not asked again. Launch a new job instead."
         )
-    waiting: dict[str, object] = {
-        "state": State.QUEUED,
-        "reason": "",
-        "finished_at": None,
-        "sent_at": None,
-    }
+    anew: dict[str, object] = {}
     if state == State.UNREADABLE:
-        waiting |= {"image": "", "notes": "", "asked_anew_at": database_now()}
-    again = change_all(Augmentation.objects.filter(pk__in=pks, state=state), **waiting)
+        anew = {"image": "", "notes": "", "asked_anew_at": database_now()}
+    rows = Augmentation.objects.filter(pk__in=pks, state=state)
+    _let_wait(job, rows, actor, told={"state": state.value, "cause": cause}, **anew)
+    return job
+
+
+@transaction.atomic
+def retry_failed(job: GenerationJob, actor: User | None = None) -> GenerationJob:
+    """Let every failed row wait again; outcomes of the contestants themselves stay.
+
+    In a job that is paused or stopped at its cap they wait, with the others, until it is resumed.
+
+    Raises:
+        Conflict: The job was cancelled, or nothing in it failed.
+    """
+    failed = Augmentation.objects.filter(job=job, state=State.FAILED)
+    if not _let_wait(job, failed, actor, told={}):
+        raise Conflict(f"Nothing in job '{job.name}' failed; there is nothing to try again.")
+    return job
+
+
+# --- Private -----------------------------------------------------------------------------------
+
+
+def _let_wait(
+    job: GenerationJob,
+    rows: QuerySet[Augmentation],
+    actor: User | None,
+    *,
+    told: dict[str, str],
+    **columns: object,
+) -> int:
+    """Returns how many wait again; the job goes on with them."""
+    waiting = {"state": State.QUEUED, "reason": "", "finished_at": None, "sent_at": None}
+    again = change_all(rows, **waiting, **columns)
     open_again(job)
     log_event(
         actor=actor,
         verb="retry",
         object_kind="job",
         object_code=job.code,
-        after={"queued": again, "state": state.value, "cause": cause},
+        after={"queued": again, **told},
     )
     job.refresh_from_db()
-    return job
+    return again
