@@ -99,11 +99,12 @@ def _fill(size: str) -> None:
 
     from arena.services.people import create_person
     from arena.services.ratings import rate
-    from arena.services.studies import close_study, open_study
+    from arena.services.studies import close_study
     from augment.models import Augmentation, Scenario
     from augment.scene.codec import modification_to_document
     from tests import full_study as made
     from tests.jobs.rows import TWO_CONES
+    from tests.opening import open_study
 
     call_command("migrate", verbosity=0)
     call_command("collectstatic", verbosity=0, interactive=False)

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from arena.models import Study
-from arena.services.studies import PlanOptions, open_study
 from augment.models import Augmentation
 from augment.scene.codec import modification_to_document
 from augment.scene.modification import Modification
+from tests.opening import open_study
 from tests.scenes import vehicle
 from tests.study_rows import Cast, cast_of
 
@@ -32,7 +32,8 @@ def with_text(cast: Cast, *, votes: int = 9, **options: object) -> Study:
         name="Round 1",
         votes_per_expert=votes,
         seed=7,
-        options=PlanOptions(allow_text=True, **options),  # type: ignore[arg-type]
+        allow_text=True,
+        **options,
         **cast,
     )
 

@@ -16,9 +16,10 @@ from django.utils import timezone
 
 from arena.models import Matchup, Study, Vote
 from arena.services.people import create_person
-from arena.services.studies import close_study, open_study
+from arena.services.studies import close_study
 from augment.models import Augmentation, BaseScene, Contestant, GenerationJob, Scenario
 from augment.scene.codec import scene_to_document
+from tests.opening import open_study
 from tests.scenes import scene as street
 
 PAPERS = (

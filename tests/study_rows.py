@@ -11,11 +11,11 @@ from django.utils import timezone
 from arena.models import Matchup, Study, Vote
 from arena.services.decisions import decision_of
 from arena.services.people import create_person
-from arena.services.studies import open_study
 from arena.services.votes import cast_vote
 from augment.models import Augmentation, BaseScene, Contestant, GenerationJob, Scenario
 from augment.scene.codec import modification_to_document, scene_to_document
 from augment.scene.modification import Modification
+from tests.opening import open_study
 from tests.scenes import scene as street
 
 KINDS = Contestant.Kind

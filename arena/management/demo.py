@@ -10,6 +10,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from django.conf import settings
 from django.contrib.auth.models import User
@@ -20,10 +21,10 @@ from arena.exports.tables import leaderboard_table
 from arena.exports.writers import FORMATS, plain_text
 from arena.models import Study
 from arena.services.people import create_person
-from arena.services.plan_options import PlanOptions
 from arena.services.ratings import rate
 from arena.services.simulation import simulate_votes
 from arena.services.studies import close_study, open_study
+from arena.services.study_plan import StudyPlan
 from augment.models import Augmentation, BaseScene, Contestant, Endpoint, GenerationJob, Scenario
 from augment.services.endpoints.contestants import (
     REFERENCE,
@@ -185,30 +186,17 @@ def vote_and_rate(scenarios: list[str], say: Callable[[str], None], folder: Path
     """A study with simulated votes, closed and rated, and its table as files."""
     study = Study.objects.filter(name=SIMULATED_STUDY).first()
     if study is None:
-        study = open_study(
-            name=SIMULATED_STUDY,
-            contestants=RATED,
-            scenarios=scenarios,
-            experts=SIMULATED_EXPERTS,
-            votes_per_expert=SIMULATED_VOTES_EACH,
-            seed=SEED,
-            allow_simulated=True,
-        )
+        asked = _study_asked(SIMULATED_STUDY, scenarios)
+        asked |= {"experts": SIMULATED_EXPERTS, "show_alike": True}
+        study = open_study(StudyPlan.read(asked | {"votes_per_expert": SIMULATED_VOTES_EACH}))
         simulate_votes(study=study, seed=SEED)
         study = close_study(study=study)
         rate(study=study, seed=SEED)
     if not Study.objects.filter(name=OPEN_STUDY).exists():
-        open_study(
-            name=OPEN_STUDY,
-            contestants=RATED,
-            scenarios=scenarios,
-            experts=["expert"],
-            # Two of a scenario's six pairs can be decided, and nobody sees one twice.
-            votes_per_expert=min(YOUR_VOTES, 2 * len(scenarios)),
-            seed=SEED,
-            allow_simulated=True,
-            options=PlanOptions(settle_alike=True),
-        )
+        # Two of a scenario's six pairs can be decided, and nobody sees one twice.
+        votes = min(YOUR_VOTES, 2 * len(scenarios))
+        asked = _study_asked(OPEN_STUDY, scenarios) | {"experts": ["expert"]}
+        open_study(StudyPlan.read(asked | {"votes_per_expert": votes}))
     table = leaderboard_table(study.snapshots.latest("made_at"))
     folder.mkdir(parents=True, exist_ok=True)
     files = []
@@ -226,6 +214,17 @@ def login_lines() -> list[str]:
         for user in User.objects.filter(username__in=names, is_active=True).order_by("pk")
         if user.check_password(PASSWORD)
     ]
+
+
+def _study_asked(name: str, scenarios: list[str]) -> dict[str, Any]:
+    return {
+        "name": name,
+        "contestants": RATED,
+        "scenarios": scenarios,
+        "seed": SEED,
+        "repeats": 0.0,
+        "allow_simulated": True,
+    }
 
 
 def _person(username: str, role: str, *, is_simulated: bool = False) -> None:

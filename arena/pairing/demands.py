@@ -13,6 +13,8 @@ MOST_OVERLAP = 0.8
 """More can't be brought together where all pairs and scenarios stay balanced for everybody."""
 
 MOST_CHECKS = 0.5
+MOST_REPEATS = 0.5
+MOST_ADAPTIVE = 0.9
 ATTENTION_CHECKS = "attention checks"
 
 
@@ -86,10 +88,10 @@ def check_share(part: str, share: float, most: float) -> None:
 
 
 def _check_shares(rules: PlanRules) -> None:
-    check_share("repeats", rules.repeat_share, 0.5)
+    check_share("repeats", rules.repeat_share, MOST_REPEATS)
     check_share("what two experts judge", rules.overlap_share, MOST_OVERLAP)
     check_share(ATTENTION_CHECKS, rules.check_share, MOST_CHECKS)
-    check_share("the adaptive part", rules.adaptive_share, 0.9)
+    check_share("the adaptive part", rules.adaptive_share, MOST_ADAPTIVE)
     if not 0.2 <= rules.uniform_share <= 1:
         raise NothingToPlan(
             "At least 20 % of the adaptive draws are uniform, else no vote could be "

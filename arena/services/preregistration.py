@@ -15,6 +15,7 @@ from django.conf import settings
 
 from arena.models import Study
 from arena.results.tree import VERSION as RESULTS_VERSION
+from arena.services.study_plan import SWITCH_COLUMNS
 from arena.services.vote_rows import VERSION as VOTES_VERSION
 from augment.models import Contestant, Scenario
 from augment.services.endpoints.treatments import options_of
@@ -70,14 +71,7 @@ def _document(study: Study) -> dict[str, Any]:
         "experts": len(rules["experts"]),
         "votes_planned": len(rules["experts"]) * study.votes_per_expert,
         "rules": {name: kept for name, kept in rules.items() if name not in _ELSEWHERE},
-        "choices": {
-            "both_miss": study.allow_both_miss,
-            "text": study.allow_text,
-            "replay": study.allow_replay,
-            "measures": study.allow_measures,
-            "practice": study.practice,
-            "simulated": study.allow_simulated,
-        },
+        "choices": {name.removeprefix("allow_"): getattr(study, name) for name in SWITCH_COLUMNS},
         "contestants": [_contestant(one) for one in contestants],
         "scenarios": [_scenario(one) for one in study.scenarios.order_by("slug")],
         "jobs": rules["jobs"],

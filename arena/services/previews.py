@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import dataclass
-from typing import Any
 
 from django.db import transaction
 
@@ -12,6 +11,7 @@ from arena.models import Matchup
 from arena.queries.coverage import shared_units
 from arena.services.prospects import GUESSES, usual_seconds
 from arena.services.studies import open_study
+from arena.services.study_plan import StudyPlan
 
 Kind = Matchup.Kind
 
@@ -47,17 +47,14 @@ class StudyPreview:
     minutes: int
 
 
-def preview_study(rules: dict[str, Any]) -> StudyPreview:
-    """What opening a study with these rules would make; nothing is kept.
-
-    Args:
-        rules: As `open_study` takes them.
+def preview_study(study_plan: StudyPlan) -> StudyPreview:
+    """What opening this study would make; nothing is kept.
 
     Raises:
         ArenaError, AugmentError: It can't be opened.
     """
     with transaction.atomic():
-        study = open_study(**rules)
+        study = open_study(study_plan)
         kinds = Counter(study.matchups.values_list("kind", flat=True))
         later = sum(study.votes_to_plan.values())
         experts = study.experts.count()

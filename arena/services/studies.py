@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from typing import Any
 
 from django.contrib.auth.models import User
@@ -14,18 +14,19 @@ from arena.models import Study
 from arena.pairing.demands import ATTENTION_CHECKS, MOST_CHECKS, check_share
 from arena.pairing.plan import Check, Entry, MatchupPlan, PlanRules, plan
 from arena.pairing.settled import Triple, draw_shown
+from arena.pairing.target_lines import read_targets
 from arena.queries.people import experts as expert_accounts
 from arena.services.attention_checks import enough_checks, placed_checks
 from arena.services.ending import cancel_study, close_study
 from arena.services.frames import Cells
 from arena.services.hypotheses import read_hypotheses
-from arena.services.plan_options import OF_THE_PLAN, PlanOptions
 from arena.services.plans import rules_of, store
 from arena.services.practice import require_practice_pictures
 from arena.services.preregistration import preregister
 from arena.services.replays import Replays, replays_of
 from arena.services.showable import windows_of
 from arena.services.shown_pictures import SampleRule, StudyPictures, choose_pictures
+from arena.services.study_plan import SWITCH_COLUMNS, StudyPlan
 from augment.errors import Conflict, UnknownName
 from augment.models import Contestant, Scenario
 from augment.services.events import log_event
@@ -33,69 +34,47 @@ from augment.services.judging.alike import alike_pairs
 from augment.services.running.choosing import find_job
 from augment.services.texts import one_line
 
-__all__ = ["PlanOptions", "cancel_study", "close_study", "open_study", "rules_of"]
+__all__ = ["cancel_study", "close_study", "open_study", "rules_of"]
 
 PLANNER = "balanced-2"
 """Name and version of the planner, kept with the rules so that a plan can be made again."""
 
 
 @transaction.atomic
-def open_study(
-    *,
-    name: str,
-    contestants: Sequence[str],
-    scenarios: Sequence[str],
-    experts: Sequence[str],
-    votes_per_expert: int,
-    seed: int,
-    options: PlanOptions | None = None,
-    allow_simulated: bool = False,
-    actor: User | None = None,
-) -> Study:
+def open_study(study_plan: StudyPlan, *, actor: User | None = None) -> Study:
     """Plan all matchups of a new study and open it.
 
     Args:
-        name: Of the study, unique.
-        contestants: Slugs; each one's latest picture of each scenario takes part.
-        scenarios: Slugs.
-        experts: Usernames of accounts with the role expert.
-        votes_per_expert: How many matchups each expert judges.
-        seed: Of the plan; the same seed and rules give the same plan.
-        options: Further rules; without them a balanced plan and nothing on top of it.
-        allow_simulated: Let simulated ones take part; where any does, everything says so.
+        study_plan: Who takes part, and by which rules; the same ones give the same plan.
         actor: Who opens it, for the log.
 
     Raises:
         InvalidDocument: The name is empty, too long or not one line.
         UnknownName: A contestant, scenario or expert does not exist.
         Conflict: The name is taken, the seed out of range, or something simulated unasked.
-        NothingToPlan: A hypothesis can't be read; pictures, drives or checks are missing.
+        NothingToPlan: A target or hypothesis can't be read; pictures, drives or checks are
+            missing.
     """
-    name, given = _free_name(name), options or PlanOptions()
-    check_seed(seed)
-    contestant_rows, scenario_rows = _contestants(contestants), _scenarios(scenarios)
-    expert_rows = _experts(experts)
-    has_simulated = _has_simulated(contestant_rows, expert_rows, are_allowed=allow_simulated)
-    jobs = [find_job(job) for job in given.jobs]
+    name = _free_name(study_plan.name)
+    check_seed(study_plan.seed)
+    contestant_rows = _contestants(study_plan.contestants)
+    scenario_rows = _scenarios(study_plan.scenarios)
+    expert_rows = _experts(study_plan.experts)
+    has_simulated = _has_simulated(
+        contestant_rows, expert_rows, are_allowed=study_plan.allow_simulated
+    )
+    jobs = [find_job(job) for job in study_plan.jobs]
     shown = choose_pictures(
-        contestant_rows, scenario_rows, seed=seed, rule=given.samples, jobs=jobs
+        contestant_rows, scenario_rows, seed=study_plan.seed, rule=study_plan.samples, jobs=jobs
     )
     entries = _entries(shown.cells)
-    checks, broken = _checks_for(given, scenario_rows, entries, votes_per_expert)
-    settled, kept = _alike(given, shown.cells, entries, seed)
-    rules = PlanRules(
-        entries=entries,
-        experts=tuple(expert.username for expert in expert_rows),
-        votes_per_expert=votes_per_expert,
-        seed=seed,
-        checks=checks,
-        alike=settled,
-        **{name: getattr(given, name) for name in OF_THE_PLAN},
-    )
+    checks, broken = _checks_for(study_plan, scenario_rows, entries)
+    settled, kept = _alike(study_plan, shown.cells, entries)
+    rules = replace(_rules(study_plan, entries, expert_rows), checks=checks, alike=settled)
     planned = plan(rules)
-    played = replays_of(broken | shown.cells) if given.allow_replay else None
-    kept |= _frozen_rules(rules, planned, played) | _frozen_pictures(given, shown)
-    study = _insert(name, kept, given, rules, has_simulated)
+    played = replays_of(broken | shown.cells) if study_plan.allow_replay else None
+    kept |= _frozen_rules(rules, planned, played) | _frozen_pictures(study_plan, shown)
+    study = _insert(name, kept, study_plan, rules, has_simulated)
     _enrol(study, contestant_rows, scenario_rows, expert_rows)
     store(study, planned.matchups, broken | shown.cells, expert_rows)
     _conclude_opening(study, matchups=len(planned.matchups), actor=actor)
@@ -160,13 +139,14 @@ def _has_simulated(
 
 
 def _checks_for(
-    given: PlanOptions, scenarios: list[Scenario], entries: tuple[Entry, ...], votes: int
+    study_plan: StudyPlan, scenarios: list[Scenario], entries: tuple[Entry, ...]
 ) -> tuple[tuple[Check, ...], Cells]:
-    """The attention checks that are asked for, where the plan shows them."""
-    check_share(ATTENTION_CHECKS, given.check_share, MOST_CHECKS)
-    wanted = round(given.check_share * votes)
+    """The attention checks that are study_plan for, where the plan shows them."""
+    share = study_plan.checks / 100
+    check_share(ATTENTION_CHECKS, share, MOST_CHECKS)
+    wanted = round(share * study_plan.votes_per_expert)
     found = enough_checks(scenarios, windows=windows_of(entries), wanted=wanted)
-    return placed_checks(*found, shows_all=given.samples is SampleRule.ALL)
+    return placed_checks(*found, shows_all=study_plan.samples is SampleRule.ALL)
 
 
 def _entries(shown: Cells) -> tuple[Entry, ...]:
@@ -176,16 +156,31 @@ def _entries(shown: Cells) -> tuple[Entry, ...]:
     )
 
 
+def _rules(study_plan: StudyPlan, entries: tuple[Entry, ...], experts: list[User]) -> PlanRules:
+    """What the planner is told, but for checks and settled pairs."""
+    appearances, pair_votes = read_targets(study_plan.targets)
+    return PlanRules(
+        entries=entries,
+        experts=tuple(expert.username for expert in experts),
+        votes_per_expert=study_plan.votes_per_expert,
+        seed=study_plan.seed,
+        appearances=appearances,
+        pair_votes=pair_votes,
+        **study_plan.shares,
+    )
+
+
 # --- What is kept ------------------------------------------------------------------------------
 
 
 def _insert(
     name: str,
     frozen: dict[str, Any],
-    given: PlanOptions,
+    study_plan: StudyPlan,
     rules: PlanRules,
-    allow_simulated: bool,
+    has_simulated: bool,
 ) -> Study:
+    switches = {column: getattr(study_plan, column) for column in SWITCH_COLUMNS}
     try:
         with transaction.atomic():
             return Study.objects.create(
@@ -194,12 +189,7 @@ def _insert(
                 votes_per_expert=rules.votes_per_expert,
                 seed=rules.seed,
                 rules=frozen,
-                allow_simulated=allow_simulated,
-                allow_both_miss=given.allow_both_miss,
-                allow_text=given.allow_text,
-                allow_replay=given.allow_replay,
-                allow_measures=given.allow_measures,
-                practice=given.practice,
+                **(switches | {"allow_simulated": has_simulated}),
                 votes_to_plan=(
                     dict.fromkeys(rules.experts, rules.votes_later) if rules.votes_later else {}
                 ),
@@ -210,11 +200,11 @@ def _insert(
 
 
 def _alike(
-    given: PlanOptions, cells: Cells, entries: Sequence[Entry], seed: int
+    study_plan: StudyPlan, cells: Cells, entries: Sequence[Entry]
 ) -> tuple[tuple[Triple, ...], dict[str, Any]]:
     """Which alike pairs are settled, and as a rule of the study which are shown all the same."""
-    alike = alike_pairs(cells) if given.settle_alike else ()
-    alike_shown = draw_shown(alike, entries, seed=seed)
+    alike = () if study_plan.show_alike else alike_pairs(cells)
+    alike_shown = draw_shown(alike, entries, seed=study_plan.seed)
     kept = {"alike_shown": [list(pair) for pair in alike_shown]}
     return tuple(sorted(set(alike) - set(alike_shown))), kept
 
@@ -227,7 +217,7 @@ def _enrol(
     study.experts.set(experts)
 
 
-def _frozen_pictures(given: PlanOptions, shown: StudyPictures) -> dict[str, Any]:
+def _frozen_pictures(study_plan: StudyPlan, shown: StudyPictures) -> dict[str, Any]:
     """Which pictures are shown: the rule for samples, the jobs they come from, the options.
 
     Beside them what is expected of their contestants.
@@ -236,17 +226,15 @@ def _frozen_pictures(given: PlanOptions, shown: StudyPictures) -> dict[str, Any]
         NothingToPlan: A hypothesis can't be read.
     """
     contestants = sorted({contestant for _, contestant in shown.cells})
-    # Kept where it departs from what the pages do, so that the settings can be used again.
-    alike = {} if given.settle_alike else {"show_alike": True}
-    return (
-        given.frozen_aims(read_hypotheses(given.hypotheses, contestants))
-        | alike
-        | {
-            "samples": given.samples.value,
-            "jobs": [{"code": str(job.code), "name": job.name} for job in shown.jobs],
-            "options": dict(sorted(shown.options.items())),
-        }
-    )
+    hypotheses = read_hypotheses(study_plan.hypotheses, contestants)
+    # Kept where it departs from the default, so that the settings can be used again.
+    alike = {"show_alike": True} if study_plan.show_alike else {}
+    return alike | {
+        "hypotheses": [one.as_document() for one in hypotheses],
+        "samples": study_plan.samples.value,
+        "jobs": [{"code": str(job.code), "name": job.name} for job in shown.jobs],
+        "options": dict(sorted(shown.options.items())),
+    }
 
 
 def _conclude_opening(study: Study, *, matchups: int, actor: User | None) -> None:

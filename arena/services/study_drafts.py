@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import asdict
 from itertools import count
 from typing import Any
 
@@ -10,27 +11,21 @@ from django.contrib.auth.models import User
 from django.db import transaction
 
 from arena.models import Study, StudyDraft
-from arena.services.hypotheses import hypotheses_of
 from arena.services.studies import open_study
+from arena.services.study_plan import LONGEST_NAME, PLAN_INPUTS, StudyPlan, plan_of
 from augment.errors import Conflict, InvalidDocument, UnknownName
 from augment.services.events import log_event
+from augment.services.inputs import InputKind
 from augment.services.texts import make_storable
 
 Entered = dict[str, str | bool | list[str]]
 """Every field of the form: a text as it was typed, a switch, or names."""
 
-TEXTS = (
-    *("name", "votes_per_expert", "seed", "repeats", "checks", "overlap", "adaptive", "targets"),
-    *("hypotheses", "samples"),
-)
-SWITCHES = (
-    *("allow_both_miss", "show_alike", "allow_text", "allow_replay", "practice"),
-    *("no_measures", "allow_simulated"),
-)
-NAMES = ("contestants", "scenarios", "experts", "jobs")
-FIELDS = (*TEXTS, *SWITCHES, *NAMES)
+SWITCHES = tuple(one.name for one in PLAN_INPUTS if one.kind is InputKind.SWITCH)
+NAMES = tuple(one.name for one in PLAN_INPUTS if one.kind is InputKind.NAMES)
+FIELDS = tuple(one.name for one in PLAN_INPUTS)
+TEXTS = tuple(name for name in FIELDS if name not in (*SWITCHES, *NAMES))
 
-LONGEST_NAME = 120
 LONGEST_TEXT = 60_000
 MOST_NAMES = 20_000
 
@@ -63,6 +58,14 @@ def read_entered(given: Mapping[str, object]) -> Entered:
     return found
 
 
+def entered_of(draft: StudyDraft) -> Entered:
+    """Return what a draft holds, by the fields as they are named today."""
+    kept = dict(draft.entered)
+    if "no_measures" in kept:  # what `allow_measures` was called, the other way round
+        kept["allow_measures"] = not kept.pop("no_measures")
+    return kept
+
+
 @transaction.atomic
 def keep_draft(*, entered: Mapping[str, object], actor: User | None = None) -> StudyDraft:
     """A new draft.
@@ -93,7 +96,8 @@ def change_draft(
     """
     found = read_entered(entered)
     held = _hold(draft, revision)
-    changed = sorted(name for name in FIELDS if held.entered.get(name) != found[name])
+    known = entered_of(held)
+    changed = sorted(name for name in FIELDS if known.get(name) != found[name])
     if not changed:
         return held
     held.entered, held.changed_by = found, actor
@@ -115,22 +119,22 @@ def discard_draft(*, draft: StudyDraft, actor: User | None = None) -> None:
 
 @transaction.atomic
 def open_draft(
-    *, draft: StudyDraft, revision: int, actor: User | None = None, **rules: Any
+    study_plan: StudyPlan, *, draft: StudyDraft, revision: int, actor: User | None = None
 ) -> Study:
     """Open the study, whose draft goes.
 
     Args:
+        study_plan: What the draft has come to.
         draft: Which.
-        revision: Of the draft that the rules were made of.
+        revision: Of the draft that the plan was made of.
         actor: Who, for the log.
-        rules: As `open_study` takes them.
 
     Raises:
         Conflict: Somebody else saved or discarded the draft meanwhile.
         ArenaError, AugmentError: See `open_study`.
     """
     held = _hold(draft, revision)
-    study = open_study(**rules, actor=actor)
+    study = open_study(study_plan, actor=actor)
     _log(held, "open draft", actor, after={"study": str(study.code)})
     held.delete()
     return study
@@ -142,46 +146,10 @@ def draft_like(*, study: Study, actor: User | None = None) -> StudyDraft:
     Raises:
         Conflict: Its votes came from a file; nobody planned them.
     """
-    return keep_draft(entered=settings_of(study), actor=actor)
-
-
-def settings_of(study: Study) -> Entered:
-    """What somebody would have entered to open this study, but for a name that is free.
-
-    Who joined by a link for everybody, and hidden pairs handed over, are no settings.
-
-    Raises:
-        Conflict: Its votes came from a file; nobody planned them.
-    """
-    rules = study.rules
-    if "entries" not in rules:
+    if "entries" not in study.rules:
         raise Conflict(f"The votes of '{study.name}' came from a file: it has no rules.")
-    shares = ("repeat_share", "check_share", "overlap_share", "adaptive_share")
-    names = ("repeats", "checks", "overlap", "adaptive")
-    given: dict[str, object] = {
-        name: f"{round(100 * rules.get(share, 0), 6):g}"
-        for name, share in zip(names, shares, strict=True)
-    }
-    given |= {
-        "name": _free_name(study.name),
-        "votes_per_expert": study.votes_per_expert,
-        "seed": study.seed,
-        "targets": "\n".join(_target_lines(rules)),
-        "hypotheses": "\n".join(one.text for one in hypotheses_of(study)),
-        "samples": rules.get("samples", "one"),
-        "show_alike": bool(rules.get("show_alike")),
-        "no_measures": not study.allow_measures,
-        **{
-            name: getattr(study, name)
-            for name in SWITCHES
-            if name not in ("show_alike", "no_measures")
-        },
-        "contestants": list(study.contestants.order_by("slug").values_list("slug", flat=True)),
-        "scenarios": list(study.scenarios.order_by("slug").values_list("slug", flat=True)),
-        "experts": list(rules["experts"]),
-        "jobs": [job["code"] for job in rules.get("jobs", ())],
-    }
-    return read_entered(given)
+    entered = {name: _as_entered(name, value) for name, value in asdict(plan_of(study)).items()}
+    return keep_draft(entered=entered | {"name": _free_name(study.name)}, actor=actor)
 
 
 def rename_in_drafts(known_as: str, name: str) -> None:
@@ -194,6 +162,17 @@ def rename_in_drafts(known_as: str, name: str) -> None:
 
 
 # --- Private -----------------------------------------------------------------------------------
+
+
+def _as_entered(name: str, value: Any) -> object:
+    """A value of a plan as somebody enters it."""
+    if name in SWITCHES:
+        return value
+    if name in NAMES:
+        return list(value)
+    if isinstance(value, float):
+        return f"{value:g}"
+    return "\n".join(value) if isinstance(value, tuple) else str(value)
 
 
 def _fault(name: str, value: object) -> str:
@@ -252,8 +231,3 @@ def _free_name(name: str) -> str:
         if found not in taken:
             return found
     raise AssertionError("numbers do not end")
-
-
-def _target_lines(rules: Mapping[str, Any]) -> list[str]:
-    by_pair = [f"{one} vs {other} {votes}" for one, other, votes in rules.get("pair_votes", ())]
-    return [f"{slug} {votes}" for slug, votes in rules.get("appearances", ())] + by_pair

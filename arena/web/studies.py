@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import uuid
-from typing import Any, cast
+from typing import cast
 
 from django.contrib import messages
 from django.contrib.auth.models import User
@@ -24,7 +24,8 @@ from arena.queries.votes import tallies
 from arena.services.handing_over import hand_over
 from arena.services.hypotheses import hypotheses_of
 from arena.services.preregistration import preregistration_bytes, preregistration_sha256
-from arena.services.studies import cancel_study, close_study, rules_of
+from arena.services.studies import cancel_study, close_study
+from arena.services.study_plan import PLAN_INPUTS, plan_of
 from arena.web.access import ADMIN, STAFF, allow_only
 from arena.web.listing import read_listing, read_page, said_choices
 from arena.web.questions import WHY, ask, is_sure, is_typed, wants_to_change
@@ -33,6 +34,7 @@ from arena.web.study_files import export_place
 from arena.web.study_forms import HandOverForm
 from arena.web.study_questions import cancelling, closing, handing_over
 from augment.errors import AugmentError
+from augment.services.inputs import InputKind
 
 STUDIES_AT_ONCE = 25
 
@@ -72,6 +74,7 @@ def study_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         "contestants": list(study.contestants.all()),
         "scenario_count": study.scenarios.count(),
         "rules": _shown_rules(study),
+        "targets": plan_of(study).targets,
         "coverage": coverage(study),
         "reports": list(reports_of(study)),
         "accounts": by_pseudonym(experts()),
@@ -168,19 +171,11 @@ def cancel(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
 # --- Private -----------------------------------------------------------------------------------
 
 
-def _shown_rules(study: Study) -> dict[str, Any] | None:
-    """The rules of the plan for the page, None for votes from a file, which nobody planned."""
-    if "entries" not in study.rules:
-        return None
-    rules = rules_of(study)
-    return {
-        "by_contestant": bool(rules.appearances),
-        "by_pair": bool(rules.pair_votes),
-        "repeats": 100 * rules.repeat_share,
-        "checks": 100 * rules.check_share if rules.checks else 0,
-        "overlap": 100 * rules.overlap_share,
-        "adaptive": 100 * rules.adaptive_share,
-        "gap": study.rules["scenario_gap_kept"],
-        "jobs": study.rules.get("jobs", []),
-        "samples": study.rules.get("samples", "one"),
-    }
+def _shown_rules(study: Study) -> list[tuple[str, str]]:
+    """Labels and values of what was asked for, but for names and lines."""
+    study_plan = plan_of(study)
+    return [
+        (one.label, one.shown(getattr(study_plan, one.name)))
+        for one in PLAN_INPUTS
+        if one.kind not in (InputKind.TEXT, InputKind.NAMES, InputKind.LINES)
+    ]

@@ -8,42 +8,16 @@ from typing import Any
 from django import forms
 from django.contrib.auth.models import User
 
-from arena.errors import NothingToPlan
-from arena.pairing.target_lines import Appearances, PairVotes, read_targets
-from arena.services.shown_pictures import SampleRule
-from arena.services.studies import PlanOptions
+from arena.services.study_drafts import SWITCHES
+from arena.services.study_plan import PLAN_INPUTS, StudyPlan
 from arena.web.forms import ChoiceForm
+from arena.web.input_fields import form_field
 from augment.models import GenerationJob
-
-
-def _percent(*, initial: int, most: int) -> forms.FloatField:
-    """A share in percent; an empty field is none."""
-    return forms.FloatField(required=False, min_value=0, max_value=most, initial=initial)
+from augment.services.inputs import InputKind
 
 
 class StudyForm(ChoiceForm):
     """A new study; its rules are fixed from the moment it opens."""
-
-    experts = forms.MultipleChoiceField(error_messages={"required": "Choose at least one expert."})
-    votes_per_expert = forms.IntegerField(min_value=1, max_value=10_000, initial=40)
-    seed = forms.IntegerField(initial=1)
-    repeats = _percent(initial=5, most=50)
-    checks = _percent(initial=0, most=50)
-    overlap = _percent(initial=10, most=80)
-    adaptive = _percent(initial=0, most=90)
-    hypotheses = forms.CharField(required=False, max_length=60_000)
-    targets = forms.CharField(required=False, max_length=20_000)
-    allow_both_miss = forms.BooleanField(required=False)
-    allow_text = forms.BooleanField(required=False)
-    show_alike = forms.BooleanField(required=False)
-    allow_replay = forms.BooleanField(required=False)
-    no_measures = forms.BooleanField(required=False)
-    practice = forms.BooleanField(required=False)
-    allow_simulated = forms.BooleanField(required=False)
-    samples = forms.ChoiceField(
-        choices=[(one.value, one.value) for one in SampleRule], required=False
-    )
-    jobs = forms.MultipleChoiceField(required=False)
 
     def __init__(
         self,
@@ -53,10 +27,22 @@ class StudyForm(ChoiceForm):
         **kwargs: Any,
     ) -> None:
         super().__init__(*args, **kwargs)
+        self.fields |= {
+            one.name: form_field(one) for one in PLAN_INPUTS if one.name not in self.fields
+        }
         self.accounts = experts
         self.all_jobs = jobs
         self._offer("jobs", [(str(job.code), job.name) for job in jobs])
         self._offer("experts", [(user.get_username(), user.get_username()) for user in experts])
+        self.fields["experts"].error_messages["required"] = "Choose at least one expert."
+
+    def rules(self) -> list[forms.BoundField]:
+        """Return what is entered beside names, switches last; for the template."""
+        kinds = {one.name: one.kind for one in PLAN_INPUTS}
+        shown = [
+            name for name, kind in kinds.items() if kind not in (InputKind.TEXT, InputKind.NAMES)
+        ]
+        return [self[name] for name in sorted(shown, key=lambda name: name in SWITCHES)]
 
     @property
     def chosen_experts(self) -> list[str]:
@@ -68,38 +54,16 @@ class StudyForm(ChoiceForm):
         """For the template."""
         return self.chosen("jobs")
 
-    def clean_targets(self) -> tuple[Appearances, PairVotes]:
-        """The targets, read."""
-        try:
-            return read_targets(self.cleaned_data["targets"].splitlines())
-        except NothingToPlan as error:
-            raise forms.ValidationError(str(error)) from error
-
-    def rules(self) -> dict[str, Any]:
-        """What the study is opened with, once the form is valid."""
-        entered = self.cleaned_data
-        names = ("name", "contestants", "scenarios", "experts", "votes_per_expert", "seed")
-        appearances, pair_votes = entered["targets"]
-        options = PlanOptions(
-            repeat_share=(entered["repeats"] or 0) / 100,
-            check_share=(entered["checks"] or 0) / 100,
+    def study_plan(self) -> StudyPlan:
+        """Return what is to be opened, once the form is valid; an empty number is 0."""
+        cleaned = {one.name: self.cleaned_data[one.name] for one in PLAN_INPUTS}
+        entered: dict[str, Any] = {
+            name: 0.0 if value is None else value for name, value in cleaned.items() if value != ""
+        }
+        if len(entered["experts"]) < 2:
             # A single expert shares nothing with anybody: what the form offers is no wish then.
-            overlap_share=(entered["overlap"] or 0) / 100 if len(entered["experts"]) > 1 else 0.0,
-            adaptive_share=(entered["adaptive"] or 0) / 100,
-            appearances=appearances,
-            pair_votes=pair_votes,
-            allow_both_miss=entered["allow_both_miss"],
-            allow_text=entered["allow_text"],
-            settle_alike=not entered["show_alike"],
-            allow_replay=entered["allow_replay"],
-            allow_measures=not entered["no_measures"],
-            practice=entered["practice"],
-            hypotheses=tuple(entered["hypotheses"].splitlines()),
-            samples=SampleRule(entered["samples"] or SampleRule.ONE),
-            jobs=tuple(entered["jobs"]),
-        )
-        given = {name: entered[name] for name in (*names, "allow_simulated")}
-        return given | {"options": options}
+            entered["overlap"] = 0.0
+        return StudyPlan.read(entered)
 
 
 class HandOverForm(forms.Form):

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import asdict
-from typing import Any
 
 from django.db import transaction
 from django.urls import reverse
@@ -13,20 +12,21 @@ from arena.models import Study, StudyDraft
 from arena.queries.votes import tallies
 from arena.services.handing_over import hand_over
 from arena.services.previews import preview_study
+from arena.services.study_plan import StudyPlan
 from arena.web.questions import Confirmation
 
 
-def opening(rules: dict[str, Any], draft: StudyDraft | None = None) -> Confirmation:
+def opening(study_plan: StudyPlan, draft: StudyDraft | None = None) -> Confirmation:
     """What the study would be.
 
     Args:
-        rules: As `open_study` takes them.
-        draft: What they were set up in, if anything.
+        study_plan: As it was entered.
+        draft: What it was set up in, if anything.
 
     Raises:
         ArenaError, AugmentError: It can't be opened.
     """
-    found = preview_study(rules)
+    found = preview_study(study_plan)
     numbers = asdict(found)
     facts = [
         (
@@ -45,14 +45,14 @@ def opening(rules: dict[str, Any], draft: StudyDraft | None = None) -> Confirmat
     facts += _settled_facts(found.settled, found.alike)
     if found.later:
         facts.append(f"Votes that are planned later, by those before: {found.later}.")
-    if rules["allow_simulated"]:
+    if study_plan.allow_simulated:
         facts.append("What is simulated may take part; every page and file then says so.")
     facts.append("Experts can vote at once. The rules can’t be changed afterwards.")
     page = ("New study", reverse("study-new"))
     if draft is not None:
         page = ("Draft", reverse("study-draft", args=[draft.code]))
     return Confirmation(
-        title=f"Open the study “{rules['name']}”?",
+        title=f"Open the study “{study_plan.name}”?",
         facts=tuple(facts),
         button="Open the study",
         back=page[1],

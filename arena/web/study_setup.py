@@ -27,6 +27,7 @@ from arena.services.study_drafts import (
     change_draft,
     discard_draft,
     draft_like,
+    entered_of,
     keep_draft,
     open_draft,
 )
@@ -39,6 +40,9 @@ from augment.models import Contestant, GenerationJob
 
 KEEP = "keep"
 """What the button sends that saves a draft."""
+
+SUGGESTED = {"votes_per_expert": 40, "overlap": 10}
+"""What a new form holds beside the defaults of a plan."""
 
 _PLANNED = ("votes_per_expert", "repeats", "checks", "overlap")
 """What the planning page hands on to a new study."""
@@ -110,7 +114,7 @@ def _set_up(request: HttpRequest, draft: StudyDraft | None) -> HttpResponse:
     if request.method == "POST" and form.is_valid() and not wants_to_change(request):
         try:
             if not is_sure(request):
-                return ask(request, opening(form.rules(), draft))
+                return ask(request, opening(form.study_plan(), draft))
             study = _open(request, draft, form)
         except (ArenaError, AugmentError) as error:
             form.add_error(None, str(error))
@@ -124,8 +128,8 @@ def _set_up(request: HttpRequest, draft: StudyDraft | None) -> HttpResponse:
 def _open(request: HttpRequest, draft: StudyDraft | None, form: StudyForm) -> Study:
     actor = cast(User, request.user)
     if draft is None:
-        return open_study(**form.rules(), actor=actor)
-    return open_draft(draft=draft, revision=_revision(request), actor=actor, **form.rules())
+        return open_study(form.study_plan(), actor=actor)
+    return open_draft(form.study_plan(), draft=draft, revision=_revision(request), actor=actor)
 
 
 def _keep(request: HttpRequest, draft: StudyDraft | None) -> HttpResponse:
@@ -204,8 +208,8 @@ def _revision(request: HttpRequest) -> int:
 def _initial(request: HttpRequest, draft: StudyDraft | None) -> dict[str, Any]:
     """What the draft has; or what the address says of a study that somebody planned."""
     if draft is not None:
-        return dict(draft.entered)
-    initial: dict[str, Any] = {"checks": usual_checks(), "practice": has_practice()}
+        return dict(entered_of(draft))
+    initial: dict[str, Any] = SUGGESTED | {"checks": usual_checks(), "practice": has_practice()}
     initial |= {name: request.GET[name] for name in _PLANNED if request.GET.get(name)}
     code = request.GET.get("study")
     if not code:

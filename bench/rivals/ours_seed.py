@@ -11,11 +11,11 @@ django.setup()
 
 from arena.services.invitations import invite  # noqa: E402
 from arena.services.people import create_person  # noqa: E402
-from arena.services.studies import open_study  # noqa: E402
 from augment.models import Augmentation, Contestant, GenerationJob, Scenario  # noqa: E402
 from augment.services.scenarios.catalogue import load_catalogue  # noqa: E402
 from augment.services.scenarios.pictures import store  # noqa: E402
 from bench.rivals.environments import ROOT  # noqa: E402
+from tests.opening import open_study  # noqa: E402
 from tests.web.cast import png  # noqa: E402
 
 CONTESTANTS = ("ann", "bob", "cid", "dora")

@@ -16,11 +16,12 @@ from arena.models import Snapshot
 from arena.services.early_looks import open_early
 from arena.services.first_start import make_first_link_token
 from arena.services.ratings import rate
-from arena.services.studies import close_study, open_study
+from arena.services.studies import close_study
 from augment.models import Contestant, Event, GenerationJob
 from tests.api.asking import error_of
 from tests.api.tokens import program, program_of
 from tests.jobs import rows
+from tests.opening import open_study
 from tests.study_rows import (
     a_study,
     contestant,

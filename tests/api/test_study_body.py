@@ -2,63 +2,43 @@
 
 from __future__ import annotations
 
-from dataclasses import fields
+from dataclasses import asdict
 from typing import Any
 
 import pytest
 
-from arena.api.studies import WHO_AND_WHAT, StudyBody, study_rules
+from arena.api.studies import StudyBody
 from arena.models import Study
-from arena.services.studies import PlanOptions
-from arena.web.study_forms import StudyForm
+from arena.services.study_plan import PLAN_INPUTS, StudyPlan
+from augment.services.inputs import InputKind
 from tests.api.asking import error_of
 from tests.api.tokens import program_of
 from tests.study_rows import cast_of
 from tests.web.cast import people
 
-OTHER_NAMES = {
-    "repeats": "repeat_share",
-    "checks": "check_share",
-    "overlap": "overlap_share",
-    "adaptive": "adaptive_share",
-    "show_alike": "settle_alike",
-    "no_measures": "allow_measures",
-}
-"""What the wire calls a field of the form; shares are percent there."""
-OF_THE_PAGE_ALONE = {"types"}
-"""Ticks all scenarios of a type where no script does."""
 
-
-def test_the_wire_takes_every_field_of_the_form_and_no_other() -> None:
-    of_form = set(StudyForm.base_fields) - OF_THE_PAGE_ALONE
-    assert {OTHER_NAMES.get(name, name) for name in of_form} == set(StudyBody().fields)
-
-
-def test_every_option_of_a_plan_can_be_given() -> None:
-    least = {"name": "x", "contestants": [], "scenarios": [], "experts": [], "votes_per_expert": 1}
-    rest: dict[str, Any] = {
-        **dict.fromkeys(("repeat_share", "check_share", "overlap_share"), 0.25),
-        "adaptive_share": 0.25,
-        **dict.fromkeys(("allow_both_miss", "allow_text", "allow_replay", "practice"), True),
-        "settle_alike": True,
-        "allow_measures": False,
-        "allow_simulated": True,
+def test_every_field_of_a_plan_can_be_given() -> None:
+    given: dict[str, Any] = {
+        **{"name": "x", "contestants": ["ann"], "scenarios": ["place"], "experts": ["eva"]},
+        **{"votes_per_expert": 7, "seed": 2, "samples": "all", "jobs": ["Round 1"]},
+        **dict.fromkeys(("repeats", "checks", "overlap", "adaptive"), 25.0),
         "targets": ["ann 7", "ann vs bob 3"],
         "hypotheses": ["ann above bob"],
-        "samples": "all",
-        "jobs": ["Round 1"],
     }
-    body = StudyBody(data=least | rest)
+    given |= {one.name: not one.default for one in PLAN_INPUTS if one.kind is InputKind.SWITCH}
+    body = StudyBody(data=given)
     assert body.is_valid(), body.errors
-    rules = study_rules(dict(body.validated_data))
-    assert set(rules) == {*WHO_AND_WHAT, "options"}
-    usual = PlanOptions()
-    left = [
-        one.name
-        for one in fields(PlanOptions)
-        if getattr(rules["options"], one.name) == getattr(usual, one.name)
-    ]
-    assert left == []
+    plan = StudyPlan.read(body.validated_data)
+    assert {
+        name: list(v) if isinstance(v, tuple) else v for name, v in asdict(plan).items()
+    } == given
+
+
+def test_what_a_body_leaves_out_is_as_in_the_plan() -> None:
+    least = {"name": "x", "contestants": [], "scenarios": [], "experts": [], "votes_per_expert": 1}
+    body = StudyBody(data=least)
+    assert body.is_valid(), body.errors
+    assert StudyPlan.read(body.validated_data) == StudyPlan.read(least)
 
 
 @pytest.mark.django_db
@@ -69,7 +49,7 @@ def test_a_preregistered_study_is_opened_by_the_wire() -> None:
         **chosen,
         "name": "Preregistered",
         "votes_per_expert": 6,
-        "overlap_share": 0.5,
+        "overlap": 50,
         "hypotheses": ["ann above bob", "Nobody is perfect."],
     }
     wrong = given | {"hypotheses": ["ann above zoe"]}

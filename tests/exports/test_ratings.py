@@ -15,11 +15,12 @@ from arena.services.early_looks import open_early
 from arena.services.people import create_person
 from arena.services.ratings import rate
 from arena.services.simulation import simulate_votes
-from arena.services.studies import close_study, open_study
+from arena.services.studies import close_study
 from augment.errors import Conflict
 from augment.models import Augmentation, Event, Scenario
 from augment.scene.codec import modification_to_document
 from augment.scene.modification import Modification
+from tests.opening import open_study
 from tests.scenes import vehicle
 from tests.study_rows import a_study, cast_of, expert, matchups_of, vote
 

@@ -14,9 +14,10 @@ from arena.models import Matchup, Snapshot, Standing, Study, Vote
 from arena.results.tree import Results
 from arena.services.people import create_person
 from arena.services.ratings import rate
-from arena.services.studies import close_study, open_study
+from arena.services.studies import close_study
 from augment.models import Contestant
 from tests.full_study import Size, contestants, draw_votes, pictures, scenarios
+from tests.opening import open_study
 from tests.web.cast import people, signed_in
 
 SIZE = Size(scenarios=10, experts=5, votes_per_expert=144)

@@ -10,10 +10,11 @@ from arena.queries.judged import last_vote_of
 from arena.queries.vote_sets import Filters, vote_set
 from arena.services.plans import rules_of
 from arena.services.ratings import rate
-from arena.services.studies import PlanOptions, close_study, open_study
+from arena.services.studies import close_study
 from augment.models import Augmentation
 from augment.scene.codec import modification_to_document
 from augment.scene.modification import Modification
+from tests.opening import open_study
 from tests.scenes import vehicle
 from tests.study_rows import cast_of, vote
 
@@ -22,7 +23,7 @@ pytestmark = pytest.mark.django_db
 PLACES_M = {"ann": 20.0, "bob": 20.1, "cid": 20.3}
 
 
-def opened(*, settle_alike: bool = False, scenarios: int = 4) -> Study:
+def opened(*, show_alike: bool = True, scenarios: int = 4) -> Study:
     cast = cast_of(scenarios=scenarios, experts=("eva",))
     for row in Augmentation.objects.select_related("contestant"):
         car = vehicle("New1", PLACES_M[row.contestant.slug], 0.0)
@@ -32,7 +33,7 @@ def opened(*, settle_alike: bool = False, scenarios: int = 4) -> Study:
         name="Round 1",
         votes_per_expert=2 * scenarios,
         seed=7,
-        options=PlanOptions(settle_alike=settle_alike),
+        show_alike=show_alike,
         **cast,
     )
 
@@ -43,7 +44,7 @@ def pairs_shown(study: Study) -> set[frozenset[str]]:
 
 
 def test_pairs_within_the_tolerance_are_ties_that_nobody_sees() -> None:
-    study = opened(settle_alike=True)
+    study = opened(show_alike=False)
     assert pairs_shown(study) == {frozenset({"ann", "cid"}), frozenset({"bob", "cid"})}
     again = plan(rules_of(study))
     assert len(again.matchups) == study.matchups.count()
@@ -58,7 +59,7 @@ def test_pairs_within_the_tolerance_are_ties_that_nobody_sees() -> None:
 
 
 def test_a_tenth_of_them_is_shown_and_their_share_of_ties_is_told() -> None:
-    study = opened(settle_alike=True, scenarios=20)
+    study = opened(show_alike=False, scenarios=20)
     shown = study.rules["alike_shown"]
     assert [pair[1:] for pair in shown] == [["ann", "bob"]] * 2
     assert len(study.rules["identical"]) == 18

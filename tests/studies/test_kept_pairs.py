@@ -9,7 +9,7 @@ import pytest
 from arena.models import Matchup
 from arena.services.handing_over import hand_over
 from arena.services.reports import Complaint, report
-from arena.services.studies import PlanOptions, open_study
+from tests.opening import open_study
 from tests.study_rows import cast_of, matchups_of, vote
 
 pytestmark = pytest.mark.django_db
@@ -21,7 +21,7 @@ def test_a_pair_whose_repeat_was_judged_is_not_handed_over(is_vote: bool) -> Non
         name="Round 1",
         votes_per_expert=8,
         seed=7,
-        options=PlanOptions(repeat_share=0.25),
+        repeats=25,
         **cast_of(),
     )
     repeat, other = (row for row in matchups_of(study, "eva") if row.kind == Matchup.Kind.REPEAT)

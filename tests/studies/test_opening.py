@@ -9,9 +9,10 @@ from django.utils import timezone
 from arena.errors import NothingToPlan
 from arena.models import Study
 from arena.pairing.plan import plan
-from arena.services.studies import close_study, open_study, rules_of
+from arena.services.studies import close_study, rules_of
 from augment.errors import Conflict, UnknownName
 from augment.models import Augmentation, Contestant, Event, Scenario
+from tests.opening import open_study
 from tests.study_rows import KINDS, a_study, cast_of, picture
 
 pytestmark = pytest.mark.django_db

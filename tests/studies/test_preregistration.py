@@ -17,12 +17,12 @@ from arena.exports.writers import FORMATS, plain_text
 from arena.models import Study
 from arena.results.tree import PairP
 from arena.services.hypotheses import HypothesisVerdict
-from arena.services.plan_options import PlanOptions
 from arena.services.preregistration import preregistration_bytes, preregistration_sha256
 from arena.services.ratings import rate
-from arena.services.studies import close_study, open_study
+from arena.services.studies import close_study
 from augment.models import Contestant
 from tests import study_rows
+from tests.opening import open_study
 from tests.web.cast import people, signed_in
 
 pytestmark = pytest.mark.django_db
@@ -35,7 +35,7 @@ def opened(*, votes: int = 9, **options: Any) -> Study:
         name="Round 1",
         votes_per_expert=votes,
         seed=7,
-        options=PlanOptions(**options),
+        **options,
         **study_rows.cast_of(experts=("eva", "finn", "gus", "hal", "ida")),
     )
 
@@ -52,7 +52,7 @@ def voted(study: Study, most: int = 1000, *, slips: int = 7) -> None:
 
 
 def test_the_file_is_frozen_at_the_opening_and_names_everything_but_people() -> None:
-    study = opened(hypotheses=LINES, overlap_share=0.2)
+    study = opened(hypotheses=LINES, overlap=20)
     frozen = preregistration_bytes(study)
     document = json.loads(frozen)
     assert document["hypotheses"] == [

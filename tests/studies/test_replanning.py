@@ -16,9 +16,9 @@ from arena.queries.votes import tallies, voting_progress
 from arena.services.handing_over import hand_over
 from arena.services.replanning import next_pairs, plan_batch
 from arena.services.reports import Complaint, report
-from arena.services.studies import PlanOptions, open_study
 from augment.errors import Conflict, UnknownName
 from augment.models import Event
+from tests.opening import open_study
 from tests.study_rows import a_study, cast_of, expert, matchups_of, vote
 
 pytestmark = pytest.mark.django_db
@@ -85,7 +85,7 @@ def test_repeats_are_drawn_anew_for_who_takes_over() -> None:
         name="Round 1",
         votes_per_expert=12,
         seed=1,
-        options=PlanOptions(repeat_share=0.25),
+        repeats=25,
         **cast_of(scenarios=12),
     )
     hand_over(study=study, username="eva", to=["finn"])
@@ -127,7 +127,8 @@ def adaptive(simulated: bool = False) -> Study:
         name="Round 1",
         votes_per_expert=20,
         seed=1,
-        options=PlanOptions(adaptive_share=0.5, repeat_share=0.1),
+        adaptive=50,
+        repeats=10,
         allow_simulated=simulated,
         **cast_of(scenarios=10, simulated_experts=simulated),
     )

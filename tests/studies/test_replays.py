@@ -12,11 +12,11 @@ from arena.errors import InvalidVote, NotYours
 from arena.models import Matchup, Study, Vote
 from arena.queries.replays import drives_of_pair
 from arena.services.decisions import Decision, decision_of
-from arena.services.studies import PlanOptions, open_study
 from arena.services.votes import cast_vote
 from augment.models import Augmentation
 from augment.simulation.trace import blind_trace
 from tests.drives import drive_pictures
+from tests.opening import open_study
 from tests.study_rows import Cast, cast_of, matchups_of
 
 pytestmark = pytest.mark.django_db
@@ -27,7 +27,8 @@ def played(cast: Cast, **options: object) -> Study:
         name="Round 1",
         votes_per_expert=12,
         seed=7,
-        options=PlanOptions(allow_replay=True, **options),  # type: ignore[arg-type]
+        allow_replay=True,
+        **options,
         **cast,
     )
 

@@ -10,11 +10,12 @@ from arena.models import Study
 from arena.services.handing_over import hand_over
 from arena.services.plans import pictures_of
 from arena.services.replanning import plan_batch
-from arena.services.studies import PlanOptions, open_study, rules_of
+from arena.services.studies import rules_of
 from augment.models import Augmentation, Scenario
 from augment.scene.codec import modification_to_document
 from augment.scene.modification import Modification
 from augment.services.scenarios.attention import draw_checks
+from tests.opening import open_study
 from tests.scenes import vehicle
 from tests.study_rows import KINDS, Cast, a_study, cast_of, contestant, picture
 
@@ -26,7 +27,7 @@ def opened(cast: Cast, votes: int = 12, **options: object) -> Study:
         name="Round 1",
         votes_per_expert=votes,
         seed=7,
-        options=PlanOptions(**options),  # type: ignore[arg-type]
+        **options,
         **cast,
     )
 
@@ -47,7 +48,7 @@ def with_checks(scenarios: int = 8) -> Cast:
 
 
 def test_repeats_point_to_what_they_show_again_with_sides_swapped() -> None:
-    study = opened(cast_of(), repeat_share=0.25)
+    study = opened(cast_of(), repeats=25)
     repeats = study.matchups.filter(kind="repeat").select_related("repeat_of")
     assert len(repeats) == 6
     for row in repeats:
@@ -61,7 +62,7 @@ def test_repeats_point_to_what_they_show_again_with_sides_swapped() -> None:
 
 
 def test_checks_show_the_reference_against_a_broken_one() -> None:
-    study = opened(with_checks(), check_share=0.25)
+    study = opened(with_checks(), checks=25)
     checks = study.matchups.filter(kind="check")
     assert len(checks) == 6
     for row in checks.select_related("left__contestant", "right__contestant"):
@@ -72,11 +73,11 @@ def test_checks_show_the_reference_against_a_broken_one() -> None:
 
 
 def test_targets_by_contestant_are_met_in_the_rows() -> None:
-    targets = (("ann", 20), ("bob", 15), ("cid", 13))
-    study = opened(cast_of(), appearances=targets)
+    targets = {"ann": 20, "bob": 15, "cid": 13}
+    study = opened(cast_of(), targets=[f"{slug} {votes}" for slug, votes in targets.items()])
     shown = Counter(study.matchups.values_list("left__contestant__slug", flat=True))
     shown += Counter(study.matchups.values_list("right__contestant__slug", flat=True))
-    assert shown == dict(targets)
+    assert shown == targets
 
 
 def test_a_study_opened_before_these_rules_is_read_without_them() -> None:
@@ -87,7 +88,7 @@ def test_a_study_opened_before_these_rules_is_read_without_them() -> None:
 
 
 def test_checks_drawn_in_another_window_stay_out_of_an_open_study() -> None:
-    study = opened(with_checks(), votes=12, check_share=0.5, adaptive_share=0.5)
+    study = opened(with_checks(), votes=12, checks=50, adaptive=50)
     eva = study.experts.get(username="eva")
     shown = {place for place, who in pictures_of(study) if who == "attention-check"}
     assert len(shown) == 8

@@ -11,11 +11,11 @@ from django.utils import timezone
 
 from arena.models import Matchup, Study
 from arena.services.shown_pictures import draw_sample
-from arena.services.studies import PlanOptions, open_study
 from augment.errors import Conflict
 from augment.models import Augmentation, Contestant, GenerationJob, Scenario
 from tests.jobs.scripted import Scripted, add, run
 from tests.llm.json_server import serving
+from tests.opening import open_study
 from tests.study_rows import contestant, expert, scenario
 from tests.web.cast import people, signed_in
 
@@ -62,7 +62,7 @@ def opened(seed: int = 7, votes: int = 9, places: int = 6, **rules: object) -> S
         experts=["eva", "finn"],
         votes_per_expert=votes,
         seed=seed,
-        options=PlanOptions(**rules),  # type: ignore[arg-type]
+        **rules,
     )
 
 

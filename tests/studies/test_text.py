@@ -37,7 +37,7 @@ def test_every_showing_keeps_what_its_two_pictures_show() -> None:
 def test_pairs_that_are_handed_over_or_planned_later_have_theirs() -> None:
     made = cast_of(experts=("eva", "finn"), scenarios=12)
     draw_changes()
-    study = with_text(made, votes=10, adaptive_share=0.5)
+    study = with_text(made, votes=10, adaptive=50)
     hand_over(study=study, username="finn", to=["eva"])
     for matchup in matchups_of(study, "eva"):
         vote(matchup)

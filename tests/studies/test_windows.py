@@ -10,13 +10,13 @@ from arena.queries.showings import VIEW_OF_OLD, view_shown
 from arena.services.frames import find_frames
 from arena.services.plans import pictures_of, planned_so_far
 from arena.services.redrawing import redraw_pictures
-from arena.services.studies import open_study
 from augment.models import Augmentation, Scenario
 from augment.scene.codec import modification_to_document
 from augment.scene.modification import Modification
 from augment.services.running import runner
 from augment.services.running.by_hand import keep_correction
 from augment.services.scenarios.pictures import camera_of, original_picture, view_of, window_of
+from tests.opening import open_study
 from tests.scenes import cone, pedestrian
 from tests.study_rows import cast_of
 
@@ -41,7 +41,7 @@ def look_otherwise(contestant: str) -> None:
 
 
 def opened(name: str, **cast: object) -> Study:
-    return open_study(**({"votes_per_expert": 2, "seed": 7} | cast), name=name)  # type: ignore[arg-type]
+    return open_study(**({"votes_per_expert": 2, "seed": 7} | cast), name=name)
 
 
 def test_pictures_of_two_windows_are_never_paired() -> None:

@@ -11,10 +11,10 @@ from django.urls import reverse
 from arena.errors import InvalidVote
 from arena.models import Matchup, Study
 from arena.queries.showings import view_shown
-from arena.services.studies import PlanOptions, open_study
 from augment.models import Scenario
 from augment.scene.intent_codec import intent_to_document
 from tests.intents import LEFT_EDGE, parked, towards
+from tests.opening import open_study
 from tests.study_rows import a_study, cast_of, matchups_of, vote
 from tests.web.cast import signed_in
 
@@ -29,8 +29,8 @@ def measured_study() -> Study:
 
 
 def without_measures() -> Study:
-    options = PlanOptions(allow_measures=False)
-    return open_study(name="Round 1", votes_per_expert=9, seed=7, options=options, **cast_of())
+    given = {"votes_per_expert": 9, "seed": 7, "allow_measures": False}
+    return open_study(name="Round 1", **given, **cast_of())
 
 
 def address(matchup: Matchup) -> str:

@@ -13,12 +13,12 @@ from arena.errors import NothingToPlan
 from arena.models import PracticePair, Study, Vote
 from arena.queries.votes import voting_progress
 from arena.services.practice import practice_pairs
-from arena.services.studies import PlanOptions, open_study
 from augment.models import Augmentation, Scenario
 from augment.scene.codec import modification_to_document
 from augment.scene.modification import Modification
 from augment.services.scenarios.attention import draw_checks
 from augment.services.scenarios.pictures import store
+from tests.opening import open_study
 from tests.scenes import vehicle
 from tests.study_rows import KINDS, cast_of, contestant, picture, scenario
 from tests.web.cast import names_of_contestants, png, signed_in
@@ -39,8 +39,8 @@ def opened(*, outside: int = 6, **options: object) -> Study:
     draw_checks(scenarios=list(Scenario.objects.values_list("slug", flat=True)))
     for number, row in enumerate(Augmentation.objects.all()):
         Augmentation.objects.filter(pk=row.pk).update(image=store(png(number)))
-    given = PlanOptions(**{"practice": True, **options})  # type: ignore[arg-type]
-    return open_study(name="Round 1", votes_per_expert=9, seed=7, options=given, **cast)
+    given = {"practice": True, **cast, **options}
+    return open_study(name="Round 1", votes_per_expert=9, seed=7, **given)
 
 
 def eva() -> User:
@@ -121,7 +121,7 @@ def test_pictures_go_to_their_expert_alone_and_the_page_names_nobody() -> None:
 
 
 def test_a_study_with_nothing_to_practise_on_is_not_opened() -> None:
-    given = PlanOptions(practice=True)
+    given = {"name": "Round 1", "votes_per_expert": 9, "practice": True}
     with pytest.raises(NothingToPlan, match="nothing to practise on"):
-        open_study(name="Round 1", votes_per_expert=9, seed=7, options=given, **cast_of())
+        open_study(**given, **cast_of())
     assert not Study.objects.exists()

@@ -9,9 +9,9 @@ from django.contrib.auth.models import User
 from django.urls import reverse
 
 from arena.models import Study
-from arena.services.studies import PlanOptions, open_study
 from augment.models import Augmentation
 from tests.drives import drive_pictures
+from tests.opening import open_study
 from tests.study_rows import Cast, a_study, cast_of, matchups_of
 from tests.web.cast import signed_in
 
@@ -25,9 +25,8 @@ def a_driven_cast(**cast: object) -> Cast:
 
 
 def a_replayed_study(**cast: object) -> Study:
-    options = PlanOptions(allow_replay=True)
     made = a_driven_cast(**cast)
-    return open_study(name="Round 1", votes_per_expert=9, seed=7, options=options, **made)
+    return open_study(name="Round 1", votes_per_expert=9, seed=7, allow_replay=True, **made)
 
 
 def page(study: Study) -> str:

@@ -12,9 +12,10 @@ from django.urls import reverse
 
 from arena.models import Study
 from arena.services.ratings import rate
-from arena.services.studies import close_study, open_study
+from arena.services.studies import close_study
 from augment.models import Contestant
 from tests import study_rows
+from tests.opening import open_study
 from tests.web.cast import people, signed_in
 
 pytestmark = pytest.mark.django_db

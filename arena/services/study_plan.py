@@ -1,0 +1,188 @@
+"""What somebody asks for who opens a study; every door derives its fields from StudyPlan."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Self
+
+from arena.models import Study
+from arena.pairing.demands import MOST_ADAPTIVE, MOST_CHECKS, MOST_OVERLAP, MOST_REPEATS
+from arena.services.hypotheses import hypotheses_of
+from arena.services.shown_pictures import SampleRule
+from augment.services.inputs import InputKind, input_field, inputs_of
+
+LONGEST_NAME = 120
+HIGHEST_SEED = 2**63 - 1
+SAMPLES = {SampleRule.ONE.value: "one of each scenario", SampleRule.ALL.value: "all of them"}
+
+
+def _percent(label: str, help: str, *, most: float, default: float = 0.0) -> Any:
+    return input_field(
+        InputKind.NUMBER, label, help, unit="%", least=0, most=round(100 * most), default=default
+    )
+
+
+def _switch(label: str, help: str, *, default: bool = False) -> Any:
+    return input_field(InputKind.SWITCH, label, help, default=default)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StudyPlan:
+    """A study that is to be opened; see arena.pairing.rules for what its rules mean."""
+
+    name: str = input_field(
+        InputKind.TEXT, "Name", "Experts see it: it should name no contestant.", most=LONGEST_NAME
+    )
+    contestants: tuple[str, ...] = input_field(
+        InputKind.NAMES, "Contestants", "Slugs; the latest picture of each scenario takes part."
+    )
+    scenarios: tuple[str, ...] = input_field(InputKind.NAMES, "Scenarios", "Slugs.")
+    experts: tuple[str, ...] = input_field(InputKind.NAMES, "Experts", "Usernames.")
+    votes_per_expert: int = input_field(InputKind.WHOLE, "Votes per expert", least=1, most=10_000)
+    seed: int = input_field(
+        InputKind.WHOLE, "Seed of the plan", default=1, least=0, most=HIGHEST_SEED
+    )
+    repeats: float = _percent(
+        "Hidden repeats",
+        "On top of the votes, sides swapped, never rated: they tell how steady each expert is.",
+        most=MOST_REPEATS,
+        default=5.0,
+    )
+    checks: float = _percent(
+        "Attention checks",
+        "A broken picture against the reference, never rated. Each needs a scenario with a "
+        "reference; have the missing ones drawn first.",
+        most=MOST_CHECKS,
+    )
+    overlap: float = _percent(
+        "Pairs that two experts judge",
+        "At least so many of the judged pairs go to two experts or more, else nobody can say how "
+        "far they agree.",
+        most=MOST_OVERLAP,
+    )
+    adaptive: float = _percent(
+        "Planned by the votes",
+        "The last share of the votes goes to the pairs that tell most; 0 plans all before the "
+        "first vote.",
+        most=MOST_ADAPTIVE,
+    )
+    targets: tuple[str, ...] = input_field(
+        InputKind.LINES,
+        "Targets",
+        "Empty for a balanced plan. Else one for each contestant, “reference=120”: in how many "
+        "votes of all experts it appears. Or one for each pair, “reference vs rule-placer=40”.",
+        default=(),
+    )
+    hypotheses: tuple[str, ...] = input_field(
+        InputKind.LINES,
+        "Hypotheses",
+        "Lines that are frozen with the study. “reference above rule-placer” alone on a line is "
+        "answered by the results.",
+        default=(),
+    )
+    samples: SampleRule = input_field(
+        InputKind.CHOICE,
+        "Where a job has several samples",
+        "One is drawn by the seed, the same for all contestants; all are shown each on its own.",
+        choices=SAMPLES,
+        default=SampleRule.ONE,
+    )
+    jobs: tuple[str, ...] = input_field(
+        InputKind.NAMES,
+        "Jobs",
+        "Names or codes of the jobs whose augmentations are shown; none for the latest of all.",
+        default=(),
+    )
+    allow_both_miss: bool = _switch(
+        "Ask whether both miss",
+        "Experts may add to Equal that both miss the instruction; it counts as a tie.",
+    )
+    show_alike: bool = _switch(
+        "Also show pairs that nobody can tell apart",
+        "Pairs that differ by at most 0.15 m and 2° in every object are otherwise settled as "
+        "ties, but for a tenth that is shown as a check.",
+    )
+    allow_text: bool = _switch(
+        "Experts may read a text description",
+        "It lists what was added, changed or removed in each image, with metres and headings; "
+        "votes say who read it.",
+    )
+    allow_measures: bool = _switch(
+        "Experts may measure",
+        "They may lay lines and rings of what the instruction asks for over both images, and "
+        "read distances to lane edges under the ruler; votes say who did.",
+        default=True,
+    )
+    allow_replay: bool = _switch(
+        "Experts may play the drives",
+        "Under the images, how a planner drove both scenes; only where every image of a scenario "
+        "was driven. Votes say who played them.",
+    )
+    practice: bool = _switch(
+        "Practice before the first pair",
+        "Five pairs, a reference beside a broken image, each followed by what was right and why; "
+        "nothing of it counts.",
+    )
+    allow_simulated: bool = _switch(
+        "Simulated may take part",
+        "Every page and file then says so.",
+    )
+
+    @classmethod
+    def read(cls, given: Mapping[str, Any]) -> Self:
+        """Make a plan of what a door has parsed: lists, and words for choices."""
+        found: dict[str, Any] = {
+            name: tuple(value) if isinstance(value, list) else value
+            for name, value in given.items()
+        }
+        return cls(**found | {"samples": SampleRule(given.get("samples", SampleRule.ONE))})
+
+    @property
+    def shares(self) -> dict[str, Any]:
+        """The percentages as the planner takes them, by its names."""
+        return {share: getattr(self, name) / 100 for name, share in SHARES.items()}
+
+
+PLAN_INPUTS = inputs_of(StudyPlan)
+SHARES = {
+    "repeats": "repeat_share",
+    "checks": "check_share",
+    "overlap": "overlap_share",
+    "adaptive": "adaptive_share",
+}
+"""What the frozen rules call a percentage; they keep it as a share."""
+SWITCH_COLUMNS = tuple(
+    one.name
+    for one in PLAN_INPUTS
+    if one.kind is InputKind.SWITCH and one.name in {column.name for column in Study._meta.fields}
+)
+"""Switches that a study keeps in a column of its own."""
+
+
+def plan_of(study: Study) -> StudyPlan:
+    """Return what was asked for when a study was opened, by what it froze.
+
+    Who joined by a link for everybody, and hidden pairs handed over, are no part of it.
+    """
+    rules = study.rules
+    return StudyPlan(
+        name=study.name,
+        contestants=tuple(study.contestants.order_by("slug").values_list("slug", flat=True)),
+        scenarios=tuple(study.scenarios.order_by("slug").values_list("slug", flat=True)),
+        experts=tuple(rules.get("experts", ())),
+        votes_per_expert=study.votes_per_expert,
+        seed=study.seed,
+        targets=_target_lines(rules),
+        hypotheses=tuple(one.text for one in hypotheses_of(study)),
+        samples=SampleRule(rules.get("samples", SampleRule.ONE)),
+        jobs=tuple(job["code"] for job in rules.get("jobs", ())),
+        show_alike=bool(rules.get("show_alike")),
+        **{name: round(100 * rules.get(share, 0), 6) for name, share in SHARES.items()},
+        **{name: getattr(study, name) for name in SWITCH_COLUMNS},
+    )
+
+
+def _target_lines(rules: Mapping[str, Any]) -> tuple[str, ...]:
+    by_pair = [f"{one} vs {other} {votes}" for one, other, votes in rules.get("pair_votes", ())]
+    return (*(f"{slug} {votes}" for slug, votes in rules.get("appearances", ())), *by_pair)
