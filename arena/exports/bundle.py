@@ -51,7 +51,11 @@ def _files(snapshot: Snapshot) -> dict[str, bytes]:
     table = leaderboard_table(snapshot)
     results = snapshot.results
     votes = vote_table(snapshot)
-    files = {f"leaderboard.{chosen.suffix}": chosen.write(table) for chosen in FORMATS.values()}
+    files = {
+        f"leaderboard.{chosen.suffix}": chosen.write(table)
+        for chosen in FORMATS.values()
+        if chosen.suffix not in CHART_FORMATS
+    }
     files |= {f"votes.{chosen.suffix}": chosen.write(votes) for chosen in VOTE_FORMATS.values()}
     files |= {
         f"{name}.{form}": chart(file_format=form)

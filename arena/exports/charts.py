@@ -1,4 +1,4 @@
-"""Ratings with their intervals, for papers, drawn by matplotlib; the pages draw their own."""
+"""Ratings with their intervals, drawn by matplotlib."""
 
 from __future__ import annotations
 

@@ -47,7 +47,6 @@ class Plot:
 
     Attributes:
         across, up: What the axes say.
-        unit: After a number across, where it is named alone.
         is_log: Whether the axis across is logarithmic.
         from_zero: Whether the axes begin at zero, a logarithmic one excepted.
         falls: Draws the curve `falls` / sqrt(x) behind the points, None without one.
@@ -56,7 +55,6 @@ class Plot:
     across: str
     up: str
     points: Sequence[Given]
-    unit: str = ""
     is_log: bool = False
     from_zero: bool = False
     falls: float | None = None
@@ -105,14 +103,14 @@ def _displacement(snapshot: Snapshot, table: LeaderboardTable) -> Plot:
         for n, row in enumerate(table.rows, start=1)
         if row.rating is not None and (far := metres.get(row.slug)) is not None
     ]
-    return Plot(across=METRES, up=ELO, points=points, unit=" m")
+    return Plot(across=METRES, up=ELO, points=points)
 
 
 def _cost(snapshot: Snapshot, table: LeaderboardTable) -> dict[str, Plot]:
     metres = {line.slug: line.median_m for line in snapshot.results.displacement}
     costs = {line.slug: line for line in snapshot.results.cost}
     by_name = {}
-    for what, label, unit in (("usd", USD, " USD"), ("tokens", TOKENS, "")):
+    for what, label in (("usd", USD), ("tokens", TOKENS)):
         rows = [
             (n, row, spent, cost.model_class)
             for n, row in enumerate(table.rows, start=1)
@@ -124,7 +122,6 @@ def _cost(snapshot: Snapshot, table: LeaderboardTable) -> dict[str, Plot]:
             points=[
                 _rated(n, row, x, group) for n, row, x, group in rows if row.rating is not None
             ],
-            unit=unit,
             is_log=True,
         )
         by_name[f"displacement-{what}"] = Plot(
@@ -135,7 +132,6 @@ def _cost(snapshot: Snapshot, table: LeaderboardTable) -> dict[str, Plot]:
                 for n, row, x, group in rows
                 if (far := metres.get(row.slug)) is not None
             ],
-            unit=unit,
             is_log=True,
             from_zero=True,
         )

@@ -1,4 +1,4 @@
-"""The charts of a rating as files, by name. The same rating always gives the same bytes."""
+"""The charts of a rating, for pages and as files; the same rating always gives the same bytes."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from functools import partial
 from typing import Protocol
 
+from arena.exports.charts import interval_chart
 from arena.exports.heat_chart import heat_chart
 from arena.exports.plots import plots
 from arena.exports.scatter_chart import scatter_chart
@@ -25,9 +26,9 @@ class Chart(Protocol):
 
 
 def charts(snapshot: Snapshot) -> Mapping[str, Chart]:
-    """Every chart beside the table's own that a rating has, by name."""
+    """Every chart that a rating has, by name."""
     table = leaderboard_table(snapshot)
-    by_name: dict[str, Chart] = {}
+    by_name: dict[str, Chart] = {"leaderboard": partial(interval_chart, table)}
     if snapshot.results.pairs:
         by_name["pairs"] = partial(heat_chart, table.rows, snapshot.results.pairs)
     if snapshot.results.types:

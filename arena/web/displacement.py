@@ -14,7 +14,6 @@ from arena.exports.displacement_table import displacement_table
 from arena.exports.displacement_writers import FORMATS
 from arena.exports.formats import format_named
 from arena.web.access import STAFF, allow_only
-from arena.web.boxes import box_sheet
 from augment.errors import UnknownName
 from augment.models import GenerationJob
 from augment.services.judging.displacement import By, types_named
@@ -68,7 +67,6 @@ def section(request: HttpRequest, job: GenerationJob) -> dict[str, object]:
     table = displacement_table(job, by=by, types=types)
     return {
         "table": table,
-        "sheet": box_sheet(table),
         "by": by,
         "labels": LABELS,
         "forms": FORMATS,

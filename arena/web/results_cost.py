@@ -6,11 +6,25 @@ from arena.exports.plots import plots
 from arena.exports.tables import LeaderboardTable
 from arena.models import Snapshot
 from arena.web.results_ratings import Context
-from arena.web.scatter import NARROW, scatter
 from augment.models import EndpointModel
 
-_CLASSES = ("Frontier", "Utility", "Open weight")
-"""What models call their classes."""
+_CHARTS = {
+    "elo-usd": ("Elo against money", "Up: Elo with its 95 % interval. Across: USD per scenario."),
+    "elo-tokens": (
+        "Elo against tokens",
+        "Up: Elo with its 95 % interval. Across: tokens per scenario, in and out.",
+    ),
+    "displacement-usd": (
+        "Displacement against money",
+        "Up: median displacement in metres, less is better. Across: USD per scenario.",
+    ),
+    "displacement-tokens": (
+        "Displacement against tokens",
+        "Up: median displacement in metres, less is better. Across: tokens per scenario, in and"
+        " out.",
+    ),
+}
+"""Title and legend of each; all have a logarithmic axis across."""
 
 
 def displacement(snapshot: Snapshot, table: LeaderboardTable) -> Context:
@@ -21,7 +35,7 @@ def displacement(snapshot: Snapshot, table: LeaderboardTable) -> Context:
         for n, row in enumerate(table.rows, start=1)
         if row.slug in by_slug
     ]
-    return {"lines": lines, "chart": scatter(plots(snapshot, table).get("displacement"))}
+    return {"lines": lines, "has_chart": "displacement" in plots(snapshot, table)}
 
 
 def cost(snapshot: Snapshot, table: LeaderboardTable) -> Context:
@@ -40,21 +54,12 @@ def cost(snapshot: Snapshot, table: LeaderboardTable) -> Context:
         for n, row in enumerate(table.rows, start=1)
         if row.slug in spent
     ]
-    charts = plots(snapshot, table)
+    drawn = plots(snapshot, table)
     return {
         "lines": lines,
-        "metres_by_money": scatter(charts.get("displacement-usd"), width=NARROW),
-        "metres_by_tokens": scatter(charts.get("displacement-tokens"), width=NARROW),
-        "by_money": scatter(charts.get("elo-usd"), width=NARROW),
-        "by_tokens": scatter(charts.get("elo-tokens"), width=NARROW),
-        "keys": [
-            {"group": group, "is_simulated": simulated, "label": labels.get(group, "")}
-            for group, simulated in sorted(
-                {
-                    (spent[row.slug].model_class, row.simulated)
-                    for row in table.rows
-                    if row.slug in spent
-                }
-            )
+        "charts": [
+            {"name": name, "title": title, "legend": legend}
+            for name, (title, legend) in _CHARTS.items()
+            if name in drawn
         ],
     }

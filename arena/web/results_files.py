@@ -20,7 +20,7 @@ from arena.exports.writers import FORMATS
 from arena.exports.zips import CONTENT_TYPE, ZIP
 from arena.models import Snapshot, Study
 from arena.queries.results import snapshot_to_export
-from arena.web.access import STAFF, allow_only
+from arena.web.access import ADMIN, ANALYST, EXPERT, STAFF, allow_only
 from arena.web.results import asked_rating, get_readable_study
 from augment.errors import Conflict, UnknownName
 
@@ -46,10 +46,10 @@ def export(request: HttpRequest, code: uuid.UUID, form: str) -> HttpResponse:
     return _file(content, chosen.content_type, f"{_slug(study)}-leaderboard.{chosen.suffix}")
 
 
-@allow_only(*STAFF)
+@allow_only(ADMIN, ANALYST, EXPERT)
 @require_safe
 def export_chart(request: HttpRequest, code: uuid.UUID, name: str, form: str) -> HttpResponse:
-    """A chart of a rating beside the table's own."""
+    """A chart of a rating for whoever may read it: a picture of its page, or a file."""
     study = get_readable_study(request, code)
     snapshot = _snapshot(request, study)
     try:

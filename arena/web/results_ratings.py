@@ -12,7 +12,6 @@ from arena.exports.heat import heat_map
 from arena.exports.tables import LeaderboardTable, Row
 from arena.models import Snapshot
 from arena.results.tree import Bounds, OnlinePlace, PairRecord, TypeStanding
-from arena.web.charts import bars, interval_chart
 
 Context = dict[str, Any]
 """What a tab's template needs."""
@@ -29,7 +28,7 @@ def standings(snapshot: Snapshot, table: LeaderboardTable) -> Context:
     claims, check = snapshot.results.claims, _cross_check(snapshot, table)
     return {
         "columns": ON_PAGE,
-        "bars": bars([(row.slug, row.lower, row.rating, row.upper) for row in table.rows]),
+        "has_bounds": any(row.has_bound for row in table.rows),
         "largest_move": max(moves, default=None),
         "removal": removal,
         "rival": removal and names[removal.rival].name,
@@ -66,11 +65,8 @@ def pairs(snapshot: Snapshot, table: LeaderboardTable) -> Context:
 
 
 def types(snapshot: Snapshot, table: LeaderboardTable) -> Context:
-    """One small chart and table a scenario type, all on one axis."""
+    """One chart of all scenario types, and a table each."""
     names = by_slug(table)
-    lines = [line for part in snapshot.results.types for line in part.lines]
-    ends = [end for line in lines for end in (line.lower, line.upper) if end is not None]
-    span = (min(ends), max(ends)) if ends else None
     parts: list[Context] = []
     for part in snapshot.results.types:
         rows = [_row(line, names[line.slug]) for line in part.lines if line.votes]
@@ -81,7 +77,6 @@ def types(snapshot: Snapshot, table: LeaderboardTable) -> Context:
             {
                 "kept": part,
                 "rows": rows,
-                "chart": interval_chart(rows, span),
                 "reasons": reasons,
             }
         )

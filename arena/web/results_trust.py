@@ -10,17 +10,14 @@ from arena.models.votes import AIDS
 from arena.queries.judged import AUTOMATIC
 from arena.queries.people import natural_order
 from arena.results.tree import PanelRater
-from arena.web.charts import bars
 from arena.web.results_authors import with_authors
 from arena.web.results_ratings import Context, is_all_tied
-from arena.web.scatter import scatter
 
 
 def raters(snapshot: Snapshot, table: LeaderboardTable) -> Context:
     """Agreement, repeats, sides, and the panel of experts."""
     kept = snapshot.results.trust.raters
     lines = [line for line in kept if line.judge != AUTOMATIC]
-    left = [(line.judge, line.left.lower, line.left.value, line.left.upper) for line in lines]
     used = {name for line in lines for name, _ in line.aids}
     aids = [name for name in AIDS if name in used]
     panel = sorted(
@@ -34,7 +31,6 @@ def raters(snapshot: Snapshot, table: LeaderboardTable) -> Context:
         "aids": aids,
         "automatic": sum(line.votes for line in kept if line.judge == AUTOMATIC),
         "automatic_judge": AUTOMATIC,
-        "left_bars": bars(left, span=(0.0, 1.0)),
     }
 
 
@@ -45,7 +41,6 @@ def coverage(snapshot: Snapshot, table: LeaderboardTable) -> Context:
     rows = table.rows
     return {
         "claims": snapshot.results.claims,
-        "chart": scatter(plot),
         "points": [(point, rows[point.number - 1]) for point in plot.points] if plot else [],
         "heat": heat_map(pairs, table.rows),
         "planned": sum(pair.planned or 0 for pair in pairs),

@@ -48,10 +48,10 @@ PARTS = {
     SoughtPart.SHARED: "On what others judged as well",
 }
 ORDERS = {
-    SoughtOrder.DISPUTED: "The most disputed pairs",
-    SoughtOrder.LOST: "The pictures that lost most votes",
-    SoughtOrder.FAULTS: "The pictures with most faults",
-    SoughtOrder.SCENARIO: "By scenario",
+    SoughtOrder.DISPUTED: "Most disputed",
+    SoughtOrder.LOST: "Most often beaten",
+    SoughtOrder.FAULTS: "Most faults",
+    SoughtOrder.SCENARIO: "Scenarios by name",
 }
 MARKS = {
     COUNTED: "Counted",
@@ -104,7 +104,7 @@ class VoteSearchForm(forms.Form):
         self._offer("mark", _choices(MARKS))
         self._offer("part", [everybody, *_choices(PARTS)])
         self._offer("aid", [everybody, *_choices(AID_LABELS)])
-        self._offer("order", [("", "The first vote"), *_choices(ORDERS)])
+        self._offer("order", [("", "First votes"), *_choices(ORDERS)])
         if not snapshot.study.shows_all_samples:
             del self.fields["sample"]
         if is_imported(snapshot.study):

@@ -47,7 +47,7 @@ def snapshot() -> Snapshot:
 
 def test_every_chart_comes_in_every_format_the_same_twice(snapshot: Snapshot) -> None:
     """Those that the zip of everything has are drawn twice for its test (test_bundle.py)."""
-    names = ["pairs", "types", "width", "displacement"]
+    names = ["leaderboard", "pairs", "types", "width", "displacement"]
     names += ["elo-usd", "displacement-usd", "elo-tokens", "displacement-tokens"]
     assert list(charts(snapshot)) == names
     again = Snapshot.objects.get(pk=snapshot.pk)
