@@ -18,6 +18,7 @@ from arena.models import Matchup, Study, Vote
 from arena.services.people import create_person
 from arena.services.studies import close_study
 from augment.models import Augmentation, BaseScene, Contestant, GenerationJob, Scenario
+from augment.scene.catalogue import ScenarioType
 from augment.scene.codec import scene_to_document
 from tests.opening import open_study
 from tests.scenes import scene as street
@@ -65,7 +66,7 @@ def scenarios(number: int) -> list[Scenario]:
         source="authored",
         provenance="a test",
     )
-    types = Scenario.Type.values
+    types = list(ScenarioType)
     return [
         Scenario.objects.create(
             slug=f"place-{index:02d}",

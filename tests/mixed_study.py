@@ -6,6 +6,7 @@ from arena.models import Matchup, Study
 from arena.services.authorships import mark_author
 from arena.services.studies import close_study
 from augment.models import Augmentation, Contestant, Scenario
+from augment.scene.catalogue import ScenarioType
 from tests.study_rows import a_study, contestant, matchups_of, picture, shown_again, vote
 
 OUTCOMES = ("left", "equal", "right", "right")
@@ -18,7 +19,7 @@ def mixed_study(*, close: bool = True) -> Study:
     are no votes. Two pairs of pictures are alike and were never shown.
     """
     study = a_study(votes_per_expert=12, contestants=("ann", "bob", "cid"))
-    Scenario.objects.filter(slug__in=("place-0", "place-1")).update(type=Scenario.Type.OVERTAKE)
+    Scenario.objects.filter(slug__in=("place-0", "place-1")).update(type=ScenarioType.OVERTAKE)
     Contestant.objects.filter(slug="cid").update(kind=Contestant.Kind.SIMULATED)
     alike = [["place-2", "ann", "bob"], ["place-0", "ann", "cid"]]
     Study.objects.filter(pk=study.pk).update(rules=study.rules | {"identical": alike})

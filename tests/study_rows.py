@@ -13,6 +13,7 @@ from arena.services.decisions import decision_of
 from arena.services.people import create_person
 from arena.services.votes import cast_vote
 from augment.models import Augmentation, BaseScene, Contestant, GenerationJob, Scenario
+from augment.scene.catalogue import ScenarioType
 from augment.scene.codec import modification_to_document, scene_to_document
 from augment.scene.modification import Modification
 from tests.opening import open_study
@@ -43,7 +44,7 @@ def scenario(slug: str) -> Scenario:
         },
     )
     return Scenario.objects.create(
-        slug=slug, base_scene=base, type=Scenario.Type.NUDGE, instruction=f"Park a car on {slug}."
+        slug=slug, base_scene=base, type=ScenarioType.NUDGE, instruction=f"Park a car on {slug}."
     )
 
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from arena.exports.published import BY_VARIANT, PublishedBox
-from augment.models import GenerationJob, Scenario
+from augment.models import GenerationJob
 from augment.services.judging.displacement import (
     PLACED_EXACTLY,
     By,
@@ -16,6 +16,7 @@ from augment.services.judging.displacement import (
     groups,
     of_job,
 )
+from augment.services.scenarios.types import ScenarioType, in_type_order
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -45,10 +46,10 @@ class DisplacementTable:
     @property
     def types_text(self) -> str:
         """Which scenario types count, in words."""
-        if self.types == tuple(Scenario.Type.values):
+        if self.types == tuple(ScenarioType):
             return "All five scenario types"
         own = {one.row.scenario.type: one.row.scenario.type_label for one in self.measured}
-        known = own | {one.value: str(one.label) for one in Scenario.Type}
+        known = own | {one.value: str(one.label) for one in ScenarioType}
         labels = tuple(known[name] for name in self.types)
         return f"Scenario types: {', '.join(labels)}"
 
@@ -99,8 +100,7 @@ def displacement_table(
             places are definite, else all.
     """
     measured = of_job(job)
-    own = {one.row.scenario.type for one in measured} - set(Scenario.Type.values)
-    every = (*Scenario.Type.values, *sorted(own))
+    every = tuple(in_type_order([*ScenarioType, *(one.row.scenario.type for one in measured)]))
     if types is None:
         types = PLACED_EXACTLY if by is By.VARIANT else every
     chosen = tuple(one for one in every if one in set(types))

@@ -10,8 +10,8 @@ from arena.exports.formats import Format, formats, round_value
 from arena.exports.tables import shown_name
 from arena.rating.printed import escape
 from arena.services.cells import csv_text
-from augment.models import Scenario
 from augment.services.judging.driving_scores import DrivingLine
+from augment.services.scenarios.types import ScenarioType, in_type_order
 
 MEASURED = "own simulator"
 _BEFORE = (
@@ -47,8 +47,8 @@ def csv_bytes(table: DrivingTable) -> bytes:
 
 def _kinds(table: DrivingTable) -> tuple[str, ...]:
     """A column each: the five types, and one's own that were driven."""
-    own = {kind for line in table.lines for kind in line.by_type} - set(Scenario.Type.values)
-    return (*Scenario.Type.values, *sorted(own))
+    driven = (kind for line in table.lines for kind in line.by_type)
+    return tuple(in_type_order([*ScenarioType, *driven]))
 
 
 def json_bytes(table: DrivingTable) -> bytes:

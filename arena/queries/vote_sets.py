@@ -21,7 +21,7 @@ from arena.queries.judged import (
     votes_up_to,
 )
 from augment.errors import UnknownName
-from augment.models import Scenario
+from augment.services.scenarios.types import ScenarioType
 
 KINDS = (MAIN, REPEAT)
 """What may be rated: planned showings, and on demand the hidden repeats of them."""
@@ -177,7 +177,7 @@ def why_left_out(
 
 
 def _check(filters: Filters, lines: Sequence[Judged]) -> None:
-    known_types = {*Scenario.Type.values, *(line.type for line in lines)}
+    known_types = {*list(ScenarioType), *(line.type for line in lines)}
     for name in filters.types:
         if name not in known_types:
             raise UnknownName("scenario type", name, sorted(known_types))

@@ -26,9 +26,8 @@ from arena.results.tree import (
     TypeStanding,
 )
 from arena.services.vote_arrays import VoteArrays
-from augment.models import Scenario
 from augment.services.judging.displacement import of_rows, summarise
-from augment.services.scenarios.types import type_label
+from augment.services.scenarios.types import in_type_order, type_label
 
 FEW_VOTES = 30
 """Below so many votes of a contestant a part of the table says that they are too few."""
@@ -83,11 +82,7 @@ def by_type(arrays: VoteArrays, board: Leaderboard) -> tuple[TypeRating, ...]:
         arrays: The votes that count.
         board: Their rating.
     """
-    order = [*Scenario.Type.values]
-    known = sorted(
-        (name for name in arrays.types if name),
-        key=lambda name: order.index(name) if name in order else len(order),
-    )
+    known = in_type_order(name for name in arrays.types if name)
     return tuple(_one_type(arrays, name, board) for name in known)
 
 

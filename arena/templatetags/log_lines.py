@@ -8,8 +8,9 @@ from typing import Any
 
 from django import template
 
-from arena.templatetags.results import left_out, method_label, type_label
+from arena.templatetags.results import left_out, method_label
 from augment.models import Event
+from augment.services.scenarios.types import type_label
 
 register = template.Library()
 

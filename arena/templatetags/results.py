@@ -12,9 +12,8 @@ from arena.models import Vote
 from arena.models.votes import AID_LABELS
 from arena.rating.estimate import Estimate
 from arena.rating.printed import interval_text, rating_text, whole_percent, with_minus
-from augment.models import Scenario
 from augment.services.judging.driving_scores import clearance_text
-from augment.services.scenarios.types import type_label as own_label
+from augment.services.scenarios.types import type_label
 
 register = template.Library()
 
@@ -94,11 +93,7 @@ def verb_label(verb: str) -> str:
     return str(_VERBS.get(verb, verb))
 
 
-@register.filter
-def type_label(name: str) -> str:
-    """The name of a scenario type."""
-    known = dict(Scenario.Type.choices)
-    return str(known[name]) if name in known else own_label(name)
+register.filter(type_label)
 
 
 @register.filter

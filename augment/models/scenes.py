@@ -55,16 +55,6 @@ class BaseScene(models.Model):
 class Scenario(models.Model):
     """A scene, its type, the user's instruction; its intent and reference if there are any."""
 
-    class Type(models.TextChoices):
-        CONSTRUCTION_ZONE = (
-            ScenarioType.CONSTRUCTION_ZONE.value,
-            ScenarioType.CONSTRUCTION_ZONE.label,
-        )
-        ACCIDENT_SITE = ScenarioType.ACCIDENT_SITE.value, ScenarioType.ACCIDENT_SITE.label
-        JAYWALKER = ScenarioType.JAYWALKER.value, ScenarioType.JAYWALKER.label
-        NUDGE = ScenarioType.NUDGE.value, ScenarioType.NUDGE.label
-        OVERTAKE = ScenarioType.OVERTAKE.value, ScenarioType.OVERTAKE.label
-
     SETS = tuple(one.value for one in CatalogueSet)
     """The parts of the authored catalogue, by name."""
 
@@ -147,9 +137,9 @@ class Scenario(models.Model):
         constraints = (
             models.CheckConstraint(
                 name="scenario_type_of_ones_own_has_a_label",
-                condition=Q(type__in=[member.value for member in ScenarioType], type_label="")
+                condition=Q(type__in=[one.value for one in ScenarioType], type_label="")
                 | (
-                    ~Q(type__in=[member.value for member in ScenarioType])
+                    ~Q(type__in=[one.value for one in ScenarioType])
                     & ~Q(type="")
                     & ~Q(type_label="")
                 ),

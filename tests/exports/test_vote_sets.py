@@ -19,6 +19,7 @@ from arena.services.studies import close_study
 from arena.services.vote_rows import COLUMNS, digest_of, vote_rows, votes_csv
 from augment.errors import Conflict
 from augment.models import Contestant, Scenario
+from augment.scene.catalogue import ScenarioType
 from tests.append_only import rewriting
 from tests.study_rows import a_study, matchups_of, vote
 
@@ -32,13 +33,13 @@ def counted(study: Study, **filters: object) -> list[str]:
 
 def test_filters_choose_by_type_and_expert_and_count_what_they_leave_out() -> None:
     study = a_study(votes_per_expert=6)
-    Scenario.objects.filter(slug="place-0").update(type=Scenario.Type.OVERTAKE)
+    Scenario.objects.filter(slug="place-0").update(type=ScenarioType.OVERTAKE)
     for matchup in study.matchups.all():
         vote(matchup)
     eva = matchups_of(study, "eva")[0].expert.person
     wanted = study.matchups.filter(scenario__slug="place-0").count()
     assert len(counted(study)) == 12
-    assert len(counted(study, types=(Scenario.Type.OVERTAKE.value,))) == wanted > 0
+    assert len(counted(study, types=(ScenarioType.OVERTAKE.value,))) == wanted > 0
     assert len(counted(study, experts=(str(eva.code),))) == 6
     found = vote_set(study, filters=Filters(experts=(str(eva.code),)), last=last_vote_of(study))
     assert found.left_out == {"filtered": 6}
@@ -105,9 +106,9 @@ def test_a_snapshot_keeps_its_filters_and_judges_and_finds_its_votes_again() -> 
     snapshot = rate(
         study=close_study(study=study),
         rounds=10,
-        filters=Filters(types=(Scenario.Type.NUDGE.value,)),
+        filters=Filters(types=(ScenarioType.NUDGE.value,)),
     )
-    assert snapshot.filters["types"] == [Scenario.Type.NUDGE.value]
+    assert snapshot.filters["types"] == [ScenarioType.NUDGE.value]
     person = matchups_of(study, "eva")[0].expert.person
     assert snapshot.results.judges[str(person.code)] == person.pseudonym
     person.pseudonym = "Somebody else"

@@ -34,7 +34,8 @@ from arena.management.demo import (
 )
 from arena.models import Person, Study
 from arena.models.tokens import fresh_token
-from augment.models import Augmentation, GenerationJob, Scenario
+from augment.models import Augmentation, GenerationJob
+from augment.scene.catalogue import ScenarioType
 from augment.scene.codec import modification_to_document
 from augment.scene.modification import Modification
 from augment.services.judging.displacement import By
@@ -94,7 +95,7 @@ def demo_folder(steady_rows: None, tmp_path: Path, settings: Settings) -> Path:
     makers = {slug: contestant(slug) for slug in RATED}
     for number in range(PLACES):
         place = scenario(f"place-{number:02d}")
-        place.type = Scenario.Type.values[number % len(Scenario.Type.values)]
+        place.type = list(ScenarioType)[number % len(list(ScenarioType))]
         place.reference = document(20.0 + number)
         place.save()
         for slug, maker in makers.items():

@@ -6,6 +6,7 @@ from datetime import UTC, datetime, timedelta
 from typing import Any
 
 from augment.models import Augmentation, BaseScene, Contestant, Endpoint, GenerationJob, Scenario
+from augment.scene.catalogue import ScenarioType
 from augment.scene.codec import modification_to_document, scene_to_document
 from augment.scene.entities import Scene
 from augment.scene.intent_codec import intent_to_document
@@ -34,7 +35,7 @@ def add_scenario(slug: str, *, scene: Scene | None = None, **columns: Any) -> Sc
         provenance="made for a test",
     )
     columns = {
-        "type": Scenario.Type.CONSTRUCTION_ZONE,
+        "type": ScenarioType.CONSTRUCTION_ZONE,
         "instruction": INSTRUCTION,
         "reference": modification_to_document(TWO_CONES),
         "intent": intent_to_document(cones(20.0, 1, Shape.LINE)),

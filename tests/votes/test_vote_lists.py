@@ -12,7 +12,7 @@ from arena.queries.vote_lists import each_vote, vote_page, votes_behind
 from arena.queries.vote_search import EVERY, LEFT_OUT, VoteSearch
 from arena.queries.vote_sets import Filters
 from arena.services.ratings import rate
-from augment.models import Scenario
+from augment.scene.catalogue import ScenarioType
 from tests.mixed_study import mixed_study
 
 pytestmark = pytest.mark.django_db
@@ -33,11 +33,11 @@ def total(snapshot: Snapshot, **search: str) -> int:
 
 CHOICES: dict[str, dict[str, object]] = {
     "all": {},
-    "one type": {"types": (Scenario.Type.OVERTAKE.value,)},
+    "one type": {"types": (ScenarioType.OVERTAKE.value,)},
     "with repeats": {"kinds": ("main", "repeat")},
     "repeats alone": {"kinds": ("repeat",)},
     "without settled pairs": {"leave_out_settled": True},
-    "one nudge": {"types": (Scenario.Type.NUDGE.value,)},
+    "one nudge": {"types": (ScenarioType.NUDGE.value,)},
     "without own": {"leave_out_own": True},
 }
 

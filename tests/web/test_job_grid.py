@@ -10,6 +10,7 @@ from django.test import Client
 from django.urls import reverse
 
 from augment.models import Augmentation, Contestant, GenerationJob, Scenario
+from augment.scene.catalogue import ScenarioType
 from tests.jobs import rows
 from tests.web.cast import people, signed_in
 
@@ -26,7 +27,7 @@ def large_job(*, scenarios: int, contestants: int, samples: int = 1) -> Generati
     Scenario.objects.bulk_create(
         Scenario(
             slug=f"street-{number:03}",
-            type=Scenario.Type.CONSTRUCTION_ZONE,
+            type=ScenarioType.CONSTRUCTION_ZONE,
             instruction=f"Place {number} cones.",
             base_scene=base,
         )

@@ -11,6 +11,7 @@ from django.urls import reverse
 
 from arena.models import Study
 from augment.models import Augmentation, BaseScene, Contestant, GenerationJob, Scenario
+from augment.scene.catalogue import ScenarioType
 from tests.jobs import rows
 from tests.web.cast import people, signed_in
 
@@ -41,7 +42,7 @@ def add_many(user: User | None = None) -> None:
     Scenario.objects.bulk_create(
         Scenario(
             slug=f"street-{number:03}",
-            type=Scenario.Type.JAYWALKER if number % 2 else Scenario.Type.CONSTRUCTION_ZONE,
+            type=ScenarioType.JAYWALKER if number % 2 else ScenarioType.CONSTRUCTION_ZONE,
             instruction=f"Place {number} cones.",
             base_scene=base,
         )

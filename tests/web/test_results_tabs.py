@@ -12,7 +12,7 @@ from arena.models import EarlyLook, Matchup, Study
 from arena.services.ratings import rate
 from arena.services.studies import close_study
 from arena.web.results_tabs import TABS
-from augment.models import Scenario
+from augment.scene.catalogue import ScenarioType
 from tests import study_rows
 from tests.full_study import Size, full_study
 from tests.web.cast import people, signed_in
@@ -89,7 +89,7 @@ def test_a_new_rating_is_asked_for_with_method_and_filters(study: Study, analyst
     person = study.experts.order_by("pk")[0].person
     sent = {
         "method": "bt", "resample": "vote", "rounds": "60", "seed": "9",
-        "types": [Scenario.Type.NUDGE.value], "experts": [str(person.code)],
+        "types": [ScenarioType.NUDGE.value], "experts": [str(person.code)],
     }  # fmt: skip
     analyst.post(reverse("study-rate", args=[study.code]), sent)
     made = study.snapshots.order_by("-pk")[0]

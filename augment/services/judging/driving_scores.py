@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from django.db.models import Q, QuerySet
 
 from augment.models import GenerationJob, Scenario, Simulation
+from augment.scene.catalogue import ScenarioType, in_type_order
 from augment.services.judging.simulations import SCORES, Options
 
 State, Subject = Simulation.State, Simulation.Subject
@@ -151,9 +152,8 @@ def _scores(which: Q, options: Options, score: str) -> DrivingScores:
     for row in rows:
         who = 0 if row.augmentation is None else row.augmentation.contestant_id
         cells[row.subject, who].append(row)
-    own = {row.scenario.type for row in rows} - set(Scenario.Type.values)
-    kinds = (*Scenario.Type.values, *sorted(own))
-    lines = [_line(cell, before, score, kinds) for cell in cells.values()]
+    kinds = in_type_order([*ScenarioType, *(row.scenario.type for row in rows)])
+    lines = [_line(cell, before, score, tuple(kinds)) for cell in cells.values()]
     return DrivingScores(
         score=score,
         options=options,

@@ -6,7 +6,8 @@ import re
 
 from augment.errors import Conflict, InvalidDocument
 from augment.models import Scenario
-from augment.scene.catalogue import ScenarioType
+from augment.scene.catalogue import ScenarioType as ScenarioType
+from augment.scene.catalogue import in_type_order as in_type_order
 from augment.services.texts import one_line
 
 LONGEST_TYPE = 40
@@ -22,7 +23,8 @@ def type_choices() -> list[tuple[str, str]]:
 
 def type_label(name: str) -> str:
     """What people read for a type; a type that nobody knows is its own label."""
-    return dict(type_choices()).get(name, name)
+    known = type_of(name)
+    return dict(type_choices()).get(name, name) if known is None else known.label
 
 
 def type_of(name: str) -> ScenarioType | None:
