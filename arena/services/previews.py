@@ -9,8 +9,9 @@ from django.db import transaction
 
 from arena.models import Matchup
 from arena.queries.coverage import shared_units
-from arena.services.prospects import GUESSES, usual_seconds
+from arena.services.prospects import usual_seconds
 from arena.services.studies import open_study
+from arena.services.study_estimate import StudyEstimate
 from arena.services.study_plan import StudyPlan
 
 Kind = Matchup.Kind
@@ -62,7 +63,7 @@ def preview_study(study_plan: StudyPlan) -> StudyPreview:
         sides = study.contestants.count(), study.scenarios.count()
         settled, alike = len(study.rules["identical"]), len(study.rules["alike"])
         transaction.set_rollback(True)
-    seconds = usual_seconds() or GUESSES["seconds"]
+    seconds = usual_seconds() or StudyEstimate().seconds
     shown = kinds[Kind.MAIN] + later + kinds[Kind.REPEAT] + kinds[Kind.CHECK]
     return StudyPreview(
         experts=experts,

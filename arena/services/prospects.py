@@ -20,31 +20,13 @@ FEWEST_VOTES = 20
 LONGEST_S = 120.0
 """Somebody who takes longer has left the room."""
 
-GUESSES: dict[str, Any] = {
-    "contestants": 9,
-    "experts": 9,
-    "scenarios": 50,
-    "spread": 150,
-    "ties": 45,
-    "expert_sd": 30,
-    "scenario_sd": 70,
-    "half_width": 25,
-    "gap": 40,
-    "power": 80,
-    "seconds": 12,
-    "repeats": 5,
-    "checks": 2,
-    "overlap": 10,
-}
-"""Where nothing is known; shares in percent. Effects are those of docs/rating.md."""
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Known:
     """What a study says of the next one like it.
 
     Attributes:
-        values: By the names of GUESSES; only what is known.
+        values: By the fields of StudyEstimate; only what is known.
         from_results: Whether spread, ties and effects are among them: only where whoever asks may
             read the results.
     """

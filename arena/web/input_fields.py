@@ -27,7 +27,8 @@ def form_field(asked: Input) -> forms.Field:
     The choices of a field of names are the caller's.
     """
     given: dict[str, Any] = {"label": asked.title, "help_text": asked.help}
-    given |= {"initial": asked.default, "required": asked.is_required}
+    given |= {"required": asked.is_required}
+    given |= {} if asked.is_required else {"initial": asked.default}
     bounds: dict[str, Any] = {"min_value": asked.least, "max_value": asked.most}
     look = {"class": "input"}
     match asked.kind:
@@ -36,7 +37,9 @@ def form_field(asked: Input) -> forms.Field:
             return forms.CharField(**words, widget=forms.TextInput(attrs=look))
         case InputKind.WHOLE:
             widget = forms.NumberInput(attrs=look)
-            return forms.IntegerField(**given | bounds | {"required": True}, widget=widget)
+            return forms.IntegerField(
+                **given | bounds | {"required": asked.default is not None}, widget=widget
+            )
         case InputKind.NUMBER:
             widget = forms.NumberInput(attrs={**look, "step": "any"})
             return forms.FloatField(**given | bounds, widget=widget)

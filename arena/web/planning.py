@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import uuid
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any, cast
 from urllib.parse import urlencode
 
@@ -16,8 +16,9 @@ from django.views.decorators.http import require_safe
 from arena.models import Study
 from arena.rating.prospects import Outlook, Prospect, Question, Wish, foretell
 from arena.services.prospects import Known, known_of, usual_seconds
+from arena.services.study_estimate import ESTIMATE_INPUTS, StudyEstimate
 from arena.web.access import STAFF, allow_only
-from arena.web.planning_form import EXPECTED, ON_TOP, WANTED, WHO, PlanningForm, filled_in
+from arena.web.planning_form import EXPECTED, ON_TOP, WANTED, WHO, PlanningForm
 from augment.errors import AugmentError
 
 
@@ -50,10 +51,8 @@ def planning_page(request: HttpRequest) -> HttpResponse:
     else:
         seconds = usual_seconds()
         known = Known(values={} if seconds is None else {"seconds": seconds})
-    entered = {
-        name: value for name in PlanningForm.base_fields if (value := request.GET.get(name))
-    }
-    form = PlanningForm(filled_in(known.values, entered))
+    entered = {one.name: value for one in ESTIMATE_INPUTS if (value := request.GET.get(one.name))}
+    form = PlanningForm(asdict(StudyEstimate()) | known.values | entered)
     context: dict[str, Any] = {
         "form": form,
         "study": study,
@@ -68,7 +67,7 @@ def planning_page(request: HttpRequest) -> HttpResponse:
         ),
     }
     if form.is_valid():
-        question = form.question()
+        question = StudyEstimate(**form.cleaned_data).question()
         context["lines"] = _lines(question, foretell(question), form.cleaned_data, study)
         context["power"] = f"{form.cleaned_data['power']:g}"
     return render(request, "studies/plan.html", context, status=422 if form.errors else 200)

@@ -14,6 +14,8 @@ from typing import Any
 
 from django.core.management.base import CommandParser
 
+from augment.errors import InvalidDocument
+
 
 class InputKind(StrEnum):
     """What a field holds: a text, a number, yes or no, one of several words, or many texts."""
@@ -35,7 +37,7 @@ class Input:
         unit: Of a number; "%" for percent.
         least, most: The bounds of a number; `most` also of a text's length.
         choices: Words and their labels.
-        default: What holds where nothing is given; None where something must be.
+        default: What holds where nothing is given; MISSING where something must be.
     """
 
     name: str = ""
@@ -46,7 +48,7 @@ class Input:
     least: float | None = None
     most: float | None = None
     choices: Mapping[str, str] = field(default_factory=dict)
-    default: Any = None
+    default: Any = MISSING
 
     @property
     def title(self) -> str:
@@ -64,15 +66,15 @@ class Input:
     @property
     def is_required(self) -> bool:
         """Whether the request can't be made without it."""
-        return self.default is None
+        return self.default is MISSING
 
 
 def input_field(
-    kind: InputKind, label: str, help: str = "", *, default: Any = None, **more: Any
+    kind: InputKind, label: str, help: str = "", *, default: Any = MISSING, **more: Any
 ) -> Any:
     """Declare a field of a request; `more` as in Input."""
     metadata = {"input": {"kind": kind, "label": label, "help": help, "default": default, **more}}
-    return field(default=MISSING if default is None else default, metadata=metadata)
+    return field(default=default, metadata=metadata)
 
 
 def inputs_of(request: type) -> tuple[Input, ...]:
@@ -84,14 +86,34 @@ def inputs_of(request: type) -> tuple[Input, ...]:
     )
 
 
+def check_bounds(request: Any) -> None:
+    """Do nothing for a request whose numbers are within their bounds.
+
+    Raises:
+        InvalidDocument: Some are not.
+    """
+    problems = [
+        (one.name, f"goes from {one.least:g} to {one.most:g}, not {value:g}")
+        for one in inputs_of(type(request))
+        if one.least is not None and one.most is not None
+        if (value := getattr(request, one.name)) is not None
+        if not one.least <= value <= one.most
+    ]
+    if problems:
+        raise InvalidDocument("request", problems)
+
+
 def add_options(parser: CommandParser, inputs: Iterable[Input]) -> None:
     """Give a command an option for each; a text that is required stands without a name."""
     for one in inputs:
         is_positional = one.kind is InputKind.TEXT and one.is_required
         words = one.help or one.title
+        if one.default and not isinstance(one.default, bool) and not one.is_required:
+            words += f" (default: {one.default})"
         given: dict[str, Any] = {"help": words.replace("%", "%%")}
         if not is_positional:
-            given |= {"required": one.is_required, "default": one.default}
+            default = None if one.is_required else one.default
+            given |= {"required": one.is_required, "default": default}
         match one.kind:
             case InputKind.SWITCH:
                 given["action"] = BooleanOptionalAction

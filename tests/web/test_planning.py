@@ -10,9 +10,9 @@ from django.urls import reverse
 
 from arena.models import Study
 from arena.rating.prospects import prospect
-from arena.services.prospects import GUESSES, known_of
+from arena.services.prospects import known_of
 from arena.services.ratings import rate
-from arena.web.planning_form import question_of
+from arena.services.study_estimate import StudyEstimate
 from tests import study_rows
 from tests.web.cast import people, signed_in
 
@@ -39,7 +39,7 @@ def _voted() -> Study:
 
 def test_the_page_is_usable_without_any_study() -> None:
     shown = _page(votes_per_expert=100)
-    expected = prospect(question_of(dict(GUESSES)), 100)
+    expected = prospect(StudyEstimate().question(), 100)
     assert f'<td class="num">{expected.minutes:.0f}</td>' in shown
     assert f"±{expected.widest:.0f}" in shown
     assert "No number of votes reaches it" in shown  # ±25 with effects so large
@@ -56,7 +56,7 @@ def test_an_open_study_gives_its_numbers_but_nothing_of_its_results() -> None:
 def test_the_command_says_the_same_numbers() -> None:
     out = StringIO()
     call_command("plan_study", "--votes-per-expert", "100", stdout=out)
-    expected = prospect(question_of(dict(GUESSES)), 100)
+    expected = prospect(StudyEstimate().question(), 100)
     said = out.getvalue()
     assert f"100 votes per expert, 900 in all, {expected.minutes:.0f} minutes each" in said
     assert "expert sd: 30 (guessed)" in said

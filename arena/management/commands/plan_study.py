@@ -2,34 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from typing import Any
 
 from django.core.management.base import CommandError, CommandParser
 
 from arena.models import Study
 from arena.rating.prospects import Outlook, Prospect, Question, Wish, foretell
-from arena.rating.sample_size import StudyDesign
-from arena.services.prospects import GUESSES, known_of, usual_seconds
+from arena.services.prospects import known_of, usual_seconds
+from arena.services.study_estimate import ESTIMATE_INPUTS, StudyEstimate
 from augment.errors import AugmentError
+from augment.services.inputs import add_options, check_bounds
 from augment.services.terminal import TerminalCommand
-
-HELP = {
-    "contestants": "how many are compared",
-    "experts": "how many judge",
-    "scenarios": "how many are shown",
-    "spread": "Elo points from the worst to the best",
-    "ties": "percent of the votes that say Equal",
-    "expert_sd": "Elo points by which experts differ about a contestant",
-    "scenario_sd": "Elo points by which scenarios differ in a contestant",
-    "half_width": "Elo points expected of the widest 95 %% interval",
-    "gap": "Elo points between two that are to be told apart",
-    "power": "percent, the chance of that",
-    "seconds": "of one vote",
-    "repeats": "hidden repeats, percent on top of the votes",
-    "checks": "attention checks, percent on top of the votes",
-    "overlap": "percent of the judged pairs that two experts judge",
-}
-_WHOLE = ("contestants", "experts", "scenarios")
 
 
 class Command(TerminalCommand):
@@ -40,27 +24,24 @@ class Command(TerminalCommand):
     def add_arguments(self, parser: CommandParser) -> None:
         """The design; whatever is left open is taken from the study, else guessed."""
         parser.add_argument("--like", metavar="STUDY", help="name of a study to take numbers from")
-        for name, text in HELP.items():
-            parser.add_argument(
-                f"--{name.replace('_', '-')}",
-                type=int if name in _WHOLE else float,
-                metavar="N",
-                help=f"{text} (guess: {GUESSES[name]})",
-            )
-        parser.add_argument("--votes-per-expert", type=int, metavar="N", help="in mind")
+        add_options(parser, ESTIMATE_INPUTS)
+        parser.set_defaults(**dict.fromkeys(one.name for one in ESTIMATE_INPUTS))
 
     def handle(self, *args: Any, **options: Any) -> None:
         """Say what it takes."""
-        given = {name: options[name] for name in HELP if options[name] is not None}
+        names = [one.name for one in ESTIMATE_INPUTS]
+        given = {name: options[name] for name in names if options[name] is not None}
         known = self._known(options["like"])
-        values = GUESSES | known | given
+        estimate = StudyEstimate(**known | given)
         try:
-            question = _question(values, options["votes_per_expert"])
-        except ValueError as error:
+            check_bounds(estimate)
+            question = estimate.question()
+        except (AugmentError, ValueError) as error:
             raise CommandError(str(error)) from error
-        for name, value in values.items():
+        for name, value in asdict(estimate).items():
             origin = "given" if name in given else "known" if name in known else "guessed"
-            self.stdout.write(f"{name.replace('_', ' ')}: {value:g} ({origin})")
+            if value is not None:
+                self.stdout.write(f"{name.replace('_', ' ')}: {value:g} ({origin})")
         self._say(question, foretell(question))
 
     def _known(self, name: str | None) -> dict[str, Any]:
@@ -98,32 +79,6 @@ class Command(TerminalCommand):
             f"widest interval is ±{wish.most.widest:.0f} and {wish.most.gap:.0f} points are told "
             f"apart. {' or '.join(needs) or 'It takes more experts and scenarios'}."
         )
-
-
-def _question(values: dict[str, Any], votes_per_expert: int | None) -> Question:
-    for name in ("half_width", "gap", "seconds"):
-        if not values[name] > 0:
-            raise ValueError(f"{name} must be more than 0, not {values[name]}")
-    if not 50 <= values["power"] < 100:
-        raise ValueError(f"power goes from 50 to below 100, not {values['power']}")
-    for name in ("repeats", "checks"):
-        if not 0 <= values[name] <= 50:
-            raise ValueError(f"{name} go from 0 to 50, not {values[name]}")
-    if votes_per_expert is not None and votes_per_expert < 1:
-        raise ValueError(f"votes per expert must be 1 or more, not {votes_per_expert}")
-    return Question(
-        design=StudyDesign(
-            **{name: values[name] for name in (*_WHOLE, "spread", "expert_sd", "scenario_sd")},
-            tie_share=values["ties"] / 100,
-            overlap_share=values["overlap"] / 100,
-        ),
-        half_width=values["half_width"],
-        gap=values["gap"],
-        power=values["power"] / 100,
-        votes_per_expert=votes_per_expert,
-        seconds=values["seconds"],
-        extra_share=(values["repeats"] + values["checks"]) / 100,
-    )
 
 
 def _line(found: Prospect, question: Question) -> str:
