@@ -9,13 +9,14 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import replace
 
-from augment.checks.asked import Asked, AskedCheck
-from augment.checks.asked_across import asked_across
-from augment.checks.asked_crash import asked_crash
-from augment.checks.asked_distance import asked_distance
-from augment.checks.asked_heading import asked_heading
-from augment.checks.asked_spacing import asked_spacing
-from augment.checks.asked_things import (
+from augment.checks.asked.across import asked_across
+from augment.checks.asked.crash import asked_crash
+from augment.checks.asked.distance import asked_distance
+from augment.checks.asked.heading import asked_heading
+from augment.checks.asked.parties import Party, match_to_requests
+from augment.checks.asked.question import Asked, AskedCheck
+from augment.checks.asked.spacing import asked_spacing
+from augment.checks.asked.things import (
     asked_changes,
     asked_count,
     asked_motion,
@@ -23,12 +24,11 @@ from augment.checks.asked_things import (
     find_attempted,
     find_unasked,
 )
-from augment.checks.asked_walk import asked_walk
+from augment.checks.asked.walk import asked_walk
 from augment.checks.finding import Finding, FindingKind, Severity
 from augment.checks.ground import Ground
 from augment.checks.landmarks import find_picked, resolve_landmarks
 from augment.checks.lanes_across import LanesAcross
-from augment.checks.parties import Party, match_to_requests
 from augment.checks.registry import findings_on
 from augment.checks.tolerances import USUAL, Tolerances
 from augment.scene.intent import Intent, Move, VehicleRequest, resolve_anchors

@@ -11,8 +11,8 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from augment.checks.asked import kerb_of
-from augment.checks.asked_across import side_sign
+from augment.checks.asked.across import side_sign
+from augment.checks.asked.question import kerb_of
 from augment.checks.ground import Ground
 from augment.checks.landmarks import resolve_landmarks
 from augment.checks.lanes_across import LanesAcross

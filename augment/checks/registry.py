@@ -9,24 +9,14 @@ these here never ask what was wanted.
 
 from __future__ import annotations
 
-from augment.checks.degrees import degrees
-from augment.checks.duplicate import duplicate
-from augment.checks.ego_offset import ego_offset
 from augment.checks.finding import Finding
+from augment.checks.geometric.boxes import duplicate, overlap, size, speed
+from augment.checks.geometric.headings import degrees, heading, walk_heading
+from augment.checks.geometric.off_road import off_road, outside_map
+from augment.checks.geometric.places import ego_offset, lane, lane_distance, lane_named
+from augment.checks.geometric.walks import walk_blocked, walk_crossing
 from augment.checks.ground import Ground
-from augment.checks.heading import heading
-from augment.checks.lane import lane
-from augment.checks.lane_distance import lane_distance
-from augment.checks.lane_named import lane_named
-from augment.checks.off_road import off_road
-from augment.checks.outside_map import outside_map
-from augment.checks.overlap import overlap
 from augment.checks.situation import ChangedScene, Check
-from augment.checks.size import size
-from augment.checks.speed import speed
-from augment.checks.walk_blocked import walk_blocked
-from augment.checks.walk_crossing import walk_crossing
-from augment.checks.walk_heading import walk_heading
 from augment.scene.entities import Scene
 from augment.scene.modification import Modification
 

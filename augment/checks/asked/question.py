@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
+from augment.checks.asked.parties import Party, RequestMatching
 from augment.checks.finding import Finding, Severity
 from augment.checks.lanes_across import LanesAcross
-from augment.checks.parties import Party, RequestMatching
 from augment.checks.tolerances import Tolerances
 from augment.scene.ego_route import EgoRoute
 from augment.scene.entities import Scene, TrafficAgent, TrafficSide

@@ -9,11 +9,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from augment.checks.asked import Asked, distance_outside, severity_of, side_of
-from augment.checks.crash_order import in_order
+from augment.checks.asked.crash import in_order
+from augment.checks.asked.parties import Party
+from augment.checks.asked.question import Asked, distance_outside, severity_of, side_of
 from augment.checks.finding import Finding, FindingKind
 from augment.checks.lanes_across import Band
-from augment.checks.parties import Party
 from augment.checks.tolerances import Tolerances
 from augment.scene.entities import AgentType, TrafficAgent
 from augment.scene.intent import (
@@ -94,9 +94,6 @@ def side_sign(lateral: Lateral | None, *, kerb: float) -> float:
     if lateral is None:
         return 0.0
     return _SIGNS[lateral.target] or kerb * _KERB_SIGNS[lateral.target]
-
-
-# Private
 
 
 def _vehicle(

@@ -1,4 +1,4 @@
-"""How much of an agent stands where its kind does not belong."""
+"""How much of an agent stands where its kind does not belong, or beyond what the map covers."""
 
 from __future__ import annotations
 
@@ -93,3 +93,23 @@ def _on_foot(agent: TrafficAgent, situation: ChangedScene) -> Finding | None:
         measured={"outside_share": share, "gap_m": gap_m},
         template="{agents[0]} is {gap_m:.1f} m off everything that the map shows.",
     )
+
+
+OUTSIDE_M = 2.0
+
+
+def outside_map(situation: ChangedScene) -> Iterator[Finding]:
+    """Wrong for a changed agent outside the convex region around all that the map shows."""
+    ground = situation.ground.everything
+    if ground.is_empty:
+        return
+    for agent in situation.changed:
+        outside_m = ground.distance_to_hull_m(agent.x_m, agent.y_m)
+        if outside_m > OUTSIDE_M:
+            yield Finding(
+                kind=FindingKind.OUTSIDE_MAP,
+                severity=Severity.WRONG,
+                agents=(agent.id,),
+                measured={"outside_m": outside_m},
+                template="{agents[0]} is {outside_m:.1f} m outside the mapped region.",
+            )

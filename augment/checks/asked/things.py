@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from augment.checks.asked import Asked, severity_of
+from augment.checks.asked.parties import Role, middle_of
+from augment.checks.asked.question import Asked, severity_of
 from augment.checks.finding import Finding, FindingKind, Severity
-from augment.checks.parties import Role, middle_of
+from augment.checks.geometric.boxes import name_type
 from augment.checks.situation import STOPPED_BELOW_MPS
-from augment.checks.size import name_type
 from augment.checks.tolerances import SPEED_MPS, SPEED_SHARE
 from augment.scene.intent import CrashRequest, VehicleRequest
 
@@ -113,9 +113,6 @@ def find_attempted(asked: Asked) -> Iterator[Finding]:
             agents=tuple(touched),
             template=f"The wish can't be met, and {{agents[0]}} is changed: {why}",
         )
-
-
-# Private
 
 
 _MOVED, _REMOVED = "moved", "removed"

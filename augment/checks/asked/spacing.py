@@ -7,9 +7,9 @@ from collections.abc import Iterator, Sequence
 from itertools import combinations, pairwise
 from statistics import median
 
-from augment.checks.asked import Asked, distance_outside, severity_of, side_of
+from augment.checks.asked.parties import Party
+from augment.checks.asked.question import Asked, distance_outside, severity_of, side_of
 from augment.checks.finding import Finding, FindingKind
-from augment.checks.parties import Party
 from augment.checks.tolerances import WORKER_M
 from augment.scene.entities import TrafficAgent
 from augment.scene.intent import ConesRequest, Length, Side, VehicleRequest
@@ -34,9 +34,6 @@ def fits_gap(asked: Asked, gap_m: float, wanted: Length) -> bool:
 def apart_m(one: TrafficAgent, other: TrafficAgent) -> float:
     """From centre to centre."""
     return math.hypot(one.x_m - other.x_m, one.y_m - other.y_m)
-
-
-# Private
 
 
 def _around_cones(asked: Asked, party: Party, request: ConesRequest) -> Iterator[Finding]:

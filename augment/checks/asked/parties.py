@@ -127,9 +127,6 @@ def middle_of(spot: Spot, lanes: LanesAcross) -> Point:
     return lanes.route.position(ahead_m, 0.0 if band is None else band.left_m)
 
 
-# Private
-
-
 @dataclass(frozen=True, slots=True)
 class _Place:
     """One agent that a request needs."""

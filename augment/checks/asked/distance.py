@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
-from augment.checks.asked import Asked, distance_outside, severity_of
-from augment.checks.crash_order import in_order
+from augment.checks.asked.crash import in_order
+from augment.checks.asked.parties import Party
+from augment.checks.asked.question import Asked, distance_outside, severity_of
 from augment.checks.finding import Finding, FindingKind
-from augment.checks.parties import Party
 from augment.checks.tolerances import CRASH_M
 from augment.scene.entities import TrafficAgent
 from augment.scene.intent import (

@@ -1,4 +1,4 @@
-"""Whether a pedestrian's walk crosses the lane that the ego drives on."""
+"""Whether a walk crosses the lane that the ego drives on, and what stands in its way."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from augment.checks.finding import Finding, FindingKind, Severity
 from augment.checks.situation import ChangedScene, is_stopped
+from augment.geometry.boxes import Box
 from augment.geometry.polyline import Polyline
 from augment.scene.entities import AgentType, Point, TrafficAgent
 
@@ -32,7 +33,7 @@ def walk_crossing(situation: ChangedScene) -> Iterator[Finding]:
     for agent in situation.changed:
         end = end_of_walk(agent)
         if agent.type is AgentType.PEDESTRIAN and end is not None:
-            yield _finding(agent, end, line, width_m)
+            yield _crossing_finding(agent, end, line, width_m)
 
 
 def end_of_walk(agent: TrafficAgent) -> Point | None:
@@ -45,7 +46,7 @@ def end_of_walk(agent: TrafficAgent) -> Point | None:
     )
 
 
-def _finding(agent: TrafficAgent, end: Point, line: Polyline, width_m: float) -> Finding:
+def _crossing_finding(agent: TrafficAgent, end: Point, line: Polyline, width_m: float) -> Finding:
     start = (agent.x_m, agent.y_m)
     crosses_at_m = _meeting(np.array(start), np.array(end), line)
     first, last = line.project(*start), line.project(*end)
@@ -90,3 +91,51 @@ def _meeting(start: NDArray[np.float64], end: NDArray[np.float64], line: Polylin
         return None
     lengths = np.hypot(steps[:, 0], steps[:, 1])
     return float((line.stations_m[:-1] + along * lengths)[meets].min())
+
+
+GRAZED_M = 0.1
+"""Whoever walks through less than this of a box passes its corner."""
+
+
+def walk_blocked(situation: ChangedScene) -> Iterator[Finding]:
+    """Doubtful for every changed pedestrian whose walk leads through something that stands.
+
+    People are no obstacle to each other: they step aside.
+    """
+    for agent in situation.changed:
+        end = end_of_walk(agent)
+        if agent.type is not AgentType.PEDESTRIAN or end is None:
+            continue
+        for other in situation.everyone:
+            if _is_in_the_way(other):
+                inside_m = _inside_m((agent.x_m, agent.y_m), end, situation.boxes[other.id])
+                if inside_m > GRAZED_M:
+                    yield _blocked_finding(agent, other, inside_m)
+
+
+def _is_in_the_way(other: TrafficAgent) -> bool:
+    return is_stopped(other) and other.type is not AgentType.PEDESTRIAN
+
+
+def _inside_m(start: Point, end: Point, box: Box) -> float:
+    """How much of the straight way from start to end lies in a box."""
+    begin, stop = box.pose.to_local(np.array([start, end]))
+    half = np.array([box.length_m, box.width_m]) / 2.0
+    step = stop - begin
+    with np.errstate(divide="ignore", invalid="ignore"):  # a way along a side never crosses it
+        shares = np.sort(np.array([(-half - begin) / step, (half - begin) / step]), axis=0)
+    is_still = step == 0.0
+    if (is_still & (np.abs(begin) > half)).any():
+        return 0.0
+    first, last = shares[0][~is_still].max(initial=0.0), shares[1][~is_still].min(initial=1.0)
+    return max(0.0, float(last - first)) * float(np.hypot(*step))
+
+
+def _blocked_finding(agent: TrafficAgent, other: TrafficAgent, inside_m: float) -> Finding:
+    return Finding(
+        kind=FindingKind.WALK_BLOCKED,
+        severity=Severity.DOUBTFUL,
+        agents=(agent.id, other.id),
+        measured={"inside_m": inside_m},
+        template="The walk of {agents[0]} leads {inside_m:.1f} m through {agents[1]}.",
+    )

@@ -1,0 +1,1 @@
+"""Checks that hold a modification against what an instruction asks for."""

@@ -1,0 +1,1 @@
+"""Checks of a modification that need no intent."""
