@@ -19,7 +19,7 @@ Field = serializers.Field[Any, Any, Any, Any]
 
 def body_field(asked: Input) -> Field:
     """Return the field of a body."""
-    given: dict[str, Any] = {"help_text": asked.help or asked.title}
+    given: dict[str, Any] = {"help_text": asked.explanation}
     given |= {"required": True} if asked.is_required else {"default": asked.default}
     bounds: dict[str, Any] = {"min_value": asked.least, "max_value": asked.most}
     match asked.kind:

@@ -64,6 +64,11 @@ class Input:
         return f"{value:,g} {self.unit}".strip() if self.kind is InputKind.NUMBER else str(value)
 
     @property
+    def explanation(self) -> str:
+        """The title and, where there is any, the help."""
+        return f"{self.title}. {self.help}" if self.help else self.title
+
+    @property
     def is_required(self) -> bool:
         """Whether the request can't be made without it."""
         return self.default is MISSING
@@ -107,7 +112,7 @@ def add_options(parser: CommandParser, inputs: Iterable[Input]) -> None:
     """Give a command an option for each; a text that is required stands without a name."""
     for one in inputs:
         is_positional = one.kind is InputKind.TEXT and one.is_required
-        words = one.help or one.title
+        words = one.explanation
         if one.default and not isinstance(one.default, bool) and not one.is_required:
             words += f" (default: {one.default})"
         given: dict[str, Any] = {"help": words.replace("%", "%%")}

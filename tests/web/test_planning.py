@@ -5,7 +5,7 @@ from __future__ import annotations
 from io import StringIO
 
 import pytest
-from django.core.management import call_command
+from django.core.management import CommandError, call_command
 from django.urls import reverse
 
 from arena.models import Study
@@ -61,3 +61,5 @@ def test_the_command_says_the_same_numbers() -> None:
     assert f"100 votes per expert, 900 in all, {expected.minutes:.0f} minutes each" in said
     assert "expert sd: 30 (guessed)" in said
     assert "no number of votes reaches it" in said
+    with pytest.raises(CommandError, match="gap: goes from 1 to 2000, not 0"):
+        call_command("plan_study", "--gap", "0")
