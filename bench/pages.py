@@ -190,7 +190,7 @@ def _visit() -> None:
     from django.db import transaction
 
     from arena.models import Study
-    from arena.web.results_tabs import TABS
+    from arena.web.results.tabs import TABS
     from augment.models import Augmentation
     from tests.web.addresses import address
     from tests.web.cast import World

@@ -5,49 +5,29 @@ from __future__ import annotations
 from django.contrib.auth import views as auth
 from django.urls import URLPattern, path
 
-from arena.web import (
-    analyses,
-    api_tokens,
-    audit,
-    authorships,
-    catalogue,
-    contestant_form,
-    contestants,
-    displacement,
-    driving,
-    editing,
-    endpoints,
-    enrolments,
-    health,
-    home,
-    intents,
-    invitations,
-    job_actions,
-    jobs,
-    labelling,
-    new_job,
-    people,
-    planning,
-    practice,
-    prompts,
-    removing,
-    reports,
-    results,
-    results_files,
-    results_votes,
-    scenario_files,
-    scenario_form,
-    scenarios,
-    scenes,
-    studies,
-    study_files,
-    study_setup,
-    transcripts,
-    uploads,
-    vote_uploads,
-    voting,
-)
-from arena.web.sign_in import SignIn
+from arena.web.contestants import endpoints
+from arena.web.contestants import forms as contestant_form
+from arena.web.contestants import pages as contestants
+from arena.web.jobs import actions as job_actions
+from arena.web.jobs import analyses, displacement, driving, labelling, scenario_files, transcripts
+from arena.web.jobs import launching as new_job
+from arena.web.jobs import pages as jobs
+from arena.web.people import accounts as people
+from arena.web.people import api_tokens, authorships, enrolments, invitations
+from arena.web.people.sign_in import SignIn
+from arena.web.results import evidence as results_votes
+from arena.web.results import files as results_files
+from arena.web.results import pages as results
+from arena.web.scenarios import catalogue, editing, intents, prompts, removing, scenes, uploads
+from arena.web.scenarios import forms as scenario_form
+from arena.web.scenarios import pages as scenarios
+from arena.web.site import audit, health, home
+from arena.web.studies import files as study_files
+from arena.web.studies import pages as studies
+from arena.web.studies import planning, reports, vote_uploads
+from arena.web.studies import setup as study_setup
+from arena.web.voting import pages as voting
+from arena.web.voting import practice
 
 urlpatterns: list[URLPattern] = [
     path("", home.home, name="home"),

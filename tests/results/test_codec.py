@@ -16,7 +16,7 @@ from arena.models import Snapshot
 from arena.results.codec import read_results, results_document
 from arena.results.kept import read_text
 from arena.results.tree import VERSION, Results
-from arena.web.results_tabs import TABS
+from arena.web.results.tabs import TABS
 from augment.errors import InvalidDocument
 from tests.results.old import OLD, stored
 from tests.web.cast import people, signed_in

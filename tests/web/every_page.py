@@ -10,7 +10,7 @@ from django.urls import reverse
 from arena.models import Vote
 from arena.queries.vote_sets import Filters
 from arena.services.ratings import rate
-from arena.web.results_tabs import TABS
+from arena.web.results.tabs import TABS
 from tests.mixed_study import mixed_study
 from tests.web.addresses import address
 from tests.web.cast import people, signed_in, world

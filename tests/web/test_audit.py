@@ -100,12 +100,12 @@ DOORS = {
     "arena/management/commands/rate.py": "--early, logged",
     "arena/management/demo.py": "rates a study that it has closed",
     "arena/management/exporting/studies.py": "--early, logged",
-    "arena/web/planning.py": "reads what the reader may read",
-    "arena/web/rating.py": "gives none: the page that asked leads to the gate",
-    "arena/web/results.py": "the gate",
-    "arena/web/results_files.py": "behind the gate",
-    "arena/web/results_votes.py": "behind the gate",
-    "arena/web/study_files.py": "asks results_access; what shows results needs it in full",
+    "arena/web/studies/planning.py": "reads what the reader may read",
+    "arena/web/results/rating.py": "gives none: the page that asked leads to the gate",
+    "arena/web/results/pages.py": "the gate",
+    "arena/web/results/files.py": "behind the gate",
+    "arena/web/results/evidence.py": "behind the gate",
+    "arena/web/studies/files.py": "asks results_access; what shows results needs it in full",
 }
 """Every module of pages, API, admin and commands that makes something of results, and why nobody
 sees those of an open study through it without an early look."""

@@ -11,7 +11,7 @@ from django.urls import reverse
 
 from arena.models import Enrolment, Study
 from arena.services.enrolments import set_enrolment
-from arena.web.enrolments import VOTER_COOKIE
+from arena.web.people.enrolments import VOTER_COOKIE
 from tests.study_rows import a_study, matchups_of, vote
 from tests.web.cast import people, signed_in
 

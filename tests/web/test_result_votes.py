@@ -15,7 +15,7 @@ from django.urls import reverse
 from arena.models import Matchup, Snapshot, Study, Vote
 from arena.queries.vote_sets import Filters
 from arena.services.ratings import rate
-from arena.web.results_tabs import TABS
+from arena.web.results.tabs import TABS
 from augment.services.scenarios.pictures import store
 from tests.mixed_study import mixed_study
 from tests.study_rows import hang

@@ -11,7 +11,7 @@ from pytest_django import DjangoAssertNumQueries
 from arena.models import EarlyLook, Matchup, Study
 from arena.services.ratings import rate
 from arena.services.studies import close_study
-from arena.web.results_tabs import TABS
+from arena.web.results.tabs import TABS
 from augment.scene.catalogue import ScenarioType
 from tests import study_rows
 from tests.full_study import Size, full_study

@@ -8,7 +8,7 @@ from django.http import HttpResponse
 from django.urls import reverse
 
 from arena.models import ImportedVote, Study
-from arena.web import vote_uploads
+from arena.web.studies import vote_uploads
 from augment.models import Event
 from tests.web.cast import people, signed_in
 

@@ -19,7 +19,7 @@ from arena.models import ApiToken
 from arena.queries.api_tokens import api_tokens_of, roles_offered
 from arena.services.api_tokens import DAYS, REQUESTS, make_api_token, revoke_api_token
 from arena.web.access import ADMIN, ANALYST, EXPERT, STAFF, allow_only
-from arena.web.people import ROLE_NAMES
+from arena.web.people.accounts import ROLE_NAMES
 from augment.errors import AugmentError
 
 USUAL_DAYS = 30

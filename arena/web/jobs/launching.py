@@ -16,8 +16,8 @@ from django.views.decorators.http import require_http_methods
 
 from arena.queries import scenarios
 from arena.web.access import ADMIN, allow_only
-from arena.web.job_actions import send_rows
-from arena.web.launch_form import LaunchForm
+from arena.web.jobs.actions import send_rows
+from arena.web.jobs.forms import LaunchForm
 from augment.errors import AugmentError
 from augment.models import Contestant, EndpointModel, GenerationJob
 from augment.services.running import jobs as service

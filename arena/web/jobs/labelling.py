@@ -23,7 +23,7 @@ from arena.queries.showings import original_beside
 from arena.services.faults import close_labelling, open_labelling, save_label
 from arena.web.access import ADMIN, EXPERT, STAFF, allow_only
 from arena.web.forms import LabelForm, LabellingForm
-from arena.web.labelling_questions import closing, opening
+from arena.web.jobs.labelling_questions import closing, opening
 from arena.web.questions import ask, is_sure, wants_to_change
 from augment.errors import AugmentError, UnknownName
 from augment.models import GenerationJob

@@ -30,12 +30,12 @@ from arena.queries.results import (
 from arena.queries.vote_lists import settled_counted
 from arena.services.early_looks import open_early
 from arena.web.access import ADMIN, ANALYST, EXPERT, STAFF, allow_only
-from arena.web.rating import rate_or_send
-from arena.web.rating_form import RatingForm
-from arena.web.results_adjustment import show_adjustment
-from arena.web.results_authors import both_versions
-from arena.web.results_tabs import TABS, Tab
-from arena.web.study_files import export_place
+from arena.web.results.adjustment import show_adjustment
+from arena.web.results.authors import both_versions
+from arena.web.results.rating import rate_or_send
+from arena.web.results.rating_form import RatingForm
+from arena.web.results.tabs import TABS, Tab
+from arena.web.studies.files import export_place
 from augment.errors import AugmentError
 
 SHOWN = 12

@@ -10,8 +10,8 @@ from arena.models.votes import AIDS
 from arena.queries.judged import AUTOMATIC
 from arena.queries.people import natural_order
 from arena.results.tree import PanelRater
-from arena.web.results_authors import with_authors
-from arena.web.results_ratings import Context, is_all_tied
+from arena.web.results.authors import with_authors
+from arena.web.results.ratings import Context, is_all_tied
 
 
 def raters(snapshot: Snapshot, table: LeaderboardTable) -> Context:

@@ -18,7 +18,7 @@ from arena.rating.prospects import Outlook, Prospect, Question, Wish, foretell
 from arena.services.prospects import Known, known_of, usual_seconds
 from arena.services.study_estimate import ESTIMATE_INPUTS, StudyEstimate
 from arena.web.access import STAFF, allow_only
-from arena.web.planning_form import EXPECTED, ON_TOP, WANTED, WHO, PlanningForm
+from arena.web.studies.planning_form import EXPECTED, ON_TOP, WANTED, WHO, PlanningForm
 from augment.errors import AugmentError
 
 

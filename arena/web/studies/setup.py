@@ -33,8 +33,8 @@ from arena.services.study_drafts import (
 )
 from arena.web.access import ADMIN, allow_only
 from arena.web.questions import ask, is_sure, wants_to_change
-from arena.web.study_forms import StudyForm
-from arena.web.study_questions import discarding, opening
+from arena.web.studies.forms import StudyForm
+from arena.web.studies.study_questions import discarding, opening
 from augment.errors import AugmentError
 from augment.models import Contestant, GenerationJob
 

@@ -9,10 +9,10 @@ from typing import Any
 from arena.exports.tables import LeaderboardTable
 from arena.models import Snapshot
 from arena.queries.results import log_of, names_in_log, snapshots_of
-from arena.web.driving import driving
-from arena.web.results_cost import cost, displacement
-from arena.web.results_ratings import Context, pairs, standings, types
-from arena.web.results_trust import coverage, raters
+from arena.web.jobs.driving import driving
+from arena.web.results.cost import cost, displacement
+from arena.web.results.ratings import Context, pairs, standings, types
+from arena.web.results.trust import coverage, raters
 
 LOG_LINES = 200
 

@@ -12,7 +12,7 @@ from django.shortcuts import redirect, render
 from django.views.decorators.http import require_http_methods
 
 from arena.web.access import ADMIN, allow_only
-from arena.web.endpoint_forms import SLUG_RULE
+from arena.web.contestants.endpoint_forms import SLUG_RULE
 from augment.errors import AugmentError
 from augment.models import Endpoint
 from augment.services.endpoints.entering import (

@@ -32,7 +32,7 @@ from arena.services.enrolments import (
     set_enrolment,
 )
 from arena.web.access import ADMIN, allow_only
-from arena.web.invitations import BACKEND, GONE, SESSION_S
+from arena.web.people.invitations import BACKEND, GONE, SESSION_S
 from augment.errors import AugmentError
 
 PAGE = 100

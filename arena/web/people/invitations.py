@@ -22,8 +22,8 @@ from arena.queries.authorships import authorships_of
 from arena.queries.invitations import expert_lines, invitation_by_token, may_be_let_in
 from arena.services.invitations import SESSION_KEY, FreshLink, accept, invite, revoke
 from arena.web.access import ADMIN, allow_only
-from arena.web.authorships import AuthorForm
-from arena.web.sign_in import with_own_language
+from arena.web.people.authorships import AuthorForm
+from arena.web.people.sign_in import with_own_language
 from augment.errors import AugmentError
 
 SESSION_S = 30 * 24 * 3600

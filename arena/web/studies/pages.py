@@ -29,10 +29,10 @@ from arena.services.study_plan import PLAN_INPUTS, plan_of
 from arena.web.access import ADMIN, STAFF, allow_only
 from arena.web.listing import read_listing, read_page, said_choices
 from arena.web.questions import WHY, ask, is_sure, is_typed, wants_to_change
-from arena.web.rating import rate_or_send
-from arena.web.study_files import export_place
-from arena.web.study_forms import HandOverForm
-from arena.web.study_questions import cancelling, closing, handing_over
+from arena.web.results.rating import rate_or_send
+from arena.web.studies.files import export_place
+from arena.web.studies.forms import HandOverForm
+from arena.web.studies.study_questions import cancelling, closing, handing_over
 from augment.errors import AugmentError
 from augment.services.inputs import InputKind
 

@@ -25,8 +25,8 @@ from arena.queries.vote_search import VoteSearch
 from arena.web.access import STAFF, allow_only
 from arena.web.listing import page_asked
 from arena.web.pictures import sized_picture_response
-from arena.web.results import asked_rating, get_readable_study
-from arena.web.vote_search_form import VoteSearchForm
+from arena.web.results.evidence_form import VoteSearchForm
+from arena.web.results.pages import asked_rating, get_readable_study
 
 
 @allow_only(*STAFF)

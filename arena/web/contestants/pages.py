@@ -15,7 +15,7 @@ from django.views.decorators.http import require_POST, require_safe
 from arena.queries.listings import Narrowing, find_contestants
 from arena.queries.scenarios import by_type
 from arena.web.access import ADMIN, STAFF, allow_only
-from arena.web.asking import asking_of
+from arena.web.contestants.asking import asking_of
 from arena.web.listing import read_listing, read_page, said_choices
 from augment.errors import AugmentError
 from augment.models import Augmentation, Contestant, GenerationJob

@@ -15,10 +15,10 @@ from arena.queries import faults, inventory, progress
 from arena.queries.people import role_of
 from arena.queries.results import ResultsAccess, results_access
 from arena.services.preferences import choose_language, choose_theme
-from arena.web.checklist import steps
 from arena.web.forms import LanguageForm, ThemeForm
 from arena.web.language import use_english
-from arena.web.sign_in import keep_language
+from arena.web.people.sign_in import keep_language
+from arena.web.site.checklist import steps
 from augment.models import GenerationJob
 from augment.services.running.summary import count_each
 

@@ -10,7 +10,7 @@ from arena.queries.vote_sets import Filters
 from arena.rating.printed import rating_text
 from arena.results.both_versions import BothRanks
 from arena.results.tree import PanelRater
-from arena.web.results_ratings import Context
+from arena.web.results.ratings import Context
 
 
 def both_versions(snapshot: Snapshot, table: LeaderboardTable) -> Context | None:

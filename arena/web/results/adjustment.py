@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from arena.exports.tables import LeaderboardTable
 from arena.models import Snapshot
-from arena.web.rating_form import COVARIATE_LABELS
-from arena.web.results_authors import in_both_versions
-from arena.web.results_ratings import Context
+from arena.web.results.authors import in_both_versions
+from arena.web.results.rating_form import COVARIATE_LABELS
+from arena.web.results.ratings import Context
 
 
 def show_adjustment(snapshot: Snapshot, table: LeaderboardTable) -> Context | None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from arena.exports.plots import plots
 from arena.exports.tables import LeaderboardTable
 from arena.models import Snapshot
-from arena.web.results_ratings import Context
+from arena.web.results.ratings import Context
 from augment.models import EndpointModel
 
 _CHARTS = {

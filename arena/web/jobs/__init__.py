@@ -1,0 +1,1 @@
+"""Pages of jobs, of what came out and of how it was judged and driven."""

@@ -1,0 +1,1 @@
+"""Pages of scenes, scenarios and what they ask for."""

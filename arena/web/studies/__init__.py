@@ -1,0 +1,1 @@
+"""Pages of a study from its plan to its files."""
