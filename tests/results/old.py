@@ -17,7 +17,9 @@ OLD: dict[str, Any] = json.loads((Path(__file__).parent / "version_1.json").read
 def stored(results: dict[str, Any]) -> Snapshot:
     """The old snapshot in the database, with such results."""
     study = Study.objects.create(name="Round 1", state="closed", seed=1, votes_per_expert=90)
-    snapshot = Snapshot.objects.create(study=study, **OLD["snapshot"] | {"results": Results()})
+    values = OLD["snapshot"] | {"results": Results()}
+    values["reason"] = values.pop("status")  # as migration 0029 calls it
+    snapshot = Snapshot.objects.create(study=study, **values)
     for line in OLD["standings"]:
         Standing.objects.create(snapshot=snapshot, **line)
     with connection.cursor() as cursor:
