@@ -23,8 +23,8 @@ from arena.rating.bradley_terry import DidNotConverge, Meetings, to_elo
 from arena.rating.comparisons import BoolArray, Comparisons, FloatArray, count_pairs
 from arena.rating.leaderboard import FEWEST_TO_JUDGE
 from arena.rating.moderated import spread_of
-from arena.rating.pulls import bradley_terry_pulls
-from arena.rating.simultaneous import judge_pairs
+from arena.rating.ranking import judge_pairs
+from arena.rating.sandwich import bradley_terry_pulls
 from bench.worlds import World, paper_ratings
 
 EFFECTS = ((0.0, 0.0), (100.0, 40.0), (0.0, 80.0))

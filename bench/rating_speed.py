@@ -25,7 +25,7 @@ from arena.rating import bradley_terry, sandwich
 from arena.rating.bootstrap import Unit
 from arena.rating.comparisons import Comparisons, count_pairs
 from arena.rating.leaderboard import Method, rate
-from arena.rating.pulls import bradley_terry_pulls
+from arena.rating.sandwich import bradley_terry_pulls
 from bench.rating_sizes import SIZES, Votes, drawn
 from bench.report import load, table, write_section
 from bench.rivals.environments import RIVALS, ROOT, NotInstalled, python_of

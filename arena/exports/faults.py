@@ -14,8 +14,7 @@ from arena.exports.latex import escape
 from arena.exports.tables import shown_name
 from arena.models import FaultLabel
 from arena.queries.faults import contestants_of, labels_of
-from arena.rating.agreement import cohens_kappa
-from arena.rating.reliability import DifferenceMetric, krippendorff_alpha
+from arena.rating.reliability import DifferenceMetric, cohens_kappa, krippendorff_alpha
 from arena.services.cells import csv_text
 from augment.models import Contestant, GenerationJob
 from augment.services.judging.fault_guess import FaultClass

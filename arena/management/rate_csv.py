@@ -17,8 +17,7 @@ from arena.management.rated_csv import FORMATS, RatedCsv
 from arena.rating.bootstrap import Unit
 from arena.rating.leaderboard import Intervals, Leaderboard, Method, Order, rate
 from arena.rating.rules import TooManyContestants, default_intervals, unit_for
-from arena.rating.votes_file import VotesFile, read_votes
-from arena.rating.votes_table import SIDE, VotesFileUnreadable, columns_of
+from arena.rating.votes_file import SIDE, VotesFile, VotesFileUnreadable, columns_of, read_votes
 from augment.escaping import escape_controls
 
 HELP = (

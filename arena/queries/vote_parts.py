@@ -11,7 +11,7 @@ from arena.pairing.order import CHECK, REPEAT
 from arena.queries.vote_marks import RATED, marked_votes, own_votes
 from arena.queries.vote_search import COUNTED, SoughtPart
 from arena.queries.vote_sets import Filters, LeftOut
-from arena.rating.raters import FAST_MS
+from arena.rating.reliability import FAST_MS
 from augment.models import Contestant
 
 _Rows = QuerySet[Vote]

@@ -12,14 +12,13 @@ from typing import Any
 import numpy as np
 
 from arena.rating import bradley_terry, davidson, elo
-from arena.rating.bootstrap import Rounds, is_certain, resample, rounds_to_draw
+from arena.rating.bootstrap import Loose, Rounds, is_certain, loose, resample, rounds_to_draw
 from arena.rating.bradley_terry import Meetings, to_elo
 from arena.rating.chains import are_determined, chains_in_sets
 from arena.rating.comparisons import BoolArray, Comparisons, FloatArray, PairCounts, tally
-from arena.rating.components import Loose, loose
 from arena.rating.logistic import Coefficient, coefficients_of, fit_with_columns
-from arena.rating.pulls import Pulls, bradley_terry_pulls, davidson_pulls
 from arena.rating.rules import Intervals, Method, Order, Rules
+from arena.rating.sandwich import Pulls, bradley_terry_pulls, davidson_pulls
 
 _NUMBERS_AT_ONCE = 4_000_000
 

@@ -23,6 +23,7 @@ import numpy as np
 from arena.rating import elo, remarks
 from arena.rating.bootstrap import Unit
 from arena.rating.bradley_terry import MEAN_ELO
+from arena.rating.chains import Diagnosis, Status, diagnose
 from arena.rating.comparisons import (
     Comparisons,
     FloatArray,
@@ -32,7 +33,6 @@ from arena.rating.comparisons import (
     split_votes,
     tally,
 )
-from arena.rating.connectivity import Diagnosis, Status, diagnose
 from arena.rating.lines import Line
 from arena.rating.logistic import Coefficient
 from arena.rating.parts import Rated, rate_part

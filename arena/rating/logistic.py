@@ -13,15 +13,15 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.special import ndtri, stdtrit
 
 from arena.rating import sandwich
 from arena.rating.bootstrap import Unit
 from arena.rating.bradley_terry import ELO_PER_LOGIT
 from arena.rating.comparisons import Comparisons, FloatArray
-from arena.rating.estimate import Estimate
+from arena.rating.estimate import LEVEL, Estimate, share, t_above, t_quantile
 from arena.rating.moderated import clusters_of
-from arena.rating.pulls import Pulls
-from arena.rating.student import t_above, t_quantile
+from arena.rating.sandwich import Pulls
 
 _MOST_STEPS = 60
 _TOLERANCE = 1e-10
@@ -146,7 +146,7 @@ def coefficients_of(
     return tuple(found)
 
 
-# --- Private -----------------------------------------------------------------------------------
+# --- Steps ---------------------------------------------------------------------------------------
 
 
 def _derivatives(
@@ -193,3 +193,52 @@ def _inverse(curvature: FloatArray, contestants: int) -> FloatArray | None:
     inverse = np.zeros_like(values)
     inverse[1:] = 1.0 / values[1:]
     return np.asarray((directions * inverse) @ directions.T)
+
+
+# --- The left side -------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SideBias:
+    """What the left side is worth.
+
+    Attributes:
+        advantage: In Elo points with the interval clustered by expert; zero is no bias.
+        standard_error: Of the advantage, in Elo points; None where it is not determined.
+        left: The share of decided votes that the left picture won.
+        clusters: Experts.
+    """
+
+    advantage: Estimate
+    standard_error: float | None
+    left: Estimate
+    clusters: int
+
+
+def side_bias(votes: Comparisons) -> SideBias:
+    """The advantage of the left side, beside what the contestants are worth.
+
+    Args:
+        votes: `first` was shown on the left. They must determine ratings; else the advantage is
+            unknown and only the share is given.
+    """
+    decided = votes.score != 0.5
+    left = share(votes.score[decided] == 1.0, votes.expert[decided])
+    clusters = len(np.unique(votes.expert))
+    fitted = fit_with_columns(votes, np.ones((len(votes), 1)))
+    if fitted is None:
+        return SideBias(
+            advantage=Estimate(value=None), standard_error=None, left=left, clusters=clusters
+        )
+    value = float(fitted.coefficients[0]) * ELO_PER_LOGIT
+    unit = Unit.EXPERT if clusters > 1 else Unit.VOTE
+    error = math.sqrt(float(parameter_covariance(votes, fitted, unit)[-1, -1]))
+    half = error * float(
+        stdtrit(clusters - 1, 0.5 + LEVEL / 2) if clusters > 1 else ndtri(0.5 + LEVEL / 2)
+    )
+    return SideBias(
+        advantage=Estimate(value=value, lower=value - half, upper=value + half),
+        standard_error=error,
+        left=left,
+        clusters=clusters,
+    )

@@ -29,8 +29,8 @@ from arena.rating.comparisons import (
     IntArray,
     renumber_codes,
 )
-from arena.rating.pulls import Pulls, without_negative_parts
-from arena.rating.student import t_quantile
+from arena.rating.estimate import t_quantile
+from arena.rating.sandwich import Pulls, without_negative_parts
 
 MOST_PRIOR = 24.0
 """The others count at most like so many further clusters, however alike all contestants seem: one

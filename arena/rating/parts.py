@@ -10,22 +10,21 @@ from dataclasses import dataclass
 import numpy as np
 
 from arena.rating import remarks, sandwich
-from arena.rating.bootstrap import Unit, interval
+from arena.rating.bootstrap import Placed, Unit, interval, open_interval, place_on_one_scale
+from arena.rating.chains import Status
 from arena.rating.comparisons import Comparisons, FloatArray, count_pairs
-from arena.rating.components import Placed, open_interval, place_on_one_scale
-from arena.rating.connectivity import Status
 from arena.rating.fits import Fitted, fit_votes
 from arena.rating.logistic import Coefficient
 from arena.rating.moderated import Spread, spread_of
 from arena.rating.ranking import (
     Separation,
     above_by_bounds,
+    judge_pairs,
     rank_sets,
     separation,
     shown_ranks,
 )
 from arena.rating.rules import Intervals, Method, Rules
-from arena.rating.simultaneous import judge_pairs
 
 _SAME = 1e-6
 """Points. Rounds that all lie within this say nothing about the spread."""

@@ -6,8 +6,8 @@ import numpy as np
 
 from arena.rating import elo, sandwich
 from arena.rating.bootstrap import Unit
+from arena.rating.chains import few_of
 from arena.rating.comparisons import Comparisons, FloatArray, IntArray, renumber_codes
-from arena.rating.connectivity import few_of
 from arena.rating.rules import Intervals, Rules
 
 FEWEST = {"expert": 5, "scenario": 10}

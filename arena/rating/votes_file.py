@@ -1,42 +1,59 @@
 """Votes from a file with the columns model_a, model_b, winner, and maybe judge and item.
 
-A quick pass reads blocks of lines into numbers and only notices that something is wrong; a slow
-one, line by line (`arena.rating.votes_table`), then finds where and says it. Millions of lines
-take seconds and little memory: no text is kept but the names.
+The file is CSV with any usual separator, JSON lines or Parquet; what it is follows from its
+content, not from its name.
 """
 
 from __future__ import annotations
 
 import csv
+import json
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
-from itertools import islice
+from array import array
+from collections import defaultdict
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
+from typing import TextIO
 
 import numpy as np
-from numpy.typing import NDArray
 
-from arena.rating.comparisons import Comparisons, IntArray
-from arena.rating.tabular import fit_row
-from arena.rating.votes_table import (
-    NEEDED,
-    OPTIONAL,
-    SIDE,
-    WINNERS,
-    VotesFileUnreadable,
-    explain,
-    is_missing,
-    line_of,
-    open_votes,
-)
+from arena.rating.comparisons import LOSS, TIE, WIN, Comparisons, FloatArray, IntArray
 
-_LINES_AT_ONCE = 20_000
-_ROWS_BEFORE_GROUPING = 500_000
-_LARGEST_KEY = 2**62
+NEEDED = ("model_a", "model_b", "winner")
+OPTIONAL = ("judge", "item")
+SIDE = "side"
+"""A covariate that every file has: `model_a` was on the left."""
+WINNERS = {"model_a": WIN, "model_b": LOSS, "tie": TIE, "tie (bothbad)": TIE}
+SEPARATORS = (",", ";", "\t", "|")
+LONGEST_CELL = 2**26
+_FIRST_BYTES = 65_536
+_PARQUET = b"PAR1"
+_UTF_16 = (b"\xff\xfe", b"\xfe\xff")
+_LINES_TO_REPORT = 20_000
 
-Rows = NDArray[np.int32]
-_HALF_POINTS = {winner: round(2 * score) for winner, score in WINNERS.items()}
+Row = list[str]
+
+
+class VotesFileUnreadable(ValueError):
+    """The file is not what it should be; the text has the line and what is allowed."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TextTable:
+    """A table while it is being read.
+
+    Attributes:
+        header: The names of the columns, without spaces around them.
+        rows: Their cells, one row after the other; an empty list for a blank line.
+        lines_read: How many lines of the file have been read so far; rows in Parquet, with one
+            for the header.
+    """
+
+    header: Row
+    rows: Iterator[Row]
+    lines_read: Callable[[], int]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -52,6 +69,37 @@ class VotesFile:
 
     comparisons: Comparisons
     repeats: int | None
+
+
+def columns_of(path: Path) -> tuple[str, ...]:
+    """Return the columns that the file has beside the needed ones.
+
+    Raises:
+        VotesFileUnreadable: The first line does not name the needed columns, each once.
+    """
+    with open_votes(path) as table:
+        return tuple(name for name in table.header if name not in NEEDED)
+
+
+@contextmanager
+def open_votes(path: Path) -> Iterator[TextTable]:
+    """Open the table of a file that has the needed columns, each once.
+
+    Raises:
+        VotesFileUnreadable: It has not, or can't be read at all.
+    """
+    try:
+        opened = _open_table(path)
+        table = opened.__enter__()
+    except (StopIteration, RuntimeError):
+        raise VotesFileUnreadable(f"line 1: the file is empty; {_columns_text()}") from None
+    except (csv.Error, ValueError) as error:
+        raise VotesFileUnreadable(f"line 1: {error}; {_columns_text()}") from error
+    try:
+        _check_header(table.header)
+        yield table
+    finally:
+        opened.__exit__(None, None, None)
 
 
 def read_votes(
@@ -78,194 +126,272 @@ def read_votes(
             first.
     """
     numbers = [f"{name}_{end}" for name in covariates if name != SIDE for end in "ab"]
-    wanted = (*NEEDED, *clusters, *numbers)
-    names = [_Codes() for _ in wanted[2:]]
+    models, *others = codes = [_Codes() for _ in ("model", *clusters)]
+    # With judges and items hardly two votes are equal.
+    is_grouped = not (clusters or covariates or in_order)
+    grouped: defaultdict[tuple[int, ...], int] = defaultdict(int)
+    coded, values = array("q"), array("d")
+    for count, (line, cells) in enumerate(_votes_in(path, (*NEEDED, *clusters, *numbers)), 1):
+        first, second, winner, *rest = cells
+        row = (
+            models[first],
+            models[second],
+            round(2 * WINNERS[winner]),
+            *(of_column[cell] for of_column, cell in zip(others, rest, strict=False)),
+        )
+        if is_grouped:
+            grouped[row] += 1
+        else:
+            coded.extend(row)
+        named = zip(numbers, rest[len(clusters) :], strict=True)
+        values.extend(_number(line, column, cell) for column, cell in named)
+        if report is not None and count % _LINES_TO_REPORT == 0:
+            report(count)
+    width = len(NEEDED) + len(clusters)
+    if is_grouped:
+        coded.extend(code for row in grouped for code in row)
+    rows = np.array(coded, dtype=np.int64).reshape(-1, width)
+    counts = np.array(list(grouped.values()) or [1] * len(rows), dtype=np.int64)
+    if report is not None:
+        report(int(counts.sum()))
+    return VotesFile(
+        comparisons=_as_votes(
+            rows, counts, clusters, codes, _columns(covariates, values, len(rows))
+        ),
+        repeats=_repeats(rows) if len(clusters) == len(OPTIONAL) else None,
+    )
+
+
+def is_missing(name: str) -> bool:
+    """Return whether a cell says nothing: empty, or what other programs write for that."""
+    return not name or name.lower() == "nan"
+
+
+# --- Lines ---------------------------------------------------------------------------------------
+
+
+def _votes_in(path: Path, wanted: Sequence[str]) -> Iterator[tuple[int, Row]]:
+    """Yield the number and the wanted cells of each line that is not blank."""
+    with open_votes(path) as table:
+        places = [table.header.index(name) for name in wanted]
+        width = len(table.header)
+        before = table.lines_read()
+        while True:
+            try:
+                row = next(table.rows, None)
+            except (csv.Error, ValueError) as error:
+                raise VotesFileUnreadable(f"line {before + 1}: {error}") from error
+            if row is None:
+                return
+            if row:
+                row = _fit_row(row, width)
+                cells = [row[place].strip() for place in places] if len(row) == width else []
+                if wrong := _wrong(len(row), width, dict(zip(wanted, cells, strict=False))):
+                    raise VotesFileUnreadable(f"line {before + 1}: {wrong}")
+                yield before + 1, cells
+            before = table.lines_read()
+
+
+def _wrong(cells_there: int, width: int, cells: dict[str, str]) -> str:
+    """Return what is wrong with a line, empty if nothing is."""
+    if cells_there != width:
+        return f"there are {cells_there} cells, in the first line {width}"
+    for name, cell in cells.items():
+        if is_missing(cell):
+            return f"{name} is {cell!r}, which is no name" if cell else f"{name} is empty"
+    if cells["winner"] not in WINNERS:
+        return f"the winner {cells['winner']!r} is none of {', '.join(WINNERS)}"
+    if cells["model_a"] == cells["model_b"]:
+        return f"{cells['model_a']!r} is compared with itself"
+    return ""
+
+
+def _number(line: int, column: str, cell: str) -> float:
     try:
-        rows, counts = _read(path, wanted, names, report, in_order=in_order)
-    except VotesFileUnreadable:
-        raise
-    except (ValueError, KeyError, csv.Error) as error:
-        explain(path, wanted)
-        raise VotesFileUnreadable(f"{path.name}: {error}") from error
-    many = 1 + len(clusters)
-    found = _as_votes(rows[:, : 2 + many], counts, clusters, names[:many])
-    if covariates:
-        first = 3 + len(clusters)
-        values = {
-            name: _numbers(path, name, codes)[rows[:, place]]
-            for place, (name, codes) in enumerate(
-                zip(numbers, names[1 + len(clusters) :], strict=False), start=first
-            )
-        }
-        columns = [
-            np.ones(len(rows)) if name == SIDE else values[f"{name}_a"] - values[f"{name}_b"]
-            for name in covariates
-        ]
-        votes = replace(found.comparisons, covariates=np.column_stack(columns))
-        found = replace(found, comparisons=votes)
-    return found
-
-
-def _numbers(path: Path, column: str, codes: _Codes) -> NDArray[np.float64]:
-    """(n,) what the names of a column are as numbers."""
-    values = np.empty(len(codes.names))
-    for place, name in enumerate(codes.names):
-        try:
-            values[place] = float(name)
-        except ValueError:
-            values[place] = math.nan
-        if not math.isfinite(values[place]):
-            raise VotesFileUnreadable(
-                f"line {line_of(path, column, name)}: {column} is {name!r}, which is no number"
-            )
-    return values
+        value = float(cell)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise VotesFileUnreadable(f"line {line}: {column} is {cell!r}, which is no number")
+    return value
 
 
 class _Codes(dict[str, int]):
-    """Numbers names as they come, without the spaces around them."""
+    """Numbers names as they come."""
 
-    def __init__(self) -> None:
-        self.names: list[str] = []
+    def __missing__(self, name: str) -> int:
+        self[name] = len(self)
+        return self[name]
 
-    def __missing__(self, cell: str) -> int:
-        name = cell.strip()
-        if is_missing(name):
-            raise ValueError("a cell is empty")
-        if name == cell:
-            self.names.append(name)
-            number = len(self.names) - 1
-        else:
-            number = self[name]
-        self[cell] = number
-        return number
-
-
-class _Winners(dict[str, int]):
-    """Half points of the first by the winner's name."""
-
-    def __missing__(self, cell: str) -> int:
-        number = self[cell] = _HALF_POINTS[cell.strip()]
-        return number
-
-
-# --- The quick pass ------------------------------------------------------------------------------
-
-
-def _read(
-    path: Path,
-    wanted: Sequence[str],
-    names: list[_Codes],
-    report: Callable[[int], None] | None,
-    *,
-    in_order: bool,
-) -> tuple[Rows, IntArray]:
-    """(R, 3 + clusters) first, second, outcome in half points, clusters; (R,) how often."""
-    coders = [names[0], names[0], _Winners(), *names[1:]]
-    parts: list[tuple[Rows, IntArray]] = [
-        (np.empty((0, len(wanted)), np.int32), np.empty(0, np.int64))
-    ]
-    pending = total = 0
-    # With judges and items hardly two votes are equal.
-    is_grouped = len(wanted) == len(NEEDED) and not in_order
-    with open_votes(path) as table:
-        places = [table.header.index(name) for name in wanted]
-        while block := list(islice(table.rows, _LINES_AT_ONCE)):
-            rows = _coded(block, len(table.header), places, coders)
-            parts.append((rows, np.ones(len(rows), dtype=np.int64)))
-            pending += len(rows)
-            total += len(rows)
-            if report is not None:
-                report(total)
-            if pending > _ROWS_BEFORE_GROUPING and is_grouped:
-                parts = [_grouped(parts)]
-                pending = 0
-    if is_grouped:
-        return _grouped(parts)
-    rows = np.concatenate([rows for rows, _ in parts])
-    return rows, np.ones(len(rows), dtype=np.int64)
-
-
-def _coded(
-    block: list[list[str]], width: int, places: list[int], coders: Sequence[dict[str, int]]
-) -> Rows:
-    """(n, columns) numbers of a block of lines; blank lines are passed over."""
-    if [] in block:
-        block = [row for row in block if row]
-    if not block:
-        return np.empty((0, len(places)), dtype=np.int32)
-    if any(len(row) > width for row in block):
-        block = [fit_row(row, width) for row in block]
-    columns = list(zip(*block, strict=True))
-    if len(columns) != width:
-        raise ValueError("a line has another number of cells")
-    coded = np.empty((len(block), len(places)), dtype=np.int32)
-    for index, (place, codes) in enumerate(zip(places, coders, strict=True)):
-        coded[:, index] = np.fromiter(
-            map(codes.__getitem__, columns[place]), dtype=np.int32, count=len(block)
-        )
-    if (coded[:, 0] == coded[:, 1]).any():
-        raise ValueError("a model is compared with itself")
-    return coded
-
-
-def _grouped(parts: list[tuple[Rows, IntArray]]) -> tuple[Rows, IntArray]:
-    """Equal rows in one, with how often they occur."""
-    rows = np.concatenate([rows for rows, _ in parts])
-    counts = np.concatenate([counts for _, counts in parts])
-    _, first, group = np.unique(_keys(rows), return_index=True, return_inverse=True)
-    added = np.bincount(group, weights=counts, minlength=len(first))
-    return rows[first], added.astype(np.int64)
-
-
-def _keys(rows: Rows) -> IntArray:
-    """(n,) a number for each row, equal for equal rows."""
-    keys = np.zeros(len(rows), dtype=np.int64)
-    largest = 1
-    for column in rows.T:
-        size = int(column.max(initial=0)) + 1
-        if largest * size > _LARGEST_KEY:
-            kinds, keys = np.unique(keys, return_inverse=True)
-            largest = len(kinds)
-        keys = keys * size + column
-        largest *= size
-    return keys
+    def alphabetical(self) -> IntArray:
+        """(n,) from the number of a name to its place in the alphabet."""
+        places = np.empty(len(self), dtype=np.int64)
+        places[[self[name] for name in sorted(self)]] = np.arange(len(self))
+        return places
 
 
 def _as_votes(
-    rows: Rows, counts: IntArray, clusters: Sequence[str], names: list[_Codes]
-) -> VotesFile:
-    """The numbers as comparisons, names in alphabetical order so that no order of lines counts."""
-    repeats = _repeats(rows, counts) if len(clusters) == len(OPTIONAL) else None
-    places = [_alphabetical(codes) for codes in names]
+    rows: IntArray,
+    counts: IntArray,
+    clusters: Sequence[str],
+    codes: Sequence[_Codes],
+    columns: Sequence[FloatArray],
+) -> Comparisons:
+    """Return the numbers as comparisons, names in alphabetical order: no order of lines counts."""
+    models, *others = (of_column.alphabetical() for of_column in codes)
     of_clusters = {
-        name: place[rows[:, 3 + index]]
-        for index, (name, place) in enumerate(zip(clusters, places[1:], strict=True))
+        name: place[rows[:, len(NEEDED) + index]]
+        for index, (name, place) in enumerate(zip(clusters, others, strict=True))
     }
     nobody = np.zeros(len(rows), dtype=np.int64)
-    votes = Comparisons(
-        names=tuple(sorted(names[0].names)),
-        first=places[0][rows[:, 0]],
-        second=places[0][rows[:, 1]],
+    return Comparisons(
+        names=tuple(sorted(codes[0])),
+        first=models[rows[:, 0]],
+        second=models[rows[:, 1]],
         score=rows[:, 2] / 2.0,
         expert=of_clusters.get("judge", nobody),
         scenario=of_clusters.get("item", nobody),
         count=counts,
+        covariates=np.column_stack(columns) if columns else np.empty((len(rows), 0)),
     )
-    return VotesFile(comparisons=votes, repeats=repeats)
 
 
-def _repeats(rows: Rows, counts: IntArray) -> int:
-    """Votes of a judge on an item and pair that have one already."""
-    turned = rows[:, 0] > rows[:, 1]
-    low, high = np.where(turned, rows[:, 1], rows[:, 0]), np.where(turned, rows[:, 0], rows[:, 1])
-    keys = _keys(np.column_stack([low, high, rows[:, 3:]]))
-    keys.sort()
-    return int(counts.sum()) - (len(keys) - int((keys[1:] == keys[:-1]).sum()))
+def _columns(covariates: Sequence[str], values: array[float], rows: int) -> list[FloatArray]:
+    """(R,) of each covariate, from both ends' numbers of each row, one row after the other."""
+    both = (
+        np.array(values, dtype=np.float64).reshape(rows, -1, 2)
+        if values
+        else np.empty((rows, 0, 2))
+    )
+    differences = iter((both[:, :, 0] - both[:, :, 1]).T)
+    return [np.ones(rows) if name == SIDE else next(differences) for name in covariates]
 
 
-def _alphabetical(codes: _Codes) -> IntArray:
-    """(n,) from the number of a name to its place in the alphabet."""
-    order = sorted(range(len(codes.names)), key=codes.names.__getitem__)
-    places = np.empty(len(order), dtype=np.int64)
-    places[order] = np.arange(len(order))
-    return places
+def _repeats(rows: IntArray) -> int:
+    """Count votes of a judge on an item and pair that have one already."""
+    keys = np.column_stack([np.sort(rows[:, :2], axis=1), rows[:, len(NEEDED) :]])
+    return len(keys) - len(np.unique(keys, axis=0))
+
+
+def _check_header(header: Sequence[str]) -> None:
+    for name in NEEDED:
+        if name not in header:
+            raise VotesFileUnreadable(f"line 1: there is no column {name!r}; {_columns_text()}")
+    twice = [name for name in (*NEEDED, *OPTIONAL) if header.count(name) > 1]
+    if twice:
+        raise VotesFileUnreadable(f"line 1: the column {twice[0]!r} is there twice")
+
+
+def _columns_text() -> str:
+    return f"needed are {', '.join(NEEDED)}, allowed besides {' and '.join(OPTIONAL)}"
+
+
+# --- Kinds of files ------------------------------------------------------------------------------
+
+
+@contextmanager
+def _open_table(path: Path) -> Iterator[TextTable]:
+    """Open a file; the separator is the one that finds most of the known columns."""
+    with path.open("rb") as file:
+        start = file.read(_FIRST_BYTES)
+    if start.startswith(_PARQUET):
+        yield _parquet(path)
+        return
+    csv.field_size_limit(LONGEST_CELL)
+    with path.open(encoding=_encoding(start), newline="") as lines:
+        beginning = lines.read(_FIRST_BYTES)
+        lines.seek(0)
+        if beginning.lstrip().startswith("{"):
+            yield _json_lines(lines)
+        else:
+            yield _separated(lines, _separator(beginning, (*NEEDED, *OPTIONAL)))
+
+
+def _fit_row(row: Row, width: int) -> Row:
+    """Return the row without empty cells behind its last column."""
+    while len(row) > width and not row[-1].strip():
+        row = row[:-1]
+    return row
+
+
+def _encoding(start: bytes) -> str:
+    if start.startswith(_UTF_16):
+        return "utf-16"
+    if start[1:2] == b"\0":
+        return "utf-16-le"
+    return "utf-16-be" if start[:1] == b"\0" else "utf-8-sig"
+
+
+def _separator(beginning: str, wanted: Sequence[str]) -> str:
+    def found(separator: str) -> int:
+        first = next(csv.reader(beginning.splitlines(keepends=True), delimiter=separator), [])
+        return len({cell.strip() for cell in first} & set(wanted))
+
+    return max(SEPARATORS, key=found)
+
+
+def _separated(lines: TextIO, separator: str) -> TextTable:
+    reader = csv.reader(lines, strict=True, delimiter=separator)
+    header = [name.strip() for name in next(reader)]
+    while header and not header[-1]:
+        header.pop()
+    return TextTable(header=header, rows=reader, lines_read=lambda: reader.line_num)
+
+
+def _json_lines(lines: TextIO) -> TextTable:
+    """An object a line; the columns are those of the first."""
+    count = 0
+    first = _object(next(line for line in lines if line.strip()))
+    header = list(first)
+    lines.seek(0)
+
+    def rows() -> Iterator[Row]:
+        nonlocal count
+        for line in lines:
+            if line.strip():
+                found = _object(line)
+                row = [_text(found.get(name)) for name in header]
+            else:
+                row = []
+            count += 1
+            yield row
+
+    return TextTable(header=header, rows=rows(), lines_read=lambda: count)
+
+
+def _object(line: str) -> dict[str, object]:
+    try:
+        found = json.loads(line)
+    except json.JSONDecodeError as error:
+        raise ValueError(f"no JSON object: {error}") from error
+    if not isinstance(found, dict):
+        raise ValueError("no JSON object")
+    return found
+
+
+def _parquet(path: Path) -> TextTable:
+    from pyarrow import ArrowException, parquet
+
+    try:
+        file = parquet.ParquetFile(path)
+    except ArrowException as error:
+        raise ValueError(f"no readable Parquet: {error}") from error
+    header = list(file.schema_arrow.names)
+    count = 1
+
+    def rows() -> Iterator[Row]:
+        nonlocal count
+        for batch in file.iter_batches():
+            for cells in zip(*(column.to_pylist() for column in batch.columns), strict=True):
+                row = [_text(cell) for cell in cells]
+                count += 1
+                yield row
+
+    return TextTable(header=header, rows=rows(), lines_read=lambda: count)
+
+
+def _text(cell: object) -> str:
+    """As our CSV files have it."""
+    if isinstance(cell, bool):
+        return "yes" if cell else "no"
+    return "" if cell is None else str(cell)

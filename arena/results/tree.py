@@ -12,10 +12,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from arena.rating.fit_test import FitTest
-from arena.rating.position import SideBias
-from arena.rating.raters import Rater
-from arena.rating.reliability import Agreement
-from arena.rating.repeats import Repeats
+from arena.rating.logistic import SideBias
+from arena.rating.reliability import Agreement, Rater, Repeats
 from arena.results.both_versions import Adjustment, OwnVotes
 from arena.results.kept import Kept
 

@@ -15,9 +15,8 @@ from arena.models import Matchup, Study
 from arena.queries.costs import model_classes, shown_augmentations, spent_on
 from arena.queries.judged import Entrant, Judged, is_imported
 from arena.queries.vote_sets import Filters
-from arena.rating.comparisons import Comparisons, select_votes
+from arena.rating.comparisons import Comparisons, select_votes, win_rates
 from arena.rating.leaderboard import Leaderboard, rate
-from arena.rating.win_rates import win_rates
 from arena.results.tree import (
     DisplacementSummary,
     PairRecord,

@@ -10,7 +10,7 @@ from django.contrib.auth.models import User
 
 from arena.models import Snapshot, Study, Vote
 from arena.queries.results import ResultsAccess, latest_snapshot, results_access
-from arena.rating.effects import estimate_effects
+from arena.rating.planning import estimate_effects
 from arena.services.snapshots import votes_of
 from arena.services.vote_arrays import vote_arrays
 

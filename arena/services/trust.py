@@ -28,12 +28,10 @@ from arena.rating.influence import (
     without_each_expert,
 )
 from arena.rating.leaderboard import Intervals, Leaderboard, Line, Method, rate
+from arena.rating.logistic import side_bias
 from arena.rating.planning import design_effects, votes_until
-from arena.rating.position import side_bias
 from arena.rating.ranking import Separation
-from arena.rating.raters import Rater, raters
-from arena.rating.reliability import agreement
-from arena.rating.repeats import Repeats, repeat_consistency
+from arena.rating.reliability import Rater, Repeats, agreement, raters, repeat_consistency
 from arena.results.tree import (
     BoardRemarks,
     OnlinePlace,

@@ -20,8 +20,13 @@ from django.utils import timezone
 
 from arena.errors import VotesUnreadable
 from arena.models import ImportedVote, Study, VoteFile
-from arena.rating.votes_file import read_votes
-from arena.rating.votes_table import OPTIONAL, VotesFileUnreadable, columns_of, open_votes
+from arena.rating.votes_file import (
+    OPTIONAL,
+    VotesFileUnreadable,
+    columns_of,
+    open_votes,
+    read_votes,
+)
 from arena.services.turns import in_turn
 from augment.errors import Conflict
 from augment.services.events import log_event

@@ -21,7 +21,7 @@ HEAVY = {
         "augment.prompts.clip",
     ),
     "pandas": ("augment.formats", "arena.exports"),
-    "pyarrow": ("augment.formats", "arena.exports", "arena.rating.tabular"),
+    "pyarrow": ("augment.formats", "arena.exports", "arena.rating.votes_file"),
     "scenariogeneration": ("augment.formats",),
     "matplotlib": ("arena.exports",),
     "scipy.interpolate": ("augment.fake_llm",),

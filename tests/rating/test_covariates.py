@@ -76,7 +76,7 @@ def test_ratings_and_coefficients_are_those_of_statsmodels() -> None:
 
 
 def test_a_side_by_itself_is_the_advantage_of_the_left() -> None:
-    from arena.rating.position import side_bias
+    from arena.rating.logistic import side_bias
 
     plain, votes = adjusted(np.ones((1200, 1)))
     found = rate(votes, unit=Unit.EXPERT).coefficients[0].points

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from arena.rating.bootstrap import Unit
-from arena.rating.connectivity import Status
+from arena.rating.chains import Status
 from arena.rating.leaderboard import Method, anchor_board, rate
 from tests.rating.votes import by_votes, named, simulated, versus
 

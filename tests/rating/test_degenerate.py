@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from arena.rating.bootstrap import Unit
+from arena.rating.chains import Status
 from arena.rating.comparisons import Comparison, as_arrays
-from arena.rating.connectivity import Status
 from arena.rating.leaderboard import Leaderboard, Method, rate
 from arena.rating.rules import Intervals, TooManyContestants
 from tests.rating.votes import by_votes, named, versus

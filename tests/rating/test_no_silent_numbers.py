@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from arena.rating.bootstrap import Unit
+from arena.rating.chains import Status
 from arena.rating.comparisons import Comparisons
-from arena.rating.connectivity import Status
 from arena.rating.leaderboard import Method, rate
 
 RULES = [

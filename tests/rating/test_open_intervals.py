@@ -9,10 +9,9 @@ import pytest
 from scipy.optimize import brentq
 from scipy.special import expit
 
-from arena.rating.bootstrap import Unit
+from arena.rating.bootstrap import Unit, open_interval
+from arena.rating.chains import Status
 from arena.rating.comparisons import Comparison, Comparisons, as_arrays
-from arena.rating.components import open_interval
-from arena.rating.connectivity import Status
 from arena.rating.leaderboard import Intervals, Leaderboard, Line, Method, rate
 from arena.rating.ranking import ranks, shown_ranks
 from tests.rating.votes import by_votes, named, versus

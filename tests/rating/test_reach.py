@@ -8,7 +8,7 @@ import pytest
 from arena.rating.bootstrap import Unit, is_certain, rounds_to_draw
 from arena.rating.comparisons import count_pairs
 from arena.rating.leaderboard import Intervals, rate
-from arena.rating.pulls import _squares
+from arena.rating.sandwich import _squares
 from tests.rating.votes import simulated
 
 SPREAD = [1400.0, 1200.0, 1100.0, 1000.0, 900.0, 600.0]

@@ -8,16 +8,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from arena.rating.comparisons import LOSS, TIE, WIN, Comparison, Comparisons
-from arena.rating.raters import raters
+from arena.rating.estimate import share, wilson
 from arena.rating.reliability import (
     DifferenceMetric,
     agreement,
     gwet_ac1,
     krippendorff_alpha,
+    raters,
+    repeat_consistency,
     unit_table,
 )
-from arena.rating.repeats import repeat_consistency
-from arena.rating.shares import share, wilson
 from tests.rating.votes import named, simulated
 
 NOBODY = np.full((9, 9), np.nan)

@@ -12,13 +12,12 @@ from scipy.special import ndtr, ndtri
 from scipy.stats import studentized_range
 
 from arena.rating.bradley_terry import ELO_PER_LOGIT
-from arena.rating.effects import estimate_effects
 from arena.rating.leaderboard import rate
 from arena.rating.moderated import Spread
-from arena.rating.planned_pairs import PlannedPairs
-from arena.rating.planning import votes_for
-from arena.rating.prospects import Question, foretell, prospect
+from arena.rating.planning import Question, estimate_effects, foretell, prospect, votes_for
+from arena.rating.ranking import CAUTION
 from arena.rating.sample_size import (
+    PlannedPairs,
     StudyDesign,
     _largest_of,
     _level_of_all_pairs,
@@ -26,7 +25,6 @@ from arena.rating.sample_size import (
     expect,
     votes_per_expert_for,
 )
-from arena.rating.simultaneous import CAUTION
 from bench.study_size import design_of, world_of
 from bench.worlds import World, paper_ratings
 

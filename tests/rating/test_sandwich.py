@@ -15,9 +15,9 @@ from arena.rating import sandwich
 from arena.rating.bootstrap import Unit
 from arena.rating.bradley_terry import ELO_PER_LOGIT, Meetings, inverse_curvature
 from arena.rating.comparisons import Comparisons, FloatArray, count_pairs
+from arena.rating.estimate import t_above, t_quantile
 from arena.rating.leaderboard import Intervals, rate
-from arena.rating.pulls import Pulls, bradley_terry_pulls
-from arena.rating.student import t_above, t_quantile
+from arena.rating.sandwich import Pulls, bradley_terry_pulls
 from tests.rating.votes import fit, simulated
 
 ARENA_RANK = json.loads((Path(__file__).parent / "arena_rank.json").read_text())

@@ -8,7 +8,7 @@ import statsmodels.api as sm
 
 from arena.rating.bootstrap import Unit
 from arena.rating.bradley_terry import ELO_PER_LOGIT
-from arena.rating.comparisons import Comparison, Comparisons, count_pairs
+from arena.rating.comparisons import Comparison, Comparisons, count_pairs, win_rates
 from arena.rating.fit_test import count_cycles, fit_test
 from arena.rating.influence import (
     fewest_votes_to_change_first,
@@ -16,9 +16,8 @@ from arena.rating.influence import (
     without_each_expert,
 )
 from arena.rating.leaderboard import Intervals, rate
+from arena.rating.logistic import side_bias
 from arena.rating.planning import design_effects, votes_for, votes_until
-from arena.rating.position import side_bias
-from arena.rating.win_rates import win_rates
 from bench.worlds import World
 from tests.rating.votes import fit, named, simulated, versus
 

@@ -9,7 +9,7 @@ from django.core.management import CommandError, call_command
 from django.urls import reverse
 
 from arena.models import Study
-from arena.rating.prospects import prospect
+from arena.rating.planning import prospect
 from arena.services.prospects import known_of
 from arena.services.ratings import rate
 from arena.services.study_estimate import StudyEstimate

@@ -8,7 +8,7 @@ from typing import Any
 from django.core.management.base import CommandError, CommandParser
 
 from arena.models import Study
-from arena.rating.prospects import Outlook, Prospect, Question, Wish, foretell
+from arena.rating.planning import Outlook, Prospect, Question, Wish, foretell
 from arena.services.prospects import known_of, usual_seconds
 from arena.services.study_estimate import ESTIMATE_INPUTS, StudyEstimate
 from augment.errors import AugmentError
@@ -17,7 +17,7 @@ from augment.services.terminal import TerminalCommand
 
 
 class Command(TerminalCommand):
-    """The door to arena.rating.prospects."""
+    """The door to arena.rating.planning."""
 
     help = "Work out the votes of a study before there is one; needs nothing in the database."
 

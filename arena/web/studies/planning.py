@@ -14,7 +14,7 @@ from django.urls import reverse
 from django.views.decorators.http import require_safe
 
 from arena.models import Study
-from arena.rating.prospects import Outlook, Prospect, Question, Wish, foretell
+from arena.rating.planning import Outlook, Prospect, Question, Wish, foretell
 from arena.services.prospects import Known, known_of, usual_seconds
 from arena.services.study_estimate import ESTIMATE_INPUTS, StudyEstimate
 from arena.web.access import STAFF, allow_only
