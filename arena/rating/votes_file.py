@@ -258,11 +258,8 @@ def _as_votes(
 
 def _columns(covariates: Sequence[str], values: array[float], rows: int) -> list[FloatArray]:
     """(R,) of each covariate, from both ends' numbers of each row, one row after the other."""
-    both = (
-        np.array(values, dtype=np.float64).reshape(rows, -1, 2)
-        if values
-        else np.empty((rows, 0, 2))
-    )
+    pairs = sum(name != SIDE for name in covariates)
+    both = np.array(values, dtype=np.float64).reshape(rows, pairs, 2)
     differences = iter((both[:, :, 0] - both[:, :, 1]).T)
     return [np.ones(rows) if name == SIDE else next(differences) for name in covariates]
 
