@@ -73,6 +73,11 @@ class Length:
         """Whether a value has to be drawn from it."""
         return self.high_m > self.low_m
 
+    @property
+    def middle_m(self) -> float:
+        """Midway between its ends."""
+        return (self.low_m + self.high_m) / 2.0
+
     def __str__(self) -> str:
         about = "about " if self.is_approximate else ""
         if self.is_range:

@@ -8,7 +8,14 @@ from dataclasses import dataclass
 from itertools import pairwise, permutations
 
 from augment.checks.asked.parties import Party
-from augment.checks.asked.question import Asked, facing_words, severity_of, side_of
+from augment.checks.asked.question import (
+    Asked,
+    distance_outside,
+    facing_words,
+    severity_of,
+    side_of,
+)
+from augment.checks.asked.spacing import fits_gap
 from augment.checks.finding import Finding, FindingKind
 from augment.checks.tolerances import CRASH_M, USUAL
 from augment.geometry.angles import difference
@@ -71,10 +78,9 @@ def _gap(pair: Pair, asked: Asked) -> Finding:
         words = "vehicles that have crashed are within {asked_m:.1f} m"
         asked_m = longest_m
     else:
-        allowed_m = max(asked.tolerances.spacing_m, asked.tolerances.spacing_share * wanted.high_m)
-        fits = (pair.off_m or 0.0) <= allowed_m
+        fits = fits_gap(asked, pair.gap_m, wanted)
         words = "{asked_m:.1f} m is asked for"
-        asked_m = (wanted.low_m + wanted.high_m) / 2.0
+        asked_m = wanted.middle_m
     return Finding(
         kind=FindingKind.ASKED_SPACING,
         severity=severity_of(fits=fits),
@@ -144,7 +150,7 @@ class Pair:
         """How far the gap is off what is said, None where nothing is."""
         if self.asked.gap is None:
             return None
-        return max(self.asked.gap.low_m - self.gap_m, self.gap_m - self.asked.gap.high_m, 0.0)
+        return distance_outside(self.gap_m, self.asked.gap.low_m, self.asked.gap.high_m)
 
 
 def in_order(party: Party, request: CrashRequest, route: EgoRoute) -> tuple[TrafficAgent, ...]:

@@ -69,7 +69,7 @@ def _in_row(asked: Asked, party: Party, wanted: Length | None, template: str) ->
         kind=FindingKind.ASKED_SPACING,
         severity=severity_of(fits=fits_gap(asked, gap_m, wanted)),
         agents=tuple(one.id for one in things),
-        measured={"gap_m": gap_m, "asked_m": (wanted.low_m + wanted.high_m) / 2.0},
+        measured={"gap_m": gap_m, "asked_m": wanted.middle_m},
         template=template,
     )
 

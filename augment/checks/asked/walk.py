@@ -82,7 +82,7 @@ def _in_file(
             kind=FindingKind.ASKED_SPACING,
             severity=severity_of(fits=fits_gap(asked, gap_m, wanted)),
             agents=(other.id, first.id),
-            measured={"gap_m": gap_m, "asked_m": (wanted.low_m + wanted.high_m) / 2.0},
+            measured={"gap_m": gap_m, "asked_m": wanted.middle_m},
             template=_BEHIND,
         )
 
