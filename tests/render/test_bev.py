@@ -12,6 +12,7 @@ from augment.errors import InvalidModification
 from augment.render import palette
 from augment.render.bev import draw
 from augment.render.camera import camera_for
+from augment.render.scale import scale_corner
 from augment.scene.entities import AgentType, TrafficAgent
 from augment.scene.modification import Modification
 from tests import scenes
@@ -110,6 +111,8 @@ def test_what_moves_has_a_tick_and_what_is_parked_has_none() -> None:
     moving = replace(parked, speed_mps=8.0)
     assert not is_blue(pixel_at(draw(STREET, added(parked), CAMERA), CAMERA, 26.0, 3.5))
     assert is_blue(pixel_at(draw(STREET, added(moving), CAMERA), CAMERA, 26.0, 3.5))
+    noisy = replace(parked, speed_mps=0.2)
+    assert draw(STREET, added(noisy), CAMERA) == draw(STREET, added(parked), CAMERA)
 
 
 def test_a_walk_is_a_dashed_arrow_to_its_end() -> None:
@@ -166,6 +169,12 @@ def test_the_front_mark_of_a_car_is_at_its_front_at_every_angle(turn_deg: int) -
         for way in (1.3, -1.3)
     )
     assert front.min(axis=2).max() > 240 > rear.min(axis=2).max()
+
+
+def test_the_scale_keeps_away_from_traffic() -> None:
+    parked = scenes.vehicle("Agent2", CAMERA.x_min_m + 4.0, CAMERA.y_min_m + 3.0)
+    assert scale_corner(STREET, CAMERA) == (False, False)
+    assert scale_corner(scenes.scene(agents=(parked,)), CAMERA) == (True, False)
 
 
 def test_ways_that_the_ego_can_take_are_dark_and_other_connectors_faint() -> None:

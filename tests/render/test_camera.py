@@ -60,6 +60,11 @@ def test_a_reference_out_of_all_reach_does_not_shrink_the_rest() -> None:
     assert both == camera_for(scenes.scene(), Modification(added=(near,)))
 
 
+def test_the_window_holds_where_walks_end() -> None:
+    walker = scenes.pedestrian("New1", 10.0, 0.0, (10.0, 40.0))
+    assert camera_for(scenes.scene(), Modification(added=(walker,))).y_max_m >= 40.0 + MARGIN_M
+
+
 def test_the_window_lies_where_the_road_is() -> None:
     # The lane and its walkway lie to the right of y = 1.75.
     reference = Modification(added=(scenes.vehicle("New1", 20.0, 0.0),))

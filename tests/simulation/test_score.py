@@ -98,6 +98,7 @@ def test_the_drivable_area_allows_less_than_30_cm(y_m: float, expected: float) -
         (1.61, 0.20125, 1.0),
         (1.59, 0.19875, 0.0),
         (9.0, 1.0, 1.0),
+        (-8.0, 0.0, 0.0),
     ],
 )
 def test_progress_is_a_share_of_the_experts(speed: float, ratio: float, enough: float) -> None:
@@ -208,10 +209,15 @@ def test_interplan_lets_four_types_use_the_other_lane(scenario_type: ScenarioTyp
         assert score.value == pytest.approx(wanted)
 
 
+@pytest.mark.parametrize(
+    "furthest", [vehicle("A", 60.0, 5.0), pedestrian("A", 10.0, 5.0, (60.0, 5.0))]
+)
 @pytest.mark.parametrize(("speed", "expected"), [(8.0, 1.0), (4.1, 1.0), (3.9, 0.0)])
-def test_interplan_wants_the_furthest_obstacle_passed(speed: float, expected: float) -> None:
+def test_interplan_wants_the_furthest_obstacle_passed(
+    furthest: TrafficAgent, speed: float, expected: float
+) -> None:
     # 60 of the expert's 120 m: half of its way.
-    parked = Modification(added=(vehicle("A", 60.0, 5.0), cone("B", 20.0, 5.0)))
+    parked = Modification(added=(furthest, cone("B", 20.0, 5.0)))
     score = score_drive(
         driven(states_along(np.full(151, speed))),
         FAR,
