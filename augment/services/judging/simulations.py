@@ -118,6 +118,7 @@ class Drives(WorkKind[Simulation]):
     """
 
     model = Simulation
+    lost_limit = 5
     related = ("scenario__base_scene", "augmentation")
 
     def __init__(self, also: Collection[str] = ()) -> None:
