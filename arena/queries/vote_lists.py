@@ -27,12 +27,6 @@ from arena.queries.listed_votes import (
     of_votes,
 )
 from arena.queries.remembering import Remembered, plan_types
-from arena.queries.vote_marks import (
-    counted_votes,
-    made_up_contestants,
-    marked_votes,
-    users_of,
-)
 from arena.queries.vote_parts import find_part
 from arena.queries.vote_search import (
     AUTOMATIC_TIE,
@@ -44,7 +38,14 @@ from arena.queries.vote_search import (
     SoughtPart,
     VoteSearch,
 )
-from arena.queries.vote_sets import Filters, why_left_out
+from arena.queries.vote_sets import (
+    Filters,
+    counted_votes,
+    made_up_contestants,
+    marked_votes,
+    users_of,
+    why_left_out,
+)
 from augment.models import Augmentation
 
 PER_PAGE = 25

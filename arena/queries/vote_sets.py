@@ -7,8 +7,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any
+from uuid import UUID
 
-from arena.models import Study
+from django.db.models import Case, Q, QuerySet, Value, When
+from django.db.models.fields import CharField
+
+from arena.models import ImportedVote, Person, Snapshot, Study, Vote
 from arena.pairing.order import CHECK, MAIN, REPEAT
 from arena.queries.judged import (
     AUTOMATIC,
@@ -16,11 +20,14 @@ from arena.queries.judged import (
     Entrant,
     Judged,
     entrants_of,
+    is_imported,
     references,
     settled_ties,
     votes_up_to,
 )
+from arena.queries.vote_search import COUNTED
 from augment.errors import UnknownName
+from augment.models import Contestant
 from augment.services.scenarios.types import ScenarioType
 
 KINDS = (MAIN, REPEAT)
@@ -131,8 +138,14 @@ def vote_set(study: Study, *, filters: Filters, last: int | None) -> VoteSet:
     automatic = [] if filters.leave_out_settled else settled_ties(study, lines)
     _check(filters, [*lines, *automatic])
     simulated = {entrant.slug for entrant in entrants if entrant.is_simulated}
+    marks = _marks(study, filters, last)
     judged = [
-        (line, why_left_out(line, filters, simulated, study.allow_simulated))
+        (
+            line,
+            marks[line.matchup]
+            if line.matchup is not None
+            else why_left_out(line, filters, simulated, study.allow_simulated),
+        )
         for line in [*lines, *automatic]
     ]
     left_out = Counter(reason.value for _, reason in judged if reason is not None)
@@ -157,20 +170,61 @@ def is_own_vote(line: Judged, filters: Filters) -> bool:
 def why_left_out(
     line: Judged, filters: Filters, simulated: set[str], allow_simulated: bool
 ) -> LeftOut | None:
-    """Why a vote does not count, None if it does."""
+    """Return why a vote without a showing does not count: a settled tie, or one from a file."""
     made_up = line.is_simulated or line.left in simulated or line.right in simulated
-    other_type = bool(filters.types) and line.type not in filters.types
-    other_expert = bool(filters.experts) and line.judge not in filters.experts
-    reasons = (
-        (LeftOut.CHECK, line.kind == CHECK),
-        (LeftOut.REPEAT, line.kind == REPEAT and REPEAT not in filters.kinds),
-        (LeftOut.SKIP, line.outcome not in RATED),
-        (LeftOut.SIMULATED, made_up and not allow_simulated),
-        (LeftOut.FILTERED, other_type or other_expert),
-        (LeftOut.FILTERED, line.kind in (MAIN, AUTOMATIC) and MAIN not in filters.kinds),
-        (LeftOut.OWN, filters.leave_out_own and is_own_vote(line, filters)),
+    if made_up and not allow_simulated:
+        return LeftOut.SIMULATED
+    is_other = (filters.types and line.type not in filters.types) or (
+        filters.experts and line.judge not in filters.experts
     )
-    return next((reason for reason, holds in reasons if holds), None)
+    if is_other or MAIN not in filters.kinds:
+        return LeftOut.FILTERED
+    return LeftOut.OWN if filters.leave_out_own and is_own_vote(line, filters) else None
+
+
+def marked_votes(snapshot: Snapshot) -> QuerySet[Vote]:
+    """All votes up to a rating with their `mark`: the first reason that fits, or COUNTED.
+
+    At most three queries beside its own: who is simulated, who was asked for, who is author.
+    """
+    filters = Filters.of_document(snapshot.filters)
+    return _marked(snapshot.study, filters, snapshot.last_vote)
+
+
+def counted_votes(snapshot: Snapshot) -> QuerySet[Vote]:
+    """The rows that the rating is made of, without those of pairs that nobody was shown."""
+    return marked_votes(snapshot).filter(Q(mark=COUNTED))
+
+
+def own_votes(filters: Filters) -> Q:
+    """Votes of authors on their own contestants; one query."""
+    users = users_of(sorted({judge for judge, _ in filters.authors}))
+    own = Q(pk=None)
+    for judge, slug in sorted(filters.authors):
+        shown = Q(shown_left__contestant__slug=slug) | Q(shown_right__contestant__slug=slug)
+        own |= Q(expert=users.get(judge)) & shown
+    return own
+
+
+def made_up_contestants(study: Study) -> QuerySet[Contestant]:
+    """Who of the study is simulated."""
+    return study.contestants.filter(kind=Contestant.Kind.SIMULATED)
+
+
+def users_of(codes: Sequence[str]) -> dict[str, int]:
+    """Accounts by the codes of their people; one query."""
+    found = Person.objects.filter(code__in=[code for code in codes if _is_code(code)])
+    return {str(code): user for code, user in found.values_list("code", "user_id")}
+
+
+def is_scenario_of(snapshot: Snapshot, slug: str) -> bool:
+    """Whether the study has a scenario of that name, be it in attention checks alone."""
+    study = snapshot.study
+    if is_imported(study):
+        return ImportedVote.objects.filter(file__study=study, item=slug).exists()
+    return study.matchups.filter(scenario__slug=slug).exists() or (
+        study.scenarios.filter(slug=slug).exists()
+    )
 
 
 # --- Private -----------------------------------------------------------------------------------
@@ -185,3 +239,57 @@ def _check(filters: Filters, lines: Sequence[Judged]) -> None:
     for name in filters.experts:
         if name not in judges:
             raise UnknownName("expert", name, sorted(judges))
+
+
+def _marks(study: Study, filters: Filters, last: int | None) -> dict[int, LeftOut | None]:
+    """Return why the current vote on each matchup does not count, None if it does."""
+    rows: Any = _marked(study, filters, last)  # the mark is no field
+    current = rows.exclude(mark=LeftOut.SUPERSEDED.value).values_list("matchup", "mark")
+    return {row: None if mark == COUNTED else LeftOut(mark) for row, mark in current}
+
+
+def _marked(study: Study, filters: Filters, last: int | None) -> QuerySet[Vote]:
+    mark = Case(
+        *(When(holds, then=Value(why.value)) for why, holds in _reasons(study, filters, last)),
+        default=Value(COUNTED),
+        output_field=CharField(),
+    )
+    rows = Vote.objects.filter(matchup__study=study, pk__lte=last or 0)
+    return rows.order_by().annotate(mark=mark)
+
+
+def _reasons(study: Study, filters: Filters, last: int | None) -> list[tuple[LeftOut, Q]]:
+    """Return why votes do not count; the first one that holds is said."""
+    reasons = [
+        (LeftOut.SUPERSEDED, Q(superseded_by__pk__lte=last or 0)),
+        (LeftOut.CHECK, Q(matchup__kind=CHECK)),
+        (LeftOut.REPEAT, Q(matchup__kind=REPEAT)),
+        (LeftOut.SKIP, ~Q(outcome__in=RATED)),
+        (LeftOut.SIMULATED, Q(is_simulated=True)),
+    ]
+    if REPEAT in filters.kinds:
+        del reasons[2]
+    if study.allow_simulated:
+        del reasons[-1]
+    else:
+        for pk in made_up_contestants(study).values_list("pk", flat=True):
+            shown = Q(shown_left__contestant=pk) | Q(shown_right__contestant=pk)
+            reasons.append((LeftOut.SIMULATED, shown))
+    if filters.types:
+        reasons.append((LeftOut.FILTERED, ~Q(matchup__scenario__type__in=filters.types)))
+    if filters.experts:
+        users = users_of(filters.experts).values()
+        reasons.append((LeftOut.FILTERED, ~Q(expert__in=list(users))))
+    if MAIN not in filters.kinds:
+        reasons.append((LeftOut.FILTERED, Q(matchup__kind=MAIN)))
+    if filters.leave_out_own and filters.authors:
+        reasons.append((LeftOut.OWN, own_votes(filters)))
+    return reasons
+
+
+def _is_code(text: str) -> bool:
+    try:
+        UUID(text)
+    except ValueError:
+        return False
+    return True
