@@ -24,7 +24,7 @@ from arena.models import (
     Study,
     Vote,
 )
-from arena.queries.results import unread_studies
+from arena.queries.studies.results import unread_studies
 
 
 class ReadOnlyStudies:

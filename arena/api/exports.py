@@ -18,7 +18,10 @@ from arena.api.schema import file_operation
 from arena.api.snapshots import get_snapshot
 from arena.api.views import FileView, as_file
 from arena.errors import NoSnapshot
-from arena.exports import (
+from arena.exports.bundle import bundle
+from arena.exports.charts.rating import CONTENT_TYPES, chart_bytes
+from arena.exports.formats import Format, format_named
+from arena.exports.jobs import (
     analyses,
     augmentations,
     displacement_objects,
@@ -26,12 +29,9 @@ from arena.exports import (
     faults,
     tool_calls,
 )
-from arena.exports.bundle import bundle
-from arena.exports.displacement_writers import FORMATS as DISPLACEMENT
-from arena.exports.driving_table import DrivingTable
-from arena.exports.driving_writers import FORMATS as DRIVING
-from arena.exports.formats import Format, format_named
-from arena.exports.rating_charts import CONTENT_TYPES, chart_bytes
+from arena.exports.jobs.displacement_writers import FORMATS as DISPLACEMENT
+from arena.exports.jobs.driving_table import DrivingTable
+from arena.exports.jobs.driving_writers import FORMATS as DRIVING
 from arena.exports.tables import leaderboard_table
 from arena.exports.votes import VOTE_FORMATS, vote_table
 from arena.exports.writers import FORMATS as LEADERBOARD

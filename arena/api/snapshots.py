@@ -23,8 +23,8 @@ from arena.exports.tables import LeaderboardTable, leaderboard_table
 from arena.models import Snapshot, Study
 from arena.models.ratings import STORED
 from arena.pairing.order import MAIN, REPEAT
-from arena.queries.results import must_read_results
-from arena.queries.vote_sets import Filters
+from arena.queries.studies.results import must_read_results
+from arena.queries.votes.sets import Filters
 from arena.rating.bootstrap import Unit
 from arena.rating.leaderboard import Intervals, Line, Method
 from arena.services.ratings import DEFAULT_ROUNDS, MOST_ROUNDS, is_big, plan_snapshot, rate

@@ -18,7 +18,7 @@ from arena.api.schema import operation
 from arena.api.views import ApiView
 from arena.models import Study
 from arena.queries.people import role_of
-from arena.queries.progress import StudyProgress, of_these, studies_seen_by
+from arena.queries.studies.progress import StudyProgress, of_these, studies_seen_by
 from arena.services.studies import close_study, open_study
 from arena.services.study_plan import PLAN_INPUTS, SWITCH_COLUMNS, StudyPlan
 

@@ -26,8 +26,8 @@ from arena.api.schema import file_operation, operation
 from arena.api.views import ApiView, FileView
 from arena.errors import StudyNotOpen
 from arena.models import AIDS, OUTCOME_LETTERS, Matchup, Report, Study, Vote
-from arena.queries.showings import as_shown, picture_shown
-from arena.queries.studies import voting_study
+from arena.queries.studies.lists import voting_study
+from arena.queries.voting.showings import as_shown, picture_shown
 from arena.services.decisions import LONGEST_COMMENT, decision_of
 from arena.services.preferences import keep_voting
 from arena.services.replanning import next_pairs

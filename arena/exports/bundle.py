@@ -6,10 +6,10 @@ import json
 from collections.abc import Iterable, Sequence
 from typing import Any
 
+from arena.exports.charts.rating import CONTENT_TYPES as CHART_FORMATS
+from arena.exports.charts.rating import charts
 from arena.exports.hypotheses import COLUMNS as HYPOTHESIS_COLUMNS
 from arena.exports.hypotheses import hypothesis_row
-from arena.exports.rating_charts import CONTENT_TYPES as CHART_FORMATS
-from arena.exports.rating_charts import charts
 from arena.exports.tables import leaderboard_table
 from arena.exports.votes import VOTE_FORMATS, vote_table
 from arena.exports.writers import FORMATS

@@ -12,11 +12,11 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from arena.exports.drawing import INK, SIMULATED, SOFT, house_style
+from arena.exports.charts.drawing import INK, SIMULATED, SOFT, house_style
 from arena.exports.samples import stamp_simulated
 from arena.exports.tables import LeaderboardTable, Row
 from arena.models import Snapshot
-from arena.queries.evidence import PictureShown, sheet_rows
+from arena.queries.votes.evidence import PictureShown, sheet_rows
 from augment.models import Scenario
 from augment.services.scenarios.pictures import shrunken_picture
 

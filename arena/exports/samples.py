@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from django.core.files.storage import default_storage
 
-from arena.exports.drawing import INK, SIMULATED, SOFT, house_style, write_figure
+from arena.exports.charts.drawing import INK, SIMULATED, SOFT, house_style, write_figure
 from arena.exports.tables import SIMULATED as SIMULATED_WORD
 from arena.queries.jobs import GridRow, JobGrid
 from augment.errors import UnknownName

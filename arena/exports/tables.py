@@ -9,7 +9,7 @@ from django.db.models import F
 
 from arena.models import Snapshot, Standing
 from arena.models.ratings import stored_values
-from arena.queries.vote_sets import LeftOut
+from arena.queries.votes.sets import LeftOut
 from arena.rating.lines import Line
 from arena.rating.printed import notes_by_reason
 from arena.rating.rules import METHOD_TEXTS, UNIT_TEXTS, Intervals

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from arena.models import Snapshot
-from arena.queries.listed_votes import ListedVote
-from arena.queries.vote_lists import each_vote
-from arena.queries.vote_search import VoteSearch
+from arena.queries.votes.listed import ListedVote
+from arena.queries.votes.lists import each_vote
+from arena.queries.votes.search import VoteSearch
 from arena.services.cells import csv_parts
 from arena.services.vote_rows import BOTH_BAD, COLUMNS, WINNERS
 

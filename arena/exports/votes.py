@@ -7,7 +7,7 @@ from typing import NamedTuple
 from arena.exports.formats import Format, formats
 from arena.exports.parquet import TEXT, WHOLE, YES_NO, parquet_bytes
 from arena.models import Snapshot, Study
-from arena.queries.judged import last_vote_of, votes_up_to
+from arena.queries.votes.judged import last_vote_of, votes_up_to
 from arena.services.snapshots import votes_of, votes_version_of
 from arena.services.vote_rows import (
     COLUMNS,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from typing import Any
 
-from arena.exports.charts import interval_chart
+from arena.exports.charts.intervals import interval_chart
 from arena.exports.columns import IN_FILES, IN_JSON, PRINTED
 from arena.exports.formats import Format, drawings, formats, round_value
 from arena.exports.hypotheses import hypotheses_document, hypothesis_line

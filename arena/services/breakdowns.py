@@ -13,8 +13,8 @@ from django.db.models import Count
 
 from arena.models import Matchup, Study
 from arena.queries.costs import model_classes, shown_augmentations, spent_on
-from arena.queries.judged import Entrant, Judged, is_imported
-from arena.queries.vote_sets import Filters
+from arena.queries.votes.judged import Entrant, Judged, is_imported
+from arena.queries.votes.sets import Filters
 from arena.rating.comparisons import Comparisons, select_votes, win_rates
 from arena.rating.leaderboard import Leaderboard, rate
 from arena.results.tree import (

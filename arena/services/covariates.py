@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from arena.queries.judged import Judged
+from arena.queries.votes.judged import Judged
 from arena.rating.comparisons import Comparisons, FloatArray
 from arena.rating.leaderboard import Leaderboard, Line
 from arena.results.both_versions import Adjustment, BothRanks, CovariateEffect, LargestMove

@@ -6,7 +6,7 @@ from django.contrib.auth.models import User
 from django.db import transaction
 
 from arena.models import EarlyLook, Study
-from arena.queries.results import votes_in
+from arena.queries.studies.results import votes_in
 from augment.errors import Conflict
 from augment.services.events import log_event
 

@@ -18,7 +18,7 @@ from arena.pairing.arrays import IntArray
 from arena.pairing.following import follow_on
 from arena.pairing.newcomers import choose_units
 from arena.pairing.rules import Grid, PlanRules, place_of
-from arena.queries.enrolments import (
+from arena.queries.studies.enrolments import (
     enrolment_by_token,
     find_silent,
     find_unfinished,

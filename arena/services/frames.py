@@ -12,7 +12,7 @@ from arena.errors import NothingToPlan
 from arena.models import Matchup, Study
 from arena.pairing.plan import PlannedMatchup
 from arena.pairing.rules import scenario_of
-from arena.queries.showings import VIEW_OF_OLD
+from arena.queries.voting.showings import VIEW_OF_OLD
 from augment.models import Augmentation, Scenario
 from augment.services.scenarios.pictures import camera_of, view_of, window_of
 

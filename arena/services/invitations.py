@@ -13,7 +13,7 @@ from django.utils import timezone
 
 from arena.errors import LinkOver
 from arena.models import Invitation, Study, token_digest
-from arena.queries.invitations import invitation_by_token, may_be_let_in
+from arena.queries.studies.invitations import invitation_by_token, may_be_let_in
 from arena.services.people import must_take_part
 from augment.errors import Conflict
 from augment.services.events import log_event

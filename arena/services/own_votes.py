@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 
-from arena.queries.judged import AUTOMATIC
-from arena.queries.vote_sets import Filters, VoteSet, is_own_vote
+from arena.queries.votes.judged import AUTOMATIC
+from arena.queries.votes.sets import Filters, VoteSet, is_own_vote
 from arena.rating.leaderboard import Leaderboard, Line, rate
 from arena.results.both_versions import BothRanks, OwnVotes
 from arena.services.covariates import largest_move, with_covariates

@@ -14,7 +14,7 @@ from django.db.models import Max
 from arena.models import Matchup, Study
 from arena.pairing.plan import Check, Entry, PlannedMatchup, PlanRules
 from arena.pairing.rules import place_of, scenario_of
-from arena.queries.showings import LEGEND
+from arena.queries.voting.showings import LEGEND
 from arena.services.attention_checks import check_pictures, placed_checks
 from arena.services.frames import (
     Cells,

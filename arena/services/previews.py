@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from django.db import transaction
 
 from arena.models import Matchup
-from arena.queries.coverage import shared_units
+from arena.queries.studies.coverage import shared_units
 from arena.services.prospects import usual_seconds
 from arena.services.studies import open_study
 from arena.services.study_estimate import StudyEstimate

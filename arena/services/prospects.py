@@ -9,7 +9,7 @@ from typing import Any
 from django.contrib.auth.models import User
 
 from arena.models import Snapshot, Study, Vote
-from arena.queries.results import ResultsAccess, latest_snapshot, results_access
+from arena.queries.studies.results import ResultsAccess, latest_snapshot, results_access
 from arena.rating.planning import estimate_effects
 from arena.services.snapshots import votes_of
 from arena.services.vote_arrays import vote_arrays

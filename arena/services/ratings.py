@@ -11,9 +11,9 @@ from django.db import transaction
 
 from arena.errors import StudyStillOpen
 from arena.models import ImportedVote, Snapshot, Study, Vote
-from arena.queries.authorships import authors_of
-from arena.queries.judged import is_imported, last_vote_of
-from arena.queries.vote_sets import Filters
+from arena.queries.studies.authorships import authors_of
+from arena.queries.votes.judged import is_imported, last_vote_of
+from arena.queries.votes.sets import Filters
 from arena.rating.bootstrap import Unit
 from arena.rating.leaderboard import Method
 from arena.rating.rules import Intervals, default_intervals, unit_for

@@ -12,7 +12,7 @@ from arena.pairing.adaptive import contestants_of, draw_units, ratings_so_far
 from arena.pairing.arrays import FloatArray
 from arena.pairing.following import follow_on
 from arena.pairing.later import judges, units_of
-from arena.queries.voting_path import upcoming
+from arena.queries.voting.path import upcoming
 from arena.services.attention_checks import without_lost_checks
 from arena.services.plans import (
     next_batch,

@@ -13,8 +13,8 @@ from django.utils import timezone
 
 from arena.models import Snapshot, Standing
 from arena.models.ratings import stored_values
-from arena.queries.judged import AUTOMATIC, Entrant, Judged, is_imported
-from arena.queries.vote_sets import Filters, VoteSet, vote_set
+from arena.queries.votes.judged import AUTOMATIC, Entrant, Judged, is_imported
+from arena.queries.votes.sets import Filters, VoteSet, vote_set
 from arena.rating.bootstrap import Unit
 from arena.rating.comparisons import Comparisons
 from arena.rating.leaderboard import Intervals, Leaderboard, Method, rate

@@ -6,7 +6,7 @@ from django.contrib.auth.models import User
 from django.db import transaction
 
 from arena.models import Snapshot, Study, StudyFile
-from arena.queries.judged import is_imported
+from arena.queries.votes.judged import is_imported
 from arena.services.written_files import waiting_row
 from augment.errors import Conflict, UnknownName
 from augment.services.events import log_event

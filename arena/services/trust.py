@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from arena.queries.judged import AUTOMATIC
-from arena.queries.vote_sets import VoteSet
+from arena.queries.votes.judged import AUTOMATIC
+from arena.queries.votes.sets import VoteSet
 from arena.rating import elo
 from arena.rating.bootstrap import Unit
 from arena.rating.bradley_terry import ELO_PER_LOGIT, MEAN_ELO

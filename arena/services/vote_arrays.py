@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 
 from arena.models import Vote
-from arena.queries.judged import Entrant, Judged
+from arena.queries.votes.judged import Entrant, Judged
 from arena.rating.comparisons import LOSS, TIE, WIN, Comparisons, FloatArray, IntArray
 
 SCORES = {

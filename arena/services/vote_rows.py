@@ -11,7 +11,7 @@ import io
 from collections.abc import Iterable, Iterator, Mapping
 
 from arena.models import Vote
-from arena.queries.judged import Judged
+from arena.queries.votes.judged import Judged
 from arena.services.cells import cell
 
 COLUMNS = (

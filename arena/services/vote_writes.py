@@ -1,4 +1,4 @@
-"""The two writes of every vote, in SQL: see `arena.queries.voting_path` for the reason."""
+"""The two writes of every vote, in SQL: see `arena.queries.voting.path` for the reason."""
 
 from __future__ import annotations
 

@@ -19,8 +19,8 @@ from django.utils import timezone
 
 from arena.errors import AlreadyDecided, InvalidVote, NotYours, StudyNotOpen, TooFast
 from arena.models import Matchup, Study, Vote
-from arena.queries.votes import VotingState, voting_state
-from arena.queries.voting_path import HeldMatchup, held_matchup, upcoming
+from arena.queries.voting.ballots import VotingState, voting_state
+from arena.queries.voting.path import HeldMatchup, held_matchup, upcoming
 from arena.services.decisions import Decision
 from arena.services.turns import in_turn
 from arena.services.vote_writes import insert, mark_served

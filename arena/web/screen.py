@@ -13,17 +13,17 @@ from django.utils.translation import gettext as _
 from django.utils.translation import pgettext
 
 from arena.models import OUTCOME_LETTERS, Report, Study, Vote
-from arena.queries.enrolments import own_enrolment
-from arena.queries.showings import as_shown
-from arena.queries.studies import longest_instructions
-from arena.queries.votes import VotingProgress, recent_votes, skip_of, voting_progress
-from arena.queries.voting_keys import (
+from arena.queries.studies.enrolments import own_enrolment
+from arena.queries.studies.lists import longest_instructions
+from arena.queries.voting.ballots import VotingProgress, recent_votes, skip_of, voting_progress
+from arena.queries.voting.keys import (
     KEY_LABELS,
     SOMETIMES,
     USUAL_KEYS,
     VotingPreferences,
     voting_preferences,
 )
+from arena.queries.voting.showings import as_shown
 from arena.services.replanning import next_pairs
 from arena.services.reports import SIDES
 

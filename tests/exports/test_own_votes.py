@@ -15,8 +15,8 @@ from hypothesis import strategies as st
 from arena.exports.bundle import bundle
 from arena.models import Snapshot, Study
 from arena.pairing.order import MAIN
-from arena.queries.judged import Entrant, Judged
-from arena.queries.vote_sets import Filters, VoteSet
+from arena.queries.votes.judged import Entrant, Judged
+from arena.queries.votes.sets import Filters, VoteSet
 from arena.rating.leaderboard import rate as rate_votes
 from arena.results.both_versions import OwnVotes
 from arena.services.authorships import mark_author

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from arena.exports.heat import heat_map
+from arena.exports.charts.heat_map import heat_map
 from arena.exports.tables import Row
 from arena.rating.estimate import Estimate
 from arena.rating.printed import whole_percent

@@ -7,12 +7,12 @@ from itertools import combinations
 
 import pytest
 
-from arena.exports.badges import badge_places
-from arena.exports.drawing import SIMULATED
-from arena.exports.heat import heat_map
-from arena.exports.plot_axes import axes, curve_points, interval_ticks
-from arena.exports.plots import ELO, VOTES, Given, Plot
-from arena.exports.scatter_chart import scatter_chart
+from arena.exports.charts.badges import badge_places
+from arena.exports.charts.drawing import SIMULATED
+from arena.exports.charts.heat_map import heat_map
+from arena.exports.charts.plot_axes import axes, curve_points, interval_ticks
+from arena.exports.charts.plots import ELO, VOTES, Given, Plot
+from arena.exports.charts.scatter import scatter_chart
 from arena.exports.tables import Row
 from arena.results.tree import PairRecord
 

@@ -8,8 +8,8 @@ from dataclasses import replace
 
 import pytest
 
-from arena.exports.charts import interval_chart
-from arena.exports.rating_charts import chart_bytes, charts
+from arena.exports.charts.intervals import interval_chart
+from arena.exports.charts.rating import chart_bytes, charts
 from arena.exports.tables import leaderboard_table
 from arena.models import Snapshot
 from arena.results.tree import DisplacementSummary, ScenarioCost

@@ -6,7 +6,7 @@ import pytest
 
 from arena.errors import NotYours, StudyStillOpen
 from arena.models import Snapshot, Study, Vote
-from arena.queries.results import (
+from arena.queries.studies.results import (
     ResultsAccess,
     latest_snapshot,
     results_access,

@@ -11,8 +11,8 @@ from pyarrow import parquet
 
 from arena.exports.votes import VOTE_FORMATS, vote_table
 from arena.models import Study, Vote
-from arena.queries.judged import last_vote_of
-from arena.queries.vote_sets import Filters, vote_set
+from arena.queries.votes.judged import last_vote_of
+from arena.queries.votes.sets import Filters, vote_set
 from arena.services.ratings import rate
 from arena.services.snapshots import votes_of
 from arena.services.studies import close_study

@@ -22,8 +22,8 @@ from django.core.files.storage import default_storage
 from django.utils import timezone
 from pytest_django import Settings
 
-from arena.exports.displacement_table import displacement_table
-from arena.exports.displacement_writers import FORMATS as DISPLACEMENT
+from arena.exports.jobs.displacement_table import displacement_table
+from arena.exports.jobs.displacement_writers import FORMATS as DISPLACEMENT
 from arena.exports.study_folder.writing import MANIFEST, write_study
 from arena.management.demo import (
     JOB,

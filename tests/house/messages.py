@@ -12,8 +12,8 @@ from tests.house.source import ROOT
 
 VOTER_MODULES = (
     *("arena/api/errors.py", "arena/models/votes.py", "arena/templatetags/shell.py"),
-    *("arena/queries/descriptions.py", "arena/queries/measures.py"),
-    *("arena/queries/voting_keys.py", "arena/services/api_tokens.py"),
+    *("arena/queries/voting/descriptions.py", "arena/queries/voting/measures.py"),
+    *("arena/queries/voting/keys.py", "arena/services/api_tokens.py"),
     *("arena/services/enrolments.py", "arena/services/preferences.py"),
     *("arena/web/people/api_tokens.py", "arena/web/people/enrolments.py", "arena/web/forms.py"),
     *("arena/web/people/accounts.py", "arena/web/voting/practice.py"),

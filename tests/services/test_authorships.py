@@ -8,7 +8,7 @@ from django.core.management import CommandError, call_command
 
 from arena.errors import NotYours
 from arena.models import Authorship, Study
-from arena.queries.authorships import authors_of
+from arena.queries.studies.authorships import authors_of
 from arena.services.authorships import mark_author, take_back_author
 from augment.errors import UnknownName
 from augment.models import Event

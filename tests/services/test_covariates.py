@@ -12,7 +12,7 @@ from django.urls import reverse
 from arena.exports.bundle import bundle_files
 from arena.exports.tables import leaderboard_table
 from arena.models import Study
-from arena.queries.vote_sets import Filters, vote_set
+from arena.queries.votes.sets import Filters, vote_set
 from arena.rating.leaderboard import rate as rate_votes
 from arena.services import ratings
 from arena.services.covariates import COVARIATES, with_covariates

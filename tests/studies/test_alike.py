@@ -6,8 +6,8 @@ import pytest
 
 from arena.models import Study
 from arena.pairing.plan import plan
-from arena.queries.judged import last_vote_of
-from arena.queries.vote_sets import Filters, vote_set
+from arena.queries.votes.judged import last_vote_of
+from arena.queries.votes.sets import Filters, vote_set
 from arena.services.plans import rules_of
 from arena.services.ratings import rate
 from arena.services.studies import close_study

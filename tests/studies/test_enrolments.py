@@ -9,7 +9,7 @@ from django.utils import timezone
 
 from arena.errors import EnrolmentOver
 from arena.models import EnrolledVoter, Enrolment, Study
-from arena.queries.enrolments import own_enrolment, state_of
+from arena.queries.studies.enrolments import own_enrolment, state_of
 from arena.services.accounts import forget_identity
 from arena.services.enrolments import drop_silent, enrol, set_enrolment
 from arena.services.people import create_person

@@ -10,7 +10,7 @@ from django.contrib.auth.models import User
 
 from arena.errors import InvalidVote, NotYours
 from arena.models import Matchup, Study, Vote
-from arena.queries.replays import drives_of_pair
+from arena.queries.voting.replays import drives_of_pair
 from arena.services.decisions import Decision, decision_of
 from arena.services.votes import cast_vote
 from augment.models import Augmentation

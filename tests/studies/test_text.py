@@ -6,8 +6,8 @@ import pytest
 from django.utils.translation import override
 
 from arena.models import Study
-from arena.queries.descriptions import describe_in_words
-from arena.queries.showings import as_shown
+from arena.queries.voting.descriptions import describe_in_words
+from arena.queries.voting.showings import as_shown
 from arena.services.handing_over import hand_over
 from arena.services.replanning import plan_batch
 from augment.models import Augmentation

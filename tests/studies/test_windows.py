@@ -6,7 +6,7 @@ import pytest
 
 from arena.errors import NothingToPlan
 from arena.models import Matchup, Study
-from arena.queries.showings import VIEW_OF_OLD, view_shown
+from arena.queries.voting.showings import VIEW_OF_OLD, view_shown
 from arena.services.frames import find_frames
 from arena.services.plans import pictures_of, planned_so_far
 from arena.services.redrawing import redraw_pictures

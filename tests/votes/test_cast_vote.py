@@ -8,8 +8,8 @@ from django.db import IntegrityError, transaction
 
 from arena.errors import AlreadyDecided, InvalidVote, NotYours, StudyNotOpen, TooFast
 from arena.models import EarlyLook, Vote
-from arena.queries.votes import current_votes, recent_votes
-from arena.queries.voting_path import upcoming
+from arena.queries.voting.ballots import current_votes, recent_votes
+from arena.queries.voting.path import upcoming
 from arena.services.decisions import decision_of
 from arena.services.studies import close_study
 from arena.services.votes import PACE_WINDOW, cast_vote, receive_vote

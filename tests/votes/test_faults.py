@@ -11,7 +11,7 @@ from django.core.management import call_command
 from django.db import IntegrityError, transaction
 
 from arena.errors import LabellingClosed, NotYours
-from arena.exports.faults import csv_bytes, fault_table, latex
+from arena.exports.jobs.faults import csv_bytes, fault_table, latex
 from arena.models import FaultLabel, LabellingRound, LabelTask
 from arena.queries.faults import labelling_of, next_task
 from arena.services.faults import close_labelling, open_labelling, save_label

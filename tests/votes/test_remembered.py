@@ -11,12 +11,12 @@ from django.test.utils import CaptureQueriesContext
 from django.utils import timezone
 
 from arena.models import Study, Vote
-from arena.queries.coverage import coverage
-from arena.queries.evidence import read_evidence
-from arena.queries.invitations import expert_lines
-from arena.queries.vote_lists import vote_page
-from arena.queries.vote_search import VoteSearch
-from arena.queries.votes import tallies
+from arena.queries.studies.coverage import coverage
+from arena.queries.studies.invitations import expert_lines
+from arena.queries.votes.evidence import read_evidence
+from arena.queries.votes.lists import vote_page
+from arena.queries.votes.search import VoteSearch
+from arena.queries.voting.ballots import tallies
 from arena.services.ratings import rate
 from tests import study_rows
 from tests.mixed_study import mixed_study

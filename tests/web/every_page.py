@@ -8,7 +8,7 @@ from django.contrib.auth.models import User
 from django.urls import reverse
 
 from arena.models import Vote
-from arena.queries.vote_sets import Filters
+from arena.queries.votes.sets import Filters
 from arena.services.ratings import rate
 from arena.web.results.tabs import TABS
 from tests.mixed_study import mixed_study

@@ -9,7 +9,7 @@ from django.urls import reverse
 
 from arena.errors import NoSnapshot, StudyNotOpen
 from arena.models import Study, Vote
-from arena.queries.results import ResultsAccess, results_access, snapshot_to_export
+from arena.queries.studies.results import ResultsAccess, results_access, snapshot_to_export
 from arena.services.ending import cancel_study, close_study
 from arena.services.ratings import rate
 from augment.errors import Conflict

@@ -12,9 +12,9 @@ from django.test import Client
 from django.urls import reverse
 
 from arena.models import FaultLabel, LabellingRound, LabelTask, Snapshot, Study, Vote
-from arena.queries.evidence import VoteScore, read_evidence
-from arena.queries.vote_lists import neighbours, vote_page
-from arena.queries.vote_search import VoteSearch
+from arena.queries.votes.evidence import VoteScore, read_evidence
+from arena.queries.votes.lists import neighbours, vote_page
+from arena.queries.votes.search import VoteSearch
 from arena.services.ratings import rate
 from arena.services.studies import close_study
 from augment.models import Augmentation

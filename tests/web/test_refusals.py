@@ -7,7 +7,7 @@ from django.utils.translation import override
 
 from arena.errors import InvalidPreference
 from arena.models import Snapshot
-from arena.queries.vote_sets import Filters
+from arena.queries.votes.sets import Filters
 from arena.services.handing_over import hand_over
 from arena.services.invitations import invite
 from arena.services.preferences import keep_voting

@@ -13,7 +13,7 @@ from django.test import Client
 from django.urls import reverse
 
 from arena.models import Matchup, Snapshot, Study, Vote
-from arena.queries.vote_sets import Filters
+from arena.queries.votes.sets import Filters
 from arena.services.ratings import rate
 from arena.web.results.tabs import TABS
 from augment.services.scenarios.pictures import store

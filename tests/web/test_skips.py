@@ -8,10 +8,10 @@ import pytest
 from django.contrib.auth.models import User
 from django.urls import reverse
 
-from arena.queries import progress
-from arena.queries.coverage import coverage
 from arena.queries.inventory import take_inventory
-from arena.queries.votes import tallies, voting_progress
+from arena.queries.studies import progress
+from arena.queries.studies.coverage import coverage
+from arena.queries.voting.ballots import tallies, voting_progress
 from tests import study_rows
 from tests.web.ballots import ballot, page
 from tests.web.cast import people, signed_in, world

@@ -7,7 +7,7 @@ from typing import Any
 from django.core.management.base import CommandError, CommandParser
 
 from arena.errors import ArenaError
-from arena.queries.studies import study_named
+from arena.queries.studies.lists import study_named
 from arena.services.handing_over import hand_over
 from augment.errors import AugmentError
 from augment.services.terminal import TerminalCommand

@@ -10,8 +10,8 @@ from django.utils import timezone
 
 from arena.errors import ArenaError
 from arena.models import Study
-from arena.queries.invitations import ExpertLine, expert_lines
-from arena.queries.studies import study_named
+from arena.queries.studies.invitations import ExpertLine, expert_lines
+from arena.queries.studies.lists import study_named
 from arena.services.invitations import LINK_LIVES, invite
 from arena.serving.stack import Web, served_address
 from augment.errors import AugmentError, UnknownName

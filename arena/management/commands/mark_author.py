@@ -9,7 +9,7 @@ from django.core.management.base import CommandError, CommandParser
 
 from arena.errors import ArenaError
 from arena.models import Study
-from arena.queries.studies import study_named
+from arena.queries.studies.lists import study_named
 from arena.services.authorships import mark_author, take_back_author
 from augment.errors import AugmentError, UnknownName
 from augment.services.terminal import TerminalCommand

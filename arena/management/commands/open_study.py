@@ -9,8 +9,8 @@ from django.core.management.base import CommandError, CommandParser
 
 from arena.errors import ArenaError
 from arena.models import Study
-from arena.queries.coverage import shared_units
 from arena.queries.inventory import usual_checks
+from arena.queries.studies.coverage import shared_units
 from arena.services.preregistration import preregistration_sha256
 from arena.services.studies import open_study
 from arena.services.study_plan import PLAN_INPUTS, SAMPLES, StudyPlan

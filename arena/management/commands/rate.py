@@ -9,8 +9,8 @@ from django.core.management.base import CommandError, CommandParser
 from arena.errors import ArenaError
 from arena.exports.tables import leaderboard_table
 from arena.exports.writers import plain_text
-from arena.queries.studies import study_named
-from arena.queries.vote_sets import Filters
+from arena.queries.studies.lists import study_named
+from arena.queries.votes.sets import Filters
 from arena.rating.bootstrap import Unit
 from arena.rating.rules import Intervals
 from arena.services.covariates import COVARIATES

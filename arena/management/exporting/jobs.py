@@ -5,19 +5,19 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from arena.exports import analyses, displacement_writers, driving_writers, faults, tool_calls
-from arena.exports.augmentations import (
+from arena.exports.formats import format_named
+from arena.exports.jobs import analyses, displacement_writers, driving_writers, faults, tool_calls
+from arena.exports.jobs.augmentations import (
     AUGMENTATION_FORMATS,
     REPEAT_FORMATS,
     augmentation_rows,
     repeat_rows,
 )
-from arena.exports.displacement_objects import BY_OBJECT, OBJECT_FORMATS, object_rows
-from arena.exports.displacement_table import displacement_table
-from arena.exports.driving_table import DrivingTable
-from arena.exports.formats import format_named
+from arena.exports.jobs.displacement_objects import BY_OBJECT, OBJECT_FORMATS, object_rows
+from arena.exports.jobs.displacement_table import displacement_table
+from arena.exports.jobs.driving_table import DrivingTable
+from arena.exports.jobs.transcripts import TRANSCRIPT_FORMATS
 from arena.exports.samples import SHEET_FORMATS, sheet_bytes, sheet_of
-from arena.exports.transcripts import TRANSCRIPT_FORMATS
 from arena.management.exporting.kinds import (
     Chosen,
     ExportedFile,

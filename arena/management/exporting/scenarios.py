@@ -6,7 +6,7 @@ from typing import Any
 
 from django.utils.text import slugify
 
-from arena.exports.scenarios import scenario_zip, zip_name
+from arena.exports.jobs.scenarios import scenario_zip, zip_name
 from arena.exports.zips import ZIP
 from arena.management.exporting.kinds import Chosen, ExportedFile, Say, add_kind
 from augment.errors import UnknownName

@@ -7,9 +7,9 @@ from uuid import UUID
 
 from arena.errors import StudyStillOpen
 from arena.exports.bundle import bundle
+from arena.exports.charts.rating import CONTENT_TYPES, chart_bytes
 from arena.exports.contact_sheet import contact_sheet, sheet_pdf
 from arena.exports.formats import format_named
-from arena.exports.rating_charts import CONTENT_TYPES, chart_bytes
 from arena.exports.tables import leaderboard_table
 from arena.exports.votes import VOTE_FORMATS, unrated_votes, vote_table
 from arena.exports.writers import FORMATS
@@ -23,9 +23,9 @@ from arena.management.exporting.kinds import (
     fill,
 )
 from arena.models import Snapshot, Study
-from arena.queries.judged import is_imported
-from arena.queries.results import snapshot_to_export
-from arena.queries.studies import study_named
+from arena.queries.studies.lists import study_named
+from arena.queries.studies.results import snapshot_to_export
+from arena.queries.votes.judged import is_imported
 from arena.services.early_looks import log_early_look
 from augment.errors import Conflict
 

@@ -14,9 +14,9 @@ from django.urls import reverse
 from django.utils.text import slugify
 from django.views.decorators.http import require_POST, require_safe
 
-from arena.exports.driving_table import DrivingTable
-from arena.exports.driving_writers import FORMATS
 from arena.exports.formats import format_named
+from arena.exports.jobs.driving_table import DrivingTable
+from arena.exports.jobs.driving_writers import FORMATS
 from arena.exports.tables import LeaderboardTable
 from arena.models import Snapshot
 from arena.queries.costs import shown_augmentations

@@ -14,12 +14,12 @@ from django.views.decorators.cache import never_cache
 from django.views.decorators.http import require_http_methods, require_safe
 
 from arena.errors import AlreadyLabelled, ArenaError, LabellingClosed, NotYours
-from arena.exports.faults import FORMATS, fault_table
 from arena.exports.formats import format_named
+from arena.exports.jobs.faults import FORMATS, fault_table
 from arena.models import FaultLabel, LabellingRound
 from arena.queries import faults
 from arena.queries.people import by_pseudonym, experts, role_of
-from arena.queries.showings import original_beside
+from arena.queries.voting.showings import original_beside
 from arena.services.faults import close_labelling, open_labelling, save_label
 from arena.web.access import ADMIN, EXPERT, STAFF, allow_only
 from arena.web.forms import LabelForm, LabellingForm

@@ -12,7 +12,7 @@ from django.utils.text import slugify
 from django.views.decorators.http import require_safe
 
 from arena.exports.formats import format_named
-from arena.exports.tool_calls import FORMATS as TOOL_CALL_FORMATS
+from arena.exports.jobs.tool_calls import FORMATS as TOOL_CALL_FORMATS
 from arena.queries.job_grid import MARKS, VIEWS, Part, grid_part
 from arena.queries.listings import MINE, Narrowing, find_jobs
 from arena.web.access import STAFF, allow_only

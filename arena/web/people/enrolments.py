@@ -22,7 +22,12 @@ from django.views.decorators.http import require_http_methods, require_POST, req
 
 from arena.errors import ArenaError, EnrolmentOver, NotYours
 from arena.models import EnrolledVoter, Enrolment, Study
-from arena.queries.enrolments import code_told, enrolled_voters, enrolment_by_token, state_of
+from arena.queries.studies.enrolments import (
+    code_told,
+    enrolled_voters,
+    enrolment_by_token,
+    state_of,
+)
 from arena.services.cells import csv_text
 from arena.services.enrolments import (
     LONGEST_CONSENT,

@@ -18,8 +18,8 @@ from django.views.decorators.http import require_http_methods, require_POST, req
 
 from arena.errors import ArenaError, LinkOver, NotYours
 from arena.models import Invitation, Study
-from arena.queries.authorships import authorships_of
-from arena.queries.invitations import expert_lines, invitation_by_token, may_be_let_in
+from arena.queries.studies.authorships import authorships_of
+from arena.queries.studies.invitations import expert_lines, invitation_by_token, may_be_let_in
 from arena.services.invitations import SESSION_KEY, FreshLink, accept, invite, revoke
 from arena.web.access import ADMIN, allow_only
 from arena.web.people.authorships import AuthorForm

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from arena.exports.tables import LeaderboardTable, Row
 from arena.models import Snapshot
-from arena.queries.vote_sets import Filters
+from arena.queries.votes.sets import Filters
 from arena.rating.printed import rating_text
 from arena.results.both_versions import BothRanks
 from arena.results.tree import PanelRater

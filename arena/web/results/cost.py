@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from arena.exports.plots import plots
+from arena.exports.charts.plots import plots
 from arena.exports.tables import LeaderboardTable
 from arena.models import Snapshot
 from arena.web.results.ratings import Context

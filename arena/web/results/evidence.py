@@ -15,13 +15,13 @@ from arena.errors import NoSnapshot
 from arena.exports.tables import LeaderboardTable, leaderboard_table
 from arena.exports.vote_lists import vote_list_csv
 from arena.models import Matchup, Snapshot, Study
-from arena.queries.descriptions import describe_in_words
-from arena.queries.judged import is_imported
-from arena.queries.results import snapshot_to_export
-from arena.queries.showings import picture_of_side
-from arena.queries.single_votes import vote_in
-from arena.queries.vote_lists import neighbours, vote_page
-from arena.queries.vote_search import VoteSearch
+from arena.queries.studies.results import snapshot_to_export
+from arena.queries.votes.judged import is_imported
+from arena.queries.votes.lists import neighbours, vote_page
+from arena.queries.votes.search import VoteSearch
+from arena.queries.votes.single import vote_in
+from arena.queries.voting.descriptions import describe_in_words
+from arena.queries.voting.showings import picture_of_side
 from arena.web.access import STAFF, allow_only
 from arena.web.listing import page_asked
 from arena.web.pictures import sized_picture_response

@@ -9,9 +9,9 @@ from django import forms
 
 from arena.models import Snapshot
 from arena.models.votes import AID_LABELS
-from arena.queries.judged import AUTOMATIC, is_imported
 from arena.queries.people import natural_order
-from arena.queries.vote_search import (
+from arena.queries.votes.judged import AUTOMATIC, is_imported
+from arena.queries.votes.search import (
     AUTOMATIC_TIE,
     COUNTED,
     EVERY,
@@ -21,7 +21,7 @@ from arena.queries.vote_search import (
     SoughtPart,
     VoteSearch,
 )
-from arena.queries.vote_sets import is_scenario_of
+from arena.queries.votes.sets import is_scenario_of
 from augment.services.running.jobs import HIGHEST_SAMPLES
 from augment.services.scenarios.types import type_choices
 

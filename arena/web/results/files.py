@@ -12,14 +12,14 @@ from django.views.decorators.http import require_safe
 
 from arena.errors import NoSnapshot
 from arena.exports.bundle import bundle
+from arena.exports.charts.rating import CONTENT_TYPES, chart_bytes
 from arena.exports.formats import format_named
-from arena.exports.rating_charts import CONTENT_TYPES, chart_bytes
 from arena.exports.tables import leaderboard_table
 from arena.exports.votes import VOTE_FORMATS, unrated_votes, vote_table
 from arena.exports.writers import FORMATS
 from arena.exports.zips import CONTENT_TYPE, ZIP
 from arena.models import Snapshot, Study
-from arena.queries.results import snapshot_to_export
+from arena.queries.studies.results import snapshot_to_export
 from arena.web.access import ADMIN, ANALYST, EXPERT, STAFF, allow_only
 from arena.web.results.pages import asked_rating, get_readable_study
 from augment.errors import Conflict, UnknownName

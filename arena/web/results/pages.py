@@ -16,18 +16,18 @@ from arena import tasks
 from arena.errors import ArenaError
 from arena.exports.tables import EARLY_LOOK, for_experts, leaderboard_table
 from arena.models import Snapshot, Study
-from arena.queries.judged import is_imported
 from arena.queries.people import role_of
-from arena.queries.results import (
+from arena.queries.studies.results import (
     STAFF as STAFF_ROLES,
 )
-from arena.queries.results import (
+from arena.queries.studies.results import (
     ResultsAccess,
     results_access,
     snapshots_of,
     votes_in,
 )
-from arena.queries.vote_lists import settled_counted
+from arena.queries.votes.judged import is_imported
+from arena.queries.votes.lists import settled_counted
 from arena.services.early_looks import open_early
 from arena.web.access import ADMIN, ANALYST, EXPERT, STAFF, allow_only
 from arena.web.results.adjustment import show_adjustment

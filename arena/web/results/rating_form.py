@@ -8,8 +8,8 @@ from django import forms
 
 from arena.models import Snapshot
 from arena.pairing.order import MAIN, REPEAT
-from arena.queries.judged import is_imported
-from arena.queries.vote_sets import Filters
+from arena.queries.votes.judged import is_imported
+from arena.queries.votes.sets import Filters
 from arena.rating.bootstrap import Unit
 from arena.rating.leaderboard import Intervals, Method
 from arena.services.covariates import COVARIATES, WITHOUT_PICTURES

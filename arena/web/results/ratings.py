@@ -7,8 +7,8 @@ from dataclasses import replace
 from statistics import median_high
 from typing import Any
 
+from arena.exports.charts.heat_map import heat_map
 from arena.exports.columns import ON_PAGE
-from arena.exports.heat import heat_map
 from arena.exports.tables import LeaderboardTable, Row
 from arena.models import Snapshot
 from arena.results.tree import Bounds, OnlinePlace, PairRecord, TypeStanding

@@ -8,7 +8,7 @@ from typing import Any
 
 from arena.exports.tables import LeaderboardTable
 from arena.models import Snapshot
-from arena.queries.results import log_of, names_in_log, snapshots_of
+from arena.queries.studies.results import log_of, names_in_log, snapshots_of
 from arena.web.jobs.driving import driving
 from arena.web.results.cost import cost, displacement
 from arena.web.results.ratings import Context, pairs, standings, types

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from arena.exports.heat import heat_map
-from arena.exports.plots import plots
+from arena.exports.charts.heat_map import heat_map
+from arena.exports.charts.plots import plots
 from arena.exports.tables import LeaderboardTable
 from arena.models import Snapshot
 from arena.models.votes import AIDS
-from arena.queries.judged import AUTOMATIC
 from arena.queries.people import natural_order
+from arena.queries.votes.judged import AUTOMATIC
 from arena.results.tree import PanelRater
 from arena.web.results.authors import with_authors
 from arena.web.results.ratings import Context, is_all_tied

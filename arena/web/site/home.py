@@ -11,9 +11,10 @@ from django.utils.http import url_has_allowed_host_and_scheme
 from django.views.decorators.http import require_POST, require_safe
 
 from arena.models import Study
-from arena.queries import faults, inventory, progress
+from arena.queries import faults, inventory
 from arena.queries.people import role_of
-from arena.queries.results import ResultsAccess, results_access
+from arena.queries.studies import progress
+from arena.queries.studies.results import ResultsAccess, results_access
 from arena.services.preferences import choose_language, choose_theme
 from arena.web.forms import LanguageForm, ThemeForm
 from arena.web.language import use_english

@@ -18,8 +18,8 @@ from django.views.decorators.http import require_POST, require_safe
 
 from arena import tasks
 from arena.models import Study, StudyFile
-from arena.queries.judged import is_imported
-from arena.queries.results import ResultsAccess, latest_snapshot, results_access
+from arena.queries.studies.results import ResultsAccess, latest_snapshot, results_access
+from arena.queries.votes.judged import is_imported
 from arena.services.study_files import (
     SHOWS_RESULTS,
     ask_for_study_file,

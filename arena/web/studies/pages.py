@@ -14,13 +14,13 @@ from django.views.decorators.http import require_http_methods, require_POST, req
 
 from arena.errors import ArenaError
 from arena.models import Study
-from arena.queries import progress
-from arena.queries.coverage import coverage, reports_of
-from arena.queries.judged import is_imported
 from arena.queries.listings import Narrowing, find_studies
 from arena.queries.people import by_pseudonym, experts
-from arena.queries.study_drafts import find_drafts
-from arena.queries.votes import tallies
+from arena.queries.studies import progress
+from arena.queries.studies.coverage import coverage, reports_of
+from arena.queries.studies.drafts import find_drafts
+from arena.queries.votes.judged import is_imported
+from arena.queries.voting.ballots import tallies
 from arena.services.handing_over import hand_over
 from arena.services.hypotheses import hypotheses_of
 from arena.services.preregistration import preregistration_bytes, preregistration_sha256

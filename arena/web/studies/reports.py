@@ -12,8 +12,8 @@ from django.shortcuts import get_object_or_404, render
 from django.views.decorators.http import require_safe
 
 from arena.models import Report, Study
-from arena.queries.coverage import reports_of
-from arena.queries.showings import view_shown
+from arena.queries.studies.coverage import reports_of
+from arena.queries.voting.showings import view_shown
 from arena.web.access import ADMIN, allow_only
 from augment.models import Augmentation
 

@@ -17,7 +17,7 @@ from arena.models import Study, StudyDraft
 from arena.queries import scenarios
 from arena.queries.inventory import usual_checks
 from arena.queries.people import by_pseudonym, experts
-from arena.queries.study_drafts import missing_of
+from arena.queries.studies.drafts import missing_of
 from arena.services.practice import has_practice
 from arena.services.studies import open_study
 from arena.services.study_drafts import (

@@ -9,7 +9,7 @@ from django.db import transaction
 from django.urls import reverse
 
 from arena.models import Study, StudyDraft
-from arena.queries.votes import tallies
+from arena.queries.voting.ballots import tallies
 from arena.services.handing_over import hand_over
 from arena.services.previews import preview_study
 from arena.services.study_plan import StudyPlan

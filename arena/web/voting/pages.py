@@ -16,11 +16,11 @@ from django.views.decorators.http import require_http_methods, require_POST, req
 
 from arena.errors import AlreadyDecided, InvalidVote, NotYours, StudyNotOpen, TooFast
 from arena.models import Study
-from arena.queries.measures import lane_edges_of_pair, measures_of_pair
-from arena.queries.replays import drives_of_pair
-from arena.queries.showings import picture_shown
-from arena.queries.studies import voting_study
-from arena.queries.votes import skipped_pairs
+from arena.queries.studies.lists import voting_study
+from arena.queries.voting.ballots import skipped_pairs
+from arena.queries.voting.measures import lane_edges_of_pair, measures_of_pair
+from arena.queries.voting.replays import drives_of_pair
+from arena.queries.voting.showings import picture_shown
 from arena.services.practice import is_due
 from arena.services.reports import report
 from arena.services.votes import receive_vote

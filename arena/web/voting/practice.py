@@ -16,7 +16,7 @@ from django.views.decorators.http import require_http_methods
 
 from arena.errors import InvalidVote, NotYours, StudyNotOpen
 from arena.models import PracticePair, Study
-from arena.queries.studies import voting_study
+from arena.queries.studies.lists import voting_study
 from arena.services.practice import answer_practice, practice_pairs, skip_practice
 from arena.web.access import EXPERT, allow_only
 from arena.web.screen import over_context

@@ -4,11 +4,19 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from arena.exports.badges import Place, badge_places
-from arena.exports.drawing import GRID, INK, MARK, SIMULATED, SOFT, house_style, write_figure
-from arena.exports.plot_axes import axes as axes_of
-from arena.exports.plot_axes import curve_points, shorten_name
-from arena.exports.plots import Given, Plot
+from arena.exports.charts.badges import Place, badge_places
+from arena.exports.charts.drawing import (
+    GRID,
+    INK,
+    MARK,
+    SIMULATED,
+    SOFT,
+    house_style,
+    write_figure,
+)
+from arena.exports.charts.plot_axes import axes as axes_of
+from arena.exports.charts.plot_axes import curve_points, shorten_name
+from arena.exports.charts.plots import Given, Plot
 from arena.exports.tables import SIMULATED as SIMULATED_WORD
 
 if TYPE_CHECKING:

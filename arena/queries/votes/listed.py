@@ -12,7 +12,7 @@ from django.db.models import Q, QuerySet
 
 from arena.models import ImportedVote, Snapshot, Vote
 from arena.pairing.order import MAIN
-from arena.queries.evidence import (
+from arena.queries.votes.evidence import (
     Evidence,
     Faults,
     PairKey,
@@ -20,9 +20,9 @@ from arena.queries.evidence import (
     VoteScore,
     read_faults,
 )
-from arena.queries.judged import AUTOMATIC, IMPORTED, Judged
-from arena.queries.vote_search import COUNTED, EVERY, LEFT_OUT, SoughtOutcome, VoteSearch
-from arena.queries.vote_sets import Filters, LeftOut
+from arena.queries.votes.judged import AUTOMATIC, IMPORTED, Judged
+from arena.queries.votes.search import COUNTED, EVERY, LEFT_OUT, SoughtOutcome, VoteSearch
+from arena.queries.votes.sets import Filters, LeftOut
 from augment.models import Augmentation
 
 

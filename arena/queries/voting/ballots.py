@@ -14,7 +14,7 @@ from arena.errors import NotYours
 from arena.models import Matchup, Study, Vote
 from arena.queries.people import by_pseudonym
 from arena.queries.remembering import Remembered, plan_and_votes
-from arena.queries.voting_path import study_now
+from arena.queries.voting.path import study_now
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -8,8 +8,8 @@ from uuid import UUID
 from django.db.models import F
 
 from arena.models import Report, Snapshot, Vote
-from arena.queries.vote_lists import votes_behind
-from arena.queries.vote_search import EVERY, VoteSearch
+from arena.queries.votes.lists import votes_behind
+from arena.queries.votes.search import EVERY, VoteSearch
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -7,9 +7,17 @@ from dataclasses import dataclass
 from itertools import groupby
 from typing import TYPE_CHECKING, Any
 
-from arena.exports.displacement_table import DisplacementTable
-from arena.exports.drawing import GRID, INK, MARK, SIMULATED, SOFT, house_style, write_figure
-from arena.exports.published import SOURCE, PublishedBox
+from arena.exports.charts.drawing import (
+    GRID,
+    INK,
+    MARK,
+    SIMULATED,
+    SOFT,
+    house_style,
+    write_figure,
+)
+from arena.exports.jobs.displacement_table import DisplacementTable
+from arena.exports.jobs.published import SOURCE, PublishedBox
 from arena.exports.tables import shown_name
 from augment.services.judging.displacement import VARIANTS, By, Group
 

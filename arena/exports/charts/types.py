@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from arena.exports.charts import draw_interval, rating_axis
-from arena.exports.drawing import INK, SIMULATED, house_style, width_in, write_figure
+from arena.exports.charts.drawing import INK, SIMULATED, house_style, width_in, write_figure
+from arena.exports.charts.intervals import draw_interval, rating_axis
 from arena.exports.tables import LeaderboardTable
 from arena.results.tree import TypeRating
 

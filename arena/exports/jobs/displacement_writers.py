@@ -6,10 +6,10 @@ import json
 from collections.abc import Sequence
 from typing import Any
 
-from arena.exports.displacement_chart import box_plot
-from arena.exports.displacement_table import DisplacementTable
+from arena.exports.charts.displacement import box_plot
 from arena.exports.formats import Format, drawings, formats, round_value
-from arena.exports.published import SOURCE, PublishedBox
+from arena.exports.jobs.displacement_table import DisplacementTable
+from arena.exports.jobs.published import SOURCE, PublishedBox
 from arena.exports.tables import shown_name
 from arena.services.cells import csv_text
 from augment.services.judging.displacement import BoxSummary, Group, Measured

@@ -5,8 +5,8 @@ from __future__ import annotations
 import json
 from typing import Any
 
-from arena.exports.driving_table import SOURCE, DrivingTable
 from arena.exports.formats import Format, formats, round_value
+from arena.exports.jobs.driving_table import SOURCE, DrivingTable
 from arena.exports.tables import shown_name
 from arena.rating.printed import escape
 from arena.services.cells import csv_text

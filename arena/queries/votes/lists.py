@@ -17,18 +17,18 @@ from django.core.paginator import Page, Paginator
 from django.db.models import Q, QuerySet
 
 from arena.models import Snapshot, Vote
-from arena.queries.evidence import read_evidence, sort_votes
-from arena.queries.judged import AUTOMATIC, Judged, is_imported, settled_ties, votes_up_to
-from arena.queries.listed_votes import (
+from arena.queries.remembering import Remembered, plan_types
+from arena.queries.votes.evidence import read_evidence, sort_votes
+from arena.queries.votes.judged import AUTOMATIC, Judged, is_imported, settled_ties, votes_up_to
+from arena.queries.votes.listed import (
     ListedVote,
     imported_votes,
     of_automatic,
     of_imported,
     of_votes,
 )
-from arena.queries.remembering import Remembered, plan_types
-from arena.queries.vote_parts import find_part
-from arena.queries.vote_search import (
+from arena.queries.votes.parts import find_part
+from arena.queries.votes.search import (
     AUTOMATIC_TIE,
     COUNTED,
     EVERY,
@@ -38,7 +38,7 @@ from arena.queries.vote_search import (
     SoughtPart,
     VoteSearch,
 )
-from arena.queries.vote_sets import (
+from arena.queries.votes.sets import (
     Filters,
     counted_votes,
     made_up_contestants,

@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from arena.exports.published import BY_VARIANT, PublishedBox
+from arena.exports.jobs.published import BY_VARIANT, PublishedBox
 from augment.models import GenerationJob
 from augment.services.judging.displacement import (
     PLACED_EXACTLY,

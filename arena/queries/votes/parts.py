@@ -8,9 +8,9 @@ from django.db.models import Exists, OuterRef, Q, QuerySet
 
 from arena.models import Snapshot, Vote
 from arena.pairing.order import CHECK, REPEAT
-from arena.queries.judged import RATED
-from arena.queries.vote_search import COUNTED, SoughtPart
-from arena.queries.vote_sets import Filters, LeftOut, marked_votes, own_votes
+from arena.queries.votes.judged import RATED
+from arena.queries.votes.search import COUNTED, SoughtPart
+from arena.queries.votes.sets import Filters, LeftOut, marked_votes, own_votes
 from arena.rating.reliability import FAST_MS
 from augment.models import Contestant
 

@@ -14,7 +14,7 @@ from django.db.models.fields import CharField
 
 from arena.models import ImportedVote, Person, Snapshot, Study, Vote
 from arena.pairing.order import CHECK, MAIN, REPEAT
-from arena.queries.judged import (
+from arena.queries.votes.judged import (
     AUTOMATIC,
     RATED,
     Entrant,
@@ -25,7 +25,7 @@ from arena.queries.judged import (
     settled_ties,
     votes_up_to,
 )
-from arena.queries.vote_search import COUNTED
+from arena.queries.votes.search import COUNTED
 from augment.errors import UnknownName
 from augment.models import Contestant
 from augment.services.scenarios.types import ScenarioType

@@ -6,8 +6,8 @@ import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from arena.exports.drawing import INK, SIMULATED, SOFT, house_style, width_in, write_figure
-from arena.exports.heat import STRONG, heat_map
+from arena.exports.charts.drawing import INK, SIMULATED, SOFT, house_style, width_in, write_figure
+from arena.exports.charts.heat_map import STRONG, heat_map
 from arena.exports.tables import Row
 from arena.results.tree import PairRecord
 

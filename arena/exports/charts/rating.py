@@ -6,12 +6,12 @@ from collections.abc import Mapping
 from functools import partial
 from typing import Protocol
 
-from arena.exports.charts import interval_chart
-from arena.exports.heat_chart import heat_chart
-from arena.exports.plots import plots
-from arena.exports.scatter_chart import scatter_chart
+from arena.exports.charts.heat import heat_chart
+from arena.exports.charts.intervals import interval_chart
+from arena.exports.charts.plots import plots
+from arena.exports.charts.scatter import scatter_chart
+from arena.exports.charts.types import type_charts
 from arena.exports.tables import leaderboard_table
-from arena.exports.type_charts import type_charts
 from arena.models import Snapshot
 from augment.errors import UnknownName
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 
-from arena.exports.plots import Plot
+from arena.exports.charts.plots import Plot
 
 MOST_TICKS = 7
 FEWEST_TICKS = 4

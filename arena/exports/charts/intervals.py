@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from arena.exports.drawing import GRID, INK, MARK, SIMULATED, house_style, write_figure
-from arena.exports.plot_axes import Interval, interval_ticks
+from arena.exports.charts.drawing import GRID, INK, MARK, SIMULATED, house_style, write_figure
+from arena.exports.charts.plot_axes import Interval, interval_ticks
 from arena.exports.tables import LeaderboardTable
 
 if TYPE_CHECKING:

@@ -15,8 +15,8 @@ from django.db.models import Count, F, Max, Q, QuerySet, Value
 
 from arena.models import FaultLabel, Matchup, Snapshot, Vote
 from arena.queries.remembering import Remembered, plan_types
-from arena.queries.vote_search import SoughtOrder, VoteSearch
-from arena.queries.vote_sets import counted_votes
+from arena.queries.votes.search import SoughtOrder, VoteSearch
+from arena.queries.votes.sets import counted_votes
 from augment.models import Contestant
 
 
