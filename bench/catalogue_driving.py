@@ -17,8 +17,7 @@ import numpy as np
 
 from augment.scene.catalogue import ScenarioType
 from augment.scene.modification import Modification
-from augment.simulation.drive import Drive, run
-from augment.simulation.expert import expert_of
+from augment.simulation.drive import Drive, expert_of, run
 from augment.simulation.pdm_closed import PdmClosed
 from augment.simulation.planners import OFFSETS_M
 from augment.simulation.road import Road

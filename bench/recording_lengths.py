@@ -17,10 +17,9 @@ import numpy as np
 
 from augment.scene.entities import Scene
 from augment.scene.recording import Recording, Track
-from augment.simulation.drive import Drive, run
-from augment.simulation.expert import Expert, expert_of
+from augment.simulation.drive import Drive, Expert, expert_of, run
+from augment.simulation.metrics import progress_ratio
 from augment.simulation.planning import Plan, Situation
-from augment.simulation.progress import progress_ratio
 from augment.simulation.road import Road
 from augment.simulation.score import score_drive
 from augment.simulation.setting import DriveSetting

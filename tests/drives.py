@@ -12,8 +12,7 @@ from augment.models import Augmentation, GenerationJob, Simulation
 from augment.scene.modification import Modification
 from augment.services.judging import simulations
 from augment.services.judging.simulations import Options
-from augment.simulation.drive import run
-from augment.simulation.expert import expert_of
+from augment.simulation.drive import expert_of, run
 from augment.simulation.pdm_closed import PdmClosed
 from augment.simulation.road import Road
 from augment.simulation.score import ScoreKind, score_drive

@@ -1,16 +1,18 @@
 """What passengers feel: smoothed accelerations, jerks and turning, and their limits.
 
 The final score and PDM's own look ahead smooth in different ways (`SCORE`, `PROPOSAL`); both ask
-the same limits of every moment.
+the same limits of every moment. Savitzky-Golay filters are kept as matrices, so that smoothing is
+one product for all proposals.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
+from scipy.signal import savgol_filter
 
-from augment.simulation.smoothing import filter_matrix
 from augment.simulation.states import (
     ACCELERATION,
     HEADING,
@@ -20,6 +22,26 @@ from augment.simulation.states import (
     FloatArray,
     yaw_rates,
 )
+
+
+@lru_cache(maxsize=64)
+def filter_matrix(count: int, window: int, order: int, derivative: int = 0) -> FloatArray:
+    """The matrix (T, T) that smooths T samples every `STEP_S`, or gives a derivative of them.
+
+    Short rows take a shorter window, and a lower order where it needs one.
+
+    Args:
+        count: T.
+        window: Samples that one polynomial is put through.
+        order: Of the polynomial.
+        derivative: 0 for the value, 1 for the rate, 2 for its rate.
+    """
+    window = min(window, count)
+    matrix = savgol_filter(
+        np.eye(count), window, min(order, window - 1), deriv=derivative, delta=STEP_S, axis=0
+    )
+    return np.asarray(matrix, dtype=np.float64)
+
 
 LIMITS: dict[str, tuple[float, float]] = {
     "longitudinal_acceleration_mps2": (-4.05, 2.40),

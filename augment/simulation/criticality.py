@@ -7,12 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from augment.simulation.contact import corners, meet, radii
 from augment.simulation.drive import Drive
 from augment.simulation.encounters import Collision
-from augment.simulation.objects import Objects
-from augment.simulation.overlap import corners, meet, radii
-from augment.simulation.safety import ttc_series
-from augment.simulation.states import HEADING, SPEED, STEP_S, FloatArray
+from augment.simulation.metrics import ttc_series
+from augment.simulation.states import HEADING, SPEED, STEP_S, FloatArray, Objects
 
 CROSSING_RAD = math.radians(20.0)
 """Paths that meet at a flatter angle follow each other; they have no encroachment."""

@@ -6,9 +6,8 @@ import math
 
 import numpy as np
 
-from augment.simulation.forecast import foresee, nearest
 from augment.simulation.idm import PLANNER_IDM
-from augment.simulation.leaders import ParallelPaths
+from augment.simulation.leaders import ParallelPaths, foresee, nearest
 from augment.simulation.planning import Plan, Situation
 from augment.simulation.road import Road
 from augment.simulation.states import SPEED, STEP_S, EgoBody, FloatArray, X, Y

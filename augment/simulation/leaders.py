@@ -1,7 +1,8 @@
-"""Who is ahead on each of several parallel paths, read once for all of them.
+"""Who is ahead on each of several parallel paths, and where everybody will be.
 
-Every object is laid beside the centreline once; beside a path that runs so far to the left of it,
-it lies as much further to the right. P paths, V policies, F slices, A objects.
+Nobody is expected to change speed or heading. Every object is laid beside the centreline once;
+beside a path that runs so far to the left of it, it lies as much further to the right. P paths,
+V policies, F slices of 0.2 s, A objects.
 """
 
 from __future__ import annotations
@@ -10,10 +11,49 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from augment.simulation.forecast import Forecast
-from augment.simulation.overlap import corners
+from augment.simulation.contact import corners
 from augment.simulation.path import Path
-from augment.simulation.states import EgoBody, FloatArray
+from augment.simulation.states import EgoBody, FloatArray, Kind, Objects
+
+SLICE_S = 0.2
+STEPS_A_SLICE = 2
+RADIUS_M = 50.0
+MOST: dict[Kind, int] = {
+    Kind.VEHICLE: 50,
+    Kind.PEDESTRIAN: 25,
+    Kind.BICYCLE: 10,
+    Kind.STATIC: 50,
+}
+"""How many of each kind PDM-Closed looks at, nearest first."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Forecast:
+    """Objects and their boxes (F, A, 5) at 0, 0.2, 0.4 ... s from now."""
+
+    objects: Objects
+    boxes: FloatArray
+
+
+def foresee(objects: Objects, horizon_s: float) -> Forecast:
+    """Constant velocity along each object's heading (backwards where its speed is negative)."""
+    times = np.arange(round(horizon_s / SLICE_S) + 1) * SLICE_S
+    boxes = np.broadcast_to(objects.boxes, (len(times), *objects.boxes.shape)).copy()
+    heading = objects.boxes[:, 2]
+    boxes[..., 0] += times[:, None] * (objects.speeds_mps * np.cos(heading))
+    boxes[..., 1] += times[:, None] * (objects.speeds_mps * np.sin(heading))
+    return Forecast(objects=objects, boxes=boxes)
+
+
+def nearest(objects: Objects, place_m: FloatArray, radius_m: float = RADIUS_M) -> Objects:
+    """Those within the radius of a place (2,), of each kind as many as PDM-Closed looks at."""
+    away = np.hypot(*(objects.boxes[:, :2] - place_m).T)
+    kept = np.zeros(len(objects), dtype=np.bool_)
+    for kind, most in MOST.items():
+        rows = np.flatnonzero((objects.kinds == kind) & (away <= radius_m))
+        kept[rows[np.argsort(away[rows], kind="stable")[:most]]] = True
+    return objects.chosen(kept)
+
 
 _BEHIND_M = 10.0
 
@@ -26,13 +66,11 @@ class Corridor:
         near_m: (F, P, A) where it begins on the path; inf where it does not meet the corridor.
         middle_m: (F, P, A) where its centre is.
         speeds_mps: (F, A) along the centreline.
-        lengths_m: (A,).
     """
 
     near_m: FloatArray
     middle_m: FloatArray
     speeds_mps: FloatArray
-    lengths_m: FloatArray
 
 
 class ParallelPaths:
@@ -93,7 +131,6 @@ class ParallelPaths:
             near_m=np.where(meets, begin, np.inf),
             middle_m=np.moveaxis(self.stations(middle[..., 0]), 0, 1),
             speeds_mps=speeds * np.cos(boxes[..., 2] - heading),
-            lengths_m=boxes[0, :, 3],
         )
 
     def _laid(self, points_m: FloatArray) -> FloatArray:

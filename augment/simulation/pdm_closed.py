@@ -1,4 +1,4 @@
-"""PDM-Closed: many IDM rollouts on parallel paths, simulated, judged, and the best one driven."""
+"""PDM-Closed: the best of several rolled-out proposals, or an emergency brake."""
 
 from __future__ import annotations
 
@@ -6,11 +6,8 @@ import math
 
 import numpy as np
 
-from augment.simulation.braking import brake, must_brake
-from augment.simulation.forecast import foresee, nearest
-from augment.simulation.leaders import Corridor, ParallelPaths
-from augment.simulation.objects import Objects
-from augment.simulation.overlap import meet
+from augment.simulation.contact import meet
+from augment.simulation.leaders import Corridor, ParallelPaths, foresee, nearest
 from augment.simulation.planning import Plan, Proposals, Situation
 from augment.simulation.proposal_scores import ProposalScores, score_proposals
 from augment.simulation.proposals import (
@@ -19,13 +16,54 @@ from augment.simulation.proposals import (
     PAPER_OFFSETS_M,
     SPEED_SHARES,
     WHOLE_STEPS,
-    Quirks,
     Rollout,
     roll_out,
 )
 from augment.simulation.road import Road
-from augment.simulation.states import SPEED, STEP_S, EgoBody, FloatArray, X, Y
+from augment.simulation.states import (
+    ACCELERATION,
+    HEADING,
+    SPEED,
+    STEP_S,
+    EgoBody,
+    FloatArray,
+    Objects,
+    X,
+    Y,
+)
 from augment.simulation.tracker import track
+
+FAULT_WITHIN_S = 2.0
+AT_MOST_MPS = 5.0
+_LOW_MPS = 0.2
+_HARDEST, _SOFTEST = -4.05, 2.40
+
+
+def must_brake(fault_s: float, speed_mps: float) -> bool:
+    """Whether even the best proposal hits somebody soon, at a speed that braking can end."""
+    return fault_s <= FAULT_WITHIN_S and speed_mps <= AT_MOST_MPS
+
+
+def brake(ego: FloatArray, body: EgoBody) -> FloatArray:
+    """Poses (T, 3) straight ahead from the ego's centre, at one commanded speed.
+
+    The commanded speed may be negative; the tracker turns that into hard braking.
+    """
+    speed = float(ego[SPEED])
+    if speed > _LOW_MPS:
+        pull = min(max(-10.0 * speed, _HARDEST), _SOFTEST)
+        commanded = 1.1 * (speed + pull)
+    else:
+        pull = min(max(-4.0 * speed - float(ego[ACCELERATION]), _HARDEST), _SOFTEST)
+        commanded = speed + pull
+    way = commanded * STEP_S * np.arange(WHOLE_STEPS + 1)
+    heading = float(ego[HEADING])
+    x_m, y_m = body.centre(ego)
+    poses = np.empty((len(way), 3))
+    poses[:, 0] = x_m + way * np.cos(heading)
+    poses[:, 1] = y_m + way * np.sin(heading)
+    poses[:, 2] = heading
+    return poses
 
 
 class PdmClosed:
@@ -33,19 +71,14 @@ class PdmClosed:
 
     Args:
         offsets_m: Lateral offsets of the paths (P,), to the left; the paper's by default.
-        speed_shares: Target speeds (V,) as parts of the speed limit.
-        quirks: Which oddities of the released code to copy.
     """
 
     def __init__(
         self,
         offsets_m: tuple[float, ...] = PAPER_OFFSETS_M,
-        speed_shares: tuple[float, ...] = SPEED_SHARES,
-        quirks: Quirks | None = None,
     ) -> None:
         self._offsets = np.array(offsets_m, dtype=np.float64)
-        self._shares = np.array(speed_shares, dtype=np.float64)
-        self._quirks = quirks or Quirks()
+        self._shares = np.array(SPEED_SHARES, dtype=np.float64)
         self._touched: set[str] = set()
 
     def start(self, road: Road, body: EgoBody) -> None:
@@ -68,7 +101,7 @@ class PdmClosed:
         )
         starts = self._paths.stations(np.array([ego_m]))[:, 0]
         speed = float(ego[SPEED])
-        rolled = roll_out(starts, speed, targets, corridor, self._ends, body, self._quirks)
+        rolled = roll_out(starts, speed, targets, corridor, self._ends, body)
         poses = self._poses(rolled)
         states = track(poses, ego, body)
         judged = score_proposals(states, forecast, self._road, body)
@@ -106,7 +139,6 @@ class PdmClosed:
             near_m=np.concatenate([corridor.near_m, stops], axis=-1),
             middle_m=np.concatenate([corridor.middle_m, stops + 1.0], axis=-1),
             speeds_mps=np.hstack([corridor.speeds_mps, np.zeros((slices, len(red)))]),
-            lengths_m=np.concatenate([corridor.lengths_m, np.zeros(len(red))]),
         )
 
     def _poses(self, rolled: Rollout) -> FloatArray:
@@ -122,7 +154,6 @@ class PdmClosed:
             near_m=corridor.near_m[:, path : path + 1],
             middle_m=corridor.middle_m[:, path : path + 1],
             speeds_mps=corridor.speeds_mps,
-            lengths_m=corridor.lengths_m,
         )
         begun = rolled.stations_m[path, policy]
         rest = roll_out(
@@ -132,7 +163,6 @@ class PdmClosed:
             one,
             self._ends[path : path + 1],
             self._body,
-            self._quirks,
             first=HORIZON_STEPS,
             last=WHOLE_STEPS,
         )

@@ -9,9 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
-from augment.simulation.objects import Objects
 from augment.simulation.road import Road
-from augment.simulation.states import EgoBody, FloatArray
+from augment.simulation.states import EgoBody, FloatArray, Objects
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -11,10 +11,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from augment.simulation.comfort import PROPOSAL, comfort_signals, is_comfortable
-from augment.simulation.contact import AHEAD_RAD, BEHIND_RAD, at_fault, bearings, classify
-from augment.simulation.forecast import STEPS_A_SLICE, Forecast
-from augment.simulation.objects import Kind
-from augment.simulation.overlap import corners, meet, radii
+from augment.simulation.contact import (
+    AHEAD_RAD,
+    BEHIND_RAD,
+    at_fault,
+    bearings,
+    classify,
+    corners,
+    meet,
+    radii,
+)
+from augment.simulation.leaders import STEPS_A_SLICE, Forecast
 from augment.simulation.road import Road
 from augment.simulation.states import (
     HEADING,
@@ -24,6 +31,7 @@ from augment.simulation.states import (
     EgoBody,
     FloatArray,
     IntArray,
+    Kind,
     X,
     Y,
 )

@@ -10,9 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from augment.simulation.forecast import STEPS_A_SLICE
 from augment.simulation.idm import PROPOSAL_IDM
-from augment.simulation.leaders import Corridor
+from augment.simulation.leaders import STEPS_A_SLICE, Corridor
 from augment.simulation.states import STEP_S, EgoBody, FloatArray
 
 ORIGINAL_OFFSETS_M = (0.0, -1.0, 1.0)
@@ -23,21 +22,6 @@ SPEED_SHARES = (0.2, 0.4, 0.6, 0.8, 1.0)
 HORIZON_STEPS = 40
 WHOLE_STEPS = 80
 FALLBACK_LIMIT_MPS = 15.0
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Quirks:
-    """What the released code does that its paper does not say; all off by default.
-
-    Attributes:
-        first_step_brake: The leaders start as zeros and are first looked up in the second step,
-            so that every proposal brakes at -3 m/s2 for one step.
-        stale_leader: The five policies of one path share the speed and the length of the leader
-            that the last of them saw.
-    """
-
-    first_step_brake: bool = False
-    stale_leader: bool = False
 
 
 @dataclass(slots=True, eq=False)
@@ -60,7 +44,6 @@ def roll_out(
     corridor: Corridor,
     ends_m: FloatArray,
     body: EgoBody,
-    quirks: Quirks,
     *,
     first: int = 0,
     last: int = HORIZON_STEPS,
@@ -74,7 +57,6 @@ def roll_out(
         corridor: Who is on the paths.
         ends_m: (P,) where the paths end; something stands there.
         body: The ego.
-        quirks: Of the released code.
         first: The step that the start belongs to.
         last: Where to end.
     """
@@ -86,11 +68,9 @@ def roll_out(
     made = np.empty((last - first + 1, *shape))
     made[0] = station
     near, leader = np.zeros(shape), np.zeros(shape)
-    refreshed_at = 1 if quirks.first_step_brake else 0
     for step in range(first, last):
-        if step % STEPS_A_SLICE == refreshed_at:
-            moment = (step + refreshed_at) // STEPS_A_SLICE
-            near, leader = _leaders(station, corridor, moment, ends_m, reach, body, quirks)
+        if step % STEPS_A_SLICE == 0:
+            near, leader = _leaders(station, corridor, step // STEPS_A_SLICE, ends_m, reach, body)
         gap = near - station - body.front_m
         pull = PROPOSAL_IDM.clipped(speed, targets, gap, leader)
         station = station + speed * STEP_S
@@ -106,7 +86,6 @@ def _leaders(
     ends_m: FloatArray,
     reach: float,
     body: EgoBody,
-    quirks: Quirks,
 ) -> tuple[FloatArray, FloatArray]:
     """Where the leader's rear is (P, V), and its speed; nearest first, of equal ones the first."""
     # As released: ahead is whose centre lies beyond the rear axle, even beside the ego itself.
@@ -122,9 +101,5 @@ def _leaders(
     which = rear.argmin(axis=-1)
     found = np.take_along_axis(rear, which[..., None], axis=-1)[..., 0]
     speeds = corridor.speeds_mps[moment][which]
-    if quirks.stale_leader:
-        speeds = np.broadcast_to(speeds[:, -1:], speeds.shape)
-        lengths = corridor.lengths_m[which]
-        found = found + (lengths - lengths[:, -1:]) / 2.0
     beyond = found >= end
     return np.where(beyond, end, found), np.where(beyond, 0.0, speeds)

@@ -13,21 +13,23 @@ import numpy as np
 
 from augment.scene.catalogue import ScenarioType
 from augment.scene.modification import Modification
-from augment.simulation import interplan
 from augment.simulation.comfort import comfort_signals, is_comfortable
-from augment.simulation.drive import Drive
-from augment.simulation.ego_lane import ego_ways
-from augment.simulation.encounters import Collision, collisions
-from augment.simulation.expert import Expert
-from augment.simulation.metric import Metric, combine
-from augment.simulation.progress import (
+from augment.simulation.drive import Drive, Expert
+from augment.simulation.encounters import Collision, collisions, ego_ways
+from augment.simulation.metrics import (
+    Metric,
+    allows_detour,
+    combine,
     direction,
+    drivable_area,
+    lane_changes_to_goal,
     making_progress,
+    no_fault_collisions,
+    passed_obstacles,
     progress,
-    red_lights,
     speed_limit,
+    time_to_collision,
 )
-from augment.simulation.safety import drivable_area, no_fault_collisions, time_to_collision
 from augment.simulation.states import HEADING
 
 
@@ -63,7 +65,6 @@ def score_drive(
     kind: ScoreKind = ScoreKind.NUPLAN,
     scenario_type: ScenarioType | None = None,
     modification: Modification | None = None,
-    with_red_lights: bool = False,
 ) -> Score:
     """Score a drive.
 
@@ -73,12 +74,11 @@ def score_drive(
         kind: nuPlan's or interPlan's.
         scenario_type: Decides the roles in interPlan's score; its defaults when None.
         modification: Names the obstacles that interPlan wants passed; none when None.
-        with_red_lights: Whether crossing a red stop line makes the score 0, which neither does.
     """
     met = collisions(drive)
     ways = ego_ways(drive.road, drive.boxes[:, :2], drive.states[:, HEADING])
-    is_special = kind is ScoreKind.INTERPLAN and interplan.allows_detour(scenario_type)
-    made = [
+    is_special = kind is ScoreKind.INTERPLAN and allows_detour(scenario_type)
+    parts = [
         no_fault_collisions(drive, met),
         drivable_area(drive),
         making_progress(drive, expert),
@@ -89,12 +89,10 @@ def score_drive(
         comfort(drive),
     ]
     if kind is ScoreKind.INTERPLAN:
-        made.append(interplan.lane_changes_to_goal(drive, ways))
+        parts.append(lane_changes_to_goal(drive, ways))
         if scenario_type is not None:
-            made.append(interplan.passed_obstacles(drive, expert, modification))
-    if with_red_lights:
-        made.append(red_lights(drive))
-    metrics = tuple(made)
+            parts.append(passed_obstacles(drive, expert, modification))
+    metrics = tuple(parts)
     return Score(kind=kind, value=combine(metrics), metrics=metrics, collisions=met, expert=expert)
 
 

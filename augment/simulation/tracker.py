@@ -1,18 +1,22 @@
-"""The LQR that turns a row of poses into pedals and wheel, all proposals at once.
+"""nuPlan's tracker: an LQR that follows a row of poses on a kinematic bicycle.
 
-Source: nuPlan's two-stage controller. Both controllers look 10 steps ahead with one constant
-input. The lateral error's way over these steps is linear in the input, and its coefficients are
-polynomials in speed and acceleration; their constants are summed up once, when this is imported.
+The speed and the curvature of the poses are fitted by regularised least squares. Both fits are
+nuPlan's, solved for the profile itself instead of its first value and its rates: the speed's
+normal matrix then holds no heading and is one constant, and the curvature's has three diagonals.
+The bicycle moves about the rear axle; its pedals and its wheel lag. Shapes: (T, B), the moments
+first, because the tracker walks along them.
 """
 
 from __future__ import annotations
 
+import math
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import ArrayLike
 
-from augment.simulation import bicycle
-from augment.simulation.profiles import curvatures, speeds
 from augment.simulation.states import (
+    ACCELERATION,
     HEADING,
     SPEED,
     STEERING,
@@ -25,6 +29,93 @@ from augment.simulation.states import (
     state_of,
     wrap_angles,
 )
+
+MAX_STEERING_RAD = math.pi / 3.0
+ACCELERATION_LAG_S = 0.2
+STEERING_LAG_S = 0.05
+_PEDAL = STEP_S / (STEP_S + ACCELERATION_LAG_S)
+_WHEEL = STEP_S / (STEP_S + STEERING_LAG_S)
+
+
+def advance(
+    state: FloatArray,
+    acceleration_mps2: FloatArray,
+    steering_rate_radps: FloatArray,
+    wheelbase_m: float,
+) -> FloatArray:
+    """The states (6, B) one step later: the place by the old speed and the old steering.
+
+    Args:
+        state: (6, B), the numbers first.
+        acceleration_mps2: The command (B,); the pedals follow with a lag of 0.2 s.
+        steering_rate_radps: The command (B,); the wheel follows with a lag of 0.05 s.
+        wheelbase_m: Between the axles.
+    """
+    following = np.empty_like(state)
+    way = state[SPEED] * STEP_S
+    heading, steering = state[HEADING], state[STEERING]
+    following[X] = state[X] + way * np.cos(heading)
+    following[Y] = state[Y] + way * np.sin(heading)
+    following[HEADING] = heading + way * np.tan(steering) / wheelbase_m
+    gained = state[ACCELERATION] + _PEDAL * (acceleration_mps2 - state[ACCELERATION])
+    following[ACCELERATION] = gained
+    following[SPEED] = state[SPEED] + gained * STEP_S
+    turned = steering + (_WHEEL * STEP_S) * steering_rate_radps
+    following[STEERING] = np.minimum(np.maximum(turned, -MAX_STEERING_RAD), MAX_STEERING_RAD)
+    return following
+
+
+JERK_PENALTY = 1e-4
+"""On the squared difference of neighbouring accelerations."""
+CURVATURE_RATE_PENALTY = 1e-2
+FIRST_CURVATURE_PENALTY = 1e-10
+
+
+def speeds(poses: FloatArray) -> FloatArray:
+    """The speed profile (T-1, B) of poses (T, B, 3)."""
+    steps = np.diff(poses[..., :2], axis=0)
+    heading = poses[:-1, :, HEADING]
+    advance = np.cos(heading) * steps[..., X] + np.sin(heading) * steps[..., Y]
+    return np.asarray(_speed_fit(len(advance)) @ advance, dtype=np.float64)
+
+
+def curvatures(poses: FloatArray, speed: FloatArray) -> FloatArray:
+    """The curvature profile (T-1, B) of poses (T, B, 3), given their speeds (T-1, B)."""
+    way = speed * STEP_S
+    right = way * wrap_angles(np.diff(poses[..., HEADING], axis=0))
+    coupling = CURVATURE_RATE_PENALTY / STEP_S**2
+    diagonal = way**2 + 2.0 * coupling
+    diagonal[0] += FIRST_CURVATURE_PENALTY - coupling
+    diagonal[-1] -= coupling
+    if len(way) == 1:
+        return np.asarray(right / (way**2 + FIRST_CURVATURE_PENALTY), dtype=np.float64)
+    return _solved(diagonal, -coupling, right)
+
+
+@lru_cache(maxsize=16)
+def _speed_fit(count: int) -> FloatArray:
+    """The matrix (N, N) from advances along the heading to speeds."""
+    second = np.zeros((max(count - 2, 0), count))
+    for row in range(len(second)):
+        second[row, row : row + 3] = np.array([1.0, -2.0, 1.0]) / STEP_S
+    normal = STEP_S**2 * np.eye(count) + JERK_PENALTY * second.T @ second
+    return np.asarray(np.linalg.inv(normal) * STEP_S, dtype=np.float64)
+
+
+def _solved(diagonal: FloatArray, off: float, right: FloatArray) -> FloatArray:
+    """Symmetric systems of three diagonals, all columns at once: (N, B) -> (N, B)."""
+    upper = np.empty_like(diagonal)
+    solved = np.empty_like(right)
+    upper[0] = off / diagonal[0]
+    solved[0] = right[0] / diagonal[0]
+    for row in range(1, len(diagonal)):
+        pivot = 1.0 / (diagonal[row] - off * upper[row - 1])
+        upper[row] = off * pivot
+        solved[row] = (right[row] - off * solved[row - 1]) * pivot
+    for row in range(len(diagonal) - 2, -1, -1):
+        solved[row] -= upper[row] * solved[row + 1]
+    return solved
+
 
 HORIZON = 10
 SPEED_WEIGHT, SPEED_COST = 10.0, 1.0
@@ -77,7 +168,7 @@ def drive_steps(
     for step in range(steps):
         state = states[step]
         pedals, wheel = plan.commands(step, state, body.wheelbase_m)
-        states[step + 1] = bicycle.advance(state, pedals, wheel, body.wheelbase_m)
+        states[step + 1] = advance(state, pedals, wheel, body.wheelbase_m)
     return np.ascontiguousarray(states.transpose(2, 0, 1))
 
 

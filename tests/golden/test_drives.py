@@ -5,8 +5,7 @@ from __future__ import annotations
 from augment.scene.catalogue import ScenarioType
 from augment.scene.entities import Scene
 from augment.scene.modification import Modification
-from augment.simulation.drive import run
-from augment.simulation.expert import expert_of
+from augment.simulation.drive import expert_of, run
 from augment.simulation.pdm_closed import PdmClosed
 from augment.simulation.road import Road
 from augment.simulation.score import ScoreKind, score_drive

@@ -18,8 +18,7 @@ from augment.geometry.frames import Pose
 from augment.geometry.polyline import Polyline
 from augment.scene.entities import Lane, Scene, TrafficAgent
 from augment.scene.modification import Modification
-from augment.simulation.drive import run
-from augment.simulation.expert import ExpertKind, expert_of
+from augment.simulation.drive import ExpertKind, expert_of, run
 from augment.simulation.idm_planner import IdmPlanner
 from augment.simulation.pdm_closed import PdmClosed
 from augment.simulation.planning import Plan, Situation

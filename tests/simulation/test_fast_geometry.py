@@ -9,12 +9,10 @@ import pytest
 import shapely
 from hypothesis import given
 from hypothesis import strategies as st
-from scipy.signal import savgol_filter
 
-from augment.simulation.overlap import corners, meet
+from augment.simulation.contact import corners, meet
 from augment.simulation.path import Path, dense
 from augment.simulation.region import Region
-from augment.simulation.smoothing import filter_matrix
 from tests.properties import examples
 
 metres = st.floats(-8.0, 8.0)
@@ -62,15 +60,3 @@ def test_places_beside_a_path_are_those_of_the_whole_line(seed: int) -> None:
     assert np.abs(d_m) == pytest.approx(shapely.distance(shapely.points(points), whole), abs=1e-9)
     assert s_m == pytest.approx(shapely.line_locate_point(whole, shapely.points(points)), abs=1e-6)
     assert (np.sign(d_m) == np.sign(aside))[np.abs(aside) > 0.05].all()
-
-
-@pytest.mark.parametrize("count", [20, 41, 151])
-@pytest.mark.parametrize(
-    ("window", "order", "derivative"),
-    [(8, 2, 0), (15, 2, 1), (5, 2, 1), (5, 3, 2), (20, 2, 0), (41, 2, 1)],
-)
-def test_smoothing_is_scipys(count: int, window: int, order: int, derivative: int) -> None:
-    samples = np.random.default_rng(7).normal(size=count)
-    wanted = savgol_filter(samples, min(window, count), order, deriv=derivative, delta=0.1)
-    found = filter_matrix(count, window, order, derivative) @ samples
-    assert found == pytest.approx(wanted, abs=1e-9)

@@ -6,7 +6,7 @@ import pytest
 
 from augment.scene.entities import Point, SceneOptions, TurnType
 from augment.scene.lane_graph import LaneGraph
-from augment.simulation.route import find_route
+from augment.simulation.road import find_route
 from tests.scenes import junction
 
 

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from augment.simulation.idm import PLANNER_IDM, PROPOSAL_IDM, TRAFFIC_IDM, Idm
-from augment.simulation.lane_drivers import LaneDrivers
-from augment.simulation.objects import Kind, Objects, join_objects
 from augment.simulation.road import Road
+from augment.simulation.road_users import LaneDrivers
+from augment.simulation.states import Kind, Objects, join_objects
 from tests.scenes import vehicle
 from tests.simulation.worlds import street
 

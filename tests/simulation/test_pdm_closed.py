@@ -10,15 +10,14 @@ import pytest
 
 from augment.scene.entities import Area, AreaKind, TrafficAgent
 from augment.scene.modification import Modification
-from augment.simulation.braking import brake, must_brake
 from augment.simulation.drive import run
-from augment.simulation.pdm_closed import PdmClosed
+from augment.simulation.pdm_closed import PdmClosed, brake, must_brake
 from augment.simulation.planning import Plan, Situation
-from augment.simulation.proposals import ORIGINAL_OFFSETS_M, PAPER_OFFSETS_M, Quirks
+from augment.simulation.proposals import ORIGINAL_OFFSETS_M, PAPER_OFFSETS_M
 from augment.simulation.road import Road
+from augment.simulation.road_users import objects_of
 from augment.simulation.setting import DriveSetting
 from augment.simulation.states import FloatArray, start_state
-from augment.simulation.walkers import objects_of
 from tests.scenes import cone, pedestrian, vehicle
 from tests.simulation.worlds import BODY, states_along, street
 
@@ -59,22 +58,6 @@ def test_it_starts_where_the_rear_axle_is_and_accelerates_by_the_idm() -> None:
     assert steps[1] - steps[0] == pytest.approx(
         0.01 * 1.5 * (1.0 - 0.8**10), rel=0.01
     )  # something stands at the far end of the path
-
-
-def test_a_stale_leader_changes_what_slow_policies_see() -> None:
-    # A comes from the right behind the fastest policy and before the slower ones.
-    agents = [
-        replace(vehicle("A", 4.6, -9.0, math.pi / 2.0), speed_mps=4.0),
-        replace(vehicle("B", 30.0, 0.0), speed_mps=5.0),
-    ]
-    plain, stale = (
-        planned(agents, speed_mps=3.0, quirks=Quirks(stale_leader=on)) for on in (False, True)
-    )
-    assert plain.proposals is not None
-    assert stale.proposals is not None
-    changed = np.abs(plain.proposals.states - stale.proposals.states).max(axis=(1, 2)) > 1e-6
-    assert not changed.reshape(9, 5)[:, -1].any()
-    assert changed.any()
 
 
 @pytest.mark.parametrize(

@@ -10,9 +10,8 @@ import pytest
 
 from augment.scene.entities import AgentType, TrafficAgent
 from augment.scene.modification import Modification
-from augment.simulation.drive import run
+from augment.simulation.drive import ExpertKind, expert_of, run
 from augment.simulation.encounters import collisions
-from augment.simulation.expert import ExpertKind, expert_of
 from augment.simulation.pdm_closed import PdmClosed
 from augment.simulation.proposals import ORIGINAL_OFFSETS_M
 from augment.simulation.road import Road

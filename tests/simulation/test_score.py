@@ -14,9 +14,9 @@ from augment.scene.catalogue import ScenarioType
 from augment.scene.entities import LaneConnector, Scene, TrafficAgent, TrafficLight
 from augment.scene.modification import Modification
 from augment.simulation.criticality import criticality
+from augment.simulation.drive import Expert, ExpertKind
 from augment.simulation.encounters import collisions
-from augment.simulation.expert import Expert, ExpertKind
-from augment.simulation.metric import Metric, combine
+from augment.simulation.metrics import Metric, combine, red_lights
 from augment.simulation.score import Score, ScoreKind, score_drive
 from augment.simulation.states import FloatArray
 from tests.scenes import cone, pedestrian, vehicle
@@ -243,7 +243,7 @@ def test_red_lights_count_only_where_asked_for(state: TrafficLight) -> None:
     drive = driven(states_along(STEADY), on=replace(plain, connectors=(crossing,)))
     assert score_drive(drive, FAR).value == 1.0
     wanted = 0.0 if state is TrafficLight.RED else 1.0
-    assert score_drive(drive, FAR, with_red_lights=True).value == wanted
+    assert red_lights(drive).value == wanted
 
 
 def test_criticality_of_a_drive_towards_a_parked_car() -> None:

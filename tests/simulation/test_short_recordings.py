@@ -7,9 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from augment.simulation.drive import run
-from augment.simulation.expert import ExpertKind, expert_of
-from augment.simulation.progress import progress_ratio
+from augment.simulation.drive import ExpertKind, expert_of, run
+from augment.simulation.metrics import progress_ratio
 from augment.simulation.road import Road
 from augment.simulation.setting import DriveSetting
 from bench.recording_lengths import (

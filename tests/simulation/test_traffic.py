@@ -12,10 +12,9 @@ from augment.geometry.polyline import Polyline
 from augment.scene.entities import AgentType, LaneConnector, TrafficAgent, TrafficLight
 from augment.scene.modification import Modification
 from augment.scene.recording import Recording, Track
-from augment.simulation.objects import Objects
 from augment.simulation.road import Road
 from augment.simulation.setting import DriveSetting
-from augment.simulation.states import start_state
+from augment.simulation.states import Objects, start_state
 from augment.simulation.traffic import Traffic
 from tests.scenes import pedestrian, vehicle
 from tests.simulation.worlds import BODY, street

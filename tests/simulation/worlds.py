@@ -10,10 +10,9 @@ import numpy as np
 from augment.geometry.polyline import Polyline
 from augment.scene.entities import Lane, Scene, TrafficAgent
 from augment.simulation.drive import Drive
-from augment.simulation.objects import NOBODY, Objects
 from augment.simulation.road import Road
-from augment.simulation.states import HEADING, SPEED, EgoBody, FloatArray, X, Y
-from augment.simulation.walkers import objects_of
+from augment.simulation.road_users import objects_of
+from augment.simulation.states import HEADING, NOBODY, SPEED, EgoBody, FloatArray, Objects, X, Y
 from tests.scenes import EGO, scene
 
 BODY = EgoBody()
