@@ -28,7 +28,7 @@ from augment.prompts.vectors import LaneFormat
 from augment.scene.entities import Scene
 from augment.scene.modification import Modification
 from augment.variants.recipes import RECIPES
-from augment.variants.showing import roles_of, shown_prompt
+from augment.variants.showing import shown_prompt
 from bench.report import PAGE, table, write_block
 from bench.rivals.environments import RIVALS, python_of
 from tests.fixtures.shelf import HARD_SLUGS, SLUGS, entry, shown_scene, whole_scene
@@ -77,7 +77,7 @@ def tokens(slug: str, scenes: list[Scene]) -> list[int]:
     texts = [
         [
             message.text
-            for role in roles_of(recipe)
+            for role in recipe.roles
             for message in shown_prompt(recipe, role, scene, WISH, Modification()).messages
         ]
         for scene in scenes

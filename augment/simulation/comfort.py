@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from scipy.signal import savgol_filter
 
 from augment.simulation.states import (
     ACCELERATION,
@@ -36,6 +35,8 @@ def filter_matrix(count: int, window: int, order: int, derivative: int = 0) -> F
         order: Of the polynomial.
         derivative: 0 for the value, 1 for the rate, 2 for its rate.
     """
+    from scipy.signal import savgol_filter
+
     window = min(window, count)
     matrix = savgol_filter(
         np.eye(count), window, min(order, window - 1), deriv=derivative, delta=STEP_S, axis=0

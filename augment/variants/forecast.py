@@ -6,10 +6,11 @@ counts them too.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from augment.variants.recipes import Recipe, Review, Tools
+from augment.variants.recipes import Recipe, Tools
 from augment.variants.transcript import ModelRole
 
 PROGRAM_TOKENS = 2_000
@@ -43,21 +44,16 @@ def calls_of(recipe: Recipe) -> dict[ModelRole, CallRange]:
     """The calls of every role that a recipe has."""
     limits = recipe.limits
     again = 1 + limits.re_asks
-    rounds = 1 if recipe.review is Review.NONE else 1 + limits.regenerations
+    rounds = recipe.rounds
     has_tool = recipe.tools is not Tools.NONE
     # The answer with the first call too many, and the one that it is asked for.
     a_round = again + (limits.calls.calls + 1 if has_tool else 0)
     calls = {
         ModelRole.MODIFIER: CallRange(least=1, usual=1 + has_tool, most=rounds * a_round),
     }
-    match recipe.review:
-        case Review.TEXT:
-            calls[ModelRole.REVIEWER] = CallRange(least=1, usual=1, most=rounds * again)
-        case Review.VISUAL:
-            calls[ModelRole.ENGINEER] = CallRange(least=2, usual=2, most=2 * rounds * again)
-            calls[ModelRole.VIEWER] = CallRange(least=1, usual=1, most=rounds * again)
-        case Review.NONE | Review.GEOMETRIC:
-            pass
+    if recipe.review is not None:
+        for role, asked in Counter(recipe.review.asks).items():
+            calls[role] = CallRange(least=asked, usual=asked, most=asked * rounds * again)
     return calls
 
 
@@ -72,7 +68,7 @@ def most_tokens(recipe: Recipe, first: Mapping[ModelRole, int]) -> dict[ModelRol
     # A cut-off answer is asked for again with twice the room.
     longest = limits.max_tokens * (2 if limits.re_asks else 1)
     turn = longest + PROGRAM_TOKENS
-    rounds = 1 if recipe.review is Review.NONE else 1 + limits.regenerations
+    rounds = recipe.rounds
     by_role = {}
     for role, calls in calls_of(recipe).items():
         # The modifier's conversation goes on through all rounds; a review is one of its own, and

@@ -8,26 +8,17 @@ modification in spite of doubts has the last word, in spite of what is wrong it 
 
 from __future__ import annotations
 
-from augment.checks import Finding, Ground, Severity
+from augment.checks import Finding, Severity
 from augment.checks.against_intent import check_against_intent
 from augment.prompts.names import short_names
-from augment.scene.intent import Intent
-from augment.variants.verdict import Submission, Verdict
+from augment.variants.review import Review, Submission, Verdict
 
 _TOLD = (Severity.WRONG, Severity.DOUBTFUL)
 
 
-def review_geometry(
-    submission: Submission, ground: Ground, intent: Intent | None = None
-) -> Verdict:
-    """What the checks make of a modification.
-
-    Args:
-        submission: What is reviewed.
-        ground: Of the submission's scene.
-        intent: What the instruction asks for, None where nobody has written it down.
-    """
-    findings = check_against_intent(ground, submission.modification, intent)
+def review_geometry(submission: Submission) -> Verdict:
+    """What the checks make of a modification."""
+    findings = check_against_intent(submission.ground, submission.modification, submission.intent)
     shown = [one for severity in _TOLD for one in findings if one.severity is severity]
     wrong = sum(one.severity is Severity.WRONG for one in shown)
     doubtful = len(shown) - wrong
@@ -59,3 +50,6 @@ def _document(finding: Finding, names: dict[str, str]) -> dict[str, object]:
         "agents": list(finding.agents),
         "sentence": finding.sentence(names),
     }
+
+
+GEOMETRIC_REVIEW = Review(name="geometric", judge=review_geometry)

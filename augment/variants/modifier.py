@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
+from augment.checks import Ground
 from augment.prompts import fill
 from augment.prompts.fill import Calling, Form
 from augment.prompts.reply import ReadReply, read_reply
@@ -44,7 +46,7 @@ def form_of(recipe: Recipe, *, native_tools: bool = False) -> Form:
     )
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True)
 class Modifier:
     """One modifier at work on one scene.
 
@@ -56,6 +58,11 @@ class Modifier:
     scene: Scene
     respondents: Respondents
     intent: Intent | None = None
+
+    @cached_property
+    def ground(self) -> Ground:
+        """The scene, laid out for the checks once for all rounds."""
+        return Ground.of(self.scene)
 
     @property
     def form(self) -> Form:

@@ -16,7 +16,9 @@ from typing import Any
 
 from augment.errors import InvalidDocument
 from augment.render.camera import WIDTH_PX
-from augment.variants.recipes import Limits, Recipe, Review, Tools
+from augment.variants.recipes import Recipe, Tools
+from augment.variants.respondents import Sampling
+from augment.variants.review import Limits
 
 EFFORTS = ("none", "minimal", "low", "medium", "high", "xhigh", "max")
 """What endpoints call how long a model thinks; not every one takes each."""
@@ -31,15 +33,6 @@ class ToolProtocol(StrEnum):
 
     PROMPT = "prompt"
     NATIVE = "native"
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Sampling:
-    """What every request of a run is sent with; None is not sent."""
-
-    temperature: float | None = None
-    seed: int | None = None
-    reasoning_effort: str | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -145,13 +138,10 @@ def options_from_document(document: Mapping[str, object]) -> ContestantOptions:
 
 def names_for(recipe: Recipe) -> tuple[str, ...]:
     """The options that a recipe has a use for."""
-    lacking = {
-        "protocol": recipe.tools is Tools.NONE,
-        "rounds": recipe.review is Review.NONE,
-        "accepted_from": recipe.review is not Review.TEXT,
-        "picture_px": recipe.review is not Review.VISUAL,
-    }
-    return tuple(name for name in NAMES if not lacking.get(name))
+    useful = {"rounds", *recipe.review.options} if recipe.review else set[str]()
+    if recipe.tools is not Tools.NONE:
+        useful.add("protocol")
+    return tuple(name for name in NAMES if name in useful or name not in _WITHOUT)
 
 
 def check_options(recipe: Recipe, options: ContestantOptions) -> None:

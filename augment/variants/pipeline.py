@@ -17,9 +17,8 @@ from augment.scene.entities import Scene
 from augment.scene.intent import Intent
 from augment.scene.modification import Modification
 from augment.variants.modifier import Modifier
-from augment.variants.options import Sampling
 from augment.variants.recipes import RECIPES, Recipe
-from augment.variants.respondents import RespondentClient, Respondents
+from augment.variants.respondents import RespondentClient, Respondents, Sampling
 from augment.variants.rounds import modify_and_review
 from augment.variants.transcript import ModelRole, Transcript
 

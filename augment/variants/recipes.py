@@ -11,29 +11,12 @@ from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
 from augment.errors import UnknownName
-from augment.llm.messages import DEFAULT_MAX_TOKENS
-from augment.prompts.vectors import DEFAULT_RADIUS_M, LaneFormat
-from augment.render.camera import WIDTH_PX
-from augment.variants.pose_call import CallLimits
-
-__all__ = [
-    "FC",
-    "GEO",
-    "OTM",
-    "PAPER",
-    "RECIPES",
-    "SPELLING",
-    "TQA",
-    "VQA",
-    "Keep",
-    "LaneFormat",
-    "Limits",
-    "Recipe",
-    "Review",
-    "Tools",
-    "find_recipe",
-    "spell_variant",
-]
+from augment.prompts.vectors import LaneFormat
+from augment.variants.geometric_review import GEOMETRIC_REVIEW
+from augment.variants.review import Limits, Review
+from augment.variants.text_qa import TEXT_REVIEW
+from augment.variants.transcript import ModelRole
+from augment.variants.visual_qa import VISUAL_REVIEW
 
 SPELLING = {"otm": "OTM", "fc": "FC", "tqa": "tQA", "vqa": "vQA", "geo": "geo"}
 """The variants as the paper spells and orders them, then ours."""
@@ -46,15 +29,6 @@ class Tools(StrEnum):
     POSE = "pose"
 
 
-class Review(StrEnum):
-    """Who looks at the result before it counts."""
-
-    NONE = "none"
-    TEXT = "text"
-    VISUAL = "visual"
-    GEOMETRIC = "geometric"
-
-
 class Keep(StrEnum):
     """Which round's modification counts: the best reviewed (of equals the last), or the last.
 
@@ -63,29 +37,6 @@ class Keep(StrEnum):
 
     BEST = "best"
     LAST = "last"
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Limits:
-    """What one run of a recipe may use.
-
-    Attributes:
-        radius_m: How far around the ego the scene is written down.
-        max_tokens: The length limit of one answer; a cut-off answer is asked again with twice it.
-        re_asks: How often an answer that can't be read is asked for again.
-        regenerations: How often a review can send the modifier back to work.
-        calls: Of tools, in one round.
-        accepted_from: The mean rating from which a text review is content.
-        picture_px: The width of the picture that a viewer is shown.
-    """
-
-    radius_m: float = DEFAULT_RADIUS_M
-    max_tokens: int = DEFAULT_MAX_TOKENS
-    re_asks: int = 1
-    regenerations: int = 2
-    calls: CallLimits = field(default_factory=CallLimits)
-    accepted_from: float = 4.0
-    picture_px: int = WIDTH_PX
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -100,20 +51,32 @@ class Recipe:
     title: str
     lane_format: LaneFormat = LaneFormat.POLYLINE
     tools: Tools = Tools.NONE
-    review: Review = Review.NONE
+    review: Review | None = None
     keep: Keep = Keep.LAST
-    limits: Limits = Limits()
+    limits: Limits = field(default_factory=Limits)
 
     def __post_init__(self) -> None:
         if self.lane_format is LaneFormat.BEZIER and self.tools is Tools.NONE:
             raise ValueError(f"{self.slug}: Bezier lanes come with the pose tool")
 
+    @property
+    def roles(self) -> tuple[ModelRole, ...]:
+        """The roles that language models play in it."""
+        return tuple(
+            dict.fromkeys((ModelRole.MODIFIER, *(self.review.asks if self.review else ())))
+        )
+
+    @property
+    def rounds(self) -> int:
+        """How often the modifier is put to work at most."""
+        return 1 if self.review is None else 1 + self.limits.regenerations
+
 
 OTM = Recipe(slug="otm", title="One-time modifier")
 FC = Recipe(slug="fc", title="Function calling", lane_format=LaneFormat.BEZIER, tools=Tools.POSE)
-TQA = Recipe(slug="tqa", title="Text QA", review=Review.TEXT, keep=Keep.BEST)
-VQA = Recipe(slug="vqa", title="Visual QA", review=Review.VISUAL)
-GEO = Recipe(slug="geo", title="Geometric review (ours)", review=Review.GEOMETRIC, keep=Keep.BEST)
+TQA = Recipe(slug="tqa", title="Text QA", review=TEXT_REVIEW, keep=Keep.BEST)
+VQA = Recipe(slug="vqa", title="Visual QA", review=VISUAL_REVIEW)
+GEO = Recipe(slug="geo", title="Geometric review (ours)", review=GEOMETRIC_REVIEW, keep=Keep.BEST)
 
 PAPER: tuple[Recipe, ...] = (OTM, FC, TQA, VQA)
 

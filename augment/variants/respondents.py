@@ -11,12 +11,20 @@ from augment.llm.client import ChatClient
 from augment.llm.messages import Message, Reply, Request, Tool, ToolChoice
 from augment.llm.patience import Patience
 from augment.prompts.texts import prompt_version
-from augment.variants.options import Sampling
 from augment.variants.recording_client import RecordingClient
 from augment.variants.transcript import ModelRole, Transcript
 
 Messages = tuple[Message, ...]
 _Read = TypeVar("_Read")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Sampling:
+    """What every request of a run is sent with; None is not sent."""
+
+    temperature: float | None = None
+    seed: int | None = None
+    reasoning_effort: str | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

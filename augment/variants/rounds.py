@@ -10,25 +10,17 @@ made before stands, and the notes say so.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 
-from augment.checks import Ground
 from augment.errors import ModelRefused, ReplyUnreadable, ReviewUnusable
 from augment.prompts import fill
 from augment.prompts.reply import ReadReply
 from augment.prompts.vectors import changes_text
-from augment.variants.geometric_review import review_geometry
 from augment.variants.modifier import Draft, Modifier
-from augment.variants.recipes import Keep, Recipe, Review
-from augment.variants.respondents import Messages
-from augment.variants.text_qa import review_text
+from augment.variants.recipes import Keep, Recipe
+from augment.variants.review import Review, Submission, Verdict
 from augment.variants.transcript import NoteKind
-from augment.variants.verdict import Submission, Verdict
-from augment.variants.visual_qa import review_picture
-
-Reviewing = Callable[[Submission], Verdict]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -62,8 +54,7 @@ def modify_and_review(modifier: Modifier, instruction: str) -> Result:
         ModelRefused: The modifier declined in its first round.
         ModelFault: The wire broke for good.
     """
-    recipe, transcript = modifier.recipe, modifier.respondents.transcript
-    reviewing = _reviewing(modifier)
+    review, transcript = modifier.recipe.review, modifier.respondents.transcript
     rounds: list[Round] = []
     remark = ""
     messages = modifier.task(instruction)
@@ -77,72 +68,51 @@ def modify_and_review(modifier: Modifier, instruction: str) -> Result:
             transcript.note(NoteKind.ROUND, {"round": number, "fault": str(fault)})
             remark = f"Round {number} brought no modification: {fault}"
             break
-        if reviewing is None:
+        if review is None:
             only = Round(number=1, read=draft.read, verdict=None)
             return Result(kept=only, is_accepted=None, remark="")
         _note_round(modifier, number, draft)
-        verdict, fault_text = _reviewed(modifier, reviewing, instruction, draft, rounds)
+        submission = _submission(modifier, instruction, draft, rounds)
+        verdict, remark = _reviewed(review, submission, number)
         rounds.append(Round(number=number, read=draft.read, verdict=verdict))
-        if verdict is None:
-            remark = fault_text
+        if verdict is None or verdict.is_accepted or number == modifier.recipe.rounds:
             break
-        if verdict.is_accepted or number > recipe.limits.regenerations:
-            break
-        messages = _regenerate(draft, verdict)
+        messages = fill.regenerate_messages(
+            draft.messages, verdict.feedback, is_measured=verdict.is_measured
+        )
     return _result(modifier, rounds, remark)
 
 
 # --- Private -----------------------------------------------------------------------------------
 
 
-def _reviewing(modifier: Modifier) -> Reviewing | None:
-    """Who reviews, as the recipe says."""
-    respondents, limits = modifier.respondents, modifier.recipe.limits
-    match modifier.recipe.review:
-        case Review.NONE:
-            return None
-        case Review.TEXT:
-            return partial(review_text, respondents=respondents, limits=limits)
-        case Review.VISUAL:
-            return partial(review_picture, respondents=respondents, limits=limits)
-        case Review.GEOMETRIC:
-            return partial(
-                review_geometry, ground=Ground.of(modifier.scene), intent=modifier.intent
-            )
-
-
-def _reviewed(
-    modifier: Modifier,
-    reviewing: Reviewing,
-    instruction: str,
-    draft: Draft,
-    rounds: list[Round],
-) -> tuple[Verdict | None, str]:
-    """The verdict, or None and why there is none."""
-    submission = Submission(
-        scene=modifier.scene,
+def _submission(
+    modifier: Modifier, instruction: str, draft: Draft, rounds: list[Round]
+) -> Submission:
+    return Submission(
+        ground=modifier.ground,
         instruction=instruction,
         modification=draft.read.modification,
+        respondents=modifier.respondents,
+        limits=modifier.recipe.limits,
         earlier=rounds[-1].read.modification if rounds else None,
         told=tuple(
             entry for one in rounds if one.verdict is not None for entry in one.verdict.feedback
         ),
+        intent=modifier.intent,
     )
-    number, kind = len(rounds) + 1, modifier.recipe.review.value
-    note = partial(modifier.respondents.transcript.note, NoteKind.REVIEW)
+
+
+def _reviewed(review: Review, submission: Submission, number: int) -> tuple[Verdict | None, str]:
+    """The verdict, or None and why there is none."""
+    note = partial(submission.respondents.transcript.note, NoteKind.REVIEW)
     try:
-        verdict = reviewing(submission)
+        verdict = review.judge(submission)
     except ReviewUnusable as unusable:
-        note({"round": number, "review": kind, "unusable": unusable.reason})
+        note({"round": number, "review": review.name, "unusable": unusable.reason})
         return None, str(unusable)
-    note({"round": number, "review": kind} | verdict.document)
+    note({"round": number, "review": review.name} | verdict.document)
     return verdict, ""
-
-
-def _regenerate(draft: Draft, verdict: Verdict) -> Messages:
-    return fill.regenerate_messages(
-        draft.messages, verdict.feedback, is_measured=verdict.is_measured
-    )
 
 
 def _note_round(modifier: Modifier, number: int, draft: Draft) -> None:

@@ -14,10 +14,11 @@ from augment.llm.messages import Message
 from augment.prompts import fill, fill_review
 from augment.prompts.lane_curves import lane_curves
 from augment.prompts.names import short_names
+from augment.prompts.vectors import LaneFormat
 from augment.scene.entities import Scene
 from augment.scene.modification import Modification
 from augment.variants.modifier import form_of
-from augment.variants.recipes import LaneFormat, Recipe, Review
+from augment.variants.recipes import Recipe
 from augment.variants.transcript import ModelRole
 from augment.variants.visual_qa import pictures
 
@@ -30,13 +31,6 @@ EXAMPLE_QUESTIONS = (
     "Between which grid lines is the centre of each blue object?",
 )
 """Shown to a viewer where no engineer has asked."""
-
-_ROLES = {
-    Review.NONE: (),
-    Review.TEXT: (ModelRole.REVIEWER,),
-    Review.VISUAL: (ModelRole.ENGINEER, ModelRole.VIEWER),
-    Review.GEOMETRIC: (),
-}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -74,11 +68,6 @@ class Shown:
         characters = sum(len(message.text) for message in self.messages)
         characters += sum(len(tool) for tool in self.tools)
         return math.ceil(characters / CHARACTERS_PER_TOKEN)
-
-
-def roles_of(recipe: Recipe) -> tuple[ModelRole, ...]:
-    """The roles that language models play in a recipe."""
-    return (ModelRole.MODIFIER, *_ROLES[recipe.review])
 
 
 def shown_prompt(

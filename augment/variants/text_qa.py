@@ -11,19 +11,19 @@ from functools import partial
 from augment.errors import ModelRefused, ReplyUnreadable, ReviewUnusable
 from augment.prompts import fill_review
 from augment.prompts.review import RatedReview, read_ratings
-from augment.variants.recipes import Limits
-from augment.variants.respondents import Inquiry, Respondents
+from augment.variants.respondents import Inquiry
+from augment.variants.review import Review, Submission, Verdict
 from augment.variants.transcript import ModelRole
-from augment.variants.verdict import Submission, Verdict
 
 
-def review_text(submission: Submission, respondents: Respondents, limits: Limits) -> Verdict:
+def review_text(submission: Submission) -> Verdict:
     """The text reviewer's verdict.
 
     Raises:
         ReviewUnusable: He declined, or neither his first nor his re-asked ratings can be read.
         ModelFault: The wire broke for good.
     """
+    limits = submission.limits
     messages = fill_review.reviewer_messages(
         submission.scene,
         submission.instruction,
@@ -32,7 +32,7 @@ def review_text(submission: Submission, respondents: Respondents, limits: Limits
         earlier=submission.told,
     )
     inquiry = Inquiry(
-        respondents=respondents,
+        respondents=submission.respondents,
         role=ModelRole.REVIEWER,
         again=fill_review.review_re_ask_messages,
         max_tokens=limits.max_tokens,
@@ -70,3 +70,8 @@ def _verdict(review: RatedReview, accepted_from: float) -> Verdict:
             "answers": review.answers,
         },
     )
+
+
+TEXT_REVIEW = Review(
+    name="text", judge=review_text, asks=(ModelRole.REVIEWER,), options=("accepted_from",)
+)

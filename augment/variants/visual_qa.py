@@ -19,21 +19,21 @@ from augment.render.camera import WIDTH_PX, camera_for
 from augment.render.reviewed import draw_for_review
 from augment.scene.entities import Scene
 from augment.scene.modification import Modification
-from augment.variants.recipes import Limits
-from augment.variants.respondents import Inquiry, Messages, Respondents
+from augment.variants.respondents import Inquiry, Messages
+from augment.variants.review import Review, Submission, Verdict
 from augment.variants.transcript import ModelRole
-from augment.variants.verdict import Submission, Verdict
 
 
-def review_picture(submission: Submission, respondents: Respondents, limits: Limits) -> Verdict:
+def review_picture(submission: Submission) -> Verdict:
     """The engineer's verdict on what the viewer sees.
 
     Raises:
         ReviewUnusable: One of the two declined or can't be read, not even asked once more.
         ModelFault: The wire broke for good.
     """
+    limits = submission.limits
     engineer = Inquiry(
-        respondents=respondents,
+        respondents=submission.respondents,
         role=ModelRole.ENGINEER,
         again=fill_review.review_re_ask_messages,
         max_tokens=limits.max_tokens,
@@ -49,7 +49,7 @@ def review_picture(submission: Submission, respondents: Respondents, limits: Lim
     try:
         questions, asked, reply = engineer.read(messages, read_questions)
         viewer = replace(engineer, role=ModelRole.VIEWER)
-        seen = _seen(submission, questions, viewer, limits.picture_px)
+        seen = _seen(submission, questions, viewer)
         said: Messages = (*asked, model_message(reply.text))
         verdict, _, _ = engineer.read(
             fill_review.verdict_messages(said, questions, seen), read_verdict
@@ -81,10 +81,11 @@ def pictures(
     return draw_for_review(shown, change, camera_for(shown, change).at_width(width_px))
 
 
-def _seen(
-    submission: Submission, questions: tuple[str, ...], inquiry: Inquiry, width_px: int
-) -> dict[int, str]:
-    shown = pictures(submission.scene, submission.modification, width_px=width_px)
+def _seen(submission: Submission, questions: tuple[str, ...], inquiry: Inquiry) -> dict[int, str]:
+    """What the viewer answers to the questions, by their numbers."""
+    shown = pictures(
+        submission.scene, submission.modification, width_px=submission.limits.picture_px
+    )
     inquiry = replace(
         inquiry, again=lambda told, said, _: fill_review.viewer_re_ask_messages(told, said)
     )
@@ -126,3 +127,11 @@ def _under_short_names(scene: Scene, modification: Modification) -> tuple[Scene,
         removed=tuple(names.agents[name] for name in modification.removed),
     )
     return shown, change
+
+
+VISUAL_REVIEW = Review(
+    name="visual",
+    judge=review_picture,
+    asks=(ModelRole.ENGINEER, ModelRole.VIEWER, ModelRole.ENGINEER),
+    options=("picture_px",),
+)

@@ -26,6 +26,7 @@ HEAVY = {
     "matplotlib": ("arena.exports",),
     "scipy.interpolate": ("augment.fake_llm",),
     "scipy.optimize": ("augment.metrics",),
+    "scipy.signal": ("augment.simulation",),
     "scipy.sparse": ("arena.rating",),
     "scipy.stats": ("arena.rating", "augment.metrics"),
 }

@@ -14,7 +14,7 @@ from augment.prompts.fill_review import viewer_messages
 from augment.prompts.texts import said_by_user
 from augment.scene.modification import Modification
 from augment.variants.modifier import form_of
-from augment.variants.recipes import RECIPES, Review
+from augment.variants.recipes import RECIPES, VQA
 from augment.variants.showing import Shown, shown_prompt
 from augment.variants.transcript import ModelRole
 from tests.scenes import junction, pedestrian, vehicle
@@ -71,7 +71,7 @@ def test_every_recipe_shows_one_of_these_prompts() -> None:
     for one in RECIPES.values():
         form = form_of(one)
         assert (form.lanes, form.calling) in {("polyline", "none"), ("bezier", "in_prompt")}
-        if one.review is Review.VISUAL:
+        if one.review is VQA.review:
             (_, task) = viewer_messages(["a?", "b?", "c?"], [b"one", b"two"])
             assert task.images == (b"one", b"two")
 

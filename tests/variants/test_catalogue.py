@@ -17,7 +17,7 @@ from augment.llm.openai_wire import OpenAIWire
 from augment.llm.patience import Patience
 from augment.metrics.displacement import displacement
 from augment.variants.pipeline import Outcome, OutcomeStatus, run
-from augment.variants.recipes import RECIPES, Review, Tools, find_recipe
+from augment.variants.recipes import RECIPES, Tools, find_recipe
 from augment.variants.respondents import RespondentClient
 from augment.variants.transcript import MemoryTranscript
 from tests.baselines.test_rule_placer_catalogue import placed
@@ -80,7 +80,7 @@ def test_every_recipe_is_played() -> None:
 @pytest.mark.timeout(400)
 @pytest.mark.parametrize("variant", CALLS_OF_GOOD)
 def test_every_variant_does_the_scenarios(server: FakeServer, variant: str) -> None:
-    reviewed = RECIPES[variant].review is not Review.NONE
+    reviewed = RECIPES[variant].review is not None
     # What is put together of two known parts shows on a quarter of them.
     for slug in SLUGS[::4] if "+" in variant else SLUGS:
         outcome, transcript = played(server, "fake-good", variant, slug)
@@ -147,8 +147,8 @@ def _is_complete(
     assert ("tool_call" in kinds) is (looks_up and way.tools is Tools.POSE)
     rest = [kind for kind in kinds if kind != "tool_call"]
     rounds = kinds.count("round")
-    assert rest == ([] if way.review is Review.NONE else ["round", "review"] * rounds + ["kept"])
-    assert rounds == (way.review is not Review.NONE) * (1 + doubted)
+    assert rest == ([] if way.review is None else ["round", "review"] * rounds + ["kept"])
+    assert rounds == (way.review is not None) * (1 + doubted)
 
 
 def _is_where_it_belongs(outcome: Outcome, slug: str) -> None:

@@ -20,7 +20,7 @@ from augment.fake_llm.server import FakeServer, running
 from augment.llm.openai_wire import OpenAIWire
 from augment.llm.patience import Patience
 from augment.variants.pipeline import run
-from augment.variants.recipes import RECIPES, find_recipe
+from augment.variants.recipes import GEO, RECIPES, find_recipe
 from augment.variants.respondents import RespondentClient
 from augment.variants.transcript import MemoryTranscript, ModelRole
 from tests.intents import intents
@@ -89,6 +89,6 @@ def test_the_page_on_the_method_names_every_recipe_and_its_parts() -> None:
         _, lanes, tool, review, counts, origin = rows[slug]
         assert ("Bezier" in lanes) is (one.lane_format == "bezier")
         assert ("pose_on_lane" in tool) is (one.tools == "pose")
-        assert review.strip() == one.review
+        assert review.strip() == (one.review.name if one.review else "none")
         assert ("of equals the last" in counts) is (one.keep == "best")
-        assert ("ours" in origin) is (one.review == "geometric")
+        assert ("ours" in origin) is (one.review is GEO.review)

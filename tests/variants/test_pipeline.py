@@ -12,7 +12,7 @@ from augment.llm.patience import Patience
 from augment.llm.scripted import ScriptedClient
 from augment.prompts.fill import prompt_version
 from augment.variants.pipeline import Outcome, OutcomeStatus, run
-from augment.variants.recipes import OTM, Review
+from augment.variants.recipes import OTM, TQA
 from augment.variants.respondents import RespondentClient
 from augment.variants.transcript import MemoryTranscript
 from tests.scenes import scene
@@ -115,7 +115,7 @@ def test_the_transcript_has_the_answer_before_anybody_reads_it() -> None:
 def test_a_recipe_that_nobody_can_run_is_refused() -> None:
     with pytest.raises(UnknownName, match="tqa"):
         run(
-            replace(OTM, slug="tqa", review=Review.TEXT),
+            replace(OTM, slug="tqa", review=TQA.review),
             scene=scene(),
             instruction="Add a car.",
             modifier=RespondentClient(client=ScriptedClient([]), model="m"),

@@ -2,14 +2,13 @@ from __future__ import annotations
 
 import pytest
 
+from augment.prompts.vectors import LaneFormat
 from augment.variants.recipes import (
     FC,
     PAPER,
     TQA,
     Keep,
-    LaneFormat,
     Recipe,
-    Review,
     Tools,
     find_recipe,
 )
@@ -21,14 +20,16 @@ def test_a_recipe_is_found_in_any_case(name: str) -> None:
     assert (found.lane_format, found.tools, found.review) == (
         LaneFormat.POLYLINE,
         Tools.NONE,
-        Review.NONE,
+        None,
     )
 
 
 def test_the_papers_four_are_its_table() -> None:
-    assert [(one.slug, one.lane_format.value, one.review.value) for one in PAPER] == [
-        ("otm", "polyline", "none"),
-        ("fc", "bezier", "none"),
+    assert [
+        (one.slug, one.lane_format.value, one.review and one.review.name) for one in PAPER
+    ] == [
+        ("otm", "polyline", None),
+        ("fc", "bezier", None),
         ("tqa", "polyline", "text"),
         ("vqa", "polyline", "visual"),
     ]

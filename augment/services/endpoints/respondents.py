@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from augment.errors import Conflict, InvalidDocument
 from augment.models import Contestant, Endpoint, EndpointModel
 from augment.variants.recipes import Recipe, find_recipe
-from augment.variants.showing import roles_of
 from augment.variants.transcript import ModelRole
 
 
@@ -39,7 +38,7 @@ def check_roles(recipe: Recipe, roles: Iterable[ModelRole]) -> None:
     Raises:
         InvalidDocument: One is named.
     """
-    free = [role for role in roles_of(recipe) if role is not ModelRole.MODIFIER]
+    free = [role for role in recipe.roles if role is not ModelRole.MODIFIER]
     allowed = f"{recipe.slug} has {', '.join(free) or 'no role besides the modifier'}"
     problems = [(f"roles.{role}", allowed) for role in roles if role not in free]
     if problems:
@@ -99,7 +98,7 @@ def _respondents(
     if contestant.endpoint is None:
         return {}
     own = Respondent(endpoint=contestant.endpoint, model=contestant.model)
-    respondents = dict.fromkeys(roles_of(find_recipe(contestant.variant)), own)
+    respondents = dict.fromkeys(find_recipe(contestant.variant).roles, own)
     for name, chosen in contestant.roles.items():
         endpoint = endpoints.get(chosen["endpoint"])
         if endpoint is None:

@@ -18,7 +18,8 @@ from augment.services.endpoints.contestants import LONGEST_NAME, add_contestant
 from augment.services.endpoints.keys import may_hold_key
 from augment.services.running.matrix import ContestantDocument, pick_slug
 from augment.variants.options import ContestantOptions, names_for, options_from_document
-from augment.variants.recipes import RECIPES, Recipe, Review, find_recipe, spell_variant
+from augment.variants.recipes import RECIPES, Recipe, find_recipe, spell_variant
+from augment.variants.transcript import ModelRole
 
 SEPARATOR = "|"
 
@@ -174,7 +175,7 @@ def _obstacle(known: EndpointModel, recipe: Recipe) -> str:
     variable = known.endpoint.key_variable
     if variable and not may_hold_key(variable):
         return f"{variable} may not hold a key"
-    if recipe.review is not Review.VISUAL or known.vision:
+    if ModelRole.VIEWER not in recipe.roles or known.vision:
         return ""
     if known.vision is None:
         return "nobody knows whether it sees pictures: probe it"

@@ -19,7 +19,7 @@ from augment.services.scenarios.pictures import store
 from augment.services.scenarios.scenes import reference_of, scene_key, scene_of
 from augment.variants.options import ContestantOptions, recipe_with
 from augment.variants.recipes import RECIPES, Tools, find_recipe
-from augment.variants.showing import Shown, roles_of, shown_prompt
+from augment.variants.showing import Shown, shown_prompt
 from augment.variants.transcript import ModelRole
 from augment.variants.visual_qa import pictures
 
@@ -51,8 +51,8 @@ def prompt_of(
         Conflict: Nobody plays that role in the variant, or it is to call natively and has no tool.
     """
     recipe = recipe_with(find_recipe(variant), options or ContestantOptions())
-    if role not in roles_of(recipe):
-        played = ", ".join(roles_of(recipe))
+    if role not in recipe.roles:
+        played = ", ".join(recipe.roles)
         raise Conflict(f"Nobody plays the {role} in {recipe.slug}; its roles: {played}.")
     if native_tools and (role is not ModelRole.MODIFIER or recipe.tools is Tools.NONE):
         raise Conflict(f"The {role} of {recipe.slug} calls no function, natively or otherwise.")
@@ -91,7 +91,7 @@ def list_choices() -> list[PromptChoice]:
         PromptChoice(
             slug=recipe.slug,
             title=recipe.title,
-            roles=tuple(role.value for role in roles_of(recipe)),
+            roles=tuple(role.value for role in recipe.roles),
             calls=recipe.tools is not Tools.NONE,
         )
         for recipe in RECIPES.values()
@@ -146,7 +146,7 @@ def preview_prompt(
     names: tuple[str, ...] = ()
     images: tuple[bytes, ...] | None = None
     recipe = recipe_with(find_recipe(variant), options or ContestantOptions())
-    if role == ModelRole.VIEWER and ModelRole.VIEWER in roles_of(recipe):
+    if role == ModelRole.VIEWER and ModelRole.VIEWER in recipe.roles:
         names = _drawn(scenario, recipe.limits.picture_px)
         if not names:
             return Preview(shown=None)
@@ -185,7 +185,7 @@ def draw_prompts(scenario_pk: int) -> None:
 
 def _widths() -> list[int]:
     """The widths of pictures that somebody is shown, the narrowest first."""
-    seeing = [one for one in RECIPES.values() if ModelRole.VIEWER in roles_of(one)]
+    seeing = [one for one in RECIPES.values() if ModelRole.VIEWER in one.roles]
     found = {recipe.limits.picture_px for recipe in seeing}
     rows = Contestant.objects.exclude(endpoint=None).values_list("options", "frozen_options")
     for documents in rows:
