@@ -75,7 +75,7 @@ def modify_and_review(modifier: Modifier, instruction: str) -> Result:
         submission = _submission(modifier, instruction, draft, rounds)
         verdict, remark = _reviewed(review, submission, number)
         rounds.append(Round(number=number, read=draft.read, verdict=verdict))
-        if verdict is None or verdict.is_accepted or number == modifier.recipe.rounds:
+        if verdict is None or verdict.is_accepted or number >= modifier.recipe.rounds:
             break
         messages = fill.regenerate_messages(
             draft.messages, verdict.feedback, is_measured=verdict.is_measured
