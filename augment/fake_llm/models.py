@@ -106,50 +106,43 @@ def _slow(request: ChatRequest, surroundings: Surroundings) -> Response:
     return replace(_good(request, surroundings), wait_s=surroundings.slow_s)
 
 
-def _500(request: ChatRequest, _: Surroundings) -> Response:
-    return error(500, "The server had an error.", kind="server_error")
+def _always(response: Response) -> Behaviour:
+    """The same response to every request."""
+    return lambda request, surroundings: response
+
+
+def _complete(
+    text: str | None, changes: dict[str, object] | None = None, **more: str
+) -> Behaviour:
+    """A completion with that text, whatever is asked."""
+    return lambda request, surroundings: as_json(
+        completion(request, text, **more) | (changes or {})  # type: ignore[arg-type]
+    )
+
+
+def _too_many(retry_after: str) -> Behaviour:
+    return _always(
+        error(
+            429,
+            "Rate limit reached.",
+            kind="requests",
+            code="rate_limit_exceeded",
+            headers={"Retry-After": retry_after},
+        )
+    )
+
+
+def _spoilt_block(fields: str) -> Behaviour:
+    start = json.dumps({"id": "Agent2", "type": "VEHICLE"})[:-1]
+    return _complete(f'Modified Vectors:\n```json\n{{"add": [{start}, {fields}}}]}}\n```\n')
+
+
+_500 = _always(error(500, "The server had an error.", kind="server_error"))
 
 
 def _500_then_ok(request: ChatRequest, surroundings: Surroundings) -> Response:
     answer = _500 if surroundings.is_first(request) else _good
     return answer(request, surroundings)
-
-
-def _429(request: ChatRequest, _: Surroundings) -> Response:
-    return _too_many("1")
-
-
-def _429_long(request: ChatRequest, _: Surroundings) -> Response:
-    return _too_many("600")
-
-
-def _too_many(retry_after: str) -> Response:
-    return error(
-        429,
-        "Rate limit reached.",
-        kind="requests",
-        code="rate_limit_exceeded",
-        headers={"Retry-After": retry_after},
-    )
-
-
-def _quota(request: ChatRequest, _: Surroundings) -> Response:
-    message = "You exceeded your current quota."
-    return error(429, message, kind="insufficient_quota", code="insufficient_quota")
-
-
-def _context(request: ChatRequest, _: Surroundings) -> Response:
-    message = "This model's maximum context length is 4096 tokens."
-    return error(400, message, param="messages", code="context_length_exceeded")
-
-
-def _list_error(request: ChatRequest, _: Surroundings) -> Response:
-    body = [{"error": {"code": 400, "message": "Invalid value.", "status": "INVALID_ARGUMENT"}}]
-    return as_json(body, status=400)
-
-
-def _html(request: ChatRequest, _: Surroundings) -> Response:
-    return Response(body=b"<html><body>Sign in</body></html>", content_type="text/html")
 
 
 def _broken_json(request: ChatRequest, surroundings: Surroundings) -> Response:
@@ -162,30 +155,9 @@ def _dropped(request: ChatRequest, surroundings: Surroundings) -> Response:
     return replace(whole, cut_at=len(whole.body) // 2)
 
 
-def _no_choices(request: ChatRequest, _: Surroundings) -> Response:
-    return as_json(completion(request, "") | {"choices": []})
-
-
-def _null_choices(request: ChatRequest, _: Surroundings) -> Response:
-    return as_json(completion(request, "") | {"choices": None})
-
-
 def _no_usage(request: ChatRequest, surroundings: Surroundings) -> Response:
     answer = good_answer(request, surroundings)
     return as_json(completion(request, answer, with_usage=False))
-
-
-def _refuse(request: ChatRequest, _: Surroundings) -> Response:
-    return as_json(completion(request, None, refusal="I can't help with that."))
-
-
-def _filtered(request: ChatRequest, _: Surroundings) -> Response:
-    return as_json(completion(request, None, finish_reason="content_filter"))
-
-
-def _prose(request: ChatRequest, _: Surroundings) -> Response:
-    text = "The car should stand some way ahead of the ego, a little to the side of its lane."
-    return as_json(completion(request, text))
 
 
 def _cut_off(request: ChatRequest, surroundings: Surroundings) -> Response:
@@ -194,23 +166,10 @@ def _cut_off(request: ChatRequest, surroundings: Surroundings) -> Response:
     return as_json(completion(request, text[:middle], finish_reason="length"))
 
 
-def _nan(request: ChatRequest, _: Surroundings) -> Response:
-    return as_json(completion(request, _spoilt_block('"x_m": NaN')))
-
-
-def _too_few(request: ChatRequest, _: Surroundings) -> Response:
-    return as_json(completion(request, _spoilt_block('"x_m": 20.0')))
-
-
 def _garbage(request: ChatRequest, _: Surroundings) -> Response:
     rng = careless.dice(request.model_dump_json())
     alphabet = '{}[]",:0123456789.-eE\n\\`#*abcXYZ \u00e9\u2028\x00add"move"remove"call"'
     return as_json(completion(request, "".join(rng.choices(alphabet, k=2000))))
-
-
-def _spoilt_block(fields: str) -> str:
-    start = json.dumps({"id": "Agent2", "type": "VEHICLE"})[:-1]
-    return f'Modified Vectors:\n```json\n{{"add": [{start}, {fields}}}]}}\n```\n'
 
 
 MODELS: dict[str, Behaviour] = {
@@ -227,22 +186,45 @@ MODELS: dict[str, Behaviour] = {
     "fake-cuts-context": _cuts_context,
     "fake-500": _500,
     "fake-500-then-ok": _500_then_ok,
-    "fake-429": _429,
-    "fake-429-long": _429_long,
-    "fake-quota": _quota,
-    "fake-context": _context,
-    "fake-list-error": _list_error,
-    "fake-html": _html,
+    "fake-429": _too_many("1"),
+    "fake-429-long": _too_many("600"),
+    "fake-quota": _always(
+        error(
+            429,
+            "You exceeded your current quota.",
+            kind="insufficient_quota",
+            code="insufficient_quota",
+        )
+    ),
+    "fake-context": _always(
+        error(
+            400,
+            "This model's maximum context length is 4096 tokens.",
+            param="messages",
+            code="context_length_exceeded",
+        )
+    ),
+    "fake-list-error": _always(
+        as_json(
+            [{"error": {"code": 400, "message": "Invalid value.", "status": "INVALID_ARGUMENT"}}],
+            status=400,
+        )
+    ),
+    "fake-html": _always(
+        Response(body=b"<html><body>Sign in</body></html>", content_type="text/html")
+    ),
     "fake-slow": _slow,
     "fake-broken-json": _broken_json,
     "fake-dropped": _dropped,
-    "fake-no-choices": _no_choices,
-    "fake-null-choices": _null_choices,
+    "fake-no-choices": _complete("", {"choices": []}),
+    "fake-null-choices": _complete("", {"choices": None}),
     "fake-no-usage": _no_usage,
-    "fake-refuse": _refuse,
-    "fake-filtered": _filtered,
-    "fake-prose": _prose,
+    "fake-refuse": _complete(None, refusal="I can't help with that."),
+    "fake-filtered": _complete(None, finish_reason="content_filter"),
+    "fake-prose": _complete(
+        "The car should stand some way ahead of the ego, a little to the side of its lane."
+    ),
     "fake-cut-off": _cut_off,
-    "fake-nan": _nan,
-    "fake-too-few": _too_few,
+    "fake-nan": _spoilt_block('"x_m": NaN'),
+    "fake-too-few": _spoilt_block('"x_m": 20.0'),
 }

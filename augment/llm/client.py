@@ -2,7 +2,7 @@
 
 In: a `Request` (messages, model, limits). Out: a `Reply` (text or calls, tokens), or a
 `ModelFault` that says whether a later attempt may do better. `openai_wire` is the one that calls
-out; `scripted` answers from a list.
+out.
 """
 
 from __future__ import annotations

@@ -10,13 +10,13 @@ import os
 import socket
 import time
 from collections.abc import Callable, Collection, Iterator
+from contextlib import AbstractContextManager
 from typing import TYPE_CHECKING
 from urllib.parse import urlsplit
 
 from augment.errors import Abandoned, InvalidDocument, ModelFault, NotSent, Unwanted
 from augment.llm.addresses import Resolve, check_resolved
 from augment.llm.client import Sending, watch_nothing
-from augment.llm.closing import Closing
 from augment.llm.messages import Reply, Request
 from augment.llm.wire_faults import Secret, fault_of_status, retry_after_s
 from augment.llm.wire_network import CONNECT_TIMEOUT_S, Network
@@ -38,7 +38,7 @@ _KEYLESS = "no-key"
 """Sent where an endpoint needs no key: without one the package would look for OPENAI_API_KEY."""
 
 
-class OpenAIWire(Closing):
+class OpenAIWire(AbstractContextManager["OpenAIWire"]):
     """A ChatClient that makes one real HTTP call for each request.
 
     Args:
@@ -134,6 +134,9 @@ class OpenAIWire(Closing):
         # Outside the handlers, so that nothing of the package's errors (which hold the request
         # with its headers) hangs on ours.
         raise fault if isinstance(fault, Unwanted) else self._secret.cleared(fault)
+
+    def __exit__(self, *fault: object) -> None:
+        self.close()
 
     def close(self) -> None:
         """Close the connections."""

@@ -5,10 +5,10 @@ from __future__ import annotations
 import ssl
 import zlib
 from collections.abc import Iterable
+from contextlib import AbstractContextManager
 from typing import TYPE_CHECKING
 
 from augment.errors import InvalidDocument, Unwanted
-from augment.llm.closing import Closing
 from augment.llm.wire_network import Network
 from augment.llm.wire_watch import OutOfTime, TooLong, Watches
 
@@ -28,7 +28,7 @@ class BadPacking(Exception):
     """A body is packed in a way that nobody asked for, or is broken."""
 
 
-class Transport(Closing):
+class Transport(AbstractContextManager["Transport"]):
     """What the package's HTTP client sends requests by (an `httpx2.BaseTransport`).
 
     Args:
@@ -69,6 +69,9 @@ class Transport(Closing):
             httpcore2.TimeoutException,
         ) as error:
             raise httpx2.TransportError(type(error).__name__) from error
+
+    def __exit__(self, *fault: object) -> None:
+        self.close()
 
     def close(self) -> None:
         """Close the connections."""

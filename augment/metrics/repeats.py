@@ -1,9 +1,9 @@
-"""How far the same question has the same answer: spreads over repeated samples. Pure."""
+"""How far the same question has the same answer: spreads over samples and over wordings."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -42,3 +42,38 @@ def within_sd(groups: Iterable[Sequence[float]]) -> float | None:
         return None
     squares = sum(float(np.var(group, ddof=1)) * (len(group) - 1) for group in repeated)
     return math.sqrt(squares / sum(len(group) - 1 for group in repeated))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Robustness:
+    """One contestant over all scenarios with at least two wordings that were measured.
+
+    Attributes:
+        scenarios: How many those are.
+        wordings: How many wordings they have together.
+        within_m: The pooled standard deviation within a scenario.
+        median_range_m: The median over scenarios of the largest less the smallest value.
+    """
+
+    scenarios: int
+    wordings: int
+    within_m: float
+    median_range_m: float
+
+
+def measure_robustness(values: Mapping[str, Sequence[float]]) -> Robustness | None:
+    """The spread within scenarios, None where no scenario has two wordings.
+
+    Args:
+        values: By scenario, one for each of its wordings.
+    """
+    several = [wordings for wordings in values.values() if len(wordings) > 1]
+    within_m = within_sd(several)
+    if within_m is None:
+        return None
+    return Robustness(
+        scenarios=len(several),
+        wordings=sum(len(wordings) for wordings in several),
+        within_m=within_m,
+        median_range_m=float(np.median([np.ptp(wordings) for wordings in several])),
+    )

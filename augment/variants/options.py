@@ -9,13 +9,13 @@ or what is known of the model.
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, fields, replace
 from enum import StrEnum
 from typing import Any
 
 from augment.errors import InvalidDocument
-from augment.render.camera import WIDTH_PX
 from augment.variants.recipes import Recipe, Tools
 from augment.variants.respondents import Sampling
 from augment.variants.review import Limits
@@ -95,17 +95,19 @@ class ContestantOptions:
         chosen = {
             name: value
             for name, value in self.to_document().items()
-            if name != "prompt_version" and value != _DEFAULTS.get(name)
+            if name != "prompt_version" and value != _RULES[name].default
         }
         return chosen | ({"sample": sample} if sample > 1 else {})
 
     def describe(self) -> str:
         """What was chosen in a few words, for names; empty where nothing was."""
-        return ", ".join(_WORDS[name].format(value) for name, value in self.to_document().items())
+        return ", ".join(
+            _RULES[name].words.format(value) for name, value in self.to_document().items()
+        )
 
     def slug(self) -> str:
         """The same as a part of a slug."""
-        parts = [_SLUGS[name].format(value) for name, value in self.to_document().items()]
+        parts = [_RULES[name].slug.format(value) for name, value in self.to_document().items()]
         return "-".join(parts).lower().replace(".", "p")
 
 
@@ -141,7 +143,7 @@ def names_for(recipe: Recipe) -> tuple[str, ...]:
     useful = {"rounds", *recipe.review.options} if recipe.review else set[str]()
     if recipe.tools is not Tools.NONE:
         useful.add("protocol")
-    return tuple(name for name in NAMES if name in useful or name not in _WITHOUT)
+    return tuple(name for name in NAMES if name in useful or not _RULES[name].without)
 
 
 def check_options(recipe: Recipe, options: ContestantOptions) -> None:
@@ -152,7 +154,7 @@ def check_options(recipe: Recipe, options: ContestantOptions) -> None:
     """
     allowed = names_for(recipe)
     problems = [
-        (f"options.{name}", f"{recipe.slug} {_WITHOUT[name]}")
+        (f"options.{name}", f"{recipe.slug} {_RULES[name].without}")
         for name in options.to_document()
         if name not in allowed
     ]
@@ -180,7 +182,7 @@ def complete_options(
         "accepted_from": limits.accepted_from,
         "radius_m": limits.radius_m,
         "prompt_version": prompt_version,
-        "picture_px": WIDTH_PX,
+        "picture_px": limits.picture_px,
     }
     allowed = names_for(recipe)
     return options_from_document(
@@ -204,97 +206,103 @@ def recipe_with(recipe: Recipe, options: ContestantOptions) -> Recipe:
 # --- Private -----------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class _Rule:
-    """What a value may be, in words and as a test, and how it is read once it may be."""
+    """What is to know of an option.
+
+    Attributes:
+        says: What a value may be, in words.
+        allows: Whether a value may be.
+        read: How it is read once it may be.
+        words: A value in a name for people.
+        slug: A value as a part of a slug.
+        default: What counts where it is left open; None where nothing does.
+        without: Why a recipe has no use for it; empty where all have one.
+    """
 
     says: str
     allows: Callable[[Any], bool]
+    words: str
+    slug: str
     read: Callable[[Any], Any] = lambda value: value
+    default: object = None
+    without: str = ""
 
 
-def _number(low: float, high: float) -> _Rule:
+def _number(low: float, high: float, **more: Any) -> _Rule:
     def allows(value: object) -> bool:
         is_number = isinstance(value, int | float) and not isinstance(value, bool)
         return is_number and math.isfinite(value) and low <= value <= high  # type: ignore[arg-type,operator]
 
-    return _Rule(f"a number from {low:g} to {high:g}", allows, float)
+    return _Rule(says=f"a number from {low:g} to {high:g}", allows=allows, read=float, **more)
 
 
-def _whole(low: int, high: int) -> _Rule:
+def _whole(low: int, high: int, **more: Any) -> _Rule:
     def allows(value: object) -> bool:
         return isinstance(value, int) and not isinstance(value, bool) and low <= value <= high
 
-    return _Rule(f"a whole number from {low} to {high}", allows)
+    return _Rule(says=f"a whole number from {low} to {high}", allows=allows, **more)
 
 
-def _one_of(*words: str) -> _Rule:
-    return _Rule(f"one of {', '.join(words)}", lambda value: value in words, str)
+def _one_of(*words: str, read: Callable[[Any], Any] = str, **more: Any) -> _Rule:
+    return _Rule(
+        says=f"one of {', '.join(words)}", allows=lambda value: value in words, read=read, **more
+    )
 
 
+_LIMITS = Limits()
 _RULES: dict[str, _Rule] = {
-    "temperature": _number(0, 2),
-    "seed": _whole(0, HIGHEST_SEED - MOST_SAMPLES),
-    "reasoning_effort": _one_of(*EFFORTS),
-    "max_output_tokens": _whole(1, 1_000_000),
-    "protocol": _Rule(
-        f"one of {', '.join(ToolProtocol)}",
-        lambda value: value in [one.value for one in ToolProtocol],
-        ToolProtocol,
+    "temperature": _number(0, 2, words="temperature {:g}", slug="t{:g}"),
+    "seed": _whole(0, HIGHEST_SEED - MOST_SAMPLES, words="seed {}", slug="s{}"),
+    "reasoning_effort": _one_of(*EFFORTS, words="effort {}", slug="{}-effort"),
+    "max_output_tokens": _whole(
+        1,
+        1_000_000,
+        words="answers to {} tokens",
+        slug="{}-tokens",
+        default=_LIMITS.max_tokens,
     ),
-    "rounds": _whole(1, MOST_ROUNDS),
-    "accepted_from": _number(1, 5),
-    "radius_m": _number(20, 300),
+    "protocol": _one_of(
+        *(protocol.value for protocol in ToolProtocol),
+        read=ToolProtocol,
+        words="{} calls",
+        slug="{}",
+        default=ToolProtocol.PROMPT.value,
+        without="calls no function, so it has no protocol",
+    ),
+    "rounds": _whole(
+        1,
+        MOST_ROUNDS,
+        words="{} rounds",
+        slug="{}-rounds",
+        default=_LIMITS.regenerations + 1,
+        without="has no review, so it has one round",
+    ),
+    "accepted_from": _number(
+        1,
+        5,
+        words="content from {:g}",
+        slug="from-{:g}",
+        default=_LIMITS.accepted_from,
+        without="has no text review, so nothing is rated",
+    ),
+    "radius_m": _number(20, 300, words="{:g} m", slug="{:g}m", default=_LIMITS.radius_m),
     "prompt_version": _Rule(
-        "twelve hexadecimal digits",
-        lambda value: (
-            isinstance(value, str) and len(value) == 12 and set(value) <= set("0123456789abcdef")
+        says="twelve hexadecimal digits",
+        allows=lambda value: (
+            isinstance(value, str) and re.fullmatch("[0-9a-f]{12}", value) is not None
         ),
+        words="prompts {}",
+        slug="p{}",
     ),
-    "picture_px": _whole(300, 2400),
+    "picture_px": _whole(
+        300,
+        2400,
+        words="pictures {} px",
+        slug="{}px",
+        default=_LIMITS.picture_px,
+        without="shows no picture",
+    ),
 }
 
 NAMES = tuple(field.name for field in fields(ContestantOptions))
-
-_WITHOUT = {
-    "protocol": "calls no function, so it has no protocol",
-    "rounds": "has no review, so it has one round",
-    "accepted_from": "has no text review, so nothing is rated",
-    "picture_px": "shows no picture",
-}
-
-_LIMITS = Limits()
-_DEFAULTS: dict[str, Any] = {
-    "max_output_tokens": _LIMITS.max_tokens,
-    "protocol": ToolProtocol.PROMPT.value,
-    "rounds": _LIMITS.regenerations + 1,
-    "accepted_from": _LIMITS.accepted_from,
-    "radius_m": _LIMITS.radius_m,
-    "picture_px": WIDTH_PX,
-}
-
-_WORDS = {
-    "temperature": "temperature {:g}",
-    "seed": "seed {}",
-    "reasoning_effort": "effort {}",
-    "max_output_tokens": "answers to {} tokens",
-    "protocol": "{} calls",
-    "rounds": "{} rounds",
-    "accepted_from": "content from {:g}",
-    "radius_m": "{:g} m",
-    "prompt_version": "prompts {}",
-    "picture_px": "pictures {} px",
-}
-
-_SLUGS = {
-    "temperature": "t{:g}",
-    "seed": "s{}",
-    "reasoning_effort": "{}-effort",
-    "max_output_tokens": "{}-tokens",
-    "protocol": "{}",
-    "rounds": "{}-rounds",
-    "accepted_from": "from-{:g}",
-    "radius_m": "{:g}m",
-    "prompt_version": "p{}",
-    "picture_px": "{}px",
-}

@@ -8,9 +8,9 @@ from contextlib import AbstractContextManager, contextmanager
 from augment.errors import ModelFault
 from augment.llm.client import ChatClient
 from augment.llm.messages import Reply
-from augment.llm.scripted import ScriptedClient
 from augment.models import Augmentation, Endpoint
 from augment.services.running import runner
+from tests.llm.scripted import ScriptedClient
 
 
 class Wire:

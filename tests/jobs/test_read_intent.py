@@ -15,7 +15,6 @@ from augment.errors import Conflict, ModelFault
 from augment.fake_llm.server import running
 from augment.llm.client import ChatClient
 from augment.llm.messages import Reply
-from augment.llm.scripted import ScriptedClient
 from augment.models import Event, IntentReading, ModelCall, Scenario
 from augment.scene.intent_codec import intent_to_document, intent_to_parts
 from augment.scene.intent_words import (
@@ -31,6 +30,7 @@ from augment.services.running.intent_readings import (
 from augment.services.scenarios.intents import accept_reading
 from tests.intents import cones, intents
 from tests.jobs.rows import add_scenario
+from tests.llm.scripted import ScriptedClient
 
 pytestmark = pytest.mark.django_db
 CONE = cones(20.0, 1, Shape.LINE)

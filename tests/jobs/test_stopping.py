@@ -13,13 +13,13 @@ from augment import tasks
 from augment.errors import WorkerStopping
 from augment.llm.client import Sending, watch_nothing
 from augment.llm.messages import Reply, Request
-from augment.llm.scripted import ScriptedClient
 from augment.models import Augmentation, Endpoint, GenerationJob, ModelCall
 from augment.services.endpoints.call_limits import Queue, place_at
 from augment.services.running import runner, stopping
 from tests.jobs.models import llama_job
 from tests.jobs.rows import launch, only_row
 from tests.jobs.running import Wire
+from tests.llm.scripted import ScriptedClient
 from tests.variants.answers import GOOD
 
 pytestmark = pytest.mark.django_db

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import logging
+from contextlib import AbstractContextManager
 
 from augment.errors import ParameterRefused
 from augment.llm.client import Sending, watch_nothing
-from augment.llm.closing import Closing
 from augment.llm.messages import Reply, Request
 from augment.llm.openai_wire import OpenAIWire
 from augment.llm.profile import ModelProfile
@@ -18,7 +18,7 @@ from augment.services.endpoints.treatments import Treatment
 logger = logging.getLogger(__name__)
 
 
-class EndpointClient(Closing):
+class EndpointClient(AbstractContextManager["EndpointClient"]):
     """The wire to an endpoint, behind its queue.
 
     Args:
@@ -66,6 +66,9 @@ class EndpointClient(Closing):
         except ParameterRefused as refused:
             self._learn(request.model, refused)
             raise
+
+    def __exit__(self, *fault: object) -> None:
+        self.close()
 
     def close(self) -> None:
         """Close the connections."""

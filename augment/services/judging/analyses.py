@@ -12,7 +12,7 @@ from statistics import fmean, median
 
 from augment.metrics.paired import PairedComparison, compare_all
 from augment.metrics.refusals import RefusalScore, score_refusals
-from augment.metrics.robustness import Robustness, measure_robustness
+from augment.metrics.repeats import Robustness, measure_robustness
 from augment.models import Augmentation, Contestant, GenerationJob
 from augment.services.judging.displacement import Measured, of_job
 
