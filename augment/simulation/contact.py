@@ -21,10 +21,10 @@ def corners(boxes: FloatArray) -> FloatArray:
     cos, sin = np.cos(boxes[..., 2])[..., None], np.sin(boxes[..., 2])[..., None]
     along = boxes[..., 3, None] * _SIGNS[:, 0]
     left = boxes[..., 4, None] * _SIGNS[:, 1]
-    made = np.empty((*boxes.shape[:-1], 4, 2))
-    made[..., 0] = boxes[..., 0, None] + along * cos - left * sin
-    made[..., 1] = boxes[..., 1, None] + along * sin + left * cos
-    return made
+    points = np.empty((*boxes.shape[:-1], 4, 2))
+    points[..., 0] = boxes[..., 0, None] + along * cos - left * sin
+    points[..., 1] = boxes[..., 1, None] + along * sin + left * cos
+    return points
 
 
 def radii(boxes: FloatArray) -> FloatArray:
@@ -99,12 +99,12 @@ def classify(
         kinds: Values of `Kind`.
         body: The ego.
     """
-    made = np.full(len(poses), Contact.LATERAL, dtype=np.int64)
-    made[_bumper_meets(poses, boxes, body)] = Contact.FRONT
-    made[bearings(poses, boxes[:, :2]) > BEHIND_RAD] = Contact.REAR
-    made[(np.abs(speeds) <= STILL_MPS) | (kinds == Kind.STATIC)] = Contact.STOPPED_TRACK
-    made[np.abs(ego_speeds) <= STILL_MPS] = Contact.STOPPED_EGO
-    return made
+    contacts = np.full(len(poses), Contact.LATERAL, dtype=np.int64)
+    contacts[_bumper_meets(poses, boxes, body)] = Contact.FRONT
+    contacts[bearings(poses, boxes[:, :2]) > BEHIND_RAD] = Contact.REAR
+    contacts[(np.abs(speeds) <= STILL_MPS) | (kinds == Kind.STATIC)] = Contact.STOPPED_TRACK
+    contacts[np.abs(ego_speeds) <= STILL_MPS] = Contact.STOPPED_EGO
+    return contacts
 
 
 def at_fault(contacts: IntArray, astray: BoolArray) -> BoolArray:

@@ -83,7 +83,7 @@ def run(
     state = start_state(setting.scene.ego, body)
     traffic = Traffic(setting, road, body, state)
     planner.start(road, body)
-    made = Drive(
+    drive = Drive(
         road=road,
         body=body,
         states=np.empty(0),
@@ -93,20 +93,20 @@ def run(
     states = [state]
     for step in range(steps):
         if _at_end(road, body, state):
-            made.at_map_end = True
+            drive.at_map_end = True
             break
-        objects = made.objects[-1]
+        objects = drive.objects[-1]
         plan = planner.plan(Situation(step=step, ego=state, objects=objects))
         following = drive_steps(_poses(plan)[None], state, body, 1)[0, 1]
         traffic.step(state, objects)
         state = following
         states.append(state)
-        made.objects.append(traffic.objects())
-        made.plans.append(plan)
+        drive.objects.append(traffic.objects())
+        drive.plans.append(plan)
         if after_step is not None:
             after_step(step + 1)
-    made.states = np.array(states)
-    return made
+    drive.states = np.array(states)
+    return drive
 
 
 def _at_end(road: Road, body: EgoBody, state: FloatArray) -> bool:

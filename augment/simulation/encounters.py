@@ -23,19 +23,19 @@ def ego_ways(road: Road, centres_m: FloatArray, headings_rad: FloatArray) -> Int
     taken: one that follows the old way, then one of the route, then the best aligned.
     """
     inside = road.covering(centres_m)
-    made = np.full(len(centres_m), NO_WAY, dtype=np.int64)
+    ways = np.full(len(centres_m), NO_WAY, dtype=np.int64)
     before = NO_WAY
     for moment, row in enumerate(inside):
         candidates = np.flatnonzero(row)
         if before != NO_WAY and row[before]:
-            made[moment] = before
+            ways[moment] = before
         elif len(candidates):
             heading = float(headings_rad[moment])
-            made[moment] = _pick(road, candidates, before, centres_m[moment], heading)
+            ways[moment] = _pick(road, candidates, before, centres_m[moment], heading)
         elif before != NO_WAY and _near(road, before, centres_m[moment]):
-            made[moment] = before
-        before = int(made[moment])
-    return made
+            ways[moment] = before
+        before = int(ways[moment])
+    return ways
 
 
 def _pick(

@@ -45,9 +45,9 @@ class Idm:
         self, speed: FloatArray, target: FloatArray, gap: FloatArray, leader_speed: FloatArray
     ) -> FloatArray:
         """The law with the gap held at the minimum gap, within the driver's two limits."""
-        made = self.acceleration(speed, target, np.maximum(gap, self.min_gap_m), leader_speed)
+        wished = self.acceleration(speed, target, np.maximum(gap, self.min_gap_m), leader_speed)
         low, high = -self.max_deceleration_mps2, self.max_acceleration_mps2
-        return np.minimum(np.maximum(made, low), high)
+        return np.minimum(np.maximum(wished, low), high)
 
     def steady_gap_m(self, speed_mps: float, target_mps: float) -> float:
         """The gap behind a leader of the same speed at which nothing changes; closed form."""

@@ -55,7 +55,7 @@ class IdmPlanner:
 
     def _driven(self, start_m: float, speed: float, rear_m: float, leader: float) -> FloatArray:
         """The poses (T, 3) over the horizon."""
-        station, made = start_m, [start_m]
+        station, stations = start_m, [start_m]
         for _ in range(round(HORIZON_S / STEP_S)):
             gap = rear_m - station - self._body.front_m
             pull = PLANNER_IDM.clipped(
@@ -64,8 +64,8 @@ class IdmPlanner:
             station += speed * STEP_S
             speed = max(0.0, speed + float(pull) * STEP_S)
             rear_m += leader * STEP_S
-            made.append(station)
-        return self._road.centreline.poses(np.array(made))
+            stations.append(station)
+        return self._road.centreline.poses(np.array(stations))
 
     def _wish_mps(self, s_m: float) -> float:
         if self._target is not None:

@@ -93,11 +93,11 @@ class ParallelPaths:
 
     def stations(self, centre_m: FloatArray) -> FloatArray:
         """Arc lengths (P, ...) on the paths, of arc lengths (...) on the centreline."""
-        made = np.empty((len(self.paths), *centre_m.shape))
+        stations = np.empty((len(self.paths), *centre_m.shape))
         for row, (on_centre, on_path) in enumerate(self._from_centre):
             inside = np.clip(centre_m, on_centre[0], on_centre[-1])
-            made[row] = np.interp(inside, on_centre, on_path) + (centre_m - inside)
-        return made
+            stations[row] = np.interp(inside, on_centre, on_path) + (centre_m - inside)
+        return stations
 
     def poses(self, stations_m: FloatArray) -> FloatArray:
         """Poses (P, ..., 3) of arc lengths (P, ...), each row on its own path."""

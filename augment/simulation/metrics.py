@@ -168,14 +168,14 @@ _CLASSES = {
 
 def no_fault_collisions(drive: Drive, met: tuple[Collision, ...]) -> Metric:
     """The product over the classes of max(0, 1 - collisions / (allowed + 1))."""
-    value, parts = 1.0, {"not_at_fault": float(sum(not one.at_fault for one in met))}
+    value, parts = 1.0, {"not_at_fault": float(sum(not collision.at_fault for collision in met))}
     for name, kinds in _CLASSES.items():
-        count = sum(one.at_fault and one.kind in kinds for one in met)
+        count = sum(collision.at_fault and collision.kind in kinds for collision in met)
         value *= max(0.0, 1.0 - count / (_ALLOWED[kinds[0]] + 1))
         parts[name] = float(count)
     happened = np.zeros(len(drive.states))
-    for one in met:
-        happened[one.moment] += 1.0 if one.at_fault else 0.5
+    for collision in met:
+        happened[collision.moment] += 1.0 if collision.at_fault else 0.5
     return Metric(
         name="no_ego_at_fault_collisions", value=value, parts=parts, series={"contact": happened}
     )
@@ -200,9 +200,9 @@ def drivable_area(drive: Drive) -> Metric:
 def time_to_collision(drive: Drive, met: tuple[Collision, ...]) -> Metric:
     """1 if every moment's time to collision is above 0.95 s."""
     series = ttc_series(drive, met, only_relevant=True)
-    for one in met:
-        if one.at_fault:
-            series[one.moment] = 0.0
+    for collision in met:
+        if collision.at_fault:
+            series[collision.moment] = 0.0
     lowest = float(series.min())
     return Metric(
         name="time_to_collision_within_bound",
@@ -222,8 +222,8 @@ def ttc_series(drive: Drive, met: tuple[Collision, ...], *, only_relevant: bool)
         only_relevant: Only who is ahead, or beside an ego that is not on one way or in an
             intersection, as nuPlan has it.
     """
-    first = {one.object_id: one.moment for one in met}
-    made = np.full(len(drive.states), np.inf)
+    first = {collision.object_id: collision.moment for collision in met}
+    times = np.full(len(drive.states), np.inf)
     centres = drive.boxes[:, :2]
     loose = off_one_way(drive) | drive.road.intersections.contains(centres)
     for moment, objects in enumerate(drive.objects):
@@ -234,8 +234,8 @@ def ttc_series(drive: Drive, met: tuple[Collision, ...], *, only_relevant: bool)
         if only_relevant:
             kept &= _relevant(state, objects, bool(loose[moment]))
         if kept.any():
-            made[moment] = _first_meeting(drive.boxes[moment], state, objects.chosen(kept))
-    return made
+            times[moment] = _first_meeting(drive.boxes[moment], state, objects.chosen(kept))
+    return times
 
 
 def _relevant(state: FloatArray, objects: Objects, loose: bool) -> BoolArray:
@@ -311,13 +311,13 @@ def _on_route(drive: Drive, way: int) -> bool:
 def _obstacles(modification: Modification | None) -> list[tuple[float, float]]:
     """Standing vehicles, cones, and where walks end."""
     changed = () if modification is None else modification.changed
-    made = []
+    places = []
     for agent in changed:
         if agent.walk_to_m is not None:
-            made.append(agent.walk_to_m)
+            places.append(agent.walk_to_m)
         elif _stands(agent):
-            made.append((agent.x_m, agent.y_m))
-    return made
+            places.append((agent.x_m, agent.y_m))
+    return places
 
 
 def _stands(agent: TrafficAgent) -> bool:

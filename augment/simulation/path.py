@@ -43,15 +43,15 @@ class Path:
 
     def poses(self, stations_m: FloatArray) -> FloatArray:
         """Poses (..., 3) at arc lengths (...,); beyond the ends straight on."""
-        made = np.empty((*stations_m.shape, 3))
-        made[..., 0] = np.interp(stations_m, self.stations_m, self.points_m[:, 0])
-        made[..., 1] = np.interp(stations_m, self.stations_m, self.points_m[:, 1])
-        made[..., 2] = np.interp(stations_m, self._middles, self.headings_rad[:-1])
+        poses = np.empty((*stations_m.shape, 3))
+        poses[..., 0] = np.interp(stations_m, self.stations_m, self.points_m[:, 0])
+        poses[..., 1] = np.interp(stations_m, self.stations_m, self.points_m[:, 1])
+        poses[..., 2] = np.interp(stations_m, self._middles, self.headings_rad[:-1])
         beyond = stations_m - np.clip(stations_m, 0.0, self.length_m)
         if beyond.any():
-            made[..., 0] += beyond * np.cos(made[..., 2])
-            made[..., 1] += beyond * np.sin(made[..., 2])
-        return made
+            poses[..., 0] += beyond * np.cos(poses[..., 2])
+            poses[..., 1] += beyond * np.sin(poses[..., 2])
+        return poses
 
     def beside(self, points_m: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Where points (N, 2) lie: arc length (N,) and distance to the left (N,).

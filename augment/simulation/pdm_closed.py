@@ -150,7 +150,7 @@ class PdmClosed:
         self, path: int, policy: int, rolled: Rollout, targets: FloatArray, corridor: Corridor
     ) -> FloatArray:
         """The winner's own rollout, carried on from 4 s to 8 s: arc lengths (T,) on its path."""
-        one = Corridor(
+        own = Corridor(
             near_m=corridor.near_m[:, path : path + 1],
             middle_m=corridor.middle_m[:, path : path + 1],
             speeds_mps=corridor.speeds_mps,
@@ -160,7 +160,7 @@ class PdmClosed:
             begun[-1:],
             float(rolled.speeds_mps[path, policy]),
             targets[policy : policy + 1],
-            one,
+            own,
             self._ends[path : path + 1],
             self._body,
             first=HORIZON_STEPS,

@@ -51,14 +51,14 @@ def planner_named(name: str, *, offsets: str = "paper", allowed: Collection[str]
 def _of_path(path: str) -> Planner:
     module, _, attribute = path.rpartition(".")
     try:
-        made = getattr(importlib.import_module(module), attribute)()
+        planner = getattr(importlib.import_module(module), attribute)()
     except (ImportError, AttributeError, TypeError, ValueError) as error:
         raise CannotDrive(
             f"The planner {path} can't be made: {error}. It is the dotted path of a "
             "class without arguments."
         ) from error
-    if not isinstance(made, Planner):
+    if not isinstance(planner, Planner):
         raise CannotDrive(
             f"{path} is no planner: it needs the methods start(road, body) and plan(situation)."
         )
-    return made
+    return planner

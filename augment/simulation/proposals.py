@@ -65,8 +65,8 @@ def roll_out(
     speed = np.full(shape, max(speed_mps, 0.0))
     targets = np.broadcast_to(targets_mps, shape)
     reach = float(targets_mps.max()) * WHOLE_STEPS * STEP_S
-    made = np.empty((last - first + 1, *shape))
-    made[0] = station
+    stations = np.empty((last - first + 1, *shape))
+    stations[0] = station
     near, leader = np.zeros(shape), np.zeros(shape)
     for step in range(first, last):
         if step % STEPS_A_SLICE == 0:
@@ -75,8 +75,8 @@ def roll_out(
         pull = PROPOSAL_IDM.clipped(speed, targets, gap, leader)
         station = station + speed * STEP_S
         speed = np.maximum(speed + pull * STEP_S, 0.0)
-        made[step + 1 - first] = station
-    return Rollout(stations_m=np.moveaxis(made, 0, -1), speeds_mps=speed)
+        stations[step + 1 - first] = station
+    return Rollout(stations_m=np.moveaxis(stations, 0, -1), speeds_mps=speed)
 
 
 def _leaders(
@@ -99,7 +99,7 @@ def _leaders(
     ahead = (middle > front) & (near - front < reach)
     rear = np.where(ahead, near, np.inf)
     which = rear.argmin(axis=-1)
-    found = np.take_along_axis(rear, which[..., None], axis=-1)[..., 0]
+    nearest = np.take_along_axis(rear, which[..., None], axis=-1)[..., 0]
     speeds = corridor.speeds_mps[moment][which]
-    beyond = found >= end
-    return np.where(beyond, end, found), np.where(beyond, 0.0, speeds)
+    beyond = nearest >= end
+    return np.where(beyond, end, nearest), np.where(beyond, 0.0, speeds)

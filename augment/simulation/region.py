@@ -38,9 +38,9 @@ class Region:
 
         rows = ((points_m - self._origin) * (1.0 / CELL_M)).astype(np.int64)
         np.clip(rows, 0, np.array(self._cells.shape) - 1, out=rows)
-        found = self._cells[rows[..., 0], rows[..., 1]]
-        inside = np.asarray(found == _IN)
-        edge = found == _EDGE
+        marks = self._cells[rows[..., 0], rows[..., 1]]
+        inside = np.asarray(marks == _IN)
+        edge = marks == _EDGE
         if edge.any():
             near = points_m[edge]
             inside[edge] = shapely.contains_xy(self.ground, near[:, 0], near[:, 1])
@@ -52,8 +52,8 @@ class Region:
 
         if shapely.is_empty(self.ground):
             return np.full(points_m.shape[:-1], np.inf)
-        found = shapely.distance(shapely.points(points_m), self.ground)
-        return np.asarray(found, dtype=np.float64)
+        distances = shapely.distance(shapely.points(points_m), self.ground)
+        return np.asarray(distances, dtype=np.float64)
 
     def _lay_cells(self) -> None:
         """Mark the cells near an edge; ask about one cell of each run between them."""

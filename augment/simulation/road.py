@@ -93,7 +93,7 @@ def _ways_to_goal(scene: Scene, graph: LaneGraph) -> frozenset[str]:
 
 def _first_turns(scene: Scene, graph: LaneGraph, turn: TurnType) -> list[str]:
     """The first connector of that turn on the ways from the ego on, the fewest ways ahead."""
-    connectors = {one.id: one for one in scene.connectors}
+    connectors = {connector.id: connector for connector in scene.connectors}
     ahead, seen = [_start(scene, graph)], set[str]()
     while ahead:
         fitting = [
@@ -254,8 +254,10 @@ class Road:
         first, second = self._follows
         both = inside[:, :, first] | inside[:, :, second]
 
-        def somewhere(found: BoolArray) -> BoolArray:
-            return np.asarray(np.logical_and.reduce(found, axis=1).any(axis=-1), dtype=np.bool_)
+        def somewhere(inside_of: BoolArray) -> BoolArray:
+            return np.asarray(
+                np.logical_and.reduce(inside_of, axis=1).any(axis=-1), dtype=np.bool_
+            )
 
         return np.asarray(somewhere(inside) | somewhere(both), dtype=np.bool_)
 
@@ -279,22 +281,22 @@ class Road:
             for before in self.names
             for after in self.graph.successors(before)
         ]
-        made = np.array(pairs, dtype=np.int64).reshape(-1, 2)
-        return made[:, 0], made[:, 1]
+        rows = np.array(pairs, dtype=np.int64).reshape(-1, 2)
+        return rows[:, 0], rows[:, 1]
 
     def _limits(self) -> FloatArray:
         """A connector without a limit has the highest of the lanes that it joins."""
-        made = []
+        limits = []
         for way in self.ways:
             limit = way.speed_limit_mps
             if limit is None and isinstance(way, LaneConnector):
                 joined = [
                     self.graph.lanes.get(name or "") for name in (way.from_lane, way.to_lane)
                 ]
-                known = [one.speed_limit_mps for one in joined if one is not None]
+                known = [lane.speed_limit_mps for lane in joined if lane is not None]
                 limit = max((value for value in known if value is not None), default=None)
-            made.append(np.nan if limit is None else limit)
-        return np.array(made, dtype=np.float64)
+            limits.append(np.nan if limit is None else limit)
+        return np.array(limits, dtype=np.float64)
 
     def _stations(self) -> FloatArray:
         """Where on the centreline each way of the route ends (K,)."""
@@ -324,14 +326,14 @@ class Road:
         if self.graph.successors(self.route[-1]):
             return np.empty(0, dtype=object)
         last = {self.route[-1], *_of_same_direction(self.graph.lanes[self.route[-1]], self)}
-        made = []
+        aprons = []
         for name in sorted(last):
             way = self.graph.lanes[name]
             line = way.centerline.points_m
             onward = np.vstack([line[-1:], _straight_on(line, RUN_OUT_M)])
             half_m = way.width_m / 2.0
-            made.append(shapely.LineString(onward).buffer(half_m, cap_style="square"))
-        return np.array(made, dtype=object)
+            aprons.append(shapely.LineString(onward).buffer(half_m, cap_style="square"))
+        return np.array(aprons, dtype=object)
 
 
 # Private
@@ -369,5 +371,5 @@ def _of_same_direction(way: AnyLane, road: Road) -> set[str]:
 def _union(pieces: NDArray[np.object_]) -> BaseGeometry:
     import shapely
 
-    made: BaseGeometry = shapely.union_all(pieces[~shapely.is_empty(pieces)])
-    return made
+    union: BaseGeometry = shapely.union_all(pieces[~shapely.is_empty(pieces)])
+    return union

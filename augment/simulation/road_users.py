@@ -128,13 +128,13 @@ class LaneDrivers:
     ) -> None:
         self._idm, self._sweep_s, self._first = idm, sweep_s, True
         self._agents = tuple(agents)
-        made = [_Lane(road, agent) for agent in self._agents]
-        self._lanes = made
+        lanes = [_Lane(road, agent) for agent in self._agents]
+        self._lanes = lanes
         self._base = objects_of(self._agents, speeds=True)
-        self.stations = np.array([lane.start_m for lane in made], dtype=np.float64)
+        self.stations = np.array([lane.start_m for lane in lanes], dtype=np.float64)
         self.speeds = self._base.speeds_mps.copy()
-        self._ends = np.array([lane.path.length_m for lane in made], dtype=np.float64)
-        self._samples = _stacked([lane.path for lane in made])
+        self._ends = np.array([lane.path.length_m for lane in lanes], dtype=np.float64)
+        self._samples = _stacked([lane.path for lane in lanes])
 
     def objects(self) -> Objects:
         """Those who are still on the map."""
@@ -173,12 +173,12 @@ class LaneDrivers:
             tangent = np.stack([np.cos(pose[:, 2]), np.sin(pose[:, 2])], axis=1)
             offset = corners(everybody.boxes[other]) - pose[:, None, :2]
             near = hit + (offset * tangent[:, None, :]).sum(axis=-1).min(axis=1)
-            found = near - front[driver]
+            gaps = near - front[driver]
             turn = everybody.boxes[other, 2] - pose[:, 2]
             along = everybody.speeds_mps[other] * np.cos(turn)
-            for row in np.argsort(-found, kind="stable"):  # the nearest is written last
-                if found[row] < gap[driver[row]]:
-                    gap[driver[row]], speed[driver[row]] = found[row], along[row]
+            for row in np.argsort(-gaps, kind="stable"):  # the nearest is written last
+                if gaps[row] < gap[driver[row]]:
+                    gap[driver[row]], speed[driver[row]] = gaps[row], along[row]
         return gap, speed
 
     def _hits(self, everybody: Objects, half: FloatArray) -> tuple[IntArray, IntArray, IntArray]:
@@ -284,7 +284,7 @@ def lane_under(road: Road, agent: TrafficAgent) -> str | None:
 def _stacked(paths: Sequence[Path]) -> FloatArray:
     """Poses (D, M, 3) at every whole metre, the last of each path repeated."""
     longest = max((int(path.length_m) + 2 for path in paths), default=0)
-    made = np.empty((len(paths), longest, 3))
+    poses = np.empty((len(paths), longest, 3))
     for row, path in enumerate(paths):
-        made[row] = path.poses(np.arange(longest, dtype=np.float64))
-    return made
+        poses[row] = path.poses(np.arange(longest, dtype=np.float64))
+    return poses

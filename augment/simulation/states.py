@@ -64,12 +64,12 @@ class EgoBody:
 
     def boxes(self, states: FloatArray) -> FloatArray:
         """Boxes (..., 5) of states (..., 3 or more): centre x, y, heading, length, width."""
-        made = np.empty((*states.shape[:-1], 5))
-        made[..., :2] = self.centre(states)
-        made[..., 2] = states[..., HEADING]
-        made[..., 3] = self.length_m
-        made[..., 4] = self.width_m
-        return made
+        boxes = np.empty((*states.shape[:-1], 5))
+        boxes[..., :2] = self.centre(states)
+        boxes[..., 2] = states[..., HEADING]
+        boxes[..., 3] = self.length_m
+        boxes[..., 4] = self.width_m
+        return boxes
 
 
 def start_state(ego: TrafficAgent, body: EgoBody) -> FloatArray:

@@ -75,7 +75,7 @@ def _starts(holds: BoolArray) -> list[int]:
 
 
 def _series(score: Score, metric: str, name: str) -> FloatArray:
-    return next(one.series[name] for one in score.metrics if one.name == metric)
+    return next(part.series[name] for part in score.metrics if part.name == metric)
 
 
 FORMAT, VERSION = "scenario-arena/drive", 1
@@ -102,8 +102,8 @@ def trace_of(setting: DriveSetting, drive: Drive, score: Score) -> dict[str, Any
         "plans": _plans(drive),
         "braking": [number for number, plan in enumerate(drive.plans) if plan.braking],
         "events": [
-            {"step": one.moment, "kind": one.kind.value, "object": one.object_id}
-            for one in events_of(drive, score)
+            {"step": event.moment, "kind": event.kind.value, "object": event.object_id}
+            for event in events_of(drive, score)
         ],
         "road": _road(drive),
     }
@@ -116,11 +116,12 @@ def blind_trace(trace: dict[str, Any]) -> dict[str, Any]:
     planner thought and scored goes, since it is no part of the picture.
     """
     objects = [
-        {name: value for name, value in one.items() if name != "id"} for one in trace["objects"]
+        {name: value for name, value in shown.items() if name != "id"}
+        for shown in trace["objects"]
     ]
     return {
         **{name: trace[name] for name in ("format", "version", "step_s", "steps", "ego", "road")},
-        "objects": sorted(objects, key=lambda one: json.dumps(one, sort_keys=True)),
+        "objects": sorted(objects, key=lambda shown: json.dumps(shown, sort_keys=True)),
     }
 
 
@@ -145,7 +146,7 @@ def _objects(setting: DriveSetting, drive: Drive, changed: set[str]) -> list[dic
         for name, kind, box, pose in zip(
             objects.ids, objects.kinds, objects.boxes, rows, strict=True
         ):
-            one = by_name.setdefault(
+            entry = by_name.setdefault(
                 name,
                 {
                     "id": name,
@@ -157,25 +158,25 @@ def _objects(setting: DriveSetting, drive: Drive, changed: set[str]) -> list[dic
                     "poses": [],
                 },
             )
-            gap = moment - one["first"] - len(one["poses"])
-            one["poses"] += [None] * gap + [pose]
+            gap = moment - entry["first"] - len(entry["poses"])
+            entry["poses"] += [None] * gap + [pose]
     whole = len(drive.objects)
-    for one in by_name.values():
-        still = all(pose == one["poses"][0] for pose in one["poses"])
-        if still and one["first"] == 0 and len(one["poses"]) == whole:
-            one["poses"] = one["poses"][:1]
+    for entry in by_name.values():
+        still = all(pose == entry["poses"][0] for pose in entry["poses"])
+        if still and entry["first"] == 0 and len(entry["poses"]) == whole:
+            entry["poses"] = entry["poses"][:1]
     return list(by_name.values())
 
 
 def _plans(drive: Drive) -> list[dict[str, Any]]:
     """What was considered, every half second: a line and a score for each proposal."""
-    made = []
+    kept = []
     for step in range(0, len(drive.plans), PLAN_EVERY):
         shown = drive.plans[step].proposals
         if shown is None:
             continue
         lines = drive.body.centre(shown.states)[:, ::LINE_EVERY].round(1)
-        made.append(
+        kept.append(
             {
                 "step": step,
                 "chosen": shown.chosen,
@@ -183,7 +184,7 @@ def _plans(drive: Drive) -> list[dict[str, Any]]:
                 "lines": [line.ravel().tolist() for line in lines],
             }
         )
-    return made
+    return kept
 
 
 def _road(drive: Drive) -> dict[str, Any]:
@@ -218,14 +219,14 @@ def _rings(ground: Any) -> list[list[list[float]]]:
     """Polygons as lists of rings, the outer one first."""
     import shapely
 
-    made = []
+    polygons = []
     for part in shapely.get_parts(ground):
         if part.geom_type == "Polygon":
             rings = [part.exterior, *part.interiors]
-            made.append([_flat(shapely.get_coordinates(ring)) for ring in rings])
-    return made
+            polygons.append([_flat(shapely.get_coordinates(ring)) for ring in rings])
+    return polygons
 
 
 def _flat(points_m: Any) -> list[float]:
-    made: list[float] = np.asarray(points_m, dtype=np.float64).round(2).ravel().tolist()
-    return made
+    numbers: list[float] = np.asarray(points_m, dtype=np.float64).round(2).ravel().tolist()
+    return numbers

@@ -150,9 +150,9 @@ def follow(reference: ArrayLike, start: ArrayLike, body: EgoBody | None = None) 
 
 def track(references: FloatArray, start: FloatArray, body: EgoBody) -> FloatArray:
     """The states (B, T, 6) of following references (B, T, 3) from one start (6,)."""
-    made = drive_steps(references, start, body, references.shape[1] - 1)
-    made[..., HEADING] = wrap_angles(made[..., HEADING])
-    return made
+    states = drive_steps(references, start, body, references.shape[1] - 1)
+    states[..., HEADING] = wrap_angles(states[..., HEADING])
+    return states
 
 
 def drive_steps(

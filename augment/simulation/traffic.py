@@ -198,7 +198,7 @@ def _replayed(setting: DriveSetting, road: Road) -> list[Track]:
     if setting.recording is None or not setting.replay:
         return []
     at_start = {agent.id: agent for agent in setting.scene.agents}
-    made = []
+    replayed = []
     for track in setting.recording.tracks:
         agent = at_start.get(track.agent_id)
         if track.agent_id in setting.replaced:
@@ -207,5 +207,5 @@ def _replayed(setting: DriveSetting, road: Road) -> list[Track]:
         # Who comes into sight later has no lane at t0 to start on; it stays away.
         if answers and (agent is None or lane_under(road, agent) is not None):
             continue
-        made.append(track)
-    return made
+        replayed.append(track)
+    return replayed
