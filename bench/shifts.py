@@ -105,7 +105,7 @@ def _shaken(agent: TrafficAgent, scale: float, rng: random.Random) -> TrafficAge
 
 
 def _contacts(scene: Scene, agents: Agents) -> list[tuple[int, int]]:
-    boxes = [_box(agent) for agent in (*agents, *scene.everyone)]
+    boxes = [agent.box for agent in (*agents, *scene.everyone)]
     return [
         (n, m)
         for n in range(len(agents))
@@ -117,7 +117,3 @@ def _contacts(scene: Scene, agents: Agents) -> list[tuple[int, int]]:
 def _near(one: Box, other: Box) -> bool:
     reach = math.hypot(one.length_m, one.width_m) + math.hypot(other.length_m, other.width_m)
     return math.hypot(one.pose.x_m - other.pose.x_m, one.pose.y_m - other.pose.y_m) < reach / 2.0
-
-
-def _box(agent: TrafficAgent) -> Box:
-    return Box(pose=agent.pose, length_m=agent.length_m, width_m=agent.width_m)

@@ -25,7 +25,7 @@ from augment.baselines.quantised_code import (
     quadrants_of,
 )
 from augment.errors import CannotPlace
-from augment.geometry.boxes import Box, overlap
+from augment.geometry.boxes import overlap
 from augment.geometry.polyline import Polyline
 from augment.scene.entities import AgentType, Scene, TrafficAgent
 from augment.scene.intent import (
@@ -170,7 +170,11 @@ def allowed_by(code: Code, places: Places, *, bin_m: float) -> tuple[NDArray[np.
 
 def _refuse_others(intent: Intent | None) -> None:
     requests = () if intent is None else intent.requests
-    asked = [name for kind, name in _UNKNOWN.items() if any(_are(kind, requests))]
+    asked = [
+        name
+        for kind, name in _UNKNOWN.items()
+        if any(isinstance(request, kind) for request in requests)
+    ]
     bodies = {request.body for request in requests if isinstance(request, VehicleRequest)}
     asked += [f"{body}s" for body in _NO_VEHICLES if body in bodies]
     if asked:
@@ -180,10 +184,6 @@ def _refuse_others(intent: Intent | None) -> None:
 
 
 _NO_VEHICLES = (Body.BICYCLE, Body.BARRIER, Body.CONSTRUCTION_SIGN)
-
-
-def _are(kind: type, requests: Sequence[object]) -> list[bool]:
-    return [isinstance(request, kind) for request in requests]
 
 
 def _along(line: Polyline) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -225,10 +225,6 @@ def _drawn(
             heading_rad=round(float(places.headings_rad[index]), 5),
             lane_id=places.lane_ids[index],
         )
-        if not any(overlap(_box(made), _box(other)).depth_m > 0.0 for other in others):
+        if not any(overlap(made.box, other.box).depth_m > 0.0 for other in others):
             return made
     return None
-
-
-def _box(agent: TrafficAgent) -> Box:
-    return Box(pose=agent.pose, length_m=agent.length_m, width_m=agent.width_m)

@@ -26,7 +26,7 @@ from augment.checks import Ground
 from augment.checks.landmarks import find_picked, list_absent, resolve_landmarks
 from augment.checks.lanes_across import LanesAcross
 from augment.errors import CannotPlace
-from augment.geometry.boxes import Box, overlap
+from augment.geometry.boxes import overlap
 from augment.scene.entities import AgentType, Scene, TrafficAgent, TurnType
 from augment.scene.intent import (
     ConesRequest,
@@ -253,7 +253,7 @@ def _problem(
     """Why the agents can't stand there, None if they can."""
     for agent in agents:
         for other in (*ground.scene.everyone, *added):
-            if overlap(_box(agent), _box(other)).depth_m > 0.0:
+            if overlap(agent.box, other.box).depth_m > 0.0:
                 name = "the ego" if other is ground.scene.ego else other.id or "what was added"
                 return f"{abs(distance_m):.1f} m from the ego it would stand in {name}."
     path_m = np.array([point for agent in agents for point in _path(agent)])
@@ -268,10 +268,6 @@ def _path(agent: TrafficAgent) -> NDArray[np.float64]:
     start = np.array([agent.x_m, agent.y_m])
     end = start if agent.walk_to_m is None else np.array(agent.walk_to_m)
     return np.asarray(np.linspace(start, end, 60 if agent.walk_to_m else 1), dtype=np.float64)
-
-
-def _box(agent: TrafficAgent) -> Box:
-    return Box(pose=agent.pose, length_m=agent.length_m, width_m=agent.width_m)
 
 
 def _rounded(agent: TrafficAgent) -> TrafficAgent:

@@ -180,11 +180,7 @@ def _is_free(pose: Pose, body: Body, scene: Scene) -> bool:
         for agent in scene.everyone
         if math.hypot(agent.x_m - pose.x_m, agent.y_m - pose.y_m) < 2.0 * length_m
     )
-    return all(
-        overlap(box, Box(pose=agent.pose, length_m=agent.length_m, width_m=agent.width_m)).depth_m
-        == 0.0
-        for agent in near
-    )
+    return all(overlap(box, agent.box).depth_m == 0.0 for agent in near)
 
 
 def _choices(

@@ -18,7 +18,6 @@ from functools import lru_cache
 import numpy as np
 from PIL import Image, ImageDraw
 
-from augment.geometry.boxes import corners
 from augment.geometry.polyline import FloatArray
 from augment.render.shapes import ribbon
 from augment.scene.entities import Scene, TrafficAgent
@@ -244,7 +243,7 @@ def _places(scene: Scene, change: Modification) -> Iterator[FloatArray]:
 
 
 def _footprint(agent: TrafficAgent) -> FloatArray:
-    box = corners(agent.pose, agent.length_m, agent.width_m)
+    box = agent.box.corners_m
     return box if agent.walk_to_m is None else np.vstack([box, [agent.walk_to_m]])
 
 

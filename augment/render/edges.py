@@ -8,7 +8,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from augment.geometry.boxes import corners
 from augment.render import palette
 from augment.render.canvas import Box, MetricCanvas, text_width_px
 from augment.scene.entities import TrafficAgent
@@ -90,7 +89,7 @@ def draw_badges(ground: MetricCanvas, badges: list[Badge]) -> None:
 
 def mark_box(ground: MetricCanvas, agent: TrafficAgent) -> Box:
     """The upright box round an agent's own, in pixels."""
-    box = ground.camera.to_pixels(corners(agent.pose, agent.length_m, agent.width_m))
+    box = ground.camera.to_pixels(agent.box.corners_m)
     (left, top), (right, bottom) = box.min(axis=0), box.max(axis=0)
     return float(left), float(top), float(right), float(bottom)
 

@@ -6,7 +6,6 @@ import math
 
 import numpy as np
 
-from augment.geometry.boxes import corners
 from augment.geometry.polyline import FloatArray
 from augment.render import palette
 from augment.render.canvas import Box, MetricCanvas, text_width_px
@@ -24,7 +23,7 @@ def draw_ghosts(ground: MetricCanvas, scene: Scene, modification: Modification) 
     gone = set(modification.removed) | {agent.id for agent in modification.moved}
     for agent in scene.agents:
         if agent.id in gone:
-            box = corners(agent.pose, agent.length_m, agent.width_m)
+            box = agent.box.corners_m
             ring = ground.camera.to_pixels(np.vstack([box, box[:1]]))
             ground.canvas.dashed(ring, palette.GHOST, 1.5, 5.0, 4.0)
 

@@ -110,7 +110,7 @@ def is_small(agent: TrafficAgent) -> bool:
 
 def draw_mark(ground: MetricCanvas, agent: TrafficAgent, style: MarkStyle) -> None:
     """One agent where it is; nothing for one that is out of the picture."""
-    box = corners(agent.pose, agent.length_m, agent.width_m)
+    box = agent.box.corners_m
     if not ground.camera.shows(box, margin_m=_LEAST_MARK_PX / ground.camera.px_per_m):
         return
     _PAINTERS[agent.type](ground, agent, style)

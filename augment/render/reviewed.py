@@ -8,8 +8,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from augment.geometry.boxes import corners
-from augment.geometry.polyline import FloatArray
 from augment.render import palette
 from augment.render.bev import paint_scene
 from augment.render.camera import Camera
@@ -99,13 +97,13 @@ def _over_boxes(ground: MetricCanvas, scene: Scene, lane: AnyLane) -> None:
 
 def _closer(modification: Modification, camera: Camera) -> Camera | None:
     """A window around what was changed within the picture, None where nothing would be gained."""
-    seen = [one for one in modification.changed if camera.shows(_footprint(one))]
+    seen = [agent for agent in modification.changed if camera.shows(agent.box.corners_m)]
     if not seen:
         return None
-    longest_px = min(max(one.length_m, one.width_m) for one in seen) * camera.px_per_m
+    longest_px = min(max(agent.length_m, agent.width_m) for agent in seen) * camera.px_per_m
     if longest_px >= SMALL_PX:
         return None
-    points = np.vstack([_footprint(one) for one in seen])
+    points = np.vstack([agent.box.corners_m for agent in seen])
     low, high = points.min(axis=0) - _AROUND_M, points.max(axis=0) + _AROUND_M
     shape = camera.width_px / camera.height_px
     width_m = max(high[0] - low[0], (high[1] - low[1]) * shape, _LEAST_WIDTH_M)
@@ -119,7 +117,3 @@ def _closer(modification: Modification, camera: Camera) -> Camera | None:
         y_max_m=float(y_m + width_m / shape / 2.0),
         px_per_m=camera.width_px / width_m,
     )
-
-
-def _footprint(agent: TrafficAgent) -> FloatArray:
-    return corners(agent.pose, agent.length_m, agent.width_m)

@@ -203,15 +203,11 @@ def _kept(
     """Those who stand in nobody and run into nothing of the change, the nearest first."""
     kept: list[TrafficAgent] = []
     for agent in wished:
-        taken = [_box(one) for one in (scene.ego, *scene.agents, *kept)]
-        in_way = [_box(one) for one in clear_of]
-        if not _meets(_box(agent), taken) and not _meets(_strip(agent), in_way):
+        taken = [one.box for one in (scene.ego, *scene.agents, *kept)]
+        in_way = [one.box for one in clear_of]
+        if not _meets(agent.box, taken) and not _meets(_strip(agent), in_way):
             kept.append(agent)
     return sorted(kept, key=lambda one: (math.hypot(one.x_m, one.y_m), one.x_m))
-
-
-def _box(agent: TrafficAgent) -> Box:
-    return Box(pose=agent.pose, length_m=agent.length_m, width_m=agent.width_m)
 
 
 def _strip(agent: TrafficAgent) -> Box:

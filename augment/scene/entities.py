@@ -11,6 +11,7 @@ from typing import Annotated
 
 from pydantic import Field
 
+from augment.geometry.boxes import Box
 from augment.geometry.frames import Pose
 from augment.scene.schema import (
     CLOSED,
@@ -120,6 +121,11 @@ class TrafficAgent:
     def pose(self) -> Pose:
         """Centre and heading."""
         return Pose(x_m=self.x_m, y_m=self.y_m, heading_rad=self.heading_rad)
+
+    @property
+    def box(self) -> Box:
+        """The ground that it takes up."""
+        return Box(pose=self.pose, length_m=self.length_m, width_m=self.width_m)
 
 
 Agents = Annotated[tuple[TrafficAgent, ...], Field(fail_fast=True, max_length=MOST_AGENTS)]

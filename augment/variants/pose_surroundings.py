@@ -114,7 +114,7 @@ class Occupancy:
         """Everybody's box, and the circle around it, by short id."""
         return {
             name: (
-                Box(pose=agent.pose, length_m=agent.length_m, width_m=agent.width_m),
+                agent.box,
                 math.hypot(agent.length_m, agent.width_m) / 2.0,
             )
             for name, agent in self.agents.items()

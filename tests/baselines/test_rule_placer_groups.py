@@ -8,7 +8,7 @@ import math
 import numpy as np
 import pytest
 
-from augment.geometry.boxes import Box, overlap
+from augment.geometry.boxes import overlap
 from augment.scene.entities import AgentType
 from augment.scene.intent import (
     Side,
@@ -71,7 +71,7 @@ def test_a_ring_stays_in_its_lane_and_closes(count: int, apart_m: float) -> None
 @pytest.mark.parametrize("count", [2, 3, 4])
 def test_crashed_cars_touch_at_most_and_leave_little_room(count: int) -> None:
     cars = added(scene(), crash(25.0, count))
-    boxes = [Box(pose=car.pose, length_m=car.length_m, width_m=car.width_m) for car in cars]
+    boxes = [car.box for car in cars]
     assert len(cars) == count
     assert cars[0].x_m == 25.0
     for i, first in enumerate(boxes):

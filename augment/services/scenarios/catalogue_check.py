@@ -19,7 +19,6 @@ import numpy as np
 from augment.checks import Ground
 from augment.checks.against_intent import check_against_intent
 from augment.checks.tolerances import AUTHORED
-from augment.geometry.boxes import corners
 from augment.geometry.polyline import FloatArray
 from augment.prompts.vectors import DEFAULT_RADIUS_M
 from augment.render.camera import Camera, camera_for
@@ -165,7 +164,7 @@ def _numbers_in(part: Any) -> Iterator[float]:
 def _unseen(scene: Scene, entry: CatalogueEntry) -> Iterator[str]:
     camera = camera_for(scene, entry.reference)
     for agent in entry.reference.changed:
-        points = corners(agent.pose, agent.length_m, agent.width_m)
+        points = agent.box.corners_m
         if agent.walk_to_m is not None:
             points = np.vstack([points, [agent.walk_to_m]])
         if not _holds(camera, points):

@@ -18,7 +18,7 @@ from augment.checks.landmarks import find_mark
 from augment.checks.lanes_across import LanesAcross
 from augment.checks.situation import VEHICLES, is_stopped
 from augment.checks.surfaces import gaps_m
-from augment.geometry.boxes import Box, corners, overlap
+from augment.geometry.boxes import Box, overlap
 from augment.geometry.frames import Pose
 from augment.render.camera import Camera, camera_for
 from augment.scene.catalogue import ScenarioType
@@ -91,7 +91,7 @@ def find_apart(one: StagedScenario) -> Iterator[str]:
     cars = one.added(*VEHICLES) if one.entry.type is ScenarioType.ACCIDENT_SITE else []
     if not cars:
         return
-    gaps = gaps_m(np.array([corners(car.pose, car.length_m, car.width_m) for car in cars]))
+    gaps = gaps_m(np.array([car.box.corners_m for car in cars]))
     for number, car in enumerate(cars[1:], start=1):
         gap_m = gaps[number, :number].min()
         if gap_m > TOUCH_M:
@@ -200,8 +200,7 @@ def is_hidden(one: StagedScenario) -> bool:
         width_m=_SIGHT_M,
     )
     return any(
-        overlap(sight, Box(pose=car.pose, length_m=car.length_m, width_m=car.width_m)).area_m2
-        > 0.0
+        overlap(sight, car.box).area_m2 > 0.0
         for car in (*one.scene.agents, *one.entry.reference.added)
         if car.type in VEHICLES and is_stopped(car)
     )

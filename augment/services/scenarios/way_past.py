@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from augment.checks import Ground
 from augment.checks.situation import is_stopped
 from augment.geometry.angles import difference
-from augment.geometry.boxes import corners
 from augment.scene.ego_route import EgoRoute
 from augment.scene.entities import Scene, TrafficAgent
 from augment.scene.modification import Modification, apply
@@ -79,10 +78,7 @@ _RANK = list(WayPast).index
 
 def _extent(route: EgoRoute, agent: TrafficAgent) -> tuple[FloatArray, FloatArray]:
     """The least and the most (s, d) of an agent's box."""
-    places = [
-        route.locate(float(x), float(y))
-        for x, y in corners(agent.pose, agent.length_m, agent.width_m)
-    ]
+    places = [route.locate(float(x), float(y)) for x, y in agent.box.corners_m]
     spots = np.array([(place.ahead_m, place.left_m) for place in places])
     return spots.min(axis=0), spots.max(axis=0)
 
