@@ -47,19 +47,6 @@ _UNKNOWN = {WalkRequest: "pedestrians", ConesRequest: "cones"}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class QuantisedPlacement:
-    """What was placed, and from which codes.
-
-    Attributes:
-        notes: The codes in words, and what they could not be held to.
-    """
-
-    modification: Modification
-    codes: tuple[Code, ...]
-    notes: str
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class Places:
     """Points every half metre along all centrelines within reach of a code.
 
@@ -75,7 +62,7 @@ class Places:
 
 def place(
     scene: Scene, intent: Intent | None, *, bin_m: float, seed: int = 0
-) -> QuantisedPlacement:
+) -> rule_placer.Placement:
     """Vehicles where their codes allow; the same for the same seed.
 
     Args:
@@ -109,13 +96,12 @@ def place(
     if vehicles and not added:
         raise CannotPlace("Every place that the code allows is taken.")
     moved = {agent.id for agent in right.modification.moved}
-    return QuantisedPlacement(
+    return rule_placer.Placement(
         modification=Modification(
-            added=tuple(one for one in added if one.id not in moved),
-            moved=tuple(one for one in added if one.id in moved),
+            added=tuple(agent for agent in added if agent.id not in moved),
+            moved=tuple(agent for agent in added if agent.id in moved),
             removed=right.modification.removed,
         ),
-        codes=codes,
         notes=" ".join(notes),
     )
 

@@ -11,31 +11,17 @@ from functools import partial
 from typing import Protocol
 
 from augment.baselines import quantised, rule_placer
+from augment.baselines.rule_placer import Placement
 from augment.scene.entities import Scene
 from augment.scene.intent import Intent
-from augment.scene.modification import Modification
 
 RULE_PLACER = "rule-placer"
-
-
-class PlacedIntent(Protocol):
-    """What was placed."""
-
-    @property
-    def modification(self) -> Modification:
-        """What is added."""
-        ...
-
-    @property
-    def notes(self) -> str:
-        """How, in words."""
-        ...
 
 
 class PlaceIntent(Protocol):
     """Adds what is asked for to a scene."""
 
-    def __call__(self, scene: Scene, intent: Intent | None, /, *, seed: int) -> PlacedIntent:
+    def __call__(self, scene: Scene, intent: Intent | None, /, *, seed: int) -> Placement:
         """The same for the same seed.
 
         Raises:

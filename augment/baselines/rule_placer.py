@@ -60,7 +60,7 @@ class Placement:
     """What was placed.
 
     Attributes:
-        notes: What stands where and which conventions filled what was open, for a page.
+        notes: What stands where and why, for a page.
     """
 
     modification: Modification

@@ -49,11 +49,6 @@ class Idm:
         low, high = -self.max_deceleration_mps2, self.max_acceleration_mps2
         return np.minimum(np.maximum(wished, low), high)
 
-    def steady_gap_m(self, speed_mps: float, target_mps: float) -> float:
-        """The gap behind a leader of the same speed at which nothing changes; closed form."""
-        wished = self.min_gap_m + self.headway_s * speed_mps
-        return wished / math.sqrt(1.0 - (speed_mps / target_mps) ** self.exponent)
-
 
 PROPOSAL_IDM = Idm(
     min_gap_m=1.0,

@@ -12,7 +12,7 @@ import numpy as np
 
 from augment.scene.entities import AgentType, TrafficAgent
 from augment.simulation.contact import corners, meet, radii
-from augment.simulation.idm import TRAFFIC_IDM, Idm
+from augment.simulation.idm import TRAFFIC_IDM
 from augment.simulation.path import Path, dense
 from augment.simulation.road import Road
 from augment.simulation.states import KIND_OF, STEP_S, FloatArray, IntArray, Objects
@@ -100,7 +100,8 @@ class Walkers:
 FALLBACK_MPS = 10.0
 """The wished speed where the map has no limit: nuPlan's."""
 SWEEP_S = 1.5
-"""A driver takes up the road that it covers in this time, so that gaps are measured from there."""
+"""Gaps are measured from the road that a driver covers in this time, but for the first step:
+nuPlan's way."""
 PATH_M = 400.0
 _LOOK_M = 80.0
 _KEPT_WAYS = 5
@@ -113,20 +114,10 @@ class LaneDrivers:
     Args:
         agents: Moving, each on a lane.
         road: The map.
-        idm: Their wishes.
-        sweep_s: How much road ahead of itself a driver takes up, in seconds of its speed, from
-            the second step on (nuPlan's traffic does); 0 for the plain law.
     """
 
-    def __init__(
-        self,
-        agents: Sequence[TrafficAgent],
-        road: Road,
-        *,
-        idm: Idm = TRAFFIC_IDM,
-        sweep_s: float = SWEEP_S,
-    ) -> None:
-        self._idm, self._sweep_s, self._first = idm, sweep_s, True
+    def __init__(self, agents: Sequence[TrafficAgent], road: Road) -> None:
+        self._first = True
         self._agents = tuple(agents)
         lanes = [_Lane(road, agent) for agent in self._agents]
         self._lanes = lanes
@@ -154,7 +145,7 @@ class LaneDrivers:
         targets = np.array(
             [lane.wish_mps(s) for lane, s in zip(self._lanes, self.stations, strict=True)]
         )
-        pull = self._idm.clipped(self.speeds, targets, gap, leader_speed)
+        pull = TRAFFIC_IDM.clipped(self.speeds, targets, gap, leader_speed)
         self.stations = self.stations + self.speeds * STEP_S
         self.speeds = np.maximum(self.speeds + pull * STEP_S, 0.0)
         self._first = False
@@ -162,7 +153,7 @@ class LaneDrivers:
     def _leaders(self, everybody: Objects) -> tuple[FloatArray, FloatArray]:
         """Gap and speed along the path of each driver's leader, (D,) each; inf without one."""
         half = self._base.boxes[:, 3] / 2.0
-        front = self.stations + half + (0.0 if self._first else self._sweep_s) * self.speeds
+        front = self.stations + half + (0.0 if self._first else SWEEP_S) * self.speeds
         gap, speed = np.full(len(front), np.inf), np.zeros(len(front))
         for row, lane in enumerate(self._lanes):
             stop = lane.red_ahead(self.stations[row] + half[row])
@@ -191,7 +182,7 @@ class LaneDrivers:
         rows = np.array(present, dtype=np.int64)
         mine = np.array([places[self._base.ids[row]] for row in present], dtype=np.int64)
         here = everybody.boxes[mine]
-        look = np.minimum(_LOOK_M, 10.0 + self.speeds[rows] * (self._sweep_s + 4.0))
+        look = np.minimum(_LOOK_M, 10.0 + self.speeds[rows] * (SWEEP_S + 4.0))
         offset = everybody.boxes[None, :, :2] - here[:, None, :2]
         reach = look[:, None] + radii(everybody.boxes)[None]
         near = (offset**2).sum(axis=-1) < reach**2
