@@ -115,9 +115,9 @@ def places_of(scene: Scene) -> Places:
     points, headings, ids = [], [], []
     lanes: list[AnyLane] = [*scene.lanes, *scene.connectors]
     for lane in lanes:
-        found, turned = _along(lane.centerline)
-        near = np.hypot(found[:, 0], found[:, 1]) <= FURTHEST_M
-        points.append(found[near])
+        points_m, turned = _along(lane.centerline)
+        near = np.hypot(points_m[:, 0], points_m[:, 1]) <= FURTHEST_M
+        points.append(points_m[near])
         headings.append(turned[near])
         ids += [lane.id] * int(near.sum())
     if not ids:
@@ -138,7 +138,7 @@ def allowed_by(code: Code, places: Places, *, bin_m: float) -> tuple[NDArray[np.
     in_quadrant = quadrants_of(places.points_m) == code.quadrant
     ahead = (places.points_m[:, 0] > 0.0) == code.quadrant.is_front
     facing = np.array([direction_of(heading) is code.direction for heading in places.headings_rad])
-    for choice, said in (
+    for choice, given_up in (
         (in_bin & in_quadrant & facing, ""),
         (in_bin & ahead & facing, ", its side given up"),
         (in_bin & in_quadrant, ", its direction given up"),
@@ -146,7 +146,7 @@ def allowed_by(code: Code, places: Places, *, bin_m: float) -> tuple[NDArray[np.
         (in_bin, ", all but the distance given up"),
     ):
         if choice.any():
-            return np.flatnonzero(choice), said
+            return np.flatnonzero(choice), given_up
     gaps = np.abs(bins - code.distance_bin)
     return np.flatnonzero(gaps == gaps.min()), ", only the nearest bin with a lane kept"
 
@@ -191,7 +191,7 @@ def _drawn(
 ) -> TrafficAgent | None:
     """A vehicle at one of the places, None where every draw met somebody else."""
     length_m, width_m = LENGTH_WIDTH_M[AgentType.VEHICLE]
-    made = TrafficAgent(
+    vehicle = TrafficAgent(
         id=name,
         type=AgentType.VEHICLE,
         x_m=0.0,
@@ -204,13 +204,13 @@ def _drawn(
     for _ in range(_DRAWS):
         index = int(rng.choice(allowed))
         x_m, y_m = places.points_m[index]
-        made = replace(
-            made,
+        vehicle = replace(
+            vehicle,
             x_m=round(float(x_m), 3),
             y_m=round(float(y_m), 3),
             heading_rad=round(float(places.headings_rad[index]), 5),
             lane_id=places.lane_ids[index],
         )
-        if not any(overlap(made.box, other.box).depth_m > 0.0 for other in others):
-            return made
+        if not any(overlap(vehicle.box, other.box).depth_m > 0.0 for other in others):
+            return vehicle
     return None

@@ -82,8 +82,8 @@ def place(scene: Scene, intent: Intent | None, *, seed: int = 0) -> Placement:
     counted, changes = _counted(scene, intent)
     sentences = [f"{name} is removed." for name in changes.removed]
     for move, agent in counted:
-        made, distance_m = _moved(move, agent, apply(scene, changes), intent.route, rng)
-        changes = replace(changes, moved=(*changes.moved, made))
+        in_place, distance_m = _moved(move, agent, apply(scene, changes), intent.route, rng)
+        changes = replace(changes, moved=(*changes.moved, in_place))
         sentences.append(f"{agent.id} is moved to {distance_m:.1f} m along the ego's lane.")
     after = apply(scene, changes)
     ground, jury = PlacingGround(after, intent.route), Jury(after, intent.route)
@@ -141,9 +141,9 @@ def _moved(
     _insist_on_needs(request)
     rest = replace(scene, agents=tuple(one for one in scene.agents if one.id != agent.id))
     ground, jury = PlacingGround(rest, route), Jury(rest, route)
-    (made,), distance_m = _fitted(request, ground, jury, (), rng)
+    (moved,), distance_m = _fitted(request, ground, jury, (), rng)
     placed = replace(
-        made,
+        moved,
         id=agent.id,
         type=agent.type,
         length_m=agent.length_m,

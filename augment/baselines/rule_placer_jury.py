@@ -52,9 +52,11 @@ class Jury:
         after = replace(self._scene, agents=(*self._scene.agents, *everyone[: len(before)]))
         ground = Ground.of(after) if before else self._ground
         own = Modification(added=tuple(agent for agent in everyone if agent.id in names))
-        found = check_against_intent(ground, own, Intent(requests=(request,), route=self._route))
-        wrong = [one.sentence() for one in found if one.severity is Severity.WRONG]
-        doubts = sum(one.severity is Severity.DOUBTFUL for one in found)
+        findings = check_against_intent(
+            ground, own, Intent(requests=(request,), route=self._route)
+        )
+        wrong = [one.sentence() for one in findings if one.severity is Severity.WRONG]
+        doubts = sum(one.severity is Severity.DOUBTFUL for one in findings)
         return PlacementVerdict(wrong=wrong[0] if wrong else None, doubts=doubts)
 
 

@@ -97,12 +97,12 @@ def bend(
     if setting is None or not right.changed:
         return Bent(modification=right, mistake="none")
     shaky = _shifted(right.changed, setting, rng.uniform(-1.5, 1.5))
-    made = {n: mistake(shaky, setting) for n, mistake in MISTAKES.items() if n not in spared}
-    possible = sorted(name for name, agents in made.items() if _differs(agents, shaky))
+    outcomes = {n: mistake(shaky, setting) for n, mistake in MISTAKES.items() if n not in spared}
+    possible = sorted(name for name, agents in outcomes.items() if _differs(agents, shaky))
     if not possible or rng.random() < _RIGHT_SHARE:
         return Bent(modification=_with(right, shaky), mistake="none")
     name = rng.choice(possible)
-    return Bent(modification=_with(right, made[name]), mistake=name)
+    return Bent(modification=_with(right, outcomes[name]), mistake=name)
 
 
 def _with(right: Modification, agents: Agents) -> Modification:
@@ -138,17 +138,17 @@ def lay_straight(scene: Scene, right: Modification) -> Modification:
     setting = _setting(scene, random.Random(0))
     if setting is None:
         return right
-    made = (
+    laid = (
         straight_line((agent,), setting)[0] if _is_past_turn(agent, setting.route) else agent
         for agent in right.changed
     )
-    return _with(right, tuple(made))
+    return _with(right, tuple(laid))
 
 
 def neighbour_lane(agents: Agents, setting: _Setting) -> Agents:
     """Everything lands one lane beside where it belongs."""
-    found = setting.graph.nearest(agents[0].x_m, agents[0].y_m)
-    width_m = setting.graph.lanes[found[0]].width_m if found else 3.5
+    nearest = setting.graph.nearest(agents[0].x_m, agents[0].y_m)
+    width_m = setting.graph.lanes[nearest[0]].width_m if nearest else 3.5
     return _shifted(agents, setting, 0.0, setting.rng.choice([-1.0, 1.0]) * width_m)
 
 
@@ -156,12 +156,12 @@ def wrong_side(agents: Agents, setting: _Setting) -> Agents:
     """The offset from the lane's centreline is taken to the other side."""
     bent = []
     for agent in agents:
-        found = setting.graph.nearest(agent.x_m, agent.y_m)
-        if found is None or abs(found[1].d_m) > 2.0:
+        nearest = setting.graph.nearest(agent.x_m, agent.y_m)
+        if nearest is None or abs(nearest[1].d_m) > 2.0:
             bent.append(agent)
             continue
-        line = setting.graph.lanes[found[0]].centerline
-        bent.append(_at(agent, *line.position(found[1].s_m, -found[1].d_m), agent.heading_rad))
+        line = setting.graph.lanes[nearest[0]].centerline
+        bent.append(_at(agent, *line.position(nearest[1].s_m, -nearest[1].d_m), agent.heading_rad))
     return tuple(bent)
 
 

@@ -36,11 +36,15 @@ def problems_of(task: Task) -> list[Problem]:
     except CannotPlace:
         return []
     added = list_of(task.prompt, "Added agents").items()
-    made = [agent_of(name, vector[:8]) for name, vector in added]
-    if len(made) != len(right):
-        return [_problem(f"{len(made)} agents were added, {len(right)} were asked for.", "Count.")]
+    added_agents = [agent_of(name, vector[:8]) for name, vector in added]
+    if len(added_agents) != len(right):
+        return [
+            _problem(
+                f"{len(added_agents)} agents were added, {len(right)} were asked for.", "Count."
+            )
+        ]
     problems: list[Problem] = []
-    for agent in made:
+    for agent in added_agents:
         meant = min(right, key=lambda one: _distance_m(one, agent))
         right.remove(meant)
         problems += _differences(agent, meant)

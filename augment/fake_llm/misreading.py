@@ -31,7 +31,7 @@ _LEVEL_M = 8.0
 
 def misread(intent: Intent, rng: random.Random) -> Intent:
     """The intent as a careless reader has it: with one mistake wherever one can be made."""
-    possible = [made for slip in SLIPS if (made := slip(intent)) is not None]
+    possible = [misreading for slip in SLIPS if (misreading := slip(intent)) is not None]
     if not possible or (intent.unmet and rng.random() > _ATTEMPT_SHARE):
         return intent
     return rng.choice(possible)

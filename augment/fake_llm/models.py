@@ -78,8 +78,8 @@ def _completed(
     probed = probing.answer_to(request)
     if probed is not None:
         return completion(request, probed[0] or None, calls=probed[1])
-    said = character.answer(request, surroundings.intents)
-    return completion(request, said.text or None, calls=said.calls)
+    answer = character.answer(request, surroundings.intents)
+    return completion(request, answer.text or None, calls=answer.calls)
 
 
 _good = _as(playing.GOOD)

@@ -102,14 +102,14 @@ class Character:
             right = _placed(task, self.hear(task, understood))
         except CannotPlace as refused:
             return Said(text=answers.write_refusal(task, _why(task, refused)))
-        made = self.bend(task, answers.renumber_added(right, task.first_new), understood)
-        wanted = tool_use.calls_for(task.scene, made)
+        placed = self.bend(task, answers.renumber_added(right, task.first_new), understood)
+        wanted = tool_use.calls_for(task.scene, placed)
         spared = len(self.first_calls)
         if understood.may_call and wanted and len(understood.results) <= spared:
             return _calling(understood, _named(wanted[: 8 - spared]))
         results = understood.results[spared:]
-        made = tool_use.with_results(task.scene, made, results)
-        text = answers.write_answer(task, made, _summary(task))
+        placed = tool_use.with_results(task.scene, placed, results)
+        text = answers.write_answer(task, placed, _summary(task))
         return Said(text=self.spoil(task, text, understood))
 
 

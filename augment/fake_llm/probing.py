@@ -21,22 +21,22 @@ def answer_to(request: ChatRequest) -> tuple[str, tuple[tuple[str, str], ...]] |
     """A text and calls (name, arguments); None where the request is no question of a probe."""
     message = request.messages[-1]
     text = message.text
-    if found := _WORD.fullmatch(text):
-        return found.group(1), ()
+    if match := _WORD.fullmatch(text):
+        return match.group(1), ()
     if text.startswith("Write a story"):
         return "A car stood on the road. " * 3, ()  # about as long as the limit allows
-    if found := _SUM.fullmatch(text):
-        total = int(found.group(1)) + int(found.group(2))
-        told = request.response_format is not None
-        return (json.dumps({"sum": total}) if told else f"That makes {total}."), ()
-    if (found := _DOUBLE.search(text)) and request.tools:
-        arguments = json.dumps({"number": int(found.group(1))})
+    if match := _SUM.fullmatch(text):
+        total = int(match.group(1)) + int(match.group(2))
+        as_object = request.response_format is not None
+        return (json.dumps({"sum": total}) if as_object else f"That makes {total}."), ()
+    if (match := _DOUBLE.search(text)) and request.tools:
+        arguments = json.dumps({"number": int(match.group(1))})
         return "", ((request.tools[0].function.name, arguments),)
     if message.images and text.startswith("Name the colour of the left half"):
         return "The left half is green, the right half is yellow.", ()
     if text.rstrip().endswith("Answer with it alone."):
-        found = _REMEMBER.search(text)
-        return (found.group(1) if found else "I was told no word."), ()
+        match = _REMEMBER.search(text)
+        return (match.group(1) if match else "I was told no word."), ()
     return None
 
 

@@ -32,11 +32,11 @@ class Response:
 
 def tool_calls(calls: Sequence[tuple[str, str]], seed: str) -> list[dict[str, object]]:
     """Calls (name, arguments) in the form of the wire, numbered and signed."""
-    made: list[dict[str, object]] = []
+    entries: list[dict[str, object]] = []
     for number, (name, arguments) in enumerate(calls):
         digest = hashlib.sha256(f"{seed}:{number}".encode()).hexdigest()
         call_id = f"call_{digest[:16]}"
-        made.append(
+        entries.append(
             {
                 "id": call_id,
                 "type": "function",
@@ -44,7 +44,7 @@ def tool_calls(calls: Sequence[tuple[str, str]], seed: str) -> list[dict[str, ob
                 "extra_content": {"fake": {"signature": signature_of(call_id)}},
             }
         )
-    return made
+    return entries
 
 
 def completion(
@@ -63,7 +63,7 @@ def completion(
     message: dict[str, object] = {"role": "assistant", "content": text, "refusal": refusal}
     if calls:
         message["tool_calls"] = tool_calls(calls, digest)
-    made: dict[str, object] = {
+    document: dict[str, object] = {
         "id": f"chatcmpl-{digest[:24]}",
         "object": "chat.completion",
         "created": 0,
@@ -78,12 +78,12 @@ def completion(
         ],
     }
     if with_usage:
-        made["usage"] = {
+        document["usage"] = {
             "prompt_tokens": prompt_tokens,
             "completion_tokens": completion_tokens,
             "total_tokens": prompt_tokens + completion_tokens,
         }
-    return made
+    return document
 
 
 def prompt_tokens_of(request: ChatRequest) -> int:

@@ -151,8 +151,8 @@ def list_of(text: str, title: str) -> Vectors:
         ValueError: There is none.
     """
     start = text.index(f"\n{title}:\n") + len(title) + 3
-    found, _ = json.JSONDecoder().raw_decode(text, start)
-    return dict(found)
+    vectors, _ = json.JSONDecoder().raw_decode(text, start)
+    return dict(vectors)
 
 
 def instruction_in(messages: Sequence[SpokenMessage]) -> str:

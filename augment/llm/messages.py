@@ -72,15 +72,15 @@ class Message:
 
     def to_document(self, *, image_url: ImageUrl = data_url) -> dict[str, object]:
         """The message in the form of the OpenAI-compatible wire."""
-        said: dict[str, object] = {"role": self.speaker.value, "content": self.text}
+        document: dict[str, object] = {"role": self.speaker.value, "content": self.text}
         if self.calls:
             # Several servers refuse an empty text beside calls.
             calls = [call.to_document() for call in self.calls]
-            return said | {"content": self.text or None, "tool_calls": calls}
+            return document | {"content": self.text or None, "tool_calls": calls}
         if self.answers:
-            return said | {"tool_call_id": self.answers}
+            return document | {"tool_call_id": self.answers}
         if not self.images:
-            return said
+            return document
         parts: list[dict[str, object]] = [{"type": "text", "text": self.text}]
         parts += [{"type": "image_url", "image_url": {"url": image_url(i)}} for i in self.images]
         return {"role": self.speaker.value, "content": parts}

@@ -169,8 +169,8 @@ def _is_sum(reply: Reply) -> bool:
 
 
 def _sees_both_halves(reply: Reply) -> bool:
-    said = reply.text.lower()
-    return 0 <= said.find("green") < said.find("yellow")
+    answer = reply.text.lower()
+    return 0 <= answer.find("green") < answer.find("yellow")
 
 
 def _long_text() -> str:

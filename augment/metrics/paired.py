@@ -58,15 +58,15 @@ def compare_all(
     """
     pairs = list(combinations(sorted(values), 2))
     streams = np.random.SeedSequence(seed).spawn(len(pairs))
-    found = []
+    comparisons = []
     for (first, second), stream in zip(pairs, streams, strict=True):
         shared = sorted(values[first].keys() & values[second].keys())
         if shared:
             differences = np.array([values[first][one] - values[second][one] for one in shared])
             rng = np.random.default_rng(stream)
-            found.append(_compared(first, second, differences, rng, rounds))
-    adjusted = adjust_holm([one.p for one in found])
-    return tuple(replace(one, p_holm=p) for one, p in zip(found, adjusted, strict=True))
+            comparisons.append(_compared(first, second, differences, rng, rounds))
+    adjusted = adjust_holm([one.p for one in comparisons])
+    return tuple(replace(one, p_holm=p) for one, p in zip(comparisons, adjusted, strict=True))
 
 
 def adjust_holm(p_values: Sequence[float | None]) -> list[float | None]:
@@ -127,10 +127,10 @@ def _drawn_medians(
     places = np.empty(n, dtype=np.int16 if n <= np.iinfo(np.int16).max else np.int64)
     places[np.argsort(differences)] = np.arange(n)
     middle = [(n - 1) // 2, n // 2]
-    found = []
+    medians = []
     for begin in range(0, rounds, _ROUNDS_AT_ONCE):
         size = (min(_ROUNDS_AT_ONCE, rounds - begin), n)
         drawn = places[rng.integers(0, n, size=size)]
         drawn.partition(middle, axis=1)
-        found.append(in_order[drawn[:, middle]].mean(axis=1))
-    return np.concatenate(found)
+        medians.append(in_order[drawn[:, middle]].mean(axis=1))
+    return np.concatenate(medians)

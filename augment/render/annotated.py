@@ -72,10 +72,10 @@ def draw_annotated(
     if stamp:
         _stamp(ground, stamp, taken)
     for mark in marks:
-        found = [by_id[name] for name in mark.agents if name in by_id]
-        for agent in found:
+        marked = [by_id[name] for name in mark.agents if name in by_id]
+        for agent in marked:
             _ring(ground, agent, _colour(mark))
-        _place(ground, mark, found, taken, boxes)
+        _place(ground, mark, marked, taken, boxes)
     draw_labels(ground, after, taken=taken)
     return ground.canvas.png(halved=True)
 

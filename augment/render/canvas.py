@@ -56,10 +56,10 @@ class Canvas:
 
     def copy(self) -> Canvas:
         """The same picture on a surface of its own."""
-        made = copy.copy(self)
-        made._texts = list(self._texts)
-        made._draw_on(self._image.copy())
-        return made
+        twin = copy.copy(self)
+        twin._texts = list(self._texts)
+        twin._draw_on(self._image.copy())
+        return twin
 
     def fill(self, points_px: FloatArray, colour: Colour) -> None:
         """A filled polygon through points (P, 2)."""

@@ -105,8 +105,8 @@ class _Drawn:
         corner = self._pixels(np.array([[left, top]]))[0].round().astype(int)
         size = (round(WINDOW_M[0] * _SCALE), round(WINDOW_M[1] * _SCALE))
         first, second = int(corner[0]), int(corner[1])
-        made = self._ground.crop((first, second, first + size[0], second + size[1]))
-        pen = ImageDraw.Draw(made)
+        picture = self._ground.crop((first, second, first + size[0], second + size[1]))
+        pen = ImageDraw.Draw(picture)
         for one in self._trace["objects"]:
             pose = _pose_at(one, step)
             if pose is not None:
@@ -115,7 +115,7 @@ class _Drawn:
         ego = self._trace["ego"]
         mark = _Box(ego["poses"][step], ego["length_m"], ego["width_m"])
         self._mark(pen, mark, palette.EGO_MARK, corner)
-        finished = made.reduce(FINENESS)
+        finished = picture.reduce(FINENESS)
         _say_time_and_scale(finished, time_s)
         return finished
 
@@ -136,8 +136,8 @@ class _Drawn:
 
     def _draw_ground(self) -> Image.Image:
         size = ((self._high - self._low) * _SCALE).round().astype(int)
-        made = Image.new("RGB", (int(size[0]), int(size[1])), palette.PAPER)
-        pen = ImageDraw.Draw(made)
+        picture = Image.new("RGB", (int(size[0]), int(size[1])), palette.PAPER)
+        pen = ImageDraw.Draw(picture)
         road = self._trace["road"]
         for ring in road["walkways"]:
             pen.polygon(self._line(ring), fill=palette.WALKWAY)
@@ -151,7 +151,7 @@ class _Drawn:
             pen.line(self._line(lane["edge"]), fill=palette.LANE_LINE, width=FINENESS)
             colour = palette.LIGHT_RED if lane["is_red"] else palette.ROAD_EDGE
             pen.line(self._line(lane["line"]), fill=colour, width=1)
-        return made
+        return picture
 
     def _line(self, flat: list[float]) -> list[tuple[float, float]]:
         return _flat(self._pixels(np.array(flat).reshape(-1, 2)))
@@ -192,19 +192,19 @@ def _stacked(pictures: list[Image.Image]) -> Image.Image:
     if len(pictures) == 1:
         return pictures[0]
     width, height = pictures[0].size
-    made = Image.new("RGB", (width, _with_gaps(height, len(pictures))), palette.ROAD_EDGE)
+    sheet = Image.new("RGB", (width, _with_gaps(height, len(pictures))), palette.ROAD_EDGE)
     for number, picture in enumerate(pictures):
-        made.paste(picture, (0, number * (height + GAP_PX)))
-    return made
+        sheet.paste(picture, (0, number * (height + GAP_PX)))
+    return sheet
 
 
 def _beside(pictures: list[Image.Image]) -> Image.Image:
     """Pictures of one size beside each other, with a line between."""
     width, height = pictures[0].size
-    made = Image.new("RGB", (_with_gaps(width, len(pictures)), height), palette.ROAD_EDGE)
+    sheet = Image.new("RGB", (_with_gaps(width, len(pictures)), height), palette.ROAD_EDGE)
     for number, picture in enumerate(pictures):
-        made.paste(picture, (number * (width + GAP_PX), 0))
-    return made
+        sheet.paste(picture, (number * (width + GAP_PX), 0))
+    return sheet
 
 
 def _with_gaps(length_px: int, count: int) -> int:

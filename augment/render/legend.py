@@ -76,14 +76,14 @@ def _places(
     entries: list[_Entry], width_px: int
 ) -> tuple[list[tuple[_Entry, float, float]], float]:
     """Where each entry begins and its row lies, in pixels, and how high all rows are."""
-    found, x_px, y_px = [], _MARGIN_PX, _MARGIN_PX + _ROW_PX / 2.0
+    places, x_px, y_px = [], _MARGIN_PX, _MARGIN_PX + _ROW_PX / 2.0
     for entry in entries:
         wide = _SAMPLE_PX + 6.0 + text_width_px(entry.words, _TEXT_PX) + _GAP_PX
         if x_px + wide > width_px and x_px > _MARGIN_PX:
             x_px, y_px = _MARGIN_PX, y_px + _ROW_PX
-        found.append((entry, x_px, y_px))
+        places.append((entry, x_px, y_px))
         x_px += wide
-    return found, y_px + _ROW_PX / 2.0 + _MARGIN_PX
+    return places, y_px + _ROW_PX / 2.0 + _MARGIN_PX
 
 
 def _entries(scene: Scene, modification: Modification) -> Iterator[_Entry]:
@@ -93,10 +93,10 @@ def _entries(scene: Scene, modification: Modification) -> Iterator[_Entry]:
         ("changed: ", palette.CHANGED_MARK, modification.changed),
         ("other ", palette.OTHER_MARK, [a for a in scene.agents if a.id not in changed]),
     )
-    for said, style, agents in groups:
+    for prefix, style, agents in groups:
         for kind in _NAMES:
             if any(agent.type is kind for agent in agents):
-                yield _Entry(draw=_agent(kind, style), words=said + _NAMES[kind])
+                yield _Entry(draw=_agent(kind, style), words=prefix + _NAMES[kind])
     everyone = (scene.ego, *scene.agents, *modification.changed)
     if any(agent.walk_to_m is not None for agent in everyone):
         yield _Entry(draw=_walk, words="to where a walk ends")

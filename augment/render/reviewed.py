@@ -51,15 +51,15 @@ def draw_for_review(scene: Scene, modification: Modification, camera: Camera) ->
 def lanes_near(scene: Scene, agents: tuple[TrafficAgent, ...]) -> list[AnyLane]:
     """The lanes and connectors near one of the agents, the nearest first."""
     lanes: list[AnyLane] = [*scene.lanes, *scene.connectors]
-    found = []
+    near = []
     for lane in lanes:
         gap_m = min(
             (lane.centerline.project(one.x_m, one.y_m).distance_m for one in agents),
             default=np.inf,
         )
         if gap_m <= NEAR_M:
-            found.append((gap_m, lane.id, lane))
-    return [lane for _, _, lane in sorted(found, key=lambda one: one[:2])]
+            near.append((gap_m, lane.id, lane))
+    return [lane for _, _, lane in sorted(near, key=lambda one: one[:2])]
 
 
 # Private

@@ -91,10 +91,10 @@ def _boundary(area: Area) -> FloatArray:
 
 
 def _walkways(ground: MetricCanvas, areas: list[Area]) -> None:
-    found = [_boundary(area) for area in areas if area.kind is AreaKind.WALKWAY]
-    for polygon in found:
+    walkways = [_boundary(area) for area in areas if area.kind is AreaKind.WALKWAY]
+    for polygon in walkways:
         ground.stroke(polygon, palette.WALKWAY_EDGE, 1.5, closed=True)
-    for polygon in found:
+    for polygon in walkways:
         ground.fill(polygon, palette.WALKWAY)
 
 

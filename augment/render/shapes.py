@@ -117,12 +117,12 @@ def long_axis(polygon: FloatArray) -> tuple[float, float, float]:
 
 def _lengthened(points: FloatArray) -> FloatArray:
     """A line with both ends drawn out; lanes that bend meet at a slight angle, with a gap."""
-    made = np.array(points, dtype=np.float64)
+    longer = np.array(points, dtype=np.float64)
     for end, inner in ((0, 1), (-1, -2)):
         (x, y), (inner_x, inner_y) = points[end], points[inner]
         share = _REACH / math.hypot(x - inner_x, y - inner_y)
-        made[end] = x + share * (x - inner_x), y + share * (y - inner_y)
-    return made
+        longer[end] = x + share * (x - inner_x), y + share * (y - inner_y)
+    return longer
 
 
 def _half(polygon: FloatArray, normal: FloatArray, limit: float) -> FloatArray:

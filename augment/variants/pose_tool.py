@@ -147,17 +147,18 @@ class PoseTool:
             return {"error": fault.problem}
         if not call.is_list:
             return self._answer_at(call, call.places[0])
-        found = [
+        answers = [
             {"distance_m": place.distance_m, "lateral_m": place.lateral_m}
             | self._answer_at(call, place)
             for place in call.places
         ]
         shared = {
             name: value
-            for name, value in found[0].items()
-            if name not in _OF_A_PLACE and all(name in one and one[name] == value for one in found)
+            for name, value in answers[0].items()
+            if name not in _OF_A_PLACE
+            and all(name in one and one[name] == value for one in answers)
         }
-        own = [{name: one[name] for name in one if name not in shared} for one in found]
+        own = [{name: one[name] for name in one if name not in shared} for one in answers]
         return {"poses": own, **shared}
 
     @cached_property
@@ -195,10 +196,10 @@ class PoseTool:
 
     def _answer_at(self, call: PoseCall, place: AskedPlace) -> dict[str, object]:
         try:
-            found = self.pose_on_lane(call.lane, call.start, *place)
+            result = self.pose_on_lane(call.lane, call.start, *place)
         except ToolError as fault:
             return {"error": fault.problem}
-        return found.to_document()
+        return result.to_document()
 
     def _spot(self, road: _Road, start_m: float, distance_m: float) -> _Spot:
         """Where a distance from s of a road leads."""

@@ -124,8 +124,8 @@ def _note_round(modifier: Modifier, number: int, draft: Draft) -> None:
 def _result(modifier: Modifier, rounds: list[Round], remark: str) -> Result:
     kept = _kept(modifier.recipe, rounds)
     accepted = None if kept.verdict is None else kept.verdict.is_accepted
-    said = "" if kept.verdict is None else f": {kept.verdict.summary}"
-    sentence = f"{modifier.recipe.title}: round {kept.number} of {len(rounds)} counts{said}."
+    judgement = "" if kept.verdict is None else f": {kept.verdict.summary}"
+    sentence = f"{modifier.recipe.title}: round {kept.number} of {len(rounds)} counts{judgement}."
     if accepted is False:
         sentence += " No round was accepted."
     modifier.respondents.transcript.note(

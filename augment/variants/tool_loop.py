@@ -120,8 +120,8 @@ def _written_turns(reply: Reply, desk: ToolDesk) -> Messages:
             break
     if not results:
         return ()
-    told = said_by_user(fill.result_text(results, is_over=desk.is_over))
-    return model_message(reply.text), told
+    results_message = said_by_user(fill.result_text(results, is_over=desk.is_over))
+    return model_message(reply.text), results_message
 
 
 def _native_turns(reply: Reply, desk: ToolDesk) -> Messages:
@@ -129,7 +129,7 @@ def _native_turns(reply: Reply, desk: ToolDesk) -> Messages:
     if not reply.tool_calls:
         return ()
     read = [read_arguments(call.arguments) for call in reply.tool_calls]
-    said = Message(
+    answer = Message(
         speaker=Speaker.ASSISTANT,
         text=reply.text,
         calls=tuple(_echo(call, one) for call, one in zip(reply.tool_calls, read, strict=True)),
@@ -139,7 +139,7 @@ def _native_turns(reply: Reply, desk: ToolDesk) -> Messages:
         written = WrittenCall(name=call.name, arguments=one.arguments, problem=one.problem)
         result = desk.answer(written)
         results.append(Message(speaker=Speaker.TOOL, text=result, answers=call.id))
-    return said, *results
+    return answer, *results
 
 
 def _echo(call: ToolCall, read: WrittenCall) -> ToolCall:
