@@ -19,7 +19,7 @@ Kind = Contestant.Kind
 
 _KINDS = (Kind.REFERENCE, Kind.RULE, Kind.LLM, Kind.SIMULATED)
 
-RUNNABLE = Q(kind__in=_KINDS, error_rates=None) | Q(kind=Kind.BASELINE, slug__in=PLACERS)
+RUNNABLE = Q(kind__in=_KINDS, error_rates__isnull=True) | Q(kind=Kind.BASELINE, slug__in=PLACERS)
 """Whom a job can run. What humans and outside baselines made is imported; the simulated errors of
 earlier versions are kept, but run no more."""
 
@@ -33,7 +33,6 @@ def is_runnable(contestant: Contestant) -> bool:
 def find_obstacle(contestant: Contestant) -> str:
     """Why no job can run a contestant, whatever the scenarios; empty where one can.
 
-    To be said by a door in the language of whoever reads it.
     """
     if not is_runnable(contestant):
         return "made by people or by an outside program, and imported"
