@@ -31,9 +31,7 @@ def is_runnable(contestant: Contestant) -> bool:
 
 
 def find_obstacle(contestant: Contestant) -> str:
-    """Why no job can run a contestant, whatever the scenarios; empty where one can.
-
-    """
+    """Why no job can run a contestant, whatever the scenarios; empty where one can."""
     if not is_runnable(contestant):
         return "made by people or by an outside program, and imported"
     try:
