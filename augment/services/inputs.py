@@ -125,7 +125,9 @@ def add_options(parser: CommandParser, inputs: Iterable[Input]) -> None:
             case InputKind.CHOICE:
                 given["choices"] = list(one.choices)
             case InputKind.LINES | InputKind.NAMES:
-                given["nargs"] = "+"
+                # An option that is given twice loses nothing; argparse extends only lists.
+                default = None if one.is_required else list(one.default)
+                given |= {"nargs": "+", "action": "extend", "default": default}
             case InputKind.WHOLE | InputKind.NUMBER:
                 given["type"] = int if one.kind is InputKind.WHOLE else float
                 given["metavar"] = "PERCENT" if one.unit == "%" else "N"

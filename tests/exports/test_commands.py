@@ -9,6 +9,7 @@ import pytest
 from django.core.management import CommandError, call_command
 from django.test import Client
 
+from arena.models import Study
 from arena.services.people import create_person
 from augment.models import Event
 from tests.exports.test_ratings import voted_study
@@ -40,6 +41,12 @@ def test_a_study_is_opened_closed_rated_and_exported_by_commands(tmp_path: Path)
     run("export", "leaderboard", "Round 1", "--format", "json", "--out", tmp_path / "board.json")
     assert json.loads((tmp_path / "board.json").read_text())["study"] == "Round 1"
     assert [path.name for path in tmp_path.iterdir()] == ["board.json"]
+
+
+def test_hypotheses_of_a_repeated_option_are_all_frozen() -> None:
+    lines = ["Nobody is perfect.", "Nobody is alike.", "Nobody is last."]
+    run(*open_arguments(), "--hypotheses", *lines[:2], "--hypotheses", lines[2])
+    assert [one["text"] for one in Study.objects.get().rules["hypotheses"]] == lines
 
 
 def test_the_same_snapshot_is_written_byte_for_byte(tmp_path: Path) -> None:
