@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator
 from contextlib import contextmanager
+from datetime import timedelta
 from io import StringIO
 from pathlib import Path
 
@@ -21,6 +22,7 @@ from augment.scene.intent_words import (
     Shape,
 )
 from augment.services.endpoints.known_endpoints import ensure_endpoint
+from augment.services.running import intent_readings
 from augment.services.running.caps import Caps
 from augment.services.running.intent_readings import (
     READINGS,
@@ -68,6 +70,19 @@ def test_what_was_read_waits_and_counts_once_it_is_accepted() -> None:
     assert Event.objects.filter(verb="set intent").count() == 1
     with pytest.raises(Conflict, match="No reading of 'street' waits"):
         accept_reading(scenario="street")
+
+
+def test_a_reading_that_is_interrupted_is_left_to_no_worker(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def interrupt(*_: object, **__: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(intent_readings, "ask_for_intent", interrupt)
+    with pytest.raises(KeyboardInterrupt):
+        reading(GOOD)
+    assert IntentReading.objects.get().state == State.FAILED
+    assert not READINGS.find_unsent(older_than=timedelta(0))
 
 
 def test_an_answer_that_breaks_the_schema_is_asked_for_once_more() -> None:

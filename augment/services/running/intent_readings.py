@@ -20,6 +20,7 @@ from augment.llm.client import ChatClient
 from augment.llm.costs import Price, WorstCase
 from augment.models import Endpoint, IntentReading, ModelCall, Scenario
 from augment.scene.intent_codec import intent_to_document
+from augment.services.clock import DATABASE_TIME
 from augment.services.endpoints.call_limits import Queue
 from augment.services.endpoints.client import EndpointClient
 from augment.services.endpoints.prices import price_of
@@ -69,7 +70,13 @@ def read_intent(
         )
         held = kind.take(reading.pk)
     assert held is not None
-    kind.work(held)
+    try:
+        kind.work(held)
+    except BaseException:  # given back, it would be paid for by a worker that nobody asked
+        given_back = kind.rows.filter(pk=reading.pk, state=State.RUNNING, claim=None)
+        why = "It was interrupted."
+        given_back.update(state=State.FAILED, reason=why, finished_at=DATABASE_TIME)
+        raise
     reading.refresh_from_db()
     return reading
 
