@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from dataclasses import replace
 from pathlib import Path
@@ -18,6 +19,7 @@ from augment.formats.writers import WRITERS, writer_named
 from augment.formats.writing import Cell, Written
 from augment.scene.motion import MotionSource
 from augment.scene.recording import Recording
+from augment.scene.recording_codec import recording_from_document
 from tests.formats.cells import cell, crossing, recorded_street
 from tests.formats.receivers import told_by
 from tests.formats.sanity import check_sanity, loaded
@@ -93,6 +95,16 @@ def test_a_gap_is_crossed_and_after_the_last_step_the_ego_goes_on() -> None:
     assert made.motion.ego.states[:, 0] == pytest.approx(8.0 * made.motion.times_s)
     lines = [loss.text for loss in writer_named("commonroad")([made]).losses]
     assert any("not recorded at 14 of 31 steps" in line for line in lines)
+
+
+def test_a_drive_that_nobody_recorded_is_not_in_our_own_json() -> None:
+    before, recording = recorded_street()
+    recording.ego[1:] = np.nan
+    made = cell(before, recording=recording, added=())
+    written = writer_named("json")([made]).files[f"{made.stem}.recording.json"]
+    assert (
+        recording_from_document(json.loads(written)).ego_is_seen.tolist() == [True] + [False] * 30
+    )
 
 
 @pytest.fixture

@@ -1,0 +1,37 @@
+"""What every log has in common, however it was read."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from augment.formats.recorded_log import Log, LoggedTrack, reading_at, speeds
+from augment.formats.road_map import RoadMap
+from augment.scene.entities import AgentType
+
+
+def test_no_speed_is_taken_over_a_gap() -> None:
+    times_s = np.array([0.0, 0.1, 0.2, 5.0, 5.1])
+    x_m = np.array([0.0, 1.0, 2.0, 90.0, 90.5])
+    found = speeds(times_s, np.column_stack([x_m, np.zeros(5)]))
+    assert found == pytest.approx([10.0, 10.0, 10.0, 5.0, 5.0])
+
+
+@pytest.mark.parametrize(
+    ("kind", "speed_mps"), [(AgentType.TRAFFIC_CONE, 0.0), (AgentType.VEHICLE, 0.4)]
+)
+def test_cones_never_move_however_their_boxes_jitter(kind: AgentType, speed_mps: float) -> None:
+    jittering = LoggedTrack(
+        name="a", type=kind, length_m=0.4, width_m=0.4, states=np.array([[5.0, 0.0, 0.0, 0.4]])
+    )
+    log = Log(
+        what="log",
+        times_s=np.zeros(1),
+        ego=np.zeros((1, 4)),
+        ego_length_m=4.8,
+        ego_width_m=2.0,
+        tracks=(jittering,),
+    )
+    city = RoadMap(what="map", place="map", segments=())
+    found = reading_at(log, 0, city, name="a", world="w", provenance="p", licence=None)
+    assert [agent.speed_mps for agent in found.scene.agents] == [speed_mps]
