@@ -13,13 +13,15 @@ import pytest
 from django.core.management import CommandError, call_command
 from pyarrow import parquet
 
-from arena.exports.bundle import bundle
+from arena.exports.bundle import MANIFEST, bundle, bundle_files
 from arena.exports.formats import format_named
 from arena.exports.tables import leaderboard_table
 from arena.exports.votes import VOTE_FORMATS, vote_table
 from arena.exports.writers import FORMATS
 from arena.models import Snapshot, Study
+from arena.queries.votes.sets import Filters
 from arena.services.ratings import rate
+from arena.services.studies import close_study
 from augment.errors import UnknownName
 from augment.models import Event
 from tests.full_study import Size, full_study
@@ -62,6 +64,16 @@ def test_the_zip_is_the_same_twice_its_manifest_true_and_no_account_named(
     assert person.pseudonym.encode() in texts
     for secret in (person.user.username, str(person.code)):
         assert secret.encode() not in texts
+
+
+def test_experts_that_a_rating_is_of_are_named_by_pseudonym() -> None:
+    study = a_study(votes_per_expert=3)
+    for matchup in study.matchups.all():
+        vote(matchup)
+    person = study.experts.order_by("pk")[0].person
+    chosen = Filters(experts=(str(person.code),))
+    files = bundle_files(rate(study=close_study(study=study), rounds=10, filters=chosen))
+    assert json.loads(files[MANIFEST])["filters"]["experts"] == [person.pseudonym]
 
 
 def test_votes_read_back_from_both_formats_are_the_same(snapshot: Snapshot) -> None:

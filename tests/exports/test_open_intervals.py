@@ -12,7 +12,7 @@ import pytest
 from django.core.management import call_command
 from pyarrow import parquet
 
-from arena.exports.tables import leaderboard_table
+from arena.exports.tables import NOT_RANKED, leaderboard_table
 from arena.exports.writers import FORMATS
 from arena.models import Snapshot, Study
 from arena.services.ratings import rate
@@ -68,3 +68,12 @@ def test_tables_of_every_format_have_the_same_order_bounds_and_reasons(
             "few": FEW,
             "weak": "no lower bound: hardly any score",
         }
+
+
+def test_nobody_is_first_where_everybody_would_be(tmp_path: Path) -> None:
+    path = tmp_path / "votes.csv"
+    path.write_text("model_a,model_b,winner\n" + "a,b,model_a\na,b,model_b\n" * 40)
+    call_command("import_votes", str(path), "--name", "Even", stdout=io.StringIO())
+    table = leaderboard_table(rate(study=Study.objects.get(name="Even"), rounds=100))
+    assert [row.rank for row in table.rows] == [None, None]
+    assert NOT_RANKED in table.reasons

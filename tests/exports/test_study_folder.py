@@ -24,7 +24,7 @@ from django.utils import timezone
 from pytest_django import Settings
 
 from arena.exports.study_folder.closure import TRAVELLING, close_over
-from arena.models import Study, Vote
+from arena.models import Person, Study, Vote
 from arena.services.ratings import rate
 from arena.services.stored_rows import as_line, columns_of, find_filled_tables, label_of
 from arena.services.studies import close_study
@@ -97,8 +97,9 @@ def test_export_import_and_export_give_the_same_folder(study: Study, tmp_path: P
 
 def test_only_pseudonyms_travel(study: Study, tmp_path: Path) -> None:
     pseudonyms = {expert.person.pseudonym for expert in study.experts.all()}
+    Person.objects.update(preferences={"theme": "own-theme"})
     files = export(study, tmp_path / "out")
-    for secret in (b'"eva"', b'"finn"', b"pbkdf2", b"md5$"):
+    for secret in (b'"eva"', b'"finn"', b"pbkdf2", b"md5$", b"own-theme"):
         assert [name for name, content in files.items() if secret in content] == []
     assert all(name.encode() in files["pairs.csv"] for name in pseudonyms)
 

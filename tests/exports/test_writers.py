@@ -8,7 +8,7 @@ from dataclasses import replace
 import pytest
 
 from arena.exports.latex import escape, latex
-from arena.exports.tables import LeaderboardTable, Row
+from arena.exports.tables import EARLY_LOOK, SIMULATED_TABLE, LeaderboardTable, Row
 from arena.exports.writers import FORMATS, csv_bytes, json_bytes
 
 PAPER = (
@@ -105,6 +105,14 @@ def test_tex_specials_are_escaped() -> None:
 def test_a_line_break_in_a_name_cannot_leave_its_comment() -> None:
     text = latex(table(row("x"), study="Round\n\\input{evil}"))
     assert all(line.startswith("%") for line in text.splitlines() if "evil" in line)
+
+
+def test_a_table_says_that_it_is_simulated_and_an_early_look() -> None:
+    plain = latex(table(row("x")))
+    marked = latex(table(row("x"), simulated=True, early=True))
+    for warning in (SIMULATED_TABLE, EARLY_LOOK):
+        assert f"% {warning}" in marked
+        assert warning not in plain
 
 
 def parsed(given: LeaderboardTable) -> list[dict[str, str]]:

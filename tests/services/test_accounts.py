@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import pytest
-from django.contrib.auth.models import Group
+from django.contrib.auth.models import Group, User
 from pytest_django import DjangoAssertNumQueries
 
 from arena.queries.accounts import AccountBackend
-from arena.queries.people import role_of
+from arena.queries.people import has_admin, role_of
 from arena.services.people import create_person
 
 pytestmark = pytest.mark.django_db
@@ -39,3 +39,11 @@ def test_an_account_that_is_gone_or_not_active_is_nobody() -> None:
     person.save()
     assert AccountBackend().get_user(person.pk) is None
     assert AccountBackend().get_user(person.pk + 1) is None
+    assert role_of(person) is None
+
+
+def test_a_paused_admin_administrates_nothing() -> None:
+    admin = create_person(username="ada", password=None, role="admin")
+    assert has_admin()
+    User.objects.filter(pk=admin.pk).update(is_active=False)
+    assert not has_admin()
