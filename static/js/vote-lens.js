@@ -90,7 +90,7 @@ export class Lens {
   put(pictures, stands = "") {
     this.stands = stands;
     if (stands) this.isFlipped = this.isPinned = false;
-    this.scenes.forEach((scene, place) => scene.firstChild.replaceWith(pictures[place]));
+    this.scenes.forEach((scene, place) => scene.firstElementChild.replaceWith(pictures[place]));
     if (stands) this.aids.add(stands);
     this.changed(this);
   }
@@ -161,7 +161,7 @@ export class Lens {
     const [x, y] = this.#at ?? [];
     const r = this.#pair.shown.width / 90 / this.#scale;
     const cross = this.#at ? `M${x - r} ${y}H${x + r}M${x} ${y - r}V${y + r}` : "";
-    for (const { lastChild: svg } of this.scenes) {
+    for (const { lastElementChild: svg } of this.scenes) {
       const [ruler, pointer] = svg.children;
       svg.style.strokeWidth = r / 4;
       ruler.setAttribute("d", this.isRuling ? `M${this.#start}L${this.#at}${cross}` : "");

@@ -25,7 +25,7 @@ async function ask(pair, query = "") {
 class Measures {
   constructor(lens, found) {
     Object.assign(this, { lens, found, pair: lens.pair });
-    this.layers = lens.scenes.map((scene) => scene.insertBefore(this.#layer(), scene.lastChild));
+    this.layers = lens.scenes.map((scene) => scene.insertBefore(this.#layer(), scene.lastElementChild));
     this.tags = lens.panels.map((panel) => {
       const tag = document.createElement("span");
       tag.className = "edges";

@@ -29,7 +29,7 @@ class Replay {
     sides.after(this.bar);
     this.films.forEach((film, place) => figures[place].append(film));
     document.body.classList.add("replays");
-    this.views = this.films.map((film, n) => new View(film.firstChild, [drives.a, drives.b][n], ACROSS_M));
+    this.views = this.films.map((film, n) => new View(film.firstElementChild, [drives.a, drives.b][n], ACROSS_M));
     this.last = Math.max(drives.a.steps, drives.b.steps) - 1;
     this.range.max = this.last;
     this.listen();

@@ -48,7 +48,7 @@ function listen(panel, place) {
 function draw() {
   const { mark, shown: { width, height } } = lens.pair;
   const r = width / 40;
-  lens.scenes.forEach(({ lastChild: svg }, place) => {
+  lens.scenes.forEach(({ lastElementChild: svg }, place) => {
     const spot = svg.querySelector(".spot") ?? svg.appendChild(document.createElementNS(svg.namespaceURI, "path"));
     spot.setAttribute("class", "spot");
     spot.setAttribute("stroke-width", width / 200);
