@@ -3,10 +3,12 @@ from __future__ import annotations
 import hashlib
 import threading
 from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
 
 import pytest
 from django.core.files.base import ContentFile
 from django.core.files.storage import default_storage
+from pytest_django import Settings
 
 from augment.scene.modification import Modification
 from augment.services.scenarios.pictures import camera_of, original_picture, picture_of, store
@@ -28,7 +30,10 @@ def test_a_picture_that_was_cut_off_is_written_again() -> None:
     assert read(NAME) == b"png"
 
 
-def test_workers_with_the_same_picture_never_meet_half_of_it() -> None:
+def test_workers_with_the_same_picture_never_meet_half_of_it(
+    settings: Settings, tmp_path: Path
+) -> None:
+    settings.MEDIA_ROOT = tmp_path
     for number in range(20):
         png = bytes([number]) * 3_000_000
         together = threading.Barrier(WORKERS)
