@@ -198,7 +198,8 @@ def _row(
     row, _ = Simulation.objects.get_or_create(
         scenario=scenario, subject=subject, augmentation=augmentation, **options.columns
     )
-    row.wait_again()
+    if row.state == State.FAILED:
+        row.wait_again()
     return row
 
 
