@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import pytest
 from django.contrib.auth.models import User
 from django.urls import reverse
@@ -85,6 +87,13 @@ def test_a_study_is_opened_with_all_its_rules() -> None:
     kinds = study.matchups.values_list("kind", flat=True)
     assert (list(kinds).count("main"), list(kinds).count("repeat")) == (24, 6)
     assert study.rules["appearances"] == [["ann", 20], ["bob", 15], ["cid", 13]]
+
+
+def test_a_target_that_can_not_be_read_is_refused_beside_its_field() -> None:
+    status, shown = opened(targets="ann lots")
+    assert status == 422
+    assert re.search(r"</textarea>.{0,400}is no target: write CONTESTANT NUMBER", shown)
+    assert not Study.objects.exists()
 
 
 def test_an_admin_hands_over_what_an_expert_has_not_judged() -> None:

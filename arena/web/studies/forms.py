@@ -8,6 +8,8 @@ from typing import Any
 from django import forms
 from django.contrib.auth.models import User
 
+from arena.errors import NothingToPlan
+from arena.pairing.target_lines import read_targets
 from arena.services.study_drafts import SWITCHES
 from arena.services.study_plan import PLAN_INPUTS, StudyPlan
 from arena.web.forms import ChoiceForm
@@ -53,6 +55,15 @@ class StudyForm(ChoiceForm):
     def chosen_jobs(self) -> list[str]:
         """For the template."""
         return self.chosen("jobs")
+
+    def clean_targets(self) -> list[str]:
+        """Refuse targets that can't be read beside their field."""
+        lines: list[str] = self.cleaned_data["targets"]
+        try:
+            read_targets(lines)
+        except NothingToPlan as error:
+            raise forms.ValidationError(str(error)) from error
+        return lines
 
     def study_plan(self) -> StudyPlan:
         """Return what is to be opened, once the form is valid; an empty number is 0."""
