@@ -18,7 +18,12 @@ from augment.errors import InvalidDocument
 from augment.formats.reading import Reader
 
 WHAT = "zip"
-_UNREADABLE = (zipfile.BadZipFile, zlib.error, EOFError, struct.error)
+_DEEPEST = 50
+"""Folders in each other; making and removing very deep ones recurses until it breaks."""
+_UNREADABLE = (
+    *(zipfile.BadZipFile, zlib.error, EOFError, struct.error),
+    *(NotImplementedError, UnicodeDecodeError),  # zipfile's faults for odd flags and names
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -128,7 +133,7 @@ def _problem(entry: zipfile.ZipInfo) -> str:
     name, place = entry.filename, PurePosixPath(entry.filename)
     if place.is_absolute() or ".." in place.parts or not place.parts:
         return "is no name within the folder"
-    if "\\" in name or ":" in name or not name.isprintable():
+    if "\\" in name or ":" in name or not name.isprintable() or len(place.parts) > _DEEPEST:
         return "is no name within the folder"
     if entry.flag_bits & 0x1:
         return "is encrypted"

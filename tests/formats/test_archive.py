@@ -46,7 +46,8 @@ def test_a_log_folder_comes_out_as_it_went_in(tmp_path: Path) -> None:
         assert (into / "log" / file.relative_to(log)).read_bytes() == file.read_bytes()
 
 
-NAMES = ["../out", "/etc/passwd", "a/../../out", "c:\\out", "a\\b", "a:b", "a\nb", "."]
+DEEP = "a/" * 900 + "b"
+NAMES = ["../out", "/etc/passwd", "a/../../out", "c:\\out", "a\\b", "a:b", "a\nb", ".", DEEP]
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -71,7 +72,10 @@ def test_no_name_leads_out_of_the_folder(tmp_path: Path, name: str) -> None:
         (lambda p: packed_as(p, zipfile.ZIP_BZIP2), "packed in another way"),
         (lambda p: scrambled(p), "is broken"),
         (lambda p: wrong_checksum(packed(p, {"a": b"hello"})), "is broken"),
-        (lambda p: encrypted(packed(p, {"a": b"hello"})), "is encrypted"),
+        (lambda p: flagged(packed(p, {"a": b"hello"}), 0x01), "is encrypted"),
+        (lambda p: flagged(packed(p, {"a": b"hello"}), 0x20), "is broken: compressed patched"),
+        (lambda p: flagged(packed(p, {"a": b"hello"}), 0x40), "is broken: strong encryption"),
+        (lambda p: misnamed(packed(p, {"a": b"hello"})), "is broken: 'utf-8' codec"),
         (lambda p: understated(packed(p, {"a": bytes(2_000)})), "is broken"),
     ],
 )
@@ -123,9 +127,19 @@ def wrong_checksum(path: Path) -> Path:
     return path
 
 
-def encrypted(path: Path) -> Path:
+def flagged(path: Path, bit: int) -> Path:
     data = bytearray(path.read_bytes())
-    data[data.index(b"PK\x01\x02") + 8] |= 1
+    data[data.index(b"PK\x01\x02") + 8] |= bit
+    path.write_bytes(data)
+    return path
+
+
+def misnamed(path: Path) -> Path:
+    """Its name is said to be UTF-8 and is none."""
+    data = bytearray(path.read_bytes())
+    entry = data.index(b"PK\x01\x02")
+    data[entry + 9] |= 0x08
+    data[entry + 46] = 0xFF
     path.write_bytes(data)
     return path
 
