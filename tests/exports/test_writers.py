@@ -8,7 +8,13 @@ from dataclasses import replace
 import pytest
 
 from arena.exports.latex import escape, latex
-from arena.exports.tables import EARLY_LOOK, SIMULATED_TABLE, LeaderboardTable, Row
+from arena.exports.tables import (
+    EARLY_LOOK,
+    SIMULATED_TABLE,
+    LeaderboardTable,
+    Row,
+    for_experts,
+)
 from arena.exports.writers import FORMATS, csv_bytes, json_bytes
 
 PAPER = (
@@ -113,6 +119,11 @@ def test_a_table_says_that_it_is_simulated_and_an_early_look() -> None:
     for warning in (SIMULATED_TABLE, EARLY_LOOK):
         assert f"% {warning}" in marked
         assert warning not in plain
+
+
+def test_experts_do_not_read_that_votes_of_authors_are_left_out() -> None:
+    shown = for_experts(table(row("x"), left_out={"filtered": 1, "own": 2, "superseded": 3}))
+    assert shown.left_out == {"filtered": 3, "superseded": 3}
 
 
 def parsed(given: LeaderboardTable) -> list[dict[str, str]]:
