@@ -141,7 +141,7 @@ def _has_simulated(
 def _checks_for(
     study_plan: StudyPlan, scenarios: list[Scenario], entries: tuple[Entry, ...]
 ) -> tuple[tuple[Check, ...], Cells]:
-    """The attention checks that are study_plan for, where the plan shows them."""
+    """The attention checks that are asked for, where the plan shows them."""
     share = study_plan.checks / 100
     check_share(ATTENTION_CHECKS, share, MOST_CHECKS)
     wanted = round(share * study_plan.votes_per_expert)
