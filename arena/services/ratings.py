@@ -111,15 +111,15 @@ class PlannedRatings(WorkKind[Snapshot]):
 
     def ended(self, pk: int, end: str, reason: str, now: Moment) -> None:
         """Say in the log why there is no rating."""
-        if end != Snapshot.State.FAILED:
-            return
         row = self.rows.select_related(*self.related).get(pk=pk)
+        if row.state != Snapshot.State.FAILED:
+            return
         log_event(
             actor=row.made_by,
             verb="rating failed",
             object_kind="study",
             object_code=row.study.code,
-            after={"snapshot": str(row.code), "why": reason},
+            after={"snapshot": str(row.code), "why": row.reason},
         )
 
 

@@ -19,7 +19,7 @@ from arena.models import ScenarioFile, StudyFile
 from arena.services.ratings import plan_snapshot
 from arena.services.studies import close_study
 from augment.errors import BudgetSpent, Conflict, LeaseLost, WorkerStopping
-from augment.models import SceneUpload, Simulation, UploadMoment, Work
+from augment.models import Event, SceneUpload, Simulation, UploadMoment, Work
 from augment.services.endpoints.known_endpoints import ensure_endpoint
 from augment.services.endpoints.known_models import model_at
 from augment.services.endpoints.probing import plan_probe
@@ -147,6 +147,17 @@ def test_a_row_that_ends_worker_after_worker_fails_and_may_be_tried_again(
     assert row.wait_again(**({"state": "queued"} if kind.name == "uploadmoment" else {}))
     assert (row.state in row.UNDER_WAY, row.reason, row.sent_at) == (True, "", None)
     assert not row.wait_again()
+
+
+def test_a_rating_that_has_lost_its_last_worker_is_logged_as_failed() -> None:
+    ratings, row = KINDS["snapshot"], WAITING["snapshot"]()
+    for number in range(1, ratings.lost_limit + 1):
+        assert not Event.objects.filter(verb="rating failed").exists()
+        taken(ratings, row, NOON + number * MINUTE)
+        ratings.take_back_lost(now=NOON + number * MINUTE + timedelta(seconds=30))
+    row.refresh_from_db()
+    logged = Event.objects.get(verb="rating failed")
+    assert logged.after == {"snapshot": str(row.code), "why": row.reason}
 
 
 def test_a_row_that_is_given_back_waits_without_a_message(kind: WorkKind[Any], row: Work) -> None:
