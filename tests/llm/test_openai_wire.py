@@ -161,6 +161,15 @@ def test_a_key_goes_to_its_endpoint_and_nothing_of_the_environment(
     assert KEY not in str(without_key)
 
 
+def test_custom_headers_of_the_environment_stop_the_client(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setenv("OPENAI_CUSTOM_HEADERS", f"X-Secret: {KEY}")
+    with pytest.raises(ModelFault, match="OPENAI_CUSTOM_HEADERS is set") as raised:
+        OpenAIWire(base_url="http://127.0.0.1:1/v1", api_key=None)
+    assert KEY not in str(raised.value)
+
+
 def test_a_proxy_is_not_asked_for_what_listens_here(
     server: FakeServer, monkeypatch: pytest.MonkeyPatch
 ) -> None:
