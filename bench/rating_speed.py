@@ -82,13 +82,6 @@ TASKS = {
 FastChat a matrix of votes by contestants (5 GB for L). arena-rank is asked for its answer alone:
 each of its calls here compiles anew."""
 
-ELSEWHERE = """FastChat's later Bradley-Terry (in its repository, not in the published package),
-measured elsewhere on 2 cores, not in this run: 0.39 s on S, 3.4 s on M, 34 s on L."""
-
-TARGETS = """Targets: Bradley-Terry by 1000 resamples of votes 13 ms, 0.45 s and 4.2 s, by 10,000
-on S 0.15 s, by 10,000 two-way ones on S 0.1 s; online Elo 0.1 s and 1.7 s; rate_csv on S 0.5 s
-and 80 MB, on L 8 s and 400 MB."""
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Measured:
@@ -280,8 +273,7 @@ def section(found: Found, names: str, before: str) -> str:
         f"{sizes}; simulated. Ours start from counts, rivals from what they take (data frames, "
         f"lists). (e): fewer rounds run, and multiplied. {before}.\n\n"
         + table(["what", "who", *names], rows)
-        + f"\n\n{' '.join(TARGETS.split())}\n\n{' '.join(ELSEWHERE.split())}\n\n"
-        "Rivals at their best: choix starts every round at the ratings of the data, evalica rates "
+        + "\n\nRivals at their best: choix starts every round at the ratings of the data, evalica rates "
         "counts with weights instead of single votes. "
         "A dash can't be done. arena-rank is not in the table: its bootstrap hangs on Linux as "
         "published."
