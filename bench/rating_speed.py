@@ -273,8 +273,8 @@ def section(found: Found, names: str, before: str) -> str:
         f"{sizes}; simulated. Ours start from counts, rivals from what they take (data frames, "
         f"lists). (e): fewer rounds run, and multiplied. {before}.\n\n"
         + table(["what", "who", *names], rows)
-        + "\n\nRivals at their best: choix starts every round at the ratings of the data, evalica rates "
-        "counts with weights instead of single votes. "
+        + "\n\nRivals at their best: choix starts every round at the ratings of the data, evalica "
+        "rates counts with weights instead of single votes. "
         "A dash can't be done. arena-rank is not in the table: its bootstrap hangs on Linux as "
         "published."
     )

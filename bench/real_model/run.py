@@ -52,9 +52,9 @@ def main(arguments: list[str]) -> None:
         redis = installation.redis()
         worker = installation.worker(concurrency=1)
         try:
-            probe = prepare(installation, base_url)
+            print(prepare(installation, base_url))
             run(installation)
-            text = report(installation, probe, before)
+            text = report(installation, before)
         finally:
             worker.stop()
             redis.stop()
@@ -123,8 +123,8 @@ def run(installation: Machine) -> None:
     print(ended.stdout, ended.stderr, file=sys.stderr)
 
 
-def report(installation: Machine, probe: str, before: str) -> str:
-    """Return the table of outcomes and, below it, what the probe found and why rows failed."""
+def report(installation: Machine, before: str) -> str:
+    """Return the table of outcomes and, below it, why rows are not done."""
     displacement = displacements(installation)
     lines = []
     for variant in VARIANTS:
@@ -163,10 +163,6 @@ def report(installation: Machine, probe: str, before: str) -> str:
             f"at most {MOST_TOKENS} tokens; medians per call; {before}.",
             "",
             table(head, lines),
-            "",
-            "The probe:",
-            "",
-            *(f"    {line}" for line in probe.strip().splitlines()),
             "",
             "Reasons of what is not done:",
             "",
