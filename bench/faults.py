@@ -17,13 +17,7 @@ from augment.geometry.angles import difference, wrap
 from augment.scene.ego_route import EgoRoute
 from augment.scene.entities import AgentType, LaneConnector, TrafficAgent, TrafficSide
 from augment.scene.sizes import LENGTH_WIDTH_M
-from bench.shifts import (
-    Agents,
-    change_each,
-    move_along,
-    name_lane,
-    new_contacts,
-)
+from bench.shifts import Agents, change_each, move_along, name_lane, new_contacts
 
 VEHICLES = (AgentType.VEHICLE, AgentType.BUS)
 

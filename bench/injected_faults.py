@@ -20,13 +20,7 @@ from augment.metrics.fault_guess import first_guess
 from augment.scene.ego_route import EgoRoute
 from augment.scene.intent import Intent
 from augment.scene.modification import Modification
-from bench.faults import (
-    HEADING_KINDS,
-    LOGIC_KINDS,
-    POSITION_KINDS,
-    FaultKind,
-    inject_fault,
-)
+from bench.faults import HEADING_KINDS, LOGIC_KINDS, POSITION_KINDS, FaultKind, inject_fault
 from bench.report import table
 from bench.shifts import jitter, move_along
 from tests.fixtures.shelf import SLUGS, entry, shown_scene

@@ -29,12 +29,7 @@ def said_of(row: Augmentation) -> list[str]:
 def with_text(cast: Cast, *, votes: int = 9, **options: object) -> Study:
     """An open study of this cast, with further rules."""
     return open_study(
-        name="Round 1",
-        votes_per_expert=votes,
-        seed=7,
-        allow_text=True,
-        **options,
-        **cast,
+        name="Round 1", votes_per_expert=votes, seed=7, allow_text=True, **options, **cast
     )
 
 

@@ -21,13 +21,7 @@ from augment.scene.intent import (
     VehicleRequest,
     WalkRequest,
 )
-from augment.scene.intent_words import (
-    Body,
-    LateralTarget,
-    Nearness,
-    Setting,
-    Shape,
-)
+from augment.scene.intent_words import Body, LateralTarget, Nearness, Setting, Shape
 from tests.fixtures.shelf import HARD_SLUGS, SLUGS, entry
 
 LEFT_EDGE, RIGHT_EDGE = LateralTarget.LEFT_BOUNDARY, LateralTarget.RIGHT_BOUNDARY
@@ -96,9 +90,7 @@ def crash(ahead_m: float, count: int, *others: CrashedCar, settings: Any = ()) -
 
 
 PAPER = parked(
-    body=Body.VEHICLE,
-    about=True,
-    lateral=Lateral(target=LEFT_EDGE, offset=metres(0.0, 1.5)),
+    body=Body.VEHICLE, about=True, lateral=Lateral(target=LEFT_EDGE, offset=metres(0.0, 1.5))
 )
 """The paper's own example: a parked vehicle 21.4 m ahead, towards the left lane boundary."""
 

@@ -15,11 +15,7 @@ from arena.api.fields import StrictSerializer, TextField
 from arena.api.schema import operation
 from arena.api.views import ApiView
 from arena.queries.people import ROLES, role_given, role_of
-from arena.services.accounts import (
-    accept_welcome,
-    check_password_strength,
-    make_welcome_token,
-)
+from arena.services.accounts import accept_welcome, check_password_strength, make_welcome_token
 from arena.services.api_tokens import make_api_token
 from arena.services.first_start import make_first_admin
 from arena.services.people import create_person
@@ -116,9 +112,7 @@ class FirstView(ApiView):
         """Answers with a token of the new admin."""
         check_password_strength(given["password"])
         user = make_first_admin(
-            token=_end_of(given["link"]),
-            username=given["username"],
-            password=given["password"],
+            token=_end_of(given["link"]), username=given["username"], password=given["password"]
         )
         return _token(user, "first start")
 

@@ -210,10 +210,7 @@ def database(name: str, *, default: Path) -> dict[str, object]:
         return parts
 
     allowed = "use sqlite:///PATH or postgresql://USER:PASSWORD@HOST:PORT/NAME"
-    standard: dict[str, object] = {
-        "ENGINE": "django.db.backends.sqlite3",
-        "NAME": str(default),
-    }
+    standard: dict[str, object] = {"ENGINE": "django.db.backends.sqlite3", "NAME": str(default)}
     return read(name, standard, parse, allowed)
 
 

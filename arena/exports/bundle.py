@@ -15,8 +15,7 @@ from arena.exports.votes import VOTE_FORMATS, vote_table
 from arena.exports.writers import FORMATS
 from arena.exports.zips import zip_bytes
 from arena.models import Snapshot
-from arena.results.codec import results_document
-from arena.results.tree import Results
+from arena.rating.snapshot_document import Results, results_document
 from arena.services.cells import csv_text
 from arena.services.preregistration import FILE_NAME, preregistration_bytes
 from arena.services.vote_rows import digest_of

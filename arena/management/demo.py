@@ -26,11 +26,7 @@ from arena.services.simulation import simulate_votes
 from arena.services.studies import close_study, open_study
 from arena.services.study_plan import StudyPlan
 from augment.models import Augmentation, BaseScene, Contestant, Endpoint, GenerationJob, Scenario
-from augment.services.endpoints.contestants import (
-    REFERENCE,
-    add_contestant,
-    ensure_builtin,
-)
+from augment.services.endpoints.contestants import REFERENCE, add_contestant, ensure_builtin
 from augment.services.endpoints.known_endpoints import ensure_endpoint
 from augment.services.judging.driving_scores import scores_of_job
 from augment.services.judging.simulations import NUPLAN, Options, plan_scenario

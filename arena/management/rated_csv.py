@@ -14,12 +14,7 @@ from arena.rating.bootstrap import Unit
 from arena.rating.leaderboard import Intervals, Leaderboard, Line
 from arena.rating.logistic import Coefficient
 from arena.rating.printed import HEADS as PAPERS_HEADS
-from arena.rating.printed import (
-    caption_text,
-    escape,
-    latex_table,
-    notes_by_reason,
-)
+from arena.rating.printed import caption_text, escape, latex_table, notes_by_reason
 from arena.rating.ranking import Separation
 from arena.rating.rules import METHOD_TEXTS
 from arena.services.cells import csv_text
@@ -175,8 +170,7 @@ def _csv(rated: RatedCsv) -> str:
     for note in rated.notes:
         print(escape_controls(note), file=sys.stderr)
     return csv_text(
-        COLUMNS,
-        ([_value(line, column) for column in COLUMNS] for line in rated.standings),
+        COLUMNS, ([_value(line, column) for column in COLUMNS] for line in rated.standings)
     )
 
 

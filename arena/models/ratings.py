@@ -12,8 +12,7 @@ from django.utils import timezone
 
 from arena.models.studies import Study
 from arena.rating.lines import Line
-from arena.results.codec import read_results, results_document
-from arena.results.tree import Results
+from arena.rating.snapshot_document import Results, read_results, results_document
 from augment.models import AppendOnly, Contestant, Work
 
 if TYPE_CHECKING:
@@ -70,8 +69,7 @@ class Snapshot(Work):
     )
     seed = models.BigIntegerField()
     filters = models.JSONField(
-        default=dict,
-        help_text="which votes were asked for: types, experts, kinds and so on",
+        default=dict, help_text="which votes were asked for: types, experts, kinds and so on"
     )
     last_vote = models.BigIntegerField(
         null=True, blank=True, help_text="no vote after this row counts; null without votes"

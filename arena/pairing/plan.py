@@ -26,14 +26,7 @@ from arena.pairing.arrays import BoolArray, FloatArray
 from arena.pairing.demands import check_rules, pair_totals
 from arena.pairing.order import CHECK, MAIN, REPEAT, Extras, Slot, deal_sides, put_in_order
 from arena.pairing.overlap import bring_together
-from arena.pairing.rules import (
-    Check,
-    Entry,
-    Grid,
-    MatchupPlan,
-    PlannedMatchup,
-    PlanRules,
-)
+from arena.pairing.rules import Check, Entry, Grid, MatchupPlan, PlannedMatchup, PlanRules
 from arena.pairing.targets import choose_wanted, share_out
 from arena.pairing.units import choose_units, draw_probability
 

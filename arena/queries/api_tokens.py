@@ -8,11 +8,7 @@ from django.utils import timezone
 from arena.models import ApiToken, token_digest
 from arena.queries.people import role_of
 
-OFFERED = {
-    "admin": ("admin", "analyst"),
-    "analyst": ("analyst",),
-    "expert": ("expert",),
-}
+OFFERED = {"admin": ("admin", "analyst"), "analyst": ("analyst",), "expert": ("expert",)}
 """The roles that a token may have, by the role of its owner. Staff know too much to vote, so
 that theirs is never an expert's."""
 

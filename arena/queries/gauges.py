@@ -68,11 +68,7 @@ def _calls() -> list[Gauge]:
     sums = settled.aggregate(
         calls=Count("pk"), nano=Sum("cost_nano_usd"), used=Sum("spent_tokens")
     )
-    states = (
-        ("answered", sums["calls"] - faulty),
-        ("failed", faulty),
-        ("in_flight", flying),
-    )
+    states = (("answered", sums["calls"] - faulty), ("failed", faulty), ("in_flight", flying))
     return [
         Gauge("arena_model_calls", "Requests to language models", "state", states),
         Gauge("arena_model_tokens", "Tokens used", "", (("", sums["used"] or 0),)),

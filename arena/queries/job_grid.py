@@ -12,10 +12,7 @@ from augment.models import Augmentation, Contestant, GenerationJob, Scenario
 
 State = Augmentation.State
 
-_LEAN = (
-    *("code", "state", "sample", "image", "scenario_id", "contestant_id"),
-    "job_id",
-)
+_LEAN = (*("code", "state", "sample", "image", "scenario_id", "contestant_id"), "job_id")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -110,10 +107,7 @@ def _scenarios(job: GenerationJob, part: Part) -> QuerySet[Scenario]:
 
 
 def _rows(
-    job: GenerationJob,
-    columns: Page[Contestant],
-    samples: Page[int],
-    scenarios: Page[Scenario],
+    job: GenerationJob, columns: Page[Contestant], samples: Page[int], scenarios: Page[Scenario]
 ) -> list[PartRow]:
     who, where = list(columns.object_list), list(scenarios.object_list)
     numbers = list(samples.object_list)
@@ -124,9 +118,6 @@ def _rows(
     for cell in cells.only(*_LEAN).order_by("sample"):
         found[cell.scenario_id, cell.contestant_id].append(cell)
     return [
-        PartRow(
-            scenario=scenario,
-            cells=[found[scenario.pk, contestant.pk] for contestant in who],
-        )
+        PartRow(scenario=scenario, cells=[found[scenario.pk, contestant.pk] for contestant in who])
         for scenario in where
     ]

@@ -138,10 +138,7 @@ def _step(
     expected = win / everything + 0.5 * tied
     of_low = games * expected
     slope = np.vstack(
-        [
-            scored - met.sums(of_low, games - of_low),
-            (ties - (games * tied).sum(axis=0))[None, :],
-        ]
+        [scored - met.sums(of_low, games - of_low), (ties - (games * tied).sum(axis=0))[None, :]]
     )
     curvature = _curvature(met, games, expected, tied, together)
     # Where there is no top it flattens out; a trace of steepness changes steps, no answer.

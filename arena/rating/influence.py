@@ -165,11 +165,7 @@ def _first_that_does(
 
 
 def _fits(
-    contestants: int,
-    counts: PairCounts,
-    games: FloatArray,
-    scores: FloatArray,
-    start: FloatArray,
+    contestants: int, counts: PairCounts, games: FloatArray, scores: FloatArray, start: FloatArray
 ) -> FloatArray:
     """(n, C) strengths of each row of counts, not a number where it determines none."""
     low, high = counts.low, counts.high

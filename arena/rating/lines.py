@@ -8,13 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from arena.rating.printed import (
-    interval_text,
-    places_text,
-    rank_text,
-    rating_text,
-    whole_percent,
-)
+from arena.rating.printed import interval_text, places_text, rank_text, rating_text, whole_percent
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

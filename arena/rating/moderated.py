@@ -22,13 +22,7 @@ from typing import Self
 import numpy as np
 
 from arena.rating.bootstrap import Unit
-from arena.rating.comparisons import (
-    BoolArray,
-    Comparisons,
-    FloatArray,
-    IntArray,
-    renumber_codes,
-)
+from arena.rating.comparisons import BoolArray, Comparisons, FloatArray, IntArray, renumber_codes
 from arena.rating.estimate import t_quantile
 from arena.rating.sandwich import Pulls, without_negative_parts
 

@@ -17,7 +17,7 @@ from arena.queries.votes.judged import Entrant, Judged, is_imported
 from arena.queries.votes.sets import Filters
 from arena.rating.comparisons import Comparisons, select_votes, win_rates
 from arena.rating.leaderboard import Leaderboard, rate
-from arena.results.tree import (
+from arena.rating.snapshot_document import (
     DisplacementSummary,
     PairRecord,
     ScenarioCost,

@@ -11,7 +11,7 @@ import numpy as np
 from arena.queries.votes.judged import Judged
 from arena.rating.comparisons import Comparisons, FloatArray
 from arena.rating.leaderboard import Leaderboard, Line
-from arena.results.both_versions import Adjustment, BothRanks, CovariateEffect, LargestMove
+from arena.rating.snapshot_document import Adjustment, BothRanks, CovariateEffect, LargestMove
 from augment.models import Augmentation
 
 SIDE, OBJECTS, VEHICLES = "side", "objects", "vehicles"

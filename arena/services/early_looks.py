@@ -33,9 +33,5 @@ def log_early_look(*, study: Study, actor: User | None, what: str) -> None:
 
 def _log(study: Study, actor: User | None, **seen: object) -> None:
     log_event(
-        actor=actor,
-        verb="look early",
-        object_kind="study",
-        object_code=study.code,
-        after=seen,
+        actor=actor, verb="look early", object_kind="study", object_code=study.code, after=seen
     )

@@ -229,11 +229,7 @@ def _take_on(
         verb="enrol",
         object_kind="study",
         object_code=study.code,
-        after={
-            "batch": number,
-            "matchups": len(planned),
-            "consent_sha256": voter.consent_sha256,
-        },
+        after={"batch": number, "matchups": len(planned), "consent_sha256": voter.consent_sha256},
     )
     return voter
 

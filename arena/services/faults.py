@@ -25,12 +25,7 @@ NOTE_LENGTH = 2000
 
 @transaction.atomic
 def open_labelling(
-    *,
-    name: str,
-    job: GenerationJob,
-    experts: Sequence[str],
-    seed: int,
-    actor: User | None = None,
+    *, name: str, job: GenerationJob, experts: Sequence[str], seed: int, actor: User | None = None
 ) -> LabellingRound:
     """Plan that each expert looks at every finished augmentation of a job, in an order of its own.
 

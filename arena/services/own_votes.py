@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from arena.queries.votes.judged import AUTOMATIC
 from arena.queries.votes.sets import Filters, VoteSet, is_own_vote
 from arena.rating.leaderboard import Leaderboard, Line, rate
-from arena.results.both_versions import BothRanks, OwnVotes
+from arena.rating.snapshot_document import BothRanks, OwnVotes
 from arena.services.covariates import largest_move, with_covariates
 from arena.services.vote_arrays import vote_arrays
 

@@ -16,13 +16,7 @@ from arena.pairing.plan import Check, Entry, PlannedMatchup, PlanRules
 from arena.pairing.rules import place_of, scenario_of
 from arena.queries.voting.showings import LEGEND
 from arena.services.attention_checks import check_pictures, placed_checks
-from arena.services.frames import (
-    Cells,
-    ScenarioFrame,
-    find_frames,
-    frames_shown,
-    sides_of,
-)
+from arena.services.frames import Cells, ScenarioFrame, find_frames, frames_shown, sides_of
 from arena.services.showable import find_showable, windows_of, with_picture
 from augment.models import Augmentation, Scenario
 from augment.services.scenarios.descriptions import Description, descriptions

@@ -14,7 +14,7 @@ from typing import Any
 from django.conf import settings
 
 from arena.models import Study
-from arena.results.tree import VERSION as RESULTS_VERSION
+from arena.rating.snapshot_document import VERSION as RESULTS_VERSION
 from arena.services.study_plan import SWITCH_COLUMNS
 from arena.services.vote_rows import VERSION as VOTES_VERSION
 from augment.models import Contestant, Scenario

@@ -46,9 +46,7 @@ def check_votes() -> None:
     """
     votes = Vote.objects.order_by("pk")
     strangers = votes.exclude(
-        expert=F("matchup__expert"),
-        shown_left=F("matchup__left"),
-        shown_right=F("matchup__right"),
+        expert=F("matchup__expert"), shown_left=F("matchup__left"), shown_right=F("matchup__right")
     ) | votes.exclude(supersedes=None).exclude(supersedes__matchup=F("matchup"))
     if vote := strangers.first():
         raise ArenaError(f"arena.vote, row {vote.pk}: it is not on what its expert was shown.")

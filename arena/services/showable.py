@@ -41,9 +41,7 @@ def with_picture(row: Augmentation, is_wanted: Callable[[str], bool]) -> Augment
 
 
 def refuse_missing(
-    contestants: list[Contestant],
-    scenarios: list[Scenario],
-    cells: Collection[tuple[str, str]],
+    contestants: list[Contestant], scenarios: list[Scenario], cells: Collection[tuple[str, str]]
 ) -> None:
     """Do nothing where everybody has a picture of every scenario.
 

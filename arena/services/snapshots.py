@@ -19,8 +19,8 @@ from arena.rating.bootstrap import Unit
 from arena.rating.comparisons import Comparisons
 from arena.rating.leaderboard import Intervals, Leaderboard, Method, rate
 from arena.rating.rules import TooManyContestants
-from arena.results.tree import VERSION as RESULTS_VERSION
-from arena.results.tree import Results
+from arena.rating.snapshot_document import VERSION as RESULTS_VERSION
+from arena.rating.snapshot_document import Results
 from arena.services import breakdowns
 from arena.services.covariates import adjustment, with_covariates
 from arena.services.own_votes import with_and_without

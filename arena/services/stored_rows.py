@@ -103,10 +103,7 @@ def columns_of(model: type[models.Model]) -> list[models.Field[Any, Any]]:
 
 
 def write_rows(
-    model: type[models.Model],
-    lines: Iterable[bytes],
-    *,
-    check: Callable[[models.Model], None],
+    model: type[models.Model], lines: Iterable[bytes], *, check: Callable[[models.Model], None]
 ) -> int:
     """Store what `read_rows` gave, keys and times included; returns how many.
 

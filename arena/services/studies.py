@@ -174,11 +174,7 @@ def _rules(study_plan: StudyPlan, entries: tuple[Entry, ...], experts: list[User
 
 
 def _insert(
-    name: str,
-    frozen: dict[str, Any],
-    study_plan: StudyPlan,
-    rules: PlanRules,
-    has_simulated: bool,
+    name: str, frozen: dict[str, Any], study_plan: StudyPlan, rules: PlanRules, has_simulated: bool
 ) -> Study:
     switches = {column: getattr(study_plan, column) for column in SWITCH_COLUMNS}
     try:

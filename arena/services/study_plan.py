@@ -124,10 +124,7 @@ class StudyPlan:
         "Five pairs, a reference beside a broken image, each followed by what was right and why; "
         "nothing of it counts.",
     )
-    allow_simulated: bool = _switch(
-        "Simulated may take part",
-        "Every page and file then says so.",
-    )
+    allow_simulated: bool = _switch("Simulated may take part", "Every page and file then says so.")
 
     @classmethod
     def read(cls, given: Mapping[str, Any]) -> Self:

@@ -22,17 +22,13 @@ from arena.rating.comparisons import (
     tally,
 )
 from arena.rating.fit_test import fit_test
-from arena.rating.influence import (
-    fewest_votes_to_change_first,
-    rank_changes,
-    without_each_expert,
-)
+from arena.rating.influence import fewest_votes_to_change_first, rank_changes, without_each_expert
 from arena.rating.leaderboard import Intervals, Leaderboard, Line, Method, rate
 from arena.rating.logistic import side_bias
 from arena.rating.planning import design_effects, votes_until
 from arena.rating.ranking import Separation
 from arena.rating.reliability import Rater, Repeats, agreement, raters, repeat_consistency
-from arena.results.tree import (
+from arena.rating.snapshot_document import (
     BoardRemarks,
     OnlinePlace,
     Overtaking,

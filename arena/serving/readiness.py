@@ -112,10 +112,7 @@ class HeldLook:
             self._held = None
 
 
-HELD = (
-    HeldLook(look_at_broker, for_s=HELD_FOR_S),
-    HeldLook(look_at_workers, for_s=HELD_FOR_S),
-)
+HELD = (HeldLook(look_at_broker, for_s=HELD_FOR_S), HeldLook(look_at_workers, for_s=HELD_FOR_S))
 PARTS: tuple[Callable[[], PartState], ...] = (look_at_database, *HELD)
 
 

@@ -55,11 +55,7 @@ _LABELS: dict[str, str] = {
     "what": "seen",
     "why": "why",
 }
-_STATES: dict[str, str] = {
-    "open": "open",
-    "closed": "closed",
-    "cancelled": "cancelled",
-}
+_STATES: dict[str, str] = {"open": "open", "closed": "closed", "cancelled": "cancelled"}
 
 Names = Mapping[str, str]
 

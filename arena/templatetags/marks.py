@@ -30,11 +30,7 @@ _TONES = {
     "open": "busy",
     "closed": "good",
 }
-_MATCHUPS = {
-    "main": "Votes",
-    "repeat": "Hidden repeats",
-    "check": "Attention checks",
-}
+_MATCHUPS = {"main": "Votes", "repeat": "Hidden repeats", "check": "Attention checks"}
 _ICONS = {"finished": "done", "stopped_at_cap": "stop"}
 
 

@@ -64,9 +64,7 @@ urlpatterns: list[URLPattern] = [
     path("scenarios/<uuid:code>/prompts/", prompts.prompts_page, name="prompts"),
     path("scenarios/<uuid:code>/prompt.json", prompts.prompt_file, name="prompt-file"),
     path(
-        "scenarios/<uuid:code>/prompts/<int:number>.png",
-        prompts.prompt_image,
-        name="prompt-image",
+        "scenarios/<uuid:code>/prompts/<int:number>.png", prompts.prompt_image, name="prompt-image"
     ),
     path("scenarios/<uuid:code>/", scenarios.scenario_page, name="scenario"),
     path("scenarios/<uuid:code>/reference/", editing.reference_page, name="reference-edit"),
@@ -117,15 +115,9 @@ urlpatterns: list[URLPattern] = [
     ),
     path("jobs/<uuid:code>/transcripts.jsonl", transcripts.export, name="transcripts-export"),
     path(
-        "jobs/<uuid:code>/tool-calls.<slug:form>",
-        jobs.export_tool_calls,
-        name="tool-calls-export",
+        "jobs/<uuid:code>/tool-calls.<slug:form>", jobs.export_tool_calls, name="tool-calls-export"
     ),
-    path(
-        "jobs/<uuid:code>/scenarios-<slug:form>/",
-        scenario_files.ask,
-        name="scenarios-write",
-    ),
+    path("jobs/<uuid:code>/scenarios-<slug:form>/", scenario_files.ask, name="scenarios-write"),
     path("scenarios-<uuid:code>.zip", scenario_files.download, name="scenarios-export"),
     path("jobs/<uuid:code>/simulate/", driving.simulate_job, name="job-simulate"),
     path("jobs/<uuid:code>/drives/", driving.drives_page, name="drives"),
@@ -161,9 +153,7 @@ urlpatterns: list[URLPattern] = [
     path("studies/<uuid:code>/enrolment/", enrolments.enrolment_page, name="enrolment"),
     path("studies/<uuid:code>/enrolment/drop/", enrolments.drop_out, name="enrolment-drop"),
     path(
-        "studies/<uuid:code>/enrolment/voters.csv",
-        enrolments.voters_file,
-        name="enrolment-voters",
+        "studies/<uuid:code>/enrolment/voters.csv", enrolments.voters_file, name="enrolment-voters"
     ),
     path("studies/<uuid:code>/experts/invite/", invitations.invite_experts, name="invite"),
     path("invitations/<uuid:code>/revoke/", invitations.revoke_invitation, name="revoke"),

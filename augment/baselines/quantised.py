@@ -28,15 +28,8 @@ from augment.errors import CannotPlace
 from augment.geometry.boxes import overlap
 from augment.geometry.polyline import Polyline
 from augment.scene.entities import AgentType, Scene, TrafficAgent
-from augment.scene.intent import (
-    ConesRequest,
-    Intent,
-    VehicleRequest,
-    WalkRequest,
-)
-from augment.scene.intent_words import (
-    Body,
-)
+from augment.scene.intent import ConesRequest, Intent, VehicleRequest, WalkRequest
+from augment.scene.intent_words import Body
 from augment.scene.lane_graph import AnyLane
 from augment.scene.modification import Modification
 from augment.scene.sizes import LENGTH_WIDTH_M

@@ -40,9 +40,7 @@ from augment.scene.intent import (
     WalkRequest,
     resolve_anchors,
 )
-from augment.scene.intent_words import (
-    Body,
-)
+from augment.scene.intent_words import Body
 from augment.scene.modification import Modification, apply
 
 _SHIFT_STEP_M = 0.25
@@ -143,11 +141,7 @@ def _moved(
     ground, jury = PlacingGround(rest, route), Jury(rest, route)
     (moved,), distance_m = _fitted(request, ground, jury, (), rng)
     placed = replace(
-        moved,
-        id=agent.id,
-        type=agent.type,
-        length_m=agent.length_m,
-        width_m=agent.width_m,
+        moved, id=agent.id, type=agent.type, length_m=agent.length_m, width_m=agent.width_m
     )
     return placed, distance_m
 

@@ -12,16 +12,8 @@ import numpy as np
 from augment.baselines.rule_placer_ground import PlacingGround
 from augment.errors import CannotPlace
 from augment.scene.entities import AgentType, TrafficAgent
-from augment.scene.intent import (
-    ConesRequest,
-    LaneChoice,
-    Side,
-)
-from augment.scene.intent_words import (
-    LateralTarget,
-    Post,
-    Shape,
-)
+from augment.scene.intent import ConesRequest, LaneChoice, Side
+from augment.scene.intent_words import LateralTarget, Post, Shape
 from augment.scene.lane_graph import LanePosition
 from augment.scene.sizes import LENGTH_WIDTH_M
 

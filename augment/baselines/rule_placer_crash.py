@@ -20,15 +20,8 @@ from augment.geometry.angles import wrap
 from augment.geometry.boxes import Box, overlap
 from augment.geometry.frames import Pose
 from augment.scene.entities import Scene, TrafficAgent
-from augment.scene.intent import (
-    CrashedCar,
-    CrashRequest,
-)
-from augment.scene.intent_words import (
-    Bearing,
-    Body,
-    Facing,
-)
+from augment.scene.intent import CrashedCar, CrashRequest
+from augment.scene.intent_words import Bearing, Body, Facing
 
 _GAP_M = 0.05
 _MOST_SHARED = 0.1
@@ -135,9 +128,7 @@ def _chained(
     spot = ground.graph.place(centre.lane_id, centre.s_m, left_m)
     lane_rad = spot.pose.heading_rad
     turn_rad = FACING_RAD[request.facing or Facing.WITH_LANE]
-    poses = [
-        Pose(x_m=spot.pose.x_m, y_m=spot.pose.y_m, heading_rad=wrap(lane_rad + turn_rad)),
-    ]
+    poses = [Pose(x_m=spot.pose.x_m, y_m=spot.pose.y_m, heading_rad=wrap(lane_rad + turn_rad))]
     for other in _everyone_after(request):
         gap_m = None
         if other.gap is not None:

@@ -26,13 +26,8 @@ from augment.scene.entities import (
     TrafficAgent,
     TurnType,
 )
-from augment.scene.intent import (
-    LaneChoice,
-    Side,
-)
-from augment.scene.intent_words import (
-    Setting,
-)
+from augment.scene.intent import LaneChoice, Side
+from augment.scene.intent_words import Setting
 from augment.scene.lane_graph import AnyLane, LanePosition
 
 _STEP_M = 0.25

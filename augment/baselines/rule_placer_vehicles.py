@@ -11,18 +11,8 @@ from augment.errors import CannotPlace
 from augment.geometry.angles import wrap
 from augment.geometry.frames import Pose
 from augment.scene.entities import AgentType, TrafficAgent
-from augment.scene.intent import (
-    LaneChoice,
-    Lateral,
-    Side,
-    VehicleRequest,
-)
-from augment.scene.intent_words import (
-    Body,
-    Facing,
-    LateralTarget,
-    Nearness,
-)
+from augment.scene.intent import LaneChoice, Lateral, Side, VehicleRequest
+from augment.scene.intent_words import Body, Facing, LateralTarget, Nearness
 from augment.scene.lane_graph import LanePosition
 from augment.scene.sizes import LENGTH_WIDTH_M
 
@@ -43,11 +33,7 @@ TYPES = {
     Body.CONSTRUCTION_SIGN: AgentType.CONSTRUCTION_SIGN,
 }
 """Of the bodies that are no plain vehicle."""
-FACING_RAD = {
-    Facing.WITH_LANE: 0.0,
-    Facing.AGAINST_LANE: math.pi,
-    Facing.ACROSS: math.pi / 2.0,
-}
+FACING_RAD = {Facing.WITH_LANE: 0.0, Facing.AGAINST_LANE: math.pi, Facing.ACROSS: math.pi / 2.0}
 _EDGE_GAP_M = 0.1
 """What is left between a box at the edge of a lane and that edge."""
 
@@ -103,9 +89,7 @@ def _vehicle(
     place = ground.graph.place(centre.lane_id, centre.s_m, d_m)
     turn_rad = FACING_RAD[request.facing or Facing.WITH_LANE] + math.radians(request.turn_deg)
     pose = Pose(
-        x_m=place.pose.x_m,
-        y_m=place.pose.y_m,
-        heading_rad=wrap(place.pose.heading_rad + turn_rad),
+        x_m=place.pose.x_m, y_m=place.pose.y_m, heading_rad=wrap(place.pose.heading_rad + turn_rad)
     )
     on_lane = abs(d_m) <= ground.lane(place).width_m / 2.0
     lane_id = place.lane_id if on_lane else None

@@ -17,12 +17,7 @@ from augment.scene.intent import (
     VehicleRequest,
     WalkRequest,
 )
-from augment.scene.intent_words import (
-    Body,
-    LateralTarget,
-    Nearness,
-    Shape,
-)
+from augment.scene.intent_words import Body, LateralTarget, Nearness, Shape
 
 _LANES = {
     None: "the ego's lane",

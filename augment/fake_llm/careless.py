@@ -77,10 +77,7 @@ def too_far(scene: Scene, right: Modification) -> Modification:
 
 
 def bend(
-    scene: Scene,
-    right: Modification,
-    rng: random.Random,
-    spared: frozenset[str] = frozenset(),
+    scene: Scene, right: Modification, rng: random.Random, spared: frozenset[str] = frozenset()
 ) -> Bent:
     """The right modification with a small inaccuracy and, mostly, one mistake.
 

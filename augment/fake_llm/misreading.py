@@ -12,14 +12,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from augment.scene.entities import TurnType
-from augment.scene.intent import (
-    Intent,
-    LaneChoice,
-    Length,
-    Relation,
-    Spot,
-    VehicleRequest,
-)
+from augment.scene.intent import Intent, LaneChoice, Length, Relation, Spot, VehicleRequest
 from augment.scene.intent_words import Body
 
 _ATTEMPT_SHARE = 0.6

@@ -14,13 +14,7 @@ from threading import Lock
 
 from augment.fake_llm import careless, playing, probing
 from augment.fake_llm.requests import ChatRequest
-from augment.fake_llm.responses import (
-    Response,
-    as_json,
-    completion,
-    error,
-    prompt_tokens_of,
-)
+from augment.fake_llm.responses import Response, as_json, completion, error, prompt_tokens_of
 from augment.fake_llm.sight import Intents, knows_nothing
 
 

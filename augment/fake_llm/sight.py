@@ -137,10 +137,7 @@ def _task(text: str) -> Task:
         ),
     )
     return Task(
-        prompt=text,
-        scene=scene,
-        instruction=_instruction(text),
-        first_new=int(first_new.group(1)),
+        prompt=text, scene=scene, instruction=_instruction(text), first_new=int(first_new.group(1))
     )
 
 
@@ -193,11 +190,7 @@ def agent_of(name: str, vector: Sequence[object]) -> TrafficAgent:
 
 def _lane(name: str, vector: Sequence[Any]) -> Lane:
     _, _, _, width, _, points = vector
-    return Lane(
-        id=name,
-        centerline=_line(points),
-        width_m=float(str(width)),
-    )
+    return Lane(id=name, centerline=_line(points), width_m=float(str(width)))
 
 
 def _connector(name: str, vector: Sequence[Any]) -> LaneConnector:

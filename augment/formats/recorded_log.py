@@ -33,11 +33,7 @@ LONGEST_GAP_S = 0.35
 NEIGHBOURS = 2
 """Steps on either side that a speed is taken over: one alone shows the annotators' jitter."""
 
-_STANDING = (
-    AgentType.TRAFFIC_CONE,
-    AgentType.BARRIER,
-    AgentType.CONSTRUCTION_SIGN,
-)
+_STANDING = (AgentType.TRAFFIC_CONE, AgentType.BARRIER, AgentType.CONSTRUCTION_SIGN)
 _HEADED = (AgentType.VEHICLE, AgentType.BUS, AgentType.BICYCLE)
 
 

@@ -18,11 +18,7 @@ from augment.geometry.angles import difference
 from augment.geometry.frames import Pose
 from augment.geometry.polyline import Polyline
 from augment.scene.directions import traffic_side_of, turn_type_of
-from augment.scene.entities import (
-    Lane,
-    LaneConnector,
-    TrafficLight,
-)
+from augment.scene.entities import Lane, LaneConnector, TrafficLight
 
 MOST_WAYS = 4_000
 

@@ -163,9 +163,7 @@ class OpenAIWire(AbstractContextManager["OpenAIWire"]):
                 return NotSent(inner.problems[0][1])
             if isinstance(inner, BadPacking):
                 return ModelFault(
-                    f"the endpoint's answer can't be unpacked: {inner}",
-                    retryable=True,
-                    status=200,
+                    f"the endpoint's answer can't be unpacked: {inner}", retryable=True, status=200
                 )
         if isinstance(error, openai.APIConnectionError):
             return _broken(f"the connection failed: {_cause(error)}", watch)

@@ -73,10 +73,7 @@ def fault_of_status(
     if refused:
         return ParameterRefused(refused, text, status=status)
     return ModelFault(
-        text,
-        retryable=passing,
-        status=status,
-        retry_after_s=wait_s if passing else None,
+        text, retryable=passing, status=status, retry_after_s=wait_s if passing else None
     )
 
 

@@ -22,11 +22,7 @@ class Probe(Work):
     state = models.CharField(max_length=20, choices=State.choices, default=State.QUEUED)
     findings = models.JSONField(default=list, help_text="one a question, as far as they are asked")
     asked_by = models.ForeignKey(
-        settings.AUTH_USER_MODEL,
-        null=True,
-        blank=True,
-        on_delete=models.PROTECT,
-        related_name="+",
+        settings.AUTH_USER_MODEL, null=True, blank=True, on_delete=models.PROTECT, related_name="+"
     )
 
     class Meta:

@@ -9,9 +9,7 @@ from django.db.models import Q
 
 from augment.scene.catalogue import CatalogueSet, ScenarioType
 from augment.scene.entities import TrafficDensity, TurnType
-from augment.scene.intent_words import (
-    IntentOrigin,
-)
+from augment.scene.intent_words import IntentOrigin
 
 DENSITIES = tuple(TrafficDensity)
 GOALS = (TurnType.LEFT, TurnType.RIGHT, TurnType.STRAIGHT)

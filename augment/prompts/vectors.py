@@ -69,10 +69,7 @@ COORDINATES: dict[LaneFormat, Coordinates] = {
 
 
 def scene_text(
-    scene: Scene,
-    *,
-    radius_m: float = DEFAULT_RADIUS_M,
-    lanes: LaneFormat = LaneFormat.POLYLINE,
+    scene: Scene, *, radius_m: float = DEFAULT_RADIUS_M, lanes: LaneFormat = LaneFormat.POLYLINE
 ) -> str:
     """The four lists under their headings, one entity a line, and what the lists can't say."""
     names, coordinates = short_names(scene), COORDINATES[lanes]

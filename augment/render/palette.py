@@ -63,11 +63,7 @@ class MarkStyle:
 
 
 EGO_MARK = MarkStyle(
-    fill=(218, 30, 40),
-    outline=(122, 8, 16),
-    detail=(255, 255, 255),
-    hatch=None,
-    outline_px=2.0,
+    fill=(218, 30, 40), outline=(122, 8, 16), detail=(255, 255, 255), hatch=None, outline_px=2.0
 )
 CHANGED_MARK = MarkStyle(
     fill=(20, 62, 192),
@@ -77,11 +73,7 @@ CHANGED_MARK = MarkStyle(
     outline_px=3.5,
 )
 OTHER_MARK = MarkStyle(
-    fill=(164, 168, 174),
-    outline=(84, 88, 94),
-    detail=(255, 255, 255),
-    hatch=None,
-    outline_px=1.5,
+    fill=(164, 168, 174), outline=(84, 88, 94), detail=(255, 255, 255), hatch=None, outline_px=1.5
 )
 
 

@@ -13,15 +13,7 @@ from augment.geometry.polyline import FloatArray
 from augment.render import palette
 from augment.render.canvas import MetricCanvas
 from augment.render.palette import Colour
-from augment.render.shapes import (
-    long_axis,
-    offset,
-    resample_line,
-    ring_of,
-    runs,
-    sides,
-    stripes,
-)
+from augment.render.shapes import long_axis, offset, resample_line, ring_of, runs, sides, stripes
 from augment.scene.entities import Area, AreaKind, Lane, LaneConnector, Scene, TrafficAgent
 from augment.scene.lane_graph import AnyLane, LaneGraph
 

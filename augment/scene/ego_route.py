@@ -56,11 +56,7 @@ class EgoRoute:
 
     @classmethod
     def of(
-        cls,
-        scene: Scene,
-        graph: LaneGraph | None = None,
-        *,
-        turn: TurnType | None = None,
+        cls, scene: Scene, graph: LaneGraph | None = None, *, turn: TurnType | None = None
     ) -> EgoRoute | None:
         """The route of a scene's ego, None where the map has no lane for it.
 

@@ -133,8 +133,7 @@ _Centerline = Annotated[Line, Field(alias="centerline_m")]
 _Left = Annotated[Line | None, Field(alias="left_boundary_m")]
 _Right = Annotated[Line | None, Field(alias="right_boundary_m")]
 _Ids = Annotated[
-    tuple[Id, ...],
-    Field(fail_fast=True, max_length=MOST_WAYS, exclude_if=lambda names: not names),
+    tuple[Id, ...], Field(fail_fast=True, max_length=MOST_WAYS, exclude_if=lambda names: not names)
 ]
 _MOST = Field(fail_fast=True, max_length=MOST_WAYS)
 

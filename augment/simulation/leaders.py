@@ -18,12 +18,7 @@ from augment.simulation.states import EgoBody, FloatArray, Kind, Objects
 SLICE_S = 0.2
 STEPS_A_SLICE = 2
 RADIUS_M = 50.0
-MOST: dict[Kind, int] = {
-    Kind.VEHICLE: 50,
-    Kind.PEDESTRIAN: 25,
-    Kind.BICYCLE: 10,
-    Kind.STATIC: 50,
-}
+MOST: dict[Kind, int] = {Kind.VEHICLE: 50, Kind.PEDESTRIAN: 25, Kind.BICYCLE: 10, Kind.STATIC: 50}
 """How many of each kind PDM-Closed looks at, nearest first."""
 
 

@@ -73,10 +73,7 @@ class PdmClosed:
         offsets_m: Lateral offsets of the paths (P,), to the left; the paper's by default.
     """
 
-    def __init__(
-        self,
-        offsets_m: tuple[float, ...] = PAPER_OFFSETS_M,
-    ) -> None:
+    def __init__(self, offsets_m: tuple[float, ...] = PAPER_OFFSETS_M) -> None:
         self._offsets = np.array(offsets_m, dtype=np.float64)
         self._shares = np.array(SPEED_SHARES, dtype=np.float64)
         self._touched: set[str] = set()

@@ -155,10 +155,7 @@ class Objects:
 
 
 NOBODY = Objects(
-    ids=(),
-    kinds=np.zeros(0, dtype=np.int64),
-    boxes=np.zeros((0, 5)),
-    speeds_mps=np.zeros(0),
+    ids=(), kinds=np.zeros(0, dtype=np.int64), boxes=np.zeros((0, 5)), speeds_mps=np.zeros(0)
 )
 
 

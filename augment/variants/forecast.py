@@ -48,9 +48,7 @@ def calls_of(recipe: Recipe) -> dict[ModelRole, CallRange]:
     has_tool = recipe.tools is not Tools.NONE
     # The answer with the first call too many, and the one that it is asked for.
     a_round = again + (limits.calls.calls + 1 if has_tool else 0)
-    calls = {
-        ModelRole.MODIFIER: CallRange(least=1, usual=1 + has_tool, most=rounds * a_round),
-    }
+    calls = {ModelRole.MODIFIER: CallRange(least=1, usual=1 + has_tool, most=rounds * a_round)}
     if recipe.review is not None:
         for role, asked in Counter(recipe.review.asks).items():
             calls[role] = CallRange(least=asked, usual=asked, most=asked * rounds * again)

@@ -256,11 +256,7 @@ _RULES: dict[str, _Rule] = {
     "seed": _whole(0, HIGHEST_SEED - MOST_SAMPLES, words="seed {}", slug="s{}"),
     "reasoning_effort": _one_of(*EFFORTS, words="effort {}", slug="{}-effort"),
     "max_output_tokens": _whole(
-        1,
-        1_000_000,
-        words="answers to {} tokens",
-        slug="{}-tokens",
-        default=_LIMITS.max_tokens,
+        1, 1_000_000, words="answers to {} tokens", slug="{}-tokens", default=_LIMITS.max_tokens
     ),
     "protocol": _one_of(
         *(protocol.value for protocol in ToolProtocol),

@@ -113,9 +113,6 @@ class Occupancy:
     def _boxes(self) -> dict[str, tuple[Box, float]]:
         """Everybody's box, and the circle around it, by short id."""
         return {
-            name: (
-                agent.box,
-                math.hypot(agent.length_m, agent.width_m) / 2.0,
-            )
+            name: (agent.box, math.hypot(agent.length_m, agent.width_m) / 2.0)
             for name, agent in self.agents.items()
         }

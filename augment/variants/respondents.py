@@ -121,10 +121,7 @@ class Inquiry:
     tools: tuple[Tool, ...] = ()
 
     def read(
-        self,
-        messages: Messages,
-        reader: Callable[[str], _Read],
-        reply: Reply | None = None,
+        self, messages: Messages, reader: Callable[[str], _Read], reply: Reply | None = None
     ) -> tuple[_Read, Messages, Reply]:
         """What was read, the conversation that led to the answer, and the answer.
 

@@ -95,11 +95,7 @@ def ask_with_tool(
     while True:
         choice = ToolChoice.NONE if desk.is_over else ToolChoice.AUTO
         reply = respondents.ask(
-            ModelRole.MODIFIER,
-            messages,
-            max_tokens=max_tokens,
-            tools=tools,
-            tool_choice=choice,
+            ModelRole.MODIFIER, messages, max_tokens=max_tokens, tools=tools, tool_choice=choice
         )
         if desk.is_over:
             return messages, reply

@@ -11,12 +11,7 @@ from django.conf import LazySettings
 from django.core.files.uploadedfile import SimpleUploadedFile
 from django.test import Client
 
-from augment.models import (
-    BaseScene,
-    Probe,
-    Scenario,
-    SceneUpload,
-)
+from augment.models import BaseScene, Probe, Scenario, SceneUpload
 from augment.scene.codec import modification_to_document, scene_to_document
 from augment.scene.modification import Modification
 from augment.services.endpoints.known_endpoints import ensure_endpoint

@@ -22,15 +22,7 @@ from tests.api.asking import error_of
 from tests.api.tokens import program, program_of
 from tests.jobs import rows
 from tests.opening import open_study
-from tests.study_rows import (
-    a_study,
-    contestant,
-    expert,
-    matchups_of,
-    picture,
-    scenario,
-    vote,
-)
+from tests.study_rows import a_study, contestant, expert, matchups_of, picture, scenario, vote
 from tests.web.cast import people, signed_in, world
 
 pytestmark = pytest.mark.django_db
@@ -76,9 +68,7 @@ def test_what_has_not_changed_is_304_and_what_has_is_not() -> None:
 
 
 @pytest.mark.parametrize("path", ["jobs", "scenarios", "contestants", "studies"])
-def test_a_list_asks_the_database_as_often_whatever_is_in_it(
-    path: str,
-) -> None:
+def test_a_list_asks_the_database_as_often_whatever_is_in_it(path: str) -> None:
     accounts = people()
     asking = program_of(accounts["admin"])
     rows.launch(scenarios=1, contestants=("reference",))

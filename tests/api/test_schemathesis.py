@@ -28,13 +28,7 @@ from arena.api.reference import make_document
 from arena.models import Snapshot
 from arena.services.early_looks import open_early
 from arena.services.ratings import rate
-from augment.models import (
-    Endpoint,
-    EndpointModel,
-    Probe,
-    SceneUpload,
-    UploadMoment,
-)
+from augment.models import Endpoint, EndpointModel, Probe, SceneUpload, UploadMoment
 from augment.services.endpoints.known_endpoints import ensure_endpoint
 from augment.services.endpoints.known_models import model_at
 from tests.api.tokens import secret_of

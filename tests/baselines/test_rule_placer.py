@@ -20,13 +20,7 @@ from augment.scene.intent import (
     VehicleRequest,
     WalkRequest,
 )
-from augment.scene.intent_words import (
-    Body,
-    LateralTarget,
-    Nearness,
-    Setting,
-    Shape,
-)
+from augment.scene.intent_words import Body, LateralTarget, Nearness, Setting, Shape
 from tests.baselines.placing import added, refusal
 from tests.intents import (
     LEFT_EDGE,

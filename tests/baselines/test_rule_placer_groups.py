@@ -10,12 +10,8 @@ import pytest
 
 from augment.geometry.boxes import overlap
 from augment.scene.entities import AgentType
-from augment.scene.intent import (
-    Side,
-)
-from augment.scene.intent_words import (
-    Shape,
-)
+from augment.scene.intent import Side
+from augment.scene.intent_words import Shape
 from tests.baselines.placing import added
 from tests.intents import LEFT_EDGE, cones, crash, metres, towards, walk
 from tests.scenes import curve, scene
@@ -42,8 +38,7 @@ def test_a_pedestrian_crosses_from_edge_to_edge(
 
 def test_a_taper_closes_the_lane_and_a_worker_stands_behind_it() -> None:
     *line, worker = added(
-        scene(),
-        cones(20.0, 6, Shape.TAPER, spacing=metres(2.5), start=Side.LEFT, has_worker=True),
+        scene(), cones(20.0, 6, Shape.TAPER, spacing=metres(2.5), start=Side.LEFT, has_worker=True)
     )
     gaps = [math.dist((a.x_m, a.y_m), (b.x_m, b.y_m)) for a, b in itertools.pairwise(line)]
     assert gaps == pytest.approx([2.5] * 5, abs=0.01)

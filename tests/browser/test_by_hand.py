@@ -23,12 +23,7 @@ from tests.formats.av2_logs import write_log
 from tests.processes import wait_until
 from tests.stack import Home
 
-pytestmark = [
-    pytest.mark.browser,
-    pytest.mark.redis,
-    pytest.mark.slow,
-    pytest.mark.timeout(600),
-]
+pytestmark = [pytest.mark.browser, pytest.mark.redis, pytest.mark.slow, pytest.mark.timeout(600)]
 PASSWORD = "nine lives of a cat"
 RED = (218, 30, 40)
 

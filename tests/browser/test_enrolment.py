@@ -41,10 +41,7 @@ def test_somebody_enrols_votes_and_gets_a_code(booth: Booth) -> None:
         drop_out_after_h=24,
     )
     context = booth.browser.new_context(
-        base_url=booth.address,
-        viewport=PHONE,
-        color_scheme="dark",
-        bypass_csp=True,
+        base_url=booth.address, viewport=PHONE, color_scheme="dark", bypass_csp=True
     )
     booth.contexts.append(context)
     page = context.new_page()

@@ -28,12 +28,7 @@ from tests.parked import TYPE, asked, intents, reference, wish, write_street
 from tests.processes import wait_until
 from tests.stack import Home
 
-pytestmark = [
-    pytest.mark.browser,
-    pytest.mark.redis,
-    pytest.mark.slow,
-    pytest.mark.timeout(600),
-]
+pytestmark = [pytest.mark.browser, pytest.mark.redis, pytest.mark.slow, pytest.mark.timeout(600)]
 
 PASSWORD = "nine lives of a cat"
 VOTES = 6

@@ -13,15 +13,9 @@ from playwright.sync_api import ViewportSize
 from tests import study_rows
 from tests.browser.booth import Booth, press
 
-pytestmark = [
-    pytest.mark.browser,
-    pytest.mark.django_db(transaction=True),
-]
+pytestmark = [pytest.mark.browser, pytest.mark.django_db(transaction=True)]
 
-SIZES = [
-    *((1920, 1080), (1280, 720), (1024, 600), (740, 360)),
-    *((768, 1024), (360, 640)),
-]
+SIZES = [*((1920, 1080), (1280, 720), (1024, 600), (740, 360)), *((768, 1024), (360, 640))]
 GERMAN = (
     "Hinter der Kreuzung ist unsere Fahrspur durch eine schräge Reihe aus sechs Leitkegeln von "
     "der linken Fahrstreifenbegrenzung zur rechten hin gesperrt, der erste 4 m hinter dem Ende "

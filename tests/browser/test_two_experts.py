@@ -15,12 +15,7 @@ from tests.browser.booth import DESK, ready
 from tests.browser.chromium import PATIENCE_MS, chromium
 from tests.stack import Home
 
-pytestmark = [
-    pytest.mark.browser,
-    pytest.mark.redis,
-    pytest.mark.slow,
-    pytest.mark.timeout(600),
-]
+pytestmark = [pytest.mark.browser, pytest.mark.redis, pytest.mark.slow, pytest.mark.timeout(600)]
 STUDY = "Two at once"
 VOTES = 12
 

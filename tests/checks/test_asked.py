@@ -11,20 +11,8 @@ from augment.checks import Finding, FindingKind, Ground, Severity
 from augment.checks.against_intent import check_against_intent
 from augment.checks.tolerances import AUTHORED
 from augment.scene.entities import AgentType, TrafficAgent, TrafficSide
-from augment.scene.intent import (
-    CrashedCar,
-    Intent,
-    LaneChoice,
-    Side,
-    Spot,
-    VehicleRequest,
-)
-from augment.scene.intent_words import (
-    Body,
-    Facing,
-    LateralTarget,
-    Shape,
-)
+from augment.scene.intent import CrashedCar, Intent, LaneChoice, Side, Spot, VehicleRequest
+from augment.scene.intent_words import Body, Facing, LateralTarget, Shape
 from augment.scene.modification import Modification
 from tests.intents import (
     CENTRED,

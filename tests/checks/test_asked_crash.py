@@ -10,18 +10,8 @@ import pytest
 from augment.checks import FindingKind, Ground
 from augment.checks.against_intent import check_against_intent
 from augment.scene.entities import TrafficAgent
-from augment.scene.intent import (
-    CrashedCar,
-    CrashRequest,
-    Intent,
-    Length,
-    Relation,
-    Spot,
-)
-from augment.scene.intent_words import (
-    Bearing,
-    Facing,
-)
+from augment.scene.intent import CrashedCar, CrashRequest, Intent, Length, Relation, Spot
+from augment.scene.intent_words import Bearing, Facing
 from augment.scene.modification import Modification
 from tests.scenes import scene, vehicle
 

@@ -47,9 +47,7 @@ def snapshot(file: Path) -> Snapshot:
     return rate(study=Study.objects.get(name="Open"), rounds=1000)
 
 
-def test_tables_of_every_format_have_the_same_order_bounds_and_reasons(
-    snapshot: Snapshot,
-) -> None:
+def test_tables_of_every_format_have_the_same_order_bounds_and_reasons(snapshot: Snapshot) -> None:
     table = leaderboard_table(snapshot)
     assert [row.slug for row in table.rows] == ORDER
     assert [row.rank for row in table.rows] == RANKS

@@ -18,7 +18,7 @@ from arena.pairing.order import MAIN
 from arena.queries.votes.judged import Entrant, Judged
 from arena.queries.votes.sets import Filters, VoteSet
 from arena.rating.leaderboard import rate as rate_votes
-from arena.results.both_versions import OwnVotes
+from arena.rating.snapshot_document import OwnVotes
 from arena.services.authorships import mark_author
 from arena.services.own_votes import OTHER_ROUNDS, with_and_without
 from arena.services.ratings import rate

@@ -8,7 +8,7 @@ from arena.exports.charts.heat_map import heat_map
 from arena.exports.tables import Row
 from arena.rating.estimate import Estimate
 from arena.rating.printed import whole_percent
-from arena.results.tree import PairRecord
+from arena.rating.snapshot_document import PairRecord
 from arena.templatetags.results import estimate_percent, percent
 
 

@@ -14,7 +14,7 @@ from arena.exports.charts.plot_axes import axes, curve_points, interval_ticks
 from arena.exports.charts.plots import ELO, VOTES, Given, Plot
 from arena.exports.charts.scatter import scatter_chart
 from arena.exports.tables import Row
-from arena.results.tree import PairRecord
+from arena.rating.snapshot_document import PairRecord
 
 
 def plot(points: list[Given], **changes: object) -> Plot:

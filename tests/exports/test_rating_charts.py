@@ -12,7 +12,7 @@ from arena.exports.charts.intervals import interval_chart
 from arena.exports.charts.rating import chart_bytes, charts
 from arena.exports.tables import leaderboard_table
 from arena.models import Snapshot
-from arena.results.tree import DisplacementSummary, ScenarioCost
+from arena.rating.snapshot_document import DisplacementSummary, ScenarioCost
 from arena.services.ratings import rate
 from tests.full_study import Size, full_study
 

@@ -6,11 +6,7 @@ import pytest
 
 from arena.errors import NotYours, StudyStillOpen
 from arena.models import Snapshot, Study, Vote
-from arena.queries.studies.results import (
-    ResultsAccess,
-    latest_snapshot,
-    results_access,
-)
+from arena.queries.studies.results import ResultsAccess, latest_snapshot, results_access
 from arena.services.early_looks import open_early
 from arena.services.people import create_person
 from arena.services.ratings import rate

@@ -159,9 +159,7 @@ def test_a_worker_writes_the_zip_that_the_jobs_page_offers(
 
 
 def test_a_message_that_comes_twice_changes_nothing_and_a_new_zip_replaces_the_old(
-    job: GenerationJob,
-    admin_client: Client,
-    django_capture_on_commit_callbacks: Any,
+    job: GenerationJob, admin_client: Client, django_capture_on_commit_callbacks: Any
 ) -> None:
     ask_for(admin_client, job, "json")
     first = ScenarioFile.objects.get()

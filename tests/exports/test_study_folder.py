@@ -28,14 +28,7 @@ from arena.models import Person, Study, Vote
 from arena.services.ratings import rate
 from arena.services.stored_rows import as_line, columns_of, find_filled_tables, label_of
 from arena.services.studies import close_study
-from augment.models import (
-    Augmentation,
-    Contestant,
-    Endpoint,
-    GenerationJob,
-    Scenario,
-    Simulation,
-)
+from augment.models import Augmentation, Contestant, Endpoint, GenerationJob, Scenario, Simulation
 from tests.study_rows import a_study, hang, matchups_of, scenario, vote, write_changes
 
 pytestmark = pytest.mark.django_db(transaction=True)

@@ -8,13 +8,7 @@ from dataclasses import replace
 import pytest
 
 from arena.exports.latex import escape, latex
-from arena.exports.tables import (
-    EARLY_LOOK,
-    SIMULATED_TABLE,
-    LeaderboardTable,
-    Row,
-    for_experts,
-)
+from arena.exports.tables import EARLY_LOOK, SIMULATED_TABLE, LeaderboardTable, Row, for_experts
 from arena.exports.writers import FORMATS, csv_bytes, json_bytes
 
 PAPER = (

@@ -24,12 +24,7 @@ Point = tuple[float, float]
 
 
 def quaternion(heading_rad: float) -> dict[str, float]:
-    return {
-        "qw": math.cos(heading_rad / 2),
-        "qx": 0.0,
-        "qy": 0.0,
-        "qz": math.sin(heading_rad / 2),
-    }
+    return {"qw": math.cos(heading_rad / 2), "qx": 0.0, "qy": 0.0, "qz": math.sin(heading_rad / 2)}
 
 
 def box(

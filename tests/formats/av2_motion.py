@@ -55,10 +55,7 @@ def rows() -> list[dict[str, Any]]:
 
 
 def write_scenario(
-    folder: Path,
-    *,
-    table: list[dict[str, Any]] | None = None,
-    city: dict[str, Any] | None = None,
+    folder: Path, *, table: list[dict[str, Any]] | None = None, city: dict[str, Any] | None = None
 ) -> Path:
     folder.mkdir(parents=True)
     made = pa.Table.from_pylist(rows() if table is None else table)

@@ -11,14 +11,7 @@ from augment.errors import InvalidDocument
 from augment.formats.argoverse2.categories import TYPE_OF
 from augment.formats.argoverse2.sensor import ArgoverseSensor
 from augment.scene.codec import scene_from_document, scene_to_document
-from augment.scene.entities import (
-    AgentType,
-    AreaKind,
-    Scene,
-    TrafficLight,
-    TrafficSide,
-    TurnType,
-)
+from augment.scene.entities import AgentType, AreaKind, Scene, TrafficLight, TrafficSide, TurnType
 from augment.scene.lane_graph import LaneGraph
 from augment.scene.recording import Recording
 from augment.scene.recording_codec import recording_to_document
@@ -91,10 +84,7 @@ def test_each_way_over_an_intersection_is_one_connector(log: Path) -> None:
         next(lane.id for lane in scene.lanes if abs(lane.centerline.points_m[0][axis] - at) < 0.01)
         for axis, at in ((0, 38.58), (1, 10.0))
     )
-    assert found == {
-        ("Lane1", onward, TurnType.STRAIGHT),
-        ("Lane1", leftward, TurnType.LEFT),
-    }
+    assert found == {("Lane1", onward, TurnType.STRAIGHT), ("Lane1", leftward, TurnType.LEFT)}
     assert {c.traffic_light for c in scene.connectors} == {TrafficLight.UNKNOWN}
     assert LaneGraph(scene).route("Lane1", 90.0)[-1] == onward
 

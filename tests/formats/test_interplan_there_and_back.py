@@ -13,9 +13,7 @@ from augment.formats.interplan.file import token_of
 from augment.formats.interplan.reader import read as read_interplan
 from augment.formats.interplan.writer import interplan_text as write_interplan
 from augment.scene.catalogue import ScenarioType
-from augment.scene.entities import (
-    AgentType,
-)
+from augment.scene.entities import AgentType
 from augment.scene.modification import without_traffic
 from tests.formats.cells import cell
 from tests.formats.round_trips import agent_changes

@@ -226,10 +226,7 @@ def test_what_both_formats_can_say_comes_back(name: str, tmp_path: Path) -> None
     found = {change.aspect for change in changes(given, reading)}
     assert (
         found
-        == {
-            "commonroad": {"area", "class", "ego motion"},
-            "scenarionet": {"area", "edge"},
-        }[name]
+        == {"commonroad": {"area", "class", "ego motion"}, "scenarionet": {"area", "edge"}}[name]
     )
 
 

@@ -64,10 +64,7 @@ def description() -> dict[str, Any]:
         },
         "tracks": {"ego": ego, "car": moving(20.0, 5.0), "cone": moving(9.0, 0.0, type="OTHER")},
         "dynamic_map_states": {
-            "x": {
-                "lane": "x",
-                "state": {"object_state": ["LANE_STATE_GO", "LANE_STATE_STOP", ""]},
-            }
+            "x": {"lane": "x", "state": {"object_state": ["LANE_STATE_GO", "LANE_STATE_STOP", ""]}}
         },
         "map_features": {
             "a": strip(-30.0, 30.0, exit_lanes=["x", "y"]),

@@ -110,9 +110,5 @@ def llama_job(
     for number, slug in enumerate(slugs):
         add_scenario(slug, instruction=f"{INSTRUCTION} Not more than {number + 1}.")
     return jobs.launch(
-        name="Round 1",
-        contestants=["llama"],
-        scenarios=slugs,
-        caps=caps,
-        is_fresh=is_fresh,
+        name="Round 1", contestants=["llama"], scenarios=slugs, caps=caps, is_fresh=is_fresh
     )

@@ -10,9 +10,7 @@ from augment.scene.catalogue import ScenarioType
 from augment.scene.codec import modification_to_document, scene_to_document
 from augment.scene.entities import Scene
 from augment.scene.intent_codec import intent_to_document
-from augment.scene.intent_words import (
-    Shape,
-)
+from augment.scene.intent_words import Shape
 from augment.scene.modification import Modification
 from augment.services.running import jobs
 from augment.services.running.runner import AUGMENTATIONS, Held

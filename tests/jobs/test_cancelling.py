@@ -79,11 +79,7 @@ def test_a_call_that_waits_when_its_job_is_cancelled_is_not_sent() -> None:
     Endpoint.objects.update(max_concurrency=1)
     client = runner.open_wire(endpoint, held)
     jobs.cancel(job)
-    with (
-        place_at(endpoint, Queue(longest_s=0.0)),
-        client as opened,
-        pytest.raises(JobCancelled),
-    ):
+    with place_at(endpoint, Queue(longest_s=0.0)), client as opened, pytest.raises(JobCancelled):
         opened.complete(ASKED)
     assert CallLease.objects.count() == 1
 

@@ -23,10 +23,7 @@ from tests.llm.json_server import JsonServer, serving
 
 pytestmark = pytest.mark.django_db(transaction=True)
 ASKED = Request(
-    model="picky",
-    messages=(Message(speaker=Speaker.USER, text="Hello"),),
-    temperature=0.0,
-    seed=7,
+    model="picky", messages=(Message(speaker=Speaker.USER, text="Hello"),), temperature=0.0, seed=7
 )
 
 

@@ -101,11 +101,7 @@ def test_samples_are_asked_anew_with_seeds_of_their_own() -> None:
     sources = [ModelCall.objects.get(attempt__augmentation=row).served_from for row in again]
     assert [one.attempt.augmentation for one in sources if one and one.attempt] == rows
     sent = [transcript_of(row)["attempts"][0]["steps"][0]["request"] for row in rows]
-    assert [(call["temperature"], call["seed"]) for call in sent] == [
-        (1.0, 7),
-        (1.0, 8),
-        (1.0, 9),
-    ]
+    assert [(call["temperature"], call["seed"]) for call in sent] == [(1.0, 7), (1.0, 8), (1.0, 9)]
 
 
 def test_another_option_never_reuses_an_answer_and_the_same_does() -> None:

@@ -14,14 +14,7 @@ from augment.models import Augmentation, Endpoint, GenerationJob, ModelCall
 from augment.scene.codec import modification_from_document, modification_to_document
 from augment.services.running import jobs, runner
 from augment.services.running.runner import AUGMENTATIONS
-from tests.jobs.rows import (
-    INSTRUCTION,
-    TWO_CONES,
-    add_model,
-    add_scenario,
-    launch,
-    only_row,
-)
+from tests.jobs.rows import INSTRUCTION, TWO_CONES, add_model, add_scenario, launch, only_row
 from tests.jobs.running import Wire, ran
 from tests.variants.answers import GOOD
 
@@ -155,9 +148,7 @@ def test_a_claim_that_is_lost_while_drawing_ends_quietly() -> None:
     assert (row.state, row.modification) == (State.QUEUED, None)
 
 
-def test_what_nobody_foresaw_fails_the_row_and_is_logged(
-    caplog: pytest.LogCaptureFixture,
-) -> None:
+def test_what_nobody_foresaw_fails_the_row_and_is_logged(caplog: pytest.LogCaptureFixture) -> None:
     row = model_job()
     wire = Wire()
     wire.client = Stumbling(ZeroDivisionError("division by zero"))

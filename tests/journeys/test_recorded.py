@@ -11,12 +11,7 @@ from augment.scene.codec import modification_from_document, scene_from_document
 from augment.scene.lane_graph import LaneGraph
 from tests.processes import machine
 
-pytestmark = [
-    pytest.mark.realdata,
-    pytest.mark.redis,
-    pytest.mark.slow,
-    pytest.mark.timeout(600),
-]
+pytestmark = [pytest.mark.realdata, pytest.mark.redis, pytest.mark.slow, pytest.mark.timeout(600)]
 INSTRUCTION = (
     "add a parked vehicle in front of ego at about 21.4 m, slightly towards the left lane boundary"
 )

@@ -4,13 +4,7 @@ from decimal import Decimal
 
 import pytest
 
-from augment.llm.costs import (
-    IMAGE_TOKENS,
-    Price,
-    nano_usd_of,
-    usd_of,
-    worst_case,
-)
+from augment.llm.costs import IMAGE_TOKENS, Price, nano_usd_of, usd_of, worst_case
 from augment.llm.messages import Message, Request, Speaker
 
 GPT_4O = Price(prompt_usd=Decimal("2.50"), completion_usd=Decimal("10"))

@@ -11,14 +11,7 @@ import pytest
 
 from augment.errors import Abandoned, JobCancelled, Unwanted
 from augment.llm.wire_watch import OutOfTime, Watch
-from tests.llm.hostile import (
-    BODY,
-    EMPTY_BLOCK,
-    LIMIT_S,
-    PACKED,
-    ask,
-    fault,
-)
+from tests.llm.hostile import BODY, EMPTY_BLOCK, LIMIT_S, PACKED, ask, fault
 from tests.llm.raw_server import Say, drip, head, whole
 
 # --- Time --------------------------------------------------------------------------------------

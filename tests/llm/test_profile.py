@@ -5,13 +5,7 @@ from dataclasses import replace
 import pytest
 
 from augment.errors import ModelFault
-from augment.llm.messages import (
-    AnswerSchema,
-    Message,
-    Request,
-    Speaker,
-    Tool,
-)
+from augment.llm.messages import AnswerSchema, Message, Request, Speaker, Tool
 from augment.llm.profile import ModelProfile
 
 HELLO = Message(speaker=Speaker.USER, text="Hello")

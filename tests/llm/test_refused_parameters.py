@@ -11,10 +11,7 @@ from tests.llm.recorder import recorder
 
 KEY = "sk-planted-4f7a9c0d1e2b3a"
 ASKED = Request(
-    model="m",
-    messages=(Message(speaker=Speaker.USER, text="Hello"),),
-    temperature=0.0,
-    seed=7,
+    model="m", messages=(Message(speaker=Speaker.USER, text="Hello"),), temperature=0.0, seed=7
 )
 
 

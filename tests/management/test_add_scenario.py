@@ -11,9 +11,7 @@ from django.core.management.base import CommandError
 from augment.models import BaseScene, Event, Scenario
 from augment.scene.codec import modification_to_document, scene_to_document
 from augment.scene.intent_codec import intent_to_document
-from augment.scene.intent_words import (
-    Shape,
-)
+from augment.scene.intent_words import Shape
 from augment.scene.modification import Modification
 from augment.services.scenarios.scene_imports import import_scene
 from tests.intents import cones

@@ -47,10 +47,7 @@ def example() -> Scene:
 
     return scene(
         ego=EGO,
-        lanes=(
-            lane("Lane1", Polyline([(-20.0, 0.0), (10.0, 0.0)])),
-            lane("Lane2", beyond()),
-        ),
+        lanes=(lane("Lane1", Polyline([(-20.0, 0.0), (10.0, 0.0)])), lane("Lane2", beyond())),
         connectors=(
             LaneConnector(
                 id="Connector1",

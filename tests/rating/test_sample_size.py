@@ -113,9 +113,7 @@ def known_spread(contestants: int, variance: float) -> Spread:
 
 
 @pytest.mark.parametrize("gap", [20.0, 40.0, 55.0])
-def test_one_pair_of_known_variance_is_found_as_often_as_a_normal_value_has_it(
-    gap: float,
-) -> None:
+def test_one_pair_of_known_variance_is_found_as_often_as_a_normal_value_has_it(gap: float) -> None:
     error = np.sqrt(2.0 * 10.0**2)
     limit = ndtri(1.0 - 0.05 / CAUTION / 2.0)
     planned = PlannedPairs(known_spread(2, 100.0), np.array([30.0]))

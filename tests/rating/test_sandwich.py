@@ -56,8 +56,7 @@ def test_one_way_clusters_are_statsmodels(unit: Unit) -> None:
     design[rows, votes.first], design[rows, votes.second] = 1.0, -1.0
     groups = votes.expert if unit is Unit.EXPERT else votes.scenario
     fitted = sm.GLM(votes.score, design[:, 1:], family=sm.families.Binomial()).fit(
-        cov_type="cluster",
-        cov_kwds={"groups": groups, "use_correction": False},
+        cov_type="cluster", cov_kwds={"groups": groups, "use_correction": False}
     )
     # Theirs hold the first at zero; differences of the others must have the same variance.
     theirs = ELO_PER_LOGIT**2 * fitted.cov_params()

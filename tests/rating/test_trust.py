@@ -10,11 +10,7 @@ from arena.rating.bootstrap import Unit
 from arena.rating.bradley_terry import ELO_PER_LOGIT
 from arena.rating.comparisons import Comparison, Comparisons, count_pairs, win_rates
 from arena.rating.fit_test import count_cycles, fit_test
-from arena.rating.influence import (
-    fewest_votes_to_change_first,
-    rank_changes,
-    without_each_expert,
-)
+from arena.rating.influence import fewest_votes_to_change_first, rank_changes, without_each_expert
 from arena.rating.leaderboard import Intervals, rate
 from arena.rating.logistic import side_bias
 from arena.rating.planning import design_effects, votes_for, votes_until

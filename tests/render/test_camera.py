@@ -35,11 +35,7 @@ def test_without_a_reference_the_window_looks_far_ahead() -> None:
     assert camera.x_min_m <= -5.0
 
 
-@given(
-    x_m=st.floats(-60.0, 120.0),
-    y_m=st.floats(-60.0, 60.0),
-    heading_rad=st.floats(-3.2, 3.2),
-)
+@given(x_m=st.floats(-60.0, 120.0), y_m=st.floats(-60.0, 60.0), heading_rad=st.floats(-3.2, 3.2))
 @examples(30)
 def test_ego_and_reference_are_inside_with_room_around_them(
     x_m: float, y_m: float, heading_rad: float
@@ -87,9 +83,7 @@ def test_over_the_catalogue_at_most_35_percent_are_blank_and_people_14_pixels_hi
 
 
 @pytest.mark.realdata
-def test_over_recorded_scenes_at_most_35_percent_are_blank(
-    realdata: Path,
-) -> None:
+def test_over_recorded_scenes_at_most_35_percent_are_blank(realdata: Path) -> None:
     blank = []
     for _, scene in recorded_moments(realdata, every_s=60.0):
         camera = camera_for(scene, None)

@@ -9,7 +9,7 @@ from typing import Any
 from django.db import connection
 
 from arena.models import Snapshot, Standing, Study
-from arena.results.tree import Results
+from arena.rating.snapshot_document import Results
 
 OLD: dict[str, Any] = json.loads((Path(__file__).parent / "version_1.json").read_text())
 

@@ -11,7 +11,7 @@ from django.test import Client
 from django.urls import reverse
 
 from arena.models import Matchup, Snapshot, Standing, Study, Vote
-from arena.results.tree import Results
+from arena.rating.snapshot_document import Results
 from arena.services.people import create_person
 from arena.services.ratings import rate
 from arena.services.studies import close_study

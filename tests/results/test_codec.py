@@ -13,9 +13,13 @@ from django.urls import reverse
 
 from arena.exports import bundle
 from arena.models import Snapshot
-from arena.results.codec import read_results, results_document
-from arena.results.kept import read_text
-from arena.results.tree import VERSION, Results
+from arena.rating.snapshot_document import (
+    VERSION,
+    Results,
+    read_results,
+    read_text,
+    results_document,
+)
 from arena.web.results.tabs import TABS
 from augment.errors import InvalidDocument
 from tests.results.old import OLD, stored

@@ -23,11 +23,7 @@ from augment.scene.intent import (
     WalkRequest,
     resolve_anchors,
 )
-from augment.scene.intent_codec import (
-    INTENT_FORMAT,
-    intent_from_document,
-    intent_to_document,
-)
+from augment.scene.intent_codec import INTENT_FORMAT, intent_from_document, intent_to_document
 from augment.scene.intent_statements import list_statements
 from augment.scene.intent_words import (
     Bearing,
@@ -211,10 +207,7 @@ def test_statements_are_short_and_name_what_they_are_about() -> None:
     ],
 )
 def test_a_distance_from_another_object_is_added_to_that_ones(
-    bus_m: float,
-    relation: Relation,
-    distance: Length | None,
-    wanted: tuple[float, float] | None,
+    bus_m: float, relation: Relation, distance: Length | None, wanted: tuple[float, float] | None
 ) -> None:
     (bus,) = parked(bus_m).requests
     named = VehicleRequest(spot=bus.spot, name="bus")

@@ -97,9 +97,7 @@ def test_loading_again_changes_nothing(folder: Path) -> None:
     assert Event.objects.count() == events
 
 
-def test_the_hard_set_comes_when_it_is_asked_for_with_its_paraphrases_beside(
-    folder: Path,
-) -> None:
+def test_the_hard_set_comes_when_it_is_asked_for_with_its_paraphrases_beside(folder: Path) -> None:
     for name in ("scenes/hairpin-hill.json", "scenarios/hairpin-hill-van.json"):
         (folder / "hard" / name).parent.mkdir(parents=True)
         shutil.copy(HARD / name, folder / "hard" / name)

@@ -25,14 +25,7 @@ from arena.services.stored_rows import as_line, columns_of
 from augment.models import GenerationJob, Scenario, Simulation
 from augment.services.judging.simulations import DRIVES
 from augment.services.running.runner import AUGMENTATIONS
-from tests.services.backup_rows import (
-    NOW,
-    PICTURE,
-    a_full_house,
-    contents,
-    empty,
-    quiet,
-)
+from tests.services.backup_rows import NOW, PICTURE, a_full_house, contents, empty, quiet
 
 pytestmark = [pytest.mark.django_db(transaction=True), pytest.mark.usefixtures("own_folders")]
 

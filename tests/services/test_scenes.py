@@ -15,10 +15,7 @@ from augment.scene.recording_codec import recording_from_document
 from augment.services.endpoints.known_endpoints import ensure_endpoint
 from augment.services.scenarios.intents import accept_reading, enter_intent
 from augment.services.scenarios.scene_imports import import_scene
-from augment.services.scenarios.scenes import (
-    add_scenario,
-    reference_of,
-)
+from augment.services.scenarios.scenes import add_scenario, reference_of
 from tests.formats.av2_logs import write_log
 from tests.intents import cones
 from tests.scenes import cone, scene, vehicle
@@ -41,11 +38,7 @@ def street(file: Path) -> BaseScene:
 
 
 def scenario(**changes: object) -> Scenario:
-    asked = {
-        "scene": "street",
-        "type": "jaywalking_pedestrian",
-        "instruction": "add a pedestrian",
-    }
+    asked = {"scene": "street", "type": "jaywalking_pedestrian", "instruction": "add a pedestrian"}
     return add_scenario(**(asked | changes))  # type: ignore[arg-type]
 
 

@@ -30,11 +30,7 @@ def opened(*, show_alike: bool = True, scenarios: int = 4) -> Study:
         row.modification = modification_to_document(Modification(added=(car,)))
         row.save(update_fields=["modification"])
     return open_study(
-        name="Round 1",
-        votes_per_expert=2 * scenarios,
-        seed=7,
-        show_alike=show_alike,
-        **cast,
+        name="Round 1", votes_per_expert=2 * scenarios, seed=7, show_alike=show_alike, **cast
     )
 
 

@@ -17,13 +17,7 @@ pytestmark = pytest.mark.django_db
 
 @pytest.mark.parametrize("is_vote", [True, False])
 def test_a_pair_whose_repeat_was_judged_is_not_handed_over(is_vote: bool) -> None:
-    study = open_study(
-        name="Round 1",
-        votes_per_expert=8,
-        seed=7,
-        repeats=25,
-        **cast_of(),
-    )
+    study = open_study(name="Round 1", votes_per_expert=8, seed=7, repeats=25, **cast_of())
     repeat, other = (row for row in matchups_of(study, "eva") if row.kind == Matchup.Kind.REPEAT)
     if is_vote:
         vote(repeat)

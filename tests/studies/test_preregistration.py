@@ -15,7 +15,7 @@ from arena.exports.bundle import bundle_files
 from arena.exports.tables import leaderboard_table
 from arena.exports.writers import FORMATS, plain_text
 from arena.models import Study
-from arena.results.tree import PairP
+from arena.rating.snapshot_document import PairP
 from arena.services.hypotheses import HypothesisVerdict
 from arena.services.preregistration import preregistration_bytes, preregistration_sha256
 from arena.services.ratings import rate

@@ -82,11 +82,7 @@ def test_a_pair_that_was_reported_but_not_judged_stays_where_it_is() -> None:
 
 def test_repeats_are_drawn_anew_for_who_takes_over() -> None:
     study = open_study(
-        name="Round 1",
-        votes_per_expert=12,
-        seed=1,
-        repeats=25,
-        **cast_of(scenarios=12),
+        name="Round 1", votes_per_expert=12, seed=1, repeats=25, **cast_of(scenarios=12)
     )
     hand_over(study=study, username="eva", to=["finn"])
     assert not matchups_of(study, "eva")

@@ -24,12 +24,7 @@ pytestmark = pytest.mark.django_db
 
 def played(cast: Cast, **options: object) -> Study:
     return open_study(
-        name="Round 1",
-        votes_per_expert=12,
-        seed=7,
-        allow_replay=True,
-        **options,
-        **cast,
+        name="Round 1", votes_per_expert=12, seed=7, allow_replay=True, **options, **cast
     )
 
 
@@ -93,10 +88,7 @@ def test_a_pair_is_played_to_its_expert_and_to_admins_alone() -> None:
     drive_pictures(pictures())
     mine = matchups_of(played(cast), "eva")[0]
     assert drives_of_pair(user=eva(), code=mine.code)
-    for user, code in [
-        (User.objects.get(username="finn"), mine.code),
-        (eva(), uuid.uuid4()),
-    ]:
+    for user, code in [(User.objects.get(username="finn"), mine.code), (eva(), uuid.uuid4())]:
         with pytest.raises(NotYours):
             drives_of_pair(user=user, code=code)
 

@@ -23,13 +23,7 @@ pytestmark = pytest.mark.django_db
 
 
 def opened(cast: Cast, votes: int = 12, **options: object) -> Study:
-    return open_study(
-        name="Round 1",
-        votes_per_expert=votes,
-        seed=7,
-        **options,
-        **cast,
-    )
+    return open_study(name="Round 1", votes_per_expert=votes, seed=7, **options, **cast)
 
 
 def with_checks(scenarios: int = 8) -> Cast:

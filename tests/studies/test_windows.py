@@ -28,8 +28,7 @@ def drawn_before(folder: str = "bev") -> None:
     """All pictures as if an earlier version had drawn them; names once said no window."""
     for row in Augmentation.objects.all():
         Augmentation.objects.filter(pk=row.pk).update(
-            image=f"{folder}/{row.pk}.png",
-            modification=modification_to_document(Modification()),
+            image=f"{folder}/{row.pk}.png", modification=modification_to_document(Modification())
         )
     Scenario.objects.update(original_image=f"{folder}/original.png")
 

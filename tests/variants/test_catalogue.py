@@ -34,12 +34,7 @@ CALLS_OF_GOOD = {
     "fc+vqa": "mmeve",
     "fc+geo": "mm",
 }
-CALLS_OF_LOW = {
-    "tqa": "mrmr",
-    "vqa": "mevemeve",
-    "fc+tqa": "mmrmmr",
-    "fc+vqa": "mmevemmeve",
-}
+CALLS_OF_LOW = {"tqa": "mrmr", "vqa": "mevemeve", "fc+tqa": "mmrmmr", "fc+vqa": "mmevemmeve"}
 KINDS = ("crash", "jaywalker", "nudge", "overtake", "roadworks")
 
 

@@ -14,10 +14,7 @@ from augment.prompts.lane_curves import control_points
 from augment.prompts.names import short_names
 from augment.scene.ego_route import EgoRoute
 from augment.scene.entities import AreaKind, SceneOptions, TurnType
-from augment.variants.pose_call import (
-    OBJECT_TYPES,
-    CallLimits,
-)
+from augment.variants.pose_call import OBJECT_TYPES, CallLimits
 from augment.variants.pose_tool import PoseTool
 from tests.fixtures.shelf import whole_scene
 from tests.scenes import curve, junction, scene, vehicle

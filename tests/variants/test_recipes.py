@@ -3,15 +3,7 @@ from __future__ import annotations
 import pytest
 
 from augment.prompts.vectors import LaneFormat
-from augment.variants.recipes import (
-    FC,
-    PAPER,
-    TQA,
-    Keep,
-    Recipe,
-    Tools,
-    find_recipe,
-)
+from augment.variants.recipes import FC, PAPER, TQA, Keep, Recipe, Tools, find_recipe
 
 
 @pytest.mark.parametrize("name", ["otm", "OTM", " Otm "])

@@ -78,10 +78,7 @@ def test_a_change_is_appended_and_supersedes_the_current_vote() -> None:
 
 @pytest.mark.parametrize(
     ("outcome", "more", "named"),
-    [
-        ("equal", {"both_miss": True}, "both_miss"),
-        ("right", {"aids": "text"}, "aids"),
-    ],
+    [("equal", {"both_miss": True}, "both_miss"), ("right", {"aids": "text"}, "aids")],
 )
 def test_a_changed_vote_is_held_against_the_studys_rules_as_a_first_one_is(
     outcome: str, more: dict[str, Any], named: str

@@ -31,11 +31,7 @@ def enrolment() -> Enrolment:
 
 
 def join(client: Client, enrolment: Enrolment, **changes: str) -> int:
-    given = {
-        "external_id": "w-1",
-        "agreed": "on",
-        "agreed_sha256": enrolment.consent_sha256,
-    }
+    given = {"external_id": "w-1", "agreed": "on", "agreed_sha256": enrolment.consent_sha256}
     return client.post(reverse("enrol", args=[enrolment.token]), given | changes).status_code
 
 

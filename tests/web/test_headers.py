@@ -20,10 +20,7 @@ def broken(request: HttpRequest) -> HttpResponse:
     raise RuntimeError("on purpose")
 
 
-urlpatterns = [
-    path("broken/", csrf_exempt(broken)),
-    path("", include("arena.config.urls")),
-]
+urlpatterns = [path("broken/", csrf_exempt(broken)), path("", include("arena.config.urls"))]
 handler404 = "arena.config.faults.answer_missing"
 handler500 = "arena.config.faults.answer_broken"
 

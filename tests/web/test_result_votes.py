@@ -68,8 +68,7 @@ def links_of(page: str) -> dict[str, int | None]:
 
 
 @pytest.mark.parametrize(
-    "filters",
-    [Filters(), Filters(leave_out_own=True, kinds=("main", "repeat"))],
+    "filters", [Filters(), Filters(leave_out_own=True, kinds=("main", "repeat"))]
 )
 def test_every_number_leads_to_as_many_votes(
     study: Study, analyst: Client, filters: Filters

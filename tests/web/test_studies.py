@@ -22,12 +22,7 @@ pytestmark = pytest.mark.django_db
 
 def test_an_admin_opens_a_study_and_its_experts_can_vote() -> None:
     cast = study_rows.cast_of()
-    sent = {
-        "name": "Round 1",
-        **cast,
-        "votes_per_expert": 9,
-        "seed": 4,
-    }
+    sent = {"name": "Round 1", **cast, "votes_per_expert": 9, "seed": 4}
     answer = signed_in(people()["admin"]).post(reverse("study-new"), {**sent, "sure": "1"})
     study = Study.objects.get()
     assert answer.headers["Location"] == reverse("study", args=[study.code])

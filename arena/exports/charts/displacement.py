@@ -114,9 +114,7 @@ def _measured(group: Group) -> ChartLine:
     colour = SIMULATED if group.is_simulated else MARK
     if summary.box is None:
         return ChartLine(
-            label=shown_name(group.contestant, group.is_simulated),
-            note=note,
-            colour=colour,
+            label=shown_name(group.contestant, group.is_simulated), note=note, colour=colour
         )
     box = summary.box
     stats = {

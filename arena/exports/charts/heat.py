@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from arena.exports.charts.drawing import INK, SIMULATED, SOFT, house_style, width_in, write_figure
 from arena.exports.charts.heat_map import STRONG, heat_map
 from arena.exports.tables import Row
-from arena.results.tree import PairRecord
+from arena.rating.snapshot_document import PairRecord
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from arena.exports.tables import Row
 from arena.rating.printed import whole_percent
-from arena.results.tree import PairRecord
+from arena.rating.snapshot_document import PairRecord
 
 STRONG = 0.3
 """So far from even a score has the full colour: experts who tie often leave little beyond."""

@@ -42,13 +42,7 @@ def interval_chart(table: LeaderboardTable, *, file_format: str) -> bytes:
         return write_figure(figure, file_format)
 
 
-def draw_interval(
-    axes: Axes,
-    place: int,
-    interval: Interval,
-    *,
-    simulated: bool,
-) -> None:
+def draw_interval(axes: Axes, place: int, interval: Interval, *, simulated: bool) -> None:
     """One line: a mark at the rating, a bar over the interval, an arrow to where it is open.
 
     Nothing without a rating and bounds, a mark alone without an interval; a bound alone begins

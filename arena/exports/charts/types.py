@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from arena.exports.charts.drawing import INK, SIMULATED, house_style, width_in, write_figure
 from arena.exports.charts.intervals import draw_interval, rating_axis
 from arena.exports.tables import LeaderboardTable
-from arena.results.tree import TypeRating
+from arena.rating.snapshot_document import TypeRating
 
 _PANEL_IN, _ROW_IN, _MOST_ACROSS = 2.1, 0.26, 3
 _BETWEEN_IN, _FOOT_IN = 0.6, 0.15

@@ -28,9 +28,7 @@ class Command(TerminalCommand):
         """Hand over and say who got how many."""
         try:
             taken = hand_over(
-                study=study_named(options["study"]),
-                username=options["expert"],
-                to=options["to"],
+                study=study_named(options["study"]), username=options["expert"], to=options["to"]
             )
         except (ArenaError, AugmentError) as error:
             raise CommandError(str(error)) from error

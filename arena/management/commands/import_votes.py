@@ -34,9 +34,7 @@ class Command(TerminalCommand):
         path: Path = options["file"]
         try:
             imported = import_votes(
-                path=path,
-                name=options["name"] or path.stem,
-                is_simulated=options["simulated"],
+                path=path, name=options["name"] or path.stem, is_simulated=options["simulated"]
             )
         except (ArenaError, AugmentError) as error:
             raise CommandError(str(error)) from error

@@ -146,9 +146,7 @@ def write_driving(options: Chosen, say: Say) -> ExportedFile:
     if options["score"] not in SCORES:
         raise UnknownName("score", options["score"], list(SCORES))
     how = Options(
-        planner=options["planner"],
-        offsets=options["offsets"],
-        is_reactive=options["reactive"],
+        planner=options["planner"], offsets=options["offsets"], is_reactive=options["reactive"]
     )
     if how not in options_driven(job):
         raise Conflict(f"Job {job.name!r} was not driven so; manage.py simulate does it.")

@@ -57,9 +57,7 @@ def write_modifications(options: Chosen, say: Say) -> ExportedFile:
     if options["format"] not in MODIFICATION_FORMATS:
         raise UnknownName("format", options["format"], list(MODIFICATION_FORMATS))
     text, losses = job_as_interplan(
-        find_job(options["job"]),
-        contestant=options["contestant"],
-        strict=options["strict"],
+        find_job(options["job"]), contestant=options["contestant"], strict=options["strict"]
     )
     for loss in losses:
         say(f"Lost: {loss}.")

@@ -14,14 +14,7 @@ from arena.exports.tables import leaderboard_table
 from arena.exports.votes import VOTE_FORMATS, unrated_votes, vote_table
 from arena.exports.writers import FORMATS
 from arena.exports.zips import ZIP
-from arena.management.exporting.kinds import (
-    Chosen,
-    ExportedFile,
-    Say,
-    add_format,
-    add_kind,
-    fill,
-)
+from arena.management.exporting.kinds import Chosen, ExportedFile, Say, add_format, add_kind, fill
 from arena.models import Snapshot, Study
 from arena.queries.studies.lists import study_named
 from arena.queries.studies.results import snapshot_to_export

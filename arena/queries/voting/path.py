@@ -113,8 +113,7 @@ def held_matchup(*, code: UUID, expert_pk: int) -> HeldMatchup | None:
     field = Matchup._meta.get_field("code")
     with connection.cursor() as cursor:
         cursor.execute(
-            _HOLD + lock,
-            {"code": field.get_db_prep_value(code, connection), "expert": expert_pk},
+            _HOLD + lock, {"code": field.get_db_prep_value(code, connection), "expert": expert_pk}
         )
         row = cursor.fetchone()
     if row is None:

@@ -80,10 +80,7 @@ def as_shown(matchup: Matchup) -> dict[str, Any]:
         shown["legend"] = sorted({*legend["scene"], *legend["pair"]})
     if matchup.descriptions is not None:
         left, right = matchup.descriptions
-        shown["text"] = {
-            "a": describe_in_words(left),
-            "b": describe_in_words(right),
-        }
+        shown["text"] = {"a": describe_in_words(left), "b": describe_in_words(right)}
     return shown
 
 

@@ -102,10 +102,7 @@ def model_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
             except AugmentError as error:
                 _tell(form, error)
             else:
-                messages.success(
-                    request,
-                    "Kept. It counts for contestants that have not run yet.",
-                )
+                messages.success(request, "Kept. It counts for contestants that have not run yet.")
                 return redirect("endpoint-model", code=code)
     probe = row.probes.first()
     is_live = probe is not None and probe.state in Probe.UNDER_WAY

@@ -18,11 +18,7 @@ from augment.errors import UnknownName
 from augment.models import GenerationJob
 from augment.services.judging.displacement import By, types_named
 
-LABELS = {
-    By.CONTESTANT: "Contestant",
-    By.TYPE: "Scenario type",
-    By.VARIANT: "Variant",
-}
+LABELS = {By.CONTESTANT: "Contestant", By.TYPE: "Scenario type", By.VARIANT: "Variant"}
 
 
 @allow_only(*STAFF)

@@ -8,8 +8,7 @@ from arena.exports.tables import LeaderboardTable, Row
 from arena.models import Snapshot
 from arena.queries.votes.sets import Filters
 from arena.rating.printed import rating_text
-from arena.results.both_versions import BothRanks
-from arena.results.tree import PanelRater
+from arena.rating.snapshot_document import BothRanks, PanelRater
 from arena.web.results.ratings import Context
 
 
@@ -38,11 +37,7 @@ def with_authors(snapshot: Snapshot, panel: Sequence[PanelRater]) -> list[Contex
     own_votes = snapshot.results.own_votes
     own = own_votes.by_judge if own_votes else {}
     return [
-        {
-            "rater": rater,
-            "is_author": rater.judge in authors,
-            "own_votes": own.get(rater.judge, 0),
-        }
+        {"rater": rater, "is_author": rater.judge in authors, "own_votes": own.get(rater.judge, 0)}
         for rater in panel
     ]
 

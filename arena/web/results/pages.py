@@ -17,15 +17,8 @@ from arena.errors import ArenaError
 from arena.exports.tables import EARLY_LOOK, for_experts, leaderboard_table
 from arena.models import Snapshot, Study
 from arena.queries.people import role_of
-from arena.queries.studies.results import (
-    STAFF as STAFF_ROLES,
-)
-from arena.queries.studies.results import (
-    ResultsAccess,
-    results_access,
-    snapshots_of,
-    votes_in,
-)
+from arena.queries.studies.results import STAFF as STAFF_ROLES
+from arena.queries.studies.results import ResultsAccess, results_access, snapshots_of, votes_in
 from arena.queries.votes.judged import is_imported
 from arena.queries.votes.lists import settled_counted
 from arena.services.early_looks import open_early

@@ -16,11 +16,7 @@ from arena.services.covariates import COVARIATES, WITHOUT_PICTURES
 from arena.services.ratings import DEFAULT_ROUNDS, MOST_ROUNDS
 from augment.services.scenarios.types import type_choices
 
-METHOD_LABELS = {
-    "bt": "Bradley-Terry",
-    "davidson": "Davidson (ties)",
-    "elo": "Online Elo",
-}
+METHOD_LABELS = {"bt": "Bradley-Terry", "davidson": "Davidson (ties)", "elo": "Online Elo"}
 UNIT_LABELS = {
     "": "as the votes allow",
     "two-way": "experts and scenarios",

@@ -11,7 +11,7 @@ from arena.exports.charts.heat_map import heat_map
 from arena.exports.columns import ON_PAGE
 from arena.exports.tables import LeaderboardTable, Row
 from arena.models import Snapshot
-from arena.results.tree import Bounds, OnlinePlace, PairRecord, TypeStanding
+from arena.rating.snapshot_document import Bounds, OnlinePlace, PairRecord, TypeStanding
 
 Context = dict[str, Any]
 """What a tab's template needs."""
@@ -73,13 +73,7 @@ def types(snapshot: Snapshot, table: LeaderboardTable) -> Context:
         if not snapshot.results.board.order:  # of an earlier version
             rows.sort(key=lambda row: (row.rating is None, -(row.rating or 0.0), row.slug))
         reasons = (part.status,) if part.reasons is None else part.reasons
-        parts.append(
-            {
-                "kept": part,
-                "rows": rows,
-                "reasons": reasons,
-            }
-        )
+        parts.append({"kept": part, "rows": rows, "reasons": reasons})
     return {
         "parts": parts,
         "few_votes": FEW,

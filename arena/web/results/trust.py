@@ -9,7 +9,7 @@ from arena.models import Snapshot
 from arena.models.votes import AIDS
 from arena.queries.people import natural_order
 from arena.queries.votes.judged import AUTOMATIC
-from arena.results.tree import PanelRater
+from arena.rating.snapshot_document import PanelRater
 from arena.web.results.authors import with_authors
 from arena.web.results.ratings import Context, is_all_tied
 

@@ -79,9 +79,7 @@ def check(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         return JsonResponse({"problem": str(error)}, status=422)
     snapped = asked.get("snap")
     found = check_edit(
-        scenario,
-        asked.get("modification"),
-        snapped=snapped if isinstance(snapped, str) else "",
+        scenario, asked.get("modification"), snapped=snapped if isinstance(snapped, str) else ""
     )
     lines = [
         {

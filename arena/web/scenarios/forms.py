@@ -276,12 +276,9 @@ def _shown(
     look = looks_again(request, waits=not drawn and request.method != "POST")
     if look == 1:
         send_later(request, enqueue_scene, scene.pk)
-    context = {
-        "scene": scene,
-        "form": form,
-        "is_drawn": drawn,
-        "look": look,
-    } | _intent_context(fields, problem)
+    context = {"scene": scene, "form": form, "is_drawn": drawn, "look": look} | _intent_context(
+        fields, problem
+    )
     return render(request, "scenarios/new.html", context, status=422 if problem else 200)
 
 

@@ -202,7 +202,6 @@ def _send_marks(request: HttpRequest, augmentation_pk: int) -> None:
 
 def _augmentation(code: uuid.UUID) -> Augmentation:
     rows = Augmentation.objects.select_related(
-        *("job", "scenario__base_scene", "contestant__endpoint", "made_by"),
-        "corrects__contestant",
+        *("job", "scenario__base_scene", "contestant__endpoint", "made_by"), "corrects__contestant"
     ).defer("scenario__base_scene__recording")
     return get_object_or_404(rows, code=code)

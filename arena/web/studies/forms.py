@@ -22,11 +22,7 @@ class StudyForm(ChoiceForm):
     """A new study; its rules are fixed from the moment it opens."""
 
     def __init__(
-        self,
-        *args: Any,
-        experts: list[User],
-        jobs: Sequence[GenerationJob] = (),
-        **kwargs: Any,
+        self, *args: Any, experts: list[User], jobs: Sequence[GenerationJob] = (), **kwargs: Any
     ) -> None:
         super().__init__(*args, **kwargs)
         self.fields |= {

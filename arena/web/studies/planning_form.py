@@ -34,7 +34,6 @@ class PlanningForm(forms.Form):
         possible = StudyEstimate(**cleaned).most_ties
         if cleaned["ties"] >= possible:
             self.add_error(
-                "ties",
-                f"Contestants so far apart can tie in less than {possible:.0f} % of votes.",
+                "ties", f"Contestants so far apart can tie in less than {possible:.0f} % of votes."
             )
         return cleaned

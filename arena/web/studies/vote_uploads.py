@@ -31,9 +31,7 @@ class VoteFileForm(forms.Form):
 
     name = forms.CharField(max_length=120, strip=True, label="Name of the study")
     file = forms.FileField(
-        label="File",
-        allow_empty_file=True,
-        error_messages={"required": "Choose a file."},
+        label="File", allow_empty_file=True, error_messages={"required": "Choose a file."}
     )
     is_simulated = forms.BooleanField(required=False)
 
@@ -61,8 +59,7 @@ def upload_votes_page(request: HttpRequest) -> HttpResponse:
             form.add_error(None, str(error))
         else:
             messages.success(
-                request,
-                f"Imported: votes {imported.votes}, contestants {imported.contestants}.",
+                request, f"Imported: votes {imported.votes}, contestants {imported.contestants}."
             )
             return redirect("results", code=imported.study.code)
     context = {"form": form, "most_mb": MOST_MB}

@@ -20,12 +20,7 @@ from arena.queries.studies.lists import voting_study
 from arena.services.practice import answer_practice, practice_pairs, skip_practice
 from arena.web.access import EXPERT, allow_only
 from arena.web.screen import over_context
-from augment.services.judging.findings import (
-    EGO_ID,
-    Finding,
-    FindingKind,
-    check_augmentation,
-)
+from augment.services.judging.findings import EGO_ID, Finding, FindingKind, check_augmentation
 
 MOST_REASONS = 3
 

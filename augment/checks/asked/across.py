@@ -25,11 +25,7 @@ from augment.scene.intent import (
     VehicleRequest,
     WalkRequest,
 )
-from augment.scene.intent_words import (
-    LateralTarget,
-    Nearness,
-    Shape,
-)
+from augment.scene.intent_words import LateralTarget, Nearness, Shape
 from augment.scene.sizes import LENGTH_WIDTH_M
 
 _SLIGHT_M = 1.5

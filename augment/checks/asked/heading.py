@@ -9,13 +9,8 @@ from augment.checks.asked.question import Asked, facing_words, severity_of, side
 from augment.checks.finding import Finding, FindingKind
 from augment.geometry.angles import difference
 from augment.scene.entities import TrafficAgent
-from augment.scene.intent import (
-    VehicleRequest,
-)
-from augment.scene.intent_words import (
-    Body,
-    Facing,
-)
+from augment.scene.intent import VehicleRequest
+from augment.scene.intent_words import Body, Facing
 
 
 def asked_heading(asked: Asked) -> Iterator[Finding]:

@@ -20,9 +20,7 @@ from augment.scene.intent import (
     VehicleRequest,
     WalkRequest,
 )
-from augment.scene.intent_words import (
-    Body,
-)
+from augment.scene.intent_words import Body
 
 
 class Role(StrEnum):

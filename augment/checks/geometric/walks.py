@@ -68,11 +68,7 @@ def _crossing_finding(agent: TrafficAgent, end: Point, line: Polyline, width_m: 
         kind=FindingKind.WALK_CROSSING,
         severity=Severity.FACT,
         agents=(agent.id,),
-        measured={
-            "crosses_at_m": crosses_at_m,
-            "start_left_m": first.d_m,
-            "end_left_m": last.d_m,
-        },
+        measured={"crosses_at_m": crosses_at_m, "start_left_m": first.d_m, "end_left_m": last.d_m},
         template=f"The walk of {{agents[0]}}{assumed} {words}",
     )
 

@@ -15,11 +15,7 @@ COLOURS = {
     "redYellow": TrafficLight.RED,
     "inactive": TrafficLight.UNKNOWN,
 }
-_DIRECTIONS = {
-    TurnType.LEFT: "left",
-    TurnType.RIGHT: "right",
-    TurnType.STRAIGHT: "straight",
-}
+_DIRECTIONS = {TurnType.LEFT: "left", TurnType.RIGHT: "right", TurnType.STRAIGHT: "straight"}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -13,14 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from augment.formats.commonroad.fields import (
-    WHAT,
-    fault,
-    points_of,
-    real,
-    references,
-    whole,
-)
+from augment.formats.commonroad.fields import WHAT, fault, points_of, real, references, whole
 from augment.formats.commonroad.lights import Light, lights_of
 from augment.formats.intersection_ways import crossing_segments
 from augment.formats.road_map import (

@@ -7,14 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from augment.formats.commonroad.fields import (
-    fault,
-    point_of,
-    points_of,
-    real,
-    value_of,
-    whole,
-)
+from augment.formats.commonroad.fields import fault, point_of, points_of, real, value_of, whole
 from augment.formats.recorded_log import LoggedTrack
 from augment.formats.road_map import left_out_notes
 from augment.formats.xml_file import Element

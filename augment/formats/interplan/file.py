@@ -138,11 +138,7 @@ def yaml_text(
         comments: Lines at the top.
         given: What stands beside the tokens; None for interPlan's fallbacks.
     """
-    usual = {
-        "accel_max": ACCEL_MAX_MPS2,
-        "decel_max": DECEL_MAX_MPS2,
-        "scenario_specifics": None,
-    }
+    usual = {"accel_max": ACCEL_MAX_MPS2, "decel_max": DECEL_MAX_MPS2, "scenario_specifics": None}
     document = {
         **(given or usual),
         "modification_details_dictionary": {

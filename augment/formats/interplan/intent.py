@@ -352,10 +352,9 @@ def _sentence(
         parts.append(f"{what}: {spots}" if len(cones) > 1 else f"{what} {spots}")
     parts += [_thing(other, kind, survey, scene) for other in _sorted(others)]
     goal = scene.options.goal
-    way = {
-        None: "",
-        TurnType.STRAIGHT: " The ego is to go straight on.",
-    }.get(goal, f" The ego is to turn {goal}.")
+    way = {None: "", TurnType.STRAIGHT: " The ego is to go straight on."}.get(
+        goal, f" The ego is to turn {goal}."
+    )
     return f"{_LEADS[kind]}: {'; '.join(parts)}.{way}"
 
 

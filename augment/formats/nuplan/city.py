@@ -217,10 +217,7 @@ def _connectors(
 
 
 def _segment(
-    name: str,
-    line: FloatArray,
-    edges: tuple[FloatArray | None, FloatArray | None],
-    count: _Count,
+    name: str, line: FloatArray, edges: tuple[FloatArray | None, FloatArray | None], count: _Count
 ) -> Segment:
     """With its boundaries in the direction of travel; some run against it in the source."""
     both = []

@@ -37,11 +37,7 @@ TYPE_OF = {
     "czone_sign": AgentType.CONSTRUCTION_SIGN,
     "generic_object": AgentType.GENERIC_OBJECT,
 }
-LIGHT_OF = {
-    "green": TrafficLight.GREEN,
-    "yellow": TrafficLight.YELLOW,
-    "red": TrafficLight.RED,
-}
+LIGHT_OF = {"green": TrafficLight.GREEN, "yellow": TrafficLight.YELLOW, "red": TrafficLight.RED}
 _COLUMNS = {
     "log": ("token", "location", "map_version", "logfile"),
     "lidar_pc": ("token", "ego_pose_token", "scene_token", "timestamp"),

@@ -21,13 +21,7 @@ from augment.formats.openscenario.reference_line import (
     reference_line,
 )
 from augment.formats.writing import CannotExpress, Cell, LossReport
-from augment.scene.entities import (
-    Lane,
-    LaneConnector,
-    Scene,
-    TrafficLight,
-    TrafficSide,
-)
+from augment.scene.entities import Lane, LaneConnector, Scene, TrafficLight, TrafficSide
 from augment.scene.lane_graph import AnyLane, LaneGraph
 
 REVISION = ("1", "7")

@@ -11,11 +11,7 @@ from django.db import transaction
 from augment.errors import AugmentError
 from augment.management.arguments import add_option_arguments, options_of_arguments
 from augment.models import Contestant
-from augment.services.endpoints.contestants import (
-    add_contestant,
-    add_like,
-    ensure_builtin,
-)
+from augment.services.endpoints.contestants import add_contestant, add_like, ensure_builtin
 from augment.services.endpoints.known_endpoints import ensure_endpoint
 from augment.services.endpoints.treatments import left_out
 from augment.services.terminal import TerminalCommand

@@ -32,9 +32,7 @@ class Command(TerminalCommand):
             "--role", choices=[role.value for role in ModelRole], default=ModelRole.MODIFIER.value
         )
         parser.add_argument(
-            "--native-tools",
-            action="store_true",
-            help="as for a model that calls tools natively",
+            "--native-tools", action="store_true", help="as for a model that calls tools natively"
         )
         parser.add_argument(
             "--picture", type=Path, metavar="FILE", help="where the viewer's PNG is written"

@@ -73,9 +73,7 @@ class Command(TerminalCommand):
 
     def _simulate(self, options: dict[str, Any]) -> None:
         how = Options(
-            planner=options["planner"],
-            offsets=options["offsets"],
-            is_reactive=options["reactive"],
+            planner=options["planner"], offsets=options["offsets"], is_reactive=options["reactive"]
         )
         scenario = Scenario.objects.filter(slug=options["what"]).first()
         job = None if scenario is not None else find_job(options["what"])

@@ -29,9 +29,7 @@ Kind = Contestant.Kind
 LONGEST_NAME = 120
 
 REFERENCE = "reference"
-_BUILTIN = {
-    REFERENCE: ("Reference", Kind.REFERENCE),
-} | {
+_BUILTIN = {REFERENCE: ("Reference", Kind.REFERENCE)} | {
     slug: (placer.name, Kind.RULE if placer.is_rule else Kind.BASELINE)
     for slug, placer in PLACERS.items()
 }

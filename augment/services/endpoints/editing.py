@@ -84,22 +84,14 @@ def add_endpoint(
     row = Endpoint(label=label, is_simulated=is_simulated, **check_facts(facts))
     row.save()
     log_event(
-        actor=actor,
-        verb="add",
-        object_kind="endpoint",
-        object_code=row.code,
-        after=facts_of(row),
+        actor=actor, verb="add", object_kind="endpoint", object_code=row.code, after=facts_of(row)
     )
     return row
 
 
 @transaction.atomic
 def change_endpoint(
-    row: Endpoint,
-    *,
-    facts: EndpointFacts,
-    may_move_key: bool = False,
-    actor: User | None = None,
+    row: Endpoint, *, facts: EndpointFacts, may_move_key: bool = False, actor: User | None = None
 ) -> Endpoint:
     """Another address, key variable or limits; they count for the next call.
 

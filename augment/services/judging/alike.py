@@ -11,9 +11,7 @@ from augment.scene.codec import modification_from_document
 from augment.scene.modification import Modification
 
 
-def alike_pairs(
-    cells: Mapping[tuple[str, str], Augmentation],
-) -> tuple[tuple[str, str, str], ...]:
+def alike_pairs(cells: Mapping[tuple[str, str], Augmentation]) -> tuple[tuple[str, str, str], ...]:
     """Pairs of contestants whose changes of a scenario are alike.
 
     Args:

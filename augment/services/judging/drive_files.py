@@ -10,12 +10,7 @@ from augment.render.film import animation, strip
 from augment.services.judging.simulations import trace_document
 from augment.simulation.trace import blind_trace
 
-FILES = {
-    "json": "application/json",
-    "gif": "image/gif",
-    "apng": "image/apng",
-    "png": "image/png",
-}
+FILES = {"json": "application/json", "gif": "image/gif", "apng": "image/apng", "png": "image/png"}
 """Content types by the name of the form; png is the strip."""
 
 

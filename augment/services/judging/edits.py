@@ -12,12 +12,7 @@ from augment.errors import InvalidDocument, InvalidModification
 from augment.models import Scenario
 from augment.scene.entities import Scene
 from augment.services.judging.findings import FindingLine, list_lines
-from augment.services.scenarios.editing import (
-    edit_to_document,
-    editable_scene,
-    read_edit,
-    snap,
-)
+from augment.services.scenarios.editing import edit_to_document, editable_scene, read_edit, snap
 from augment.services.scenarios.scenes import intent_of
 
 

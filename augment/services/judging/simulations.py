@@ -215,11 +215,7 @@ def _driven(
     kind = type_of(row.scenario.type)
     scores = {
         name: score_drive(
-            drove,
-            expert,
-            kind=name,
-            scenario_type=kind,
-            modification=setting.modification,
+            drove, expert, kind=name, scenario_type=kind, modification=setting.modification
         )
         for name in ScoreKind
     }

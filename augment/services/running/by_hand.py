@@ -119,7 +119,5 @@ def _person(slug: str, name: str) -> Contestant:
     if found.kind != Kind.HUMAN:
         raise Conflict(f"“{found.name}” is no person; choose another slug.")
     if found.retired_at is not None:
-        raise Conflict(
-            f"“{found.name}” is retired; choose another slug.",
-        )
+        raise Conflict(f"“{found.name}” is retired; choose another slug.")
     return found

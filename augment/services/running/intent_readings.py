@@ -82,12 +82,7 @@ def read_intent(
 
 
 def plan_reading(
-    *,
-    scenario: str,
-    endpoint: str,
-    model: str,
-    caps: Caps = USUAL_CAPS,
-    actor: User | None = None,
+    *, scenario: str, endpoint: str, model: str, caps: Caps = USUAL_CAPS, actor: User | None = None
 ) -> IntentReading:
     """The row of a reading that nobody has been asked for yet.
 
@@ -117,10 +112,7 @@ class Readings(WorkKind[IntentReading]):
     related = ("scenario", "endpoint", "asked_by")
 
     def __init__(
-        self,
-        client: AbstractContextManager[ChatClient] | None = None,
-        *,
-        is_fresh: bool = False,
+        self, client: AbstractContextManager[ChatClient] | None = None, *, is_fresh: bool = False
     ) -> None:
         self._client = client
         self._is_fresh = is_fresh
@@ -135,10 +127,7 @@ class Readings(WorkKind[IntentReading]):
         try:
             with client as opened:
                 intent = ask_for_intent(
-                    row.scenario.instruction,
-                    client=opened,
-                    model=row.model,
-                    transcript=transcript,
+                    row.scenario.instruction, client=opened, model=row.model, transcript=transcript
                 )
         except ModelFault as fault:
             return Settlement(state=State.FAILED, reason=sentence_of(fault))

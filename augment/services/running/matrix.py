@@ -116,10 +116,7 @@ def load_matrix(document: object, *, actor: User | None = None) -> Matrix:
     ensure_builtin()
     problems: list[tuple[str, str]] = []
     before = set(Contestant.objects.values_list("slug", flat=True))
-    found = [
-        *_product(given, problems, actor),
-        *_named(given, problems, actor),
-    ]
+    found = [*_product(given, problems, actor), *_named(given, problems, actor)]
     scenarios = _scenarios(given.scenarios, problems)
     if not found and not problems:
         problems.append(("models", "name models with variants, or contestants"))

@@ -266,11 +266,7 @@ def _drawn(row: Augmentation, what: str) -> str:
 
 
 def _from_model(
-    row: Augmentation,
-    endpoint: Endpoint,
-    scene: Scene,
-    held: Held,
-    connect: Connect | None,
+    row: Augmentation, endpoint: Endpoint, scene: Scene, held: Held, connect: Connect | None
 ) -> Answer:
     respondents = respondents_of(row.contestant)
     treatment = treatment_of(row.contestant, respondents)

@@ -16,13 +16,7 @@ from typing import Any
 from django.db import OperationalError, connection, transaction
 from django.utils import timezone
 
-from augment.errors import (
-    BudgetSpent,
-    DatabaseLocked,
-    LeaseLost,
-    ModelFault,
-    NotSent,
-)
+from augment.errors import BudgetSpent, DatabaseLocked, LeaseLost, ModelFault, NotSent
 from augment.llm.costs import Price, WorstCase, worst_case
 from augment.llm.fingerprint import image_reference, request_hash
 from augment.llm.messages import Reply, Request

@@ -17,11 +17,7 @@ MOST_FILES = 500
 
 
 def add_from_files(
-    table: File[bytes],
-    documents: Sequence[File[bytes]],
-    *,
-    keeps: bool,
-    actor: User | None = None,
+    table: File[bytes], documents: Sequence[File[bytes]], *, keeps: bool, actor: User | None = None
 ) -> BulkReport:
     """Add the scenarios of a list, all or none, and say of each what became of it.
 

@@ -192,9 +192,7 @@ def is_hidden(one: StagedScenario) -> bool:
     dx_m, dy_m = walker.x_m - ego.x_m, walker.y_m - ego.y_m
     sight = Box(
         pose=Pose(
-            x_m=ego.x_m + dx_m / 2.0,
-            y_m=ego.y_m + dy_m / 2.0,
-            heading_rad=math.atan2(dy_m, dx_m),
+            x_m=ego.x_m + dx_m / 2.0, y_m=ego.y_m + dy_m / 2.0, heading_rad=math.atan2(dy_m, dx_m)
         ),
         length_m=math.hypot(dx_m, dy_m),
         width_m=_SIGHT_M,

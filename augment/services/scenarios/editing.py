@@ -15,10 +15,7 @@ from augment.geometry.angles import difference, wrap
 from augment.geometry.frames import Pose
 from augment.models import Scenario
 from augment.render.camera import AROUND_THE_EGO
-from augment.scene.codec import (
-    modification_from_document,
-    modification_to_document,
-)
+from augment.scene.codec import modification_from_document, modification_to_document
 from augment.scene.entities import AgentType, Point, Scene, TrafficAgent
 from augment.scene.lane_graph import LaneGraph
 from augment.scene.modification import Modification

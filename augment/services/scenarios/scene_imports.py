@@ -177,12 +177,7 @@ def _keep(
             )
     except IntegrityError:  # somebody else was faster
         raise Conflict(f"There is a scene called {slug!r} already; choose another slug.") from None
-    after = {
-        "slug": slug,
-        "source": source,
-        "path": path.name,
-        "frame": reading.moment.frame,
-    }
+    after = {"slug": slug, "source": source, "path": path.name, "frame": reading.moment.frame}
     if reading.moment.item is not None:
         after["item"] = reading.moment.item
     log_event(actor=actor, verb="import", object_kind="scene", object_code=row.code, after=after)

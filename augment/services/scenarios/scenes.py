@@ -24,13 +24,9 @@ from augment.scene.codec import (
 )
 from augment.scene.density import spawn_traffic
 from augment.scene.entities import Scene, TrafficAgent, TrafficDensity, TurnType
-from augment.scene.intent import (
-    Intent,
-)
+from augment.scene.intent import Intent
 from augment.scene.intent_codec import intent_from_document, intent_to_document
-from augment.scene.intent_words import (
-    IntentOrigin,
-)
+from augment.scene.intent_words import IntentOrigin
 from augment.scene.lane_graph import LaneGraph
 from augment.scene.modification import Modification, apply, check_fits, without_traffic
 from augment.services.events import log_event

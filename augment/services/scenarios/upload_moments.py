@@ -36,9 +36,7 @@ def ask_for_moment(
     """
     offered = {(stop["item"], stop["frame"]) for track in upload.tracks for stop in track["stops"]}
     if (item, frame) not in offered:
-        raise Conflict(
-            f"“{upload.name}” offers no such moment.",
-        )
+        raise Conflict(f"“{upload.name}” offers no such moment.")
     row, is_new = UploadMoment.objects.get_or_create(
         upload=upload, item=item, frame=frame, defaults={"asked_by": actor}
     )

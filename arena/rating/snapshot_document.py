@@ -1,21 +1,118 @@
-"""What a snapshot keeps beside its standings, as values. Read this file first.
+"""What a snapshot keeps beside its standings: typed values and their one codec.
 
-In: what `arena.services` computes of the votes. Out: what pages and files read. The names of the
-fields are the keys of the stored document (`arena.results.codec`); `since` marks those that came
-with a later version of it. None and empty mean that the votes do not determine it, that nobody
-asked, or that the version which rated did not know of it yet. Keys of statistics that are no
-longer computed (bets against experts, types pooled, change within sessions) are passed over.
+The names of the fields are the keys of the stored JSON document; `since` marks those that came
+with a later version of it. None and empty mean that the votes do not determine a value, that
+nobody asked for it, or that the version which rated did not know it yet. Keys of statistics that
+are no longer computed are passed over.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Mapping
+from dataclasses import Field, dataclass, field, fields, is_dataclass
+from functools import cache
+from typing import Annotated, Any
 
+from pydantic import PlainValidator, TypeAdapter, ValidationError
+
+from arena.rating.estimate import Estimate
 from arena.rating.fit_test import FitTest
 from arena.rating.logistic import SideBias
 from arena.rating.reliability import Agreement, Rater, Repeats
-from arena.results.both_versions import Adjustment, OwnVotes
-from arena.results.kept import Kept
+from augment.errors import InvalidDocument
+
+
+def read_text(stored: Any) -> str:
+    """Return a kept sentence; versions before kept its text and the values of its places apart.
+
+    Raises:
+        ValueError: It is neither.
+    """
+    if isinstance(stored, dict):
+        values = {name: _joined(value) for name, value in stored["values"].items()}
+        return str(stored["text"] % values)
+    if not isinstance(stored, str):
+        raise ValueError(f"a sentence or plain text is allowed, not {stored!r}")
+    return stored
+
+
+def _joined(value: Any) -> Any:
+    """A value in words: names by commas, groups of names by semicolons."""
+    if not isinstance(value, list):
+        return value
+    between = "; " if any(isinstance(part, list) for part in value) else ", "
+    return between.join(", ".join(part) if isinstance(part, list) else part for part in value)
+
+
+Kept = Annotated[str, PlainValidator(read_text)]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LargestMove:
+    """By how many ranks somebody moves at most, and who does."""
+
+    places: int
+    slugs: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BothRanks:
+    """A contestant in two versions of a rating, with and without something."""
+
+    slug: str
+    rank_with: int | None
+    rating_with: float | None
+    rank_without: int | None
+    rating_without: float | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OwnVotes:
+    """The rating with and without the votes of authors on their own contestants.
+
+    Attributes:
+        left_out: Whether the table leaves them out.
+        votes, experts: How many there are, and by how many.
+        of_experts: How many experts there are in all.
+        rounds: Of the version that the table does not show; `reasons` are about that one.
+        largest: None where nobody has a rank in both versions.
+        by_judge: Their number by the judge's code.
+    """
+
+    left_out: bool
+    votes: int
+    experts: int
+    of_experts: int
+    rounds: int
+    reasons: tuple[Kept, ...]
+    largest: LargestMove | None
+    lines: tuple[BothRanks, ...]
+    by_judge: dict[str, int]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CovariateEffect:
+    """What one unit of a covariate is worth, in Elo points, and how likely that is by chance."""
+
+    name: str
+    points: Estimate
+    p_value: float | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Adjustment:
+    """What a rating was adjusted for, and what that changes.
+
+    Attributes:
+        effects: None where the votes do not determine them; then the table is not adjusted.
+        lines: With it and without it.
+        largest: None where nobody has a rank in both versions.
+    """
+
+    effects: tuple[CovariateEffect, ...]
+    lines: tuple[BothRanks, ...]
+    largest: LargestMove | None
+
 
 VERSION = 4
 """3 is without what a rating was adjusted for; 2 also without adjusted
@@ -259,3 +356,50 @@ class Results:
     cost: tuple[ScenarioCost, ...] = ()
     models: dict[str, str] = field(default_factory=dict)
     judges: dict[str, str] = field(default_factory=dict)
+
+
+def read_results(document: Mapping[str, Any]) -> Results:
+    """The results of a stored document; an empty one is of version 0.
+
+    Raises:
+        InvalidDocument: It is of a later version, or not what its version says.
+    """
+    version = document.get("version", 0)
+    if version not in range(VERSION + 1):
+        allowed = f"a version from 0 to {VERSION}, not {version!r}"
+        raise InvalidDocument("rating", [("version", allowed)])
+    try:
+        return _adapter().validate_python(document)
+    except ValidationError as error:
+        faults = [(".".join(map(str, one["loc"])), one["msg"]) for one in error.errors()]
+        raise InvalidDocument("rating", faults) from error
+
+
+def results_document(results: Results) -> dict[str, Any]:
+    """The document of results, with the keys that their version has."""
+    if not results.version:
+        return {}
+    document: dict[str, Any] = _document(results, results.version)
+    return document
+
+
+@cache
+def _adapter() -> TypeAdapter[Results]:
+    return TypeAdapter(Results)
+
+
+def _document(value: Any, version: int) -> Any:
+    if is_dataclass(value):
+        return {
+            field.name: _document(found, version)
+            for field in fields(value)
+            if _is_known(field, found := getattr(value, field.name), version)
+        }
+    if isinstance(value, dict):
+        return {str(key): _document(found, version) for key, found in value.items()}
+    return [_document(one, version) for one in value] if isinstance(value, tuple) else value
+
+
+def _is_known(known: Field[Any], value: Any, version: int) -> bool:
+    """Whether a version has the field; what is set stays whatever it says."""
+    return bool(version >= known.metadata.get("since", 0) or value != known.default)

@@ -1,1 +1,0 @@
-"""What a rating keeps beside its standings: typed values and their one codec."""
