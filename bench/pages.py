@@ -97,8 +97,8 @@ def _fill(size: str) -> None:
     from django.core.management import call_command
     from django.db import transaction
 
+    from arena.results.services.ratings import rate_now as rate
     from arena.services.people import create_person
-    from arena.services.ratings import rate
     from arena.services.studies import close_study
     from augment.models import Augmentation, Scenario
     from augment.scene.codec import modification_to_document
@@ -190,7 +190,7 @@ def _visit() -> None:
     from django.db import transaction
 
     from arena.models import Study
-    from arena.web.results.tabs import TABS
+    from arena.results.pages.tabs import TABS
     from augment.models import Augmentation
     from tests.web.addresses import address
     from tests.web.cast import World

@@ -75,7 +75,7 @@ def _shots() -> list[Shot]:
 
     from arena.management.demo import JOB, OPEN_STUDY, SIMULATED_STUDY
     from arena.models import Study, Vote
-    from arena.web.results.tabs import TABS
+    from arena.results.pages.tabs import TABS
     from augment.models import Augmentation, GenerationJob, Simulation
     from tests.web.addresses import address
     from tests.web.cast import World

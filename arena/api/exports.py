@@ -18,8 +18,7 @@ from arena.api.schema import file_operation
 from arena.api.snapshots import get_snapshot
 from arena.api.views import FileView, as_file
 from arena.errors import NoSnapshot
-from arena.exports.bundle import bundle
-from arena.exports.charts.rating import CONTENT_TYPES, chart_bytes
+from arena.exports.files import CONTENT_TYPE as ZIP_TYPE
 from arena.exports.formats import Format, format_named
 from arena.exports.jobs import (
     analyses,
@@ -32,12 +31,13 @@ from arena.exports.jobs import (
 from arena.exports.jobs.displacement_writers import FORMATS as DISPLACEMENT
 from arena.exports.jobs.driving_table import DrivingTable
 from arena.exports.jobs.driving_writers import FORMATS as DRIVING
-from arena.exports.tables import leaderboard_table
-from arena.exports.votes import VOTE_FORMATS, vote_table
-from arena.exports.writers import FORMATS as LEADERBOARD
-from arena.exports.zips import CONTENT_TYPE as ZIP_TYPE
 from arena.models import Snapshot
 from arena.queries.analyses import analysis_of
+from arena.results.exports.bundle import bundle
+from arena.results.exports.charts import CONTENT_TYPES, chart_bytes
+from arena.results.exports.tables import leaderboard_table
+from arena.results.exports.votes import VOTE_FORMATS, vote_table
+from arena.results.exports.writers import FORMATS as LEADERBOARD
 from augment.errors import UnknownName
 from augment.models import GenerationJob
 from augment.services.judging.displacement import By

@@ -19,15 +19,16 @@ from arena.api.fields import FlagField, StrictSerializer, TextField, WholeNumber
 from arena.api.schema import operation
 from arena.api.studies import get_study
 from arena.api.views import ApiView, keep_and_send
-from arena.exports.tables import LeaderboardTable, leaderboard_table
 from arena.models import Snapshot, Study
 from arena.models.ratings import STORED
 from arena.pairing.order import MAIN, REPEAT
-from arena.queries.studies.results import must_read_results
-from arena.queries.votes.sets import Filters
 from arena.rating.bootstrap import Unit
 from arena.rating.leaderboard import Intervals, Line, Method
-from arena.services.ratings import DEFAULT_ROUNDS, MOST_ROUNDS, is_big, plan_snapshot, rate
+from arena.results.exports.tables import LeaderboardTable, leaderboard_table
+from arena.results.queries.access import must_read_results
+from arena.results.queries.votes import Filters
+from arena.results.services.ratings import DEFAULT_ROUNDS, MOST_ROUNDS, is_big, plan_snapshot
+from arena.results.services.ratings import rate_now as rate
 from arena.services.study_plan import HIGHEST_SEED
 from augment.services.scenarios.types import type_choices
 

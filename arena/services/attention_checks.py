@@ -11,8 +11,8 @@ from django.db.models import F
 from arena.errors import NothingToPlan
 from arena.pairing.plan import Check, PlanRules
 from arena.pairing.rules import place_of
-from arena.services.frames import Cells
 from arena.services.showable import find_showable, with_picture
+from arena.voting.services.shown_pictures import Cells
 from augment.models import Augmentation, Contestant, Scenario
 from augment.services.scenarios.pictures import window_of
 

@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from arena.queries.votes.judged import Judged
 from arena.rating.comparisons import Comparisons, FloatArray
 from arena.rating.leaderboard import Leaderboard, Line
 from arena.rating.snapshot_document import Adjustment, BothRanks, CovariateEffect, LargestMove
+from arena.results.queries.votes import Judged
 from augment.models import Augmentation
 
 SIDE, OBJECTS, VEHICLES = "side", "objects", "vehicles"

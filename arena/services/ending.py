@@ -62,7 +62,7 @@ def cancel_study(*, study: Study, why: str = "", actor: User | None = None) -> S
 
 
 def _end(study: Study, state: Study.State, *, verb: str, actor: User | None, **more: Any) -> Study:
-    # A vote holds its matchup's row until it is stored; see arena.services.votes.
+    # A vote holds its matchup's row until it is stored; see arena.voting.services.casting.
     list(study.matchups.select_for_update().order_by("pk").values_list("pk", flat=True))
     study.state = state
     study.closed_at = timezone.now()

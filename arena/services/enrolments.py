@@ -25,10 +25,10 @@ from arena.queries.studies.enrolments import (
     has_free_place,
 )
 from arena.services.attention_checks import without_lost_checks
-from arena.services.frames import Cells
 from arena.services.handing_over import undecided_rows
 from arena.services.people import create_person
 from arena.services.plans import next_batch, pictures_of, rules_of, store
+from arena.voting.services.shown_pictures import Cells
 from augment.errors import Conflict
 from augment.services.events import log_event
 from augment.services.texts import one_line

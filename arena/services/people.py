@@ -9,7 +9,7 @@ from django.db import IntegrityError, transaction
 from arena.errors import NotYours
 from arena.models import Person, Study
 from arena.queries.people import ROLES
-from arena.queries.studies.results import votes_in
+from arena.results.queries.access import votes_in
 from augment.errors import Conflict, InvalidDocument, UnknownName
 from augment.services.events import log_event
 from augment.services.texts import one_line

@@ -14,10 +14,16 @@ from django.db.models import Max
 from arena.models import Matchup, Study
 from arena.pairing.plan import Check, Entry, PlannedMatchup, PlanRules
 from arena.pairing.rules import place_of, scenario_of
-from arena.queries.voting.showings import LEGEND
 from arena.services.attention_checks import check_pictures, placed_checks
-from arena.services.frames import Cells, ScenarioFrame, find_frames, frames_shown, sides_of
 from arena.services.showable import find_showable, windows_of, with_picture
+from arena.voting.queries.showings import LEGEND
+from arena.voting.services.shown_pictures import (
+    Cells,
+    ScenarioFrame,
+    find_frames,
+    frames_shown,
+    sides_of,
+)
 from augment.models import Augmentation, Scenario
 from augment.services.scenarios.descriptions import Description, descriptions
 from augment.services.scenarios.legends import legend_of_scene, legends_of_changes

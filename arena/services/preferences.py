@@ -12,7 +12,7 @@ from django.utils.translation import gettext as _
 from arena.errors import InvalidPreference
 from arena.models import Person
 from arena.queries.profiles import Language, Theme
-from arena.queries.voting.keys import (
+from arena.voting.queries.keys import (
     KEY_LABELS,
     SOMETIMES,
     SWITCHES,

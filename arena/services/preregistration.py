@@ -15,8 +15,8 @@ from django.conf import settings
 
 from arena.models import Study
 from arena.rating.snapshot_document import VERSION as RESULTS_VERSION
+from arena.results.services.vote_files import VERSION as VOTES_VERSION
 from arena.services.study_plan import SWITCH_COLUMNS
-from arena.services.vote_rows import VERSION as VOTES_VERSION
 from augment.models import Contestant, Scenario
 from augment.services.endpoints.treatments import options_of
 

@@ -9,10 +9,10 @@ from typing import Any
 from django.contrib.auth.models import User
 
 from arena.models import Snapshot, Study, Vote
-from arena.queries.studies.results import ResultsAccess, latest_snapshot, results_access
 from arena.rating.planning import estimate_effects
-from arena.services.snapshots import votes_of
-from arena.services.vote_arrays import vote_arrays
+from arena.results.queries.access import ResultsAccess, latest_snapshot, results_access
+from arena.results.services.analysis import vote_arrays
+from arena.results.services.ratings import votes_of
 
 LAST_VOTES = 2000
 FEWEST_VOTES = 20

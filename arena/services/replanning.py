@@ -12,7 +12,6 @@ from arena.pairing.adaptive import contestants_of, draw_units, ratings_so_far
 from arena.pairing.arrays import FloatArray
 from arena.pairing.following import follow_on
 from arena.pairing.later import judges, units_of
-from arena.queries.voting.path import upcoming
 from arena.services.attention_checks import without_lost_checks
 from arena.services.plans import (
     next_batch,
@@ -22,7 +21,8 @@ from arena.services.plans import (
     store,
     votes_left,
 )
-from arena.services.vote_writes import mark_served
+from arena.voting.queries.ballots import upcoming
+from arena.voting.services.casting import mark_served
 from augment.services.events import log_event
 
 MOST_AHEAD = 12

@@ -10,8 +10,8 @@ from django.db import IntegrityError, transaction
 
 from arena.errors import InvalidVote, NotYours, StudyNotOpen
 from arena.models import Matchup, Report, Study
-from arena.queries.voting.ballots import matchup_of
-from arena.services.decisions import LONGEST_COMMENT
+from arena.voting.queries.ballots import matchup_of
+from arena.voting.services.casting import LONGEST_COMMENT
 from augment.errors import Conflict
 from augment.services.texts import make_storable
 

@@ -6,7 +6,7 @@ from django.contrib.auth.models import User
 from django.db import transaction
 
 from arena.models import ScenarioFile
-from arena.services.written_files import waiting_row
+from arena.results.services.written_files import waiting_row
 from augment.errors import UnknownName
 from augment.models import GenerationJob
 from augment.services.events import log_event

@@ -5,9 +5,8 @@ from __future__ import annotations
 from arena.models import Study, Vote
 from arena.pairing.order import MAIN
 from arena.pairing.rules import scenario_of
-from arena.queries.votes.judged import AUTOMATIC
-from arena.queries.votes.sets import VoteSet
 from arena.rating.printed import whole_percent
+from arena.results.queries.votes import AUTOMATIC, VoteSet
 
 
 def settled_remark(study: Study, votes: VoteSet, *, left_out: bool) -> str:

@@ -9,7 +9,7 @@ from django.db.models import QuerySet
 from arena.errors import NothingToPlan
 from arena.pairing.plan import Entry
 from arena.pairing.rules import scenario_of
-from arena.services.frames import MOST_NAMED
+from arena.voting.services.shown_pictures import MOST_NAMED
 from augment.models import Augmentation, Contestant, Scenario
 from augment.services.scenarios.pictures import window_of
 

@@ -18,15 +18,20 @@ from arena.pairing.target_lines import read_targets
 from arena.queries.people import experts as expert_accounts
 from arena.services.attention_checks import enough_checks, placed_checks
 from arena.services.ending import cancel_study, close_study
-from arena.services.frames import Cells
 from arena.services.hypotheses import read_hypotheses
 from arena.services.plans import rules_of, store
 from arena.services.practice import require_practice_pictures
 from arena.services.preregistration import preregister
-from arena.services.replays import Replays, replays_of
 from arena.services.showable import windows_of
-from arena.services.shown_pictures import SampleRule, StudyPictures, choose_pictures
 from arena.services.study_plan import SWITCH_COLUMNS, StudyPlan
+from arena.voting.services.shown_pictures import (
+    Cells,
+    Replays,
+    SampleRule,
+    StudyPictures,
+    choose_pictures,
+    replays_of,
+)
 from augment.errors import Conflict, UnknownName
 from augment.models import Contestant, Scenario
 from augment.services.events import log_event

@@ -11,7 +11,7 @@ from django.urls import reverse
 from django.utils.html import format_html
 from django.utils.safestring import SafeString
 
-from arena.queries.votes.search import VoteSearch
+from arena.results.queries.search import VoteSearch
 
 register = template.Library()
 

@@ -12,8 +12,8 @@ from django.utils.translation import gettext_lazy as _
 from arena.models import Report, Vote
 from arena.queries.profiles import Language, Theme
 from arena.queries.scenarios import TypeGroup
-from arena.services.decisions import LONGEST_COMMENT, Decision, decision_of
 from arena.services.reports import SIDES, Complaint
+from arena.voting.services.casting import LONGEST_COMMENT, Decision, decision_of
 from augment.models import Contestant
 from augment.services.judging.fault_guess import FaultClass
 from augment.services.running.caps import Caps

@@ -5,6 +5,11 @@ from __future__ import annotations
 from django.contrib.auth import views as auth
 from django.urls import URLPattern, path
 
+from arena.results.pages import evidence as results_votes
+from arena.results.pages import ratings as results
+from arena.results.pages import ratings as results_files
+from arena.voting import pages
+from arena.voting import pages as voting
 from arena.web.contestants import endpoints
 from arena.web.contestants import forms as contestant_form
 from arena.web.contestants import pages as contestants
@@ -15,9 +20,6 @@ from arena.web.jobs import pages as jobs
 from arena.web.people import accounts as people
 from arena.web.people import api_tokens, authorships, enrolments, invitations
 from arena.web.people.sign_in import SignIn
-from arena.web.results import evidence as results_votes
-from arena.web.results import files as results_files
-from arena.web.results import pages as results
 from arena.web.scenarios import catalogue, editing, intents, prompts, removing, scenes, uploads
 from arena.web.scenarios import forms as scenario_form
 from arena.web.scenarios import pages as scenarios
@@ -26,8 +28,6 @@ from arena.web.studies import files as study_files
 from arena.web.studies import pages as studies
 from arena.web.studies import planning, reports, vote_uploads
 from arena.web.studies import setup as study_setup
-from arena.web.voting import pages as voting
-from arena.web.voting import practice
 
 urlpatterns: list[URLPattern] = [
     path("", home.home, name="home"),
@@ -164,7 +164,7 @@ urlpatterns: list[URLPattern] = [
     path("studies/<uuid:code>/reports/<uuid:key>/", reports.report_page, name="report"),
     path("studies/<uuid:code>/vote/", voting.vote_page, name="vote"),
     path("studies/<uuid:code>/vote/help/", voting.help_page, name="vote-help"),
-    path("studies/<uuid:code>/vote/practice/", practice.practice_page, name="vote-practice"),
+    path("studies/<uuid:code>/vote/practice/", pages.practice_page, name="vote-practice"),
     path("studies/<uuid:code>/vote/skipped/", voting.skipped_page, name="vote-skipped"),
     path("studies/<uuid:code>/vote/report/", voting.report_pair, name="vote-report"),
     path("i/<str:token>", voting.matchup_image, name="matchup-image"),

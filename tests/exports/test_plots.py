@@ -7,14 +7,20 @@ from itertools import combinations
 
 import pytest
 
-from arena.exports.charts.badges import badge_places
-from arena.exports.charts.drawing import SIMULATED
-from arena.exports.charts.heat_map import heat_map
-from arena.exports.charts.plot_axes import axes, curve_points, interval_ticks
-from arena.exports.charts.plots import ELO, VOTES, Given, Plot
-from arena.exports.charts.scatter import scatter_chart
-from arena.exports.tables import Row
 from arena.rating.snapshot_document import PairRecord
+from arena.results.exports.charts import SIMULATED, heat_map
+from arena.results.exports.plots import (
+    ELO,
+    VOTES,
+    Given,
+    Plot,
+    axis_ticks,
+    badge_places,
+    curve_points,
+    interval_ticks,
+    scatter_chart,
+)
+from arena.results.exports.tables import Row
 
 
 def plot(points: list[Given], **changes: object) -> Plot:
@@ -23,7 +29,7 @@ def plot(points: list[Given], **changes: object) -> Plot:
 
 def test_between_two_marks_of_a_logarithmic_axis_every_digit_has_one() -> None:
     given = [Given(number=n, name="x", x=x, y=1.0) for n, x in enumerate((2500.0, 4000.0))]
-    across, _ = axes(plot(given, is_log=True))
+    across, _ = axis_ticks(plot(given, is_log=True))
     assert [f"{mark:g}" for mark in across] == ["2000", "3000", "4000", "5000"]
 
 
@@ -38,7 +44,7 @@ def test_no_number_covers_another_where_points_lie_on_each_other() -> None:
 def test_the_curve_stays_inside_of_axes_that_begin_at_zero() -> None:
     given = [Given(number=1, name="a", x=100.0, y=20.0)]
     falling = plot(given, from_zero=True, falls=200.0)
-    across, up = axes(falling)
+    across, up = axis_ticks(falling)
     assert across[0] == up[0] == 0.0
     assert curve_points(falling)
     assert all(0.0 < x <= across[-1] and y <= up[-1] for x, y in curve_points(falling))

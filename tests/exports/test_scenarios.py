@@ -19,7 +19,7 @@ from django.urls import reverse
 
 from arena.exports.jobs.scenario_files import SCENARIO_FILES
 from arena.models import ScenarioFile
-from arena.services.written_files import keep_file
+from arena.results.services.written_files import keep_file
 from augment.formats.writers import WRITERS
 from augment.models import Augmentation, BaseScene, Contestant, GenerationJob
 from augment.scene.catalogue import ScenarioType

@@ -12,12 +12,12 @@ from tests.house.source import ROOT
 
 VOTER_MODULES = (
     *("arena/api/errors.py", "arena/models/votes.py", "arena/templatetags/shell.py"),
-    *("arena/queries/voting/descriptions.py", "arena/queries/voting/measures.py"),
-    *("arena/queries/voting/keys.py", "arena/services/api_tokens.py"),
+    *("arena/voting/queries/showings.py", "arena/voting/queries/showings.py"),
+    *("arena/voting/queries/keys.py", "arena/services/api_tokens.py"),
     *("arena/services/enrolments.py", "arena/services/preferences.py"),
     *("arena/web/people/api_tokens.py", "arena/web/people/enrolments.py", "arena/web/forms.py"),
-    *("arena/web/people/accounts.py", "arena/web/voting/practice.py"),
-    *("arena/web/screen.py", "arena/web/voting/pages.py"),
+    *("arena/web/people/accounts.py", "arena/voting/pages.py"),
+    *("arena/web/screen.py", "arena/voting/pages.py"),
 )
 """Modules whose messages stand on pages that voters are shown."""
 

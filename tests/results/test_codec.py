@@ -11,7 +11,6 @@ import pytest
 from django.core import serializers
 from django.urls import reverse
 
-from arena.exports import bundle
 from arena.models import Snapshot
 from arena.rating.snapshot_document import (
     VERSION,
@@ -20,7 +19,8 @@ from arena.rating.snapshot_document import (
     read_text,
     results_document,
 )
-from arena.web.results.tabs import TABS
+from arena.results.exports import bundle
+from arena.results.pages.tabs import TABS
 from augment.errors import InvalidDocument
 from tests.results.old import OLD, stored
 from tests.web.cast import people, signed_in

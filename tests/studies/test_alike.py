@@ -6,10 +6,9 @@ import pytest
 
 from arena.models import Study
 from arena.pairing.plan import plan
-from arena.queries.votes.judged import last_vote_of
-from arena.queries.votes.sets import Filters, vote_set
+from arena.results.queries.votes import Filters, last_vote_of, vote_set
+from arena.results.services.ratings import rate_now as rate
 from arena.services.plans import rules_of
-from arena.services.ratings import rate
 from arena.services.studies import close_study
 from augment.models import Augmentation
 from augment.scene.codec import modification_to_document

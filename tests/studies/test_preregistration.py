@@ -11,14 +11,14 @@ import pytest
 from django.urls import reverse
 
 from arena.errors import NothingToPlan
-from arena.exports.bundle import bundle_files
-from arena.exports.tables import leaderboard_table
-from arena.exports.writers import FORMATS, plain_text
 from arena.models import Study
 from arena.rating.snapshot_document import PairP
+from arena.results.exports.bundle import bundle_files
+from arena.results.exports.tables import leaderboard_table
+from arena.results.exports.writers import FORMATS, plain_text
+from arena.results.services.ratings import rate_now as rate
 from arena.services.hypotheses import HypothesisVerdict
 from arena.services.preregistration import preregistration_bytes, preregistration_sha256
-from arena.services.ratings import rate
 from arena.services.studies import close_study
 from augment.models import Contestant
 from tests import study_rows

@@ -12,10 +12,10 @@ from arena.errors import NotYours
 from arena.models import Study, Vote
 from arena.pairing.order import MAIN
 from arena.queries.studies.progress import of_expert, of_study
-from arena.queries.voting.ballots import tallies, voting_progress
 from arena.services.handing_over import hand_over
 from arena.services.replanning import next_pairs, plan_batch
 from arena.services.reports import Complaint, report
+from arena.voting.queries.ballots import tallies, voting_progress
 from augment.errors import Conflict, UnknownName
 from augment.models import Event
 from tests.opening import open_study

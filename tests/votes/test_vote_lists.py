@@ -8,10 +8,10 @@ import pytest
 from django.db.models import F
 
 from arena.models import Snapshot, Study, Vote
-from arena.queries.votes.lists import each_vote, vote_page, votes_behind
-from arena.queries.votes.search import EVERY, LEFT_OUT, VoteSearch
-from arena.queries.votes.sets import Filters
-from arena.services.ratings import rate
+from arena.results.queries.evidence import each_vote, vote_page, votes_behind
+from arena.results.queries.search import EVERY, LEFT_OUT, VoteSearch
+from arena.results.queries.votes import Filters
+from arena.results.services.ratings import rate_now as rate
 from augment.scene.catalogue import ScenarioType
 from tests.mixed_study import mixed_study
 
@@ -116,7 +116,7 @@ def test_every_number_of_standings_pairs_and_raters_is_a_search(study: Study) ->
 def test_pages_hold_every_vote_once_and_automatic_ties_at_the_end(
     study: Study, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("arena.queries.votes.lists.PER_PAGE", 7)
+    monkeypatch.setattr("arena.results.queries.evidence.PER_PAGE", 7)
     study.allow_simulated = True
     study.save()
     snapshot = rated(study)

@@ -8,9 +8,9 @@ from django.contrib.auth.models import User
 from django.urls import reverse
 
 from arena.models import Vote
-from arena.queries.votes.sets import Filters
-from arena.services.ratings import rate
-from arena.web.results.tabs import TABS
+from arena.results.pages.tabs import TABS
+from arena.results.queries.votes import Filters
+from arena.results.services.ratings import rate_now as rate
 from tests.mixed_study import mixed_study
 from tests.web.addresses import address
 from tests.web.cast import people, signed_in, world

@@ -17,7 +17,7 @@ from django.urls import reverse
 from django.utils import timezone
 
 from arena.models import EarlyLook, Snapshot, Study
-from arena.services.ratings import rate
+from arena.results.services.ratings import rate_now as rate
 from arena.services.studies import close_study
 from augment.models import Event
 from augment.services.events import log_event
@@ -90,7 +90,7 @@ def test_it_is_exported_as_csv_and_as_json_lines() -> None:
 GIVES_RESULTS = re.compile(
     r"\b(leaderboard_table|bundle|chart_bytes|vote_table|vote_list_csv|snapshot_to_export"
     r"|write_study|ask_for_study_file|unrated_votes|plan_snapshot|answer_hypotheses|known_of)\("
-    r"|services\.ratings import .*\brate\b"
+    r"|services\.ratings import .*\brate_now\b"
 )
 DOORS = {
     "arena/api/exports.py": "by get_snapshot, which asks must_read_results",
@@ -101,10 +101,8 @@ DOORS = {
     "arena/management/demo.py": "rates a study that it has closed",
     "arena/management/exporting/studies.py": "--early, logged",
     "arena/web/studies/planning.py": "reads what the reader may read",
-    "arena/web/results/rating.py": "gives none: the page that asked leads to the gate",
-    "arena/web/results/pages.py": "the gate",
-    "arena/web/results/files.py": "behind the gate",
-    "arena/web/results/evidence.py": "behind the gate",
+    "arena/results/pages/ratings.py": "the gate",
+    "arena/results/pages/evidence.py": "behind the gate",
     "arena/web/studies/files.py": "asks results_access; what shows results needs it in full",
 }
 """Every module of pages, API, admin and commands that makes something of results, and why nobody
@@ -113,7 +111,14 @@ sees those of an open study through it without an early look."""
 
 def test_every_door_to_results_is_on_the_list() -> None:
     root = Path(settings.BASE_DIR)
-    folders = ("arena/web", "arena/api", "arena/admin", "arena/management", "arena/templatetags")
+    folders = (
+        "arena/web",
+        "arena/api",
+        "arena/admin",
+        "arena/management",
+        "arena/templatetags",
+        "arena/results/pages",
+    )
     found = {
         str(path.relative_to(root))
         for folder in folders

@@ -13,9 +13,9 @@ from django.test import Client
 from django.urls import reverse
 
 from arena.models import Matchup, Snapshot, Study, Vote
-from arena.queries.votes.sets import Filters
-from arena.services.ratings import rate
-from arena.web.results.tabs import TABS
+from arena.results.pages.tabs import TABS
+from arena.results.queries.votes import Filters
+from arena.results.services.ratings import rate_now as rate
 from augment.services.scenarios.pictures import store
 from tests.mixed_study import mixed_study
 from tests.study_rows import hang

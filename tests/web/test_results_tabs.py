@@ -9,9 +9,9 @@ from django.urls import reverse
 from pytest_django import DjangoAssertNumQueries
 
 from arena.models import EarlyLook, Matchup, Study
-from arena.services.ratings import rate
+from arena.results.pages.tabs import TABS
+from arena.results.services.ratings import rate_now as rate
 from arena.services.studies import close_study
-from arena.web.results.tabs import TABS
 from augment.scene.catalogue import ScenarioType
 from tests import study_rows
 from tests.full_study import Size, full_study

@@ -11,7 +11,7 @@ from django.urls import reverse
 from arena.queries.inventory import take_inventory
 from arena.queries.studies import progress
 from arena.queries.studies.coverage import coverage
-from arena.queries.voting.ballots import tallies, voting_progress
+from arena.voting.queries.ballots import tallies, voting_progress
 from tests import study_rows
 from tests.web.ballots import ballot, page
 from tests.web.cast import people, signed_in, world

@@ -8,8 +8,16 @@ import json
 from collections.abc import Sequence
 from typing import Any
 
-from arena.exports.formats import Format, formats, round_value
-from arena.exports.parquet import NUMBER, TEXT, WHOLE, YES_NO, parquet_bytes
+from arena.exports.formats import (
+    NUMBER,
+    TEXT,
+    WHOLE,
+    YES_NO,
+    Format,
+    formats,
+    parquet_bytes,
+    round_value,
+)
 from arena.services.cells import cell
 from augment.models import GenerationJob
 from augment.services.judging.augmentation_rows import AugmentationLine, augmentation_lines

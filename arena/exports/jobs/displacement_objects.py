@@ -7,8 +7,7 @@ import io
 import json
 from collections.abc import Collection, Sequence
 
-from arena.exports.formats import Format, formats
-from arena.exports.parquet import NUMBER, TEXT, WHOLE, YES_NO, parquet_bytes
+from arena.exports.formats import NUMBER, TEXT, WHOLE, YES_NO, Format, formats, parquet_bytes
 from arena.services.cells import cell
 from augment.models import GenerationJob
 from augment.services.judging.displaced_objects import DisplacedObject, ObjectPosition, objects_of

@@ -6,11 +6,11 @@ import json
 from collections.abc import Sequence
 from typing import Any
 
-from arena.exports.charts.displacement import box_plot
 from arena.exports.formats import Format, drawings, formats, round_value
 from arena.exports.jobs.displacement_table import DisplacementTable
 from arena.exports.jobs.published import SOURCE, PublishedBox
-from arena.exports.tables import shown_name
+from arena.results.exports.box_plot import box_plot
+from arena.results.exports.tables import shown_name
 from arena.services.cells import csv_text
 from augment.services.judging.displacement import BoxSummary, Group, Measured
 

@@ -7,8 +7,8 @@ import platform
 from dataclasses import asdict
 from importlib import metadata
 
-from arena.exports.zips import zip_bytes
-from arena.services.vote_rows import digest_of
+from arena.exports.files import zip_bytes
+from arena.results.services.vote_files import digest_of
 from augment.services.judging.scenario_export import Exported
 
 MANIFEST = "manifest.json"

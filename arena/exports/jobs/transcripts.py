@@ -8,8 +8,8 @@ from typing import Any
 
 from django.core.files.storage import default_storage
 
+from arena.exports.files import zip_bytes
 from arena.exports.formats import Format, formats
-from arena.exports.zips import zip_bytes
 from augment.models import Augmentation, GenerationJob
 from augment.services.running.transcript_export import record_of
 from augment.services.running.transcript_steps import tries_by_augmentation

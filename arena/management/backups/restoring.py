@@ -15,8 +15,6 @@ from django.db import DatabaseError, IntegrityError, connection, models, transac
 
 from arena.errors import ArenaError
 from arena.exports.files import write_whole
-from arena.exports.study_folder.closure import TRAVELLING
-from arena.exports.study_folder.writing import FORMAT as STUDY
 from arena.management.backups.archive import (
     MEDIA,
     ROWS,
@@ -28,7 +26,9 @@ from arena.management.backups.archive import (
     ZipSource,
     read_manifest,
 )
-from arena.services import stored_rows
+from arena.results.exports.closure import TRAVELLING
+from arena.results.exports.study_folder import FORMAT as STUDY
+from arena.results.services import stored_rows
 from arena.services.row_rules import check_row, check_votes
 from arena.services.unfinished_work import end_restored_work, is_unfinished
 from augment.models import Endpoint, Simulation

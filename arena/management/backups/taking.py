@@ -15,14 +15,14 @@ from django.db import connection
 
 from arena.errors import ArenaError
 from arena.management.backups.archive import MEDIA, ROWS, SECRET_KEY, Manifest, add_member
-from arena.services.stored_rows import (
+from arena.results.services.stored_rows import (
     applied_migrations,
     find_tables,
     frozen_rows,
     label_of,
     read_rows,
 )
-from arena.services.written_files import FOLDERS
+from arena.results.services.written_files import FOLDERS
 from arena.serving.readiness import find_unapplied_migrations
 from augment.services.scenarios.thumbnails import FOLDER as THUMBNAILS
 

@@ -9,12 +9,12 @@ from django.core.management.base import CommandError, CommandParser
 
 from arena.errors import ArenaError
 from arena.exports.files import write_whole
-from arena.exports.study_folder.writing import write_study
 from arena.management.exporting.jobs import add_jobs
 from arena.management.exporting.kinds import ExportedFile
 from arena.management.exporting.scenarios import add_scenarios
 from arena.management.exporting.studies import add_studies
 from arena.queries.studies.lists import study_named
+from arena.results.exports.study_folder import write_study
 from augment.errors import AugmentError
 from augment.services.terminal import TerminalCommand
 

@@ -17,7 +17,6 @@ from arena.exports.jobs.displacement_objects import BY_OBJECT, OBJECT_FORMATS, o
 from arena.exports.jobs.displacement_table import displacement_table
 from arena.exports.jobs.driving_table import DrivingTable
 from arena.exports.jobs.transcripts import TRANSCRIPT_FORMATS
-from arena.exports.samples import SHEET_FORMATS, sheet_bytes, sheet_of
 from arena.management.exporting.kinds import (
     Chosen,
     ExportedFile,
@@ -28,6 +27,7 @@ from arena.management.exporting.kinds import (
     fill,
 )
 from arena.queries.jobs import grid
+from arena.results.exports.sheets import SHEET_FORMATS, sheet_bytes, sheet_of
 from augment.errors import Conflict, UnknownName
 from augment.services.judging.analyses import analyse_job
 from augment.services.judging.displacement import By, types_named

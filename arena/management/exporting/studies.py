@@ -6,20 +6,20 @@ from typing import Any
 from uuid import UUID
 
 from arena.errors import StudyStillOpen
-from arena.exports.bundle import bundle
-from arena.exports.charts.rating import CONTENT_TYPES, chart_bytes
-from arena.exports.contact_sheet import contact_sheet, sheet_pdf
+from arena.exports.files import ZIP
 from arena.exports.formats import format_named
-from arena.exports.tables import leaderboard_table
-from arena.exports.votes import VOTE_FORMATS, unrated_votes, vote_table
-from arena.exports.writers import FORMATS
-from arena.exports.zips import ZIP
 from arena.management.exporting.kinds import Chosen, ExportedFile, Say, add_format, add_kind, fill
 from arena.models import Snapshot, Study
 from arena.queries.studies.lists import study_named
-from arena.queries.studies.results import snapshot_to_export
-from arena.queries.votes.judged import is_imported
-from arena.services.early_looks import log_early_look
+from arena.results.exports.bundle import bundle
+from arena.results.exports.charts import CONTENT_TYPES, chart_bytes
+from arena.results.exports.sheets import contact_sheet, sheet_pdf
+from arena.results.exports.tables import leaderboard_table
+from arena.results.exports.votes import VOTE_FORMATS, unrated_votes, vote_table
+from arena.results.exports.writers import FORMATS
+from arena.results.queries.access import snapshot_to_export
+from arena.results.queries.votes import is_imported
+from arena.results.services.ratings import log_early_look
 from augment.errors import Conflict
 
 

@@ -13,7 +13,7 @@ from arena.errors import NotYours
 from arena.models import Invitation, Study, Vote, token_digest
 from arena.queries.people import role_of
 from arena.queries.remembering import Remembered, plan_and_votes
-from arena.queries.voting.ballots import ExpertTally, tallies
+from arena.voting.queries.ballots import ExpertTally, tallies
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

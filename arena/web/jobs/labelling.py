@@ -19,8 +19,8 @@ from arena.exports.jobs.faults import FORMATS, fault_table
 from arena.models import FaultLabel, LabellingRound
 from arena.queries import faults
 from arena.queries.people import by_pseudonym, experts, role_of
-from arena.queries.voting.showings import original_beside
 from arena.services.faults import close_labelling, open_labelling, save_label
+from arena.voting.queries.showings import original_beside
 from arena.web.access import ADMIN, EXPERT, STAFF, allow_only
 from arena.web.forms import LabelForm, LabellingForm
 from arena.web.jobs.labelling_questions import closing, opening

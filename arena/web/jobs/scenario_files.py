@@ -15,7 +15,7 @@ from django.urls import reverse
 from django.views.decorators.http import require_POST, require_safe
 
 from arena import tasks
-from arena.exports.zips import CONTENT_TYPE
+from arena.exports.files import CONTENT_TYPE
 from arena.models import ScenarioFile
 from arena.services.scenario_files import ask_for_file, files_of
 from arena.web.access import STAFF, allow_only

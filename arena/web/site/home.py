@@ -14,7 +14,7 @@ from arena.models import Study
 from arena.queries import faults, inventory
 from arena.queries.people import role_of
 from arena.queries.studies import progress
-from arena.queries.studies.results import ResultsAccess, results_access
+from arena.results.queries.access import ResultsAccess, results_access
 from arena.services.preferences import choose_language, choose_theme
 from arena.web.forms import LanguageForm, ThemeForm
 from arena.web.language import use_english

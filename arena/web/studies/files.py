@@ -18,9 +18,14 @@ from django.views.decorators.http import require_POST, require_safe
 
 from arena import tasks
 from arena.models import Study, StudyFile
-from arena.queries.studies.results import ResultsAccess, latest_snapshot, results_access
-from arena.queries.votes.judged import is_imported
-from arena.services.study_files import SHOWS_RESULTS, ask_for_study_file, study_files_of, why_not
+from arena.results.queries.access import ResultsAccess, latest_snapshot, results_access
+from arena.results.queries.votes import is_imported
+from arena.results.services.written_files import (
+    SHOWS_RESULTS,
+    ask_for_study_file,
+    study_files_of,
+    why_not,
+)
 from arena.web.access import STAFF, allow_only
 from arena.web.sending import send_later
 from augment.errors import AugmentError

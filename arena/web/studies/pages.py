@@ -19,17 +19,17 @@ from arena.queries.people import by_pseudonym, experts
 from arena.queries.studies import progress
 from arena.queries.studies.coverage import coverage, reports_of
 from arena.queries.studies.drafts import find_drafts
-from arena.queries.votes.judged import is_imported
-from arena.queries.voting.ballots import tallies
+from arena.results.pages.ratings import rate_or_send
+from arena.results.queries.votes import is_imported
 from arena.services.handing_over import hand_over
 from arena.services.hypotheses import hypotheses_of
 from arena.services.preregistration import preregistration_bytes, preregistration_sha256
 from arena.services.studies import cancel_study, close_study
 from arena.services.study_plan import PLAN_INPUTS, plan_of
+from arena.voting.queries.ballots import tallies
 from arena.web.access import ADMIN, STAFF, allow_only
 from arena.web.listing import read_listing, read_page, said_choices
 from arena.web.questions import WHY, ask, is_sure, is_typed, wants_to_change
-from arena.web.results.rating import rate_or_send
 from arena.web.studies.files import export_place
 from arena.web.studies.forms import HandOverForm
 from arena.web.studies.study_questions import cancelling, closing, handing_over

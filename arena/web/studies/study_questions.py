@@ -9,10 +9,10 @@ from django.db import transaction
 from django.urls import reverse
 
 from arena.models import Study, StudyDraft
-from arena.queries.voting.ballots import tallies
 from arena.services.handing_over import hand_over
 from arena.services.previews import preview_study
 from arena.services.study_plan import StudyPlan
+from arena.voting.queries.ballots import tallies
 from arena.web.questions import Confirmation
 
 

@@ -1,0 +1,1 @@
+"""Results of a study: which votes count, ratings, evidence, files and pages."""

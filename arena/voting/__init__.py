@@ -1,0 +1,1 @@
+"""Blind voting: what experts are shown, what they decide, and storing it once."""
