@@ -212,7 +212,7 @@ def _visit() -> None:
         if name not in {"vote", "vote-help", "report", *ACTIONS}:
             rows += [_opened(name, admin, address(name, here))]
     for tab in TABS:
-        rows += [_opened(f"results: {tab.name}", admin, f"{address('results', here)}{tab.name}/")]
+        rows += [_opened(f"results: {tab}", admin, f"{address('results', here)}{tab}/")]
     rows += [_opened(f"api: {url}", admin, f"/api/v1/{url}") for url in _lists()]
     json.dump([row for row in rows if row is not None], sys.stdout)
 

@@ -33,11 +33,11 @@ from arena.exports.jobs.driving_table import DrivingTable
 from arena.exports.jobs.driving_writers import FORMATS as DRIVING
 from arena.models import Snapshot
 from arena.queries.analyses import analysis_of
-from arena.results.exports.bundle import bundle
 from arena.results.exports.charts import CONTENT_TYPES, chart_bytes
 from arena.results.exports.tables import leaderboard_table
 from arena.results.exports.votes import VOTE_FORMATS, vote_table
 from arena.results.exports.writers import FORMATS as LEADERBOARD
+from arena.results.exports.writers import bundle
 from augment.errors import UnknownName
 from augment.models import GenerationJob
 from augment.services.judging.displacement import By

@@ -1,4 +1,4 @@
-"""What all writers share: what formats there are, and how a value is written."""
+"""What all writers share: the formats that there are, Parquet files, and rounded numbers."""
 
 from __future__ import annotations
 
@@ -13,6 +13,9 @@ from augment.errors import UnknownName
 Table = TypeVar("Table")
 Named = TypeVar("Named")
 Drawn = TypeVar("Drawn", contravariant=True)
+
+TEXT, WHOLE, NUMBER, YES_NO = "string", "int64", "double", "bool"
+"""What a column of a Parquet file can hold; every cell may be empty."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -75,17 +78,8 @@ def drawings(chart: _Drawing[Table]) -> dict[str, Callable[[Table], bytes]]:
     return {name: partial(chart, file_format=name) for name in ("svg", "pdf", "png")}
 
 
-def round_value(value: float | None) -> float | None:
-    """Four decimals, which every machine agrees on."""
-    return None if value is None else round(value, 4)
-
-
-TEXT, WHOLE, NUMBER, YES_NO = "text", "whole", "number", "yes or no"
-"""What a column can hold; every cell may be empty."""
-
-
 def parquet_bytes(columns: Mapping[str, str], rows: Iterable[Sequence[object]]) -> bytes:
-    """One file.
+    """A Parquet file; the same rows always give the same bytes.
 
     Args:
         columns: What each holds, by its name.
@@ -94,21 +88,16 @@ def parquet_bytes(columns: Mapping[str, str], rows: Iterable[Sequence[object]]) 
     import pyarrow
     from pyarrow import parquet
 
-    kinds = {
-        TEXT: pyarrow.string(),
-        WHOLE: pyarrow.int64(),
-        NUMBER: pyarrow.float64(),
-        YES_NO: pyarrow.bool_(),
-    }
-    schema = pyarrow.schema([(name, kinds[kind]) for name, kind in columns.items()])
+    kinds = [pyarrow.type_for_alias(kind) for kind in columns.values()]
     cells = list(zip(*rows, strict=True)) or [() for _ in columns]
-    table = pyarrow.table(
-        [
-            pyarrow.array(list(column), type=kinds[kind])
-            for column, kind in zip(cells, columns.values(), strict=True)
-        ],
-        schema=schema,
-    )
+    arrays = [
+        pyarrow.array(list(column), type=kind) for column, kind in zip(cells, kinds, strict=True)
+    ]
     file = io.BytesIO()
-    parquet.write_table(table, file, compression="zstd")
+    parquet.write_table(pyarrow.table(arrays, names=list(columns)), file, compression="zstd")
     return file.getvalue()
+
+
+def round_value(value: float | None) -> float | None:
+    """Four decimals, which every machine agrees on."""
+    return None if value is None else round(value, 4)

@@ -9,9 +9,11 @@ from django.db.models import QuerySet
 from arena.errors import NothingToPlan
 from arena.pairing.plan import Entry
 from arena.pairing.rules import scenario_of
-from arena.voting.services.shown_pictures import MOST_NAMED
 from augment.models import Augmentation, Contestant, Scenario
 from augment.services.scenarios.pictures import window_of
+
+MOST_NAMED = 8
+"""So many missing pictures are named, the others counted."""
 
 
 def find_showable(scenarios: list[Scenario]) -> QuerySet[Augmentation]:

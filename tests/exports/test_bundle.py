@@ -15,10 +15,9 @@ from pyarrow import parquet
 
 from arena.exports.formats import format_named
 from arena.models import Snapshot, Study
-from arena.results.exports.bundle import MANIFEST, bundle, bundle_files
 from arena.results.exports.tables import leaderboard_table
 from arena.results.exports.votes import VOTE_FORMATS, vote_table
-from arena.results.exports.writers import FORMATS
+from arena.results.exports.writers import FORMATS, MANIFEST, bundle, bundle_files
 from arena.results.queries.votes import Filters
 from arena.results.services.ratings import rate_now as rate
 from arena.services.studies import close_study

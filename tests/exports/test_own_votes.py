@@ -16,7 +16,7 @@ from arena.models import Snapshot, Study
 from arena.pairing.order import MAIN
 from arena.rating.leaderboard import rate as rate_votes
 from arena.rating.snapshot_document import OwnVotes
-from arena.results.exports.bundle import bundle
+from arena.results.exports.writers import bundle
 from arena.results.queries.votes import Entrant, Filters, Judged, VoteSet
 from arena.results.services.analysis import OTHER_ROUNDS, vote_arrays, with_and_without
 from arena.results.services.ratings import rate_now as rate

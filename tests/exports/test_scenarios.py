@@ -19,7 +19,7 @@ from django.urls import reverse
 
 from arena.exports.jobs.scenario_files import SCENARIO_FILES
 from arena.models import ScenarioFile
-from arena.results.services.written_files import keep_file
+from arena.results.services.written_files import MadeFile, keep_file
 from augment.formats.writers import WRITERS
 from augment.models import Augmentation, BaseScene, Contestant, GenerationJob
 from augment.scene.catalogue import ScenarioType
@@ -182,7 +182,7 @@ def test_a_zip_that_a_newer_one_overtook_leaves_no_file(
         for row in (fast, slow):
             lease = held[row]
             assert lease is not None
-            keep_file(row, lease, name="a.zip", content=ContentFile(b"zip"))
+            keep_file(row, lease, MadeFile(name="a.zip", content=ContentFile(b"zip")))
     (left,) = ScenarioFile.objects.all()
     assert (left, left.is_waiting) == (fast, False)
     assert default_storage.exists(left.stored)

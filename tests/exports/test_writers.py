@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import pytest
 
+from arena.rating.printed import escape
 from arena.results.exports.tables import (
     EARLY_LOOK,
     SIMULATED_TABLE,
@@ -14,7 +15,7 @@ from arena.results.exports.tables import (
     Row,
     for_experts,
 )
-from arena.results.exports.writers import FORMATS, csv_bytes, escape, json_bytes, latex
+from arena.results.exports.writers import FORMATS, csv_bytes, json_bytes, latex
 
 PAPER = (
     ("interPlan", "", 1, 1042, 9, 11, 1960),

@@ -11,8 +11,8 @@ from django.urls import reverse
 
 from arena.models import Study
 from arena.rating.leaderboard import rate as rate_votes
-from arena.results.exports.bundle import bundle_files
 from arena.results.exports.tables import leaderboard_table
+from arena.results.exports.writers import bundle_files
 from arena.results.queries.votes import Filters, vote_set
 from arena.results.services import ratings
 from arena.results.services.analysis import vote_arrays

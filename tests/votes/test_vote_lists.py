@@ -8,8 +8,8 @@ import pytest
 from django.db.models import F
 
 from arena.models import Snapshot, Study, Vote
-from arena.results.queries.evidence import each_vote, vote_page, votes_behind
-from arena.results.queries.search import EVERY, LEFT_OUT, VoteSearch
+from arena.results.queries.evidence import each_vote, vote_page
+from arena.results.queries.search import EVERY, LEFT_OUT, VoteSearch, find_votes
 from arena.results.queries.votes import Filters
 from arena.results.services.ratings import rate_now as rate
 from augment.scene.catalogue import ScenarioType
@@ -50,9 +50,7 @@ def test_the_database_gives_the_reasons_of_the_rating(
     study.allow_simulated = allow_simulated
     study.save()
     snapshot = rated(study, **CHOICES[choice])
-    marks = Counter(
-        votes_behind(snapshot, VoteSearch(mark=EVERY)).values_list(F("mark"), flat=True)
-    )
+    marks = Counter(find_votes(snapshot, VoteSearch(mark=EVERY)).values_list(F("mark"), flat=True))
     for vote in each_vote(snapshot, VoteSearch(mark=EVERY)):
         if vote.code is None and vote.mark != "automatic":
             marks[vote.mark] += 1

@@ -12,7 +12,8 @@ from django.test import Client
 from django.urls import reverse
 
 from arena.models import FaultLabel, LabellingRound, LabelTask, Snapshot, Study, Vote
-from arena.results.queries.evidence import VoteScore, neighbours, read_evidence, vote_page
+from arena.results.queries.evidence import neighbours, vote_page
+from arena.results.queries.scores import VoteScore, read_evidence
 from arena.results.queries.search import VoteSearch
 from arena.results.services.ratings import rate_now as rate
 from arena.services.studies import close_study

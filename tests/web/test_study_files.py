@@ -15,7 +15,7 @@ from django.urls import reverse
 from pytest_django import Settings
 
 from arena.models import EarlyLook, Study, StudyFile
-from arena.results.exports.written_files import STUDY_FILES
+from arena.results.exports.study_files import STUDY_FILES
 from arena.results.services.ratings import rate_now as rate
 from arena.services.ending import cancel_study
 from arena.services.studies import close_study

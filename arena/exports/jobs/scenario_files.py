@@ -10,7 +10,7 @@ from django.utils.text import slugify
 
 from arena.exports.jobs.scenarios import scenario_zip, zip_name
 from arena.models import ScenarioFile
-from arena.results.exports.written_files import FileWork, MadeFile
+from arena.results.services.written_files import FileWork, MadeFile
 from augment.services.judging.scenario_export import Exported, export_job
 
 

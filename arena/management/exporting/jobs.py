@@ -27,7 +27,7 @@ from arena.management.exporting.kinds import (
     fill,
 )
 from arena.queries.jobs import grid
-from arena.results.exports.sheets import SHEET_FORMATS, sheet_bytes, sheet_of
+from arena.results.exports.sheets import SHEET_FORMATS, sample_sheet
 from augment.errors import Conflict, UnknownName
 from augment.services.judging.analyses import analyse_job
 from augment.services.judging.displacement import By, types_named
@@ -113,14 +113,13 @@ def write_samples(options: Chosen, say: Say) -> ExportedFile:
     form = options["format"] or Path(options["out"]).suffix.removeprefix(".")
     if form not in SHEET_FORMATS:
         raise UnknownName("format", form, list(SHEET_FORMATS))
-    job = find_job(options["job"])
-    sheet = sheet_of(
-        job.name,
-        grid(job, sample=options["sample"]),
+    content = sample_sheet(
+        grid(find_job(options["job"]), sample=options["sample"]),
         scenarios=options["scenarios"],
         contestants=options["contestants"],
+        file_format=form,
     )
-    return ExportedFile(sheet_bytes(sheet, file_format=form), form, False)
+    return ExportedFile(content, form, False)
 
 
 def _add_driving(kinds: Any) -> None:

@@ -11,12 +11,11 @@ from arena.exports.formats import format_named
 from arena.management.exporting.kinds import Chosen, ExportedFile, Say, add_format, add_kind, fill
 from arena.models import Snapshot, Study
 from arena.queries.studies.lists import study_named
-from arena.results.exports.bundle import bundle
 from arena.results.exports.charts import CONTENT_TYPES, chart_bytes
-from arena.results.exports.sheets import contact_sheet, sheet_pdf
+from arena.results.exports.sheets import contact_sheet
 from arena.results.exports.tables import leaderboard_table
 from arena.results.exports.votes import VOTE_FORMATS, unrated_votes, vote_table
-from arena.results.exports.writers import FORMATS
+from arena.results.exports.writers import FORMATS, bundle
 from arena.results.queries.access import snapshot_to_export
 from arena.results.queries.votes import is_imported
 from arena.results.services.ratings import log_early_look
@@ -90,8 +89,7 @@ def write_contact_sheet(options: Chosen, say: Say) -> ExportedFile:
     if is_imported(snapshot.study):
         raise Conflict("Votes from a file have no pictures, so there is no contact sheet.")
     scenarios = list(snapshot.study.scenarios.defer("reference").order_by("type", "slug"))
-    sheet = contact_sheet(snapshot, leaderboard_table(snapshot), scenarios)
-    return ExportedFile(sheet_pdf(sheet), "pdf", False)
+    return ExportedFile(contact_sheet(snapshot, scenarios), "pdf", False)
 
 
 def _snapshot(options: Chosen) -> Snapshot:

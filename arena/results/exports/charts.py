@@ -1,159 +1,132 @@
-"""What all charts for papers share: the colours, and bytes that never differ between two runs."""
+"""The charts of a rating, for pages and as files: intervals, pairs, scenario types, scatters."""
 
 from __future__ import annotations
 
-import io
 import math
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from threading import Lock
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import Any
 
 from arena.models import Snapshot
 from arena.rating.printed import whole_percent
 from arena.rating.snapshot_document import PairRecord, TypeRating
-from arena.results.exports.plots import Interval, interval_ticks, plots, scatter_chart
+from arena.results.exports.drawing import (
+    INK,
+    SIMULATED,
+    SOFT,
+    draw_interval,
+    house_style,
+    interval_ticks,
+    name_rows,
+    names_width_in,
+    rating_axis,
+    write_figure,
+)
+from arena.results.exports.plots import plots, scatter_chart
 from arena.results.exports.tables import LeaderboardTable, Row, leaderboard_table
 from augment.errors import UnknownName
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+CONTENT_TYPES = {"svg": "image/svg+xml", "pdf": "application/pdf", "png": "image/png"}
+
+Chart = Callable[..., bytes]
+"""Takes `file_format`: "svg", "pdf" or "png"."""
+
+STRONG = 0.3
+"""This far from an even score a cell has its full colour."""
+
+STEPS, FEW = 10, 30
+
+_COLOURS = ("#f0a15c", "#f7f8f8", "#6aa5db")
+"""Orange for the column, blue for the row: told apart with any colour vision."""
 
 
-INK, SOFT, GRID, MARK, SIMULATED = "#1d2733", "#5b6773", "#d5dbe3", "#2f6db5", "#7a4fae"
-DPI = 200
+def charts(snapshot: Snapshot) -> Mapping[str, Chart]:
+    """Every chart that a rating has, by name."""
+    table, results = leaderboard_table(snapshot), snapshot.results
+    by_name: dict[str, Chart] = {"leaderboard": partial(interval_chart, table)}
+    if results.pairs:
+        by_name["pairs"] = partial(heat_chart, table.rows, results.pairs)
+    if results.types:
+        by_name["types"] = partial(type_charts, results.types, table.rows)
+    scatters = plots(snapshot, table)
+    return by_name | {name: partial(scatter_chart, plot) for name, plot in scatters.items()}
 
-# Nothing that differs between two runs may get into a file: no date, no random ids, no version.
-_METADATA: dict[str, dict[str, Any]] = {
-    "svg": {"Date": None, "Creator": None},
-    "pdf": {"CreationDate": None, "Creator": None, "Producer": None},
-    "png": {"Software": None},
-}
 
-_ONE_AT_A_TIME = Lock()
+def chart_bytes(snapshot: Snapshot, *, name: str, file_format: str) -> bytes:
+    """A chart of a rating as a file.
 
-
-@contextmanager
-def house_style() -> Iterator[None]:
-    """The settings of matplotlib under which every chart is drawn.
-
-    They belong to the whole process: a chart that ends would take them away from one that another
-    thread of the web server is drawing. So charts wait for each other.
+    Raises:
+        UnknownName: The rating has no such chart, or there is no such format.
     """
-    import matplotlib
-
-    settings: dict[Any, Any] = {
-        "svg.hashsalt": "scenario-arena",
-        "svg.fonttype": "none",
-        "pdf.fonttype": 42,  # publishers refuse Type 3, matplotlib's usual form
-        "text.parse_math": False,  # a dollar sign in a name is a dollar sign
-    }
-    with _ONE_AT_A_TIME, matplotlib.rc_context(settings):
-        yield
-
-
-def width_in(text: str, size_pt: float) -> float:
-    """How many inches a text takes; call it within `house_style`."""
-    from matplotlib.textpath import TextPath
-
-    return float(TextPath((0.0, 0.0), text, size=size_pt).get_extents().width) / 72.0
-
-
-def write_figure(figure: Figure, file_format: str) -> bytes:
-    """The figure as the bytes of a file.
-
-    Args:
-        figure: Made and filled within `house_style`.
-        file_format: "svg", "pdf" or "png".
-    """
-    picture = io.BytesIO()
-    figure.savefig(picture, format=file_format, dpi=DPI, metadata=_METADATA[file_format])
-    return picture.getvalue()
-
-
-_ROW_IN = 0.34
+    if file_format not in CONTENT_TYPES:
+        raise UnknownName("format", file_format, list(CONTENT_TYPES))
+    known = charts(snapshot)
+    if name not in known:
+        raise UnknownName("chart of this rating", name, list(known))
+    return known[name](file_format=file_format)
 
 
 def interval_chart(table: LeaderboardTable, *, file_format: str) -> bytes:
-    """The ratings as dots with their intervals as bars, best on top; diamonds are simulated.
-
-    Args:
-        table: Contestants without a rating keep their line, without a dot.
-        file_format: "svg", "pdf" or "png".
-    """
+    """Ratings as dots with their intervals as bars, best on top; diamonds are simulated."""
     from matplotlib.figure import Figure
 
+    rows = table.rows
     with house_style():
-        figure = Figure(figsize=(6.4, 1.1 + _ROW_IN * len(table.rows)), layout="constrained")
+        figure = Figure(figsize=(6.4, 1.1 + 0.34 * len(rows)), layout="constrained")
         axes = figure.add_subplot()
-        for place, row in enumerate(table.rows):
+        for place, row in enumerate(rows):
             draw_interval(axes, place, row.interval, simulated=row.simulated)
-        axes.set_yticks(range(len(table.rows)), [row.model for row in table.rows])
-        for label, row in zip(axes.get_yticklabels(), table.rows, strict=True):
-            label.set_color(SIMULATED if row.simulated else INK)
-        axes.set_xlabel(_label(table), color=INK)
-        rating_axis(axes, len(table.rows))
-        ratings = [row.rating for row in table.rows if row.rating is not None]
-        span = (min(ratings), max(ratings)) if ratings else None
-        marks = interval_ticks((row.interval for row in table.rows), span)
-        if marks:
-            axes.set_xlim(marks[0], marks[-1])
-            axes.set_xticks(marks, [f"{mark:g}" for mark in marks])
+        name_rows(axes, rows)
+        axes.set_xlabel(_interval_label(table), color=INK)
+        rating_axis(axes, len(rows))
+        ratings = [row.rating for row in rows if row.rating is not None]
+        if ticks := interval_ticks((row.interval for row in rows), ratings):
+            axes.set_xlim(ticks[0], ticks[-1])
+            axes.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
         return write_figure(figure, file_format)
 
 
-def draw_interval(axes: Axes, place: int, interval: Interval, *, simulated: bool) -> None:
-    """One line: a mark at the rating, a bar over the interval, an arrow to where it is open.
+def type_charts(parts: Sequence[TypeRating], rows: Sequence[Row], *, file_format: str) -> bytes:
+    """A panel for each scenario type on one axis, contestants in the order of the whole table."""
+    from matplotlib.figure import Figure
 
-    Nothing without a rating and bounds, a mark alone without an interval; a bound alone begins
-    with a stroke.
-    """
-    lower, middle, upper = interval
-    colour, shape = (SIMULATED, "D") if simulated else (MARK, "o")
-    known = [one for one in (lower, middle, upper) if one is not None]
-    if not known:
-        return
-    if len(known) > 1:
-        axes.plot([known[0], known[-1]], [place, place], color=colour, linewidth=1.6)
-    if middle is None:
-        axes.plot(known, [place], marker="|", markersize=9, markeredgewidth=1.6, color=colour)
-    else:
-        axes.plot([middle], [place], marker=shape, markersize=5, color=colour)
-    if (lower is None) != (upper is None):
-        start, edge = (known[0], 0.0) if lower is None else (known[-1], 1.0)
-        axes.annotate(
-            "", (edge, place), (start, place), axes.get_yaxis_transform(), "data",
-            arrowprops={
-                "arrowstyle": "->", "color": colour, "linewidth": 1.6, "shrinkA": 0, "shrinkB": 0,
-            },
-        )  # fmt: skip
-
-
-def rating_axis(axes: Axes, rows: int) -> None:
-    """Ratings across, lines from top to bottom."""
-    axes.set_ylim(rows - 0.5, -0.5)
-    axes.grid(axis="x", color=GRID, linewidth=0.6)
-    axes.set_axisbelow(True)
-    axes.spines[["top", "right", "left"]].set_visible(False)
-    axes.tick_params(axis="y", length=0)
-
-
-def _label(table: LeaderboardTable) -> str:
-    marks = [word for word, so in (("simulated", table.simulated), ("early", table.early)) if so]
-    has_intervals = any(row.has_bound for row in table.rows)
-    text = "Elo with 95 % intervals" if has_intervals else "Elo, without intervals"
-    if table.has_parts:
-        marks.append("only within groups comparable")
-    return text + (f" ({', '.join(marks)})" if marks else "")
+    across = min(len(parts), 3)
+    down = math.ceil(len(parts) / across)
+    with house_style():
+        names_in, plot_in = names_width_in(rows, 7.0) + 0.2, 0.26 * len(rows)
+        between_in, foot_in = 0.6, 0.15
+        wide, high = names_in + 2.1 * across, (plot_in + between_in) * down + foot_in
+        figure = Figure(figsize=(wide, high))
+        panels = list(figure.subplots(down, across, sharex=True, squeeze=False).flat)
+        figure.subplots_adjust(
+            left=names_in / wide,
+            right=1.0 - 0.1 / wide,
+            top=1.0 - 0.25 / high,
+            bottom=(foot_in + 0.25) / high,
+            wspace=0.08,
+            hspace=between_in / plot_in,
+        )
+        for number, (panel, part) in enumerate(zip(panels, parts, strict=False)):
+            lines = {line.slug: line for line in part.lines}
+            for place, row in enumerate(rows):
+                if line := lines.get(row.slug):
+                    bounds = (line.lower, line.rating, line.upper)
+                    draw_interval(panel, place, bounds, simulated=row.simulated)
+            panel.set_title(f"{part.label} (n {part.votes})", fontsize=7, color=INK)
+            name_rows(panel, rows, fontsize=7.0)
+            if number % across:
+                panel.set_yticklabels([""] * len(rows))
+            panel.tick_params(axis="x", labelsize=7, labelbottom=True)
+            rating_axis(panel, len(rows))
+        for panel in panels[len(parts) :]:
+            panel.set_visible(False)
+        text = "Elo with 95 % intervals, each type rated by itself"
+        figure.text(0.5, 0.08 / high, text, ha="center", fontsize=8, color=INK)
+        return write_figure(figure, file_format)
 
 
-STRONG = 0.3
-"""So far from even a score has the full colour: experts who tie often leave little beyond."""
-STEPS = 10
-FEW = 30
+# --- Pairs -------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -189,192 +162,85 @@ class HeatRow:
 
 
 def heat_map(pairs: Sequence[PairRecord], rows: Sequence[Row]) -> list[HeatRow]:
-    """The table, contestants in the given order both ways.
-
-    Args:
-        pairs: As a snapshot keeps them: wins, ties and losses of `a` against `b`.
-        rows: The contestants.
-    """
-    found: dict[tuple[str, str], tuple[float, int, int | None]] = {}
+    """The scores of all against all, contestants in the given order both ways."""
+    scores: dict[tuple[str, str], tuple[float, PairRecord]] = {}
     for pair in pairs:
         score = pair.wins + pair.ties / 2
-        found[pair.a, pair.b] = (score, pair.votes, pair.planned)
-        found[pair.b, pair.a] = (pair.votes - score, pair.votes, pair.planned)
+        scores[pair.a, pair.b] = (score, pair)
+        scores[pair.b, pair.a] = (pair.votes - score, pair)
+
+    def cell(row: Row, other: Row) -> HeatCell | None:
+        if row.slug == other.slug:
+            return None
+        score, pair = scores.get((row.slug, other.slug), (0.0, None))
+        votes = pair.votes if pair else 0
+        share = score / votes if votes else None
+        towards = 0.0 if share is None else (share - 0.5) / STRONG
+        return HeatCell(
+            other=other,
+            share=share,
+            step=round(STEPS * (min(max(towards, -1.0), 1.0) + 1.0) / 2.0),
+            votes=votes,
+            planned=pair.planned if pair else None,
+            is_few=votes < FEW,
+        )
+
     return [
-        HeatRow(number=n, row=row, cells=[_cell(row, other, found) for other in rows])
-        for n, row in enumerate(rows, start=1)
+        HeatRow(number=number, row=row, cells=[cell(row, other) for other in rows])
+        for number, row in enumerate(rows, start=1)
     ]
 
 
-def _step(share: float) -> int:
-    towards = (share - 0.5) / STRONG
-    return round(STEPS * (min(max(towards, -1.0), 1.0) + 1.0) / 2.0)
-
-
-def _cell(
-    row: Row, other: Row, found: dict[tuple[str, str], tuple[float, int, int | None]]
-) -> HeatCell | None:
-    if row.slug == other.slug:
-        return None
-    score, votes, planned = found.get((row.slug, other.slug), (0.0, 0, None))
-    share = score / votes if votes else None
-    return HeatCell(
-        other=other,
-        share=share,
-        step=_step(0.5 if share is None else share),
-        votes=votes,
-        planned=planned,
-        is_few=votes < FEW,
-    )
-
-
-_CELL_IN, _FOOT_IN, _FEWEST_IN = 0.62, 0.5, 3.9
-_NAME_PT = 8.0
-_COLOURS = ("#f0a15c", "#f7f8f8", "#6aa5db")
-"""Orange for the column, blue for the row: told apart with any colour vision."""
-
-
 def heat_chart(rows: Sequence[Row], pairs: Sequence[PairRecord], *, file_format: str) -> bytes:
-    """Percent and number of votes in every cell, contestants in the given order.
-
-    Args:
-        rows: The contestants.
-        pairs: As a snapshot keeps them.
-        file_format: "svg", "pdf" or "png".
-    """
+    """Percent and number of votes in every cell, contestants in the given order."""
     from matplotlib.colors import LinearSegmentedColormap
     from matplotlib.figure import Figure
 
     lines = heat_map(pairs, rows)
-    numbers = [str(n) for n in range(1, len(rows) + 1)]
     with house_style():
-        names_in = max((width_in(row.model, _NAME_PT) for row in rows), default=0.0) + 0.45
-        side = _CELL_IN * max(len(rows), 2)
-        wide, high = max(names_in + side, _FEWEST_IN) + 0.1, side + _FOOT_IN + 0.1
+        names_in = names_width_in(rows, 8.0) + 0.45
+        side_in, foot_in = 0.62 * max(len(rows), 2), 0.5
+        wide, high = max(names_in + side_in, 3.9) + 0.1, side_in + foot_in + 0.1
         figure = Figure(figsize=(wide, high))
-        axes = figure.add_axes((names_in / wide, _FOOT_IN / high, side / wide, side / high))
-        colours = LinearSegmentedColormap.from_list("score", _COLOURS)
+        axes = figure.add_axes((names_in / wide, foot_in / high, side_in / wide, side_in / high))
         shares = [
             [math.nan if cell is None or cell.share is None else cell.share for cell in line.cells]
             for line in lines
         ]
+        colours = LinearSegmentedColormap.from_list("score", _COLOURS)
         axes.imshow(shares, cmap=colours, vmin=0.5 - STRONG, vmax=0.5 + STRONG)
+        centred: dict[str, Any] = {"ha": "center", "va": "center", "color": INK}
         for i, line in enumerate(lines):
             for j, cell in enumerate(line.cells):
                 if cell is not None and cell.votes:
-                    _write(axes, f"{cell.percent}", j, i - 0.12, 9.0)
-                    _write(axes, f"{cell.votes}", j, i + 0.24, 6.5)
+                    axes.text(j, i - 0.12, f"{cell.percent}", fontsize=9.0, **centred)
+                    axes.text(j, i + 0.24, f"{cell.votes}", fontsize=6.5, **centred)
+        numbers = [str(line.number) for line in lines]
         axes.set_yticks(range(len(rows)), numbers, fontsize=8)
         axes.set_xticks(range(len(rows)), numbers, fontsize=8)
         for place, row in enumerate(rows):
             axes.annotate(
                 row.model, (0.0, place), (-18.0, 0.0), ("axes fraction", "data"),
-                "offset points", ha="right", va="center", fontsize=_NAME_PT,
+                "offset points", ha="right", va="center", fontsize=8.0,
                 color=SIMULATED if row.simulated else INK,
             )  # fmt: skip
         axes.tick_params(length=0, colors=INK)
         axes.spines[:].set_visible(False)
-        figure.text(
-            0.99, 0.08 / high, "Score of the row in percent, a tie half a win; votes beneath",
-            ha="right", color=SOFT, fontsize=7.5,
-        )  # fmt: skip
+        text = "Score of the row in percent, a tie half a win; votes beneath"
+        figure.text(0.99, 0.08 / high, text, ha="right", color=SOFT, fontsize=7.5)
         return write_figure(figure, file_format)
 
 
-def _write(axes: Axes, text: str, x: float, y: float, size: float) -> None:
-    """Inside a cell; ink keeps a contrast of 4.5 on every colour."""
-    axes.text(x, y, text, ha="center", va="center", fontsize=size, color=INK)
+# --- Private -----------------------------------------------------------------------------------
 
 
-_PANEL_IN, _ROW_IN_types, _MOST_ACROSS = 2.1, 0.26, 3
-_BETWEEN_IN, _FOOT_IN_types = 0.6, 0.15
-_NAME_PT_types = 7.0
-
-
-def type_charts(
-    parts: Sequence[TypeRating], table: LeaderboardTable, *, file_format: str
-) -> bytes:
-    """A panel a type on one axis, contestants in the order of the whole table.
-
-    Args:
-        parts: As a snapshot keeps them.
-        table: Whose lines they are.
-        file_format: "svg", "pdf" or "png".
-    """
-    from matplotlib.figure import Figure
-
-    rows = table.rows
-    across = min(len(parts), _MOST_ACROSS)
-    down = math.ceil(len(parts) / across)
-    with house_style():
-        names = max((width_in(row.model, _NAME_PT_types) for row in rows), default=0.0) + 0.2
-        plot = _ROW_IN_types * len(rows)
-        wide, high = names + _PANEL_IN * across, (plot + _BETWEEN_IN) * down + _FOOT_IN_types
-        figure = Figure(figsize=(wide, high))
-        panels = list(figure.subplots(down, across, sharex=True, squeeze=False).flat)
-        figure.subplots_adjust(
-            left=names / wide,
-            right=1.0 - 0.1 / wide,
-            top=1.0 - 0.25 / high,
-            bottom=(_FOOT_IN_types + 0.25) / high,
-            wspace=0.08,
-            hspace=_BETWEEN_IN / plot,
-        )
-        for number, (panel, part) in enumerate(zip(panels, parts, strict=False)):
-            by_slug = {line.slug: line for line in part.lines}
-            for place, row in enumerate(rows):
-                line = by_slug.get(row.slug)
-                if line is not None:
-                    interval = (line.lower, line.rating, line.upper)
-                    draw_interval(panel, place, interval, simulated=row.simulated)
-            panel.set_title(f"{part.label} (n {part.votes})", fontsize=7, color=INK)
-            labels = ["" if number % across else row.model for row in rows]
-            panel.set_yticks(range(len(rows)), labels, fontsize=_NAME_PT_types)
-            for label, row in zip(panel.get_yticklabels(), rows, strict=True):
-                label.set_color(SIMULATED if row.simulated else INK)
-            panel.tick_params(axis="x", labelsize=7, labelbottom=True)
-            rating_axis(panel, len(rows))
-        for panel in panels[len(parts) :]:
-            panel.set_visible(False)
-        figure.text(
-            0.5, 0.08 / high, "Elo with 95 % intervals, each type rated by itself", ha="center",
-            fontsize=8, color=INK,
-        )  # fmt: skip
-        return write_figure(figure, file_format)
-
-
-CONTENT_TYPES = {"svg": "image/svg+xml", "pdf": "application/pdf", "png": "image/png"}
-
-
-class Chart(Protocol):
-    """A chart that can be drawn."""
-
-    def __call__(self, *, file_format: str) -> bytes:
-        """The bytes of an "svg", "pdf" or "png" file."""
-
-
-def charts(snapshot: Snapshot) -> Mapping[str, Chart]:
-    """Every chart that a rating has, by name."""
-    table = leaderboard_table(snapshot)
-    by_name: dict[str, Chart] = {"leaderboard": partial(interval_chart, table)}
-    if snapshot.results.pairs:
-        by_name["pairs"] = partial(heat_chart, table.rows, snapshot.results.pairs)
-    if snapshot.results.types:
-        by_name["types"] = partial(type_charts, snapshot.results.types, table)
-    for name, plot in plots(snapshot, table).items():
-        by_name[name] = partial(scatter_chart, plot)
-    return by_name
-
-
-def chart_bytes(snapshot: Snapshot, *, name: str, file_format: str) -> bytes:
-    """A chart of a rating as a file.
-
-    Raises:
-        UnknownName: The rating has no such chart, or there is no such format.
-    """
-    if file_format not in CONTENT_TYPES:
-        raise UnknownName("format", file_format, list(CONTENT_TYPES))
-    known = charts(snapshot)
-    if name not in known:
-        raise UnknownName("chart of this rating", name, list(known))
-    return known[name](file_format=file_format)
+def _interval_label(table: LeaderboardTable) -> str:
+    marks = {
+        "simulated": table.simulated,
+        "early": table.early,
+        "only within groups comparable": table.has_parts,
+    }
+    has_intervals = any(row.has_bound for row in table.rows)
+    text = "Elo with 95 % intervals" if has_intervals else "Elo, without intervals"
+    words = [word for word, holds in marks.items() if holds]
+    return f"{text} ({', '.join(words)})" if words else text

@@ -1,330 +1,216 @@
-"""A sheet of pictures, scenarios down and contestants across: the paper's qualitative figure."""
+"""Sheets of pictures: samples of a job for a paper's figure, and a study's contact sheet."""
 
 from __future__ import annotations
 
 import io
 import textwrap
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from django.core.files.storage import default_storage
 
 from arena.models import Snapshot
-from arena.queries.jobs import GridRow, JobGrid
-from arena.results.exports.charts import INK, SIMULATED, SOFT, house_style, write_figure
-from arena.results.exports.tables import SIMULATED as SIMULATED_WORD
-from arena.results.exports.tables import LeaderboardTable, Row
-from arena.results.queries.evidence import PictureShown, sheet_rows
+from arena.queries.jobs import JobGrid
+from arena.results.exports.drawing import (
+    INK,
+    NO_METADATA,
+    SIMULATED,
+    SOFT,
+    house_style,
+    write_figure,
+)
+from arena.results.exports.tables import Row, leaderboard_table, shown_name
+from arena.results.queries.scores import PictureShown, pictures_by_scenario
 from augment.errors import UnknownName
-from augment.models import Augmentation, Contestant, Scenario
+from augment.models import Augmentation, Scenario
 from augment.services.scenarios.pictures import shrunken_picture
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-
 SHEET_FORMATS = ("pdf", "png")
 
-_WIDTH_IN, _HEIGHT_IN = 3.2, 3.2 * 2.0 / 3.0
-_CAPTION_IN, _HEAD_IN, _FOOT_IN = 0.42, 0.3, 0.28
 _LEGEND = (
     "Ego vehicle red, changed agents blue. Every row has one camera for all its pictures. "
     "An unreadable or refused answer shows the unchanged scene."
 )
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Sheet:
-    """What is on the sheet, in its order."""
-
-    job: str
-    contestants: tuple[Contestant, ...]
-    rows: tuple[GridRow, ...]
+# --- Samples of a job --------------------------------------------------------------------------
 
 
-def sheet_of(
-    job: str, grid: JobGrid, *, scenarios: Sequence[str], contestants: Sequence[str]
-) -> Sheet:
-    """The chosen cells of a job's grid, in the order in which they were named.
+def sample_sheet(
+    grid: JobGrid, *, scenarios: Sequence[str], contestants: Sequence[str], file_format: str
+) -> bytes:
+    """Scenarios down and contestants across, in the order in which they are named.
 
     Raises:
         UnknownName: The job has no such scenario or contestant.
     """
-    columns = {contestant.slug: n for n, contestant in enumerate(grid.contestants)}
-    lines = {row.scenario.slug: row for row in grid.rows}
-    for kind, names, known in (
-        ("contestant of this job", contestants, columns),
-        ("scenario of this job", scenarios, lines),
-    ):
-        for name in names:
-            if name not in known:
-                raise UnknownName(kind, name, list(known))
-    chosen = [columns[slug] for slug in contestants]
-    return Sheet(
-        job=job,
-        contestants=tuple(grid.contestants[n] for n in chosen),
-        rows=tuple(
-            GridRow(scenario=lines[slug].scenario, cells=[lines[slug].cells[n] for n in chosen])
-            for slug in scenarios
-        ),
-    )
-
-
-def sheet_bytes(sheet: Sheet, *, file_format: str) -> bytes:
-    """The sheet as a file.
-
-    Args:
-        sheet: At least one scenario and one contestant.
-        file_format: "pdf" or "png".
-    """
     from matplotlib.figure import Figure
 
-    across, down = len(sheet.contestants), len(sheet.rows)
-    row_in = _HEIGHT_IN + _CAPTION_IN
-    size = (_WIDTH_IN * across, _HEAD_IN + row_in * down + _FOOT_IN)
+    columns = {contestant.slug: n for n, contestant in enumerate(grid.contestants)}
+    lines = {row.scenario.slug: row for row in grid.rows}
+    _check_names("contestant of this job", contestants, list(columns))
+    _check_names("scenario of this job", scenarios, list(lines))
+    chosen = [columns[slug] for slug in contestants]
+    across, down = len(contestants), len(scenarios)
+    picture_in, head_in, foot_in = 3.2 * 2.0 / 3.0, 0.3, 0.28
+    row_in = picture_in + 0.42
+    wide, high = 3.2 * across, head_in + row_in * down + foot_in
     with house_style():
-        figure = Figure(figsize=size)
-        for n, contestant in enumerate(sheet.contestants):
-            is_simulated = contestant.is_simulated
+        figure = Figure(figsize=(wide, high))
+        centred: dict[str, Any] = {"ha": "center", "va": "center"}
+        for n, contestant in enumerate(grid.contestants[place] for place in chosen):
             figure.text(
-                (n + 0.5) / across,
-                1.0 - 0.55 * _HEAD_IN / size[1],
-                contestant.name + (SIMULATED_WORD if is_simulated else ""),
-                ha="center",
-                va="center",
-                fontsize=9,
-                fontweight="bold",
-                color=SIMULATED if is_simulated else INK,
-            )
-        for line, row in enumerate(sheet.rows):
-            top_in = size[1] - _HEAD_IN - row_in * line
-            for n, cell in enumerate(row.cells):
-                left = (n + 0.01) / across
-                place = (
-                    left,
-                    (top_in - _HEIGHT_IN) / size[1],
-                    0.98 / across,
-                    _HEIGHT_IN / size[1],
-                )
-                _picture(figure.add_axes(place), cell)
-            caption = _caption(chr(ord("a") + line % 26), row, across)
-            middle = (top_in - _HEIGHT_IN - 0.06) / size[1]
-            figure.text(0.5, middle, caption, ha="center", va="top", fontsize=8, color=INK)
-        figure.text(0.5, 0.09 / size[1], _legend(across), ha="center", fontsize=6, color=SOFT)
+                (n + 0.5) / across, 1.0 - 0.55 * head_in / high,
+                shown_name(contestant.name, contestant.is_simulated), fontsize=9,
+                fontweight="bold", color=SIMULATED if contestant.is_simulated else INK, **centred,
+            )  # fmt: skip
+        for line, slug in enumerate(scenarios):
+            bottom_in = high - head_in - row_in * line - picture_in
+            for n, place in enumerate(chosen):
+                box = ((n + 0.01) / across, bottom_in / high, 0.98 / across, picture_in / high)
+                _draw_sample(figure.add_axes(box), lines[slug].cells[place])
+            caption = _caption(chr(ord("a") + line % 26), lines[slug].scenario, across)
+            y = (bottom_in - 0.06) / high
+            figure.text(0.5, y, caption, ha="center", va="top", fontsize=8, color=INK)
+        legend = textwrap.fill(_LEGEND, width=72 * across)
+        figure.text(0.5, 0.09 / high, legend, ha="center", fontsize=6, color=SOFT)
         return write_figure(figure, file_format)
 
 
-def stamp_simulated(axes: Axes, *, size: float = 24.0) -> None:
-    """A word across a picture that somebody may cut out of the sheet."""
-    axes.text(
-        0.5,
-        0.5,
-        "SIMULATED",
-        transform=axes.transAxes,
-        ha="center",
-        va="center",
-        rotation=25,
-        fontsize=size,
-        fontweight="bold",
-        color=SIMULATED,
-        alpha=0.3,
-    )
+def _check_names(what: str, names: Sequence[str], known: list[str]) -> None:
+    for name in names:
+        if name not in known:
+            raise UnknownName(what, name, known)
 
 
-# Private
-
-
-def _picture(axes: Axes, cell: Augmentation | None) -> None:
-    """The cell's picture, or a word on why there is none."""
+def _draw_sample(axes: Axes, cell: Augmentation | None) -> None:
+    """Draw the cell's picture, or a word on why there is none."""
     from matplotlib.image import imread
 
-    axes.set_xticks([])
-    axes.set_yticks([])
-    axes.spines[:].set_color(SOFT)
-    axes.spines[:].set_linewidth(0.5)
+    pixels = None
     if cell is not None and cell.image and default_storage.exists(cell.image):
         with default_storage.open(cell.image) as file:
-            axes.imshow(imread(io.BytesIO(file.read()), format="png"))
-        if cell.contestant.is_simulated:
-            stamp_simulated(axes)
-        if cell.state != Augmentation.State.DONE:
-            axes.set_title(_word(cell), fontsize=7, color=SOFT, y=0.02, va="bottom")
-        return
-    axes.text(0.5, 0.5, _word(cell), ha="center", va="center", fontsize=8, color=SOFT)
+            pixels = imread(io.BytesIO(file.read()), format="png")
+    is_simulated = cell is not None and cell.contestant.is_simulated
+    word = _explain(cell)
+    _fill_frame(axes, pixels, word, is_simulated=is_simulated, size=24.0, line=0.5)
+    if pixels is not None and word:
+        axes.set_title(word, fontsize=7, color=SOFT, y=0.02, va="bottom")
 
 
-def _word(cell: Augmentation | None) -> str:
+def _explain(cell: Augmentation | None) -> str:
     if cell is None:
         return "not part of the job"
-    if cell.state in Augmentation.SHOWABLE and cell.state != Augmentation.State.DONE:
+    if cell.state == Augmentation.State.DONE:
+        return ""
+    if cell.state in Augmentation.SHOWABLE:
         return f"{cell.get_state_display()}: unchanged scene"
     return f"no picture: {cell.get_state_display().lower()}"
 
 
-def _caption(letter: str, row: GridRow, across: int) -> str:
-    text = f"({letter}) {row.scenario.get_type_display()}: “{row.scenario.instruction.strip()}”"
+def _caption(letter: str, scenario: Scenario, across: int) -> str:
+    text = f"({letter}) {scenario.get_type_display()}: “{scenario.instruction.strip()}”"
     return "\n".join(textwrap.wrap(text, width=50 * across, max_lines=2, placeholder=" …"))
 
 
-def _legend(across: int) -> str:
-    return "\n".join(textwrap.wrap(_LEGEND, width=72 * across))
+# --- The contact sheet -------------------------------------------------------------------------
 
-
-PAGE_IN = (11.69, 8.27)
+_PAGE_IN = (11.69, 8.27)
 """A4, lying."""
 
-_MARGIN_IN, _HEAD_IN_contact_sheet, _CAPTION_IN_contact_sheet, _LABEL_IN, _GAP_IN = (
-    0.45,
-    0.35,
-    0.42,
-    0.2,
-    0.1,
-)
-_ACROSS = 5
-_CELL_IN = (PAGE_IN[0] - 2 * _MARGIN_IN) / _ACROSS
+_ACROSS, _MARGIN_IN, _CAPTION_IN, _GAP_IN = 5, 0.45, 0.42, 0.1
+_CELL_IN = (_PAGE_IN[0] - 2 * _MARGIN_IN) / _ACROSS
 _PICTURE_IN = (_CELL_IN - _GAP_IN) * 2.0 / 3.0
-_LINE_IN = _PICTURE_IN + _LABEL_IN + 0.06
+_LINE_IN = _PICTURE_IN + 0.26
 _SHRUNK_PX = 600
-_BOTTOM_IN = _MARGIN_IN
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class SheetCell:
-    """A contestant on a scenario; without a picture nobody judged one."""
-
-    row: Row
-    picture: PictureShown | None
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class SheetRow:
-    """A scenario with its cells in the order of the table."""
-
-    scenario: Scenario
-    cells: tuple[SheetCell, ...]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ContactSheet:
-    """What is on the sheet, and what stands above it."""
-
-    study: str
-    rating: str
-    simulated: bool
-    rows: tuple[SheetRow, ...]
-
-
-def contact_sheet(
-    snapshot: Snapshot, table: LeaderboardTable, scenarios: Sequence[Scenario]
-) -> ContactSheet:
-    """The pictures of these scenarios; three queries."""
-    found = sheet_rows(snapshot, [one.pk for one in scenarios])
-    return ContactSheet(
-        study=snapshot.study.name,
-        rating=str(snapshot.code),
-        simulated=snapshot.includes_simulated,
-        rows=tuple(
-            SheetRow(
-                scenario=one,
-                cells=tuple(
-                    SheetCell(row=row, picture=found[one.pk].get(row.slug)) for row in table.rows
-                ),
-            )
-            for one in scenarios
-        ),
-    )
-
-
-def sheet_pdf(sheet: ContactSheet) -> bytes:
-    """The sheet as pages of A4."""
+def contact_sheet(snapshot: Snapshot, scenarios: Sequence[Scenario]) -> bytes:
+    """Every contestant's picture on these scenarios with the votes on it, as a PDF of A4 pages."""
     from matplotlib.backends.backend_pdf import PdfPages
 
     content = io.BytesIO()
-    nothing = {"CreationDate": None, "Creator": None, "Producer": None}
-    with house_style(), PdfPages(content, metadata=nothing) as pages:
-        for figure in _pages(sheet):
+    with house_style(), PdfPages(content, metadata=NO_METADATA["pdf"]) as pages:
+        for figure in _pages(snapshot, scenarios):
             pages.savefig(figure)
     return content.getvalue()
 
 
-# --- Private -----------------------------------------------------------------------------------
-
-
-def _pages(sheet: ContactSheet) -> Iterator[Figure]:
+def _pages(snapshot: Snapshot, scenarios: Sequence[Scenario]) -> Iterator[Figure]:
     """One figure a page; a scenario whose cells don't fit any more begins a new one."""
-    from matplotlib.figure import Figure
-
-    figure, top = None, 0.0
-    for row in sheet.rows:
-        lines = -(-len(row.cells) // _ACROSS)
-        high = _CAPTION_IN_contact_sheet + lines * _LINE_IN
-        if figure is None or top - high < _BOTTOM_IN:
-            if figure is not None:
-                yield figure
-            figure = Figure(figsize=PAGE_IN)
-            _head(figure, sheet)
-            top = PAGE_IN[1] - _MARGIN_IN - _HEAD_IN_contact_sheet
-        _row(figure, row, top)
-        top -= high + _GAP_IN
-    if figure is None:
-        figure = Figure(figsize=PAGE_IN)
-        _head(figure, sheet)
+    rows = leaderboard_table(snapshot).rows
+    shown = pictures_by_scenario(snapshot, [scenario.pk for scenario in scenarios])
+    high_in = _CAPTION_IN + -(-len(rows) // _ACROSS) * _LINE_IN
+    first_in = _PAGE_IN[1] - _MARGIN_IN - 0.35
+    figure, top_in = _new_page(snapshot), first_in
+    for scenario in scenarios:
+        if top_in - high_in < _MARGIN_IN and top_in < first_in:
+            yield figure
+            figure, top_in = _new_page(snapshot), first_in
+        text = f"{scenario.slug}: {' '.join(scenario.instruction.split())}"
+        lines = "\n".join(textwrap.wrap(text, width=170, max_lines=2))
+        x, y = _MARGIN_IN / _PAGE_IN[0], top_in / _PAGE_IN[1]
+        figure.text(x, y, lines, fontsize=7.5, color=INK, va="top")
+        for n, row in enumerate(rows):
+            line, column = divmod(n, _ACROSS)
+            left_in = _MARGIN_IN + column * _CELL_IN
+            bottom_in = top_in - _CAPTION_IN - line * _LINE_IN - _PICTURE_IN
+            _draw_cell(figure, row, shown[scenario.pk].get(row.slug), left_in, bottom_in)
+        top_in -= high_in + _GAP_IN
     yield figure
 
 
-def _head(figure: Figure, sheet: ContactSheet) -> None:
-    y = 1.0 - _MARGIN_IN / PAGE_IN[1]
-    x = _MARGIN_IN / PAGE_IN[0]
-    mark = " (simulated)" if sheet.simulated else ""
-    figure.text(x, y, f"{sheet.study}{mark}", fontsize=11, fontweight="bold", color=INK, va="top")
-    said = f"Rating {sheet.rating[:8]}. Beneath each picture: votes won, tied, lost."
-    figure.text(1.0 - x, y, said, fontsize=7, color=SOFT, ha="right", va="top")
+def _new_page(snapshot: Snapshot) -> Figure:
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=_PAGE_IN)
+    x, y = _MARGIN_IN / _PAGE_IN[0], 1.0 - _MARGIN_IN / _PAGE_IN[1]
+    name = shown_name(snapshot.study.name, snapshot.includes_simulated)
+    figure.text(x, y, name, fontsize=11, fontweight="bold", color=INK, va="top")
+    rating = str(snapshot.code)[:8]
+    text = f"Rating {rating}. Beneath each picture: votes won, tied, lost."
+    figure.text(1.0 - x, y, text, fontsize=7, color=SOFT, ha="right", va="top")
+    return figure
 
 
-def _row(figure: Figure, row: SheetRow, top_in: float) -> None:
-    instruction = " ".join(row.scenario.instruction.split())
-    said = textwrap.wrap(f"{row.scenario.slug}: {instruction}", width=170, max_lines=2)
-    figure.text(
-        _MARGIN_IN / PAGE_IN[0], top_in / PAGE_IN[1], "\n".join(said), fontsize=7.5, color=INK,
-        va="top",
-    )  # fmt: skip
-    for n, cell in enumerate(row.cells):
-        line, column = divmod(n, _ACROSS)
-        left_in = _MARGIN_IN + column * _CELL_IN
-        bottom_in = top_in - _CAPTION_IN_contact_sheet - line * _LINE_IN - _PICTURE_IN
-        _cell(figure, cell, left_in, bottom_in)
-
-
-def _cell(figure: Figure, cell: SheetCell, left_in: float, bottom_in: float) -> None:
-    wide, high = PAGE_IN
-    axes = figure.add_axes(
-        (left_in / wide, bottom_in / high, (_CELL_IN - _GAP_IN) / wide, _PICTURE_IN / high)
+def _draw_cell(
+    figure: Figure, row: Row, picture: PictureShown | None, left_in: float, bottom_in: float
+) -> None:
+    wide, high = _PAGE_IN
+    width_in = _CELL_IN - _GAP_IN
+    box = (left_in / wide, bottom_in / high, width_in / wide, _PICTURE_IN / high)
+    pixels = None if picture is None else shrunken_picture(picture.image, _SHRUNK_PX)
+    word = "no votes" if picture is None else "no picture"
+    _fill_frame(
+        figure.add_axes(box), pixels, word, is_simulated=row.simulated, size=14.0, line=0.4
     )
+    name = textwrap.shorten(row.model, width=38, placeholder="…")
+    below: dict[str, Any] = {"y": (bottom_in - 0.05) / high, "fontsize": 6.5, "va": "top"}
+    figure.text(left_in / wide, s=name, color=SIMULATED if row.simulated else INK, **below)
+    if picture is not None:
+        score = f"{picture.score.wins}, {picture.score.ties}, {picture.score.losses}"
+        figure.text((left_in + width_in) / wide, s=score, color=SOFT, ha="right", **below)
+
+
+def _fill_frame(
+    axes: Axes, pixels: Any | None, word: str, *, is_simulated: bool, size: float, line: float
+) -> None:
+    """Draw a picture or a word instead; a simulated one is stamped, as it may be cut out."""
     axes.set_xticks([])
     axes.set_yticks([])
     axes.spines[:].set_color(SOFT)
-    axes.spines[:].set_linewidth(0.4)
-    picture = cell.picture
-    colours = None if picture is None else shrunken_picture(picture.image, _SHRUNK_PX)
-    if picture is None:
-        axes.text(0.5, 0.5, "no votes", ha="center", va="center", fontsize=7, color=SOFT)
-    elif colours is None:
-        axes.text(0.5, 0.5, "no picture", ha="center", va="center", fontsize=7, color=SOFT)
-    else:
-        axes.imshow(colours)
-        if cell.row.simulated:
-            stamp_simulated(axes, size=14)
-    score = "" if picture is None else _score(picture)
-    name = textwrap.shorten(cell.row.model, width=38, placeholder="…")
-    colour = SIMULATED if cell.row.simulated else INK
-    y = (bottom_in - 0.05) / high
-    right_in = left_in + _CELL_IN - _GAP_IN
-    figure.text(left_in / wide, y, name, fontsize=6.5, color=colour, va="top")
-    figure.text(right_in / wide, y, score, fontsize=6.5, color=SOFT, ha="right", va="top")
-
-
-def _score(picture: PictureShown) -> str:
-    score = picture.score
-    return f"{score.wins}, {score.ties}, {score.losses}"
+    axes.spines[:].set_linewidth(line)
+    centred: dict[str, Any] = {"transform": axes.transAxes, "ha": "center", "va": "center"}
+    if pixels is None:
+        axes.text(0.5, 0.5, word, fontsize=7.5, color=SOFT, **centred)
+        return
+    axes.imshow(pixels)
+    if is_simulated:
+        axes.text(
+            0.5, 0.5, "SIMULATED", rotation=25, fontsize=size, fontweight="bold",
+            color=SIMULATED, alpha=0.3, **centred,
+        )  # fmt: skip

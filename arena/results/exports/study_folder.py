@@ -20,9 +20,9 @@ from arena.errors import ArenaError
 from arena.exports.jobs.displacement_objects import csv_bytes as objects_csv
 from arena.exports.jobs.displacement_objects import object_rows
 from arena.models import Matchup, Snapshot, Study, Vote
-from arena.results.exports.bundle import MANIFEST as RATING_MANIFEST
-from arena.results.exports.bundle import bundle_files
 from arena.results.exports.closure import Closure, close_over, travelling_rows
+from arena.results.exports.writers import MANIFEST as RATING_MANIFEST
+from arena.results.exports.writers import bundle_files
 from arena.results.services.stored_rows import (
     applied_migrations,
     as_line,

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from operator import attrgetter
 from typing import Any
 
 from django.db.models import F
@@ -53,6 +51,11 @@ class Row(Line):
         """The name, with "(simulated)" where that is so."""
         return shown_name(self.name, self.simulated)
 
+    @property
+    def score_text(self) -> str:
+        """The mean score of a vote, a dash without votes."""
+        return f"{self.score_percent} %" if self.votes else "–"
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LeaderboardTable:
@@ -98,17 +101,23 @@ class LeaderboardTable:
     def method_text(self) -> str:
         """How the numbers came about, in one line."""
         adjusted = f", adjusted for {', '.join(self.covariates)}" if self.covariates else ""
-        return f"{METHOD_TEXTS[self.method]}{adjusted}, {intervals_text(self)}, seed {self.seed}"
+        unit = UNIT_TEXTS[self.unit]
+        intervals = (
+            f"in closed form, clustered by {unit}"
+            if self.is_closed_form
+            else f"by {self.rounds} resamples of {unit}"
+        )
+        method = METHOD_TEXTS[self.method]
+        return f"{method}{adjusted}, 95 % intervals {intervals}, seed {self.seed}"
 
     @property
-    def intervals_note(self) -> dict[str, str]:
-        """How intervals were found, for documents; older ratings had no word for resamples."""
-        return {"intervals": self.intervals} if self.is_closed_form else {}
+    def notes_on_method(self) -> dict[str, Any]:
+        """How intervals were found and what is adjusted for, for documents.
 
-    @property
-    def adjusted_note(self) -> dict[str, list[str]]:
-        """What the ratings are adjusted for, for documents."""
-        return {"covariates": list(self.covariates)} if self.covariates else {}
+        Older ratings had no word for resamples.
+        """
+        notes: dict[str, Any] = {"intervals": self.intervals} if self.is_closed_form else {}
+        return notes | ({"covariates": list(self.covariates)} if self.covariates else {})
 
     @property
     def is_closed_form(self) -> bool:
@@ -138,19 +147,11 @@ class LeaderboardTable:
         return len({row.part for row in self.rows if row.rating is not None}) > 1
 
 
-def intervals_text(table: LeaderboardTable) -> str:
-    """How intervals were found."""
-    unit = UNIT_TEXTS[table.unit]
-    if table.is_closed_form:
-        return f"95 % intervals in closed form, clustered by {unit}"
-    return f"95 % intervals by {table.rounds} resamples of {unit}"
-
-
 def leaderboard_table(snapshot: Snapshot) -> LeaderboardTable:
     """The table of a snapshot, best first; one query."""
     lines = snapshot.standings.select_related("contestant")
     standings = list(lines.order_by(F("rating").desc(nulls_last=True), "slug"))
-    board = snapshot.results.board
+    board, adjustment = snapshot.results.board, snapshot.results.adjustment
     reasons = (snapshot.reason,) if board.reasons is None else board.reasons
     last = len(standings)
     standings.sort(key=lambda standing: board.parts.get(standing.slug, last))
@@ -182,7 +183,7 @@ def leaderboard_table(snapshot: Snapshot) -> LeaderboardTable:
         simulated=snapshot.includes_simulated,
         early=snapshot.is_early,
         notes=tuple(filter(None, board.warnings)),
-        covariates=_covariates(snapshot),
+        covariates=tuple(effect.name for effect in adjustment.effects) if adjustment else (),
         preregistration=preregistration_sha256(snapshot.study),
         hypotheses=answer_hypotheses(snapshot),
     )
@@ -197,22 +198,10 @@ def for_experts(table: LeaderboardTable) -> LeaderboardTable:
     return replace(table, left_out=left_out)
 
 
-def _covariates(snapshot: Snapshot) -> tuple[str, ...]:
-    """None where the votes do not determine what these are worth."""
-    found = snapshot.results.adjustment
-    return tuple(one.name for one in found.effects) if found else ()
-
-
-def _options(standing: Standing) -> str:
-    """What a contestant was fixed to when it first ran, which nothing changes any more."""
-    who = standing.contestant
-    fixed = None if who is None else who.frozen_options
-    return json.dumps(fixed, sort_keys=True) if fixed else ""
-
-
 def _row(standing: Standing, part: int) -> Row:
-    name, variant = standing.name, standing.variant
+    name, variant, who = standing.name, standing.variant, standing.contestant
     last_word = name.rpartition(" ")[2]
+    fixed = who.frozen_options if who else None
     return Row(
         name=name,
         variant=last_word if variant and last_word.lower() == variant.lower() else "",
@@ -220,82 +209,82 @@ def _row(standing: Standing, part: int) -> Row:
         kind=standing.kind,
         simulated=standing.is_simulated,
         part=part,
-        options=_options(standing),
+        options=json.dumps(fixed, sort_keys=True) if fixed else "",
         **stored_values(standing),
     )
-
-
-ELO_POINTS, VOTES, PLACE, PERCENT = "Elo points", "votes", "place", "%"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Column:
     """A column, and where it stands: nowhere where the name for a place is empty.
 
+    A new column is an entry at the end of COLUMNS, so that what reads files by position goes on;
+    one that is stored needs a field of `arena.rating.lines.Line` and, with a migration, of
+    `Standing`.
+
     Attributes:
-        name: In CSV and Parquet.
-        kind: What Parquet holds.
-        unit: Empty for words.
-        value: Of a contestant's row; of the whole table with `of_table`.
+        field: Of a contestant's row; of the whole table with `of_table`.
+        name: In CSV and Parquet; `kind` is what Parquet holds.
         key: In JSON.
         printed: Its head in LaTeX and in the terminal.
         page: Its head on the page.
-        text: How a value is printed, in LaTeX, in the terminal and on the page.
+        text_field: What is printed, in LaTeX, in the terminal and on the page.
         identifies: Says whose line it is, which stands first in JSON and where it is printed.
     """
 
-    value: Callable[[Any], object]
-    kind: str = TEXT
-    unit: str = ""
+    field: str
     name: str = ""
+    kind: str = TEXT
     key: str = ""
     printed: str = ""
-    page: str | None = None
-    text: Callable[[Row], str] = str
+    page: str = ""
+    text_field: str = ""
     identifies: bool = False
     of_table: bool = False
 
     def value_of(self, table: LeaderboardTable, row: Row) -> object:
         """What stands in files."""
-        return self.value(table if self.of_table else row)
+        return getattr(table if self.of_table else row, self.field)
+
+    def text(self, row: Row) -> str:
+        """What is printed."""
+        return str(getattr(row, self.text_field or self.field))
 
 
-def _column(name: str, kind: str = TEXT, field: str = "", **more: Any) -> Column:
-    """Of a field of the row, called alike in JSON."""
-    field = field or name
-    settings: dict[str, Any] = {"key": name, "text": lambda row: str(getattr(row, field))} | more
-    return Column(name=name, kind=kind, value=attrgetter(field), **settings)
+def _column(name: str, kind: str = TEXT, **more: Any) -> Column:
+    """A column that is called in JSON, and in the row unless said otherwise, as in files."""
+    return Column(**{"field": name, "name": name, "kind": kind, "key": name} | more)
+
+
+def _column_of_table(name: str, kind: str = TEXT, field: str = "") -> Column:
+    return Column(field=field or name, name=name, kind=kind, of_table=True)
 
 
 COLUMNS = (
-    _column("rank", WHOLE, unit=PLACE, printed="Rank", page="Rank",
-            text=attrgetter("rank_text")),
+    _column("rank", WHOLE, printed="Rank", page="Rank", text_field="rank_text"),
     _column("model", printed="Model", page="Contestant", identifies=True),
-    _column("elo", NUMBER, "rating", unit=ELO_POINTS, key="rating", printed="Elo",
-            page="Elo", text=attrgetter("elo_text")),
-    _column("lower", NUMBER, unit=ELO_POINTS),
-    _column("upper", NUMBER, unit=ELO_POINTS),
-    Column(value=attrgetter("interval_text"), unit=ELO_POINTS, printed="95% CI",
-           page="95 % CI", text=attrgetter("interval_text")),
-    _column("votes", WHOLE, unit=VOTES, printed="Votes", page="Votes"),
-    Column(value=attrgetter("score_percent"), unit=PERCENT, page="Score",
-           text=lambda row: f"{row.score_percent} %" if row.votes else "–"),
-    _column("wins", WHOLE, unit=VOTES, page="Won"),
-    _column("ties", WHOLE, unit=VOTES, page="Tied"),
-    _column("losses", WHOLE, unit=VOTES, page="Lost"),
+    _column("elo", NUMBER, field="rating", key="rating", printed="Elo", page="Elo",
+            text_field="elo_text"),
+    _column("lower", NUMBER),
+    _column("upper", NUMBER),
+    Column(field="interval_text", printed="95% CI", page="95 % CI"),
+    _column("votes", WHOLE, printed="Votes", page="Votes"),
+    Column(field="score_text", page="Score"),
+    _column("wins", WHOLE, page="Won"),
+    _column("ties", WHOLE, page="Tied"),
+    _column("losses", WHOLE, page="Lost"),
     _column("slug", identifies=True),
     _column("kind", identifies=True),
     _column("simulated", YES_NO, identifies=True),
     _column("note"),
-    _column("study", key="", of_table=True),
-    _column("method", field="method_text", key="", of_table=True),
-    _column("study_simulated", YES_NO, "simulated", key="", of_table=True),
-    _column("early", YES_NO, key="", of_table=True),
-    _column("rank_best", WHOLE, unit=PLACE),
-    _column("rank_worst", WHOLE, unit=PLACE),
-    _column("preregistration", key="", of_table=True),
-    Column(value=attrgetter("ranks_text"), unit=PLACE, printed="95% ranks",
-           text=attrgetter("ranks_text")),
+    _column_of_table("study"),
+    _column_of_table("method", field="method_text"),
+    _column_of_table("study_simulated", YES_NO, "simulated"),
+    _column_of_table("early", YES_NO),
+    _column("rank_best", WHOLE),
+    _column("rank_worst", WHOLE),
+    _column_of_table("preregistration"),
+    Column(field="ranks_text", printed="95% ranks"),
     _column("options"),
 )  # fmt: skip
 
@@ -304,36 +293,3 @@ ON_PAGE = tuple(column for column in COLUMNS if column.page)
 _WHOSE_FIRST = sorted(COLUMNS, key=lambda column: not column.identifies)
 IN_JSON = tuple(column for column in _WHOSE_FIRST if column.key)
 PRINTED = tuple(column for column in _WHOSE_FIRST if column.printed)
-
-
-HYPOTHESIS_COLUMNS = ("hypothesis", "better", "other", "verdict", "difference", "p_adjusted")
-
-
-def hypothesis_row(one: Answered) -> list[object]:
-    """A line of a table; what no number answers is empty."""
-    better, other = one.hypothesis.above or ("", "")
-    return [one.hypothesis.text, better, other, one.verdict or "", one.difference, one.p]
-
-
-def hypotheses_document(answered: Sequence[Answered]) -> list[dict[str, Any]]:
-    """For JSON."""
-    return [
-        {
-            "hypothesis": one.hypothesis.text,
-            "above": list(one.hypothesis.above) if one.hypothesis.above else None,
-            "verdict": one.verdict,
-            "difference": None if one.difference is None else round(one.difference, 2),
-            "p_adjusted": one.p,
-        }
-        for one in answered
-    ]
-
-
-def hypothesis_line(one: Answered) -> str:
-    """For a terminal."""
-    if one.verdict is None:
-        return f"Hypothesis: {one.hypothesis.text}"
-    numbers = [] if one.difference is None else [f"{one.difference:+.0f} points"]
-    if one.p is not None:
-        numbers.append(f"p {one.p:.3f} adjusted")
-    return f"Hypothesis: {one.hypothesis.text}: {one.verdict} ({', '.join(numbers) or 'unrated'})."

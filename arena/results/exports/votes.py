@@ -1,4 +1,4 @@
-"""The votes of a rating as a file, in the column form of Chatbot Arena, with pseudonyms."""
+"""Votes as files: those of a rating in the column form of Chatbot Arena, and a list of any."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from arena.exports.formats import TEXT, WHOLE, YES_NO, Format, formats, parquet_
 from arena.models import Snapshot, Study
 from arena.results.queries.evidence import ListedVote, each_vote
 from arena.results.queries.search import VoteSearch
-from arena.results.queries.votes import last_vote_of, votes_up_to
+from arena.results.queries.votes import RATED, Filters, current_votes, last_vote_of
 from arena.results.services.ratings import votes_of, votes_version_of
 from arena.results.services.vote_files import (
     BOTH_BAD,
@@ -17,17 +17,17 @@ from arena.results.services.vote_files import (
     VERSION,
     WINNERS,
     Row,
+    vote_columns,
     vote_rows,
     votes_csv,
 )
-from arena.results.services.vote_files import vote_columns as columns_of
 from arena.services.cells import csv_parts
 
-_KINDS = dict.fromkeys(COLUMNS, TEXT) | {
-    "ms_visible": WHOLE,
-    "simulated": YES_NO,
-    "position": WHOLE,
-}
+_KINDS = {"ms_visible": WHOLE, "simulated": YES_NO, "position": WHOLE}
+
+LIST_COLUMNS = (*COLUMNS, "mark", "reason", "vote")
+"""Those of the rating's own file, then why a vote does not count ("counted" where it does), why it
+was skipped, and the code in its address."""
 
 
 class VoteTable(NamedTuple):
@@ -49,38 +49,30 @@ def vote_table(snapshot: Snapshot) -> VoteTable:
 
 def unrated_votes(study: Study) -> VoteTable:
     """The votes of a study that nobody rates, repeats and checks by their kind; no skips."""
-    current, _ = votes_up_to(study, last_vote_of(study))
-    decided = [vote for vote in current if vote.outcome in WINNERS]
+    current = current_votes(study, Filters(), last_vote_of(study))
+    decided = [vote for vote in current if vote.outcome in RATED]
     names = {vote.judge: vote.judge_name for vote in decided}
     return VoteTable(version=VERSION, rows=list(vote_rows(decided, names)))
 
 
-def csv_of(table: VoteTable) -> bytes:
-    """The file whose hash the snapshot keeps."""
-    return votes_csv(table.rows, table.version)
-
-
 def parquet_of(table: VoteTable) -> bytes:
-    """The same columns, typed; nothing is guarded, as no spreadsheet reads it."""
-    names = columns_of(table.version)
+    """The columns of the CSV file, typed; nothing is guarded, as no spreadsheet reads it."""
+    names = vote_columns(table.version)
     rows = (row[: len(names)] for row in table.rows)
-    return parquet_bytes({name: _KINDS[name] for name in names}, rows)
+    return parquet_bytes({name: _KINDS.get(name, TEXT) for name in names}, rows)
 
 
-VOTE_FORMATS: dict[str, Format[VoteTable]] = formats(csv=csv_of, parquet=parquet_of)
-
-
-LIST_COLUMNS = (*COLUMNS, "mark", "reason", "vote")
-"""Those of the rating's own file, then why a vote does not count ("counted" where it does), why it
-was skipped, and the code in its address."""
+VOTE_FORMATS: dict[str, Format[VoteTable]] = formats(
+    csv=lambda table: votes_csv(table.rows, table.version), parquet=parquet_of
+)
 
 
 def vote_list_csv(snapshot: Snapshot, search: VoteSearch) -> Iterator[bytes]:
-    """The file, some lines at a time; names are pseudonyms, no cell is a formula."""
-    return csv_parts(LIST_COLUMNS, map(_row, each_vote(snapshot, search)))
+    """All votes that are looked for, some lines at a time; names are pseudonyms."""
+    return csv_parts(LIST_COLUMNS, map(_list_row, each_vote(snapshot, search)))
 
 
-def _row(vote: ListedVote) -> tuple[object, ...]:
+def _list_row(vote: ListedVote) -> tuple[object, ...]:
     return (
         vote.left.slug,
         vote.right.slug,

@@ -1,4 +1,4 @@
-"""What is looked for among the votes of a rating, parsed from the address once."""
+"""The evidence of a rating: votes with their pictures, as a grid, a file, or one at a time."""
 
 from __future__ import annotations
 
@@ -13,26 +13,15 @@ from django.shortcuts import get_object_or_404, render
 from django.utils.text import slugify
 from django.views.decorators.http import require_safe
 
-from arena.errors import NoSnapshot
-from arena.models import Matchup, Snapshot, Study
+from arena.models import ImportedVote, Matchup, Snapshot, Study
 from arena.models.votes import AID_LABELS
 from arena.queries.people import natural_order
-from arena.results.exports.tables import LeaderboardTable, leaderboard_table
+from arena.results.exports.tables import shown_name
 from arena.results.exports.votes import vote_list_csv
-from arena.results.pages.ratings import asked_rating, get_readable_study
-from arena.results.queries.access import snapshot_to_export
+from arena.results.pages.ratings import get_readable_study, get_snapshot
 from arena.results.queries.evidence import neighbours, vote_in, vote_page
-from arena.results.queries.search import (
-    AUTOMATIC_TIE,
-    COUNTED,
-    EVERY,
-    LEFT_OUT,
-    SoughtOrder,
-    SoughtOutcome,
-    SoughtPart,
-    VoteSearch,
-)
-from arena.results.queries.votes import AUTOMATIC, is_imported, is_scenario_of
+from arena.results.queries.search import MARKS, ORDERS, OUTCOMES, PARTS, VoteSearch
+from arena.results.queries.votes import AUTOMATIC, COUNTED, is_imported
 from arena.voting.queries.showings import describe_in_words, picture_of_side
 from arena.web.access import STAFF, allow_only
 from arena.web.listing import page_asked
@@ -40,47 +29,7 @@ from arena.web.pictures import sized_picture_response
 from augment.services.running.jobs import HIGHEST_SAMPLES
 from augment.services.scenarios.types import type_choices
 
-OUTCOMES = {
-    SoughtOutcome.WON: "The contestant won",
-    SoughtOutcome.TIED: "Tied",
-    SoughtOutcome.LOST: "The contestant lost",
-    SoughtOutcome.LEFT: "A is better",
-    SoughtOutcome.EQUAL: "Equal",
-    SoughtOutcome.RIGHT: "B is better",
-    SoughtOutcome.DECIDED: "A or B is better",
-    SoughtOutcome.BOTH_MISS: "Equal, both miss the instruction",
-    SoughtOutcome.SKIP: "Skipped",
-}
-PARTS = {
-    SoughtPart.COMMENTED: "With a comment",
-    SoughtPart.FAST: "Under 1 s",
-    SoughtPart.OWN: "By authors on their own contestants",
-    SoughtPart.REPEATS: "Hidden repeats of counted votes",
-    SoughtPart.ALIKE: "Hidden repeats answered alike",
-    SoughtPart.CHECKS: "Attention checks answered",
-    SoughtPart.PASSED: "Attention checks passed",
-    SoughtPart.CHECKS_SKIPPED: "Attention checks skipped",
-    SoughtPart.SHARED: "On what others judged as well",
-}
-ORDERS = {
-    SoughtOrder.DISPUTED: "Most disputed",
-    SoughtOrder.LOST: "Most often beaten",
-    SoughtOrder.FAULTS: "Most faults",
-    SoughtOrder.SCENARIO: "Scenarios by name",
-}
-MARKS = {
-    COUNTED: "Counted",
-    EVERY: "All",
-    LEFT_OUT: "Left out",
-    "superseded": "Left out: changed later",
-    "check": "Left out: attention checks",
-    "repeat": "Left out: hidden repeats",
-    "skip": "Left out: skipped",
-    "simulated": "Left out: simulated",
-    "filtered": "Left out: not asked for",
-    "own": "Left out: by authors on their own contestants",
-    AUTOMATIC_TIE: "Not shown: nobody can tell the pictures apart",
-}
+_ALL = ("", "all")
 
 
 class VoteSearchForm(forms.Form):
@@ -88,48 +37,52 @@ class VoteSearchForm(forms.Form):
 
     contestant = forms.ChoiceField(label="Contestant", required=False)
     opponent = forms.ChoiceField(label="Against", required=False)
-    outcome = forms.ChoiceField(label="Outcome", required=False)
-    type = forms.ChoiceField(label="Scenario type", required=False)
+    outcome = forms.ChoiceField(label="Outcome", required=False, choices=[_ALL, *OUTCOMES.items()])
+    type = forms.ChoiceField(
+        label="Scenario type", required=False, choices=lambda: [_ALL, *type_choices()]
+    )
     scenario = forms.CharField(label="Scenario", required=False, max_length=200)
     sample = forms.IntegerField(
         label="Sample", required=False, min_value=1, max_value=HIGHEST_SAMPLES
     )
     expert = forms.ChoiceField(label="Expert", required=False)
-    mark = forms.ChoiceField(label="Counts", required=False)
-    part = forms.ChoiceField(label="Only", required=False)
-    aid = forms.ChoiceField(label="Looked with", required=False)
+    mark = forms.ChoiceField(label="Counts", required=False, choices=[*MARKS.items()])
+    part = forms.ChoiceField(label="Only", required=False, choices=[_ALL, *PARTS.items()])
+    aid = forms.ChoiceField(
+        label="Looked with", required=False, choices=[_ALL, *AID_LABELS.items()]
+    )
     comment = forms.CharField(label="Words in the comment", required=False, max_length=200)
-    order = forms.ChoiceField(label="Begin with", required=False)
+    order = forms.ChoiceField(
+        label="Begin with", required=False, choices=[("", "First votes"), *ORDERS.items()]
+    )
 
-    def __init__(
-        self, query: Mapping[str, str], *, snapshot: Snapshot, names: Mapping[str, str]
-    ) -> None:
-        """Offer what the rating has; names of contestants by slug."""
+    def __init__(self, query: Mapping[str, str], *, snapshot: Snapshot) -> None:
+        """Offer what the rating has."""
         data = {name: query.get(name, "") for name in self.base_fields}
-        data["mark"] = data["mark"] or COUNTED
-        super().__init__(data)
-        self._snapshot = snapshot
-        everybody = ("", "all")
-        contestants = [everybody, *names.items()]
-        self._offer("contestant", contestants)
-        self._offer("opponent", contestants)
-        self._offer("outcome", [everybody, *_choices(OUTCOMES)])
-        self._offer("type", [everybody, *type_choices()])
-        self._offer("expert", [everybody, *_experts(snapshot)])
-        self._offer("mark", _choices(MARKS))
-        self._offer("part", [everybody, *_choices(PARTS)])
-        self._offer("aid", [everybody, *_choices(AID_LABELS)])
-        self._offer("order", [("", "First votes"), *_choices(ORDERS)])
-        if not snapshot.study.shows_all_samples:
-            del self.fields["sample"]
-        if is_imported(snapshot.study):
+        super().__init__(data | {"mark": data["mark"] or COUNTED})
+        self._study = snapshot.study
+        lines = snapshot.standings.order_by("name")
+        shown = [(line.slug, shown_name(line.name, line.is_simulated)) for line in lines]
+        fields: dict[str, Any] = self.fields
+        fields["contestant"].choices = fields["opponent"].choices = [_ALL, *shown]
+        fields["expert"].choices = [_ALL, *_experts(snapshot)]
+        if not self._study.shows_all_samples:
+            del fields["sample"]
+        if is_imported(self._study):
             for name in ("type", "part", "aid", "comment", "order"):
-                del self.fields[name]
+                del fields[name]
 
     def clean_scenario(self) -> str:
-        """A scenario that occurs."""
+        """A scenario that occurs, be it in attention checks alone."""
         slug: str = self.cleaned_data["scenario"].strip()
-        if slug and not is_scenario_of(self._snapshot, slug):
+        study = self._study
+        occurs = not slug or (
+            ImportedVote.objects.filter(file__study=study, item=slug).exists()
+            if is_imported(study)
+            else study.matchups.filter(scenario__slug=slug).exists()
+            or study.scenarios.filter(slug=slug).exists()
+        )
+        if not occurs:
             raise forms.ValidationError(
                 "There is no scenario “%(name)s” in this study.", params={"name": slug}
             )
@@ -141,58 +94,27 @@ class VoteSearchForm(forms.Form):
 
     def clean(self) -> dict[str, Any]:
         """Refuse what says nothing."""
-        found: dict[str, Any] = super().clean() or {}
-        contestant, outcome = found.get("contestant"), found.get("outcome")
-        if contestant and contestant == found.get("opponent"):
+        cleaned: dict[str, Any] = super().clean() or {}
+        contestant, outcome = cleaned.get("contestant"), cleaned.get("outcome")
+        if contestant and contestant == cleaned.get("opponent"):
             self.add_error("opponent", "Choose somebody else: nobody meets themselves.")
-        if outcome and not contestant and SoughtOutcome(outcome).needs_contestant:
-            if outcome == SoughtOutcome.TIED:
-                found["outcome"] = SoughtOutcome.EQUAL.value
-            else:
-                self.add_error("outcome", "Choose the contestant who won or lost.")
-        return found
+        if outcome in ("won", "lost") and not contestant:
+            self.add_error("outcome", "Choose the contestant who won or lost.")
+        return cleaned
 
     def search(self) -> VoteSearch:
-        """What is looked for, once the form is valid."""
-        return VoteSearch.of_query(self.cleaned_data)
-
-    def _offer(self, name: str, choices: list[tuple[str, Any]]) -> None:
-        field = self.fields[name]
-        assert isinstance(field, forms.ChoiceField)
-        field.choices = choices
-
-
-def _choices(labels: Mapping[Any, Any]) -> list[tuple[str, Any]]:
-    return [(str(value), label) for value, label in labels.items()]
-
-
-def _experts(snapshot: Snapshot) -> list[tuple[str, str]]:
-    """Pseudonyms as the rating kept them, and of the study's experts without a counted vote."""
-    names = {
-        str(code): name
-        for code, name in snapshot.study.experts.values_list("person__code", "person__pseudonym")
-    } | snapshot.results.judges
-    if AUTOMATIC in names:
-        names[AUTOMATIC] = "nobody: never shown"
-    names.pop("", None)
-    return sorted(names.items(), key=lambda item: natural_order(item[1]))
+        """What is looked for; everything that counts where the form is not valid."""
+        return VoteSearch.of_query(self.cleaned_data) if self.is_valid() else VoteSearch()
 
 
 @allow_only(*STAFF)
 @require_safe
 def votes_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """One page of the votes that the address looks for, with their pictures."""
-    study, snapshot, table = _rating(request, code)
-    form = _form(request, snapshot, table)
-    context = _context(study, snapshot, form) | {"search": None}
+    snapshot, form, context = _asked(request, code)
     if not form.is_valid():
         return render(request, "results/votes.html", context, status=422)
-    search = form.search()
-    context |= {
-        "search": search,
-        "page": vote_page(snapshot, search, page_asked(request)),
-        "query": _query(snapshot, search),
-    }
+    context["page"] = vote_page(snapshot, form.search(), page_asked(request))
     return render(request, "results/votes.html", context)
 
 
@@ -200,12 +122,10 @@ def votes_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
 @require_safe
 def votes_file(request: HttpRequest, code: uuid.UUID) -> HttpResponseBase:
     """All votes that the address looks for, as CSV."""
-    study, snapshot, table = _rating(request, code)
-    form = _form(request, snapshot, table)
+    snapshot, form, context = _asked(request, code)
     if not form.is_valid():
-        context = _context(study, snapshot, form) | {"search": None}
         return render(request, "results/votes.html", context, status=422)
-    name = f"{slugify(study.name) or 'study'}-votes-list.csv"
+    name = f"{slugify(snapshot.study.name) or 'study'}-votes-list.csv"
     return StreamingHttpResponse(
         vote_list_csv(snapshot, form.search()),
         content_type="text/csv; charset=utf-8",
@@ -217,22 +137,17 @@ def votes_file(request: HttpRequest, code: uuid.UUID) -> HttpResponseBase:
 @require_safe
 def single_vote_page(request: HttpRequest, code: uuid.UUID, vote: uuid.UUID) -> HttpResponse:
     """One vote: the pair as it was shown, what was decided how, and who drew what."""
-    study, snapshot, table = _rating(request, code)
-    form = _form(request, snapshot, table)
-    search = form.search() if form.is_valid() else VoteSearch()
-    found = vote_in(snapshot, vote)
-    if found is None:
+    snapshot, form, context = _asked(request, code)
+    single = vote_in(snapshot, vote)
+    if single is None:
         raise Http404
-    matchup = found.vote.matchup
-    described = matchup.descriptions and [describe_in_words(side) for side in matchup.descriptions]
-    context = _context(study, snapshot, form) | {
-        "search": search,
-        "query": _query(snapshot, search),
-        "found": found,
-        "vote": found.vote,
+    matchup = single.vote.matchup
+    context |= {
+        "found": single,
+        "vote": single.vote,
         "matchup": matchup,
-        "described": described,
-        "beside": neighbours(snapshot, search, found.vote),
+        "described": [describe_in_words(side) for side in matchup.descriptions or ()],
+        "beside": neighbours(snapshot, form.search(), single.vote),
     }
     return render(request, "results/vote.html", context)
 
@@ -256,30 +171,33 @@ def shown_picture(
 # --- Private -----------------------------------------------------------------------------------
 
 
-def _rating(request: HttpRequest, code: uuid.UUID) -> tuple[Study, Snapshot, LeaderboardTable]:
-    study = get_readable_study(request, code)
-    try:
-        snapshot = snapshot_to_export(study, asked_rating(request))
-    except NoSnapshot as error:
-        raise Http404 from error
-    return study, snapshot, leaderboard_table(snapshot)
-
-
-def _form(request: HttpRequest, snapshot: Snapshot, table: LeaderboardTable) -> VoteSearchForm:
-    names = {row.slug: row.model for row in table.rows}
-    return VoteSearchForm(request.GET.dict(), snapshot=snapshot, names=names)
-
-
-def _context(study: Study, snapshot: Snapshot, form: VoteSearchForm) -> dict[str, Any]:
-    return {
+def _asked(
+    request: HttpRequest, code: uuid.UUID
+) -> tuple[Snapshot, VoteSearchForm, dict[str, Any]]:
+    """The rating, what is looked for, and what the templates of both pages need of them."""
+    study: Study = get_readable_study(request, code)
+    snapshot = get_snapshot(request, study)
+    form = VoteSearchForm(request.GET.dict(), snapshot=snapshot)
+    query = {"rating": str(snapshot.code), **form.search().as_query()}
+    context = {
         "study": study,
         "snapshot": snapshot,
         "form": form,
+        "search": form.search() if form.is_valid() else None,
+        "query": urlencode(query),
         "imported": is_imported(study),
         "is_staff": True,
     }
+    return snapshot, form, context
 
 
-def _query(snapshot: Snapshot, search: VoteSearch) -> str:
-    """What an address says of the rating and of what is looked for."""
-    return urlencode({"rating": str(snapshot.code), **search.as_query()})
+def _experts(snapshot: Snapshot) -> list[tuple[str, str]]:
+    """Pseudonyms as the rating kept them, and of the study's experts without a counted vote."""
+    names = {
+        str(code): name
+        for code, name in snapshot.study.experts.values_list("person__code", "person__pseudonym")
+    } | snapshot.results.judges
+    if AUTOMATIC in names:
+        names[AUTOMATIC] = "nobody: never shown"
+    names.pop("", None)
+    return sorted(names.items(), key=lambda item: natural_order(item[1]))

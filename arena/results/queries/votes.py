@@ -1,4 +1,4 @@
-"""Votes as a rating reads them, and who competes.
+"""The votes of a study as a rating reads them: which count, which do not and why, who competes.
 
 Votes of a study and votes of a file look alike from here on.
 """
@@ -6,33 +6,61 @@ Votes of a study and votes of a file look alike from here on.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
-from datetime import UTC
+from datetime import UTC, datetime
 from enum import StrEnum
-from typing import Any, NamedTuple
-from uuid import UUID
+from typing import Any, NamedTuple, TypeVar, cast
 
-from django.db.models import Case, Max, Q, QuerySet, Value, When
+from django.db.models import Case, F, Max, Model, Q, QuerySet, Value, When
 from django.db.models.fields import CharField
 
 from arena.models import ImportedVote, Person, Snapshot, Study, Vote
 from arena.pairing.order import CHECK, MAIN, REPEAT
 from arena.pairing.rules import Entry, grid_of, scenario_of
 from arena.pairing.settled import draw_ties
-from arena.results.queries.search import COUNTED
 from augment.errors import UnknownName
 from augment.models import Contestant
 from augment.services.scenarios.types import ScenarioType
 
+Row = TypeVar("Row", bound=Model)
+
 AUTOMATIC = "automatic"
 """A kind beside those of matchups: a tie on a pair that nobody can tell apart nor was shown."""
+
+IMPORTED = "imported"
+"""The kind of a contestant that is known by its name alone."""
 
 RATED = (Vote.Outcome.LEFT.value, Vote.Outcome.EQUAL.value, Vote.Outcome.RIGHT.value)
 """Outcomes that say something; a skip does not."""
 
-IMPORTED = "imported"
-"""The kind of a contestant that is known by its name alone."""
+IMPORTED_OUTCOMES = dict(
+    zip(
+        (ImportedVote.Outcome.FIRST.value, ImportedVote.Outcome.TIE.value,
+         ImportedVote.Outcome.SECOND.value, ImportedVote.Outcome.BOTH_BAD.value),
+        (*RATED, Vote.Outcome.EQUAL.value),
+        strict=True,
+    )
+)  # fmt: skip
+
+KINDS = (MAIN, REPEAT)
+"""What may be rated: planned showings, and on demand the hidden repeats of them."""
+
+COUNTED, AUTOMATIC_TIE = "counted", "automatic"
+"""Marks beside the reasons of `LeftOut`: what counts, and pairs that nobody can tell apart where
+the rating does not count them."""
+
+
+class LeftOut(StrEnum):
+    """Why a vote is no part of a rating. The first reason that fits is the one that is said."""
+
+    SUPERSEDED = "superseded"
+    CHECK = "check"
+    REPEAT = "repeat"
+    SKIP = "skip"
+    SIMULATED = "simulated"
+    FILTERED = "filtered"
+    OWN = "own"
 
 
 class Judged(NamedTuple):
@@ -42,7 +70,8 @@ class Judged(NamedTuple):
         judge: A lasting code, and `judge_name` the pseudonym.
         item: The scenario's slug, and `type` its type.
         left, right: Slugs of contestants.
-        outcome: left, equal or right.
+        outcome: left, equal, right or skip.
+        mark: Why it does not count, or COUNTED.
         matchup: Its row, and `repeat_of` the row of the matchup that it shows again.
         at: When it was given, in UTC as ISO 8601; empty where nobody knows, as in all below.
         position: Of the matchup in the expert's own order, from 1.
@@ -60,9 +89,10 @@ class Judged(NamedTuple):
     outcome: str
     both_miss: bool
     is_simulated: bool
-    ms_visible: int | None
-    matchup: int | None
-    repeat_of: int | None
+    mark: str = COUNTED
+    ms_visible: int | None = None
+    matchup: int | None = None
+    repeat_of: int | None = None
     at: str = ""
     position: int | None = None
     aids: str = ""
@@ -83,195 +113,10 @@ class Entrant:
 
     slug: str
     name: str
-    variant: str
-    kind: str
-    is_simulated: bool
-    contestant: Contestant | None
-
-
-def is_imported(study: Study) -> bool:
-    """Whether the votes came from a file."""
-    return hasattr(study, "vote_file")
-
-
-def last_vote_of(study: Study) -> int | None:
-    """The row of the newest vote, so that later ones can be told apart."""
-    votes = (
-        ImportedVote.objects.filter(file__study=study)
-        if is_imported(study)
-        else Vote.objects.filter(matchup__study=study)
-    )
-    found: int | None = votes.aggregate(last=Max("pk"))["last"]
-    return found
-
-
-def votes_up_to(study: Study, last: int | None) -> tuple[list[Judged], int]:
-    """The votes that were current at a row, oldest first, and how many were superseded by then.
-
-    Args:
-        study: A study of matchups, or one of votes from elsewhere.
-        last: See `last_vote_of`; None for none at all.
-    """
-    if is_imported(study):
-        return _imported(study, last), 0
-    current = _voted(study, last)
-    everything = Vote.objects.filter(matchup__study=study, pk__lte=last or 0).count()
-    return current, everything - len(current)
-
-
-def entrants_of(study: Study, votes: Iterable[Judged]) -> tuple[Entrant, ...]:
-    """Who competes, by slug: a study's contestants, or who occurs in the votes of a file."""
-    return _names(votes) if is_imported(study) else _contestants(study)
-
-
-def settled_ties(study: Study, lines: Iterable[Judged]) -> list[Judged]:
-    """Ties on the pairs that the study settled without showing; see arena.pairing.settled.
-
-    Args:
-        study: A study; one of votes from elsewhere has no such pairs.
-        lines: Its votes, which say how often a pair is judged, and by whom.
-    """
-    settled = [(place, one, other) for place, one, other in study.rules.get("identical", ())]
-    if not settled:
-        return []
-    by_judge: dict[str, list[Judged]] = {}
-    for line in lines:
-        if line.kind == MAIN and line.outcome in RATED:
-            by_judge.setdefault(line.judge, []).append(line)
-    types = dict(study.scenarios.values_list("slug", "type"))
-    drawn = draw_ties(
-        settled,
-        {judge: len(own) for judge, own in by_judge.items()},
-        showable=_count_showable(study),
-        seed=study.seed,
-    )
-    return [
-        Judged(
-            judge=judge, judge_name=by_judge[judge][0].judge_name, item=scenario_of(place),
-            type=types[scenario_of(place)], kind=AUTOMATIC, left=left, right=right,
-            outcome=Vote.Outcome.EQUAL.value, both_miss=False,
-            is_simulated=by_judge[judge][0].is_simulated, ms_visible=None, matchup=None,
-            repeat_of=None,
-        )
-        for (place, left, right), judge in drawn
-    ]  # fmt: skip
-
-
-def _count_showable(study: Study) -> int:
-    """How many pairs of pictures the planner may show."""
-    entries = tuple(Entry(**entry) for entry in study.rules["entries"])
-    alike = tuple((place, one, other) for place, one, other in study.rules.get("alike", ()))
-    return int(grid_of(entries, alike).showable.sum())
-
-
-def references() -> frozenset[str]:
-    """The slugs of the references, which win attention checks."""
-    rows = Contestant.objects.filter(kind=Contestant.Kind.REFERENCE)
-    return frozenset(rows.values_list("slug", flat=True))
-
-
-# --- Votes of a study --------------------------------------------------------------------------
-
-
-def _contestants(study: Study) -> tuple[Entrant, ...]:
-    return tuple(
-        Entrant(
-            slug=row.slug,
-            name=row.name,
-            variant=row.variant,
-            kind=row.kind,
-            is_simulated=row.is_simulated,
-            contestant=row,
-        )
-        for row in study.contestants.order_by("slug")
-    )
-
-
-def _voted(study: Study, last: int | None) -> list[Judged]:
-    """Four queries, whatever the number of votes."""
-    slugs = dict(Contestant.objects.values_list("pk", "slug"))
-    places = {
-        pk: (slug, kind) for pk, slug, kind in study.scenarios.values_list("pk", "slug", "type")
-    }
-    people = {
-        user: (str(code), name)
-        for user, code, name in Person.objects.values_list("user", "code", "pseudonym")
-    }
-    current = Q(superseded_by=None) | Q(superseded_by__pk__gt=last or 0)
-    rows = (
-        Vote.objects.filter(current, matchup__study=study, pk__lte=last or 0)
-        .order_by("pk")
-        .values_list(
-            "expert", "matchup__scenario", "matchup__kind", "shown_left__contestant",
-            "shown_right__contestant", "outcome", "both_miss", "is_simulated", "ms_visible",
-            "matchup", "matchup__repeat_of", "at", "matchup__position", "aids", "comment",
-            "shown_left__code", "shown_right__code",
-        )
-    )  # fmt: skip
-    return [
-        Judged(
-            *people[expert], *places[place], kind, slugs[left], slugs[right],
-            outcome, both_miss, simulated, ms, matchup, repeat_of,
-            at.astimezone(UTC).isoformat(timespec="milliseconds"), position, aids, comment,
-            str(left_code), str(right_code),
-        )
-        for (
-            expert, place, kind, left, right, outcome, both_miss, simulated, ms, matchup,
-            repeat_of, at, position, aids, comment, left_code, right_code
-        ) in rows.iterator(chunk_size=5000)
-    ]  # fmt: skip
-
-
-# --- Votes of a file ---------------------------------------------------------------------------
-
-_OUTCOMES = {
-    ImportedVote.Outcome.FIRST.value: Vote.Outcome.LEFT.value,
-    ImportedVote.Outcome.SECOND.value: Vote.Outcome.RIGHT.value,
-    ImportedVote.Outcome.TIE.value: Vote.Outcome.EQUAL.value,
-    ImportedVote.Outcome.BOTH_BAD.value: Vote.Outcome.EQUAL.value,
-}
-
-
-def _imported(study: Study, last: int | None) -> list[Judged]:
-    rows = (
-        ImportedVote.objects.filter(file__study=study, pk__lte=last or 0)
-        .order_by("line")
-        .values_list("first", "second", "outcome", "judge", "item")
-    )
-    return [
-        Judged(
-            judge=judge, judge_name=judge, item=item, type="", kind=MAIN, left=first, right=second,
-            outcome=_OUTCOMES[outcome], both_miss=outcome == ImportedVote.Outcome.BOTH_BAD.value,
-            is_simulated=study.allow_simulated, ms_visible=None, matchup=None, repeat_of=None,
-        )
-        for first, second, outcome, judge, item in rows.iterator(chunk_size=5000)
-    ]  # fmt: skip
-
-
-def _names(lines: Iterable[Judged]) -> tuple[Entrant, ...]:
-    found = sorted({name for line in lines for name in (line.left, line.right)})
-    return tuple(
-        Entrant(
-            slug=name, name=name, variant="", kind=IMPORTED, is_simulated=False, contestant=None
-        )
-        for name in found
-    )
-
-
-KINDS = (MAIN, REPEAT)
-"""What may be rated: planned showings, and on demand the hidden repeats of them."""
-
-
-class LeftOut(StrEnum):
-    """Why a vote is no part of a rating. The first reason that fits is the one that is said."""
-
-    SUPERSEDED = "superseded"
-    CHECK = "check"
-    REPEAT = "repeat"
-    SKIP = "skip"
-    SIMULATED = "simulated"
-    FILTERED = "filtered"
-    OWN = "own"
+    variant: str = ""
+    kind: str = IMPORTED
+    is_simulated: bool = False
+    contestant: Contestant | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -347,67 +192,128 @@ class VoteSet:
     left_out: dict[str, int]
 
 
-def vote_set(study: Study, *, filters: Filters, last: int | None) -> VoteSet:
-    """The votes of a study up to a row.
+def is_imported(study: Study) -> bool:
+    """Whether the votes came from a file."""
+    return hasattr(study, "vote_file")
 
-    Args:
-        study: A study of matchups, or one of votes from elsewhere.
-        filters: Which of its votes count.
-        last: See `judged.last_vote_of`; None for none at all.
+
+def last_vote_of(study: Study) -> int | None:
+    """The row of the newest vote, so that later ones can be told apart."""
+    votes: QuerySet[Any] = (
+        ImportedVote.objects.filter(file__study=study)
+        if is_imported(study)
+        else Vote.objects.filter(matchup__study=study)
+    )
+    last: int | None = votes.aggregate(last=Max("pk"))["last"]
+    return last
+
+
+def vote_set(study: Study, *, filters: Filters, last: int | None) -> VoteSet:
+    """The votes of a study up to a row, see `last_vote_of`; None for none at all.
 
     Raises:
         UnknownName: A filter names a type, a judge or a kind that does not occur.
     """
-    for kind in filters.kinds:
-        if kind not in KINDS:
-            raise UnknownName("kind of vote", kind, list(KINDS))
-    lines, superseded = votes_up_to(study, last)
-    entrants = entrants_of(study, lines)
-    automatic = [] if filters.leave_out_settled else settled_ties(study, lines)
-    _check(filters, [*lines, *automatic])
-    simulated = {entrant.slug for entrant in entrants if entrant.is_simulated}
-    marks = _marks(study, filters, last)
-    judged = [
-        (
-            line,
-            marks[line.matchup]
-            if line.matchup is not None
-            else why_left_out(line, filters, simulated, study.allow_simulated),
-        )
-        for line in [*lines, *automatic]
-    ]
-    left_out = Counter(reason.value for _, reason in judged if reason is not None)
-    left_out[LeftOut.SUPERSEDED.value] = superseded
-    checks = tuple(line for line, reason in judged if reason is LeftOut.CHECK)
+    votes = current_votes(study, filters, last)
+    given = len(votes)
+    if not filters.leave_out_settled:
+        votes += settled_ties(study, votes, filters)
+    _check_names(filters, votes)
+    left_out = Counter(vote.mark for vote in votes if vote.mark != COUNTED)
+    if not is_imported(study):
+        everything = Vote.objects.filter(matchup__study=study, pk__lte=last or 0).count()
+        left_out[LeftOut.SUPERSEDED.value] = everything - given
+    checks = tuple(vote for vote in votes if vote.mark == LeftOut.CHECK)
+    references = Contestant.objects.filter(kind=Contestant.Kind.REFERENCE)
     return VoteSet(
-        entrants=entrants,
-        counted=tuple(line for line, reason in judged if reason is None),
-        with_own=tuple(line for line, reason in judged if reason in (None, LeftOut.OWN)),
-        repeats=tuple(line for line, _ in judged if line.kind == REPEAT and line.outcome in RATED),
+        entrants=_entrants(study, votes),
+        counted=tuple(vote for vote in votes if vote.mark == COUNTED),
+        with_own=tuple(vote for vote in votes if vote.mark in (COUNTED, LeftOut.OWN)),
+        repeats=tuple(vote for vote in votes if vote.kind == REPEAT and vote.outcome in RATED),
         checks=checks,
-        references=references() if checks else frozenset(),
+        references=frozenset(references.values_list("slug", flat=True) if checks else ()),
         left_out={reason: number for reason, number in sorted(left_out.items()) if number},
     )
 
 
-def is_own_vote(line: Judged, filters: Filters) -> bool:
-    """Whether an author voted on a contestant of their own; settled ties are nobody's votes."""
-    return line.kind != AUTOMATIC and filters.is_own(line.judge, line.left, line.right)
+def current_votes(study: Study, filters: Filters, last: int | None) -> list[Judged]:
+    """The votes that were current at a row, oldest first, with their marks."""
+    if is_imported(study):
+        lines = marked_lines(study, filters, last).order_by("line")
+        names = ("first", "second", "outcome", "judge", "item", F("mark"))
+        return [
+            Judged(
+                judge=judge, judge_name=judge, item=item, type="", kind=MAIN, left=first,
+                right=second, outcome=IMPORTED_OUTCOMES[outcome],
+                both_miss=outcome == ImportedVote.Outcome.BOTH_BAD,
+                is_simulated=study.allow_simulated, mark=mark,
+            )
+            for first, second, outcome, judge, item, mark in lines.values_list(*names)
+        ]  # fmt: skip
+    rows: QuerySet[Any] = _mark_votes(study, filters, last)
+    rows = rows.exclude(Q(mark=LeftOut.SUPERSEDED.value)).order_by("pk").values_list(
+        "expert__person__code", "expert__person__pseudonym", "matchup__scenario__slug",
+        "matchup__scenario__type", "matchup__kind", "shown_left__contestant__slug",
+        "shown_right__contestant__slug", "outcome", "both_miss", "is_simulated", F("mark"),
+        "ms_visible", "matchup", "matchup__repeat_of", "at", "matchup__position", "aids",
+        "comment", "shown_left__code", "shown_right__code",
+    )  # fmt: skip
+    return [
+        vote._replace(
+            judge=str(vote.judge),
+            at=cast("datetime", vote.at).astimezone(UTC).isoformat(timespec="milliseconds"),
+            left_code=str(vote.left_code),
+            right_code=str(vote.right_code),
+        )
+        for vote in (Judged(*row) for row in rows)
+    ]
 
 
-def why_left_out(
-    line: Judged, filters: Filters, simulated: set[str], allow_simulated: bool
-) -> LeftOut | None:
-    """Return why a vote without a showing does not count: a settled tie, or one from a file."""
-    made_up = line.is_simulated or line.left in simulated or line.right in simulated
-    if made_up and not allow_simulated:
-        return LeftOut.SIMULATED
-    is_other = (filters.types and line.type not in filters.types) or (
-        filters.experts and line.judge not in filters.experts
+def settled_ties(study: Study, votes: Iterable[Judged], filters: Filters) -> list[Judged]:
+    """Ties on the pairs that the study settled without showing; see arena.pairing.settled.
+
+    Args:
+        study: A study; one of votes from elsewhere has no such pairs.
+        votes: Its current votes, which say how often a pair is judged, and by whom.
+        filters: Which of the ties count.
+    """
+    settled = [(place, one, other) for place, one, other in study.rules.get("identical", ())]
+    if not settled:
+        return []
+    by_judge: dict[str, list[Judged]] = {}
+    for vote in votes:
+        if vote.kind == MAIN and vote.outcome in RATED:
+            by_judge.setdefault(vote.judge, []).append(vote)
+    types = dict(study.scenarios.values_list("slug", "type"))
+    entries = tuple(Entry(**entry) for entry in study.rules["entries"])
+    alike = tuple((place, one, other) for place, one, other in study.rules.get("alike", ()))
+    drawn = draw_ties(
+        settled,
+        {judge: len(own) for judge, own in by_judge.items()},
+        showable=int(grid_of(entries, alike).showable.sum()),
+        seed=study.seed,
     )
-    if is_other or MAIN not in filters.kinds:
-        return LeftOut.FILTERED
-    return LeftOut.OWN if filters.leave_out_own and is_own_vote(line, filters) else None
+    simulated = {row.slug for row in study.contestants.all() if row.is_simulated}
+    ties = []
+    for (place, left, right), judge in drawn:
+        item, first = scenario_of(place), by_judge[judge][0]
+        tie = Judged(
+            judge=judge, judge_name=first.judge_name, item=item, type=types[item], kind=AUTOMATIC,
+            left=left, right=right, outcome=Vote.Outcome.EQUAL.value, both_miss=False,
+            is_simulated=first.is_simulated,
+        )  # fmt: skip
+        is_made_up = tie.is_simulated or not simulated.isdisjoint((left, right))
+        if is_made_up and not study.allow_simulated:
+            tie = tie._replace(mark=LeftOut.SIMULATED.value)
+        elif not _is_asked_for(tie, filters):
+            tie = tie._replace(mark=LeftOut.FILTERED.value)
+        ties.append(tie._replace(mark=AUTOMATIC_TIE) if filters.leave_out_settled else tie)
+    return ties
+
+
+def is_own_vote(vote: Judged, filters: Filters) -> bool:
+    """Whether an author voted on a contestant of their own; settled ties are nobody's votes."""
+    return vote.kind != AUTOMATIC and filters.is_own(vote.judge, vote.left, vote.right)
 
 
 def marked_votes(snapshot: Snapshot) -> QuerySet[Vote]:
@@ -416,7 +322,7 @@ def marked_votes(snapshot: Snapshot) -> QuerySet[Vote]:
     At most three queries beside its own: who is simulated, who was asked for, who is author.
     """
     filters = Filters.of_document(snapshot.filters)
-    return _marked(snapshot.study, filters, snapshot.last_vote)
+    return _mark_votes(snapshot.study, filters, snapshot.last_vote)
 
 
 def counted_votes(snapshot: Snapshot) -> QuerySet[Vote]:
@@ -424,9 +330,20 @@ def counted_votes(snapshot: Snapshot) -> QuerySet[Vote]:
     return marked_votes(snapshot).filter(Q(mark=COUNTED))
 
 
+def marked_lines(study: Study, filters: Filters, last: int | None) -> QuerySet[ImportedVote]:
+    """The votes of a study's file up to a row, each with its `mark`."""
+    is_other = Q()
+    if filters.types or MAIN not in filters.kinds:
+        is_other = Q(pk__isnull=False)
+    elif filters.experts:
+        is_other = ~Q(judge__in=filters.experts)
+    reasons = [(LeftOut.FILTERED, is_other)] if is_other else []
+    return _with_mark(ImportedVote.objects.filter(file__study=study, pk__lte=last or 0), reasons)
+
+
 def own_votes(filters: Filters) -> Q:
     """Votes of authors on their own contestants; one query."""
-    users = users_of(sorted({judge for judge, _ in filters.authors}))
+    users = users_of({judge for judge, _ in filters.authors})
     own = Q(pk=None)
     for judge, slug in sorted(filters.authors):
         shown = Q(shown_left__contestant__slug=slug) | Q(shown_right__contestant__slug=slug)
@@ -434,90 +351,82 @@ def own_votes(filters: Filters) -> Q:
     return own
 
 
-def made_up_contestants(study: Study) -> QuerySet[Contestant]:
-    """Who of the study is simulated."""
-    return study.contestants.filter(kind=Contestant.Kind.SIMULATED)
-
-
-def users_of(codes: Sequence[str]) -> dict[str, int]:
-    """Accounts by the codes of their people; one query."""
-    found = Person.objects.filter(code__in=[code for code in codes if _is_code(code)])
-    return {str(code): user for code, user in found.values_list("code", "user_id")}
-
-
-def is_scenario_of(snapshot: Snapshot, slug: str) -> bool:
-    """Whether the study has a scenario of that name, be it in attention checks alone."""
-    study = snapshot.study
-    if is_imported(study):
-        return ImportedVote.objects.filter(file__study=study, item=slug).exists()
-    return study.matchups.filter(scenario__slug=slug).exists() or (
-        study.scenarios.filter(slug=slug).exists()
-    )
+def users_of(codes: Collection[str]) -> dict[str, int]:
+    """Accounts by the codes of their people, whatever else is among the codes; one query."""
+    people = Person.objects.values_list("code", "user_id")
+    return {str(code): user for code, user in people if str(code) in codes}
 
 
 # --- Private -----------------------------------------------------------------------------------
 
 
-def _check(filters: Filters, lines: Sequence[Judged]) -> None:
-    known_types = {*list(ScenarioType), *(line.type for line in lines)}
-    for name in filters.types:
-        if name not in known_types:
-            raise UnknownName("scenario type", name, sorted(known_types))
-    judges = {line.judge for line in lines}
-    for name in filters.experts:
-        if name not in judges:
-            raise UnknownName("expert", name, sorted(judges))
+def _entrants(study: Study, votes: Iterable[Judged]) -> tuple[Entrant, ...]:
+    """Who competes, by slug: a study's contestants, or who occurs in the votes of a file."""
+    if is_imported(study):
+        names = {name for vote in votes for name in (vote.left, vote.right)}
+        return tuple(Entrant(slug=name, name=name) for name in sorted(names))
+    return tuple(
+        Entrant(
+            slug=row.slug, name=row.name, variant=row.variant, kind=row.kind,
+            is_simulated=row.is_simulated, contestant=row,
+        )
+        for row in study.contestants.order_by("slug")
+    )  # fmt: skip
 
 
-def _marks(study: Study, filters: Filters, last: int | None) -> dict[int, LeftOut | None]:
-    """Return why the current vote on each matchup does not count, None if it does."""
-    rows: Any = _marked(study, filters, last)  # the mark is no field
-    current = rows.exclude(mark=LeftOut.SUPERSEDED.value).values_list("matchup", "mark")
-    return {row: None if mark == COUNTED else LeftOut(mark) for row, mark in current}
+def _check_names(filters: Filters, votes: Sequence[Judged]) -> None:
+    judges = {vote.judge for vote in votes}
+    types = {*(one.value for one in ScenarioType), *(vote.type for vote in votes)}
+    for what, names, known in (
+        ("kind of vote", filters.kinds, list(KINDS)),
+        ("scenario type", filters.types, sorted(types)),
+        ("expert", filters.experts, sorted(judges)),
+    ):
+        for name in names:
+            if name not in known:
+                raise UnknownName(what, name, known)
 
 
-def _marked(study: Study, filters: Filters, last: int | None) -> QuerySet[Vote]:
-    mark = Case(
-        *(When(holds, then=Value(why.value)) for why, holds in _reasons(study, filters, last)),
-        default=Value(COUNTED),
-        output_field=CharField(),
+def _is_asked_for(tie: Judged, filters: Filters) -> bool:
+    return (
+        MAIN in filters.kinds
+        and (not filters.types or tie.type in filters.types)
+        and (not filters.experts or tie.judge in filters.experts)
     )
-    rows = Vote.objects.filter(matchup__study=study, pk__lte=last or 0)
-    return rows.order_by().annotate(mark=mark)
 
 
-def _reasons(study: Study, filters: Filters, last: int | None) -> list[tuple[LeftOut, Q]]:
-    """Return why votes do not count; the first one that holds is said."""
+def _mark_votes(study: Study, filters: Filters, last: int | None) -> QuerySet[Vote]:
     reasons = [
         (LeftOut.SUPERSEDED, Q(superseded_by__pk__lte=last or 0)),
         (LeftOut.CHECK, Q(matchup__kind=CHECK)),
-        (LeftOut.REPEAT, Q(matchup__kind=REPEAT)),
-        (LeftOut.SKIP, ~Q(outcome__in=RATED)),
-        (LeftOut.SIMULATED, Q(is_simulated=True)),
     ]
-    if REPEAT in filters.kinds:
-        del reasons[2]
-    if study.allow_simulated:
-        del reasons[-1]
-    else:
-        for pk in made_up_contestants(study).values_list("pk", flat=True):
+    if REPEAT not in filters.kinds:
+        reasons.append((LeftOut.REPEAT, Q(matchup__kind=REPEAT)))
+    reasons.append((LeftOut.SKIP, ~Q(outcome__in=RATED)))
+    if not study.allow_simulated:
+        reasons.append((LeftOut.SIMULATED, Q(is_simulated=True)))
+        simulated = study.contestants.filter(kind=Contestant.Kind.SIMULATED)
+        for pk in simulated.values_list("pk", flat=True):
             shown = Q(shown_left__contestant=pk) | Q(shown_right__contestant=pk)
             reasons.append((LeftOut.SIMULATED, shown))
     if filters.types:
         reasons.append((LeftOut.FILTERED, ~Q(matchup__scenario__type__in=filters.types)))
     if filters.experts:
-        users = users_of(filters.experts).values()
-        reasons.append((LeftOut.FILTERED, ~Q(expert__in=list(users))))
+        users = list(users_of(filters.experts).values())
+        reasons.append((LeftOut.FILTERED, ~Q(expert__in=users)))
     if MAIN not in filters.kinds:
         reasons.append((LeftOut.FILTERED, Q(matchup__kind=MAIN)))
     if filters.leave_out_own and filters.authors:
         reasons.append((LeftOut.OWN, own_votes(filters)))
-    return reasons
+    rows = Vote.objects.filter(matchup__study=study, pk__lte=last or 0)
+    return _with_mark(rows, reasons)
 
 
-def _is_code(text: str) -> bool:
-    try:
-        UUID(text)
-    except ValueError:
-        return False
-    return True
+def _with_mark(rows: QuerySet[Row], reasons: Sequence[tuple[LeftOut, Q]]) -> QuerySet[Row]:
+    """Annotate why rows do not count; the first reason that holds is said."""
+    mark = Case(
+        *(When(holds, then=Value(reason.value)) for reason, holds in reasons),
+        default=Value(COUNTED),
+        output_field=CharField(),
+    )
+    return cast("QuerySet[Row]", rows.order_by().annotate(mark=mark))

@@ -1,9 +1,11 @@
-"""Rows of files that workers write: asked for once, kept with their content."""
+"""Files that workers write and pages offer: asked for once, made, and kept with their content."""
 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
+from abc import abstractmethod
+from contextlib import AbstractContextManager
+from dataclasses import dataclass
 from functools import partial
 from pathlib import PurePath
 from typing import TypeVar
@@ -18,14 +20,45 @@ from arena.models.written_files import WrittenFile
 from arena.results.queries.votes import is_imported
 from augment.errors import Conflict, UnknownName
 from augment.services.events import log_event
-from augment.services.work import Lease, Settlement
+from augment.services.work import Lease, Settlement, WorkKind
 
 Row = TypeVar("Row", bound=WrittenFile)
+Kind = StudyFile.Kind
 
 FOLDERS = (ScenarioFile.FOLDER, StudyFile.FOLDER)
 """Where the contents lie, among the pictures; a backup leaves them out."""
 
-_PIECE = 1 << 20
+SHOWS_RESULTS = (Kind.STUDY, Kind.CONTACT_SHEET)
+"""Kinds for those alone who may read the study's results."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MadeFile:
+    """What is to be stored.
+
+    Attributes:
+        name: What it is called for people.
+        warnings: What whoever passes it on has to know.
+        marked: Whether data that must not be used commercially is in it.
+    """
+
+    name: str
+    content: File[bytes]
+    warnings: tuple[str, ...] = ()
+    marked: bool = False
+
+
+class FileWork(WorkKind[Row]):
+    """The work of writing one kind of file."""
+
+    @abstractmethod
+    def made(self, row: Row) -> AbstractContextManager[MadeFile]:
+        """The file of a row, while it is open."""
+
+    def run(self, row: Row, held: Lease[Row]) -> None:
+        """Make it and keep it."""
+        with self.made(row) as made:
+            keep_file(row, held, made)
 
 
 def waiting_row(row: Row) -> Row | None:
@@ -33,67 +66,42 @@ def waiting_row(row: Row) -> Row | None:
     return row.alike().filter(state__in=row.UNDER_WAY).first()
 
 
-def keep_file(
-    row: Row,
-    held: Lease[Row],
-    *,
-    name: str,
-    content: File[bytes],
-    warnings: Sequence[str] = (),
-    marked: bool = False,
-) -> None:
-    """Store the content; the files of the same owner and kind before it go.
+def keep_file(row: Row, held: Lease[Row], made: MadeFile) -> None:
+    """Store the content and remove older files of the same owner and kind.
 
-    So does the content itself where a newer one was faster and has removed the row.
-
-    Args:
-        row: Of which the content is.
-        held: The right to write it.
-        name: What it is called for people.
-        content: Read from its beginning.
-        warnings: What whoever passes it on has to know.
-        marked: Whether data that must not be used commercially is in it.
+    The content itself goes where a newer file was faster and has removed the row.
     """
-    stored = f"{row.FOLDER}/{row.code}{PurePath(name).suffix}"
+    stored = f"{row.FOLDER}/{row.code}{PurePath(made.name).suffix}"
     if default_storage.exists(stored):  # a worker that died left it
         default_storage.delete(stored)
-    content.seek(0)
+    made.content.seek(0)
     digest = hashlib.sha256()
-    size_bytes = 0
-    for piece in content.chunks(_PIECE):
+    for piece in made.content.chunks(1 << 20):
         digest.update(piece)
-        size_bytes += len(piece)
-    content.seek(0)
-    kept = default_storage.save(stored, content)
+    size_bytes = made.content.tell()
+    made.content.seek(0)
+    kept = default_storage.save(stored, made.content)
     columns = {
-        "name": name,
+        "name": made.name,
         "stored": kept,
         "size_bytes": size_bytes,
         "digest": digest.hexdigest(),
-        "warnings": list(warnings),
-        "is_non_commercial": marked,
+        "warnings": list(made.warnings),
+        "is_non_commercial": made.marked,
     }
     with transaction.atomic():
-        if held.settle(Settlement(state=WrittenFile.State.READY, columns=columns)):
-            _remove_older(row)
-        else:
+        if not held.settle(Settlement(state=WrittenFile.State.READY, columns=columns)):
             transaction.on_commit(partial(default_storage.delete, kept))
+            return
+        # Locked, so that none is kept between the reading of its name and its removal.
+        older = row.alike().filter(pk__lt=row.pk).order_by("pk").select_for_update()
+        gone = dict(older.values_list("pk", "stored"))
+        row.alike().filter(pk__in=gone).delete()
+        for name in filter(None, gone.values()):
+            transaction.on_commit(partial(default_storage.delete, name))
 
 
-def _remove_older(row: WrittenFile) -> None:
-    # Held, so that none of them is kept between the reading of its name and its removal.
-    older = row.alike().filter(pk__lt=row.pk).order_by("pk").select_for_update()
-    gone = list(older.values_list("pk", "stored"))
-    row.alike().filter(pk__in=[pk for pk, _ in gone]).delete()
-    for _, stored in gone:
-        if stored:
-            transaction.on_commit(partial(default_storage.delete, stored))
-
-
-Kind = StudyFile.Kind
-
-SHOWS_RESULTS = (Kind.STUDY, Kind.CONTACT_SHEET)
-"""Kinds for those alone who may read the study's results."""
+# --- Files of a study --------------------------------------------------------------------------
 
 
 def why_not(study: Study, kind: str) -> str:
@@ -106,16 +114,16 @@ def why_not(study: Study, kind: str) -> str:
     """
     if kind not in Kind.values:
         raise UnknownName("file of a study", kind, list(Kind.values))
+    is_cancelled = study.state == Study.State.CANCELLED
     if kind == Kind.STUDY:
         if study.state == Study.State.OPEN:
             return "It is written once the study is closed: what still changes is no whole."
-        if study.state == Study.State.CANCELLED:
+        if is_cancelled:
             return "A cancelled study is not written as a whole; its votes can be exported."
-        return ""
-    if is_imported(study):
+    elif is_imported(study):
         return "Votes from a file have no pictures."
-    if kind == Kind.CONTACT_SHEET:
-        if study.state == Study.State.CANCELLED:
+    elif kind == Kind.CONTACT_SHEET:
+        if is_cancelled:
             return "The study was cancelled: it has no results."
         if not study.snapshots.filter(state=Snapshot.State.READY).exists():
             return "Rate the study first: the sheet has the votes of a rating."
@@ -124,7 +132,7 @@ def why_not(study: Study, kind: str) -> str:
 
 @transaction.atomic
 def ask_for_study_file(*, study: Study, kind: str, actor: User | None = None) -> StudyFile:
-    """A row for a worker to write; one that waits already is asked for once more.
+    """Return a row for a worker to write; one that waits already is asked for once more.
 
     Raises:
         UnknownName: There is no such kind.
