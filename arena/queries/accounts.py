@@ -7,11 +7,8 @@ from typing import Any
 from django.contrib.auth.backends import ModelBackend
 from django.contrib.auth.models import User
 
-from arena.queries.plain import instances
-
-_COLUMNS = tuple(field.attname for field in User._meta.concrete_fields)
-_ACCOUNT = f"""
-SELECT {", ".join(f"account.{name}" for name in _COLUMNS)}, auth_group.name
+_ACCOUNT = """
+SELECT account.*, auth_group.name AS role
 FROM auth_user account
 LEFT JOIN auth_user_groups ON auth_user_groups.user_id = account.id
 LEFT JOIN auth_group ON auth_group.id = auth_user_groups.group_id
@@ -27,9 +24,9 @@ class AccountBackend(ModelBackend):
 
         Its `role_names` hold the names of its groups for `role_of`, as of this request.
         """
-        rows = instances(User, _COLUMNS, _ACCOUNT, {"id": user_id})
-        if not rows or not self.user_can_authenticate(rows[0][0]):
+        rows: list[Any] = list(User.objects.raw(_ACCOUNT, {"id": user_id}))
+        if not rows or not self.user_can_authenticate(rows[0]):
             return None
-        user: Any = rows[0][0]
-        user.role_names = frozenset(role for _, (role,) in rows)
+        user = rows[0]
+        user.role_names = frozenset(row.role for row in rows)
         return user  # type: ignore[no-any-return]

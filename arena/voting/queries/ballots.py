@@ -1,190 +1,28 @@
-"""The three questions of every vote, asked in SQL.
-
-Thousands of votes ask them, and building these queries anew for each of them cost more than half
-of a vote. The same text runs on SQLite and on PostgreSQL.
-"""
+"""What an expert has voted and votes on next. Nobody sees what is somebody else's."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from datetime import datetime
+from typing import Any
 from uuid import UUID
 
 from django.contrib.auth.models import User
 from django.db import connection
-from django.db.models import Count, Q, QuerySet
+from django.db.models import BooleanField, Count, F, Q, QuerySet
+from django.db.models.functions import Coalesce
 from django.utils import timezone
 
 from arena.errors import NotYours
 from arena.models import Matchup, Study, Vote
 from arena.queries.people import by_pseudonym
-from arena.queries.plain import instances
 from arena.queries.remembering import Remembered, plan_and_votes
-from augment.models import Scenario
 
 LONGEST_LOOK_MS = 60_000
 """A pair that stayed on screen longer counts as this long in the pace: the expert was away."""
 
 PACE_VOTES = 20
 """So many latest votes make the pace."""
-
-_HOLD = """
-SELECT matchup.id, matchup.study_id, matchup.left_id, matchup.right_id,
-       COALESCE(person.is_simulated, FALSE)
-FROM arena_matchup matchup
-LEFT JOIN arena_person person ON person.user_id = matchup.expert_id
-WHERE matchup.code = %(code)s AND matchup.expert_id = %(expert)s
-  AND NOT EXISTS (
-    SELECT 1 FROM arena_earlylook look
-    WHERE look.study_id = matchup.study_id AND look.user_id = matchup.expert_id
-  )
-"""
-
-_STUDY = (
-    *("id", "code", "name", "state", "allow_both_miss", "allow_text", "allow_replay"),
-    "allow_measures",
-    "votes_to_plan",
-)
-_STATE = """
-SELECT study.id, study.code, study.name, study.state, study.allow_both_miss, study.allow_text,
-       study.allow_replay, study.allow_measures, study.votes_to_plan,
-       (SELECT COUNT(*) FROM arena_matchup matchup
-        WHERE matchup.study_id = study.id AND matchup.expert_id = %(expert)s) AS total,
-       (SELECT COUNT(*) FROM arena_vote vote
-        JOIN arena_matchup matchup ON matchup.id = vote.matchup_id
-        WHERE matchup.study_id = study.id AND vote.expert_id = %(expert)s
-          AND vote.supersedes_id IS NULL) AS decided,
-       (SELECT COUNT(*) FROM arena_vote vote
-        JOIN arena_matchup matchup ON matchup.id = vote.matchup_id
-        WHERE matchup.study_id = study.id AND vote.expert_id = %(expert)s
-          AND vote.outcome = 'skip' AND NOT EXISTS (
-            SELECT 1 FROM arena_vote later WHERE later.supersedes_id = vote.id)) AS skipped,
-       (SELECT COUNT(*) FROM arena_vote vote
-        WHERE vote.expert_id = %(expert)s AND vote.at > %(since)s) AS just_now,
-       (SELECT AVG(CASE WHEN latest.ms_visible > %(longest)s THEN %(longest)s
-                        ELSE latest.ms_visible END)
-        FROM (SELECT vote.ms_visible FROM arena_vote vote
-              JOIN arena_matchup matchup ON matchup.id = vote.matchup_id
-              WHERE matchup.study_id = %(study)s AND vote.expert_id = %(expert)s
-                AND vote.ms_visible IS NOT NULL
-              ORDER BY vote.id DESC LIMIT %(votes)s) latest) AS pace_ms
-FROM arena_study study
-WHERE study.id = %(study)s
-"""
-
-_MATCHUP = (
-    *("id", "code", "study_id", "expert_id", "scenario_id", "position", "kind", "view"),
-    *("served_at", "left_token", "right_token", "original_token", "original_image"),
-    "descriptions",
-)
-_COMING = """
-SELECT matchup.id, matchup.code, matchup.study_id, matchup.expert_id, matchup.scenario_id,
-       matchup.position, matchup.kind, matchup.view, matchup.served_at, matchup.left_token,
-       matchup.right_token, matchup.original_token, matchup.original_image, matchup.descriptions,
-       scenario.instruction
-FROM arena_matchup matchup
-JOIN augment_scenario scenario ON scenario.id = matchup.scenario_id
-WHERE matchup.study_id = %(study)s AND matchup.expert_id = %(expert)s
-  AND NOT EXISTS (SELECT 1 FROM arena_vote vote WHERE vote.matchup_id = matchup.id)
-ORDER BY matchup.position
-LIMIT %(n)s
-"""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class HeldMatchup:
-    """What storing a vote needs of its matchup.
-
-    Attributes:
-        is_simulated: Its expert is the machine.
-    """
-
-    pk: int
-    study_id: int
-    left_id: int
-    right_id: int
-    is_simulated: bool
-
-
-def held_matchup(*, code: UUID, expert_pk: int) -> HeldMatchup | None:
-    """The expert's matchup, its row locked until the transaction ends.
-
-    Nothing where it is somebody else's, does not exist, or the expert has opened the results of
-    its study. SQLite needs no lock: its transactions write one after the other.
-    """
-    lock = ""
-    if connection.features.has_select_for_update:
-        lock = connection.ops.for_update_sql(of=("matchup",))
-    field = Matchup._meta.get_field("code")
-    with connection.cursor() as cursor:
-        cursor.execute(
-            _HOLD + lock, {"code": field.get_db_prep_value(code, connection), "expert": expert_pk}
-        )
-        row = cursor.fetchone()
-    if row is None:
-        return None
-    pk, study, left, right, simulated = row
-    return HeldMatchup(
-        pk=pk, study_id=study, left_id=left, right_id=right, is_simulated=bool(simulated)
-    )
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class StudyNow:
-    """A study and one expert in it.
-
-    Attributes:
-        study: With what `_STUDY` names; the rest is loaded when somebody asks for it.
-        total: Matchups that are planned for the expert.
-        voted: Those with a vote; `skipped` those that were skipped instead.
-        just_now: Votes of the expert's account since the moment that was asked for.
-        pace_ms: How long the latest pairs were on screen on average, None before any.
-    """
-
-    study: Study
-    total: int
-    voted: int
-    skipped: int
-    just_now: int
-    pace_ms: float | None
-
-
-def study_now(*, study_pk: int, expert_pk: int, since: datetime) -> StudyNow:
-    """How far an expert is in a study.
-
-    Args:
-        study_pk: Of a study that exists.
-        expert_pk: Whose matchups and votes are counted.
-        since: Votes after this moment are counted by `just_now`, of whatever study.
-    """
-    values = {
-        "study": study_pk,
-        "expert": expert_pk,
-        "since": connection.ops.adapt_datetimefield_value(since),
-        "longest": LONGEST_LOOK_MS,
-        "votes": PACE_VOTES,
-    }
-    ((study, counts),) = instances(Study, _STUDY, _STATE, values)
-    total, decided, skipped, just_now, pace_ms = counts
-    return StudyNow(
-        study=study,
-        total=total,
-        voted=decided - skipped,
-        skipped=skipped,
-        just_now=just_now,
-        pace_ms=None if pace_ms is None else float(pace_ms),
-    )
-
-
-def upcoming(*, study: Study, expert: User, n: int) -> list[Matchup]:
-    """The next matchups of this expert, at most n, with what a browser needs of them."""
-    values = {"study": study.pk, "expert": expert.pk, "n": n}
-    matchups = []
-    for matchup, (instruction,) in instances(Matchup, _MATCHUP, _COMING, values):
-        shown = (matchup.scenario_id, instruction)
-        matchup.scenario = Scenario.from_db(connection.alias, ("id", "instruction"), shown)
-        matchups.append(matchup)
-    return matchups
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -217,7 +55,7 @@ class VotingState:
     """What a vote needs to know of its study, read anew.
 
     Attributes:
-        study: Name, code, state and what it allows; nothing else is loaded.
+        study: Name, code, state and what it allows; the rest is loaded when asked for.
         just_now: Votes of the expert's account since the moment that was asked for.
     """
 
@@ -263,6 +101,29 @@ def matchup_of(*, expert: User, code: UUID | str) -> Matchup:
     return matchup
 
 
+def hold_matchup(*, expert: User, code: UUID) -> Matchup:
+    """The expert's matchup, its row locked until the transaction ends; see `by_machine`.
+
+    The lock makes two votes on one matchup wait for each other, and the closing of the study for
+    both. Who has opened the study's results votes in it no longer.
+
+    Raises:
+        NotYours: It is somebody else's, does not exist, or is closed to the expert.
+    """
+    rows = Matchup.objects.select_for_update(of=("self",)).filter(code=code, expert=expert)
+    machine = Coalesce(F("expert__person__is_simulated"), False, output_field=BooleanField())
+    held = (
+        rows.exclude(study__early_looks__user=expert)
+        .annotate(by_machine=machine)
+        .select_related("study")
+        .only("study__name", "study__state", "left", "right")
+        .first()
+    )
+    if held is None:
+        raise NotYours("This matchup is not yours.")
+    return held
+
+
 def current_votes(study: Study) -> QuerySet[Vote]:
     """What experts have decided: the votes that no later vote supersedes, of every kind."""
     return Vote.objects.filter(matchup__study=study, superseded_by=None)
@@ -277,19 +138,28 @@ def recent_votes(*, study: Study, expert: User, n: int = 10) -> list[Vote]:
 
 def skipped_pairs(*, study: Study, expert: User) -> list[Vote]:
     """The expert's skips that count, by the place of their pairs; each can be voted on still."""
-    skips = current_votes(study).filter(expert=expert, outcome=Vote.Outcome.SKIP)
-    found = skips.select_related("matchup__scenario").defer("matchup__scenario__reference")
-    return list(found.order_by("matchup__position"))
+    return list(_skips(study, expert).order_by("matchup__position"))
 
 
 def skip_of(*, study: Study, expert: User, key: str) -> Vote | None:
     """The expert's skip of that key, None where it counts no longer or the key is none."""
     try:
-        asked = UUID(key)
+        return _skips(study, expert).filter(key=UUID(key)).first()
     except ValueError:
         return None
-    skips = current_votes(study).filter(expert=expert, outcome=Vote.Outcome.SKIP)
-    return skips.filter(key=asked).select_related("matchup__scenario").first()
+
+
+def upcoming(*, study: Study, expert: User, n: int) -> list[Matchup]:
+    """The next matchups of this expert, at most n, with what a browser needs of them."""
+    rows = Matchup.objects.filter(study=study, expert=expert, votes=None).select_related(
+        "scenario"
+    )
+    needed = (
+        *("code", "study_id", "expert_id", "position", "kind", "view", "served_at"),
+        *("left_token", "right_token", "original_token", "original_image", "descriptions"),
+        "scenario__instruction",
+    )
+    return list(rows.select_related("scenario").only(*needed).order_by("position")[:n])
 
 
 def voting_progress(*, study: Study, expert: User) -> VotingProgress:
@@ -305,12 +175,21 @@ def voting_state(*, study_pk: int, expert: User, since: datetime) -> VotingState
         expert: Whose matchups and votes are counted.
         since: Votes after this moment count as given just now, of whatever study.
     """
-    now = study_now(study_pk=study_pk, expert_pk=expert.pk, since=since)
-    total = now.total + now.study.votes_to_plan.get(expert.username, 0)
+    values = {
+        "study": study_pk,
+        "expert": expert.pk,
+        "since": connection.ops.adapt_datetimefield_value(since),
+        "longest": LONGEST_LOOK_MS,
+        "votes": PACE_VOTES,
+    }
+    row: Any = Study.objects.raw(_STATE, values)[0]  # with the counts as attributes
     progress = VotingProgress(
-        total=total, voted=now.voted, skipped=now.skipped, pace_ms=now.pace_ms
+        total=row.total + row.votes_to_plan.get(expert.username, 0),
+        voted=row.decided - row.skipped,
+        skipped=row.skipped,
+        pace_ms=None if row.pace_ms is None else float(row.pace_ms),
     )
-    return VotingState(study=now.study, progress=progress, just_now=now.just_now)
+    return VotingState(study=row, progress=progress, just_now=row.just_now)
 
 
 def tallies(study: Study) -> list[ExpertTally]:
@@ -319,45 +198,69 @@ def tallies(study: Study) -> list[ExpertTally]:
     lines = []
     experts = study.experts.select_related("person").prefetch_related("groups")
     for expert in by_pseudonym(experts):
-        counts = outcomes.get(expert.pk, (0, 0, 0, 0))
+        left_wins, ties, right_wins, skips = outcomes.get(expert.pk, (0, 0, 0, 0))
         lines.append(
             ExpertTally(
                 expert=expert,
                 pseudonym=expert.person.pseudonym,
                 is_simulated=expert.person.is_simulated,
                 total=totals.get(expert.pk, 0) + study.votes_to_plan.get(expert.username, 0),
-                voted=sum(counts[:3]),
-                left_wins=counts[0],
-                ties=counts[1],
-                right_wins=counts[2],
-                skips=counts[3],
+                voted=left_wins + ties + right_wins,
+                left_wins=left_wins,
+                ties=ties,
+                right_wins=right_wins,
+                skips=skips,
             )
         )
     return lines
 
 
-def _tally(study: Study) -> tuple[dict[int, int], dict[int, tuple[int, int, int, int]]]:
+# --- Private -----------------------------------------------------------------------------------
+
+_Tally = tuple[dict[int, int], dict[int, tuple[int, int, int, int]]]
+_TALLIED: Remembered[_Tally] = Remembered(8)
+
+# Thousands of votes ask this, and building the query anew cost as much as asking it.
+_STATE = """
+SELECT study.id, study.code, study.name, study.state, study.allow_both_miss, study.allow_text,
+       study.allow_replay, study.allow_measures, study.votes_to_plan,
+       (SELECT COUNT(*) FROM arena_matchup matchup
+        WHERE matchup.study_id = study.id AND matchup.expert_id = %(expert)s) AS total,
+       (SELECT COUNT(*) FROM arena_vote vote
+        JOIN arena_matchup matchup ON matchup.id = vote.matchup_id
+        WHERE matchup.study_id = study.id AND vote.expert_id = %(expert)s
+          AND vote.supersedes_id IS NULL) AS decided,
+       (SELECT COUNT(*) FROM arena_vote vote
+        JOIN arena_matchup matchup ON matchup.id = vote.matchup_id
+        WHERE matchup.study_id = study.id AND vote.expert_id = %(expert)s
+          AND vote.outcome = 'skip' AND NOT EXISTS (
+            SELECT 1 FROM arena_vote later WHERE later.supersedes_id = vote.id)) AS skipped,
+       (SELECT COUNT(*) FROM arena_vote vote
+        WHERE vote.expert_id = %(expert)s AND vote.at > %(since)s) AS just_now,
+       (SELECT AVG(CASE WHEN latest.ms_visible > %(longest)s THEN %(longest)s
+                        ELSE latest.ms_visible END)
+        FROM (SELECT vote.ms_visible FROM arena_vote vote
+              JOIN arena_matchup matchup ON matchup.id = vote.matchup_id
+              WHERE matchup.study_id = %(study)s AND vote.expert_id = %(expert)s
+                AND vote.ms_visible IS NOT NULL
+              ORDER BY vote.id DESC LIMIT %(votes)s) latest) AS pace_ms
+FROM arena_study study
+WHERE study.id = %(study)s
+"""
+
+
+def _skips(study: Study, expert: User) -> QuerySet[Vote]:
+    skips = current_votes(study).filter(expert=expert, outcome=Vote.Outcome.SKIP)
+    return skips.select_related("matchup__scenario").defer("matchup__scenario__reference")
+
+
+def _tally(study: Study) -> _Tally:
     """By expert: the matchups, and the current votes to the left, equal, to the right, skipped."""
-    totals = dict(
-        Matchup.objects.filter(study=study)
-        .values_list("expert")
-        .annotate(n=Count("pk"))
-        .values_list("expert", "n")
+    totals = Matchup.objects.filter(study=study).order_by().values_list("expert")
+    outcomes = ("left", "equal", "right", "skip")
+    counts = {name: Count("pk", filter=Q(outcome=name)) for name in outcomes}
+    votes = current_votes(study).order_by().values_list("expert").annotate(**counts)
+    return (
+        dict(totals.annotate(n=Count("pk"))),
+        {expert: (left, ties, right, skips) for expert, left, ties, right, skips in votes},
     )
-    outcomes = {
-        expert: (left_wins, ties, right_wins, skips)
-        for expert, left_wins, ties, right_wins, skips in current_votes(study)
-        .values("expert")
-        .annotate(
-            left_wins=Count("pk", filter=Q(outcome="left")),
-            ties=Count("pk", filter=Q(outcome="equal")),
-            right_wins=Count("pk", filter=Q(outcome="right")),
-            skips=Count("pk", filter=Q(outcome="skip")),
-        )
-        .order_by()
-        .values_list("expert", "left_wins", "ties", "right_wins", "skips")
-    }
-    return totals, outcomes
-
-
-_TALLIED: Remembered[tuple[dict[int, int], dict[int, tuple[int, int, int, int]]]] = Remembered(8)

@@ -1,10 +1,9 @@
-"""The text description in words: what augment.render.description gives as values."""
+"""What is shown of a pair: pictures behind tokens, texts, drives, and measures over it."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from functools import cache
 from itertools import pairwise
 from typing import Any
 from uuid import UUID
@@ -12,8 +11,7 @@ from uuid import UUID
 from django.contrib.auth.models import User
 from django.db.models import Q
 from django.urls import reverse
-from django.utils.translation import get_language, gettext
-from django.utils.translation import gettext_noop as _
+from django.utils.translation import gettext, gettext_noop
 
 from arena.errors import NotYours
 from arena.models import LabelTask, Matchup, PracticePair
@@ -22,83 +20,6 @@ from augment.models import Augmentation, Simulation
 from augment.services.judging.drive_files import blind_drive
 from augment.services.judging.measures import LaneEdges, MeasureLine, lane_edges_of, measures_of
 from augment.services.scenarios.pictures import window_of
-
-_KINDS = {
-    "EGO_VEHICLE": _("Vehicle"),
-    "VEHICLE": _("Vehicle"),
-    "BUS": _("Bus"),
-    "BICYCLE": _("Bicycle"),
-    "PEDESTRIAN": _("Pedestrian"),
-    "TRAFFIC_CONE": _("Traffic cone"),
-    "BARRIER": _("Barrier"),
-    "CONSTRUCTION_SIGN": _("Construction sign"),
-    "GENERIC_OBJECT": _("Object"),
-}
-_HEADINGS = {
-    0: _("facing as the ego does"),
-    90: _("facing left"),
-    -90: _("facing right"),
-    180: _("facing the opposite way"),
-}
-_ALONG = {0: _("lying lengthways"), 90: _("lying across")}
-_FACING = (_("facing {}° to the left"), _("facing {}° to the right"))
-_TURNED = (_("turned {}° to the left"), _("turned {}° to the right"))
-_AHEAD = (_("{} m ahead"), _("{} m behind"))
-_LEFT = (_("{} m left"), _("{} m right"))
-_IN_LINE = _("in line with the ego")
-_NOTHING, _GONE = _("Nothing was changed."), _("No longer there: {}")
-_STANDS, _MOVES, _WALKS = _("standing"), _("moving at {} m/s"), _("walking to {}")
-_ALL = (
-    *(*_KINDS.values(), *_HEADINGS.values(), *_ALONG.values()),
-    *(*_FACING, *_TURNED, *_AHEAD, *_LEFT, _IN_LINE, _NOTHING, _GONE, _STANDS, _MOVES, _WALKS),
-)
-
-Words = Mapping[str, str]
-
-
-def describe_in_words(lines: Sequence[Mapping[str, Any]]) -> list[str]:
-    """One sentence in the reader's language for each line, as they are kept with a matchup."""
-    words = _words_in(get_language())
-    return [_sentence(line, words) for line in lines] or [words[_NOTHING]]
-
-
-# Private
-
-
-@cache
-def _words_in(language: str | None) -> Words:
-    """All texts in the active language: looking one up is slow where a page describes many."""
-    return {text: gettext(text) for text in _ALL}
-
-
-def _sentence(line: Mapping[str, Any], words: Words) -> str:
-    parts = [words[_KINDS[line["kind"]]], _place(line["ahead_m"], line["left_m"], words)]
-    if line["heading_deg"] is not None:
-        parts.append(_angle(line["heading_deg"], _HEADINGS, _FACING, words))
-    if line["along_deg"] is not None:
-        parts.append(_angle(line["along_deg"], _ALONG, _TURNED, words))
-    if line["walk_to_m"]:
-        ahead_m, left_m = line["walk_to_m"]
-        parts.append(words[_WALKS].format(_place(ahead_m, left_m, words)))
-    elif line["speed_mps"]:
-        parts.append(words[_MOVES].format(f"{line['speed_mps']:.1f}"))
-    elif line["speed_mps"] is not None:
-        parts.append(words[_STANDS])
-    said = ", ".join(parts)
-    return words[_GONE].format(said) if line["change"] == "gone" else said
-
-
-def _place(ahead_m: float, left_m: float, words: Words) -> str:
-    ahead = words[_AHEAD[ahead_m < 0]].format(f"{abs(ahead_m):.1f}")
-    side = words[_LEFT[left_m < 0] if left_m else _IN_LINE].format(f"{abs(left_m):.1f}")
-    return f"{ahead}, {side}"
-
-
-def _angle(degrees: int, named: Mapping[int, str], turns: tuple[str, str], words: Words) -> str:
-    if degrees in named:
-        return words[named[degrees]]
-    return words[turns[degrees < 0]].format(abs(degrees))
-
 
 VIEW_OF_OLD: dict[str, Any] = {
     **{"px_per_m": 20.0, "ego_px": [300.0, 400.0]},
@@ -110,7 +31,8 @@ reference did not fit it was wider: the ruler of such a picture measures too lit
 LEGEND = "legend"
 """In the view of a matchup: the legend's entries of its scene, and those that the pair adds."""
 
-_NOT_SHOWN = "This picture is not shown to you."
+
+# --- Pictures ----------------------------------------------------------------------------------
 
 
 def picture_shown(*, user: User, token: str) -> str:
@@ -119,18 +41,10 @@ def picture_shown(*, user: User, token: str) -> str:
     Raises:
         NotYours: The token is somebody else's or stands for nothing; the text does not say which.
     """
-    rows = Matchup.objects.filter(
-        Q(left_token=token) | Q(right_token=token) | Q(original_token=token)
-    )
-    unread = ("left__modification", "right__modification", "descriptions")
-    shown = rows.select_related("left", "right").defer(*unread)
-    matchup = shown.order_by().first()
-    if matchup is None:
-        return _picture_to_label(user=user, token=token)
-    if matchup.expert_id != user.pk and role_of(user) != "admin":
-        raise NotYours(_NOT_SHOWN)
-    sides = {matchup.original_token: "original", matchup.left_token: "left"}
-    return picture_of_side(matchup, sides.get(token, "right"))
+    shown, image = _find_shown(token)
+    if shown is None or not image or not _may_see(user, shown):
+        raise NotYours("This picture is not shown to you.")
+    return image
 
 
 def picture_of_side(matchup: Matchup, side: str) -> str:
@@ -140,6 +54,12 @@ def picture_of_side(matchup: Matchup, side: str) -> str:
     if side == "left":
         return matchup.left_image or matchup.left.image
     return matchup.right_image or matchup.right.image
+
+
+def original_beside(augmentation: Augmentation) -> str:
+    """The picture before the change, "" where it shows another window than that after it."""
+    original = augmentation.scenario.original_image
+    return original if window_of(original) == window_of(augmentation.image) else ""
 
 
 def view_shown(matchup: Matchup) -> dict[str, Any]:
@@ -169,36 +89,113 @@ def as_shown(matchup: Matchup) -> dict[str, Any]:
     return shown
 
 
-def original_beside(augmentation: Augmentation) -> str:
-    """The picture before the change, "" where it shows another window than that after it."""
-    original = augmentation.scenario.original_image
-    return original if window_of(original) == window_of(augmentation.image) else ""
+def _may_see(user: User, shown: Matchup | LabelTask | PracticePair) -> bool:
+    return shown.expert_id == user.pk or role_of(user) == "admin"
 
 
-def _picture_to_label(*, user: User, token: str) -> str:
-    rows = LabelTask.objects.filter(Q(token=token) | Q(original_token=token))
-    tasks = rows.select_related("augmentation__scenario").defer(
-        "augmentation__modification", "augmentation__scenario__reference"
+def _find_shown(token: str) -> tuple[Matchup | LabelTask | PracticePair | None, str]:
+    """What a token belongs to, and the picture that it stands for."""
+    matchup = (
+        Matchup.objects.filter(
+            Q(left_token=token) | Q(right_token=token) | Q(original_token=token)
+        )
+        .select_related("left", "right")
+        .defer("left__modification", "right__modification", "descriptions")
+        .first()
     )
-    task = tasks.first()
-    if task is None:
-        return _picture_practised(user=user, token=token)
-    if task.expert_id != user.pk and role_of(user) != "admin":
-        raise NotYours(_NOT_SHOWN)
-    if task.token == token:
-        return task.augmentation.image
-    original = original_beside(task.augmentation)
-    if not original:
-        raise NotYours(_NOT_SHOWN)
-    return original
+    if matchup is not None:
+        sides = {matchup.original_token: "original", matchup.left_token: "left"}
+        return matchup, picture_of_side(matchup, sides.get(token, "right"))
+    task = (
+        LabelTask.objects.filter(Q(token=token) | Q(original_token=token))
+        .select_related("augmentation__scenario")
+        .defer("augmentation__modification", "augmentation__scenario__reference")
+        .first()
+    )
+    if task is not None:
+        is_after = task.token == token
+        return task, task.augmentation.image if is_after else original_beside(task.augmentation)
+    pairs = PracticePair.objects.filter(Q(left_token=token) | Q(right_token=token))
+    pair = pairs.select_related("good", "broken").first()
+    if pair is None:
+        return None, ""
+    return pair, pair.left.image if pair.left_token == token else pair.right.image
 
 
-def _picture_practised(*, user: User, token: str) -> str:
-    rows = PracticePair.objects.filter(Q(left_token=token) | Q(right_token=token))
-    pair = rows.select_related("good", "broken").order_by().first()
-    if pair is None or (pair.expert_id != user.pk and role_of(user) != "admin"):
-        raise NotYours(_NOT_SHOWN)
-    return pair.left.image if pair.left_token == token else pair.right.image
+def _pair_of(user: User, code: UUID, *columns: str) -> Matchup:
+    """The matchup with these columns and those of its study and scenario that they name.
+
+    Raises:
+        NotYours: The pair is somebody else's or there is none; the text does not say which.
+    """
+    rows = Matchup.objects.select_related("study", "scenario").only("expert", *columns)
+    matchup = rows.filter(code=code).first()
+    if matchup is None or not _may_see(user, matchup):
+        raise NotYours("This pair is not shown to you.")
+    return matchup
+
+
+# --- Texts -------------------------------------------------------------------------------------
+
+_KINDS = {
+    "EGO_VEHICLE": gettext_noop("Vehicle"),
+    "VEHICLE": gettext_noop("Vehicle"),
+    "BUS": gettext_noop("Bus"),
+    "BICYCLE": gettext_noop("Bicycle"),
+    "PEDESTRIAN": gettext_noop("Pedestrian"),
+    "TRAFFIC_CONE": gettext_noop("Traffic cone"),
+    "BARRIER": gettext_noop("Barrier"),
+    "CONSTRUCTION_SIGN": gettext_noop("Construction sign"),
+    "GENERIC_OBJECT": gettext_noop("Object"),
+}
+_HEADINGS = {
+    0: gettext_noop("facing as the ego does"),
+    90: gettext_noop("facing left"),
+    -90: gettext_noop("facing right"),
+    180: gettext_noop("facing the opposite way"),
+}
+_ALONG = {0: gettext_noop("lying lengthways"), 90: gettext_noop("lying across")}
+_FACING = (gettext_noop("facing {}° to the left"), gettext_noop("facing {}° to the right"))
+_TURNED = (gettext_noop("turned {}° to the left"), gettext_noop("turned {}° to the right"))
+_AHEAD = (gettext_noop("{} m ahead"), gettext_noop("{} m behind"))
+_LEFT = (gettext_noop("{} m left"), gettext_noop("{} m right"))
+
+
+def describe_in_words(lines: Sequence[Mapping[str, Any]]) -> list[str]:
+    """One sentence in the reader's language for each line of the text description of a picture."""
+    return [_sentence(line) for line in lines] or [gettext("Nothing was changed.")]
+
+
+def _sentence(line: Mapping[str, Any]) -> str:
+    parts = [gettext(_KINDS[line["kind"]]), _place(line["ahead_m"], line["left_m"])]
+    if line["heading_deg"] is not None:
+        parts.append(_angle(line["heading_deg"], _HEADINGS, _FACING))
+    if line["along_deg"] is not None:
+        parts.append(_angle(line["along_deg"], _ALONG, _TURNED))
+    if line["walk_to_m"]:
+        parts.append(gettext("walking to {}").format(_place(*line["walk_to_m"])))
+    elif line["speed_mps"]:
+        parts.append(gettext("moving at {} m/s").format(f"{line['speed_mps']:.1f}"))
+    elif line["speed_mps"] is not None:
+        parts.append(gettext("standing"))
+    sentence = ", ".join(parts)
+    if line["change"] == "gone":
+        return gettext("No longer there: {}").format(sentence)
+    return sentence
+
+
+def _place(ahead_m: float, left_m: float) -> str:
+    ahead = gettext(_AHEAD[ahead_m < 0]).format(f"{abs(ahead_m):.1f}")
+    if not left_m:
+        return f"{ahead}, {gettext('in line with the ego')}"
+    return f"{ahead}, {gettext(_LEFT[left_m < 0]).format(f'{abs(left_m):.1f}')}"
+
+
+def _angle(degrees: int, named: Mapping[int, str], turns: tuple[str, str]) -> str:
+    return gettext(named.get(degrees, turns[degrees < 0])).format(abs(degrees))
+
+
+# --- Drives ------------------------------------------------------------------------------------
 
 
 def drives_of_pair(*, user: User, code: UUID) -> dict[str, dict[str, Any]] | None:
@@ -210,12 +207,8 @@ def drives_of_pair(*, user: User, code: UUID) -> dict[str, dict[str, Any]] | Non
     Raises:
         NotYours: The pair is somebody else's or there is none; the text does not say which.
     """
-    rows = Matchup.objects.select_related("study", "scenario").only(
-        "left", "right", "expert", "scenario__slug", "study__allow_replay", "study__rules"
-    )
-    matchup = rows.filter(code=code).first()
-    if matchup is None or (matchup.expert_id != user.pk and role_of(user) != "admin"):
-        raise NotYours("This pair is not shown to you.")
+    needed = ("left", "right", "scenario__slug", "study__allow_replay", "study__rules")
+    matchup = _pair_of(user, code, *needed)
     played = matchup.study.rules.get("replays", {}) if matchup.study.allow_replay else {}
     if matchup.scenario.slug not in played.get("scenarios", ()):
         return None
@@ -231,56 +224,46 @@ def drives_of_pair(*, user: User, code: UUID) -> dict[str, dict[str, Any]] | Non
     return {side: blind_drive(drive_by_picture[key]) for side, key in sides.items()}
 
 
+# --- Measures ----------------------------------------------------------------------------------
+
 _Point = list[float]
 
 _MARGIN_PX = 24.0
 """Labels stay so far within the picture."""
 
+_MEASURED = ("view", "study__allow_measures", "scenario__intent", "scenario__base_scene",
+             "scenario__keep_traffic")  # fmt: skip
+
 
 def measures_of_pair(*, user: User, code: UUID) -> dict[str, Any] | None:
-    """What may be drawn over both pictures of one of the user's own pairs; admins may look at all.
+    """Lines and rings over both pictures of one of the user's own pairs, in pixels.
 
-    It follows from the scenario alone. None where the study has no such aid.
-
-    Args:
-        user: Who looks.
-        code: Of the matchup.
+    They follow from the scenario alone; admins may look at all. None where the study has no such
+    aid.
 
     Raises:
         NotYours: The pair is somebody else's or there is none; the text does not say which.
         InvalidDocument: The stored scene or intent can't be read.
     """
-    matchup = _measured(user, code)
-    if matchup is None:
+    matchup = _pair_of(user, code, *_MEASURED)
+    if not matchup.study.allow_measures:
         return None
     view = view_shown(matchup)
     reach_m = math.hypot(view["width"], view["height"]) / view["px_per_m"]
-    found = measures_of(matchup.scenario, reach_m=reach_m)
-    lines = [
-        ([_pixels(point, view) for point in line.points_m], _label(line)) for line in found.lines
-    ]
-    rings = [
-        (_pixels(ring.centre_m, view), ring.radius_m * view["px_per_m"], f"{ring.radius_m:.4g} m")
-        for ring in found.rings
-    ]
-    return {
-        "lines": [
-            {"points": points, "label": label, **_label_place(points, view)}
-            for points, label in lines
-            if _is_seen(points, view)
-        ],
-        "rings": [
-            {
-                "at": centre,
-                "r": round(radius, 1),
-                "label": label,
-                "text": place,
-                "anchor": "middle",
-            }
-            for centre, radius, label in rings
-            if (place := _first_within(_around(centre, radius), view))
-        ],
-    }
+    measures = measures_of(matchup.scenario, reach_m=reach_m)
+    lines = []
+    for line in measures.lines:
+        points = [_pixels(point, view) for point in line.points_m]
+        if _is_seen(points, view):
+            label = {"label": _label(line), **_label_place(points, view)}
+            lines.append({"points": points, **label})
+    rings = []
+    for ring in measures.rings:
+        centre, radius = _pixels(ring.centre_m, view), ring.radius_m * view["px_per_m"]
+        if place := _first_within(_around(centre, radius), view):
+            label = {"label": f"{ring.radius_m:.4g} m", "text": place, "anchor": "middle"}
+            rings.append({"at": centre, "r": round(radius, 1), **label})
+    return {"lines": lines, "rings": rings}
 
 
 def lane_edges_of_pair(
@@ -294,8 +277,8 @@ def lane_edges_of_pair(
         NotYours: The pair is somebody else's or there is none; the text does not say which.
         InvalidDocument: The stored scene can't be read.
     """
-    matchup = _measured(user, code)
-    if matchup is None:
+    matchup = _pair_of(user, code, *_MEASURED)
+    if not matchup.study.allow_measures:
         return None
     view = view_shown(matchup)
     ego_x, ego_y = view["ego_px"]
@@ -303,28 +286,12 @@ def lane_edges_of_pair(
     return (lane_edges_of(matchup.scenario, x_m, y_m),)
 
 
-# --- Private -----------------------------------------------------------------------------------
-
-
-def _measured(user: User, code: UUID) -> Matchup | None:
-    rows = Matchup.objects.select_related("study", "scenario").only(
-        "expert", "view", "study__allow_measures", "scenario__intent", "scenario__base_scene",
-        "scenario__keep_traffic",
-    )  # fmt: skip
-    matchup = rows.filter(code=code).first()
-    if matchup is None or (matchup.expert_id != user.pk and role_of(user) != "admin"):
-        raise NotYours("This pair is not shown to you.")
-    return matchup if matchup.study.allow_measures else None
-
-
 def _label(line: MeasureLine) -> str:
     if line.ahead_m is not None:
-        text = gettext("{} m ahead") if line.ahead_m >= 0.0 else gettext("{} m behind")
-        return text.format(f"{abs(line.ahead_m):.4g}")
+        return gettext(_AHEAD[line.ahead_m < 0.0]).format(f"{abs(line.ahead_m):.4g}")
     if not line.left_m:
         return gettext("centre of the lane")
-    text = gettext("{} m left") if line.left_m > 0.0 else gettext("{} m right")
-    return text.format(f"{abs(line.left_m):.4g}")
+    return gettext(_LEFT[line.left_m < 0.0]).format(f"{abs(line.left_m):.4g}")
 
 
 def _pixels(point_m: tuple[float, float], view: dict[str, Any]) -> _Point:
@@ -335,20 +302,17 @@ def _pixels(point_m: tuple[float, float], view: dict[str, Any]) -> _Point:
 def _around(centre: _Point, radius: float) -> list[_Point]:
     """Points of a circle, the ones furthest up first: there a label is least in the way."""
     turns = [side * math.radians(degrees) for degrees in range(0, 181, 10) for side in (1, -1)]
+    x, y = centre
     return [
-        [
-            round(centre[0] + radius * math.sin(turn), 1),
-            round(centre[1] - radius * math.cos(turn), 1),
-        ]
+        [round(x + radius * math.sin(turn), 1), round(y - radius * math.cos(turn), 1)]
         for turn in turns
     ]
 
 
 def _is_within(point: _Point, view: dict[str, Any]) -> bool:
-    sizes = (float(view["width"]), float(view["height"]))
-    return all(
-        _MARGIN_PX <= value <= size - _MARGIN_PX for value, size in zip(point, sizes, strict=True)
-    )
+    x, y = point
+    wide, high = view["width"] - _MARGIN_PX, view["height"] - _MARGIN_PX
+    return bool(_MARGIN_PX <= x <= wide and _MARGIN_PX <= y <= high)
 
 
 def _is_seen(points: list[_Point], view: dict[str, Any]) -> bool:
