@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from arena.rating.comparisons import Comparisons, FloatArray
-from arena.rating.leaderboard import Leaderboard, Line
+from arena.rating.leaderboard import Leaderboard
 from arena.rating.snapshot_document import Adjustment, BothRanks, CovariateEffect, LargestMove
 from arena.results.queries.votes import Judged
 from augment.models import Augmentation
@@ -64,7 +64,7 @@ def adjustment(names: Sequence[str], board: Leaderboard, plain: Leaderboard) -> 
     """
     if not names:
         return None
-    lines = tuple(_both(*both) for both in zip(board.lines, plain.lines, strict=True))
+    lines = both_ranks(board, plain)
     return Adjustment(
         effects=tuple(
             CovariateEffect(name=name, points=one.points, p_value=one.p_value)
@@ -72,6 +72,20 @@ def adjustment(names: Sequence[str], board: Leaderboard, plain: Leaderboard) -> 
         ),
         lines=lines,
         largest=largest_move(lines),
+    )
+
+
+def both_ranks(with_it: Leaderboard, without: Leaderboard) -> tuple[BothRanks, ...]:
+    """The ranks and ratings of everybody in two versions of a rating."""
+    return tuple(
+        BothRanks(
+            slug=first.name,
+            rank_with=first.rank,
+            rating_with=first.rating,
+            rank_without=second.rank,
+            rating_without=second.rating,
+        )
+        for first, second in zip(with_it.lines, without.lines, strict=True)
     )
 
 
@@ -90,16 +104,6 @@ def largest_move(lines: Sequence[BothRanks]) -> LargestMove | None:
 
 
 # --- Private -----------------------------------------------------------------------------------
-
-
-def _both(adjusted: Line, plain: Line) -> BothRanks:
-    return BothRanks(
-        slug=adjusted.name,
-        rank_with=adjusted.rank,
-        rating_with=adjusted.rating,
-        rank_without=plain.rank,
-        rating_without=plain.rating,
-    )
 
 
 def _counts(codes: set[str]) -> dict[str, tuple[int, int]]:

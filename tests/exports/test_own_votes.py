@@ -18,9 +18,10 @@ from arena.rating.leaderboard import rate as rate_votes
 from arena.rating.snapshot_document import OwnVotes
 from arena.results.exports.writers import bundle
 from arena.results.queries.votes import Entrant, Filters, Judged, VoteSet
-from arena.results.services.analysis import OTHER_ROUNDS, vote_arrays, with_and_without
+from arena.results.services.analysis import vote_arrays
 from arena.results.services.ratings import rate_now as rate
 from arena.results.services.ratings import votes_of
+from arena.results.services.trust import OTHER_ROUNDS, with_and_without
 from arena.services.authorships import mark_author
 from augment.models import Event
 from tests.full_study import Size, full_study

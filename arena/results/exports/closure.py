@@ -195,54 +195,53 @@ def close_over(study: Study) -> Closure:
 def _people(closure: Closure) -> set[int]:
     """Who votes, labels, has written or has looked; whoever only administered stays at home."""
     study, labellings = closure.study, LabellingRound.objects.filter(job__in=closure.jobs)
-    found: tuple[Rows, ...] = (
+    people: list[QuerySet[Any, Any]] = [
         study.experts.values_list("pk", flat=True),
-        Matchup.objects.filter(study=study).values_list("expert", flat=True),
-        Vote.objects.filter(matchup__study=study).values_list("expert", flat=True),
-        Report.objects.filter(matchup__study=study).values_list("expert", flat=True),
-        Authorship.objects.filter(study=study).values_list("expert", flat=True),
-        EarlyLook.objects.filter(study=study).values_list("user", flat=True),
-        LabelTask.objects.filter(labelling__in=labellings).values_list("expert", flat=True),
         labellings.exclude(experts=None).values_list("experts", flat=True),
-    )
-    return {pk for keys in found for pk in keys}
+    ]
+    columns: list[tuple[QuerySet[Any], str]] = [
+        (Matchup.objects.filter(study=study), "expert"),
+        (Vote.objects.filter(matchup__study=study), "expert"),
+        (Report.objects.filter(matchup__study=study), "expert"),
+        (Authorship.objects.filter(study=study), "expert"),
+        (EarlyLook.objects.filter(study=study), "user"),
+        (LabelTask.objects.filter(labelling__in=labellings), "expert"),
+    ]
+    people += [rows.values_list(column, flat=True) for rows, column in columns]
+    return {pk for keys in people for pk in keys}
 
 
 def travelling_rows(closure: Closure, rows: Rows) -> Iterator[list[Any]]:
     """The rows of one table without names of accounts, machines or addresses of people."""
     model = rows.model
     columns = columns_of(model)
+    names = [column.attname for column in columns]
+    accounts = [
+        column.attname
+        for column in columns
+        if isinstance(column, models.ForeignKey) and column.related_model is User and column.null
+    ]
     for values in read_values(rows):
-        row = dict(zip([column.attname for column in columns], values, strict=True))
-        _hide(model, columns, row, closure)
+        row = dict(zip(names, values, strict=True))
+        row |= {name: None for name in accounts if row[name] not in closure.accounts}
+        row |= _HIDDEN.get(model, {})
+        if model is User:
+            row["username"] = closure.accounts[row["id"]]
+        elif model is Study:
+            row["rules"] = closure.renamed_rules()
+            row["votes_to_plan"] = closure.renamed_votes_to_plan()
         yield list(row.values())
 
 
-def _hide(
-    model: type[models.Model],
-    columns: list[models.Field[Any, Any]],
-    row: dict[str, Any],
-    closure: Closure,
-) -> None:
-    for column in columns:
-        is_account = isinstance(column, models.ForeignKey) and column.related_model is User
-        if is_account and column.null and row[column.attname] not in closure.accounts:
-            row[column.attname] = None
-    if model is User:
-        row |= {
-            "username": closure.accounts[row["id"]],
-            **{"password": "!", "first_name": "", "last_name": "", "email": ""},
-            **{"is_staff": False, "is_superuser": False, "last_login": None},
-            "date_joined": LONG_AGO,
-        }
-    elif model is Endpoint:
-        row["key_variable"] = ""  # whose keys are sent where is for each host to say
-    elif model is Person:
-        row["preferences"] = {}
-    elif model is Attempt:
-        row["worker"] = ""
-    elif model is Augmentation:
-        row |= {"claim": None, "heartbeat_at": None}
-    elif model is Study:
-        row["rules"] = closure.renamed_rules()
-        row["votes_to_plan"] = closure.renamed_votes_to_plan()
+_HIDDEN: dict[type[models.Model], dict[str, Any]] = {
+    User: {
+        **{"password": "!", "first_name": "", "last_name": "", "email": ""},
+        **{"is_staff": False, "is_superuser": False, "last_login": None},
+        "date_joined": LONG_AGO,
+    },
+    Endpoint: {"key_variable": ""},  # whose keys are sent where is for each host to say
+    Person: {"preferences": {}},
+    Attempt: {"worker": ""},
+    Augmentation: {"claim": None, "heartbeat_at": None},
+}
+"""What stands in columns whose values stay at home."""

@@ -1,11 +1,12 @@
-"""What a snapshot keeps: computing it from its votes, and reading those votes again."""
+"""Rating a study: which votes, which method, which seed, now or by a worker, and what is kept."""
 
 from __future__ import annotations
 
 import platform
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TypedDict, Unpack
+from enum import StrEnum
+from typing import TypedDict, TypeVar, Unpack
 
 import numpy
 import scipy
@@ -28,21 +29,14 @@ from arena.results.queries.votes import (
     AUTOMATIC,
     Entrant,
     Filters,
-    Judged,
     VoteSet,
     is_imported,
     last_vote_of,
     vote_set,
 )
 from arena.results.services import analysis
-from arena.results.services.analysis import (
-    VoteArrays,
-    board_remarks,
-    precision,
-    trust,
-    vote_arrays,
-    with_and_without,
-)
+from arena.results.services.analysis import VoteArrays, vote_arrays
+from arena.results.services.trust import board_remarks, precision, trust, with_and_without
 from arena.results.services.vote_files import VERSION as VOTES_VERSION
 from arena.results.services.vote_files import digest_of, vote_rows, votes_csv
 from arena.services.covariates import COVARIATES, WITHOUT_PICTURES, adjustment, with_covariates
@@ -53,173 +47,12 @@ from augment.services.clock import Moment
 from augment.services.events import log_event
 from augment.services.work import Lease, WorkKind
 
-Report = Callable[[int], None]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Computed:
-    """What came out beside that which the snapshot itself has: its lines."""
-
-    board: Leaderboard
-    entrants: tuple[Entrant, ...]
-
-
-def compute(snapshot: Snapshot, report: Report) -> Computed:
-    """Rate the votes that a planned snapshot names, into the snapshot; nothing is stored.
-
-    Args:
-        snapshot: A planned one, stored or not.
-        report: Is told how far it is, in percent.
-    """
-    report(5)
-    votes = _vote_set(snapshot)
-    arrays = vote_arrays(votes.entrants, votes.counted)
-    report(20)
-    plain = board = _rate(snapshot, arrays.comparisons)
-    if snapshot.covariates:
-        names = snapshot.covariates
-        board = _rate(snapshot, with_covariates(arrays.comparisons, votes.counted, names))
-    report(60)
-    judges = {vote.judge: vote.judge_name for vote in votes.counted}
-    snapshot.results = _results(snapshot, votes, arrays, board, plain, judges)
-    report(90)
-    snapshot.votes_sha256 = digest_of(votes_csv(vote_rows(votes.counted, judges)))
-    snapshot.votes_counted = len(votes.counted)
-    snapshot.votes_left_out = votes.left_out
-    snapshot.versions = {
-        "python": platform.python_version(),
-        "numpy": numpy.__version__,
-        "scipy": scipy.__version__,
-        "results": RESULTS_VERSION,
-        "votes": VOTES_VERSION,
-    }
-    snapshot.reason = board.explanation
-    snapshot.degenerate_rounds = board.degenerate_rounds
-    snapshot.includes_simulated = _any_simulated(votes.counted, votes.entrants)
-    return Computed(board=board, entrants=votes.entrants)
-
-
-@transaction.atomic
-def keep(snapshot: Snapshot, computed: Computed) -> Snapshot:
-    """Store what was computed."""
-    snapshot.state = Snapshot.State.READY
-    snapshot.progress = 100
-    snapshot.claim = snapshot.heartbeat_at = None
-    snapshot.finished_at = timezone.now()
-    snapshot.save()
-    _store_lines(snapshot, computed.board, computed.entrants)
-    return snapshot
-
-
-def votes_of(snapshot: Snapshot) -> VoteSet:
-    """The votes that a snapshot is made of, read again.
-
-    Raises:
-        Conflict: They are not what they were: somebody changed rows by hand.
-    """
-    votes = _vote_set(snapshot)
-    rows = vote_rows(votes.counted, snapshot.results.judges)
-    if digest_of(votes_csv(rows, votes_version_of(snapshot))) != snapshot.votes_sha256:
-        raise Conflict(
-            f"The votes of '{snapshot.study.name}' are not those of this rating any more. "
-            "Rate again."
-        )
-    return votes
-
-
-def votes_version_of(snapshot: Snapshot) -> int:
-    """The version of the columns that its file of votes has; older ones had no word for it."""
-    return int(snapshot.versions.get("votes", 1))
-
-
-# --- Private -----------------------------------------------------------------------------------
-
-
-def _rate(snapshot: Snapshot, comparisons: Comparisons) -> Leaderboard:
-    try:
-        return rate(
-            comparisons,
-            method=Method(snapshot.method),
-            rounds=snapshot.rounds,
-            unit=Unit(snapshot.resampling_unit),
-            intervals=Intervals(snapshot.intervals),
-            seed=snapshot.seed,
-        )
-    except TooManyContestants as error:
-        raise Conflict(f"{snapshot.study.name!r}: {error}") from error
-
-
-def _vote_set(snapshot: Snapshot) -> VoteSet:
-    filters = Filters.of_document(snapshot.filters)
-    return vote_set(snapshot.study, filters=filters, last=snapshot.last_vote)
-
-
-def _results(
-    snapshot: Snapshot,
-    votes: VoteSet,
-    arrays: VoteArrays,
-    board: Leaderboard,
-    plain: Leaderboard,
-    judges: dict[str, str],
-) -> Results:
-    study, seed = snapshot.study, snapshot.seed
-    from_file = is_imported(study)
-    filters = Filters.of_document(snapshot.filters)
-    planned = analysis.planned_pairs(study, filters)
-    planned.update(
-        frozenset((vote.left, vote.right)) for vote in votes.counted if vote.kind == AUTOMATIC
-    )
-    remark = settled_remark(study, votes, left_out=filters.leave_out_settled)
-    remarks = board_remarks(board)
-    if remark:
-        remarks = replace(remarks, warnings=(*remarks.warnings, remark))
-    return Results(
-        version=RESULTS_VERSION,
-        board=remarks,
-        trust=trust(arrays, votes, plain, seed=seed),
-        claims=precision(arrays, board, unit=board.unit, seed=seed),
-        own_votes=with_and_without(votes, filters, board, snapshot.covariates),
-        adjustment=adjustment(snapshot.covariates, board, plain),
-        pairs=analysis.pairs(arrays.comparisons, votes.counted, planned),
-        types=analysis.by_type(arrays, board),
-        displacement=() if from_file else analysis.displacement(study),
-        cost=() if from_file else analysis.cost(study, votes.entrants),
-        models={
-            entrant.slug: entrant.contestant.model
-            for entrant in votes.entrants
-            if entrant.contestant is not None
-        },
-        judges=judges,
-    )
-
-
-def _any_simulated(votes: tuple[Judged, ...], entrants: tuple[Entrant, ...]) -> bool:
-    """Whether something in the table is simulated, be it a line without votes."""
-    return any(entrant.is_simulated for entrant in entrants) or any(
-        vote.is_simulated for vote in votes
-    )
-
-
-def _store_lines(snapshot: Snapshot, board: Leaderboard, entrants: tuple[Entrant, ...]) -> None:
-    Standing.objects.bulk_create(
-        Standing(
-            snapshot=snapshot,
-            contestant=one.contestant,
-            slug=one.slug,
-            name=one.name,
-            variant=one.variant,
-            kind=one.kind,
-            is_simulated=one.is_simulated,
-            **stored_values(line),
-        )
-        for one, line in zip(entrants, board.lines, strict=True)
-    )
-
-
 DEFAULT_ROUNDS = 10_000
 MOST_ROUNDS = 100_000
 WHILE_WAITING = 20_000
 """Up to so many votes a person waits for the page; more are a worker's job."""
+
+Word = TypeVar("Word", bound=StrEnum)
 
 
 class Choices(TypedDict, total=False):
@@ -234,6 +67,17 @@ class Choices(TypedDict, total=False):
     filters: Filters | None
     early: bool
     actor: User | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Computed:
+    """What came out beside that which the snapshot itself has: its lines."""
+
+    board: Leaderboard
+    entrants: tuple[Entrant, ...]
+
+
+# --- Doors -------------------------------------------------------------------------------------
 
 
 def rate_now(*, study: Study, **choices: Unpack[Choices]) -> Snapshot:
@@ -303,15 +147,9 @@ class PlannedRatings(WorkKind[Snapshot]):
     def ended(self, pk: int, end: str, reason: str, now: Moment) -> None:
         """Say in the log why there is no rating."""
         row = self.rows.select_related(*self.related).get(pk=pk)
-        if row.state != Snapshot.State.FAILED:
-            return
-        log_event(
-            actor=row.made_by,
-            verb="rating failed",
-            object_kind="study",
-            object_code=row.study.code,
-            after={"snapshot": str(row.code), "why": row.reason},
-        )
+        if row.state == Snapshot.State.FAILED:
+            after = {"snapshot": str(row.code), "why": row.reason}
+            _log_act(row.study, row.made_by, "rating failed", after)
 
 
 RATINGS = PlannedRatings()
@@ -322,6 +160,108 @@ def is_big(study: Study) -> bool:
     if is_imported(study):
         return ImportedVote.objects.filter(file__study=study).count() > WHILE_WAITING
     return Vote.objects.filter(matchup__study=study).count() > WHILE_WAITING
+
+
+@transaction.atomic
+def open_early(*, study: Study, actor: User) -> None:
+    """Open the results of an open study to somebody, who no longer votes in it from then on.
+
+    Raises:
+        Conflict: The study is not open: there is nothing to open early.
+    """
+    if study.state != Study.State.OPEN:
+        raise Conflict(f"The study '{study.name}' is {study.state}: nothing is opened early.")
+    _, is_new = EarlyLook.objects.get_or_create(study=study, user=actor)
+    if is_new:
+        after = {"what": "results", "ends_voting": votes_in(actor, study)}
+        _log_act(study, actor, "look early", after)
+
+
+def log_early_look(*, study: Study, actor: User | None, what: str) -> None:
+    """Write to the log that somebody looked at results of an open study on purpose."""
+    _log_act(study, actor, "look early", {"what": what})
+
+
+# --- Computing and keeping ---------------------------------------------------------------------
+
+
+def compute(snapshot: Snapshot, report: Callable[[int], None]) -> Computed:
+    """Rate the votes that a planned snapshot names, into the snapshot; nothing is stored.
+
+    Args:
+        snapshot: A planned one, stored or not.
+        report: Is told how far it is, in percent.
+    """
+    report(5)
+    votes = _vote_set(snapshot)
+    arrays = vote_arrays(votes.entrants, votes.counted)
+    report(20)
+    plain = board = _rate(snapshot, arrays.comparisons)
+    if names := snapshot.covariates:
+        board = _rate(snapshot, with_covariates(arrays.comparisons, votes.counted, names))
+    report(60)
+    snapshot.results = results = _results(snapshot, votes, arrays, board, plain)
+    report(90)
+    snapshot.votes_sha256 = digest_of(votes_csv(vote_rows(votes.counted, results.judges)))
+    snapshot.votes_counted = len(votes.counted)
+    snapshot.votes_left_out = votes.left_out
+    snapshot.versions = {
+        "python": platform.python_version(),
+        "numpy": numpy.__version__,
+        "scipy": scipy.__version__,
+        "results": RESULTS_VERSION,
+        "votes": VOTES_VERSION,
+    }
+    snapshot.reason = board.explanation
+    snapshot.degenerate_rounds = board.degenerate_rounds
+    # Whether something in the table is simulated, be it a line without votes.
+    snapshot.includes_simulated = any(one.is_simulated for one in votes.entrants + votes.counted)
+    return Computed(board=board, entrants=votes.entrants)
+
+
+@transaction.atomic
+def keep(snapshot: Snapshot, computed: Computed) -> Snapshot:
+    """Store what was computed."""
+    snapshot.state = Snapshot.State.READY
+    snapshot.progress = 100
+    snapshot.claim = snapshot.heartbeat_at = None
+    snapshot.finished_at = timezone.now()
+    snapshot.save()
+    Standing.objects.bulk_create(
+        Standing(
+            snapshot=snapshot,
+            contestant=entrant.contestant,
+            slug=entrant.slug,
+            name=entrant.name,
+            variant=entrant.variant,
+            kind=entrant.kind,
+            is_simulated=entrant.is_simulated,
+            **stored_values(line),
+        )
+        for entrant, line in zip(computed.entrants, computed.board.lines, strict=True)
+    )
+    return snapshot
+
+
+def votes_of(snapshot: Snapshot) -> VoteSet:
+    """The votes that a snapshot is made of, read again.
+
+    Raises:
+        Conflict: They are not what they were: somebody changed rows by hand.
+    """
+    votes = _vote_set(snapshot)
+    rows = vote_rows(votes.counted, snapshot.results.judges)
+    if digest_of(votes_csv(rows, votes_version_of(snapshot))) != snapshot.votes_sha256:
+        raise Conflict(
+            f"The votes of '{snapshot.study.name}' are not those of this rating any more. "
+            "Rate again."
+        )
+    return votes
+
+
+def votes_version_of(snapshot: Snapshot) -> int:
+    """The version of the columns that its file of votes has; older ones had no word for it."""
+    return int(snapshot.versions.get("votes", 1))
 
 
 # --- Private -----------------------------------------------------------------------------------
@@ -345,9 +285,18 @@ def _planned(
     is_early = study.state == Study.State.OPEN
     if is_early and not early:
         raise StudyStillOpen(study.name)
-    chosen = _method(method)
-    drawn = _default_unit(study, chosen) if unit is None else _unit(unit)
-    _check_draws(chosen, drawn, rounds, seed)
+    if not 1 <= rounds <= MOST_ROUNDS:
+        raise Conflict(f"Bootstrap rounds go from 1 to {MOST_ROUNDS}, not {rounds}.")
+    if not 0 <= seed < 2**63:
+        raise Conflict(f"A seed goes from 0 to 2^63 - 1, not {seed}.")
+    chosen = _read_word(Method, method, "method")
+    drawn = _read_word(Unit, unit or _default_unit(study, chosen), "resampling unit")
+    if chosen is Method.ELO and drawn is not Unit.VOTE:
+        raise Conflict(f"Online Elo resamples single votes only; '{drawn.value}' needs bt.")
+    known = WITHOUT_PICTURES if is_imported(study) else COVARIATES
+    for name in covariates:
+        if name not in known:
+            raise UnknownName("covariate", name, list(known))
     return Snapshot(
         study=study,
         state=Snapshot.State.QUEUED,
@@ -355,8 +304,8 @@ def _planned(
         method=chosen,
         rounds=rounds,
         resampling_unit=drawn,
-        intervals=_intervals(intervals, chosen, drawn, covariates),
-        covariates=_covariates(study, covariates),
+        intervals=_intervals(intervals, chosen, drawn, is_adjusted=bool(covariates)),
+        covariates=[name for name in known if name in covariates],
         seed=seed,
         filters=replace(filters or Filters(), authors=authors_of(study)).as_document(),
         last_vote=last_vote_of(study),
@@ -366,50 +315,14 @@ def _planned(
     )
 
 
-def _log(snapshot: Snapshot) -> None:
-    log_event(
-        actor=snapshot.made_by,
-        verb="rate early" if snapshot.is_early else "rate",
-        object_kind="study",
-        object_code=snapshot.study.code,
-        after={
-            "snapshot": str(snapshot.code),
-            "method": snapshot.method,
-            "filters": _asked(snapshot),
-        },
-    )
+def _read_word(words: type[Word], name: str, what: str) -> Word:
+    if name not in list(words):
+        raise UnknownName(what, name, [word.value for word in words])
+    return words(name)
 
 
-def _asked(snapshot: Snapshot) -> dict[str, object]:
-    """The filters for the log, where each mark of an author has a line of its own already."""
-    return {name: value for name, value in snapshot.filters.items() if name != "authors"}
-
-
-def _method(name: str) -> Method:
-    if name not in list(Method):
-        raise UnknownName("method", name, [method.value for method in Method])
-    return Method(name)
-
-
-def _unit(name: str) -> Unit:
-    if name not in list(Unit):
-        raise UnknownName("resampling unit", name, [unit.value for unit in Unit])
-    return Unit(name)
-
-
-def _covariates(study: Study, names: Sequence[str]) -> list[str]:
-    """In the order in which they are known, each once."""
-    known = WITHOUT_PICTURES if is_imported(study) else COVARIATES
-    for name in names:
-        if name not in known:
-            raise UnknownName("covariate", name, list(known))
-    return [name for name in known if name in names]
-
-
-def _intervals(
-    name: str | None, method: Method, unit: Unit, covariates: Sequence[str]
-) -> Intervals:
-    if covariates:
+def _intervals(name: str | None, method: Method, unit: Unit, *, is_adjusted: bool) -> Intervals:
+    if is_adjusted:
         if method is not Method.BRADLEY_TERRY or name == Intervals.RESAMPLES:
             raise Conflict(
                 "Only Bradley-Terry with intervals in closed form can be adjusted for what "
@@ -418,11 +331,10 @@ def _intervals(
         return Intervals.CLOSED_FORM
     if name is None:
         return default_intervals(method, unit)
-    if name not in list(Intervals):
-        raise UnknownName("kind of intervals", name, [one.value for one in Intervals])
-    if method is Method.ELO and name != Intervals.RESAMPLES:
+    chosen = _read_word(Intervals, name, "kind of intervals")
+    if method is Method.ELO and chosen is not Intervals.RESAMPLES:
         raise Conflict("Online Elo has no intervals in closed form, only resamples.")
-    return Intervals(name)
+    return chosen
 
 
 def _default_unit(study: Study, method: Method) -> Unit:
@@ -435,36 +347,65 @@ def _default_unit(study: Study, method: Method) -> Unit:
     return unit_for(judges=judges, items=items)
 
 
-def _check_draws(method: Method, unit: Unit, rounds: int, seed: int) -> None:
-    if not 1 <= rounds <= MOST_ROUNDS:
-        raise Conflict(f"Bootstrap rounds go from 1 to {MOST_ROUNDS}, not {rounds}.")
-    if not 0 <= seed < 2**63:
-        raise Conflict(f"A seed goes from 0 to 2^63 - 1, not {seed}.")
-    if method is Method.ELO and unit is not Unit.VOTE:
-        raise Conflict(f"Online Elo resamples single votes only; '{unit.value}' needs bt.")
+def _log(snapshot: Snapshot) -> None:
+    # Each mark of an author has a line of its own already.
+    filters = {name: value for name, value in snapshot.filters.items() if name != "authors"}
+    after = {"snapshot": str(snapshot.code), "method": snapshot.method, "filters": filters}
+    verb = "rate early" if snapshot.is_early else "rate"
+    _log_act(snapshot.study, snapshot.made_by, verb, after)
 
 
-@transaction.atomic
-def open_early(*, study: Study, actor: User) -> None:
-    """Open the results of an open study to somebody, who no longer votes in it from then on.
-
-    Raises:
-        Conflict: The study is not open: there is nothing to open early.
-    """
-    if study.state != Study.State.OPEN:
-        raise Conflict(f"The study '{study.name}' is {study.state}: nothing is opened early.")
-    _, is_new = EarlyLook.objects.get_or_create(study=study, user=actor)
-    if is_new:
-        ends_voting = votes_in(actor, study)
-        _log_early_looks(study, actor, what="results", ends_voting=ends_voting)
-
-
-def log_early_look(*, study: Study, actor: User | None, what: str) -> None:
-    """Write to the log that somebody looked at results of an open study on purpose."""
-    _log_early_looks(study, actor, what=what)
-
-
-def _log_early_looks(study: Study, actor: User | None, **seen: object) -> None:
+def _log_act(study: Study, actor: User | None, verb: str, after: Mapping[str, object]) -> None:
     log_event(
-        actor=actor, verb="look early", object_kind="study", object_code=study.code, after=seen
+        actor=actor, verb=verb, object_kind="study", object_code=study.code, after=dict(after)
+    )
+
+
+def _vote_set(snapshot: Snapshot) -> VoteSet:
+    filters = Filters.of_document(snapshot.filters)
+    return vote_set(snapshot.study, filters=filters, last=snapshot.last_vote)
+
+
+def _rate(snapshot: Snapshot, comparisons: Comparisons) -> Leaderboard:
+    try:
+        return rate(
+            comparisons,
+            method=Method(snapshot.method),
+            rounds=snapshot.rounds,
+            unit=Unit(snapshot.resampling_unit),
+            intervals=Intervals(snapshot.intervals),
+            seed=snapshot.seed,
+        )
+    except TooManyContestants as error:
+        raise Conflict(f"{snapshot.study.name!r}: {error}") from error
+
+
+def _results(
+    snapshot: Snapshot, votes: VoteSet, arrays: VoteArrays, board: Leaderboard, plain: Leaderboard
+) -> Results:
+    study, seed = snapshot.study, snapshot.seed
+    from_file = is_imported(study)
+    filters = Filters.of_document(snapshot.filters)
+    planned = analysis.planned_pairs(study, filters)
+    planned.update(
+        frozenset((vote.left, vote.right)) for vote in votes.counted if vote.kind == AUTOMATIC
+    )
+    remark = settled_remark(study, votes, left_out=filters.leave_out_settled)
+    return Results(
+        version=RESULTS_VERSION,
+        board=board_remarks(board, *filter(None, [remark])),
+        trust=trust(arrays, votes, plain, seed=seed),
+        claims=precision(arrays, board, seed=seed),
+        own_votes=with_and_without(votes, filters, board, snapshot.covariates),
+        adjustment=adjustment(snapshot.covariates, board, plain),
+        pairs=analysis.pairs(arrays.comparisons, votes.counted, planned),
+        types=analysis.by_type(arrays, board),
+        displacement=() if from_file else analysis.displacement(study),
+        cost=() if from_file else analysis.cost(study, votes.entrants),
+        models={
+            entrant.slug: entrant.contestant.model
+            for entrant in votes.entrants
+            if entrant.contestant is not None
+        },
+        judges={vote.judge: vote.judge_name for vote in votes.counted},
     )

@@ -1,13 +1,11 @@
-"""Votes as the rows of a table that other rating packages read, and the hash of a vote set.
+"""Votes as a table that other rating packages read, and votes from elsewhere as a study.
 
-The hash is that of the CSV file with these rows, so whoever has the file can check it.
+A vote set is known by the hash of its CSV file, so whoever has the file can check it.
 """
 
 from __future__ import annotations
 
-import csv
 import hashlib
-import io
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from datetime import timedelta
@@ -28,7 +26,7 @@ from arena.rating.votes_file import (
     read_votes,
 )
 from arena.results.queries.votes import Judged
-from arena.services.cells import cell
+from arena.services.cells import csv_text
 from arena.voting.services.turns import in_turn
 from augment.errors import Conflict
 from augment.services.events import log_event
@@ -92,29 +90,8 @@ def vote_rows(votes: Iterable[Judged], names: Mapping[str, str]) -> Iterator[Row
 
 def votes_csv(rows: Iterable[Row], version: int = VERSION) -> bytes:
     """The rows with their head; no cell is a formula."""
-    sheet = io.StringIO()
-    writer = csv.writer(sheet, lineterminator="\n")
-    writer.writerow(vote_columns(version))
-    width, guarded = _WIDTHS[version], _Guarded()
-    writer.writerows(
-        tuple(_written(value, guarded) if value is not None else None for value in row[:width])
-        for row in rows
-    )
-    return sheet.getvalue().encode()
-
-
-def _written(value: str | int | bool, guarded: _Guarded) -> object:
-    if isinstance(value, str):
-        return guarded[value]
-    return value if not isinstance(value, bool) else "yes" if value else "no"
-
-
-class _Guarded(dict[str, str]):
-    """The same few names come again and again: each is guarded once."""
-
-    def __missing__(self, text: str) -> str:
-        self[text] = guarded = cell(text)
-        return guarded
+    names = vote_columns(version)
+    return csv_text(names, (row[: len(names)] for row in rows)).encode()
 
 
 def digest_of(content: bytes) -> str:
