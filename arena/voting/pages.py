@@ -33,8 +33,13 @@ from arena.web.forms import ReportForm, VoteForm
 from arena.web.pictures import picture_response
 from arena.web.screen import over_context, vote_context
 from augment.errors import Conflict
-from augment.services.judging.findings import EGO_ID, Finding, FindingKind, check_augmentation
-from augment.services.judging.measures import LaneEdges
+from augment.services.judging.findings import (
+    EGO_ID,
+    Finding,
+    FindingKind,
+    LaneEdges,
+    check_augmentation,
+)
 
 
 @allow_only(EXPERT)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from arena.rating.estimate import Estimate
-from arena.rating.printed import whole_percent
+from arena.rating.comparisons import Estimate
+from arena.rating.lines import whole_percent
 from arena.rating.snapshot_document import PairRecord
 from arena.results.exports.charts import heat_map
 from arena.results.exports.tables import Row

@@ -18,7 +18,7 @@ from arena.results.services.vote_files import COLUMNS, digest_of, vote_rows, vot
 from arena.services.studies import close_study
 from augment.errors import Conflict
 from augment.models import Contestant, Scenario
-from augment.scene.catalogue import ScenarioType
+from augment.scene.entities import ScenarioType
 from tests.append_only import rewriting
 from tests.study_rows import a_study, matchups_of, vote
 

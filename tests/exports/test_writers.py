@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import pytest
 
-from arena.rating.printed import escape
+from arena.rating.lines import escape
 from arena.results.exports.tables import (
     EARLY_LOOK,
     SIMULATED_TABLE,

@@ -12,7 +12,7 @@ from arena.results.queries.evidence import each_vote, vote_page
 from arena.results.queries.search import EVERY, LEFT_OUT, VoteSearch, find_votes
 from arena.results.queries.votes import Filters
 from arena.results.services.ratings import rate_now as rate
-from augment.scene.catalogue import ScenarioType
+from augment.scene.entities import ScenarioType
 from tests.mixed_study import mixed_study
 
 pytestmark = pytest.mark.django_db

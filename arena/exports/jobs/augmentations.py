@@ -20,8 +20,13 @@ from arena.exports.formats import (
 )
 from arena.services.cells import cell
 from augment.models import GenerationJob
-from augment.services.judging.augmentation_rows import AugmentationLine, augmentation_lines
-from augment.services.judging.repeatability import RepeatLine, SampleSpread, repeatability
+from augment.services.judging.analyses import (
+    AugmentationLine,
+    RepeatLine,
+    SampleSpread,
+    augmentation_lines,
+    repeatability,
+)
 
 COLUMNS = {
     "job": TEXT, "scenario": TEXT, "type": TEXT, "contestant": TEXT, "name": TEXT, "model": TEXT,

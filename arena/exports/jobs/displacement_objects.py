@@ -10,7 +10,7 @@ from collections.abc import Collection, Sequence
 from arena.exports.formats import NUMBER, TEXT, WHOLE, YES_NO, Format, formats, parquet_bytes
 from arena.services.cells import cell
 from augment.models import GenerationJob
-from augment.services.judging.displaced_objects import DisplacedObject, ObjectPosition, objects_of
+from augment.services.judging.displacement import DisplacedObject, ObjectPosition, objects_of
 
 BY_OBJECT = "object"
 """How it is asked for, beside the groupings."""

@@ -7,8 +7,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from arena.exports.formats import Format, drawings, formats, round_value
-from arena.exports.jobs.displacement_table import DisplacementTable
-from arena.exports.jobs.published import SOURCE, PublishedBox
+from arena.jobs.exports.displacement import SOURCE, DisplacementTable, PublishedBox
 from arena.results.exports.box_plot import box_plot
 from arena.results.exports.tables import shown_name
 from arena.services.cells import csv_text

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from django.core.files.base import ContentFile
 from django.utils.text import slugify
 
-from arena.exports.jobs.scenarios import scenario_zip, zip_name
+from arena.jobs.exports.files import scenario_zip, zip_name
 from arena.models import ScenarioFile
 from arena.results.services.written_files import FileWork, MadeFile
 from augment.services.judging.scenario_export import Exported, export_job

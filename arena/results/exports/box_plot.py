@@ -6,8 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from arena.exports.jobs.displacement_table import DisplacementTable
-from arena.exports.jobs.published import SOURCE, PublishedBox
+from arena.jobs.exports.displacement import SOURCE, DisplacementTable, PublishedBox
 from arena.results.exports.drawing import (
     GRID,
     INK,

@@ -9,7 +9,7 @@ from functools import partial
 from typing import Any
 
 from arena.models import Snapshot
-from arena.rating.printed import whole_percent
+from arena.rating.lines import whole_percent
 from arena.rating.snapshot_document import PairRecord, TypeRating
 from arena.results.exports.drawing import (
     INK,

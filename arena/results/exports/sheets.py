@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 from django.core.files.storage import default_storage
 
+from arena.jobs.queries import JobGrid
 from arena.models import Snapshot
-from arena.queries.jobs import JobGrid
 from arena.results.exports.drawing import (
     INK,
     NO_METADATA,

@@ -12,7 +12,7 @@ from django.core.files.base import ContentFile
 from django.utils.text import slugify
 
 from arena.exports.files import zip_folder
-from arena.exports.jobs.scenario_files import made_of
+from arena.jobs.exports.files import made_of
 from arena.models import Study, StudyFile
 from arena.results.exports.sheets import contact_sheet
 from arena.results.exports.study_folder import write_study

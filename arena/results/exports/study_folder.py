@@ -16,8 +16,8 @@ from django.core.files.storage import default_storage
 from django.template.loader import render_to_string
 
 from arena.errors import ArenaError
-from arena.exports.jobs.displacement_objects import csv_bytes as objects_csv
-from arena.exports.jobs.displacement_objects import object_rows
+from arena.jobs.exports.displacement import object_csv as objects_csv
+from arena.jobs.exports.displacement import object_rows
 from arena.models import Matchup, Snapshot, Study, Vote
 from arena.results.exports.closure import Closure, close_over, travelling_rows
 from arena.results.exports.writers import MANIFEST as RATING_MANIFEST
@@ -33,8 +33,7 @@ from arena.services.cells import csv_text
 from arena.services.preregistration import FILE_NAME, preregistration_bytes, preregistration_sha256
 from arena.services.unfinished_work import UNFINISHED
 from augment.models import Augmentation, Contestant, GenerationJob, Scenario
-from augment.services.running.transcript_export import record_of
-from augment.services.running.transcript_steps import tries_by_augmentation
+from augment.services.running.transcript_records import record_of, tries_by_augmentation
 
 File = tuple[str, bytes]
 

@@ -11,8 +11,7 @@ from django.db.models import F
 from arena.exports.formats import NUMBER, TEXT, WHOLE, YES_NO
 from arena.models import Snapshot, Standing
 from arena.models.ratings import stored_values
-from arena.rating.lines import Line
-from arena.rating.printed import notes_by_reason
+from arena.rating.lines import Line, notes_by_reason
 from arena.rating.rules import METHOD_TEXTS, UNIT_TEXTS, Intervals
 from arena.results.queries.votes import LeftOut
 from arena.services.hypotheses import Answered, answer_hypotheses

@@ -12,7 +12,7 @@ from typing import Any
 from arena.exports.files import zip_bytes
 from arena.exports.formats import Format, drawings, formats, parquet_bytes, round_value
 from arena.models import Snapshot
-from arena.rating.printed import caption_text, escape, latex_table
+from arena.rating.lines import caption_text, escape, latex_table
 from arena.rating.snapshot_document import Results, results_document
 from arena.results.exports.charts import CONTENT_TYPES as CHART_FORMATS
 from arena.results.exports.charts import charts, interval_chart

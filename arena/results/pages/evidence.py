@@ -27,7 +27,7 @@ from arena.web.access import STAFF, allow_only
 from arena.web.listing import page_asked
 from arena.web.pictures import sized_picture_response
 from augment.services.running.jobs import HIGHEST_SAMPLES
-from augment.services.scenarios.types import type_choices
+from augment.services.scenarios.scenes import type_choices
 
 _ALL = ("", "all")
 

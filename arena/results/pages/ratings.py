@@ -53,7 +53,7 @@ from arena.services.covariates import COVARIATES, WITHOUT_PICTURES
 from arena.web.access import ADMIN, ANALYST, EXPERT, STAFF, allow_only
 from arena.web.studies.files import export_place
 from augment.errors import AugmentError, Conflict, UnknownName
-from augment.services.scenarios.types import type_choices
+from augment.services.scenarios.scenes import type_choices
 
 METHODS = {
     Method.BRADLEY_TERRY: "Bradley-Terry",

@@ -7,10 +7,11 @@ from dataclasses import dataclass, replace
 from statistics import median_high
 from typing import Any
 
+from arena.jobs.pages.driving import driving
 from arena.models import Snapshot
 from arena.models.votes import AIDS
 from arena.queries.people import natural_order
-from arena.rating.printed import rating_text
+from arena.rating.lines import rating_text
 from arena.rating.snapshot_document import (
     Adjustment,
     BothRanks,
@@ -24,7 +25,6 @@ from arena.results.exports.plots import plots
 from arena.results.exports.tables import ON_PAGE, LeaderboardTable, Row
 from arena.results.queries.access import log_of, names_in_log, snapshots_of
 from arena.results.queries.votes import AUTOMATIC, Filters
-from arena.web.jobs.driving import driving
 from augment.models import EndpointModel
 
 Context = dict[str, Any]

@@ -21,7 +21,7 @@ from arena.pairing.rules import Entry, grid_of, scenario_of
 from arena.pairing.settled import draw_ties
 from augment.errors import UnknownName
 from augment.models import Contestant
-from augment.services.scenarios.types import ScenarioType
+from augment.services.scenarios.scenes import ScenarioType
 
 Row = TypeVar("Row", bound=Model)
 

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 from django.db.models import Count
 
+from arena.jobs.queries import model_classes, shown_augmentations, spent_on
 from arena.models import Matchup, Study, Vote
-from arena.queries.costs import model_classes, shown_augmentations, spent_on
 from arena.rating.comparisons import (
     LOSS,
     TIE,
@@ -33,7 +33,7 @@ from arena.rating.snapshot_document import (
 )
 from arena.results.queries.votes import Entrant, Filters, Judged, is_imported
 from augment.services.judging.displacement import of_rows, summarise
-from augment.services.scenarios.types import in_type_order, type_label
+from augment.services.scenarios.scenes import in_type_order, type_label
 
 SCORES = {
     Vote.Outcome.LEFT.value: WIN,

@@ -8,9 +8,8 @@ from dataclasses import fields, replace
 
 import numpy as np
 
-from arena.rating import elo
+from arena.rating import models
 from arena.rating.bootstrap import Unit
-from arena.rating.bradley_terry import ELO_PER_LOGIT, MEAN_ELO
 from arena.rating.comparisons import (
     Comparisons,
     FloatArray,
@@ -19,10 +18,15 @@ from arena.rating.comparisons import (
     select_votes,
     tally,
 )
-from arena.rating.fit_test import fit_test
-from arena.rating.influence import fewest_votes_to_change_first, rank_changes, without_each_expert
+from arena.rating.influence import (
+    fewest_votes_to_change_first,
+    fit_test,
+    rank_changes,
+    without_each_expert,
+)
 from arena.rating.leaderboard import Intervals, Leaderboard, Method, rate
 from arena.rating.logistic import side_bias
+from arena.rating.models import ELO_PER_LOGIT, MEAN_ELO
 from arena.rating.planning import design_effects, votes_until
 from arena.rating.ranking import Separation
 from arena.rating.reliability import Repeats, agreement, raters, repeat_consistency
@@ -290,7 +294,7 @@ def _panel(
 
 def _elo_order(votes: Comparisons, strengths: FloatArray, seed: int) -> tuple[OnlinePlace, ...]:
     """Contestants by Bradley-Terry, with what online Elo makes of them."""
-    online = np.median(elo.resample_elo(votes, rounds=ELO_ROUNDS, seed=seed), axis=1)
+    online = np.median(models.resample_elo(votes, rounds=ELO_ROUNDS, seed=seed), axis=1)
     places = np.argsort(np.argsort(-online, kind="stable"))
     return tuple(
         OnlinePlace(

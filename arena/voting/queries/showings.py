@@ -17,8 +17,8 @@ from arena.errors import NotYours
 from arena.models import LabelTask, Matchup, PracticePair
 from arena.queries.people import role_of
 from augment.models import Augmentation, Simulation
-from augment.services.judging.drive_files import blind_drive
-from augment.services.judging.measures import LaneEdges, MeasureLine, lane_edges_of, measures_of
+from augment.services.judging.findings import LaneEdges, MeasureLine, lane_edges_of, measures_of
+from augment.services.judging.simulations import blind_drive
 from augment.services.scenarios.pictures import window_of
 
 VIEW_OF_OLD: dict[str, Any] = {
