@@ -27,12 +27,12 @@ import numpy as np
 from arena.rating.bradley_terry import ELO_PER_LOGIT
 from arena.rating.comparisons import Comparisons, IntArray
 from arena.rating.leaderboard import rate
-from bench.rating_sizes import WINNERS
 from bench.report import load, table, write_section
 
 ROOT = Path(__file__).resolve().parents[1]
 HEADING = "Intervals in closed form, with many contestants"
 TIES = 0.3
+WINNERS = ("model_a", "tie", "model_b")
 
 
 WHAT = """`python -m bench.rating_scale [--write]` (in `make bench`): `rate(votes)` with

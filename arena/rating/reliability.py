@@ -90,17 +90,6 @@ def agreement(votes: Comparisons, *, rounds: int, seed: int) -> Agreement:
     )
 
 
-def gwet_ac1(table: IntArray) -> float | None:
-    """AC1 of a table (U, K) of values by unit; None if no unit was judged twice.
-
-    What is expected by chance comes from all units, also those that were judged once.
-
-    Source: K. L. Gwet, Computing inter-rater reliability in the presence of high agreement (2008).
-    """
-    is_shared = table.sum(axis=1) >= 2
-    return float(_ac1_of(_shares(table).sum(axis=0)[None])[0]) if is_shared.any() else None
-
-
 def unit_table(votes: Comparisons) -> tuple[IntArray, IntArray]:
     """(U, 3) how often each value was given to each unit, and (U,) the units' scenarios."""
     counts = count_pairs(votes)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from dataclasses import fields, replace
 from typing import Any
@@ -25,7 +26,7 @@ from arena.rating.fit_test import fit_test
 from arena.rating.influence import fewest_votes_to_change_first, rank_changes, without_each_expert
 from arena.rating.leaderboard import Intervals, Leaderboard, Line, Method, rate
 from arena.rating.logistic import side_bias
-from arena.rating.planning import design_effects, votes_until
+from arena.rating.planning import design_effects
 from arena.rating.ranking import Separation
 from arena.rating.reliability import Rater, Repeats, agreement, raters, repeat_consistency
 from arena.rating.snapshot_document import (
@@ -152,10 +153,7 @@ def precision(arrays: VoteArrays, board: Leaderboard, *, unit: Unit, seed: int) 
         planning=()
         if typical is None
         else tuple(
-            VotesWanted(
-                half_width=wanted,
-                votes=votes_until(votes=votes, half_width=typical, wanted=wanted),
-            )
+            VotesWanted(half_width=wanted, votes=math.ceil(votes * (typical / wanted) ** 2))
             for wanted in WANTED
         ),
     )

@@ -7,7 +7,6 @@ import pytest
 
 from arena.rating import elo
 from arena.rating.comparisons import Comparisons, FloatArray, count_pairs, select_votes
-from bench.rating_sizes import SIZES, drawn
 from tests.rating.votes import simulated
 
 TRUTH = [1150.0, 1040.0, 1000.0, 980.0, 830.0]
@@ -55,7 +54,18 @@ def test_every_round_is_a_replay_of_votes_drawn_with_replacement(
 
 
 def test_counted_votes_are_resampled_like_as_many_rows() -> None:
-    counted = drawn(SIZES[0]).counted(clusters=False)
+    drawn = simulated(TRUTH, 900, 1)
+    columns = (drawn.first, drawn.second, drawn.score)
+    kinds, count = np.unique(np.stack(columns, axis=1), axis=0, return_counts=True)
+    counted = Comparisons(
+        names=drawn.names,
+        first=kinds[:, 0].astype(np.int64),
+        second=kinds[:, 1].astype(np.int64),
+        score=np.asarray(kinds[:, 2], dtype=np.float64),
+        expert=np.zeros(len(kinds), dtype=np.int64),
+        scenario=np.zeros(len(kinds), dtype=np.int64),
+        count=count,
+    )
     single = select_votes(counted, np.repeat(np.arange(len(counted)), counted.count))
     rows = Comparisons(
         names=single.names,
