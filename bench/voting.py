@@ -198,7 +198,7 @@ def main(runs: int) -> None:
             postgres.cleanup()
     head = ["database", "votes/s", "median ms", "p95 ms", "max ms"]
     said = (
-        f"`make bench`: {CLIENTS} clients, {TURNS} votes each a run, {runs} runs; a vote is stored "
+        f"`make bench`: {CLIENTS} clients, {TURNS} votes each a run, {runs} runs; a vote is kept "
         f"and the next pair comes back. Gunicorn with 2 workers of 4 threads; {before}."
     )
     print(text := f"{said}\n\n{table(head, rows)}")

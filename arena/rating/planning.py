@@ -19,13 +19,12 @@ from functools import lru_cache
 import numpy as np
 from scipy.special import ndtr, ndtri
 
-from arena.rating.bootstrap import Unit
-from arena.rating.bradley_terry import ELO_PER_LOGIT
-from arena.rating.comparisons import Comparisons, FloatArray
-from arena.rating.estimate import LEVEL, t_quantile
+from arena.rating.comparisons import LEVEL, Comparisons, FloatArray, t_quantile
 from arena.rating.leaderboard import Intervals, Leaderboard, rate
-from arena.rating.moderated import MOST_PRIOR
+from arena.rating.models import ELO_PER_LOGIT
 from arena.rating.ranking import CAUTION
+from arena.rating.rules import Unit
+from arena.rating.sandwich import MOST_PRIOR
 
 MOST_SEARCHED = 500
 """No more experts, or scenarios, are thought of."""

@@ -19,8 +19,17 @@ from enum import StrEnum
 
 import numpy as np
 
-from arena.rating.comparisons import BoolArray, Comparisons, FloatArray, IntArray, count_pairs
-from arena.rating.estimate import LEVEL, Estimate, share, wilson
+from arena.rating.comparisons import (
+    LEVEL,
+    BoolArray,
+    Comparisons,
+    Estimate,
+    FloatArray,
+    IntArray,
+    count_pairs,
+    share,
+    wilson,
+)
 
 VALUES = 3
 _TAILS = (50.0 * (1.0 - LEVEL), 50.0 * (1.0 + LEVEL))

@@ -7,8 +7,7 @@ import scipy.stats
 from hypothesis import given
 from hypothesis import strategies as st
 
-from arena.rating.comparisons import LOSS, TIE, WIN, Comparison, Comparisons
-from arena.rating.estimate import share, wilson
+from arena.rating.comparisons import LOSS, TIE, WIN, Comparison, Comparisons, share, wilson
 from arena.rating.reliability import (
     DifferenceMetric,
     agreement,

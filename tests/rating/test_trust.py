@@ -6,14 +6,19 @@ import numpy as np
 import pytest
 import statsmodels.api as sm
 
-from arena.rating.bootstrap import Unit
-from arena.rating.bradley_terry import ELO_PER_LOGIT
 from arena.rating.comparisons import Comparison, Comparisons, count_pairs, win_rates
-from arena.rating.fit_test import count_cycles, fit_test
-from arena.rating.influence import fewest_votes_to_change_first, rank_changes, without_each_expert
+from arena.rating.influence import (
+    count_cycles,
+    fewest_votes_to_change_first,
+    fit_test,
+    rank_changes,
+    without_each_expert,
+)
 from arena.rating.leaderboard import Intervals, rate
 from arena.rating.logistic import side_bias
+from arena.rating.models import ELO_PER_LOGIT
 from arena.rating.planning import design_effects
+from arena.rating.rules import Unit
 from bench.worlds import World
 from tests.rating.votes import fit, named, simulated, versus
 
