@@ -15,8 +15,8 @@ from arena.api.paging import PageQuery, answer_page, page_of
 from arena.api.schema import operation
 from arena.api.views import ApiView
 from augment.models import Contestant
-from augment.services.endpoints.entering import VARIANTS, EnteredEndpoint, enter_contestant
-from augment.services.running.transcript_export import contestant_documents
+from augment.services.endpoints.contestants import VARIANTS, EnteredEndpoint, enter_contestant
+from augment.services.running.transcript_records import contestant_documents
 
 KINDS = [kind.value for kind in Contestant.Kind if kind is not Contestant.Kind.CHECK]
 

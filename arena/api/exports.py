@@ -43,7 +43,7 @@ from augment.models import GenerationJob
 from augment.services.judging.displacement import By
 from augment.services.judging.driving_scores import options_driven, scores_of_job
 from augment.services.judging.simulations import SCORES, Options
-from augment.services.running.tool_calls import tool_calls_by_augmentation
+from augment.services.running.progress import tool_calls_by_augmentation
 
 Export = tuple[Mapping[str, Format[Any]], Callable[[GenerationJob], Any]]
 CHARTS = ("pairs", "types")

@@ -15,7 +15,7 @@ from arena.web.access import ADMIN, allow_only
 from arena.web.contestants.endpoint_forms import SLUG_RULE
 from augment.errors import AugmentError
 from augment.models import Endpoint
-from augment.services.endpoints.entering import (
+from augment.services.endpoints.contestants import (
     OPTION_NAMES,
     PROTOCOLS,
     REASONING_EFFORTS,

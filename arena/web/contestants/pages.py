@@ -19,8 +19,8 @@ from arena.web.contestants.asking import asking_of
 from arena.web.listing import read_listing, read_page, said_choices
 from augment.errors import AugmentError
 from augment.models import Augmentation, Contestant, GenerationJob
-from augment.services.endpoints.respondents import respondents_of
-from augment.services.retirement import retire, take_back
+from augment.services.endpoints.treatments import respondents_of
+from augment.services.events import retire, take_back
 
 CONTESTANTS_AT_ONCE = 50
 

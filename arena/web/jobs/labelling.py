@@ -27,7 +27,7 @@ from arena.web.jobs.labelling_questions import closing, opening
 from arena.web.questions import ask, is_sure, wants_to_change
 from augment.errors import AugmentError, UnknownName
 from augment.models import GenerationJob
-from augment.services.judging.fault_guess import FaultClass
+from augment.services.judging.findings import FaultClass
 
 
 @allow_only(EXPERT)

@@ -21,8 +21,7 @@ from arena.web.jobs.forms import LaunchForm
 from augment.errors import AugmentError
 from augment.models import Contestant, EndpointModel, GenerationJob
 from augment.services.running import jobs as service
-from augment.services.running.cells import add_cells
-from augment.services.running.matrix import matrix_text, read_matrix
+from augment.services.running.matrix import add_cells, matrix_text, read_matrix
 
 LONGEST_FILE = 1_000_000
 LONGEST_NAME = 120

@@ -29,12 +29,14 @@ from arena.web.listing import (
 )
 from augment.errors import UnknownName
 from augment.models import Augmentation, GenerationJob
-from augment.services.judging.repeatability import repeatability
-from augment.services.running.causes import SHOWN, failure_groups
-from augment.services.running.costs import costs_of
-from augment.services.running.pace import pace_of
-from augment.services.running.summary import count_each, count_rows
-from augment.services.running.tool_calls import (
+from augment.services.judging.analyses import repeatability
+from augment.services.running.budget import costs_of
+from augment.services.running.progress import (
+    SHOWN,
+    count_each,
+    count_rows,
+    failure_groups,
+    pace_of,
     tool_calls_by_augmentation,
     tool_calls_by_contestant,
 )

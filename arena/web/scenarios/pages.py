@@ -32,9 +32,8 @@ from augment.models import (
 )
 from augment.services.judging.displacement import of_augmentation
 from augment.services.judging.findings import Checked, check_augmentation
-from augment.services.running.transcript_export import transcript_of
-from augment.services.running.transcript_steps import totals_of, tries_of
-from augment.services.running.transcripts import IMAGES
+from augment.services.running.calls import IMAGES
+from augment.services.running.transcript_records import totals_of, transcript_of, tries_of
 from augment.services.scenarios.intents import last_reading, statements_of, waiting_reading
 from augment.services.scenarios.scene_notes import notes_of
 from augment.services.scenarios.scene_pictures import (

@@ -18,7 +18,7 @@ from arena.web.access import ADMIN, STAFF, allow_only
 from arena.web.questions import Confirmation, ask, is_sure
 from augment.errors import AugmentError
 from augment.models import BaseScene, Scenario
-from augment.services.retirement import retire, take_back
+from augment.services.events import retire, take_back
 
 
 @allow_only(ADMIN)

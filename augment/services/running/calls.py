@@ -1,8 +1,4 @@
-"""Every call to a language model as a row, within a budget.
-
-The request is stored and its worst case reserved before it is sent, the answer stored before it
-is read, each in a transaction of its own: a crash in between loses nothing that was paid for.
-"""
+"""The tries at an augmentation: opened with its lease, closed with its outcome."""
 
 from __future__ import annotations
 
@@ -10,24 +6,158 @@ import logging
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+from datetime import datetime
 from typing import Any
 
 from django.db import OperationalError, connection, transaction
+from django.db.models import Max
 from django.utils import timezone
 
-from augment.errors import BudgetSpent, DatabaseLocked, LeaseLost, ModelFault, NotSent
+from augment.errors import (
+    BudgetSpent,
+    DatabaseLocked,
+    JobCancelled,
+    LeaseLost,
+    ModelFault,
+    NotSent,
+)
 from augment.llm.costs import Price, WorstCase, worst_case
 from augment.llm.fingerprint import image_reference, request_hash
-from augment.llm.messages import Reply, Request
-from augment.models import Augmentation, Endpoint, GenerationJob, ModelCall, TranscriptNote
-from augment.services.endpoints.prices import price_of
-from augment.services.running import answers, budget, stopping
-from augment.services.running.attempts import insist_wanted
+from augment.llm.messages import Reply, Request, ToolCall
+from augment.models import (
+    Attempt,
+    Augmentation,
+    Endpoint,
+    GenerationJob,
+    ModelCall,
+    TranscriptNote,
+)
+from augment.services.clock import Moment
+from augment.services.endpoints.known_models import price_of
+from augment.services.running import budget, workers
 from augment.services.scenarios.pictures import store
 from augment.services.texts import make_document_storable, make_storable
-from augment.services.work import Lease
+from augment.services.work import Lease, TryEnd
 from augment.variants.transcript import ModelRole, NoteKind
+
+CANCELLED = GenerationJob.objects.filter(state=GenerationJob.State.CANCELLED)
+CLOSED = GenerationJob.objects.filter(
+    state__in=(GenerationJob.State.CANCELLED, *GenerationJob.HELD)
+)
+"""Jobs in which nothing is started any more, or not for now."""
+
+
+def open_attempt(pk: int, worker: str, now: Moment) -> None:
+    """The next try at an augmentation."""
+    tries = Attempt.objects.filter(augmentation_id=pk)
+    number = (tries.aggregate(last=Max("number"))["last"] or 0) + 1
+    Attempt.objects.create(augmentation_id=pk, number=number, worker=worker, started_at=now)
+
+
+def close_attempt(pk: int, end: str, reason: str, now: Moment) -> None:
+    """How the current try ended. One that was lost stays without a time: nobody saw its end."""
+    budget.settle_unseen(row_pk=pk, now=now)
+    finished_at = None if end == TryEnd.LOST else now
+    Attempt.objects.filter(augmentation_id=pk, finished_at=None, outcome="").update(
+        finished_at=finished_at, outcome=end, reason=reason
+    )
+
+
+def insist_wanted(held: Lease[Augmentation], *, lock: bool = False) -> None:
+    """Return while the row is the holder's and its job goes on.
+
+    Raises:
+        LeaseLost: The row is somebody else's now.
+        JobCancelled: Its job is cancelled.
+    """
+    if not held.is_held(lock=lock):
+        raise LeaseLost
+    if CANCELLED.filter(augmentations=held.pk).exists():
+        raise JobCancelled
+
+
+_COPIED = ("answer", "refusal", "extras", "model_returned", "finish_reason")
+_COUNTS = ("prompt_tokens", "completion_tokens")
+
+
+def find_earlier_answer(
+    *,
+    request_hash: str,
+    augmentation_pk: int,
+    attempt_pk: int,
+    is_fresh: bool,
+    since: datetime | None = None,
+) -> ModelCall | None:
+    """The last call that answered the same request, None where it is to be asked.
+
+    Args:
+        request_hash: Of the request.
+        augmentation_pk: The row that asks; an attempt that was stopped is replayed for it.
+        attempt_pk: The attempt that asks.
+        is_fresh: Whether only that replay counts: each earlier answer once, none of this attempt.
+        since: The row is asked anew: as if fresh, and no answer from before counts.
+    """
+    calls = ModelCall.objects.filter(
+        request_hash=request_hash, served_from=None, answer__isnull=False, fault=""
+    )
+    if since is not None:
+        calls = calls.filter(started_at__gte=since)
+    if is_fresh or since is not None:
+        calls = (
+            calls.filter(attempt__augmentation=augmentation_pk)
+            .exclude(attempt=attempt_pk)
+            .exclude(copies__attempt=attempt_pk)
+        )
+    return calls.order_by("-pk").first()
+
+
+def columns_of(reply: Reply) -> dict[str, Any]:
+    """The answer as columns of its call; a refusal that says nothing else is the answer."""
+    return {
+        "answer": make_storable(reply.text or reply.refusal or ""),
+        "refusal": None if reply.refusal is None else make_storable(reply.refusal),
+        "extras": _extras_of(reply),
+        "model_returned": make_storable(reply.model)[:120],
+        "finish_reason": make_storable(reply.finish_reason)[:40],
+        "prompt_tokens": reply.prompt_tokens,
+        "completion_tokens": reply.completion_tokens,
+        "latency_s": reply.latency_s,
+    }
+
+
+def reply_of(call: ModelCall) -> Reply:
+    """The answer that a call had, as it would come again; it took no time."""
+    return Reply(
+        text=call.answer or "",
+        model=call.model_returned,
+        finish_reason=call.finish_reason,
+        refusal=call.refusal,
+        tool_calls=tuple(ToolCall(**made) for made in (call.extras or {}).get("tool_calls", [])),
+        prompt_tokens=call.prompt_tokens,
+        completion_tokens=call.completion_tokens,
+    )
+
+
+def columns_of_copy(source: ModelCall, *, now: datetime) -> dict[str, Any]:
+    """A call that was answered from another one: the same answer, and nothing spent."""
+    copied = {name: getattr(source, name) for name in (*_COPIED, *_COUNTS)}
+    nothing = {"spent_tokens": 0, "cost_nano_usd": 0, "started_at": now, "settled_at": now}
+    return copied | nothing | {"served_from_id": source.served_from_id or source.pk}
+
+
+# --- Private -----------------------------------------------------------------------------------
+
+
+def _extras_of(reply: Reply) -> dict[str, Any] | None:
+    """What a reply carries beside its text, None for most."""
+    if not reply.tool_calls:
+        return None
+    extras: dict[str, Any] = {"tool_calls": [asdict(made) for made in reply.tool_calls]}
+    if reply.calls_left_out:
+        extras["calls_left_out"] = reply.calls_left_out
+    return dict(make_document_storable(extras))
+
 
 IMAGES = "asked"
 """The folder in the media storage of the images that models are shown."""
@@ -124,12 +254,10 @@ class CallTranscript(ABC):
         with transaction.atomic():
             self.insist()
             ModelCall.objects.create(
-                **columns,
-                **answers.columns_of_copy(earlier, now=timezone.now()),
-                number=self._numbers + 1,
+                **columns, **columns_of_copy(earlier, now=timezone.now()), number=self._numbers + 1
             )
         self._numbers += 1
-        return answers.reply_of(earlier)
+        return reply_of(earlier)
 
     def asked(self, role: ModelRole, request: Request, prompt_version: str) -> int:
         """Reserve the worst case of a request and store it; returns its number, from 1.
@@ -150,7 +278,7 @@ class CallTranscript(ABC):
         worst, price = worst_case(request), self._price_of(self._at(role), request.model)
         wait_s = FIRST_WAIT_S
         while True:
-            stopping.insist_on_going_on()
+            workers.insist_on_going_on()
             room, pk = self._try(columns, worst, price)
             if room == budget.Room.TAKEN:
                 self._numbers += 1
@@ -168,7 +296,7 @@ class CallTranscript(ABC):
             LeaseLost: Somebody took the row over and settled the call as one that never was.
             WorkerStopping: It waited for its place for so long that this worker is to stop.
         """
-        stopping.insist_on_going_on()
+        workers.insist_on_going_on()
         call = ModelCall.objects.filter(pk=self._open[number].pk, settled_at=None)
         if not call.update(sent_at=timezone.now()):
             raise LeaseLost
@@ -180,7 +308,7 @@ class CallTranscript(ABC):
         """
         call = self._open.pop(number)
         used = budget.used_by_reply(reply, worst=call.worst, price=call.price)
-        answer = answers.columns_of(reply)
+        answer = columns_of(reply)
         # Also where there is none: the worker may have been thought dead meanwhile.
         answer["fault"] = "" if fault is None else make_storable(sentence_of(fault))
         self._settle(call, used, answer)
@@ -298,7 +426,7 @@ class RowTranscript(CallTranscript):
         insist_wanted(self._held, lock=True)
 
     def earlier_answer(self, request_hash: str) -> ModelCall | None:  # noqa: D102
-        return answers.find_earlier_answer(
+        return find_earlier_answer(
             request_hash=request_hash,
             augmentation_pk=self._row.pk,
             attempt_pk=self._attempt.pk,
