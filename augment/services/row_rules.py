@@ -35,9 +35,9 @@ from augment.services.scenarios.scenes import (
     INSTRUCTION_LENGTH,
     check_reference,
     check_slug,
+    check_type,
     scene_of,
 )
-from augment.services.scenarios.types import check_type
 from augment.services.texts import check_picture_name, check_prose, check_stored_name, one_line
 from augment.simulation.planners import OFFSETS_M
 from augment.variants.options import options_from_document

@@ -20,8 +20,7 @@ from augment.scene.catalogue import ScenarioType
 from augment.scene.codec import modification_from_document
 from augment.scene.entities import TrafficAgent
 from augment.scene.modification import Modification
-from augment.services.scenarios.scenes import reference_of
-from augment.services.scenarios.types import type_choices, type_rank
+from augment.services.scenarios.scenes import reference_of, type_choices, type_rank
 from augment.variants.recipes import SPELLING, spell_variant
 
 __all__ = [

@@ -51,8 +51,7 @@ from augment.services.running.calls import (
     open_attempt,
     sentence_of,
 )
-from augment.services.scenarios.pictures import camera_of, original_picture, picture_of
-from augment.services.scenarios.redrawing import redraw
+from augment.services.scenarios.pictures import camera_of, original_picture, picture_of, redraw
 from augment.services.scenarios.scenes import intent_of, reference_of, scene_of, seed_of
 from augment.services.texts import LONGEST_NOTES, make_document_storable, make_storable
 from augment.services.work import Lease, Settlement, WorkKind, change_all
