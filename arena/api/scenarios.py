@@ -20,11 +20,12 @@ from augment.models import Scenario
 from augment.models.scenes import DENSITIES, GOALS
 from augment.services.scenarios.scenes import (
     INSTRUCTION_LENGTH,
+    LONGEST_LABEL,
+    LONGEST_TYPE,
     SLUG_LENGTH,
     add_scenario,
     read_circumstances,
 )
-from augment.services.scenarios.types import LONGEST_LABEL, LONGEST_TYPE
 from augment.tasks import enqueue_scenario
 
 

@@ -35,9 +35,9 @@ from augment.services.scenarios.scenes import (
     INSTRUCTION_LENGTH,
     check_reference,
     check_slug,
+    check_type,
     scene_of,
 )
-from augment.services.scenarios.types import check_type
 from augment.services.stored_names import check_picture_name, check_stored_name
 from augment.services.texts import check_prose, one_line
 from augment.simulation.planners import OFFSETS_M

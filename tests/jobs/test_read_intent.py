@@ -23,7 +23,7 @@ from augment.services.endpoints.known_endpoints import ensure_endpoint
 from augment.services.running import intent_readings
 from augment.services.running.caps import Caps
 from augment.services.running.intent_readings import READINGS, plan_reading, read_intent
-from augment.services.scenarios.intents import accept_reading
+from augment.services.scenarios.editing import accept_reading
 from tests.intents import cones, intents
 from tests.jobs.rows import add_scenario
 from tests.llm.scripted import ScriptedClient

@@ -16,7 +16,7 @@ from augment.services.judging.displacement import (
     groups,
     of_job,
 )
-from augment.services.scenarios.types import ScenarioType, in_type_order
+from augment.services.scenarios.scenes import ScenarioType, in_type_order
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

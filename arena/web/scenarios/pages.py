@@ -35,15 +35,15 @@ from augment.services.judging.findings import Checked, check_augmentation
 from augment.services.running.transcript_export import transcript_of
 from augment.services.running.transcript_steps import totals_of, tries_of
 from augment.services.running.transcripts import IMAGES
-from augment.services.scenarios.intents import last_reading, statements_of, waiting_reading
-from augment.services.scenarios.scene_notes import notes_of
-from augment.services.scenarios.scene_pictures import (
+from augment.services.scenarios.editing import last_reading, statements_of, waiting_reading
+from augment.services.scenarios.pictures import (
     SceneView,
     is_drawn,
     reference_picture,
     scene_picture,
 )
-from augment.services.scenarios.types import type_choices
+from augment.services.scenarios.scene_imports import notes_of
+from augment.services.scenarios.scenes import type_choices
 from augment.tasks import enqueue_marks, enqueue_scenario
 
 LOOKS = tuple(str(number) for number in range(6))

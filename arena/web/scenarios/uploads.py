@@ -18,7 +18,8 @@ from arena.web.access import STAFF, allow_only
 from arena.web.sending import looks_again, send_later
 from augment.errors import AugmentError
 from augment.models import SceneUpload, UploadMoment
-from augment.services.scenarios import upload_moments, uploads
+from augment.services.scenarios import uploads
+from augment.services.scenarios import uploads as upload_moments
 from augment.tasks import enqueue_moment, enqueue_upload
 
 

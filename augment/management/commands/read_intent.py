@@ -15,7 +15,7 @@ from augment.models import IntentReading
 from augment.scene.intent_codec import intent_from_document
 from augment.scene.intent_statements import list_statements
 from augment.services.running.intent_readings import USUAL_CAPS, read_intent
-from augment.services.scenarios.intents import accept_reading, enter_intent
+from augment.services.scenarios.editing import accept_reading, enter_intent
 from augment.services.terminal import TerminalCommand
 
 

@@ -48,8 +48,7 @@ from augment.services.running.attempts import (
     open_attempt,
 )
 from augment.services.running.transcripts import RowTranscript, sentence_of
-from augment.services.scenarios.pictures import camera_of, original_picture, picture_of
-from augment.services.scenarios.redrawing import redraw
+from augment.services.scenarios.pictures import camera_of, original_picture, picture_of, redraw
 from augment.services.scenarios.scenes import intent_of, reference_of, scene_of, seed_of
 from augment.services.texts import LONGEST_NOTES, make_document_storable, make_storable
 from augment.services.work import Lease, Settlement, WorkKind, change_all
