@@ -13,7 +13,7 @@ from django.utils import timezone
 
 from augment.broker import check_broker
 from augment.errors import AugmentError
-from augment.formats.yaml_file import read_yaml_file
+from augment.formats.documents import read_yaml_file
 from augment.management.arguments import add_cap_arguments, caps_of
 from augment.models import Augmentation, GenerationJob
 from augment.services.endpoints.contestants import ensure_builtin

@@ -9,7 +9,7 @@ from typing import Any
 from django.core.management.base import CommandError
 
 from augment.errors import AugmentError
-from augment.formats.json_file import read_json
+from augment.formats.documents import read_json
 from augment.management.arguments import add_cap_arguments, caps_of
 from augment.models import IntentReading
 from augment.scene.intent_codec import intent_from_document

@@ -17,7 +17,7 @@ from django.contrib.auth.models import User
 from django.db import transaction
 
 from augment.errors import Conflict, InvalidDocument, InvalidModification, UnknownName
-from augment.formats.json_file import read_json
+from augment.formats.documents import read_json
 from augment.models import Augmentation, BaseScene, Scenario
 from augment.scene.catalogue import CatalogueSet
 from augment.scene.catalogue_codec import CatalogueEntry, entry_from_document

@@ -14,24 +14,27 @@ from pydantic import BaseModel
 
 from augment.errors import AugmentError, Conflict, InvalidDocument, UnknownName
 from augment.formats.apart import UntrustedInput
-from augment.formats.interplan.file import InterplanSource, ReadFile, options_of, token_of
-from augment.formats.interplan.intent import describe_reference
-from augment.formats.interplan.reader import goal_place, read_document, read_entry, traffic_of
-from augment.formats.interplan.schema import (
+from augment.formats.documents import MAX_CHARACTERS, read_yaml_file
+from augment.formats.interplan.file import (
     WHAT,
     Details,
     File,
+    InterplanSource,
+    ReadFile,
     SpecialScenario,
     file_of,
     left_out_of_details,
     left_out_of_file,
+    options_of,
     place_of,
+    token_of,
 )
+from augment.formats.interplan.intent import describe_reference
+from augment.formats.interplan.reader import goal_place, read_document, read_entry, traffic_of
 from augment.formats.interplan.writer import interplan_text
-from augment.formats.nuplan.scenario import NuPlan
+from augment.formats.nuplan_log import NuPlan
 from augment.formats.reading import Reading
 from augment.formats.writing import Cell, Loss
-from augment.formats.yaml_file import MAX_CHARACTERS, read_yaml_file
 from augment.models import Augmentation, BaseScene, GenerationJob, Scenario
 from augment.scene.codec import (
     modification_from_document,

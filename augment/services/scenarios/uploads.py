@@ -19,9 +19,8 @@ from django.db import transaction
 
 from augment.errors import AugmentError, Conflict, InvalidDocument
 from augment.formats.apart import UntrustedInput
-from augment.formats.readers import READERS, reader_of
+from augment.formats.readers import READERS, RecordingPart, Timeline, reader_of
 from augment.formats.reading import Reading
-from augment.formats.timeline import RecordingPart, Timeline
 from augment.models import SceneUpload, UploadMoment
 from augment.render.bev import draw
 from augment.render.camera import camera_for
