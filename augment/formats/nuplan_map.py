@@ -1,28 +1,273 @@
-"""The map of a city as segments and areas, in its UTM zone.
+"""Longitude and latitude as the metres of a UTM zone.
 
-A lane's id is its feature id; connectors have ids of their own, so their names begin with c. What
-the columns of lane_connectors call the exit lane is the one that a connector comes from.
+The transverse Mercator of the WGS 84 ellipsoid by Krüger's series to the fourth order in the third
+flattening: within a micrometre inside a zone (Karney, Transverse Mercator with an accuracy of a
+few nanometers, J. Geodesy 85, 2011).
 """
 
 from __future__ import annotations
 
 import math
+import sqlite3
 from collections.abc import Iterator, Sequence
+from contextlib import closing, contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
+from urllib.parse import quote
 
 import numpy as np
+from numpy.typing import NDArray
 
 from augment.errors import InvalidDocument
-from augment.formats.nuplan_log import WHAT, open_tables
-from augment.formats.nuplan_map import FloatArray, Layers
 from augment.formats.road_map import USUAL_M, RoadMap, Segment, count_notes, limit_notes
 from augment.formats.roads import RADIUS_M
 from augment.geometry.polyline import Polyline
 from augment.scene.directions import turn_type_of
 from augment.scene.entities import AreaKind, TrafficLight, TrafficSide, TurnType
 from augment.scene.notes import Note, SceneNoteKind
+
+WHAT = "nuPlan log"
+LONGEST_VALUE = 16 * 1024 * 1024
+"""Bytes of one value or row."""
+
+
+class Tables:
+    """A database's tables."""
+
+    def __init__(self, connection: sqlite3.Connection, name: str) -> None:
+        self._connection = connection
+        self._name = name
+
+    def has(self, table: str) -> bool:
+        """Whether there is a table of that name; a view or a virtual table is a program."""
+        text = (
+            "SELECT 1 FROM sqlite_master WHERE type = 'table' AND name = ? "
+            "AND sql NOT LIKE 'CREATE VIRTUAL%'"
+        )
+        return bool(self._connection.execute(text, (table,)).fetchone())
+
+    def columns(self, table: str) -> set[str]:
+        """Its columns, without computed ones; none of a table that is not there."""
+        if not self.has(table):
+            return set()
+        text = "SELECT name FROM pragma_table_info(?)"
+        return {str(row[0]) for row in self._connection.execute(text, (table,))}
+
+    def need(self, table: str, columns: Sequence[str]) -> None:
+        """Whether the table has these columns.
+
+        Raises:
+            InvalidDocument: It has not.
+        """
+        there = self.columns(table)
+        if not there:
+            raise InvalidDocument(WHAT, [(self._name, f"has no table {table!r}")])
+        missing = [name for name in columns if name not in there]
+        if missing:
+            faults = [(f"{self._name}: {table}", f"has no column {one!r}") for one in missing]
+            raise InvalidDocument(WHAT, faults)
+
+    def rows(self, query: str, values: Sequence[Any] = ()) -> list[tuple[Any, ...]]:
+        """What a query gives."""
+        return list(self.each(query, values))
+
+    def each(self, query: str, values: Sequence[Any] = ()) -> Iterator[tuple[Any, ...]]:
+        """The same, one by one."""
+        yield from self._connection.execute(query, tuple(values))
+
+
+@contextmanager
+def open_tables(path: Path) -> Iterator[Tables]:
+    """The file's tables, as long as the block lasts.
+
+    Raises:
+        InvalidDocument: It is not there, or no database.
+    """
+    if not path.is_file():
+        raise InvalidDocument(WHAT, [(str(path), "is not there")])
+    address = f"file:{quote(str(path.resolve()))}?mode=ro&immutable=1"
+    try:
+        with closing(sqlite3.connect(address, uri=True)) as connection:
+            connection.execute("PRAGMA trusted_schema = OFF")
+            connection.execute("PRAGMA cell_size_check = ON")
+            connection.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, LONGEST_VALUE)
+            yield Tables(connection, path.name)
+    except (sqlite3.Error, UnicodeDecodeError) as fault:
+        raise InvalidDocument(
+            WHAT, [(path.name, f"can't be read as a database: {fault}")]
+        ) from None
+
+
+FloatArray = NDArray[np.float64]
+
+WGS84_A_M = 6_378_137.0
+WGS84_F = 1.0 / 298.257223563
+SCALE = 0.9996
+FALSE_EAST_M = 500_000.0
+FALSE_NORTH_M = 10_000_000.0
+
+_N = WGS84_F / (2.0 - WGS84_F)
+_E = math.sqrt(WGS84_F * (2.0 - WGS84_F))
+_RADIUS_M = WGS84_A_M / (1.0 + _N) * (1.0 + _N**2 / 4.0 + _N**4 / 64.0)
+_ALPHA = (
+    _N / 2.0 - 2.0 * _N**2 / 3.0 + 5.0 * _N**3 / 16.0 + 41.0 * _N**4 / 180.0,
+    13.0 * _N**2 / 48.0 - 3.0 * _N**3 / 5.0 + 557.0 * _N**4 / 1440.0,
+    61.0 * _N**3 / 240.0 - 103.0 * _N**4 / 140.0,
+    49561.0 * _N**4 / 161280.0,
+)
+
+
+def to_utm(degrees: FloatArray, *, zone: int, is_south: bool) -> FloatArray:
+    """East and north (P, 2) in metres.
+
+    Args:
+        degrees: Longitude and latitude (P, 2).
+        zone: 1 to 60.
+        is_south: Whether it is a zone of the southern hemisphere.
+    """
+    longitude = np.radians(degrees[:, 0] - (6.0 * zone - 183.0))
+    sine = np.sin(np.radians(degrees[:, 1]))
+    conformal = np.sinh(np.arctanh(sine) - _E * np.arctanh(_E * sine))
+    xi = np.arctan2(conformal, np.cos(longitude))
+    eta = np.arcsinh(np.sin(longitude) / np.hypot(conformal, np.cos(longitude)))
+    north, east = xi.copy(), eta.copy()
+    for order, alpha in enumerate(_ALPHA, start=1):
+        north += alpha * np.sin(2.0 * order * xi) * np.cosh(2.0 * order * eta)
+        east += alpha * np.cos(2.0 * order * xi) * np.sinh(2.0 * order * eta)
+    return np.column_stack(
+        [
+            FALSE_EAST_M + SCALE * _RADIUS_M * east,
+            (FALSE_NORTH_M if is_south else 0.0) + SCALE * _RADIUS_M * north,
+        ]
+    )
+
+
+_ENVELOPE_BYTES = (0, 32, 48, 48, 64)
+GEOGRAPHIC = 4326
+
+
+class Layers:
+    """The layers of a map."""
+
+    def __init__(self, tables: Tables, center_m: FloatArray, reach_m: float) -> None:
+        """The layers, of which only what lies near a point is read.
+
+        Args:
+            tables: Of the map.
+            center_m: The point (2,) in the map's projected coordinate system.
+            reach_m: What is further in a direction of the compass is passed over.
+        """
+        self._tables = tables
+        self._zone, self._is_south = _zone(tables)
+        self._low, self._high = center_m - reach_m, center_m + reach_m
+        tables.need("gpkg_geometry_columns", ("table_name", "column_name", "srs_id"))
+        self._geometry = {
+            str(table): (str(column), int(srs))
+            for table, column, srs in tables.rows(
+                "SELECT table_name, column_name, srs_id FROM gpkg_geometry_columns"
+            )
+            if isinstance(srs, int)
+        }
+
+    def has(self, layer: str) -> bool:
+        """Whether there is such a layer."""
+        return layer in self._geometry and self._tables.has(layer)
+
+    def read(self, layer: str, columns: tuple[str, ...]) -> Iterator[tuple[Any, FloatArray]]:
+        """Each near feature's named columns as a tuple, and its points.
+
+        Of several parts, the longest; of a polygon, its outline.
+
+        Raises:
+            InvalidDocument: The layer or a column is not there, or a geometry is broken.
+        """
+        if layer not in self._geometry:
+            raise InvalidDocument(WHAT, [("map", f"has no layer {layer!r}")])
+        geometry, srs = self._geometry[layer]
+        if srs not in (GEOGRAPHIC, (32700 if self._is_south else 32600) + self._zone):
+            raise InvalidDocument(WHAT, [(layer, f"is in EPSG:{srs}, which is not read")])
+        self._tables.need(layer, (*columns, geometry))
+        names = ", ".join(_quoted(name) for name in (*columns, geometry))
+        rows = self._tables.rows(
+            f"SELECT {names} FROM {_quoted(layer)} WHERE {_quoted(geometry)} IS NOT NULL"
+        )
+        lines = self._lines([row[-1] for row in rows], srs, layer)
+        for row, points in zip(rows, lines, strict=True):
+            if (points.min(axis=0) <= self._high).all() and (
+                points.max(axis=0) >= self._low
+            ).all():
+                yield row[:-1], points
+
+    def _lines(self, blocks: list[Any], srs: int, layer: str) -> list[FloatArray]:
+        """The points (P, 2) of each geometry; all of a layer are projected in one go."""
+        import shapely
+
+        if not blocks:
+            return []
+        try:
+            geometries = shapely.from_wkb([_well_known_binary(block) for block in blocks])
+            lines = [_longest_line(geometry) for geometry in geometries]
+        except (ValueError, shapely.errors.ShapelyError) as fault:
+            raise InvalidDocument(WHAT, [(layer, f"has a broken geometry: {fault}")]) from None
+        points, owners = shapely.get_coordinates(lines, return_index=True)
+        if not np.isfinite(points).all():
+            raise InvalidDocument(WHAT, [(layer, "has a point that is not finite")])
+        if srs == GEOGRAPHIC:
+            if (np.abs(points) > (180.0, 89.0)).any():
+                raise InvalidDocument(WHAT, [(layer, "has degrees that are none")])
+            points = to_utm(points, zone=self._zone, is_south=self._is_south)
+        return np.split(points, np.flatnonzero(np.diff(owners)) + 1)
+
+
+# Private
+
+
+def _quoted(name: str) -> str:
+    return '"' + name.replace('"', '""') + '"'
+
+
+def _zone(tables: Tables) -> tuple[int, bool]:
+    tables.need("meta", ("key", "value"))
+    rows = tables.rows("SELECT value FROM meta WHERE key = 'projectedCoordSystem'")
+    text = str(rows[0][0]) if rows else ""
+    code = text.rsplit(":", 1)[-1].strip()
+    if code.isdecimal() and len(code) == 5:
+        hemisphere, zone = divmod(int(code), 100)
+        if hemisphere in (326, 327) and 1 <= zone <= 60:
+            return zone, hemisphere == 327
+    raise InvalidDocument(
+        WHAT, [("meta.projectedCoordSystem", f"{text[:40]!r} is no UTM zone as EPSG:326xx")]
+    )
+
+
+def _well_known_binary(block: Any) -> bytes:
+    """The geometry without the header that a GeoPackage puts before it."""
+    if not isinstance(block, bytes) or block[:2] != b"GP" or len(block) < 8:
+        raise ValueError("does not begin with GP")
+    envelope = block[3] >> 1 & 7
+    if envelope >= len(_ENVELOPE_BYTES) or block[3] & 0x10:
+        raise ValueError("is empty, or has an unknown envelope")
+    return block[8 + _ENVELOPE_BYTES[envelope] :]
+
+
+def _longest_line(geometry: Any) -> Any:
+    """The longest part of a line, or the longest outline of a polygon.
+
+    Raises:
+        ValueError: It is neither, or has no points.
+    """
+    import shapely
+
+    parts = [
+        part.exterior if part.geom_type == "Polygon" else part
+        for part in shapely.get_parts(geometry).tolist()
+    ]
+    line = max(parts, key=shapely.get_num_coordinates, default=geometry)
+    if line.is_empty or line.geom_type not in ("LineString", "LinearRing"):
+        raise ValueError(f"a {line.geom_type} is not read")
+    return line
+
 
 BICYCLE_LANE = 1
 TURN_OF = {0: TurnType.STRAIGHT, 1: TurnType.LEFT, 2: TurnType.RIGHT, 3: TurnType.U_TURN}

@@ -1,27 +1,58 @@
-"""Run by the receivers' own Python: hold files against the schema, load them, print what is there.
+"""Run by the receivers' own Python: `python script.py FILE...` prints one JSON object a file.
 
-`python read_commonroad.py FILE...` prints one JSON object a line.
+The packages are there alone, so they are imported where they are used.
 """
 
 from __future__ import annotations
 
 import json
+import logging
 import sys
 from pathlib import Path
 from typing import Any
 
-import commonroad
-from commonroad.common.file_reader import CommonRoadFileReader
-from lxml import etree
 
-FOLDER = Path(commonroad.__file__).parent / "common" / "xml_definition_files"
-SCHEMA = etree.XMLSchema(etree.parse(FOLDER / "XML_commonRoad_XSD.xsd"))
+def check_asam(file: str) -> dict[str, Any]:
+    """ASAM's checks of OpenDRIVE (.xodr) and OpenSCENARIO (.xosc): the status of each, issues."""
+    from qc_baselib import Configuration, Result
+    from qc_opendrive import constants as drive_constants
+    from qc_opendrive import main as drive
+    from qc_openscenario import constants as scenario_constants
+    from qc_openscenario import main as scenario
+
+    program, constants = (
+        (drive, drive_constants) if file.endswith(".xodr") else (scenario, scenario_constants)
+    )
+    config, result = Configuration(), Result()
+    config.set_config_param("InputFile", file)
+    bundle = constants.BUNDLE_NAME
+    result.register_checker_bundle(
+        name=bundle, description="", version=constants.BUNDLE_VERSION, summary=""
+    )
+    result.set_result_version(version=constants.BUNDLE_VERSION)
+    program.run_checks(config, result)
+    checkers = result.get_checker_ids(bundle)
+    return {
+        "status": {name: result.get_checker_status(name).value for name in checkers},
+        "issues": [
+            f"{name}: {issue.description} {[place.description for place in issue.locations]}"
+            for name in checkers
+            for issue in result.get_issues(bundle, name)
+        ],
+    }
 
 
-def described(file: str) -> dict[str, Any]:
+def read_commonroad(file: str) -> dict[str, Any]:
+    """What stands in a file that keeps to the schema; else the schema's faults."""
+    import commonroad
+    from commonroad.common.file_reader import CommonRoadFileReader
+    from lxml import etree
+
+    folder = Path(commonroad.__file__).parent / "common" / "xml_definition_files"
+    schema = etree.XMLSchema(etree.parse(folder / "XML_commonRoad_XSD.xsd"))
     document = etree.parse(file)
-    SCHEMA.validate(document)
-    faults = [str(fault) for fault in SCHEMA.error_log]
+    schema.validate(document)
+    faults = [str(fault) for fault in schema.error_log]
     if faults:
         return {"faults": faults}
     scenario, problems = CommonRoadFileReader(file).open()
@@ -77,5 +108,7 @@ def _obstacle(one: Any) -> dict[str, Any]:
 
 
 if __name__ == "__main__":
+    logging.disable()
     for name in sys.argv[1:]:
-        sys.stdout.write(json.dumps(described(name)) + "\n")
+        read = read_commonroad if name.endswith(".xml") else check_asam
+        sys.stdout.write(json.dumps(read(name)) + "\n")
