@@ -59,3 +59,18 @@ class AddRequestId(logging.Filter):
         """Let every line through."""
         record.request_id = current_request_id()
         return True
+
+
+_KEY_IN_ADDRESS = re.compile(r"(/(?:invitation|i|first|welcome)/)[A-Za-z0-9_-]+")
+
+
+class HideKeys(logging.Filter):
+    """Replace the keys in addresses of invitations and pictures by three dots."""
+
+    def filter(self, record: logging.LogRecord) -> bool:
+        """Let every line through, without keys."""
+        text = record.getMessage()
+        hidden = _KEY_IN_ADDRESS.sub(r"\1...", text)
+        if hidden != text:
+            record.msg, record.args = hidden, None
+        return True

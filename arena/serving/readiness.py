@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import secrets
 import threading
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from django.conf import settings
 from django.db import DatabaseError, connection
 from django.db.migrations.executor import MigrationExecutor
 
@@ -119,3 +121,11 @@ PARTS: tuple[Callable[[], PartState], ...] = (look_at_database, *HELD)
 def look_at_parts() -> tuple[PartState, ...]:
     """All of them, in the order in which they need each other."""
     return tuple(look() for look in PARTS)
+
+
+def opens_metrics(authorization: str | None) -> bool:
+    """Whether a header bears the token of the settings; without a token none does."""
+    expected = settings.METRICS_TOKEN
+    scheme, _, given = (authorization or "").partition(" ")
+    is_bearer = scheme.lower() == "bearer" and bool(expected)
+    return is_bearer and secrets.compare_digest(given.strip().encode(), expected.encode())
