@@ -1,4 +1,4 @@
-"""How many wrong passwords are too many: for an account at an address, and for an address."""
+"""Login limits per account and address, and where a request comes from."""
 
 from __future__ import annotations
 
@@ -15,14 +15,13 @@ from django.http import HttpRequest
 
 
 class LoginLimit(AxesDatabaseHandler):  # type: ignore[misc] # untyped
-    """Also counts an address as a whole, so that one can't try every account a few times.
+    """Count failures per address as well, against trying every account a few times.
 
-    A right password wipes the count of its own account alone: whoever has an account can't use
-    it to go on with the others.
+    A successful login clears the count of its own account only.
     """
 
     def get_failures(self, request: HttpRequest, credentials: dict[str, Any] | None = None) -> int:
-        """Failures of the account at this address; at the limit too once the address is there."""
+        """Return the failures of the account here; at least the limit if the address has its own."""
         failures = int(super().get_failures(request, credentials))
         if _of_address(request) < settings.ADDRESS_FAILURE_LIMIT:
             return failures
@@ -41,7 +40,7 @@ def _of_address(request: HttpRequest) -> int:
 
 
 def client_address(request: HttpRequest) -> str | None:
-    """The address of whoever asks, None where there is none (a socket of this machine).
+    """Return the client's address, None for a local socket.
 
     A header is believed only as far as our own proxies wrote it: with N of them in front, the Nth
     entry from the right is what the outermost of ours saw. Everything further left may be made up.

@@ -1,4 +1,4 @@
-"""Nobody waits long for a database that something else keeps to itself."""
+"""Middleware: 503 for a busy database, and headers that every answer carries."""
 
 from __future__ import annotations
 
@@ -21,17 +21,16 @@ logger = logging.getLogger(__name__)
 
 
 class BusyMiddleware:
-    """Answers 503 where the database can't be written or pictures can't be reached for now."""
+    """Answer 503 while the database can't be written or the picture storage is unreachable."""
 
     def __init__(self, get_response: Callable[[HttpRequest], HttpResponseBase]) -> None:
         self.get_response = get_response
 
     def __call__(self, request: HttpRequest) -> HttpResponseBase:
-        """The answer of whoever is next."""
         return self.get_response(request)
 
     def process_exception(self, request: HttpRequest, exception: Exception) -> HttpResponse | None:
-        """Tell it from faults of ours, which stay what they are."""
+        """Return the 503 answer, or None for any other exception."""
         if isinstance(exception, DatabaseBusy) or is_transient(exception):
             logger.warning("%s", exception.__cause__ or exception)
             return faults.answer_busy(request)
@@ -42,10 +41,7 @@ class BusyMiddleware:
 
 
 def limit_connections() -> None:
-    """Have the connections of a web server wait for locks no longer than a vote may.
-
-    Workers and commands have nobody who waits for an answer: theirs wait longer.
-    """
+    """Limit how long connections of a web server wait for locks; workers may wait longer."""
     connection_created.connect(_limit)
 
 
@@ -68,13 +64,12 @@ POLICY = ", ".join(f"{feature}=()" for feature in NOT_USED)
 
 
 class HeaderMiddleware:
-    """Stands first, so that redirects and errors of all others pass through it as well."""
+    """Add caching and permissions headers; stands first, so that errors get them as well."""
 
     def __init__(self, get_response: Callable[[HttpRequest], HttpResponseBase]) -> None:
         self.get_response = get_response
 
     def __call__(self, request: HttpRequest) -> HttpResponseBase:
-        """The answer; what says itself how it may be kept goes on saying so."""
         answer = self.get_response(request)
         answer.headers.setdefault("Cache-Control", NOT_KEPT)
         answer.headers.setdefault("Permissions-Policy", POLICY)

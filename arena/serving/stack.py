@@ -31,11 +31,11 @@ ON_PATH = ("redis-server", "valkey-server")
 
 
 class PortTaken(ArenaError):
-    """The product can't listen where it should: mostly somebody else does already."""
+    """The address to listen on is invalid or in use."""
 
 
 def require_free_port(host: str, port: int) -> None:
-    """Return if a server can listen there.
+    """Raise unless a server can listen at this address.
 
     Raises:
         PortTaken: Another program does already, the address is not this computer's, or the
@@ -56,7 +56,7 @@ def require_free_port(host: str, port: int) -> None:
 
 
 def port_answers(host: str, port: int) -> bool:
-    """Whether somebody accepts connections there."""
+    """Return whether a server accepts connections at this address."""
     try:
         with socket.create_connection((host, port), timeout=1.0):
             return True
@@ -65,7 +65,7 @@ def port_answers(host: str, port: int) -> bool:
 
 
 def redis_answers(socket_path: Path) -> bool:
-    """Whether a Redis answers on that socket."""
+    """Return whether a Redis answers on that socket."""
     if not socket_path.exists():
         return False
     client = redis.Redis(
@@ -129,15 +129,15 @@ def private_redis(socket_path: Path) -> Program:
 
 
 class AlreadyRunning(ArenaError):
-    """Another supervisor of the same folder is up."""
+    """Another supervisor runs in the same folder."""
 
 
 @contextmanager
 def hold_alone(say: Callable[[str], None]) -> Iterator[None]:
-    """Keep other supervisors out of this folder; nothing is kept where REDIS_URL is set.
+    """Hold the lock of this folder against other supervisors, unless REDIS_URL is set.
 
-    The system lets go of the lock when this process ends, however it ends. What an earlier one
-    left behind that was killed is ended.
+    The operating system releases the lock when this process ends, however it ends. Processes that
+    a killed supervisor left behind are ended.
 
     Args:
         say: Gets a line where anything is ended.
