@@ -10,8 +10,8 @@ import openai
 from django.core.management import call_command
 from django.utils import timezone
 
+from augment.llm.client import Patience
 from augment.llm.messages import Message, Request, Speaker
-from augment.llm.patience import Patience
 from augment.models import EndpointModel
 from augment.services.endpoints.contestants import add_contestant
 from augment.services.endpoints.known_endpoints import ensure_endpoint

@@ -21,9 +21,8 @@ from functools import lru_cache
 
 from augment.fake_llm.playing import GOOD, LEARNING, Character
 from augment.fake_llm.requests import chat_request
-from augment.llm.client import Sending, watch_nothing
+from augment.llm.client import Patience, Sending, watch_nothing
 from augment.llm.messages import Reply, Request
-from augment.llm.patience import Patience
 from augment.variants.pipeline import Outcome, run
 from augment.variants.recipes import RECIPES
 from augment.variants.respondents import RespondentClient

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from augment.fake_llm.requests import ChatRequest, SpokenMessage
-from augment.prompts.texts import read_text
+from augment.prompts.fill import read_text
 from augment.variants.transcript import ModelRole
 
 _RESULT = read_text("function_result.md").partition("\n")[0]

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from augment.fake_llm.requests import ChatRequest, signature_of
-from augment.llm.window import least_tokens
+from augment.llm.costs import least_tokens
 
 _CHARACTERS_PER_TOKEN = 4
 

@@ -21,8 +21,8 @@ from numpy.typing import NDArray
 from augment.fake_llm.requests import SpokenMessage
 from augment.geometry.angles import difference
 from augment.geometry.polyline import Polyline
-from augment.prompts.lane_curves import curve_from
-from augment.prompts.texts import QUOTE
+from augment.prompts.fill import QUOTE
+from augment.prompts.vectors import curve_from
 from augment.scene.entities import (
     AgentType,
     Area,

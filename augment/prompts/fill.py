@@ -9,27 +9,91 @@ endpoint can reuse the unchanged beginning.
 
 from __future__ import annotations
 
+import hashlib
 import json
-from collections.abc import Sequence
+import re
+import unicodedata
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import cache
+from importlib.resources import files
 
+from augment.checks.tolerances import USUAL, Tolerances
+from augment.errors import InvalidDocument, ReplyUnreadable
 from augment.llm.messages import Message, Speaker, Tool
-from augment.prompts.blocks import names_changes
+from augment.prompts.blocks import last_object, names_changes
 from augment.prompts.calls import calls_in
 from augment.prompts.extent import BESIDE_M, CROSSED_M, behind_m
-from augment.prompts.texts import (
-    QUOTE,
-    fill_text,
-    model_message,
-    prompt_version,
-    quote,
-    read_text,
-    said_by_user,
-)
-from augment.prompts.vectors import DEFAULT_RADIUS_M, LaneFormat, scene_text
+from augment.prompts.vectors import DEFAULT_RADIUS_M, LaneFormat, changes_text, scene_text
 from augment.scene.entities import Scene
+from augment.scene.intent import Intent
+from augment.scene.intent_codec import intent_from_parts, parts_schema
+from augment.scene.modification import Modification
+
+QUOTE = "> "
+"""Stands before every line of somebody else's words: no line of them can end the quotation."""
+
+LONGEST_ECHO = 20_000
+
+VECTORS_VERSION = 4
+"""Raised with every change to what of a scene is written down, or how: no text shows that."""
+
+
+@cache
+def prompt_version() -> str:
+    """Twelve hexadecimal digits that change with every change to any prompt text or form."""
+    digest = hashlib.sha256(b"vectors %d\0" % VECTORS_VERSION)
+    for entry in sorted(files(__package__).joinpath("text").iterdir(), key=lambda e: e.name):
+        digest.update(entry.name.encode() + b"\0" + entry.read_bytes() + b"\0")
+    return digest.hexdigest()[:12]
+
+
+@cache
+def read_text(name: str) -> str:
+    """The text of that name as it stands in its file."""
+    return files(__package__).joinpath("text", name).read_text(encoding="utf-8").strip()
+
+
+def fill_text(name: str, **values: str) -> str:
+    """The text with each {{name}} replaced once; what is filled in is not looked at again.
+
+    Raises:
+        KeyError: A name has no value.
+    """
+    parts = []
+    rest = read_text(name)
+    while "{{" in rest:
+        before, _, rest = rest.partition("{{")
+        key, _, rest = rest.partition("}}")
+        parts += [before, values[key]]
+    return re.sub(r"\n{3,}", "\n\n", "".join([*parts, rest])).strip()
+
+
+def quote(words: str) -> str:
+    """Somebody's words as a quotation, line by line, without control characters."""
+    clean = ("".join(map(_printable, line)).strip() for line in words.splitlines())
+    return "\n".join(QUOTE + line for line in clean if line)
+
+
+def model_message(answer: str) -> Message:
+    """A turn of the model; an empty one is refused by several servers."""
+    return Message(speaker=Speaker.ASSISTANT, text=answer[:LONGEST_ECHO] or "(empty answer)")
+
+
+def said_by_user(words: str, *, images: tuple[bytes, ...] = ()) -> Message:
+    """A turn of whoever talks to the model."""
+    return Message(speaker=Speaker.USER, text=words, images=images)
+
+
+def number_lines(entries: Sequence[str]) -> str:
+    """The entries as a numbered list, each on one line."""
+    return "\n".join(f"{n}. {' '.join(entry.split())}" for n, entry in enumerate(entries, 1))
+
+
+def _printable(character: str) -> str:
+    return " " if unicodedata.category(character).startswith("C") else character
+
 
 __all__ = ["QUOTE", "Calling", "Form", "modifier_messages", "prompt_version", "quote"]
 
@@ -161,3 +225,148 @@ def _modifier(form: Form) -> str:
 
 def _listed(entries: Sequence[str]) -> str:
     return "\n".join(f"- {entry}" for entry in entries)
+
+
+CANNOT_SEE = "cannot see"
+
+
+def reviewer_messages(
+    scene: Scene,
+    instruction: str,
+    modification: Modification,
+    *,
+    radius_m: float,
+    earlier: Sequence[str] = (),
+) -> tuple[Message, ...]:
+    """What the text reviewer is asked: scene, wish and changed vectors, no reasoning.
+
+    Args:
+        scene: The scene before the change.
+        instruction: The user's wish.
+        modification: What is reviewed.
+        radius_m: How far around the ego the scene is written down.
+        earlier: The feedback that the editor was given in earlier rounds.
+    """
+    told = fill_text("reviewer.md", **_rules(radius_m), problems=read_text("common_problems.md"))
+    task = _task(scene, instruction, modification, radius_m, earlier)
+    return Message(speaker=Speaker.SYSTEM, text=told), said_by_user(task)
+
+
+def engineer_messages(
+    scene: Scene,
+    instruction: str,
+    modification: Modification,
+    *,
+    radius_m: float,
+    earlier: Sequence[str] = (),
+) -> tuple[Message, ...]:
+    """What the engineer is asked first: for questions to the viewer; arguments as above."""
+    told = fill_text("engineer.md", **_rules(radius_m), drawn=read_text("drawn.md"))
+    task = _task(scene, instruction, modification, radius_m, earlier)
+    return Message(speaker=Speaker.SYSTEM, text=told), said_by_user(task)
+
+
+def viewer_messages(questions: Sequence[str], pictures: Sequence[bytes]) -> tuple[Message, ...]:
+    """What the viewer is asked: the questions, about the pictures (PNG)."""
+    task = fill_text("viewer_task.md", questions=number_lines(questions))
+    return (
+        Message(speaker=Speaker.SYSTEM, text=fill_text("viewer.md", drawn=read_text("drawn.md"))),
+        said_by_user(task, images=tuple(pictures)),
+    )
+
+
+def verdict_messages(
+    messages: tuple[Message, ...], questions: Sequence[str], answers: Mapping[int, str]
+) -> tuple[Message, ...]:
+    """The engineer's conversation up to his questions, and what the viewer saw."""
+    lines = [
+        f"{n}. {' '.join(question.split())} -> {answers.get(n, CANNOT_SEE)}"
+        for n, question in enumerate(questions, start=1)
+    ]
+    told = fill_text("engineer_answers.md", answers=quote("\n".join(lines)))
+    return (*messages, said_by_user(told))
+
+
+def review_re_ask_messages(
+    messages: tuple[Message, ...], answer: str, problems: Sequence[str]
+) -> tuple[Message, ...]:
+    """The conversation so far, the answer that can't be read, and what is wrong with it."""
+    asked = fill_text("review_re_ask.md", problems="\n".join(f"- {one}" for one in problems))
+    return (*messages, model_message(answer), said_by_user(asked))
+
+
+def viewer_re_ask_messages(messages: tuple[Message, ...], answer: str) -> tuple[Message, ...]:
+    """The viewer's conversation with an answer that answers nothing; the picture stays in it."""
+    return (*messages, model_message(answer), said_by_user(read_text("viewer_re_ask.md")))
+
+
+def _rules(radius_m: float) -> dict[str, str]:
+    """What the editor was told and what is a deviation from it, the same for every reviewer."""
+    return {
+        "input_format": input_format(radius_m),
+        "distances": read_text("distances_walked.md"),
+        "rules": read_text("rules.md"),
+        "tolerances": tolerances_text(USUAL),
+    }
+
+
+def tolerances_text(allowed: Tolerances) -> str:
+    """From when on a deviation is a problem: what the program's own checks go by."""
+    return fill_text(
+        "tolerances.md",
+        distance_m=f"{allowed.distance_m:g}",
+        distance_percent=f"{100.0 * allowed.distance_share:g}",
+        across_m=f"{allowed.across_m:g}",
+        middle_m=f"{allowed.middle_m:g}",
+        heading_deg=f"{allowed.heading_deg:g}",
+        spacing_m=f"{allowed.spacing_m:g}",
+        spacing_percent=f"{100.0 * allowed.spacing_share:g}",
+    )
+
+
+def _task(
+    scene: Scene,
+    instruction: str,
+    modification: Modification,
+    radius_m: float,
+    earlier: Sequence[str],
+) -> str:
+    told = "\n".join(earlier)
+    return fill_text(
+        "review_task.md",
+        scene=scene_text(scene, radius_m=radius_m),
+        quoted=quote(instruction),
+        changes=changes_text(scene, modification),
+        earlier=fill_text("earlier_feedback.md", quoted=quote(told)) if earlier else "",
+    )
+
+
+_MOST_PROBLEMS = 8
+
+
+def reader_messages(instruction: str) -> tuple[Message, ...]:
+    """The rules with the JSON schema, and the sentence."""
+    system = fill_text("reader.md", schema=_schema())
+    task = fill_text("reader_task.md", quoted=quote(instruction))
+    return Message(speaker=Speaker.SYSTEM, text=system), said_by_user(task)
+
+
+def read_intent(answer: str) -> Intent:
+    """The intent of a reader's answer.
+
+    Raises:
+        ReplyUnreadable: There is no block, or it breaks the schema or contradicts itself.
+    """
+    found, _ = last_object(answer, frozenset({"requests"}))
+    try:
+        return intent_from_parts(found)
+    except InvalidDocument as fault:
+        problems = fault.problems[:_MOST_PROBLEMS]
+    raise ReplyUnreadable(
+        [f"{ascii(path).strip(chr(39))[:80]}: {text}" for path, text in problems]
+    )
+
+
+@cache
+def _schema() -> str:
+    return json.dumps(parts_schema(), separators=(",", ":"))

@@ -10,17 +10,28 @@ from __future__ import annotations
 import json
 import math
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from enum import StrEnum
+from functools import cached_property
+from itertools import count
+from string import ascii_letters
 
 import numpy as np
 
-from augment.geometry.polyline import Polyline
-from augment.prompts.clip import boundary_within, distance_to_area_m, simplify_boundary
-from augment.prompts.extent import BESIDE_M, Extent, extent_of, shown_spans
-from augment.prompts.lane_curves import control_points
-from augment.prompts.names import ShortNames, number_of, short_names
-from augment.scene.bezier_lanes import bezier_lane
+from augment.geometry.bezier import CubicBezier, travel_pose
+from augment.geometry.frames import Pose
+from augment.geometry.polyline import Polyline, Projection
+from augment.prompts.extent import (
+    BESIDE_M,
+    Extent,
+    boundary_within,
+    distance_to_area_m,
+    extent_of,
+    shown_spans,
+    simplify_boundary,
+)
+from augment.scene.bezier_lanes import BezierLane, bezier_lane, piece_ids, straight_curve
 from augment.scene.entities import (
     Area,
     Lane,
@@ -30,7 +41,152 @@ from augment.scene.entities import (
     TrafficDensity,
     TurnType,
 )
+from augment.scene.lane_graph import AnyLane, LaneGraph
 from augment.scene.modification import Modification
+
+
+@dataclass(frozen=True)
+class ShortNames:
+    """Ids of a scene and their short forms, such as Agent2, Lane3, Connector1, Area4.
+
+    Attributes:
+        agents, lanes, areas: Short form by the scene's own id; lanes are lanes and connectors.
+    """
+
+    agents: dict[str, str]
+    lanes: dict[str, str]
+    areas: dict[str, str]
+
+    @cached_property
+    def agent_ids(self) -> dict[str, str]:
+        """The scene's agent id by short form."""
+        return {short: name for name, short in self.agents.items()}
+
+    @cached_property
+    def lane_ids(self) -> dict[str, str]:
+        """The scene's lane or connector id by short form."""
+        return {short: name for name, short in self.lanes.items()}
+
+    @property
+    def next_agent(self) -> str:
+        """The id that the first new agent should get."""
+        return f"Agent{1 + max(number_of(short) for short in self.agents.values())}"
+
+
+def short_names(scene: Scene) -> ShortNames:
+    """The short forms for everything in the scene; ids that are short already stay."""
+    lanes = _shorten((lane.id for lane in scene.lanes), "Lane")
+    connectors = _shorten((connector.id for connector in scene.connectors), "Connector")
+    return ShortNames(
+        agents=_shorten((agent.id for agent in scene.everyone), "Agent"),
+        lanes=lanes | connectors,
+        areas=_shorten((area.id for area in scene.areas), "Area"),
+    )
+
+
+def number_of(short: str) -> int:
+    """The number at the end of a short id."""
+    return int(short.lstrip(ascii_letters))
+
+
+def _shorten(ids: Iterable[str], prefix: str) -> dict[str, str]:
+    names = list(ids)
+    kept = {name for name in names if re.fullmatch(prefix + "[1-9][0-9]{0,4}", name, re.ASCII)}
+    free = (f"{prefix}{number}" for number in count(1))
+    fresh = (name for name in free if name not in kept)
+    return {name: name if name in kept else next(fresh) for name in names}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LaneCurve:
+    """One lane or connector as far as it is shown.
+
+    Attributes:
+        id: Its short id.
+        lane: Its pieces; s = 0 is where the shown part begins.
+        whole: The whole of it, as recorded.
+        begins_m: Where on its centreline the shown part begins.
+        before, after: Short ids of what joins it within the shown map, straightest first.
+    """
+
+    id: str
+    lane: BezierLane
+    whole: AnyLane
+    begins_m: float
+    before: tuple[str, ...] = ()
+    after: tuple[str, ...] = ()
+
+    @property
+    def width_m(self) -> float:
+        """How wide it is."""
+        return self.whole.width_m
+
+    @property
+    def length_m(self) -> float:
+        """How long the shown part is."""
+        return self.lane.length_m
+
+    def pose_at(self, s_m: float, d_m: float = 0.0) -> Pose:
+        """The place on the recorded centreline at s of the shown part, d to the left."""
+        return travel_pose(self.whole.centerline, self.begins_m + s_m, d_m)
+
+    def project(self, x_m: float, y_m: float) -> Projection:
+        """The nearest place on the recorded centreline of the shown part."""
+        shown = self.whole.centerline.between(self.begins_m, self.begins_m + self.length_m)
+        return shown.project(x_m, y_m)
+
+    @property
+    def pieces(self) -> tuple[str, ...]:
+        """How its pieces are called, in order of travel."""
+        return piece_ids(self.id, len(self.lane.pieces))
+
+
+def lane_curves(scene: Scene, names: ShortNames, radius_m: float) -> dict[str, LaneCurve]:
+    """All lanes and connectors that a prompt shows, by short id, in the order of the scene."""
+    graph = LaneGraph(scene)
+    spans = shown_spans(scene, radius_m)
+    begins = {key for key, (start_m, _) in spans.items() if start_m < 1e-6}
+    ends = {
+        key
+        for key, (_, end_m) in spans.items()
+        if end_m > graph.lanes[key].centerline.length_m - 1e-6
+    }
+
+    def shown(ids: Iterable[str], among: set[str]) -> tuple[str, ...]:
+        return tuple(names.lanes[lane_id] for lane_id in ids if lane_id in among)
+
+    return {
+        names.lanes[key]: LaneCurve(
+            id=names.lanes[key],
+            lane=bezier_lane(graph.lanes[key].centerline.between(*span)),
+            whole=graph.lanes[key],
+            begins_m=span[0],
+            before=shown(graph.predecessors(key) if key in begins else (), ends),
+            after=shown(graph.successors(key) if key in ends else (), begins),
+        )
+        for key, span in spans.items()
+    }
+
+
+def control_points(lane: BezierLane) -> list[list[list[float]]]:
+    """The control points [x, y] of each piece, to the centimetre, ready for JSON.
+
+    Four, or of a straight piece its two ends.
+    """
+    return [
+        np.add(np.round(piece.curve.control_m[:: 3 if piece.is_straight else 1], 2), 0.0).tolist()
+        for piece in lane.pieces
+    ]
+
+
+def curve_from(points: Sequence[Sequence[float]]) -> CubicBezier:
+    """The curve of control points as the prompt writes them, four, or two of a straight one.
+
+    Raises:
+        ValueError: They are neither, or no curve.
+    """
+    return straight_curve(*points) if len(points) == 2 else CubicBezier(points)
+
 
 SPACING_M = 5.0
 DEFAULT_RADIUS_M = 80.0

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from augment.checks import Finding, Severity
 from augment.checks.against_intent import check_against_intent
-from augment.prompts.names import short_names
+from augment.prompts.vectors import short_names
 from augment.variants.review import Review, Submission, Verdict
 
 _TOLD = (Severity.WRONG, Severity.DOUBTFUL)

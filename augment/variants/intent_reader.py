@@ -5,10 +5,8 @@ It sees the sentence alone. What it read counts for nothing until a person has a
 
 from __future__ import annotations
 
-from augment.llm.client import ChatClient
-from augment.llm.patience import Patience
-from augment.prompts.fill_review import review_re_ask_messages
-from augment.prompts.intent_reader import read_intent, reader_messages
+from augment.llm.client import ChatClient, Patience
+from augment.prompts.fill import read_intent, reader_messages, review_re_ask_messages
 from augment.scene.intent import Intent
 from augment.variants.respondents import Inquiry, RespondentClient, Respondents
 from augment.variants.transcript import ModelRole, Transcript

@@ -7,9 +7,8 @@ from functools import cached_property
 
 from augment.checks import Ground
 from augment.prompts import fill
-from augment.prompts.fill import Calling, Form
+from augment.prompts.fill import Calling, Form, model_message
 from augment.prompts.reply import ReadReply, read_reply
-from augment.prompts.texts import model_message
 from augment.scene.entities import Scene
 from augment.scene.intent import Intent
 from augment.variants.pose_tool import PoseTool

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 
 from augment.errors import ModelRefused, ReplyUnreadable, UnknownName
-from augment.llm.patience import Patience
+from augment.llm.client import Patience
 from augment.scene.entities import Scene
 from augment.scene.intent import Intent
 from augment.scene.modification import Modification

@@ -10,7 +10,7 @@ from typing import NamedTuple
 from augment.errors import ToolError
 from augment.geometry.bezier import CubicBezier
 from augment.prompts.calls import PARAMETERS, TOOL
-from augment.prompts.lane_curves import curve_from
+from augment.prompts.vectors import curve_from
 from augment.scene.entities import AgentType
 
 LANE_START = "lane"

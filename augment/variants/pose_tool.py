@@ -28,9 +28,14 @@ from augment.errors import ToolError
 from augment.geometry.bezier import CubicBezier, FitError
 from augment.geometry.frames import Pose
 from augment.prompts.calls import TOOL
-from augment.prompts.lane_curves import LaneCurve, lane_curves
-from augment.prompts.names import ShortNames, short_names
-from augment.prompts.vectors import DEFAULT_RADIUS_M, shown_agents
+from augment.prompts.vectors import (
+    DEFAULT_RADIUS_M,
+    LaneCurve,
+    ShortNames,
+    lane_curves,
+    short_names,
+    shown_agents,
+)
 from augment.scene.bezier_lanes import BezierLane, LanePiece
 from augment.scene.entities import AgentType, Scene, TrafficAgent
 from augment.variants.pose_call import LANE_START, AskedPlace, PoseCall, read_call

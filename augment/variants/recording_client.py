@@ -6,10 +6,9 @@ from dataclasses import dataclass
 from functools import partial
 
 from augment.errors import Abandoned, ModelFault, NotSent, ParameterRefused, Unwanted
-from augment.llm.client import ChatClient
+from augment.llm.client import ChatClient, Patience
+from augment.llm.costs import cut_of
 from augment.llm.messages import Reply, Request
-from augment.llm.patience import Patience
-from augment.llm.window import cut_of
 from augment.variants.transcript import ModelRole, Transcript
 
 

@@ -7,10 +7,9 @@ from dataclasses import dataclass, field
 from typing import TypeVar
 
 from augment.errors import ModelRefused, ReplyUnreadable
-from augment.llm.client import ChatClient
+from augment.llm.client import ChatClient, Patience
 from augment.llm.messages import Message, Reply, Request, Tool, ToolChoice
-from augment.llm.patience import Patience
-from augment.prompts.texts import prompt_version
+from augment.prompts.fill import prompt_version
 from augment.variants.recording_client import RecordingClient
 from augment.variants.transcript import ModelRole, Transcript
 

@@ -11,10 +11,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from augment.llm.messages import Message
-from augment.prompts import fill, fill_review
-from augment.prompts.lane_curves import lane_curves
-from augment.prompts.names import short_names
-from augment.prompts.vectors import LaneFormat
+from augment.prompts import fill
+from augment.prompts import fill as fill_review
+from augment.prompts.vectors import LaneFormat, lane_curves, short_names
 from augment.scene.entities import Scene
 from augment.scene.modification import Modification
 from augment.variants.modifier import form_of

@@ -9,8 +9,8 @@ from __future__ import annotations
 from functools import partial
 
 from augment.errors import ModelRefused, ReplyUnreadable, ReviewUnusable
-from augment.prompts import fill_review
-from augment.prompts.review import RatedReview, read_ratings
+from augment.prompts import fill
+from augment.prompts.reply import RatedReview, read_ratings
 from augment.variants.respondents import Inquiry
 from augment.variants.review import Review, Submission, Verdict
 from augment.variants.transcript import ModelRole
@@ -24,7 +24,7 @@ def review_text(submission: Submission) -> Verdict:
         ModelFault: The wire broke for good.
     """
     limits = submission.limits
-    messages = fill_review.reviewer_messages(
+    messages = fill.reviewer_messages(
         submission.scene,
         submission.instruction,
         submission.modification,
@@ -34,7 +34,7 @@ def review_text(submission: Submission) -> Verdict:
     inquiry = Inquiry(
         respondents=submission.respondents,
         role=ModelRole.REVIEWER,
-        again=fill_review.review_re_ask_messages,
+        again=fill.review_re_ask_messages,
         max_tokens=limits.max_tokens,
         re_asks=limits.re_asks,
     )

@@ -14,8 +14,7 @@ from augment.errors import ToolError
 from augment.llm.messages import Message, Reply, Speaker, ToolCall, ToolChoice
 from augment.prompts import fill
 from augment.prompts.calls import TOOL, WrittenCall, calls_in, read_arguments
-from augment.prompts.fill import Calling
-from augment.prompts.texts import model_message, said_by_user
+from augment.prompts.fill import Calling, model_message, said_by_user
 from augment.variants.pose_call import CallLimits
 from augment.variants.pose_tool import PoseTool
 from augment.variants.respondents import Messages, Respondents

@@ -11,10 +11,10 @@ from dataclasses import replace
 from functools import partial
 
 from augment.errors import ModelRefused, ReplyUnreadable, ReviewUnusable
-from augment.prompts import fill_review
-from augment.prompts.names import short_names
-from augment.prompts.review import read_questions, read_sight, read_verdict
-from augment.prompts.texts import model_message
+from augment.prompts import fill
+from augment.prompts.fill import model_message
+from augment.prompts.reply import read_questions, read_sight, read_verdict
+from augment.prompts.vectors import short_names
 from augment.render.camera import WIDTH_PX, camera_for
 from augment.render.reviewed import draw_for_review
 from augment.scene.entities import Scene
@@ -35,11 +35,11 @@ def review_picture(submission: Submission) -> Verdict:
     engineer = Inquiry(
         respondents=submission.respondents,
         role=ModelRole.ENGINEER,
-        again=fill_review.review_re_ask_messages,
+        again=fill.review_re_ask_messages,
         max_tokens=limits.max_tokens,
         re_asks=limits.re_asks,
     )
-    messages = fill_review.engineer_messages(
+    messages = fill.engineer_messages(
         submission.scene,
         submission.instruction,
         submission.modification,
@@ -51,9 +51,7 @@ def review_picture(submission: Submission) -> Verdict:
         viewer = replace(engineer, role=ModelRole.VIEWER)
         seen = _seen(submission, questions, viewer)
         said: Messages = (*asked, model_message(reply.text))
-        verdict, _, _ = engineer.read(
-            fill_review.verdict_messages(said, questions, seen), read_verdict
-        )
+        verdict, _, _ = engineer.read(fill.verdict_messages(said, questions, seen), read_verdict)
     except ReplyUnreadable as unreadable:
         raise ReviewUnusable("; ".join(unreadable.problems)) from unreadable
     except ModelRefused as refused:
@@ -86,10 +84,8 @@ def _seen(submission: Submission, questions: tuple[str, ...], inquiry: Inquiry) 
     shown = pictures(
         submission.scene, submission.modification, width_px=submission.limits.picture_px
     )
-    inquiry = replace(
-        inquiry, again=lambda told, said, _: fill_review.viewer_re_ask_messages(told, said)
-    )
-    messages = fill_review.viewer_messages(questions, shown)
+    inquiry = replace(inquiry, again=lambda told, said, _: fill.viewer_re_ask_messages(told, said))
+    messages = fill.viewer_messages(questions, shown)
     seen, _, _ = inquiry.read(messages, partial(read_sight, count=len(questions)))
     return seen
 

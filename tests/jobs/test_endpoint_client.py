@@ -9,9 +9,9 @@ from typing import Any
 import pytest
 
 from augment.errors import KeyMissing
+from augment.llm.client import Patience
 from augment.llm.messages import Message, Request, Speaker
 from augment.llm.openai_wire import OpenAIWire
-from augment.llm.patience import Patience
 from augment.models import Augmentation, CallLease, Endpoint, EndpointModel, Event, ModelCall
 from augment.services.endpoints.call_limits import Queue
 from augment.services.endpoints.client import EndpointClient

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from django.urls import reverse
 
-from augment.llm.fingerprint import request_hash
+from augment.llm.messages import request_hash
 from augment.models import Augmentation, Endpoint, ModelCall, TranscriptNote
 from augment.services.running import caps, pausing, runner
 from augment.services.running.caps import Caps

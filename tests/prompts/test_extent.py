@@ -9,8 +9,7 @@ import pytest
 
 from augment.geometry.polyline import Polyline
 from augment.prompts.extent import BESIDE_M, extent_of, shown_spans
-from augment.prompts.names import short_names
-from augment.prompts.vectors import DEFAULT_RADIUS_M, agent_vectors
+from augment.prompts.vectors import DEFAULT_RADIUS_M, agent_vectors, short_names
 from augment.scene.entities import Lane, LaneConnector, TurnType
 from augment.variants.pose_tool import PoseTool
 from tests.fixtures.shelf import HARD_SLUGS, SLUGS, entry, whole_scene

@@ -9,9 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from augment.prompts.fill import regenerate_messages, result_text
-from augment.prompts.fill_review import viewer_messages
-from augment.prompts.texts import said_by_user
+from augment.prompts.fill import regenerate_messages, result_text, said_by_user, viewer_messages
 from augment.scene.modification import Modification
 from augment.variants.modifier import form_of
 from augment.variants.recipes import RECIPES, VQA

@@ -10,15 +10,14 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from augment.geometry.polyline import Polyline
-from augment.prompts.clip import boundary_within, simplify_boundary
-from augment.prompts.extent import Extent, extent_of
-from augment.prompts.names import short_names
+from augment.prompts.extent import Extent, boundary_within, extent_of, simplify_boundary
 from augment.prompts.vectors import (
     agent_vectors,
     area_vectors,
     connector_vectors,
     lane_vectors,
     scene_text,
+    short_names,
 )
 from augment.scene.entities import Lane
 from tests.fixtures.shelf import SLUGS, entry, whole_scene

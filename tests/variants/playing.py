@@ -7,8 +7,8 @@ import random
 from collections.abc import Iterable, Mapping
 
 from augment.errors import ModelFault
+from augment.llm.client import Patience
 from augment.llm.messages import Reply, ToolCall
-from augment.llm.patience import Patience
 from augment.scene.entities import Scene
 from augment.scene.intent import Intent
 from augment.variants.pipeline import Outcome, run

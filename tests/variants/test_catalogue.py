@@ -13,8 +13,8 @@ import pytest
 
 from augment.checks import findings
 from augment.fake_llm.server import FakeServer, running
+from augment.llm.client import Patience
 from augment.llm.openai_wire import OpenAIWire
-from augment.llm.patience import Patience
 from augment.metrics.displacement import displacement
 from augment.variants.pipeline import Outcome, OutcomeStatus, run
 from augment.variants.recipes import RECIPES, Tools, find_recipe

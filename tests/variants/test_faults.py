@@ -17,8 +17,8 @@ import pytest
 from augment.errors import ModelFault
 from augment.fake_llm.models import MODELS
 from augment.fake_llm.server import FakeServer, running
+from augment.llm.client import Patience
 from augment.llm.openai_wire import OpenAIWire
-from augment.llm.patience import Patience
 from augment.variants.pipeline import run
 from augment.variants.recipes import GEO, RECIPES, find_recipe
 from augment.variants.respondents import RespondentClient

@@ -8,10 +8,10 @@ import re
 import pytest
 
 from augment.fake_llm.playing import CARELESS, GOOD
-from augment.llm.patience import Patience
+from augment.llm.client import Patience
 from augment.prompts.blocks import names_changes
 from augment.prompts.calls import calls_in
-from augment.prompts.texts import read_text
+from augment.prompts.fill import read_text
 from augment.variants.pipeline import run
 from augment.variants.recipes import find_recipe
 from augment.variants.respondents import RespondentClient

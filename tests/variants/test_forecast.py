@@ -9,9 +9,8 @@ import pytest
 
 from augment.fake_llm.playing import GOOD, LOOPING, STUBBORN, Character
 from augment.fake_llm.requests import chat_request
-from augment.llm.client import Sending, watch_nothing
+from augment.llm.client import Patience, Sending, watch_nothing
 from augment.llm.messages import Reply, Request
-from augment.llm.patience import Patience
 from augment.variants.forecast import CallRange, calls_of, most_tokens
 from augment.variants.pipeline import run
 from augment.variants.recipes import FC, OTM, RECIPES, TQA, VQA

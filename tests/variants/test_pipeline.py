@@ -7,8 +7,8 @@ from dataclasses import replace
 import pytest
 
 from augment.errors import ModelFault, UnknownName
+from augment.llm.client import Patience
 from augment.llm.messages import Reply, Speaker
-from augment.llm.patience import Patience
 from augment.prompts.fill import prompt_version
 from augment.variants.pipeline import Outcome, OutcomeStatus, run
 from augment.variants.recipes import OTM, TQA

@@ -10,8 +10,7 @@ from hypothesis import strategies as st
 
 from augment.errors import ToolError
 from augment.geometry.polyline import Polyline
-from augment.prompts.lane_curves import control_points
-from augment.prompts.names import short_names
+from augment.prompts.vectors import control_points, short_names
 from augment.scene.ego_route import EgoRoute
 from augment.scene.entities import AreaKind, SceneOptions, TurnType
 from augment.variants.pose_call import OBJECT_TYPES, CallLimits

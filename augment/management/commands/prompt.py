@@ -9,7 +9,7 @@ from typing import Any
 from django.core.management.base import CommandError
 
 from augment.errors import AugmentError
-from augment.prompts.texts import prompt_version
+from augment.prompts.fill import prompt_version
 from augment.services.scenarios.prompts import prompt_of
 from augment.services.terminal import TerminalCommand
 from augment.variants.showing import Shown

@@ -6,10 +6,9 @@ import logging
 from contextlib import AbstractContextManager
 
 from augment.errors import ParameterRefused
-from augment.llm.client import Sending, watch_nothing
+from augment.llm.client import ModelProfile, Sending, watch_nothing
 from augment.llm.messages import Reply, Request
 from augment.llm.openai_wire import OpenAIWire
-from augment.llm.profile import ModelProfile
 from augment.models import Endpoint
 from augment.services.endpoints.call_limits import Queue, place_at
 from augment.services.endpoints.known_models import profile_of, remember_refusal

@@ -12,7 +12,7 @@ from django.core.serializers.json import DjangoJSONEncoder
 from django.db import transaction
 from django.utils import timezone
 
-from augment.llm.profile import ModelProfile
+from augment.llm.client import ModelProfile
 from augment.models import Endpoint, EndpointModel
 from augment.services.endpoints.price_list import listed_price
 from augment.services.events import log_event

@@ -16,10 +16,10 @@ from django.db import transaction
 from django.db.models import Exists, OuterRef
 
 from augment.errors import Conflict, ModelFault, ParameterRefused
+from augment.llm.client import ModelProfile
 from augment.llm.messages import LengthName
-from augment.llm.profile import ModelProfile
 from augment.models import Augmentation, Contestant, Endpoint, ModelCall
-from augment.prompts.texts import prompt_version
+from augment.prompts.fill import prompt_version
 from augment.services.endpoints.known_models import profile_of, profiles_of
 from augment.services.endpoints.respondents import Respondent, respondents_of_each
 from augment.services.events import log_event

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from django.db.models import Avg, Count, Exists, OuterRef, Q
 
 from augment.models import Augmentation, Contestant, Endpoint, ModelCall
-from augment.prompts.texts import prompt_version
+from augment.prompts.fill import prompt_version
 from augment.services.endpoints.moves import Spell, spells_at_address
 
 GUESSED_LATENCY_S = 10.0

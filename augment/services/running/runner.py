@@ -28,7 +28,7 @@ from augment.errors import (
     Unwanted,
 )
 from augment.llm.client import ChatClient
-from augment.llm.cutting import shorten
+from augment.llm.messages import shorten
 from augment.models import Augmentation, Contestant, Endpoint
 from augment.scene.codec import modification_from_document, modification_to_document
 from augment.scene.entities import Scene

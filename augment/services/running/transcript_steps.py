@@ -12,8 +12,7 @@ from typing import Any
 
 from django.db.models import Prefetch
 
-from augment.llm.cutting import shorten
-from augment.llm.fingerprint import IMAGE_SCHEME
+from augment.llm.messages import IMAGE_SCHEME, shorten
 from augment.models import Attempt, Augmentation, ModelCall, TranscriptNote
 from augment.services.running.call_changes import changes_of
 

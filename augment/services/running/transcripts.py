@@ -18,8 +18,7 @@ from django.utils import timezone
 
 from augment.errors import BudgetSpent, DatabaseLocked, LeaseLost, ModelFault, NotSent
 from augment.llm.costs import Price, WorstCase, worst_case
-from augment.llm.fingerprint import image_reference, request_hash
-from augment.llm.messages import Reply, Request
+from augment.llm.messages import Reply, Request, image_reference, request_hash
 from augment.models import Augmentation, Endpoint, GenerationJob, ModelCall, TranscriptNote
 from augment.services.endpoints.prices import price_of
 from augment.services.running import answers, budget, stopping

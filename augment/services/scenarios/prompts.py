@@ -12,7 +12,7 @@ from django.core.files.storage import default_storage
 
 from augment.errors import Conflict, UnknownName
 from augment.models import Contestant, Scenario
-from augment.prompts.texts import prompt_version
+from augment.prompts.fill import prompt_version
 from augment.render.camera import LOOK
 from augment.scene.modification import Modification
 from augment.services.scenarios.pictures import store
