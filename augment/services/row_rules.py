@@ -42,7 +42,7 @@ from augment.services.stored_names import check_picture_name, check_stored_name
 from augment.services.texts import check_prose, one_line
 from augment.simulation.planners import OFFSETS_M
 from augment.variants.options import options_from_document
-from augment.variants.transcript import ModelRole
+from augment.variants.respondents import ModelRole
 
 LONGEST_TRACE = 1 << 26
 """Of a drive to look at, unpacked: some hundred times what 15 s take."""

@@ -10,8 +10,7 @@ from augment.llm.openai_wire import OpenAIWire
 from augment.scene.entities import Scene
 from augment.variants.pipeline import Outcome, run
 from augment.variants.recipes import find_recipe
-from augment.variants.respondents import RespondentClient
-from augment.variants.transcript import MemoryTranscript
+from augment.variants.respondents import MemoryTranscript, RespondentClient
 
 
 def outcome(

@@ -14,7 +14,7 @@ from augment.services.running import caps, pausing, runner
 from augment.services.running.caps import Caps
 from augment.services.running.transcript_export import transcript_of
 from augment.services.running.transcript_steps import totals_of, tries_of
-from augment.variants.transcript import NoteKind
+from augment.variants.respondents import NoteKind
 from tests.jobs.models import Model, after_a_second_look, llama_job, reply
 from tests.jobs.rows import INSTRUCTION, only_row
 from tests.llm.raw_server import speaking, whole

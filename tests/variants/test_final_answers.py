@@ -14,8 +14,7 @@ from augment.prompts.calls import calls_in
 from augment.prompts.fill import read_text
 from augment.variants.pipeline import run
 from augment.variants.recipes import find_recipe
-from augment.variants.respondents import RespondentClient
-from augment.variants.transcript import MemoryTranscript
+from augment.variants.respondents import MemoryTranscript, RespondentClient
 from bench.mutated_answers import Answering
 from tests.fixtures.shelf import SLUGS, entry, shown_scene
 from tests.prompts.test_calls import FORMS

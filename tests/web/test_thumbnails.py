@@ -14,7 +14,7 @@ from pytest_django import Settings
 from arena.config import env
 from augment.render.bev import draw
 from augment.render.camera import camera_for
-from augment.render.shrunken import shrink_png
+from augment.render.canvas import shrink_png
 from augment.scene.modification import Modification
 from augment.services.scenarios.pictures import store
 from augment.services.scenarios.thumbnails import WIDTHS_PX, thumbnail_of

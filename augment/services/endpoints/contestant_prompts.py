@@ -9,7 +9,7 @@ from augment.services.endpoints.treatments import options_of, other_prompts
 from augment.services.scenarios.prompts import Preview, preview_prompt
 from augment.variants.options import ToolProtocol
 from augment.variants.recipes import Tools, find_recipe
-from augment.variants.transcript import ModelRole
+from augment.variants.respondents import ModelRole
 
 
 def asking_contestants() -> list[Contestant]:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from augment.errors import Conflict, InvalidDocument
 from augment.models import Contestant, Endpoint, EndpointModel
 from augment.variants.recipes import Recipe, find_recipe
-from augment.variants.transcript import ModelRole
+from augment.variants.respondents import ModelRole
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

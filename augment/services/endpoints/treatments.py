@@ -30,7 +30,7 @@ from augment.variants.options import (
     options_from_document,
 )
 from augment.variants.recipes import find_recipe
-from augment.variants.transcript import ModelRole
+from augment.variants.respondents import ModelRole
 
 OPTIONS = NAMES
 """Of a contestant, in the order in which they are shown."""

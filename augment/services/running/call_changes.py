@@ -10,7 +10,7 @@ from typing import Any
 
 from augment.models import ModelCall, TranscriptNote
 from augment.variants.options import ToolProtocol
-from augment.variants.transcript import ModelRole, NoteKind
+from augment.variants.respondents import ModelRole, NoteKind
 
 _OLD_NAME, _NEW_NAME = "max_tokens", "max_completion_tokens"
 _SENT = ("temperature", "seed", "reasoning_effort")

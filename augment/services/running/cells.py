@@ -19,7 +19,7 @@ from augment.services.endpoints.keys import may_hold_key
 from augment.services.running.matrix import ContestantDocument, pick_slug
 from augment.variants.options import ContestantOptions, names_for, options_from_document
 from augment.variants.recipes import RECIPES, Recipe, find_recipe, spell_variant
-from augment.variants.transcript import ModelRole
+from augment.variants.respondents import ModelRole
 
 SEPARATOR = "|"
 

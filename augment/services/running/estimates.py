@@ -18,11 +18,10 @@ from augment.services.endpoints.respondents import Respondent, respondents_of
 from augment.services.endpoints.treatments import options_of
 from augment.services.running.reuse import count_answered, latency_of, seconds_for
 from augment.services.scenarios.scenes import reference_of, scene_of
-from augment.variants.forecast import TokenUse, calls_of, most_tokens
 from augment.variants.options import recipe_with
 from augment.variants.recipes import Recipe, find_recipe
-from augment.variants.showing import shown_prompt
-from augment.variants.transcript import ModelRole
+from augment.variants.respondents import ModelRole
+from augment.variants.showing import TokenUse, calls_of, most_tokens, shown_prompt
 
 ANSWER_TOKENS = 1_200
 PICTURE_TOKENS = 1_500

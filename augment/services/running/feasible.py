@@ -13,7 +13,7 @@ from augment.services.endpoints.keys import key_of, may_hold_key
 from augment.services.endpoints.respondents import Respondent, respondents_of, sight_of, viewer_of
 from augment.services.endpoints.treatments import options_of, other_prompts
 from augment.variants.options import ToolProtocol
-from augment.variants.transcript import ModelRole
+from augment.variants.respondents import ModelRole
 
 Kind = Contestant.Kind
 

@@ -30,8 +30,8 @@ from augment.services.running import answers, budget
 from augment.services.running.caps import Caps
 from augment.services.running.transcripts import CallTranscript, sentence_of
 from augment.services.work import Lease, Settlement, WorkKind
-from augment.variants.intent_reader import ask_for_intent
-from augment.variants.transcript import NoteKind
+from augment.variants.pipeline import ask_for_intent
+from augment.variants.respondents import NoteKind
 
 State = IntentReading.State
 USUAL_CAPS = Caps(calls=6)

@@ -31,7 +31,7 @@ from augment.variants.options import (
     options_from_document,
 )
 from augment.variants.recipes import find_recipe
-from augment.variants.transcript import ModelRole
+from augment.variants.respondents import ModelRole
 
 WHAT = "matrix"
 MOST_CONTESTANTS = 500

@@ -56,8 +56,7 @@ from augment.services.work import Lease, Settlement, WorkKind, change_all
 from augment.variants import pipeline
 from augment.variants.options import ToolProtocol, recipe_with
 from augment.variants.recipes import find_recipe
-from augment.variants.respondents import RespondentClient
-from augment.variants.transcript import ModelRole
+from augment.variants.respondents import ModelRole, RespondentClient
 
 logger = logging.getLogger(__name__)
 

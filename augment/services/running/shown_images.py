@@ -10,7 +10,7 @@ from django.db.models import QuerySet
 from augment.models import ModelCall
 from augment.services.running.transcript_steps import images_in
 from augment.services.running.transcripts import IMAGES
-from augment.variants.transcript import ModelRole
+from augment.variants.respondents import ModelRole
 
 AT_ONCE = 200
 

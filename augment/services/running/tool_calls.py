@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from django.db.models import Max
 
 from augment.models import Augmentation, GenerationJob, TranscriptNote
-from augment.variants.transcript import NoteKind
+from augment.variants.respondents import NoteKind
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

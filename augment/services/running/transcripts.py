@@ -26,7 +26,7 @@ from augment.services.running.attempts import insist_wanted
 from augment.services.scenarios.pictures import store
 from augment.services.texts import make_document_storable, make_storable
 from augment.services.work import Lease
-from augment.variants.transcript import ModelRole, NoteKind
+from augment.variants.respondents import ModelRole, NoteKind
 
 IMAGES = "asked"
 """The folder in the media storage of the images that models are shown."""

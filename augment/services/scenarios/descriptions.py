@@ -8,13 +8,13 @@ from functools import cache
 from typing import Any
 
 from augment.models import Augmentation, Scenario
-from augment.render.description import describe
+from augment.render.legend import describe
 from augment.scene.codec import modification_from_document
 from augment.scene.modification import Modification
 from augment.services.scenarios.scenes import scene_of
 
 Description = list[dict[str, Any]]
-"""The lines of augment.render.description, ready to be stored."""
+"""The lines of augment.render.legend, ready to be stored."""
 
 
 def descriptions(

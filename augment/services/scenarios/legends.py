@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from augment.models import Augmentation, Scenario
-from augment.render.legend_keys import change_keys, scene_keys
+from augment.render.legend import change_keys, scene_keys
 from augment.scene.codec import modification_from_document
 from augment.services.scenarios.scenes import scene_of
 

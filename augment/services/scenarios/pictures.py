@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from augment.models import Scenario
 from augment.render.bev import draw
 from augment.render.camera import Camera, camera_for
-from augment.render.shrunken import shrink
+from augment.render.canvas import shrink
 from augment.scene.codec import modification_from_document
 from augment.scene.entities import Scene
 from augment.scene.modification import Modification

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from django.core.files.storage import default_storage
 
-from augment.render.shrunken import shrink_png
+from augment.render.canvas import shrink_png
 from augment.services.scenarios.pictures import store_as
 
 FOLDER = "thumbnails"
