@@ -22,10 +22,8 @@ from augment.llm.costs import Price, cut_of, usd_of
 from augment.llm.messages import LengthName, Reply, Request, shorten
 from augment.llm.questions import Ability, ProbeQuestion, questions_for
 from augment.models import Endpoint, EndpointModel
-from augment.services.endpoints.call_limits import Queue, place_at
-from augment.services.endpoints.known_models import model_at
-from augment.services.endpoints.prices import price_of
-from augment.services.endpoints.wires import wire_to
+from augment.services.endpoints.client import Queue, place_at, wire_to
+from augment.services.endpoints.known_models import model_at, price_of
 from augment.services.events import log_event
 from augment.services.texts import make_document_storable
 
