@@ -15,7 +15,6 @@ from rest_framework.request import Request
 
 from arena.api.access import STAFF
 from arena.api.schema import file_operation
-from arena.api.snapshots import get_snapshot
 from arena.api.views import FileView, as_file
 from arena.errors import NoSnapshot
 from arena.exports.bundle import bundle
@@ -38,6 +37,7 @@ from arena.exports.writers import FORMATS as LEADERBOARD
 from arena.exports.zips import CONTENT_TYPE as ZIP_TYPE
 from arena.models import Snapshot
 from arena.queries.analyses import analysis_of
+from arena.results.api import get_snapshot
 from augment.errors import UnknownName
 from augment.models import GenerationJob
 from augment.services.judging.displacement import By

@@ -4,20 +4,12 @@ from __future__ import annotations
 
 from django.urls import URLPattern, path
 
-from arena.api import (
-    contestants,
-    endpoints,
-    exports,
-    jobs,
-    people,
-    reference,
-    scenarios,
-    snapshots,
-    studies,
-    uploads,
-    voting,
-)
+from arena.api import contestants, endpoints, exports, jobs, reference, scenarios, uploads
 from arena.api.views import ApiView
+from arena.people import api
+from arena.results import api as snapshots
+from arena.studies import api as studies
+from arena.voting import api as voting
 
 
 def _at(address: str, view: type[ApiView], name: str) -> URLPattern:
@@ -28,9 +20,9 @@ def _at(address: str, view: type[ApiView], name: str) -> URLPattern:
 urlpatterns: list[URLPattern] = [
     path("reference/", reference.reference_page, name="api-reference"),
     _at("openapi.json", reference.DocumentView, "api-document"),
-    _at("people", people.PeopleView, "api-people"),
-    _at("first", people.FirstView, "api-first"),
-    _at("welcome", people.WelcomeView, "api-welcome"),
+    _at("people", api.PeopleView, "api-people"),
+    _at("first", api.FirstView, "api-first"),
+    _at("welcome", api.WelcomeView, "api-welcome"),
     _at("uploads", uploads.UploadsView, "api-uploads"),
     _at("uploads/<uuid:code>", uploads.UploadView, "api-upload"),
     _at("uploads/<uuid:code>/moments", uploads.MomentsView, "api-moments"),
