@@ -13,9 +13,7 @@ from django.shortcuts import get_object_or_404
 from django.utils.text import slugify
 from rest_framework.request import Request
 
-from arena.api.access import STAFF
-from arena.api.schema import file_operation
-from arena.api.views import FileView, as_file
+from arena.api.views import STAFF, FileView, as_file, file_operation
 from arena.errors import NoSnapshot
 from arena.exports.bundle import bundle
 from arena.exports.charts.rating import CONTENT_TYPES, chart_bytes

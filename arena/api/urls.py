@@ -4,10 +4,15 @@ from __future__ import annotations
 
 from django.urls import URLPattern, path
 
-from arena.api import contestants, endpoints, exports, jobs, reference, scenarios, uploads
+from arena.api import exports, reference
 from arena.api.views import ApiView
+from arena.contestants import api as contestants
+from arena.contestants import api as endpoints
+from arena.jobs import api as jobs
 from arena.people import api
 from arena.results import api as snapshots
+from arena.scenarios import api as scenarios
+from arena.scenarios import api as uploads
 from arena.studies import api as studies
 from arena.voting import api as voting
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 REST_FRAMEWORK = {
     "DEFAULT_AUTHENTICATION_CLASSES": [
-        "arena.api.access.BearerToken",
+        "arena.api.views.BearerToken",
         "rest_framework.authentication.SessionAuthentication",
     ],
     "DEFAULT_PERMISSION_CLASSES": ["rest_framework.permissions.IsAuthenticated"],
     "DEFAULT_RENDERER_CLASSES": ["rest_framework.renderers.JSONRenderer"],
     "DEFAULT_PARSER_CLASSES": ["rest_framework.parsers.JSONParser"],
-    "DEFAULT_SCHEMA_CLASS": "arena.api.schema.ArenaSchema",
+    "DEFAULT_SCHEMA_CLASS": "arena.api.views.ArenaSchema",
 }
 SPECTACULAR_SETTINGS = {
     "TITLE": "Scenario Arena",

@@ -14,10 +14,8 @@ from rest_framework import serializers
 from rest_framework.request import Request
 
 from arena import tasks
-from arena.api.access import STAFF
 from arena.api.fields import FlagField, StrictSerializer, TextField, WholeNumberField
-from arena.api.schema import operation
-from arena.api.views import ApiView, keep_and_send
+from arena.api.views import STAFF, ApiView, keep_and_send, operation
 from arena.exports.tables import LeaderboardTable, leaderboard_table
 from arena.models import Snapshot, Study
 from arena.models.ratings import STORED

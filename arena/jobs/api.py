@@ -11,11 +11,18 @@ from rest_framework import serializers
 from rest_framework.request import Request
 from rest_framework.response import Response
 
-from arena.api.access import ADMINS, STAFF
 from arena.api.fields import FlagField, StrictSerializer, TextField, WholeNumberField
-from arena.api.paging import PageQuery, answer_page, page_of
-from arena.api.schema import operation
-from arena.api.views import ApiView, WarnedDocument, keep_and_send
+from arena.api.views import (
+    ADMINS,
+    STAFF,
+    ApiView,
+    PageQuery,
+    WarnedDocument,
+    answer_page,
+    keep_and_send,
+    operation,
+    page_of,
+)
 from augment.models import GenerationJob
 from augment.services.running import caps, jobs
 from augment.services.running.caps import Caps

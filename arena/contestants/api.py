@@ -1,8 +1,9 @@
-"""Endpoints, their models, and probes of what a model can do. Keys are never sent or accepted."""
+"""Contestants and how they ask."""
 
 from __future__ import annotations
 
 import uuid
+from collections.abc import Sequence
 from functools import partial
 from typing import Any
 
@@ -11,17 +12,117 @@ from django.shortcuts import get_object_or_404
 from drf_spectacular.utils import extend_schema_field
 from rest_framework import serializers
 from rest_framework.request import Request
+from rest_framework.response import Response
 
-from arena.api.access import ADMINS, STAFF
 from arena.api.fields import FlagField, StrictSerializer, TextField, WholeNumberField
-from arena.api.schema import operation
-from arena.api.views import ApiView, WarnedDocument, keep_and_send
+from arena.api.views import (
+    ADMINS,
+    STAFF,
+    ApiView,
+    PageQuery,
+    WarnedDocument,
+    answer_page,
+    keep_and_send,
+    operation,
+    page_of,
+)
 from arena.queries.probes import probe_lines
-from augment.models import Endpoint, EndpointModel, Probe
+from augment.models import Contestant, Endpoint, EndpointModel, Probe
 from augment.services.endpoints import editing
 from augment.services.endpoints.editing import EndpointFacts
+from augment.services.endpoints.entering import VARIANTS, EnteredEndpoint, enter_contestant
 from augment.services.endpoints.probing import plan_probe
+from augment.services.running.transcript_export import contestant_documents
 from augment.tasks import enqueue_probe
+
+KINDS = [kind.value for kind in Contestant.Kind if kind is not Contestant.Kind.CHECK]
+
+
+class ContestantQuery(PageQuery):
+    """Which contestants."""
+
+    kind = serializers.ChoiceField(choices=KINDS, required=False)
+    variant = serializers.ChoiceField(choices=list(VARIANTS), required=False)
+    slug = serializers.CharField(max_length=80, required=False)
+
+
+class ContestantEndpointDocument(serializers.Serializer[Any]):
+    """Where a contestant's model is."""
+
+    label = serializers.CharField()  # type: ignore[assignment]
+    base_url = serializers.CharField()
+    is_simulated = serializers.BooleanField()
+
+
+class WholeContestantDocument(serializers.Serializer[Any]):
+    """A contestant, as in transcripts."""
+
+    code = serializers.UUIDField()
+    slug = serializers.CharField()
+    name = serializers.CharField()
+    kind = serializers.CharField()
+    variant = serializers.CharField(allow_null=True)
+    model = serializers.CharField(allow_null=True)
+    roles = serializers.DictField(help_text="The models of other roles.")
+    options = serializers.DictField(help_text="Those that were chosen.")
+    frozen_options = serializers.DictField(
+        allow_null=True, help_text="All options, from its first run on."
+    )
+    left_out = serializers.DictField(
+        help_text="By role, options that its model does not support and that are not sent."
+    )
+    sends = serializers.DictField(allow_null=True)
+    endpoint = ContestantEndpointDocument(allow_null=True)
+    retired_at = serializers.DateTimeField(allow_null=True)
+
+
+class ContestantBody(StrictSerializer):
+    """A new contestant that asks a language model."""
+
+    slug = TextField(max_length=80)
+    variant = serializers.ChoiceField(choices=list(VARIANTS))
+    endpoint = TextField(max_length=80, help_text="The label of an endpoint.")
+    model = TextField(max_length=120, help_text="The model id on the endpoint.")
+    name = TextField(max_length=120, required=False, default="", allow_blank=True)
+    options = serializers.DictField(required=False, default=dict, help_text="By name.")
+
+
+class ContestantsView(ApiView):
+    """Contestants; attention checks are not among them."""
+
+    readers, writers = STAFF, ADMINS
+
+    @operation(
+        "Contestants by slug",
+        answers=page_of(WholeContestantDocument),
+        query=ContestantQuery,
+        name="listContestants",
+    )
+    def get(self, request: Request, given: dict[str, Any]) -> Response:
+        """Retired ones have a date in `retired_at`."""
+        rows = Contestant.objects.exclude(kind=Contestant.Kind.CHECK).select_related("endpoint")
+        return answer_page(
+            request, rows, given, WholeContestantDocument, order="slug", lines=_documents
+        )
+
+    @operation(
+        "Add a contestant that asks a language model",
+        takes=ContestantBody,
+        answers=WholeContestantDocument,
+        status=201,
+        name="createContestant",
+    )
+    def post(self, request: Request, given: dict[str, Any]) -> dict[str, Any]:
+        """The same one twice is one."""
+        endpoint = EnteredEndpoint(label=given.pop("endpoint"))
+        return _documents([enter_contestant(**given, endpoint=endpoint, actor=self.user)])[0]
+
+
+def _documents(rows: Sequence[Contestant]) -> list[dict[str, Any]]:
+    return [
+        document | {"code": row.code, "retired_at": row.retired_at}
+        for row, document in zip(rows, contestant_documents(rows), strict=True)
+    ]
 
 
 class EndpointDocument(serializers.ModelSerializer[Endpoint]):
