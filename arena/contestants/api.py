@@ -26,7 +26,7 @@ from arena.api.views import (
     operation,
     page_of,
 )
-from arena.queries.probes import probe_lines
+from arena.contestants.queries import probe_lines
 from augment.models import Contestant, Endpoint, EndpointModel, Probe
 from augment.services.endpoints import editing
 from augment.services.endpoints.editing import EndpointFacts

@@ -25,7 +25,7 @@ from arena.api.views import (
     operation,
     page_of,
 )
-from arena.queries.scenarios import OWN
+from arena.scenarios.queries import OWN
 from arena.services.sent_files import was_too_large
 from augment.models import Scenario, SceneUpload, UploadMoment
 from augment.models.scenes import DENSITIES, GOALS

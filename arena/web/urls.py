@@ -5,9 +5,14 @@ from __future__ import annotations
 from django.contrib.auth import views as auth
 from django.urls import URLPattern, path
 
-from arena.web.contestants import endpoints
-from arena.web.contestants import forms as contestant_form
-from arena.web.contestants import pages as contestants
+from arena.contestants.pages import contestants, endpoints
+from arena.contestants.pages import contestants as contestant_form
+from arena.scenarios.pages import editing, prompts, scenarios, uploads
+from arena.scenarios.pages import forms as scenario_form
+from arena.scenarios.pages import scenarios as catalogue
+from arena.scenarios.pages import scenarios as intents
+from arena.scenarios.pages import scenarios as removing
+from arena.scenarios.pages import uploads as scenes
 from arena.web.jobs import actions as job_actions
 from arena.web.jobs import analyses, displacement, driving, labelling, scenario_files, transcripts
 from arena.web.jobs import launching as new_job
@@ -18,9 +23,6 @@ from arena.web.people.sign_in import SignIn
 from arena.web.results import evidence as results_votes
 from arena.web.results import files as results_files
 from arena.web.results import pages as results
-from arena.web.scenarios import catalogue, editing, intents, prompts, removing, scenes, uploads
-from arena.web.scenarios import forms as scenario_form
-from arena.web.scenarios import pages as scenarios
 from arena.web.site import audit, health, home
 from arena.web.studies import files as study_files
 from arena.web.studies import pages as studies

@@ -13,7 +13,7 @@ from django.core.files.storage import default_storage
 from django.db import connection
 from django.test.utils import CaptureQueriesContext
 
-from arena.services import references as guarded
+from arena.scenarios import services as guarded
 from augment.errors import Conflict, InvalidDocument, InvalidModification
 from augment.models import Augmentation, Contestant, Event, Scenario
 from augment.render.bev import draw

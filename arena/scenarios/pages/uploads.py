@@ -12,14 +12,16 @@ from django.shortcuts import get_object_or_404, redirect, render
 from django.urls import reverse
 from django.views.decorators.http import require_POST, require_safe
 
-from arena.queries.uploads import place_of, track_maps
+from arena.scenarios.queries import counts_of, place_of, scene_rows, track_maps, upload_rows
 from arena.services.sent_files import was_too_large
 from arena.web.access import STAFF, allow_only
 from arena.web.sending import looks_again, send_later
 from augment.errors import AugmentError
-from augment.models import SceneUpload, UploadMoment
+from augment.models import BaseScene, SceneUpload, UploadMoment
 from augment.services.scenarios import upload_moments, uploads
-from augment.tasks import enqueue_moment, enqueue_upload
+from augment.services.scenarios.scene_notes import notes_of
+from augment.services.scenarios.scene_pictures import SceneView, is_drawn, scene_picture
+from augment.tasks import enqueue_moment, enqueue_scene, enqueue_upload
 
 
 @allow_only(*STAFF)
@@ -149,3 +151,36 @@ def _stop(row: SceneUpload, track: str, stop: str) -> tuple[str, int]:
         raise LookupError
     found = row.tracks[part]["stops"][number]
     return found["item"], found["frame"]
+
+
+@allow_only(*STAFF)
+@require_safe
+def scenes_page(request: HttpRequest) -> HttpResponse:
+    """Every scene, the files that were sent, and the form to send another."""
+    context = {
+        "scenes": scene_rows(),
+        "uploads": upload_rows(),
+        "formats": uploads.FORMATS.items(),
+        "most_megabytes": uploads.most_megabytes(),
+    }
+    return render(request, "scenes/list.html", context)
+
+
+@allow_only(*STAFF)
+@require_safe
+def scene_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
+    """One scene: drawn with and without its traffic, what is in it, its scenarios."""
+    row = get_object_or_404(BaseScene, code=code)
+    drawn = is_drawn(scene_picture(row, SceneView.KEPT))
+    look = looks_again(request, waits=not drawn)
+    if look == 1:
+        send_later(request, enqueue_scene, row.pk)
+    context = {
+        "scene": row,
+        "counts": counts_of(row),
+        "notes": notes_of(row),
+        "scenarios": row.scenarios.only("base_scene", "code", "slug", "instruction"),
+        "is_drawn": drawn,
+        "look": look,
+    }
+    return render(request, "scenes/scene.html", context)

@@ -12,8 +12,8 @@ from django.shortcuts import get_object_or_404, redirect, render
 from django.urls import reverse
 from django.views.decorators.http import require_safe
 
+from arena.contestants.queries import asking_of
 from arena.web.access import STAFF, allow_only
-from arena.web.contestants.asking import asking_of
 from arena.web.pictures import picture_response
 from arena.web.sending import looks_again, send_later
 from augment.errors import AugmentError, UnknownName

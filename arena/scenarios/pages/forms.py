@@ -14,7 +14,7 @@ from django.http import HttpRequest, HttpResponse, QueryDict
 from django.shortcuts import get_object_or_404, redirect, render
 from django.views.decorators.http import require_http_methods
 
-from arena.services.scenario_edits import change_scenario
+from arena.scenarios.services import change_scenario
 from arena.services.sent_files import was_too_large
 from arena.web.access import STAFF, allow_only
 from arena.web.json_text import read_json
