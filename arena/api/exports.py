@@ -23,16 +23,16 @@ from arena.exports.jobs import (
     augmentations,
     displacement_objects,
     displacement_table,
-    faults,
     tool_calls,
 )
 from arena.exports.jobs.displacement_writers import FORMATS as DISPLACEMENT
-from arena.exports.jobs.driving_table import DrivingTable
-from arena.exports.jobs.driving_writers import FORMATS as DRIVING
 from arena.exports.tables import leaderboard_table
 from arena.exports.votes import VOTE_FORMATS, vote_table
 from arena.exports.writers import FORMATS as LEADERBOARD
 from arena.exports.zips import CONTENT_TYPE as ZIP_TYPE
+from arena.jobs.exports import faults
+from arena.jobs.exports.driving import FORMATS as DRIVING
+from arena.jobs.exports.driving import DrivingTable
 from arena.models import Snapshot
 from arena.queries.analyses import analysis_of
 from arena.results.api import get_snapshot

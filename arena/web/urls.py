@@ -7,6 +7,8 @@ from django.urls import URLPattern, path
 
 from arena.contestants.pages import contestants, endpoints
 from arena.contestants.pages import contestants as contestant_form
+from arena.jobs.pages import driving, labelling
+from arena.jobs.pages import launching as new_job
 from arena.scenarios.pages import editing, prompts, scenarios, uploads
 from arena.scenarios.pages import forms as scenario_form
 from arena.scenarios.pages import scenarios as catalogue
@@ -14,8 +16,7 @@ from arena.scenarios.pages import scenarios as intents
 from arena.scenarios.pages import scenarios as removing
 from arena.scenarios.pages import uploads as scenes
 from arena.web.jobs import actions as job_actions
-from arena.web.jobs import analyses, displacement, driving, labelling, scenario_files, transcripts
-from arena.web.jobs import launching as new_job
+from arena.web.jobs import analyses, displacement, scenario_files, transcripts
 from arena.web.jobs import pages as jobs
 from arena.web.people import accounts as people
 from arena.web.people import api_tokens, authorships, enrolments, invitations

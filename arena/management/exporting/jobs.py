@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from arena.exports.formats import format_named
-from arena.exports.jobs import analyses, displacement_writers, driving_writers, faults, tool_calls
+from arena.exports.jobs import analyses, displacement_writers, tool_calls
 from arena.exports.jobs.augmentations import (
     AUGMENTATION_FORMATS,
     REPEAT_FORMATS,
@@ -15,9 +15,10 @@ from arena.exports.jobs.augmentations import (
 )
 from arena.exports.jobs.displacement_objects import BY_OBJECT, OBJECT_FORMATS, object_rows
 from arena.exports.jobs.displacement_table import displacement_table
-from arena.exports.jobs.driving_table import DrivingTable
-from arena.exports.jobs.transcripts import TRANSCRIPT_FORMATS
 from arena.exports.samples import SHEET_FORMATS, sheet_bytes, sheet_of
+from arena.jobs.exports import driving, faults
+from arena.jobs.exports.driving import DrivingTable
+from arena.jobs.exports.files import TRANSCRIPT_FORMATS
 from arena.management.exporting.kinds import (
     Chosen,
     ExportedFile,
@@ -136,12 +137,12 @@ def _add_driving(kinds: Any) -> None:
     kind.add_argument(
         "--with-paper", action="store_true", help="add the paper's rows below a rule"
     )
-    add_format(kind, driving_writers.FORMATS)
+    add_format(kind, driving.FORMATS)
 
 
 def write_driving(options: Chosen, say: Say) -> ExportedFile:
     """Mean scores of the drives that were made just so."""
-    chosen = format_named(driving_writers.FORMATS, options["format"])
+    chosen = format_named(driving.FORMATS, options["format"])
     job = find_job(options["job"])
     if options["score"] not in SCORES:
         raise UnknownName("score", options["score"], list(SCORES))

@@ -13,11 +13,11 @@ from django.views.decorators.http import require_safe
 
 from arena.exports.formats import format_named
 from arena.exports.jobs.tool_calls import FORMATS as TOOL_CALL_FORMATS
+from arena.jobs.pages.driving import section as driving_section
 from arena.queries.job_grid import MARKS, VIEWS, Part, grid_part
 from arena.queries.listings import MINE, Narrowing, find_jobs
 from arena.web.access import STAFF, allow_only
 from arena.web.jobs.displacement import section
-from arena.web.jobs.driving import section as driving_section
 from arena.web.jobs.scenario_files import rows_of
 from arena.web.listing import (
     choice_asked,

@@ -12,12 +12,14 @@ from django.db import IntegrityError, transaction
 from django.utils import timezone
 
 from arena.errors import AlreadyLabelled, LabellingClosed, NothingToPlan, NotYours
-from arena.models import FaultLabel, LabellingRound, LabelTask
+from arena.models import FaultLabel, LabellingRound, LabelTask, ScenarioFile
 from arena.queries.people import experts as expert_accounts
+from arena.services.written_files import waiting_row
 from augment.errors import Conflict, UnknownName
 from augment.models import Augmentation, GenerationJob
 from augment.services.events import log_event
 from augment.services.judging.fault_guess import FaultClass, guess_faults
+from augment.services.judging.scenario_export import FORMATS
 from augment.services.texts import make_storable, one_line
 
 NOTE_LENGTH = 2000
@@ -180,3 +182,33 @@ def _save(
             for fault in FaultClass
         },
     )
+
+
+@transaction.atomic
+def ask_for_file(
+    *, job: GenerationJob, file_format: str, actor: User | None = None
+) -> ScenarioFile:
+    """A row for a worker to write; one that waits already is asked for once more.
+
+    Raises:
+        UnknownName: No such format.
+    """
+    if file_format not in FORMATS:
+        raise UnknownName("format", file_format, list(FORMATS))
+    row = ScenarioFile(job=job, format=file_format, asked_by=actor)
+    if (waiting := waiting_row(row)) is not None:
+        return waiting
+    row.save()
+    log_event(
+        actor=actor,
+        verb="ask for scenarios",
+        object_kind="job",
+        object_code=job.code,
+        after={"format": file_format, "file": str(row.code)},
+    )
+    return row
+
+
+def files_of(job: GenerationJob) -> dict[str, ScenarioFile]:
+    """The newest row of each format."""
+    return {row.format: row for row in ScenarioFile.objects.filter(job=job).order_by("pk")}

@@ -15,9 +15,8 @@ from django.utils.text import slugify
 from django.views.decorators.http import require_POST, require_safe
 
 from arena.exports.formats import format_named
-from arena.exports.jobs.driving_table import DrivingTable
-from arena.exports.jobs.driving_writers import FORMATS
 from arena.exports.tables import LeaderboardTable
+from arena.jobs.exports.driving import FORMATS, DrivingTable
 from arena.models import Snapshot
 from arena.queries.costs import shown_augmentations
 from arena.queries.driving import DRIVES, before_of, cells_of

@@ -1,33 +1,86 @@
-"""Labelling faults: the page of an expert, which tells nothing of who made what, and of a job."""
+"""What an admin is asked before a labelling opens or closes."""
 
 from __future__ import annotations
 
 import uuid
+from collections.abc import Sequence
 from typing import cast
 
 from django.contrib import messages
 from django.contrib.auth.models import User
+from django.db import transaction
 from django.http import Http404, HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, redirect, render
+from django.urls import reverse
 from django.utils.text import slugify
 from django.views.decorators.cache import never_cache
 from django.views.decorators.http import require_http_methods, require_safe
 
 from arena.errors import AlreadyLabelled, ArenaError, LabellingClosed, NotYours
 from arena.exports.formats import format_named
-from arena.exports.jobs.faults import FORMATS, fault_table
+from arena.jobs.exports.faults import FORMATS, fault_table
+from arena.jobs.services import close_labelling, open_labelling, save_label
 from arena.models import FaultLabel, LabellingRound
 from arena.queries import faults
+from arena.queries.faults import of_job
 from arena.queries.people import by_pseudonym, experts, role_of
 from arena.queries.voting.showings import original_beside
-from arena.services.faults import close_labelling, open_labelling, save_label
 from arena.web.access import ADMIN, EXPERT, STAFF, allow_only
 from arena.web.forms import LabelForm, LabellingForm
-from arena.web.jobs.labelling_questions import closing, opening
-from arena.web.questions import ask, is_sure, wants_to_change
+from arena.web.questions import Confirmation, ask, is_sure, wants_to_change
 from augment.errors import AugmentError, UnknownName
 from augment.models import GenerationJob
 from augment.services.judging.fault_guess import FaultClass
+
+
+def opening(job: GenerationJob, *, name: str, experts: Sequence[str], seed: int) -> Confirmation:
+    """Counted by opening it and taking that back at once.
+
+    Raises:
+        ArenaError, AugmentError: It can't be opened.
+    """
+    with transaction.atomic():
+        labelling = open_labelling(job=job, name=name, experts=experts, seed=seed)
+        tasks = labelling.tasks.count()
+        pictures = labelling.tasks.values("augmentation").distinct().count()
+        transaction.set_rollback(True)
+    facts = (
+        f"Pictures: {pictures}. Experts: {len(experts)}. Labels planned: {tasks}.",
+        "Experts see it at once; who labels, and in which order, can’t be changed afterwards.",
+    )
+    return Confirmation(
+        title=f"Open the labelling “{name}”?",
+        facts=facts,
+        button="Open the labelling",
+        back=reverse("faults", args=[job.code]),
+        is_final=False,
+        crumbs=_crumbs(job),
+    )
+
+
+def closing(labelling: LabellingRound) -> Confirmation:
+    """What is there, and what will never come."""
+    line = next(one for one in of_job(labelling.job) if one.labelling.pk == labelling.pk)
+    facts = (
+        f"Labels saved, which stay: {line.labelled}.",
+        f"Planned labels that will be missing: {line.left}.",
+        "It takes no more labels. This can’t be taken back.",
+    )
+    return Confirmation(
+        title=f"Close the labelling “{labelling.name}”?",
+        facts=facts,
+        button="Close the labelling",
+        back=reverse("faults", args=[labelling.job.code]),
+        crumbs=_crumbs(labelling.job),
+    )
+
+
+def _crumbs(job: GenerationJob) -> tuple[tuple[str, str], ...]:
+    return (
+        ("Jobs", reverse("jobs")),
+        (job.name, reverse("job", args=[job.code])),
+        ("Fault labels", reverse("faults", args=[job.code])),
+    )
 
 
 @allow_only(EXPERT)
