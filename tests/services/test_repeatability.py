@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import pytest
 
-from arena.queries.jobs import grid
+from arena.jobs.queries import grid
 from augment.errors import UnknownName
 from augment.models import Augmentation, GenerationJob
 from augment.scene.codec import modification_to_document

@@ -17,10 +17,9 @@ from django.views.decorators.http import require_POST, require_safe
 from arena.exports.formats import format_named
 from arena.exports.tables import LeaderboardTable
 from arena.jobs.exports.driving import FORMATS, DrivingTable
+from arena.jobs.queries import DRIVES, Part, before_of, shown_augmentations
+from arena.jobs.queries import drive_cells as cells_of
 from arena.models import Snapshot
-from arena.queries.costs import shown_augmentations
-from arena.queries.driving import DRIVES, before_of, cells_of
-from arena.queries.job_grid import Part
 from arena.web.access import ADMIN, STAFF, allow_only
 from arena.web.listing import choice_asked, page_asked
 from augment.errors import AugmentError, QueueFault, UnknownName

@@ -16,10 +16,10 @@ from django.http import HttpRequest, HttpResponse
 from django.shortcuts import redirect, render
 from django.views.decorators.http import require_http_methods
 
+from arena.jobs.pages.jobs import send_rows
 from arena.scenarios import queries
 from arena.web.access import ADMIN, allow_only
 from arena.web.forms import CapsForm, ChoiceForm, Offer
-from arena.web.jobs.actions import send_rows
 from augment.errors import AugmentError
 from augment.models import Contestant, EndpointModel, GenerationJob
 from augment.services.endpoints.entering import PROTOCOLS, REASONING_EFFORTS
