@@ -15,7 +15,8 @@ from drf_spectacular.utils import extend_schema
 from rest_framework.request import Request
 from rest_framework.response import Response
 
-from arena.api.views import STAFF, ApiView
+from arena.api.access import STAFF
+from arena.api.views import ApiView
 from arena.queries.people import role_of
 
 

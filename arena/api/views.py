@@ -10,7 +10,7 @@ from urllib.parse import urlencode
 from django.contrib.auth.models import User
 from django.db import transaction
 from django.db.models import Model, QuerySet
-from django.http import HttpResponse
+from django.http import Http404, HttpResponse
 from django.http.response import HttpResponseBase
 from django.views.decorators.cache import never_cache
 from django.views.decorators.http import conditional_page
@@ -19,58 +19,18 @@ from drf_spectacular.openapi import AutoSchema
 from drf_spectacular.types import OpenApiTypes
 from drf_spectacular.utils import OpenApiParameter, extend_schema, inline_serializer
 from rest_framework import serializers
-from rest_framework.authentication import BaseAuthentication
 from rest_framework.exceptions import ValidationError
 from rest_framework.parsers import BaseParser
-from rest_framework.permissions import SAFE_METHODS, BasePermission
+from rest_framework.permissions import SAFE_METHODS
 from rest_framework.request import Request
 from rest_framework.response import Response
 from rest_framework.views import APIView
 
+from arena.api.access import RoleAllowed
 from arena.api.errors import error_response
 from arena.api.fields import SoundJSONParser, StrictSerializer
-from arena.errors import TokenOver
-from arena.models import ApiToken
-from arena.queries.people import role_of
-from arena.services.api_tokens import use_api_token
-from augment.errors import QueueFault
-
-SCHEME = "bearer"
-ADMINS = ("admin",)
-STAFF = ("admin", "analyst")
-EXPERTS = ("expert",)
-
-
-class BearerToken(BaseAuthentication):
-    """`Authorization: Bearer arena_...`; without that header the session decides."""
-
-    def authenticate(self, request: Request) -> tuple[User, ApiToken] | None:
-        """Return the owner, with the token's role, and the token.
-
-        Raises:
-            TokenOver: The token is unknown, expired or revoked.
-            TooManyRequests: It was used too often.
-        """
-        scheme, _, secret = request.headers.get("Authorization", "").partition(" ")
-        if scheme.lower() != SCHEME:
-            return None
-        if not secret.strip():
-            raise TokenOver("No token follows the word Bearer.")
-        return use_api_token(secret.strip())
-
-    def authenticate_header(self, request: Request) -> str:
-        """Return the `WWW-Authenticate` header of a 401."""
-        return "Bearer"
-
-
-class RoleAllowed(BasePermission):
-    """Admit the roles in a view's `readers` and `writers`; both where a method does not exist."""
-
-    def has_permission(self, request: Request, view: Any) -> bool:
-        """Return whether the account has one of the roles."""
-        allowed = view.readers if request.method in SAFE_METHODS else view.writers
-        return role_of(request.user) in (allowed or (*view.readers, *view.writers))
-
+from arena.exports.formats import Format, format_named
+from augment.errors import QueueFault, UnknownName
 
 Row = TypeVar("Row", bound=Model)
 
@@ -194,7 +154,7 @@ ERRORS_OF_CHANGES = ERRORS | {
 class BearerScheme(OpenApiAuthenticationExtension):  # type: ignore[no-untyped-call]
     """How the document describes tokens."""
 
-    target_class = "arena.api.views.BearerToken"
+    target_class = "arena.api.access.BearerToken"
     name = "token"
 
     def get_security_definition(self, auto_schema: AutoSchema) -> dict[str, Any]:
@@ -392,3 +352,11 @@ def answer_page(
         kept = request.query_params.dict() | {"after": str(shown[-1].code)}  # type: ignore[attr-defined]
         body["next"] = f"{request.path}?{urlencode(kept)}"
     return Response(body)
+
+
+def written_as(formats: Mapping[str, Format[Any]], form: str) -> Format[Any]:
+    """Return the format of that name, or raise 404."""
+    try:
+        return format_named(formats, form)
+    except UnknownName as error:
+        raise Http404 from error

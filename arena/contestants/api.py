@@ -14,10 +14,9 @@ from rest_framework import serializers
 from rest_framework.request import Request
 from rest_framework.response import Response
 
+from arena.api.access import ADMINS, STAFF
 from arena.api.fields import FlagField, StrictSerializer, TextField, WholeNumberField
 from arena.api.views import (
-    ADMINS,
-    STAFF,
     ApiView,
     PageQuery,
     WarnedDocument,

@@ -8,15 +8,34 @@ from dataclasses import fields
 from functools import partial
 from typing import Any
 
+from django.http import Http404
+from django.http.response import HttpResponseBase
 from django.shortcuts import get_object_or_404
+from django.utils.text import slugify
 from drf_spectacular.utils import extend_schema_field
 from rest_framework import serializers
 from rest_framework.request import Request
 
 from arena import tasks
+from arena.api.access import STAFF
 from arena.api.fields import FlagField, StrictSerializer, TextField, WholeNumberField
-from arena.api.views import STAFF, ApiView, keep_and_send, operation
+from arena.api.views import (
+    ApiView,
+    FileView,
+    as_file,
+    file_operation,
+    keep_and_send,
+    operation,
+    written_as,
+)
+from arena.errors import NoSnapshot
+from arena.exports.bundle import bundle
+from arena.exports.charts.rating import CONTENT_TYPES, chart_bytes
+from arena.exports.formats import Format
 from arena.exports.tables import LeaderboardTable, leaderboard_table
+from arena.exports.votes import VOTE_FORMATS, vote_table
+from arena.exports.writers import FORMATS as LEADERBOARD
+from arena.exports.zips import CONTENT_TYPE as ZIP_TYPE
 from arena.models import Snapshot, Study
 from arena.models.ratings import STORED
 from arena.pairing.order import MAIN, REPEAT
@@ -27,6 +46,7 @@ from arena.rating.leaderboard import Intervals, Line, Method
 from arena.services.ratings import DEFAULT_ROUNDS, MOST_ROUNDS, is_big, plan_snapshot, rate
 from arena.services.study_plan import HIGHEST_SEED
 from arena.studies.api import get_study
+from augment.errors import UnknownName
 from augment.services.scenarios.types import type_choices
 
 _FIELDS: dict[str, Callable[[], serializers.Field[Any, Any, Any, Any]]] = {
@@ -175,6 +195,48 @@ def get_snapshot(view: ApiView, code: uuid.UUID) -> Snapshot:
     return snapshot
 
 
+CHARTS = ("pairs", "types")
+
+
+class SnapshotExportView(FileView):
+    """A rating as a file."""
+
+    readers = STAFF
+
+    @file_operation(
+        "A rating as a file",
+        types=[
+            *(one.content_type for one in LEADERBOARD.values()),
+            *(one.content_type for one in VOTE_FORMATS.values()),
+            *CONTENT_TYPES.values(),
+            ZIP_TYPE,
+        ],
+        name="exportSnapshot",
+        words={
+            "name": ["leaderboard", "votes", "all", *CHARTS],
+            "form": [*LEADERBOARD, *VOTE_FORMATS, *CONTENT_TYPES, "zip"],
+        },
+    )
+    def get(self, request: Request, code: uuid.UUID, name: str, form: str) -> HttpResponseBase:
+        """Its table, votes, a chart, or all of them in a zip."""
+        snapshot = get_snapshot(self, code)
+        if snapshot.state != Snapshot.State.READY:
+            raise NoSnapshot("This rating is not ready.")
+        study = slugify(snapshot.study.name) or "study"
+        if name == "all":
+            if form != "zip":
+                raise Http404
+            return as_file(bundle(snapshot), ZIP_TYPE, f"{study}-rating.zip")
+        if name == "leaderboard":
+            chosen: Format[Any] = written_as(LEADERBOARD, form)
+            table: Any = leaderboard_table(snapshot)
+        elif name == "votes":
+            chosen, table = written_as(VOTE_FORMATS, form), vote_table(snapshot)
+        else:
+            return _chart(snapshot, name, form, f"{study}-{name}.{form}")
+        return as_file(chosen.write(table), chosen.content_type, f"{study}-{name}.{chosen.suffix}")
+
+
 # --- Private -----------------------------------------------------------------------------------
 
 
@@ -195,3 +257,11 @@ def _wanted(given: dict[str, Any]) -> dict[str, Any]:
         leave_out_own=given.pop("leave_out_own"),
     )
     return given | {"filters": filters}
+
+
+def _chart(snapshot: Snapshot, name: str, form: str, file_name: str) -> HttpResponseBase:
+    try:
+        content = chart_bytes(snapshot, name=name, file_format=form)
+    except UnknownName as error:
+        raise Http404 from error
+    return as_file(content, CONTENT_TYPES[form], file_name)

@@ -14,9 +14,9 @@ from rest_framework.parsers import MultiPartParser
 from rest_framework.request import Request
 from rest_framework.response import Response
 
+from arena.api.access import STAFF
 from arena.api.fields import FlagField, StrictSerializer, TextField, WholeNumberField
 from arena.api.views import (
-    STAFF,
     ApiView,
     PageQuery,
     WarnedDocument,

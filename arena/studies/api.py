@@ -10,17 +10,9 @@ from rest_framework import serializers
 from rest_framework.request import Request
 from rest_framework.response import Response
 
+from arena.api.access import ADMINS, EXPERTS, STAFF
 from arena.api.fields import Field, StrictSerializer, body_field
-from arena.api.views import (
-    ADMINS,
-    EXPERTS,
-    STAFF,
-    ApiView,
-    PageQuery,
-    answer_page,
-    operation,
-    page_of,
-)
+from arena.api.views import ApiView, PageQuery, answer_page, operation, page_of
 from arena.models import Study
 from arena.queries.people import role_of
 from arena.queries.studies.progress import StudyProgress, of_these, studies_seen_by

@@ -13,6 +13,7 @@ from rest_framework.permissions import IsAuthenticated
 from rest_framework.request import Request
 from rest_framework.response import Response
 
+from arena.api.access import ADMINS, EXPERTS
 from arena.api.fields import (
     CodeField,
     FlagField,
@@ -21,7 +22,7 @@ from arena.api.fields import (
     TextField,
     WholeNumberField,
 )
-from arena.api.views import ADMINS, EXPERTS, ApiView, FileView, file_operation, operation
+from arena.api.views import ApiView, FileView, file_operation, operation
 from arena.errors import StudyNotOpen
 from arena.models import AIDS, OUTCOME_LETTERS, Matchup, Report, Study, Vote
 from arena.queries.studies.lists import voting_study

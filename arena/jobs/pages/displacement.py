@@ -10,13 +10,8 @@ from django.utils.text import slugify
 from django.views.decorators.http import require_safe
 
 from arena.exports.formats import format_named
-from arena.jobs.exports.displacement import (
-    BY_OBJECT,
-    FORMATS,
-    OBJECT_FORMATS,
-    displacement_table,
-    object_rows,
-)
+from arena.jobs.exports.displacement import displacement_table
+from arena.jobs.exports.displacement_files import BY_OBJECT, FORMATS, OBJECT_FORMATS, object_rows
 from arena.web.access import STAFF, allow_only
 from augment.errors import UnknownName
 from augment.models import GenerationJob
