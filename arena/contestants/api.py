@@ -27,11 +27,11 @@ from arena.api.views import (
 )
 from arena.contestants.queries import probe_lines
 from augment.models import Contestant, Endpoint, EndpointModel, Probe
-from augment.services.endpoints import editing
-from augment.services.endpoints.editing import EndpointFacts
-from augment.services.endpoints.entering import VARIANTS, EnteredEndpoint, enter_contestant
+from augment.services.endpoints import known_endpoints
+from augment.services.endpoints.contestants import VARIANTS, EnteredEndpoint, enter_contestant
+from augment.services.endpoints.known_endpoints import EndpointFacts
 from augment.services.endpoints.probing import plan_probe
-from augment.services.running.transcript_export import contestant_documents
+from augment.services.running.transcript_records import contestant_documents
 from augment.tasks import enqueue_probe
 
 KINDS = [kind.value for kind in Contestant.Kind if kind is not Contestant.Kind.CHECK]
@@ -144,14 +144,14 @@ class EndpointBody(StrictSerializer):
     base_url = TextField(max_length=200)
     key_variable = TextField(max_length=80, required=False, default="", allow_blank=True)
     max_concurrency = WholeNumberField(
-        required=False, default=4, min_value=1, max_value=editing.HIGHEST_CONCURRENCY
+        required=False, default=4, min_value=1, max_value=known_endpoints.HIGHEST_CONCURRENCY
     )
     requests_per_minute = WholeNumberField(
         required=False,
         default=None,
         allow_null=True,
         min_value=1,
-        max_value=editing.HIGHEST_PER_MINUTE,
+        max_value=known_endpoints.HIGHEST_PER_MINUTE,
     )
 
 
@@ -224,7 +224,7 @@ class EndpointsView(ApiView):
     )
     def post(self, request: Request, given: dict[str, Any]) -> Endpoint:
         """409 where the label is taken."""
-        return editing.add_endpoint(
+        return known_endpoints.add_endpoint(
             label=given.pop("label"),
             is_simulated=given.pop("is_simulated"),
             facts=EndpointFacts(**given),
@@ -247,7 +247,7 @@ class ModelsView(ApiView):
     def post(self, request: Request, code: uuid.UUID, given: dict[str, Any]) -> EndpointModel:
         """Comes with its listed price; all else is unknown before a probe."""
         row = get_object_or_404(Endpoint, code=code)
-        return editing.add_model(row, model=given["model"], actor=self.user)
+        return known_endpoints.add_model(row, model=given["model"], actor=self.user)
 
 
 class ProbeView(ApiView):

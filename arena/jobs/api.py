@@ -40,11 +40,15 @@ from augment.models import GenerationJob
 from augment.services.judging.displacement import By
 from augment.services.judging.driving_scores import options_driven, scores_of_job
 from augment.services.judging.simulations import SCORES, Options
-from augment.services.running import caps, jobs
-from augment.services.running.caps import Caps
+from augment.services.running import budget, jobs
+from augment.services.running.budget import Caps
 from augment.services.running.estimates import estimate
-from augment.services.running.summary import JobCounts, count_each, count_rows
-from augment.services.running.tool_calls import tool_calls_by_augmentation
+from augment.services.running.progress import (
+    JobCounts,
+    count_each,
+    count_rows,
+    tool_calls_by_augmentation,
+)
 from augment.services.running.workers import workforce
 from augment.tasks import enqueue_job
 
@@ -132,10 +136,10 @@ class JobBody(EstimateBody):
     name = TextField(max_length=120)
     cap_usd = serializers.DecimalField(16, 9, required=False, default=None)
     cap_calls = WholeNumberField(
-        required=False, default=None, min_value=1, max_value=caps.HIGHEST_CALLS
+        required=False, default=None, min_value=1, max_value=budget.HIGHEST_CALLS
     )
     cap_tokens = WholeNumberField(
-        required=False, default=None, min_value=1, max_value=caps.HIGHEST_TOKENS
+        required=False, default=None, min_value=1, max_value=budget.HIGHEST_TOKENS
     )
 
 

@@ -25,10 +25,10 @@ from augment.models import (
     Scenario,
     Simulation,
 )
-from augment.services.endpoints.spending import CONTESTANT, Spending, sum_spending
+from augment.services.endpoints.known_models import CONTESTANT, Spending, sum_spending
 from augment.services.judging.analyses import JobAnalysis, analyse_job
 from augment.services.judging.simulations import Options
-from augment.services.running.summary import cells_of
+from augment.services.running.progress import cells_of
 
 State = Augmentation.State
 

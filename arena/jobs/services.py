@@ -18,7 +18,7 @@ from arena.services.written_files import waiting_row
 from augment.errors import Conflict, UnknownName
 from augment.models import Augmentation, GenerationJob
 from augment.services.events import log_event
-from augment.services.judging.fault_guess import FaultClass, guess_faults
+from augment.services.judging.findings import FaultClass, guess_faults
 from augment.services.judging.scenario_export import FORMATS
 from augment.services.texts import make_storable, one_line
 

@@ -47,7 +47,7 @@ from arena.services.ratings import DEFAULT_ROUNDS, MOST_ROUNDS, is_big, plan_sna
 from arena.services.study_plan import HIGHEST_SEED
 from arena.studies.api import get_study
 from augment.errors import UnknownName
-from augment.services.scenarios.types import type_choices
+from augment.services.scenarios.scenes import type_choices
 
 _FIELDS: dict[str, Callable[[], serializers.Field[Any, Any, Any, Any]]] = {
     "str": serializers.CharField,

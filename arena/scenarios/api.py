@@ -29,14 +29,16 @@ from arena.scenarios.queries import OWN
 from arena.services.sent_files import was_too_large
 from augment.models import Scenario, SceneUpload, UploadMoment
 from augment.models.scenes import DENSITIES, GOALS
-from augment.services.scenarios import upload_moments, uploads
+from augment.services.scenarios import uploads
+from augment.services.scenarios import uploads as upload_moments
 from augment.services.scenarios.scenes import (
     INSTRUCTION_LENGTH,
+    LONGEST_LABEL,
+    LONGEST_TYPE,
     SLUG_LENGTH,
     add_scenario,
     read_circumstances,
 )
-from augment.services.scenarios.types import LONGEST_LABEL, LONGEST_TYPE
 from augment.tasks import enqueue_moment, enqueue_scenario, enqueue_upload
 
 

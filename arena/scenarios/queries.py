@@ -11,7 +11,7 @@ from typing import Any
 from django.db.models import Count, QuerySet
 
 from augment.models import Augmentation, BaseScene, Contestant, Scenario, SceneUpload
-from augment.services.scenarios.types import type_choices
+from augment.services.scenarios.scenes import type_choices
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

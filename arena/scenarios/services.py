@@ -12,8 +12,8 @@ from arena.models import LabelTask, Study
 from augment.errors import AugmentError, Conflict
 from augment.models import BaseScene, Scenario
 from augment.services.events import log_event
-from augment.services.scenarios import references
-from augment.services.scenarios.redrawing import redraw
+from augment.services.scenarios import editing
+from augment.services.scenarios.pictures import redraw
 from augment.services.scenarios.scenes import (
     Circumstances,
     change_circumstances,
@@ -83,7 +83,7 @@ def set_reference(scenario: Scenario, document: object, *, actor: User | None = 
             changes.
     """
     _hold_unjudged(scenario)
-    return references.set_reference(scenario, document, actor=actor)
+    return editing.set_reference(scenario, document, actor=actor)
 
 
 @transaction.atomic
@@ -94,13 +94,13 @@ def drop_reference(scenario: Scenario, *, actor: User | None = None) -> Scenario
         Conflict: As above, or it has none.
     """
     _hold_unjudged(scenario)
-    return references.drop_reference(scenario, actor=actor)
+    return editing.drop_reference(scenario, actor=actor)
 
 
 def why_not_editable(scenario: Scenario) -> str:
     """Why the reference of a scenario can't be changed now, empty where it can."""
     try:
-        references.refuse_catalogue(scenario)
+        editing.refuse_catalogue(scenario)
         _refuse_judged(scenario)
     except Conflict as conflict:
         return conflict.args[0]  # type: ignore[no-any-return]

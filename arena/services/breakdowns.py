@@ -26,7 +26,7 @@ from arena.rating.snapshot_document import (
 )
 from arena.services.vote_arrays import VoteArrays
 from augment.services.judging.displacement import of_rows, summarise
-from augment.services.scenarios.types import in_type_order, type_label
+from augment.services.scenarios.scenes import in_type_order, type_label
 
 FEW_VOTES = 30
 """Below so many votes of a contestant a part of the table says that they are too few."""

@@ -21,8 +21,7 @@ from arena.services.reports import Complaint, check_complaint
 from arena.services.studies import check_seed
 from augment.errors import AugmentError
 from augment.services import row_rules
-from augment.services.stored_names import check_picture_name
-from augment.services.texts import one_line
+from augment.services.texts import check_picture_name, one_line
 
 REFUSALS = (AugmentError, ArenaError, ValidationError, ValueError, KeyError, TypeError)
 """What a rule raises."""

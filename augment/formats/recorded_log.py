@@ -15,8 +15,7 @@ import numpy as np
 from augment.errors import InvalidDocument
 from augment.formats.reading import Moment, Reading, frame_in
 from augment.formats.road_map import FURTHEST_M, FloatArray, MapExtract, RoadMap
-from augment.formats.roads import road_around
-from augment.formats.strips import RADIUS_M
+from augment.formats.roads import RADIUS_M, road_around
 from augment.geometry.angles import wrap
 from augment.geometry.frames import Pose
 from augment.scene.entities import AgentType, Origin, Scene, TrafficAgent

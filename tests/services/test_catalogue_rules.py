@@ -17,7 +17,7 @@ from augment.scene.entities import AgentType, Scene, TrafficAgent
 from augment.scene.intent import Intent, Side
 from augment.scene.intent_words import Setting
 from augment.scene.modification import Modification
-from augment.services.scenarios.catalogue_rules import (
+from augment.services.scenarios.catalogue_check import (
     StagedScenario,
     find_apart,
     find_sparse,

@@ -16,7 +16,7 @@ from arena.jobs.queries import labelling_of, next_task
 from arena.jobs.services import close_labelling, open_labelling, save_label
 from arena.models import FaultLabel, LabellingRound, LabelTask
 from augment.models import Event, GenerationJob
-from augment.services.judging.fault_guess import FaultClass
+from augment.services.judging.findings import FaultClass
 from tests.exports.test_displacement import a_job
 from tests.study_rows import expert
 

@@ -13,7 +13,7 @@ from augment.models import Augmentation, Scenario
 from augment.scene.codec import modification_to_document
 from augment.scene.modification import Modification
 from augment.services.running import runner
-from augment.services.scenarios.scene_pictures import draw_scenario, draw_scene
+from augment.services.scenarios.pictures import draw_scenario, draw_scene
 from tests.jobs.rows import add_scenario, launch
 from tests.scenes import scene, vehicle
 from tests.web.cast import people, signed_in

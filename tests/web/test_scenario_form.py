@@ -14,7 +14,7 @@ from augment.models import BaseScene, GenerationJob, Scenario
 from augment.scene.codec import modification_to_document
 from augment.scene.modification import Modification
 from augment.services.running.choosing import resolve_scenarios
-from augment.services.scenarios.scene_pictures import draw_scenario, draw_scene
+from augment.services.scenarios.pictures import draw_scenario, draw_scene
 from tests.jobs.rows import add_scenario
 from tests.scenes import cone
 from tests.study_rows import a_study

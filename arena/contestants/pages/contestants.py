@@ -21,7 +21,7 @@ from arena.web.access import ADMIN, STAFF, allow_only
 from arena.web.listing import read_listing, read_page, said_choices
 from augment.errors import AugmentError
 from augment.models import Augmentation, Contestant, Endpoint, GenerationJob
-from augment.services.endpoints.entering import (
+from augment.services.endpoints.contestants import (
     OPTION_NAMES,
     PROTOCOLS,
     REASONING_EFFORTS,
@@ -29,8 +29,8 @@ from augment.services.endpoints.entering import (
     EnteredEndpoint,
     enter_contestant,
 )
-from augment.services.endpoints.respondents import respondents_of
-from augment.services.retirement import retire, take_back
+from augment.services.endpoints.treatments import respondents_of
+from augment.services.events import retire, take_back
 
 CONTESTANTS_AT_ONCE = 50
 

@@ -22,10 +22,15 @@ from arena.queries.people import role_of
 from arena.web.access import ADMIN, STAFF, allow_only
 from augment.errors import AugmentError, InvalidDocument, QueueFault
 from augment.models import Endpoint, EndpointModel, Probe
-from augment.services.endpoints import editing
-from augment.services.endpoints.editing import FACTS, EndpointFacts, ModelFacts
-from augment.services.endpoints.entering import REASONING_EFFORTS
-from augment.services.endpoints.keys import is_key_here, list_key_variables
+from augment.services.endpoints import known_endpoints
+from augment.services.endpoints.contestants import REASONING_EFFORTS
+from augment.services.endpoints.known_endpoints import (
+    FACTS,
+    EndpointFacts,
+    ModelFacts,
+    is_key_here,
+    list_key_variables,
+)
 from augment.services.endpoints.probing import plan_probe
 from augment.services.running.workers import workforce
 from augment.tasks import enqueue_probe
@@ -163,7 +168,7 @@ def new_endpoint_page(request: HttpRequest) -> HttpResponse:
     form = EndpointPageForm(request.POST if request.method == "POST" else None)
     if request.method == "POST" and form.is_valid():
         try:
-            row = editing.add_endpoint(
+            row = known_endpoints.add_endpoint(
                 label=form.cleaned_data["label"],
                 facts=form.facts(),
                 is_simulated=form.cleaned_data["is_simulated"],
@@ -194,7 +199,7 @@ def add_model(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Note a model of an endpoint; its listed price comes with it."""
     endpoint = get_object_or_404(Endpoint, code=code)
     try:
-        row = editing.add_model(
+        row = known_endpoints.add_model(
             endpoint, model=request.POST.get("model", ""), actor=cast(User, request.user)
         )
     except AugmentError as error:
@@ -214,7 +219,9 @@ def model_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         form = ModelPageForm(request.POST, row=row)
         if form.is_valid():
             try:
-                editing.change_model(row, facts=form.facts(), actor=cast(User, request.user))
+                known_endpoints.change_model(
+                    row, facts=form.facts(), actor=cast(User, request.user)
+                )
             except AugmentError as error:
                 _tell(form, error)
             else:
@@ -255,7 +262,7 @@ def _change(request: HttpRequest, row: Endpoint) -> HttpResponse:
     form = EndpointPageForm(request.POST, row=row)
     if form.is_valid():
         try:
-            editing.change_endpoint(
+            known_endpoints.change_endpoint(
                 row,
                 facts=form.facts(),
                 may_move_key=form.cleaned_data["move_key"],

@@ -18,8 +18,7 @@ from arena.models import Matchup, Snapshot, Vote
 from arena.services.cells import csv_text
 from arena.services.preregistration import FILE_NAME, preregistration_bytes
 from augment.models import Augmentation, Contestant, GenerationJob, Scenario
-from augment.services.running.transcript_export import record_of
-from augment.services.running.transcript_steps import Try, tries_by_augmentation
+from augment.services.running.transcript_records import Try, record_of, tries_by_augmentation
 
 File = tuple[str, bytes]
 

@@ -20,7 +20,7 @@ from augment.services.judging.displacement import (
     groups,
     of_job,
 )
-from augment.services.scenarios.types import ScenarioType, in_type_order
+from augment.services.scenarios.scenes import ScenarioType, in_type_order
 
 SOURCE = "read from the paper's figure"
 

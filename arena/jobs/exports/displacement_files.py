@@ -15,8 +15,14 @@ from arena.exports.tables import shown_name
 from arena.jobs.exports.displacement import SOURCE, DisplacementTable, PublishedBox
 from arena.services.cells import cell, csv_text
 from augment.models import GenerationJob
-from augment.services.judging.displaced_objects import DisplacedObject, ObjectPosition, objects_of
-from augment.services.judging.displacement import BoxSummary, Group, Measured
+from augment.services.judging.displacement import (
+    BoxSummary,
+    DisplacedObject,
+    Group,
+    Measured,
+    ObjectPosition,
+    objects_of,
+)
 
 COLUMNS = (
     "group", "contestant", "slug", "model", "variant", "simulated", "augmentations", "n",

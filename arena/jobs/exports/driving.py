@@ -11,7 +11,7 @@ from arena.exports.tables import shown_name
 from arena.rating.printed import escape
 from arena.services.cells import csv_text
 from augment.services.judging.driving_scores import CLOSE_M, DrivingLine, DrivingScores
-from augment.services.scenarios.types import ScenarioType, in_type_order, type_choices
+from augment.services.scenarios.scenes import ScenarioType, in_type_order, type_choices
 
 SOURCE = "reported in the paper"
 REPORTED = (

@@ -17,7 +17,7 @@ from arena.models import FaultLabel
 from arena.rating.reliability import DifferenceMetric, cohens_kappa, krippendorff_alpha
 from arena.services.cells import csv_text
 from augment.models import Contestant, GenerationJob
-from augment.services.judging.fault_guess import FaultClass
+from augment.services.judging.findings import FaultClass
 
 COLUMNS = (
     "contestant", "slug", "simulated", "all", "position", "heading", "logic",

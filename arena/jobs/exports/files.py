@@ -21,9 +21,8 @@ from arena.models import ScenarioFile
 from arena.services.vote_rows import digest_of
 from augment.models import Augmentation, GenerationJob
 from augment.services.judging.scenario_export import Exported, export_job
-from augment.services.running.transcript_export import record_of
-from augment.services.running.transcript_steps import tries_by_augmentation
-from augment.services.running.transcripts import IMAGES
+from augment.services.running.calls import IMAGES
+from augment.services.running.transcript_records import record_of, tries_by_augmentation
 
 MANIFEST = "manifest.json"
 WARNING = "WARNING.txt"

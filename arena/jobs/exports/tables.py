@@ -13,10 +13,15 @@ from arena.exports.formats import Format, formats, round_value
 from arena.exports.parquet import NUMBER, TEXT, WHOLE, YES_NO, parquet_bytes
 from arena.services.cells import cell, csv_text
 from augment.models import GenerationJob
-from augment.services.judging.analyses import JobAnalysis
-from augment.services.judging.augmentation_rows import AugmentationLine, augmentation_lines
-from augment.services.judging.repeatability import RepeatLine, SampleSpread, repeatability
-from augment.services.running.tool_calls import ToolCallLine
+from augment.services.judging.analyses import (
+    AugmentationLine,
+    JobAnalysis,
+    RepeatLine,
+    SampleSpread,
+    augmentation_lines,
+    repeatability,
+)
+from augment.services.running.progress import ToolCallLine
 
 COLUMNS = {
     "job": TEXT, "scenario": TEXT, "type": TEXT, "contestant": TEXT, "name": TEXT, "model": TEXT,

@@ -25,14 +25,13 @@ from arena.web.listing import choice_asked, page_asked
 from augment.errors import AugmentError, QueueFault, UnknownName
 from augment.models import GenerationJob, Simulation
 from augment.services.judging import simulations
-from augment.services.judging.drive_files import FILES, drive_file
 from augment.services.judging.driving_scores import (
     least_clearance_m,
     options_driven,
     scores_of_augmentations,
     scores_of_job,
 )
-from augment.services.judging.simulations import NUPLAN, SCORES, Options
+from augment.services.judging.simulations import FILES, NUPLAN, SCORES, Options, drive_file
 from augment.tasks import enqueue_simulations
 
 LABELS = {"nuplan": "nuPlan", "interplan": "interPlan"}

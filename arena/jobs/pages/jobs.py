@@ -36,14 +36,17 @@ from arena.web.listing import (
 from arena.web.questions import Confirmation, ask, is_sure
 from augment.errors import AugmentError, QueueFault, UnknownName
 from augment.models import Augmentation, GenerationJob
-from augment.services.judging.repeatability import repeatability
+from augment.services.judging.analyses import repeatability
+from augment.services.running import jobs
 from augment.services.running import jobs as service
-from augment.services.running import pausing, retrying
-from augment.services.running.causes import SHOWN, failure_groups, rows_of_cause
-from augment.services.running.costs import costs_of
-from augment.services.running.pace import pace_of
-from augment.services.running.summary import count_each, count_rows
-from augment.services.running.tool_calls import (
+from augment.services.running.budget import costs_of
+from augment.services.running.progress import (
+    SHOWN,
+    count_each,
+    count_rows,
+    failure_groups,
+    pace_of,
+    rows_of_cause,
     tool_calls_by_augmentation,
     tool_calls_by_contestant,
 )
@@ -155,7 +158,7 @@ def retry_job(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     job = get_object_or_404(GenerationJob, code=code)
     try:
         with transaction.atomic():
-            retrying.retry_failed(job=job, actor=cast(User, request.user))
+            jobs.retry_failed(job=job, actor=cast(User, request.user))
             transaction.on_commit(partial(send_rows, request, job.pk))
     except AugmentError as error:
         messages.error(request, str(error))
@@ -189,7 +192,7 @@ def pause_job(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Start nothing new; what is in flight ends."""
     job = get_object_or_404(GenerationJob, code=code)
     try:
-        pausing.pause(job, actor=cast(User, request.user))
+        jobs.pause(job, actor=cast(User, request.user))
     except AugmentError as error:
         messages.error(request, str(error))
     else:
@@ -226,7 +229,7 @@ def resume_job(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         return redirect("job", code=code)
     try:
         with transaction.atomic():
-            pausing.resume(job, higher=form.caps(), actor=cast(User, request.user))
+            jobs.resume(job, higher=form.caps(), actor=cast(User, request.user))
             transaction.on_commit(partial(send_rows, request, job.pk))
     except AugmentError as error:
         messages.error(request, str(error))

@@ -30,7 +30,7 @@ from arena.web.forms import LabelForm, LabellingForm
 from arena.web.questions import Confirmation, ask, is_sure, wants_to_change
 from augment.errors import AugmentError, UnknownName
 from augment.models import GenerationJob
-from augment.services.judging.fault_guess import FaultClass
+from augment.services.judging.findings import FaultClass
 
 
 def opening(job: GenerationJob, *, name: str, experts: Sequence[str], seed: int) -> Confirmation:

@@ -34,7 +34,7 @@ from augment.services.judging.displacement import By, types_named
 from augment.services.judging.driving_scores import options_driven, scores_of_job
 from augment.services.judging.simulations import SCORES, Options
 from augment.services.running.choosing import find_job
-from augment.services.running.tool_calls import tool_calls_by_augmentation
+from augment.services.running.progress import tool_calls_by_augmentation
 
 
 def add_jobs(kinds: Any) -> None:

@@ -36,29 +36,28 @@ from augment.models import (
     UploadMoment,
 )
 from augment.services.endpoints.contestants import ensure_builtin
+from augment.services.events import retire, take_back
 from augment.services.judging.displacement import of_augmentation
 from augment.services.judging.findings import Checked, check_augmentation
-from augment.services.retirement import retire, take_back
+from augment.services.running.calls import IMAGES
 from augment.services.running.intent_readings import plan_reading
-from augment.services.running.transcript_export import transcript_of
-from augment.services.running.transcript_steps import totals_of, tries_of
-from augment.services.running.transcripts import IMAGES
+from augment.services.running.transcript_records import totals_of, transcript_of, tries_of
 from augment.services.scenarios.catalogue import load_own_catalogue
-from augment.services.scenarios.intents import (
+from augment.services.scenarios.editing import (
     accept_reading,
     enter_intent,
     last_reading,
     statements_of,
     waiting_reading,
 )
-from augment.services.scenarios.scene_notes import notes_of
-from augment.services.scenarios.scene_pictures import (
+from augment.services.scenarios.pictures import (
     SceneView,
     is_drawn,
     reference_picture,
     scene_picture,
 )
-from augment.services.scenarios.types import type_choices
+from augment.services.scenarios.scene_imports import notes_of
+from augment.services.scenarios.scenes import type_choices
 from augment.tasks import enqueue_marks, enqueue_reading, enqueue_scenario
 
 LOOKS = tuple(str(number) for number in range(6))

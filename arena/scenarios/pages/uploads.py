@@ -18,9 +18,10 @@ from arena.web.access import STAFF, allow_only
 from arena.web.sending import looks_again, send_later
 from augment.errors import AugmentError
 from augment.models import BaseScene, SceneUpload, UploadMoment
-from augment.services.scenarios import upload_moments, uploads
-from augment.services.scenarios.scene_notes import notes_of
-from augment.services.scenarios.scene_pictures import SceneView, is_drawn, scene_picture
+from augment.services.scenarios import uploads
+from augment.services.scenarios import uploads as upload_moments
+from augment.services.scenarios.pictures import SceneView, is_drawn, scene_picture
+from augment.services.scenarios.scene_imports import notes_of
 from augment.tasks import enqueue_moment, enqueue_scene, enqueue_upload
 
 

@@ -22,7 +22,7 @@ from arena.web.language import use_english
 from arena.web.people.sign_in import keep_language
 from arena.web.site.checklist import steps
 from augment.models import GenerationJob
-from augment.services.running.summary import count_each
+from augment.services.running.progress import count_each
 
 LATEST_JOBS = 5
 

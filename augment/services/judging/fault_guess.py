@@ -5,7 +5,7 @@ from __future__ import annotations
 from augment.errors import InvalidDocument, InvalidModification
 from augment.metrics.fault_guess import FaultClass, first_guess
 from augment.models import Augmentation
-from augment.services.judging.checks import findings_of
+from augment.services.judging.findings import findings_of
 
 __all__ = ["FaultClass", "guess_faults"]
 

@@ -20,8 +20,7 @@ from augment.scene.recording import Recording
 from augment.scene.recording_codec import recording_from_document
 from augment.services.judging.simulations import trace_document
 from augment.services.scenarios.interplan import refuse_changes
-from augment.services.scenarios.scenes import scene_of
-from augment.services.scenarios.types import type_of
+from augment.services.scenarios.scenes import scene_of, type_of
 
 FORMATS = tuple(WRITERS)
 RECORDED = "recorded"

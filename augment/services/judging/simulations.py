@@ -17,8 +17,7 @@ from augment.models import Augmentation, GenerationJob, Scenario, Simulation
 from augment.scene.codec import modification_from_document
 from augment.scene.modification import Modification
 from augment.scene.recording_codec import recording_from_document
-from augment.services.scenarios.scenes import reference_of, scene_of
-from augment.services.scenarios.types import type_of
+from augment.services.scenarios.scenes import reference_of, scene_of, type_of
 from augment.services.work import Lease, Settlement, WorkKind
 from augment.simulation.criticality import criticality
 from augment.simulation.drive import Drive, expert_of, run

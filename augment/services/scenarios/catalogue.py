@@ -24,7 +24,7 @@ from augment.scene.entities import Scene
 from augment.scene.intent_codec import intent_to_document
 from augment.scene.intent_words import IntentOrigin
 from augment.services.events import log_event
-from augment.services.scenarios.catalogue_files import folder_of, read_catalogue
+from augment.services.scenarios.catalogue import folder_of, read_catalogue
 from augment.services.scenarios.scenes import add_scenario, content_hash
 
 SOURCE = "authored"

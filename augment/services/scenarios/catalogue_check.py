@@ -28,9 +28,14 @@ from augment.scene.entities import Scene
 from augment.scene.intent_codec import intent_to_parts
 from augment.scene.intent_statements import list_statements
 from augment.scene.modification import without_traffic
-from augment.services.scenarios.catalogue_files import folder_of, read_catalogue
-from augment.services.scenarios.catalogue_rules import RULES, StagedScenario, find_sparse
-from augment.services.scenarios.way_past import WayPast, way_past
+from augment.services.scenarios.catalogue import folder_of, read_catalogue
+from augment.services.scenarios.catalogue_check import (
+    RULES,
+    StagedScenario,
+    WayPast,
+    find_sparse,
+    way_past,
+)
 
 MOST_ON_ONE_SCENE = 8
 

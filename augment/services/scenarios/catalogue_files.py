@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from augment.errors import InvalidDocument, InvalidModification
-from augment.formats.json_file import read_json
+from augment.formats.documents import read_json
 from augment.scene.catalogue import CatalogueSet
 from augment.scene.catalogue_codec import CatalogueEntry, entry_from_document
 from augment.scene.codec import scene_from_document

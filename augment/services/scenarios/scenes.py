@@ -30,7 +30,7 @@ from augment.scene.intent_words import IntentOrigin
 from augment.scene.lane_graph import LaneGraph
 from augment.scene.modification import Modification, apply, check_fits, without_traffic
 from augment.services.events import log_event
-from augment.services.scenarios.types import label_for, type_of
+from augment.services.scenarios.scenes import label_for, type_of
 from augment.services.texts import check_prose
 
 SLUG_LENGTH = 80
