@@ -45,6 +45,8 @@ from arena.rating.bootstrap import Unit
 from arena.rating.leaderboard import Intervals, Line, Method
 from arena.services.ratings import DEFAULT_ROUNDS, MOST_ROUNDS, is_big, plan_snapshot, rate
 from arena.services.study_plan import HIGHEST_SEED
+from arena.studies.api import get_study
+from augment.errors import UnknownName
 from augment.services.scenarios.scenes import type_choices
 
 _FIELDS: dict[str, Callable[[], serializers.Field[Any, Any, Any, Any]]] = {
