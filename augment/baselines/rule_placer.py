@@ -15,20 +15,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from augment.baselines.rule_placer_cones import cones
-from augment.baselines.rule_placer_crash import count_arrangements, crash
-from augment.baselines.rule_placer_ground import PlacingGround
-from augment.baselines.rule_placer_jury import Jury, number_agents
-from augment.baselines.rule_placer_vehicles import vehicle
-from augment.baselines.rule_placer_walkers import walkers
-from augment.baselines.rule_placer_words import describe, list_conventions, name_of
+from augment.baselines.placed_things import cones, count_arrangements, crash, vehicle, walkers
+from augment.baselines.placing_ground import PlacingGround
+from augment.baselines.rule_placer import Jury, describe, list_conventions, name_of, number_agents
 from augment.checks import Ground
-from augment.checks.landmarks import find_picked, list_absent, resolve_landmarks
-from augment.checks.lanes_across import LanesAcross
+from augment.checks.lanes_across import LanesAcross, find_picked, list_absent, resolve_landmarks
 from augment.errors import CannotPlace
-from augment.geometry.boxes import overlap
-from augment.scene.entities import AgentType, Scene, TrafficAgent, TurnType
+from augment.geometry.frames import overlap
+from augment.scene.entities import AgentType, Modification, Scene, TrafficAgent, TurnType, apply
 from augment.scene.intent import (
+    Body,
     ConesRequest,
     CrashRequest,
     Intent,
@@ -40,8 +36,6 @@ from augment.scene.intent import (
     WalkRequest,
     resolve_anchors,
 )
-from augment.scene.intent_words import Body
-from augment.scene.modification import Modification, apply
 
 _SHIFT_STEP_M = 0.25
 _SHIFT_EXACT_M = 0.5

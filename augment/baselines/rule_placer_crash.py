@@ -13,15 +13,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from augment.baselines.rule_placer_ground import PlacingGround
-from augment.baselines.rule_placer_vehicles import FACING_RAD, SIZES_M, build_vehicle
+from augment.baselines.placed_things import FACING_RAD, SIZES_M, build_vehicle
+from augment.baselines.placing_ground import PlacingGround
 from augment.errors import CannotPlace
-from augment.geometry.angles import wrap
-from augment.geometry.boxes import Box, overlap
-from augment.geometry.frames import Pose
+from augment.geometry.frames import Box, Pose, overlap, wrap
 from augment.scene.entities import Scene, TrafficAgent
-from augment.scene.intent import CrashedCar, CrashRequest
-from augment.scene.intent_words import Bearing, Body, Facing
+from augment.scene.intent import Bearing, Body, CrashedCar, CrashRequest, Facing
 
 _GAP_M = 0.05
 _MOST_SHARED = 0.1

@@ -13,8 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from augment.errors import CannotPlace
-from augment.geometry.angles import difference
-from augment.geometry.frames import Pose
+from augment.geometry.frames import Pose, difference
 from augment.scene.ego_route import EgoRoute
 from augment.scene.entities import (
     AgentType,
@@ -26,8 +25,7 @@ from augment.scene.entities import (
     TrafficAgent,
     TurnType,
 )
-from augment.scene.intent import LaneChoice, Side
-from augment.scene.intent_words import Setting
+from augment.scene.intent import LaneChoice, Setting, Side
 from augment.scene.lane_graph import AnyLane, LanePosition
 
 _STEP_M = 0.25

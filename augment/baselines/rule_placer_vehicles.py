@@ -6,15 +6,21 @@ import math
 
 import numpy as np
 
-from augment.baselines.rule_placer_ground import PlacingGround
+from augment.baselines.placing_ground import PlacingGround
 from augment.errors import CannotPlace
-from augment.geometry.angles import wrap
-from augment.geometry.frames import Pose
-from augment.scene.entities import AgentType, TrafficAgent
-from augment.scene.intent import LaneChoice, Lateral, Side, VehicleRequest
-from augment.scene.intent_words import Body, Facing, LateralTarget, Nearness
+from augment.geometry.frames import Pose, wrap
+from augment.scene.entities import LENGTH_WIDTH_M, AgentType, TrafficAgent
+from augment.scene.intent import (
+    Body,
+    Facing,
+    LaneChoice,
+    Lateral,
+    LateralTarget,
+    Nearness,
+    Side,
+    VehicleRequest,
+)
 from augment.scene.lane_graph import LanePosition
-from augment.scene.sizes import LENGTH_WIDTH_M
 
 SIZES_M: dict[Body, tuple[float, float]] = {
     Body.VEHICLE: LENGTH_WIDTH_M[AgentType.VEHICLE],

@@ -9,30 +9,24 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import replace
 
-from augment.checks.asked.across import asked_across
-from augment.checks.asked.crash import asked_crash
-from augment.checks.asked.distance import asked_distance
-from augment.checks.asked.heading import asked_heading
-from augment.checks.asked.parties import Party, match_to_requests
-from augment.checks.asked.question import Asked, AskedCheck
-from augment.checks.asked.spacing import asked_spacing
-from augment.checks.asked.things import (
+from augment.checks.asked_places import asked_across, asked_crash, asked_distance, asked_spacing
+from augment.checks.asked_things import (
     asked_changes,
     asked_count,
+    asked_heading,
     asked_motion,
     asked_type,
+    asked_walk,
     find_attempted,
     find_unasked,
 )
-from augment.checks.asked.walk import asked_walk
 from augment.checks.finding import Finding, FindingKind, Severity
 from augment.checks.ground import Ground
-from augment.checks.landmarks import find_picked, resolve_landmarks
-from augment.checks.lanes_across import LanesAcross
+from augment.checks.lanes_across import LanesAcross, find_picked, resolve_landmarks
+from augment.checks.parties import USUAL, Asked, AskedCheck, Party, Tolerances, match_to_requests
 from augment.checks.registry import findings_on
-from augment.checks.tolerances import USUAL, Tolerances
+from augment.scene.entities import Modification
 from augment.scene.intent import Intent, Move, VehicleRequest, resolve_anchors
-from augment.scene.modification import Modification
 
 ASKED_CHECKS: tuple[AskedCheck, ...] = (
     asked_count,

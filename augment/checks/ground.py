@@ -9,8 +9,7 @@ import heapq
 from dataclasses import dataclass
 from functools import cached_property
 
-from augment.checks.lane_index import LaneIndex
-from augment.checks.surfaces import Surface
+from augment.checks.ground import LaneIndex, Surface
 from augment.scene.ego_route import REACH_M, EgoRoute
 from augment.scene.entities import AreaKind, Scene
 from augment.scene.lane_graph import LaneGraph

@@ -12,12 +12,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from augment.checks.lanes_across import LanesAcross
-from augment.geometry.angles import difference
+from augment.geometry.frames import difference
 from augment.geometry.polyline import FloatArray
 from augment.scene.ego_route import RoutePosition
 from augment.scene.entities import AgentType, AreaKind, LaneConnector, TrafficAgent
-from augment.scene.intent import Intent, Length, Spot, from_ego
-from augment.scene.landmarks import LaneChoice, MapPlace, Pick, Relation, Side, Sight
+from augment.scene.intent import (
+    Intent,
+    LaneChoice,
+    Length,
+    MapPlace,
+    Pick,
+    Relation,
+    Side,
+    Sight,
+    Spot,
+    from_ego,
+)
 
 _STANDS_BELOW_MPS = 0.5
 _BESIDE_M = 15.0

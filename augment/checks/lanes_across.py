@@ -8,9 +8,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from augment.checks.ground import Ground
-from augment.checks.lane_index import Beside, LaneIndex, best_aligned
-from augment.geometry.angles import difference
+from augment.checks.ground import Beside, Ground, LaneIndex, best_aligned
+from augment.geometry.frames import difference
 from augment.scene.ego_route import EgoRoute
 from augment.scene.entities import TurnType
 from augment.scene.intent import LaneChoice

@@ -9,16 +9,22 @@ these here never ask what was wanted.
 
 from __future__ import annotations
 
+from augment.checks.bodies import duplicate, overlap, size, speed, walk_blocked, walk_crossing
 from augment.checks.finding import Finding
-from augment.checks.geometric.boxes import duplicate, overlap, size, speed
-from augment.checks.geometric.headings import degrees, heading, walk_heading
-from augment.checks.geometric.off_road import off_road, outside_map
-from augment.checks.geometric.places import ego_offset, lane, lane_distance, lane_named
-from augment.checks.geometric.walks import walk_blocked, walk_crossing
 from augment.checks.ground import Ground
+from augment.checks.places import (
+    degrees,
+    ego_offset,
+    heading,
+    lane,
+    lane_distance,
+    lane_named,
+    off_road,
+    outside_map,
+    walk_heading,
+)
 from augment.checks.situation import ChangedScene, Check
-from augment.scene.entities import Scene
-from augment.scene.modification import Modification
+from augment.scene.entities import Modification, Scene
 
 CHECKS: tuple[Check, ...] = (
     ego_offset,

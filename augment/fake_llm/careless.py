@@ -12,13 +12,11 @@ import random
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-from augment.geometry.angles import wrap
+from augment.geometry.frames import wrap
 from augment.scene.ego_route import EgoRoute
-from augment.scene.entities import AgentType, Scene, TrafficAgent, TurnType
-from augment.scene.intent import Intent, LaneChoice, Length, Relation, Spot, VehicleRequest
-from augment.scene.intent_words import Body
+from augment.scene.entities import AgentType, Modification, Scene, TrafficAgent, TurnType
+from augment.scene.intent import Body, Intent, LaneChoice, Length, Relation, Spot, VehicleRequest
 from augment.scene.lane_graph import LaneGraph
-from augment.scene.modification import Modification
 
 SPARED_BY_TOOL = frozenset({"straight-line", "ego-heading"})
 """Mistakes that nobody makes who asks a function for poses on lanes."""

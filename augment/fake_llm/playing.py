@@ -27,14 +27,13 @@ from augment.fake_llm.sight import (
     task_of,
 )
 from augment.fake_llm.wire import ChatRequest
-from augment.geometry.angles import difference, wrap
+from augment.geometry.frames import difference, wrap
 from augment.prompts.vectors import compass
+from augment.scene.codec import intent_to_parts
 from augment.scene.ego_route import EgoRoute
-from augment.scene.entities import AgentType, Scene, TrafficAgent
+from augment.scene.entities import AgentType, Modification, Scene, TrafficAgent
 from augment.scene.intent import Intent
-from augment.scene.intent_codec import intent_to_parts
 from augment.scene.lane_graph import LaneGraph
-from augment.scene.modification import Modification
 from augment.variants.respondents import ModelRole
 
 SEES_NOTHING = "I can't find a scene and an instruction in what I was given."

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from augment.fake_llm.wire import ChatRequest, SpokenMessage
-from augment.geometry.angles import difference
+from augment.geometry.frames import difference
 from augment.geometry.polyline import Polyline
 from augment.prompts.fill import QUOTE, read_text
 from augment.prompts.vectors import curve_from

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from augment.geometry.angles import wrap
+from augment.geometry.frames import wrap
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -7,9 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from augment.geometry.angles import difference
-from augment.scene.entities import AgentType, TrafficAgent
-from augment.scene.modification import Modification
+from augment.geometry.frames import difference
+from augment.scene.entities import AgentType, Modification, TrafficAgent
 
 _UPRIGHT = frozenset({AgentType.TRAFFIC_CONE, AgentType.CONSTRUCTION_SIGN})
 """Drawn upright whatever their heading."""

@@ -14,8 +14,7 @@ from enum import StrEnum
 
 import numpy as np
 
-from augment.scene.entities import AgentType, TrafficAgent
-from augment.scene.modification import Modification
+from augment.scene.entities import AgentType, Modification, TrafficAgent
 
 
 class ObjectClass(StrEnum):

@@ -20,15 +20,14 @@ from enum import StrEnum
 from functools import cache
 from importlib.resources import files
 
-from augment.checks.tolerances import USUAL
+from augment.checks.parties import USUAL
 from augment.llm.messages import Message, Speaker, Tool
 from augment.prompts.blocks import names_changes
 from augment.prompts.calls import calls_in
 from augment.prompts.extent import BESIDE_M, CROSSED_M, behind_m
 from augment.prompts.vectors import DEFAULT_RADIUS_M, LaneFormat, changes_text, scene_text
-from augment.scene.entities import Scene
-from augment.scene.intent_codec import parts_schema
-from augment.scene.modification import Modification
+from augment.scene.codec import parts_schema
+from augment.scene.entities import Modification, Scene
 
 QUOTE = "> "
 """Stands before every line of somebody else's words: no line of them can end the quotation."""

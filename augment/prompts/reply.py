@@ -16,13 +16,12 @@ from typing import Annotated, Literal, TypeVar
 from pydantic import Field
 
 from augment.errors import InvalidDocument, InvalidModification, ReplyUnreadable
-from augment.geometry.angles import wrap
+from augment.geometry.frames import wrap
 from augment.prompts.blocks import LONGEST_ANSWER, Strict, last_object, validate, without_thoughts
 from augment.prompts.vectors import DEFAULT_RADIUS_M, ShortNames, short_names
-from augment.scene.entities import AgentType, Scene, TrafficAgent
+from augment.scene.codec import intent_from_parts
+from augment.scene.entities import AgentType, Modification, Scene, TrafficAgent, check_fits
 from augment.scene.intent import Intent
-from augment.scene.intent_codec import intent_from_parts
-from augment.scene.modification import Modification, check_fits
 
 MOST_AGENTS = 64
 LONGEST_NOTES = 4000

@@ -29,9 +29,15 @@ from augment.geometry.frames import Pose
 from augment.geometry.polyline import Projection
 from augment.prompts.extent import boundary_near, extent_of, shown_spans
 from augment.scene.bezier_lanes import BezierLane, bezier_lane, piece_ids, straight_curve
-from augment.scene.entities import Lane, Scene, TrafficAgent, TrafficDensity, TurnType
+from augment.scene.entities import (
+    Lane,
+    Modification,
+    Scene,
+    TrafficAgent,
+    TrafficDensity,
+    TurnType,
+)
 from augment.scene.lane_graph import AnyLane, LaneGraph
-from augment.scene.modification import Modification
 
 SPACING_M = 5.0
 DEFAULT_RADIUS_M = 80.0

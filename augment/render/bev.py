@@ -44,9 +44,16 @@ from augment.render.road import (
     scale_corner,
 )
 from augment.render.shapes import sides
-from augment.scene.entities import AgentType, LaneConnector, Point, Scene, TrafficAgent
+from augment.scene.entities import (
+    AgentType,
+    LaneConnector,
+    Modification,
+    Point,
+    Scene,
+    TrafficAgent,
+    apply,
+)
 from augment.scene.lane_graph import AnyLane
-from augment.scene.modification import Modification, apply
 
 
 def draw(

@@ -12,9 +12,8 @@ from augment.geometry.polyline import FloatArray
 from augment.render import palette
 from augment.render.canvas import Box, MetricCanvas, text_width_px
 from augment.render.road import raster
-from augment.scene.entities import Scene, TrafficAgent
+from augment.scene.entities import Modification, Scene, TrafficAgent
 from augment.scene.lane_graph import AnyLane
-from augment.scene.modification import Modification
 
 TEXT_PX = 21
 _HEIGHT_PX = 34.0

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from augment.geometry.angles import wrap
+from augment.geometry.frames import wrap
 from augment.geometry.polyline import FloatArray
 from augment.render import palette
 from augment.render.camera import Camera
@@ -18,9 +18,16 @@ from augment.render.marks import draw_mark, draw_motion, draw_walks, is_walking,
 from augment.render.palette import Colour, MarkStyle
 from augment.render.road import own_lanes
 from augment.render.shapes import resample_line
-from augment.scene.entities import AgentType, AreaKind, Point, Scene, TrafficAgent, TrafficLight
-from augment.scene.modification import Modification
-from augment.scene.sizes import LENGTH_WIDTH_M
+from augment.scene.entities import (
+    LENGTH_WIDTH_M,
+    AgentType,
+    AreaKind,
+    Modification,
+    Point,
+    Scene,
+    TrafficAgent,
+    TrafficLight,
+)
 
 _TEXT_PX = 14
 _ROW_PX, _SAMPLE_PX, _GAP_PX, _MARGIN_PX = 36.0, 56.0, 18.0, 10.0

@@ -12,11 +12,14 @@ from typing import Annotated, Any, TypeVar
 from pydantic import Field, TypeAdapter
 
 from augment.errors import InvalidDocument
-from augment.scene.catalogue import ScenarioType
-from augment.scene.codec import modification_from_document, modification_to_document
+from augment.scene.codec import (
+    intent_from_document,
+    intent_to_document,
+    modification_from_document,
+    modification_to_document,
+)
+from augment.scene.entities import Modification, ScenarioType
 from augment.scene.intent import Intent
-from augment.scene.intent_codec import intent_from_document, intent_to_document
-from augment.scene.modification import Modification
 from augment.scene.schema import CLOSED, Text, Yes, read, write
 
 SCENARIO_FORMAT = "scenario-arena/scenario"

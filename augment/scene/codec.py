@@ -11,10 +11,9 @@ from typing import Any
 from pydantic import TypeAdapter
 
 from augment.errors import InvalidDocument
-from augment.scene.entities import Scene
-from augment.scene.modification import Modification
+from augment.scene.codec import modification_problems, scene_problems
+from augment.scene.entities import Modification, Scene
 from augment.scene.schema import read, write
-from augment.scene.soundness import modification_problems, scene_problems
 
 SCENE_FORMAT = "scenario-arena/scene"
 MODIFICATION_FORMAT = "scenario-arena/modification"

@@ -15,20 +15,21 @@ from typing import Annotated, Literal, Self, TypeVar
 from pydantic import Field, model_validator
 
 from augment.scene.entities import TurnType
-from augment.scene.intent_words import (
+from augment.scene.intent import (
     Bearing,
     Body,
     Facing,
+    LaneChoice,
     LateralTarget,
+    MapPlace,
     Nearness,
+    Pick,
     Post,
+    Relation,
     Setting,
     Shape,
+    Side,
 )
-from augment.scene.landmarks import LaneChoice as LaneChoice
-from augment.scene.landmarks import MapPlace, Pick
-from augment.scene.landmarks import Relation as Relation
-from augment.scene.landmarks import Side as Side
 from augment.scene.schema import CLOSED, MOST_OBJECTS, Count, Id, Real, Text, Yes
 
 MOST_REQUESTS = 20

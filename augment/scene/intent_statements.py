@@ -9,31 +9,29 @@ from collections.abc import Iterator
 
 from augment.scene.entities import TurnType
 from augment.scene.intent import (
+    Bearing,
+    Body,
     ConesRequest,
     CrashedCar,
     CrashRequest,
+    Facing,
     Intent,
     Lateral,
+    LateralTarget,
     Length,
     Move,
+    Nearness,
+    Post,
     Relation,
     Request,
+    Setting,
+    Shape,
     Side,
     Spot,
     VehicleRequest,
     WalkRequest,
 )
-from augment.scene.intent_words import (
-    Bearing,
-    Body,
-    Facing,
-    LateralTarget,
-    Nearness,
-    Post,
-    Setting,
-    Shape,
-)
-from augment.scene.landmark_statements import LANES, MARKS, state_pick
+from augment.scene.intent_statements import LANES, MARKS, state_pick
 
 
 def list_statements(intent: Intent) -> tuple[str, ...]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from augment.scene.landmarks import LaneChoice, MapPlace, Pick, Relation, Side, Sight
+from augment.scene.intent import LaneChoice, MapPlace, Pick, Relation, Side, Sight
 
 MARKS = {
     MapPlace.JUNCTION_START: "the start of the junction",

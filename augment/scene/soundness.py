@@ -12,11 +12,11 @@ from augment.scene.entities import (
     Area,
     Lane,
     LaneConnector,
+    Modification,
     Scene,
     TrafficAgent,
     TurnType,
 )
-from augment.scene.modification import Modification
 from augment.scene.schema import path
 
 EGO_ID = "Agent1"

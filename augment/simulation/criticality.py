@@ -7,11 +7,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from augment.simulation.contact import corners, meet, radii
 from augment.simulation.drive import Drive
-from augment.simulation.encounters import Collision
-from augment.simulation.metrics import ttc_series
-from augment.simulation.states import HEADING, SPEED, STEP_S, FloatArray, Objects
+from augment.simulation.metrics import Collision, ttc_series
+from augment.simulation.states import (
+    HEADING,
+    SPEED,
+    STEP_S,
+    FloatArray,
+    Objects,
+    corners,
+    meet,
+    radii,
+)
 
 CROSSING_RAD = math.radians(20.0)
 """Paths that meet at a flatter angle follow each other; they have no encroachment."""

@@ -6,10 +6,21 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from augment.simulation.contact import Contact, at_fault, classify, corners, meet
 from augment.simulation.drive import Drive
 from augment.simulation.road import Road
-from augment.simulation.states import SPEED, BoolArray, FloatArray, IntArray, Kind, wrap_angles
+from augment.simulation.states import (
+    SPEED,
+    BoolArray,
+    Contact,
+    FloatArray,
+    IntArray,
+    Kind,
+    at_fault,
+    classify,
+    corners,
+    meet,
+    wrap_angles,
+)
 
 NO_WAY = -1
 NEAR_M = 5.0

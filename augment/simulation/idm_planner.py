@@ -6,11 +6,11 @@ import math
 
 import numpy as np
 
-from augment.simulation.idm import PLANNER_IDM
-from augment.simulation.leaders import ParallelPaths, foresee, nearest
+from augment.simulation.pdm_closed import ParallelPaths, foresee, nearest
 from augment.simulation.planning import Plan, Situation
 from augment.simulation.road import Road
 from augment.simulation.states import SPEED, STEP_S, EgoBody, FloatArray, X, Y
+from augment.simulation.traffic import PLANNER_IDM
 
 TARGET_MPS = 10.0
 RADIUS_M = 40.0

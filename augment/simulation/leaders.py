@@ -11,9 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from augment.simulation.contact import corners
 from augment.simulation.path import Path
-from augment.simulation.states import EgoBody, FloatArray, Kind, Objects
+from augment.simulation.states import EgoBody, FloatArray, Kind, Objects, corners
 
 SLICE_S = 0.2
 STEPS_A_SLICE = 2

@@ -6,19 +6,21 @@ import math
 
 import numpy as np
 
-from augment.simulation.contact import meet
-from augment.simulation.leaders import Corridor, ParallelPaths, foresee, nearest
-from augment.simulation.planning import Plan, Proposals, Situation
-from augment.simulation.proposal_scores import ProposalScores, score_proposals
-from augment.simulation.proposals import (
+from augment.simulation.pdm_closed import (
     FALLBACK_LIMIT_MPS,
     HORIZON_STEPS,
     PAPER_OFFSETS_M,
     SPEED_SHARES,
     WHOLE_STEPS,
+    Corridor,
+    ParallelPaths,
     Rollout,
+    foresee,
+    nearest,
     roll_out,
 )
+from augment.simulation.planning import Plan, Proposals, Situation
+from augment.simulation.proposal_scores import ProposalScores, score_proposals
 from augment.simulation.road import Road
 from augment.simulation.states import (
     ACCELERATION,
@@ -30,6 +32,7 @@ from augment.simulation.states import (
     Objects,
     X,
     Y,
+    meet,
 )
 from augment.simulation.tracker import track
 

@@ -7,10 +7,9 @@ from collections.abc import Callable, Collection
 from functools import partial
 
 from augment.errors import CannotDrive, UnknownName
-from augment.simulation.idm_planner import IdmPlanner
-from augment.simulation.pdm_closed import PdmClosed
+from augment.simulation.pdm_closed import ORIGINAL_OFFSETS_M, PAPER_OFFSETS_M, PdmClosed
+from augment.simulation.planners import IdmPlanner
 from augment.simulation.planning import Planner
-from augment.simulation.proposals import ORIGINAL_OFFSETS_M, PAPER_OFFSETS_M
 
 OFFSETS_M: dict[str, tuple[float, ...]] = {
     "paper": PAPER_OFFSETS_M,

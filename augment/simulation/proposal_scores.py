@@ -10,20 +10,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from augment.simulation.comfort import PROPOSAL, comfort_signals, is_comfortable
-from augment.simulation.contact import (
-    AHEAD_RAD,
-    BEHIND_RAD,
-    at_fault,
-    bearings,
-    classify,
-    corners,
-    meet,
-    radii,
-)
-from augment.simulation.leaders import STEPS_A_SLICE, Forecast
+from augment.simulation.pdm_closed import STEPS_A_SLICE, Forecast
+from augment.simulation.proposal_scores import PROPOSAL, comfort_signals, is_comfortable
 from augment.simulation.road import Road
 from augment.simulation.states import (
+    AHEAD_RAD,
+    BEHIND_RAD,
     HEADING,
     SPEED,
     STEP_S,
@@ -34,6 +26,12 @@ from augment.simulation.states import (
     Kind,
     X,
     Y,
+    at_fault,
+    bearings,
+    classify,
+    corners,
+    meet,
+    radii,
 )
 
 STILL_MPS = 5e-3

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from augment.simulation.idm import PROPOSAL_IDM
-from augment.simulation.leaders import STEPS_A_SLICE, Corridor
+from augment.simulation.pdm_closed import STEPS_A_SLICE, Corridor
 from augment.simulation.states import STEP_S, EgoBody, FloatArray
+from augment.simulation.traffic import PROPOSAL_IDM
 
 ORIGINAL_OFFSETS_M = (0.0, -1.0, 1.0)
 """The centreline first: of equal scores, all zero among them, the lowest number wins."""

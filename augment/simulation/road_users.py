@@ -11,11 +11,19 @@ from collections.abc import Sequence
 import numpy as np
 
 from augment.scene.entities import AgentType, TrafficAgent
-from augment.simulation.contact import corners, meet, radii
-from augment.simulation.idm import TRAFFIC_IDM
 from augment.simulation.path import Path, dense
 from augment.simulation.road import Road
-from augment.simulation.states import KIND_OF, STEP_S, FloatArray, IntArray, Objects
+from augment.simulation.states import (
+    KIND_OF,
+    STEP_S,
+    FloatArray,
+    IntArray,
+    Objects,
+    corners,
+    meet,
+    radii,
+)
+from augment.simulation.traffic import TRAFFIC_IDM
 
 ACTIVE_WITHIN_M = 50.0
 """A walker appears once the ego has no further to go than this along its centreline."""

@@ -11,17 +11,17 @@ from enum import StrEnum
 
 import numpy as np
 
-from augment.scene.catalogue import ScenarioType
-from augment.scene.modification import Modification
-from augment.simulation.comfort import comfort_signals, is_comfortable
+from augment.scene.entities import Modification, ScenarioType
 from augment.simulation.drive import Drive, Expert
-from augment.simulation.encounters import Collision, collisions, ego_ways
 from augment.simulation.metrics import (
+    Collision,
     Metric,
     allows_detour,
+    collisions,
     combine,
     direction,
     drivable_area,
+    ego_ways,
     lane_changes_to_goal,
     making_progress,
     no_fault_collisions,
@@ -30,6 +30,7 @@ from augment.simulation.metrics import (
     speed_limit,
     time_to_collision,
 )
+from augment.simulation.proposal_scores import comfort_signals, is_comfortable
 from augment.simulation.states import HEADING
 
 

@@ -9,15 +9,6 @@ import numpy as np
 from augment.scene.entities import AgentType, TrafficAgent
 from augment.scene.recording import Recording, Track, agent_of
 from augment.simulation.road import Road
-from augment.simulation.road_users import (
-    Drifters,
-    LaneDrivers,
-    Walkers,
-    free_agents,
-    lane_under,
-    objects_of,
-)
-from augment.simulation.setting import DriveSetting
 from augment.simulation.states import (
     KIND_OF,
     NOBODY,
@@ -29,6 +20,15 @@ from augment.simulation.states import (
     Kind,
     Objects,
     join_objects,
+)
+from augment.simulation.traffic import (
+    Drifters,
+    DriveSetting,
+    LaneDrivers,
+    Walkers,
+    free_agents,
+    lane_under,
+    objects_of,
 )
 
 STANDS_BELOW_MPS = 0.5

@@ -26,9 +26,8 @@ from augment.prompts.calls import TOOL, WrittenCall, calls_in, read_arguments
 from augment.prompts.fill import Calling, Form, Messages
 from augment.prompts.reply import ReadReply, read_intent, read_reply
 from augment.prompts.vectors import changes_text
-from augment.scene.entities import Scene
+from augment.scene.entities import Modification, Scene
 from augment.scene.intent import Intent
-from augment.scene.modification import Modification
 from augment.variants.pose_tool import PoseTool
 from augment.variants.recipes import RECIPES, Keep, Recipe, Tools
 from augment.variants.respondents import (

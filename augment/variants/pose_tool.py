@@ -26,8 +26,7 @@ import numpy as np
 from augment.checks import Ground
 from augment.errors import ToolError
 from augment.geometry.bezier import CubicBezier, FitError
-from augment.geometry.boxes import Box, overlap
-from augment.geometry.frames import Pose
+from augment.geometry.frames import Box, Pose, overlap
 from augment.prompts.calls import PARAMETERS, TOOL
 from augment.prompts.vectors import (
     DEFAULT_RADIUS_M,
@@ -39,8 +38,7 @@ from augment.prompts.vectors import (
     shown_agents,
 )
 from augment.scene.bezier_lanes import BezierLane, LanePiece
-from augment.scene.entities import AgentType, Scene, TrafficAgent
-from augment.scene.sizes import LENGTH_WIDTH_M
+from augment.scene.entities import LENGTH_WIDTH_M, AgentType, Scene, TrafficAgent
 
 LANE_START = "lane"
 """The start that means the beginning of the lane; any other start is an agent's id."""

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 from augment.checks import Ground, Severity
-from augment.checks.against_intent import check_against_intent
+from augment.checks.registry import check_against_intent
 from augment.errors import ModelRefused, ReplyUnreadable, ReviewUnusable
 from augment.llm.messages import DEFAULT_MAX_TOKENS
 from augment.prompts import fill
@@ -22,9 +22,8 @@ from augment.prompts.reply import read_questions, read_ratings, read_sight, read
 from augment.prompts.vectors import DEFAULT_RADIUS_M, short_names
 from augment.render.bev import draw_for_review
 from augment.render.camera import WIDTH_PX, camera_for
-from augment.scene.entities import Scene
+from augment.scene.entities import Modification, Scene
 from augment.scene.intent import Intent
-from augment.scene.modification import Modification
 from augment.variants.respondents import ModelRole, Respondents
 
 

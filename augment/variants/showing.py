@@ -15,8 +15,7 @@ from dataclasses import dataclass
 
 from augment.llm.messages import Message
 from augment.prompts import fill
-from augment.scene.entities import Scene
-from augment.scene.modification import Modification
+from augment.scene.entities import Modification, Scene
 from augment.variants.pipeline import form_of
 from augment.variants.recipes import Recipe, Tools
 from augment.variants.respondents import ModelRole

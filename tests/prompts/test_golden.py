@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from augment.prompts.fill import regenerate_messages, result_text, said_by_user, viewer_messages
-from augment.scene.modification import Modification
+from augment.scene.entities import Modification
 from augment.variants.pipeline import form_of
 from augment.variants.recipes import RECIPES, VQA
 from augment.variants.respondents import ModelRole

@@ -6,7 +6,7 @@ import numpy as np
 
 from augment.render import palette
 from augment.render.bev import FaultMark, draw, draw_annotated
-from augment.scene.modification import Modification
+from augment.scene.entities import Modification
 from tests.render.pictures import WIDE, opened
 from tests.scenes import scene, vehicle
 

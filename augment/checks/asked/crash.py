@@ -7,22 +7,22 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise, permutations
 
-from augment.checks.asked.parties import Party
-from augment.checks.asked.question import (
+from augment.checks.asked_places import fits_gap
+from augment.checks.finding import Finding, FindingKind
+from augment.checks.parties import (
+    CRASH_M,
+    USUAL,
     Asked,
+    Party,
     distance_outside,
     facing_words,
     severity_of,
     side_of,
 )
-from augment.checks.asked.spacing import fits_gap
-from augment.checks.finding import Finding, FindingKind
-from augment.checks.tolerances import CRASH_M, USUAL
-from augment.geometry.angles import difference
+from augment.geometry.frames import difference
 from augment.scene.ego_route import EgoRoute
 from augment.scene.entities import TrafficAgent
-from augment.scene.intent import CrashedCar, CrashRequest, LaneChoice
-from augment.scene.intent_words import Bearing, Facing
+from augment.scene.intent import Bearing, CrashedCar, CrashRequest, Facing, LaneChoice
 
 
 def asked_crash(asked: Asked) -> Iterator[Finding]:

@@ -5,14 +5,18 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
-from augment.checks.asked.crash import in_order
-from augment.checks.asked.parties import Party
-from augment.checks.asked.question import Asked, distance_outside, severity_of
+from augment.checks.asked_places import in_order
 from augment.checks.finding import Finding, FindingKind
-from augment.checks.tolerances import CRASH_M
+from augment.checks.parties import CRASH_M, Asked, Party, distance_outside, severity_of
 from augment.scene.entities import TrafficAgent
-from augment.scene.intent import ConesRequest, CrashRequest, Relation, VehicleRequest, WalkRequest
-from augment.scene.intent_words import Shape
+from augment.scene.intent import (
+    ConesRequest,
+    CrashRequest,
+    Relation,
+    Shape,
+    VehicleRequest,
+    WalkRequest,
+)
 
 
 def asked_distance(asked: Asked) -> Iterator[Finding]:

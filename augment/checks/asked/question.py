@@ -5,14 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
-from augment.checks.asked.parties import Party, RequestMatching
 from augment.checks.finding import Finding, Severity
 from augment.checks.lanes_across import LanesAcross
-from augment.checks.tolerances import Tolerances
+from augment.checks.parties import Party, RequestMatching, Tolerances
 from augment.scene.ego_route import EgoRoute
-from augment.scene.entities import Scene, TrafficAgent, TrafficSide
-from augment.scene.intent_words import Facing
-from augment.scene.modification import Modification
+from augment.scene.entities import Modification, Scene, TrafficAgent, TrafficSide
+from augment.scene.intent import Facing
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

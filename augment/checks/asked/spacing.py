@@ -7,10 +7,8 @@ from collections.abc import Iterator, Sequence
 from itertools import combinations, pairwise
 from statistics import median
 
-from augment.checks.asked.parties import Party
-from augment.checks.asked.question import Asked, distance_outside, severity_of, side_of
 from augment.checks.finding import Finding, FindingKind
-from augment.checks.tolerances import WORKER_M
+from augment.checks.parties import WORKER_M, Asked, Party, distance_outside, severity_of, side_of
 from augment.scene.entities import TrafficAgent
 from augment.scene.intent import ConesRequest, Length, Side, VehicleRequest
 

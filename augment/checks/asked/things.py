@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from augment.checks.asked.parties import Role, middle_of
-from augment.checks.asked.question import Asked, severity_of
+from augment.checks.bodies import name_type
 from augment.checks.finding import Finding, FindingKind, Severity
-from augment.checks.geometric.boxes import name_type
+from augment.checks.parties import SPEED_MPS, SPEED_SHARE, Asked, Role, middle_of, severity_of
 from augment.checks.situation import STOPPED_BELOW_MPS
-from augment.checks.tolerances import SPEED_MPS, SPEED_SHARE
 from augment.scene.intent import CrashRequest, VehicleRequest
 
 

@@ -6,10 +6,10 @@ import math
 from collections.abc import Iterator, Sequence
 from itertools import combinations
 
-from augment.checks.asked.question import Asked, severity_of, side_of
-from augment.checks.asked.spacing import apart_m, fits_gap
+from augment.checks.asked_places import apart_m, fits_gap
+from augment.checks.bodies import end_of_walk
 from augment.checks.finding import Finding, FindingKind
-from augment.checks.geometric.walks import end_of_walk
+from augment.checks.parties import Asked, severity_of, side_of
 from augment.scene.entities import TrafficAgent
 from augment.scene.intent import Side, WalkRequest
 

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator
 
 from augment.checks.finding import Finding, FindingKind, Severity
-from augment.checks.lane_index import Beside
+from augment.checks.ground import Beside
 from augment.checks.situation import ChangedScene
 from augment.scene.entities import TrafficAgent
 

@@ -14,7 +14,7 @@ from augment.llm.costs import Price, usd_of, worst_case
 from augment.llm.messages import Request
 from augment.models import Augmentation, Contestant, Endpoint, Event, ModelCall, Scenario
 from augment.prompts.fill import prompt_version
-from augment.scene.modification import Modification
+from augment.scene.entities import Modification
 from augment.services.endpoints.known_models import price_of
 from augment.services.endpoints.treatments import Respondent, options_of, respondents_of
 from augment.services.scenarios.scenes import reference_of, scene_of

@@ -19,7 +19,7 @@ from django.db.models import QuerySet
 from django.utils import timezone
 from numpy.typing import NDArray
 
-from augment.baselines.broken import break_reference
+from augment.baselines.registry import break_reference
 from augment.models import Augmentation, BaseScene, Contestant, GenerationJob, Scenario
 from augment.render.bev import draw
 from augment.render.camera import AROUND_THE_EGO, LOOK, Camera, camera_for
@@ -30,8 +30,7 @@ from augment.scene.codec import (
     modification_to_document,
     scene_from_document,
 )
-from augment.scene.entities import Scene
-from augment.scene.modification import Modification, without_traffic
+from augment.scene.entities import Modification, Scene, without_traffic
 from augment.services.events import log_event
 from augment.services.scenarios.scenes import content_hash, reference_of, scene_key, scene_of
 

@@ -16,9 +16,9 @@ from augment.fake_llm.sight import same_text
 from augment.models import Contestant, Scenario
 from augment.prompts.fill import prompt_version
 from augment.render.camera import LOOK
+from augment.scene.codec import intent_from_document
+from augment.scene.entities import Modification
 from augment.scene.intent import Intent
-from augment.scene.intent_codec import intent_from_document
-from augment.scene.modification import Modification
 from augment.services.scenarios.pictures import store
 from augment.services.scenarios.scenes import reference_of, scene_key, scene_of
 from augment.variants.options import ContestantOptions, recipe_with
