@@ -11,8 +11,7 @@ from collections.abc import Sequence
 
 from augment.baselines.registry import PLACERS, PlaceIntent
 from augment.errors import CannotPlace
-from augment.metrics.displacement import Displacement, displacement
-from augment.metrics.summary import summarise
+from augment.metrics.displacement import Displacement, displacement, summarise
 from augment.scene.catalogue import ScenarioType
 from augment.scene.modification import Modification
 from bench.report import table

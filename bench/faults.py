@@ -13,7 +13,7 @@ from dataclasses import replace
 from enum import StrEnum
 from itertools import pairwise
 
-from augment.geometry.angles import difference, wrap
+from augment.geometry.frames import difference, wrap
 from augment.scene.ego_route import EgoRoute
 from augment.scene.entities import AgentType, LaneConnector, TrafficAgent, TrafficSide
 from augment.scene.sizes import LENGTH_WIDTH_M

@@ -25,7 +25,7 @@ from augment.baselines.quantised_code import (
     quadrants_of,
 )
 from augment.errors import CannotPlace
-from augment.geometry.boxes import overlap
+from augment.geometry.frames import overlap
 from augment.geometry.polyline import Polyline
 from augment.scene.entities import AgentType, Scene, TrafficAgent
 from augment.scene.intent import ConesRequest, Intent, VehicleRequest, WalkRequest

@@ -14,7 +14,7 @@ from enum import IntEnum
 import numpy as np
 from numpy.typing import NDArray
 
-from augment.geometry.angles import difference
+from augment.geometry.frames import difference
 from augment.scene.entities import TrafficAgent
 
 FURTHEST_M = 72.0

@@ -26,7 +26,7 @@ from augment.checks import Ground
 from augment.checks.landmarks import find_picked, list_absent, resolve_landmarks
 from augment.checks.lanes_across import LanesAcross
 from augment.errors import CannotPlace
-from augment.geometry.boxes import overlap
+from augment.geometry.frames import overlap
 from augment.scene.entities import AgentType, Scene, TrafficAgent, TurnType
 from augment.scene.intent import (
     ConesRequest,

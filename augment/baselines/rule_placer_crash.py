@@ -16,9 +16,7 @@ import numpy as np
 from augment.baselines.rule_placer_ground import PlacingGround
 from augment.baselines.rule_placer_vehicles import FACING_RAD, SIZES_M, build_vehicle
 from augment.errors import CannotPlace
-from augment.geometry.angles import wrap
-from augment.geometry.boxes import Box, overlap
-from augment.geometry.frames import Pose
+from augment.geometry.frames import Box, Pose, overlap, wrap
 from augment.scene.entities import Scene, TrafficAgent
 from augment.scene.intent import CrashedCar, CrashRequest
 from augment.scene.intent_words import Bearing, Body, Facing

@@ -13,8 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from augment.errors import CannotPlace
-from augment.geometry.angles import difference
-from augment.geometry.frames import Pose
+from augment.geometry.frames import Pose, difference
 from augment.scene.ego_route import EgoRoute
 from augment.scene.entities import (
     AgentType,

@@ -8,8 +8,7 @@ import numpy as np
 
 from augment.baselines.rule_placer_ground import PlacingGround
 from augment.errors import CannotPlace
-from augment.geometry.angles import wrap
-from augment.geometry.frames import Pose
+from augment.geometry.frames import Pose, wrap
 from augment.scene.entities import AgentType, TrafficAgent
 from augment.scene.intent import LaneChoice, Lateral, Side, VehicleRequest
 from augment.scene.intent_words import Body, Facing, LateralTarget, Nearness

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from augment.checks.lanes_across import LanesAcross
-from augment.geometry.angles import difference
+from augment.geometry.frames import difference
 from augment.geometry.polyline import FloatArray
 from augment.scene.ego_route import RoutePosition
 from augment.scene.entities import AgentType, AreaKind, LaneConnector, TrafficAgent

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from augment.geometry.angles import difference
+from augment.geometry.frames import difference
 from augment.scene.lane_graph import AnyLane
 
 FloatArray = NDArray[np.float64]

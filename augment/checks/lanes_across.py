@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 from augment.checks.ground import Ground
 from augment.checks.lane_index import Beside, LaneIndex, best_aligned
-from augment.geometry.angles import difference
+from augment.geometry.frames import difference
 from augment.scene.ego_route import EgoRoute
 from augment.scene.entities import TurnType
 from augment.scene.intent import LaneChoice

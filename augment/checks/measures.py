@@ -16,7 +16,7 @@ from augment.checks.asked.question import kerb_of
 from augment.checks.ground import Ground
 from augment.checks.landmarks import resolve_landmarks
 from augment.checks.lanes_across import LanesAcross
-from augment.geometry.angles import difference
+from augment.geometry.frames import difference
 from augment.scene.entities import Point
 from augment.scene.intent import Intent, LaneChoice, Spot, WalkRequest, resolve_anchors
 

@@ -12,7 +12,7 @@ from augment.checks.finding import Finding
 from augment.checks.ground import Ground
 from augment.checks.lane_index import Beside, best_aligned
 from augment.checks.surfaces import gaps_m
-from augment.geometry.boxes import Box
+from augment.geometry.frames import Box
 from augment.scene.entities import AgentType, TrafficAgent
 from augment.scene.modification import Modification, apply
 

@@ -12,7 +12,7 @@ import random
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-from augment.geometry.angles import wrap
+from augment.geometry.frames import wrap
 from augment.scene.ego_route import EgoRoute
 from augment.scene.entities import AgentType, Scene, TrafficAgent
 from augment.scene.lane_graph import LaneGraph

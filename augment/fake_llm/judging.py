@@ -16,7 +16,7 @@ from augment.baselines.rule_placer import place
 from augment.errors import CannotPlace
 from augment.fake_llm.requests import ChatRequest
 from augment.fake_llm.sight import Task, agent_of, list_of
-from augment.geometry.angles import difference
+from augment.geometry.frames import difference
 from augment.scene.entities import AgentType, TrafficAgent
 
 _FAR_M = 3.0

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from augment.fake_llm.requests import SpokenMessage
-from augment.geometry.angles import difference
+from augment.geometry.frames import difference
 from augment.geometry.polyline import Polyline
 from augment.prompts.lane_curves import curve_from
 from augment.prompts.texts import QUOTE

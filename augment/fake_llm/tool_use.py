@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from augment.geometry.angles import difference, wrap
+from augment.geometry.frames import difference, wrap
 from augment.scene.entities import Scene, TrafficAgent
 from augment.scene.lane_graph import LaneGraph
 from augment.scene.modification import Modification

@@ -17,8 +17,7 @@ from augment.formats.reading import Moment, Reading, frame_in
 from augment.formats.road_map import FURTHEST_M, FloatArray, MapExtract, RoadMap
 from augment.formats.roads import road_around
 from augment.formats.strips import RADIUS_M
-from augment.geometry.angles import wrap
-from augment.geometry.frames import Pose
+from augment.geometry.frames import Pose, wrap
 from augment.scene.entities import AgentType, Origin, Scene, TrafficAgent
 from augment.scene.lane_graph import LaneGraph
 from augment.scene.notes import Note, SceneNoteKind

@@ -14,8 +14,7 @@ from itertools import islice
 from augment.formats.intersection_ways import Way, following_of, ways_through
 from augment.formats.road_map import MapExtract, Name, RoadMap
 from augment.formats.strips import Strip, check_count, find_areas, find_strips, join
-from augment.geometry.angles import difference
-from augment.geometry.frames import Pose
+from augment.geometry.frames import Pose, difference
 from augment.geometry.polyline import Polyline
 from augment.scene.directions import traffic_side_of, turn_type_of
 from augment.scene.entities import Lane, LaneConnector, TrafficLight

@@ -16,7 +16,7 @@ from typing import Annotated, Literal, TypeVar
 from pydantic import Field
 
 from augment.errors import InvalidModification, ReplyUnreadable
-from augment.geometry.angles import wrap
+from augment.geometry.frames import wrap
 from augment.prompts.blocks import last_object
 from augment.prompts.names import ShortNames, short_names
 from augment.prompts.strict import Strict, validate

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from augment.geometry.angles import wrap
+from augment.geometry.frames import wrap
 from augment.render.marks import is_walking, stands
 from augment.scene.entities import AgentType, Point, Scene, TrafficAgent
 from augment.scene.modification import Modification

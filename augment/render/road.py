@@ -7,8 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from augment.geometry.angles import difference
-from augment.geometry.frames import Pose
+from augment.geometry.frames import Pose, difference
 from augment.geometry.polyline import FloatArray
 from augment.render import palette
 from augment.render.canvas import MetricCanvas

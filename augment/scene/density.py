@@ -12,8 +12,7 @@ import random
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
-from augment.geometry.boxes import Box, overlap
-from augment.geometry.frames import Pose
+from augment.geometry.frames import Box, Pose, overlap
 from augment.geometry.polyline import Polyline
 from augment.scene.ego_route import find_ego_lane
 from augment.scene.entities import (

@@ -11,8 +11,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from augment.geometry.angles import difference
-from augment.geometry.frames import Pose
+from augment.geometry.frames import Pose, difference
 from augment.geometry.polyline import Polyline
 from augment.scene.entities import Lane, TrafficSide, TurnType
 

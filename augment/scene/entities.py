@@ -11,8 +11,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from augment.geometry.boxes import Box
-from augment.geometry.frames import Pose
+from augment.geometry.frames import Box, Pose
 from augment.scene.schema import (
     CLOSED,
     Heading,

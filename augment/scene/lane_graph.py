@@ -15,8 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from augment.errors import UnknownName
-from augment.geometry.angles import difference
-from augment.geometry.frames import Pose
+from augment.geometry.frames import Pose, difference
 from augment.geometry.polyline import Projection
 from augment.scene.entities import Lane, LaneConnector, Scene, TurnType
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from augment.checks.surfaces import rings, strips
 from augment.errors import CannotDrive
-from augment.geometry.angles import difference
+from augment.geometry.frames import difference
 from augment.scene.ego_route import find_ego_lane
 from augment.scene.entities import AreaKind, Lane, LaneConnector, Scene, TrafficLight, TurnType
 from augment.scene.lane_graph import AnyLane, LaneGraph

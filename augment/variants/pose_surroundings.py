@@ -14,8 +14,7 @@ from functools import cached_property
 
 from augment.checks import Ground
 from augment.errors import ToolError
-from augment.geometry.boxes import Box, overlap
-from augment.geometry.frames import Pose
+from augment.geometry.frames import Box, Pose, overlap
 from augment.scene.entities import AgentType, TrafficAgent
 from augment.scene.sizes import LENGTH_WIDTH_M
 

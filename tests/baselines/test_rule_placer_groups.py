@@ -8,7 +8,7 @@ import math
 import numpy as np
 import pytest
 
-from augment.geometry.boxes import overlap
+from augment.geometry.frames import overlap
 from augment.scene.entities import AgentType
 from augment.scene.intent import Side
 from augment.scene.intent_words import Shape

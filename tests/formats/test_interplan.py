@@ -12,7 +12,7 @@ from augment.formats.interplan.file import ReadEntry, token_of
 from augment.formats.interplan.reader import read
 from augment.formats.interplan.writer import interplan_text as write
 from augment.formats.writing import Cell
-from augment.geometry.angles import difference
+from augment.geometry.frames import difference
 from augment.scene.catalogue import ScenarioType
 from augment.scene.entities import AgentType, TrafficAgent
 from augment.scene.modification import Modification, without_traffic

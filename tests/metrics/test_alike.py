@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import pytest
 
-from augment.metrics.alike import are_alike
+from augment.metrics.displacement import are_alike
 from augment.scene.entities import AgentType
 from augment.scene.modification import Modification
 from tests.scenes import cone, pedestrian, vehicle

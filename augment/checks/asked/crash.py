@@ -18,7 +18,7 @@ from augment.checks.asked.question import (
 from augment.checks.asked.spacing import fits_gap
 from augment.checks.finding import Finding, FindingKind
 from augment.checks.tolerances import CRASH_M, USUAL
-from augment.geometry.angles import difference
+from augment.geometry.frames import difference
 from augment.scene.ego_route import EgoRoute
 from augment.scene.entities import TrafficAgent
 from augment.scene.intent import CrashedCar, CrashRequest, LaneChoice

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 from augment.checks.asked.question import Asked, facing_words, severity_of, side_of
 from augment.checks.finding import Finding, FindingKind
-from augment.geometry.angles import difference
+from augment.geometry.frames import difference
 from augment.scene.entities import TrafficAgent
 from augment.scene.intent import VehicleRequest
 from augment.scene.intent_words import Body, Facing

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from augment.checks.finding import Finding, FindingKind, Severity
 from augment.checks.situation import STOPPED_BELOW_MPS, VEHICLES, ChangedScene, is_stopped
-from augment.geometry import boxes
+from augment.geometry import frames
 from augment.scene.entities import AgentType, TrafficAgent
 
 TOUCH_M = 0.01
@@ -44,7 +44,7 @@ def _may_meet(one: TrafficAgent, other: TrafficAgent) -> bool:
 
 
 def _pair(agent: TrafficAgent, other: TrafficAgent, situation: ChangedScene) -> Iterator[Finding]:
-    shared = boxes.overlap(situation.boxes[agent.id], situation.boxes[other.id])
+    shared = frames.overlap(situation.boxes[agent.id], situation.boxes[other.id])
     if shared.depth_m <= TOUCH_M:
         return
     share = max(shared.share_of_first, shared.share_of_second)

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from augment.checks.finding import Finding, FindingKind, Severity
 from augment.checks.lane_index import Beside
 from augment.checks.situation import ChangedScene, is_stopped
-from augment.geometry.angles import difference
+from augment.geometry.frames import difference
 from augment.scene.entities import AgentType, TrafficAgent
 
 ALONG_BELOW_DEG = 30.0

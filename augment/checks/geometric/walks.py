@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from augment.checks.finding import Finding, FindingKind, Severity
 from augment.checks.situation import ChangedScene, is_stopped
-from augment.geometry.boxes import Box
+from augment.geometry.frames import Box
 from augment.geometry.polyline import Polyline
 from augment.scene.entities import AgentType, Point, TrafficAgent
 

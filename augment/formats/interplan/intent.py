@@ -15,7 +15,7 @@ from statistics import median
 from augment.checks.against_intent import check_against_intent
 from augment.checks.ground import Ground
 from augment.checks.lanes_across import Band, LanesAcross
-from augment.geometry.angles import difference
+from augment.geometry.frames import difference
 from augment.scene.catalogue import ScenarioType
 from augment.scene.entities import AgentType, Point, Scene, TrafficAgent, TurnType
 from augment.scene.intent import (

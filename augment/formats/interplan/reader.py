@@ -32,8 +32,7 @@ from augment.formats.interplan.schema import (
     place_of,
 )
 from augment.formats.yaml_file import read_yaml
-from augment.geometry.angles import wrap
-from augment.geometry.frames import Pose
+from augment.geometry.frames import Pose, wrap
 from augment.scene.density import ExtraAgent, spawn_traffic
 from augment.scene.entities import AgentType, Point, Scene, TrafficAgent
 from augment.scene.modification import Modification

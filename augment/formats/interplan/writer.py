@@ -30,7 +30,7 @@ from augment.formats.interplan.file import (
 from augment.formats.interplan.reader import read_entry
 from augment.formats.interplan.schema import OBJECTS, SpecialScenario
 from augment.formats.writing import Cell, Loss, Written
-from augment.geometry.angles import difference, wrap
+from augment.geometry.frames import difference, wrap
 from augment.scene.catalogue import ScenarioType
 from augment.scene.entities import AgentType, Point, Scene, TrafficAgent
 from augment.scene.modification import without_traffic

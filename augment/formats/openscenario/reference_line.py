@@ -13,7 +13,7 @@ import numpy as np
 
 from augment.formats.bounds import bounds_of
 from augment.formats.writing import CannotExpress
-from augment.geometry.angles import difference
+from augment.geometry.frames import difference
 from augment.geometry.polyline import FloatArray, Polyline
 from augment.scene.lane_graph import AnyLane
 

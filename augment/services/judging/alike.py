@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from itertools import combinations
 
-from augment.metrics.alike import are_alike
+from augment.metrics.displacement import are_alike
 from augment.models import Augmentation
 from augment.scene.codec import modification_from_document
 from augment.scene.modification import Modification

@@ -10,9 +10,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from statistics import fmean, median
 
-from augment.metrics.paired import PairedComparison, compare_all
-from augment.metrics.refusals import RefusalScore, score_refusals
-from augment.metrics.repeats import Robustness, measure_robustness
+from augment.metrics.paired import (
+    PairedComparison,
+    RefusalScore,
+    Robustness,
+    compare_all,
+    measure_robustness,
+    score_refusals,
+)
 from augment.models import Augmentation, Contestant, GenerationJob
 from augment.services.judging.displacement import Measured, of_job
 

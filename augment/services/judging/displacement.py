@@ -10,8 +10,14 @@ from enum import StrEnum
 from django.db.models import Max, QuerySet
 
 from augment.errors import InvalidDocument, UnknownName
-from augment.metrics.displacement import Displacement, Match, displacement
-from augment.metrics.summary import BoxSummary, Summary, summarise
+from augment.metrics.displacement import (
+    BoxSummary,
+    Displacement,
+    Match,
+    Summary,
+    displacement,
+    summarise,
+)
 from augment.models import Augmentation, GenerationJob, Scenario
 from augment.scene.catalogue import ScenarioType
 from augment.scene.codec import modification_from_document

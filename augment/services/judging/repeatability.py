@@ -6,7 +6,7 @@ from collections import defaultdict
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from augment.metrics.repeats import SampleSpread, spread_of, within_sd
+from augment.metrics.paired import SampleSpread, spread_of, within_sd
 from augment.models import Augmentation, GenerationJob
 from augment.services.judging.augmentation_rows import AugmentationLine, augmentation_lines
 

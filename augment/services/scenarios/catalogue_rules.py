@@ -18,8 +18,7 @@ from augment.checks.landmarks import find_mark
 from augment.checks.lanes_across import LanesAcross
 from augment.checks.situation import VEHICLES, is_stopped
 from augment.checks.surfaces import gaps_m
-from augment.geometry.boxes import Box, overlap
-from augment.geometry.frames import Pose
+from augment.geometry.frames import Box, Pose, overlap
 from augment.render.camera import Camera, camera_for
 from augment.scene.catalogue import ScenarioType
 from augment.scene.catalogue_codec import ENGLISH, CatalogueEntry

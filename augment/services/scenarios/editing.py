@@ -11,8 +11,7 @@ from dataclasses import replace
 from functools import lru_cache
 from typing import Any
 
-from augment.geometry.angles import difference, wrap
-from augment.geometry.frames import Pose
+from augment.geometry.frames import Pose, difference, wrap
 from augment.models import Scenario
 from augment.render.camera import AROUND_THE_EGO
 from augment.scene.codec import modification_from_document, modification_to_document

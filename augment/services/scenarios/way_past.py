@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from augment.checks import Ground
 from augment.checks.situation import is_stopped
-from augment.geometry.angles import difference
+from augment.geometry.frames import difference
 from augment.scene.ego_route import EgoRoute
 from augment.scene.entities import Scene, TrafficAgent
 from augment.scene.modification import Modification, apply
