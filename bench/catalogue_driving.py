@@ -15,8 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from augment.scene.catalogue import ScenarioType
-from augment.scene.modification import Modification
+from augment.scene.entities import Modification, ScenarioType
 from augment.simulation.drive import Drive, expert_of, run
 from augment.simulation.pdm_closed import PdmClosed
 from augment.simulation.planners import OFFSETS_M

@@ -14,8 +14,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from augment.scene.entities import TrafficAgent
-from augment.scene.modification import Modification
+from augment.scene.entities import Modification, TrafficAgent
 from augment.simulation.drive import run
 from augment.simulation.pdm_closed import PdmClosed
 from augment.simulation.planning import Plan, Situation

@@ -19,7 +19,7 @@ from augment.baselines import rule_placer
 from augment.baselines.registry import PLACERS
 from augment.errors import CannotPlace
 from augment.fake_llm import careless, misreading
-from augment.scene.modification import Modification
+from augment.scene.entities import Modification
 from bench.displacement import made, measured
 from tests.fixtures.shelf import HARD_SLUGS, SLUGS, entry, shown_scene
 

@@ -12,8 +12,7 @@ from dataclasses import replace
 
 from augment.geometry.frames import Box, overlap, wrap
 from augment.scene.ego_route import EgoRoute
-from augment.scene.entities import Scene, TrafficAgent
-from augment.scene.modification import Modification
+from augment.scene.entities import Modification, Scene, TrafficAgent
 
 Agents = tuple[TrafficAgent, ...]
 

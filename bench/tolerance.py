@@ -24,7 +24,7 @@ from augment.baselines.rule_placer import place
 from augment.errors import CannotPlace
 from augment.fake_llm.server import running
 from augment.metrics.displacement import Likeness, are_alike, displacement
-from augment.scene.modification import Modification
+from augment.scene.entities import Modification
 from tests.fake_llm.asking import outcome
 from tests.fixtures.shelf import SLUGS, entry, shown_scene
 from tests.intents import intents

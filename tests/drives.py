@@ -9,7 +9,7 @@ from functools import cache
 from typing import Any
 
 from augment.models import Augmentation, GenerationJob, Simulation
-from augment.scene.modification import Modification
+from augment.scene.entities import Modification
 from augment.services.judging import simulations
 from augment.services.judging.simulations import Options
 from augment.simulation.drive import expert_of, run

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from augment.scene.modification import Modification
+from augment.scene.entities import Modification
 
 SPACING_M = 0.6
 """Between the centres of the objects, so that a pile of several is seen as a pile."""

@@ -27,12 +27,9 @@ from augment.baselines.quantised_code import (
 from augment.errors import CannotPlace
 from augment.geometry.frames import overlap
 from augment.geometry.polyline import Polyline
-from augment.scene.entities import AgentType, Scene, TrafficAgent
-from augment.scene.intent import ConesRequest, Intent, VehicleRequest, WalkRequest
-from augment.scene.intent_words import Body
+from augment.scene.entities import LENGTH_WIDTH_M, AgentType, Modification, Scene, TrafficAgent
+from augment.scene.intent import Body, ConesRequest, Intent, VehicleRequest, WalkRequest
 from augment.scene.lane_graph import AnyLane
-from augment.scene.modification import Modification
-from augment.scene.sizes import LENGTH_WIDTH_M
 
 _STEP_M = 0.5
 _DRAWS = 50

@@ -27,8 +27,9 @@ from augment.checks.landmarks import find_picked, list_absent, resolve_landmarks
 from augment.checks.lanes_across import LanesAcross
 from augment.errors import CannotPlace
 from augment.geometry.frames import overlap
-from augment.scene.entities import AgentType, Scene, TrafficAgent, TurnType
+from augment.scene.entities import AgentType, Modification, Scene, TrafficAgent, TurnType, apply
 from augment.scene.intent import (
+    Body,
     ConesRequest,
     CrashRequest,
     Intent,
@@ -40,8 +41,6 @@ from augment.scene.intent import (
     WalkRequest,
     resolve_anchors,
 )
-from augment.scene.intent_words import Body
-from augment.scene.modification import Modification, apply
 
 _SHIFT_STEP_M = 0.25
 _SHIFT_EXACT_M = 0.5

@@ -11,11 +11,9 @@ import numpy as np
 
 from augment.baselines.rule_placer_ground import PlacingGround
 from augment.errors import CannotPlace
-from augment.scene.entities import AgentType, TrafficAgent
-from augment.scene.intent import ConesRequest, LaneChoice, Side
-from augment.scene.intent_words import LateralTarget, Post, Shape
+from augment.scene.entities import LENGTH_WIDTH_M, AgentType, TrafficAgent
+from augment.scene.intent import ConesRequest, LaneChoice, LateralTarget, Post, Shape, Side
 from augment.scene.lane_graph import LanePosition
-from augment.scene.sizes import LENGTH_WIDTH_M
 
 CONE_SPACING_M = 2.5
 """Between cones of which nobody says how far: interPlan's median."""

@@ -18,8 +18,7 @@ from augment.baselines.rule_placer_vehicles import FACING_RAD, SIZES_M, build_ve
 from augment.errors import CannotPlace
 from augment.geometry.frames import Box, Pose, overlap, wrap
 from augment.scene.entities import Scene, TrafficAgent
-from augment.scene.intent import CrashedCar, CrashRequest
-from augment.scene.intent_words import Bearing, Body, Facing
+from augment.scene.intent import Bearing, Body, CrashedCar, CrashRequest, Facing
 
 _GAP_M = 0.05
 _MOST_SHARED = 0.1

@@ -25,8 +25,7 @@ from augment.scene.entities import (
     TrafficAgent,
     TurnType,
 )
-from augment.scene.intent import LaneChoice, Side
-from augment.scene.intent_words import Setting
+from augment.scene.intent import LaneChoice, Setting, Side
 from augment.scene.lane_graph import AnyLane, LanePosition
 
 _STEP_M = 0.25

@@ -6,9 +6,8 @@ from dataclasses import dataclass, replace
 
 from augment.checks import Ground, Severity
 from augment.checks.against_intent import check_against_intent
-from augment.scene.entities import Scene, TrafficAgent, TurnType
+from augment.scene.entities import Modification, Scene, TrafficAgent, TurnType
 from augment.scene.intent import Intent, Request
-from augment.scene.modification import Modification
 
 _Agents = tuple[TrafficAgent, ...]
 

@@ -9,11 +9,18 @@ import numpy as np
 from augment.baselines.rule_placer_ground import PlacingGround
 from augment.errors import CannotPlace
 from augment.geometry.frames import Pose, wrap
-from augment.scene.entities import AgentType, TrafficAgent
-from augment.scene.intent import LaneChoice, Lateral, Side, VehicleRequest
-from augment.scene.intent_words import Body, Facing, LateralTarget, Nearness
+from augment.scene.entities import LENGTH_WIDTH_M, AgentType, TrafficAgent
+from augment.scene.intent import (
+    Body,
+    Facing,
+    LaneChoice,
+    Lateral,
+    LateralTarget,
+    Nearness,
+    Side,
+    VehicleRequest,
+)
 from augment.scene.lane_graph import LanePosition
-from augment.scene.sizes import LENGTH_WIDTH_M
 
 SIZES_M: dict[Body, tuple[float, float]] = {
     Body.VEHICLE: LENGTH_WIDTH_M[AgentType.VEHICLE],

@@ -7,9 +7,8 @@ import math
 import numpy as np
 
 from augment.baselines.rule_placer_ground import PlacingGround
-from augment.scene.entities import AgentType, Point, TrafficAgent
+from augment.scene.entities import LENGTH_WIDTH_M, AgentType, Point, TrafficAgent
 from augment.scene.intent import Side, WalkRequest
-from augment.scene.sizes import LENGTH_WIDTH_M
 
 WALK_S = 15.0
 """How long a walk takes in interPlan, whatever its length: 0.5 to 1.9 m/s."""

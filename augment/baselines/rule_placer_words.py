@@ -8,16 +8,19 @@ from augment.baselines.rule_placer_cones import CONE_SPACING_M
 from augment.baselines.rule_placer_vehicles import BUMPER_GAP_M, SLIGHT_OFFSET_M
 from augment.baselines.rule_placer_walkers import APART_M
 from augment.scene.intent import (
+    Body,
     ConesRequest,
     CrashRequest,
     LaneChoice,
     Lateral,
+    LateralTarget,
+    Nearness,
     Relation,
     Request,
+    Shape,
     VehicleRequest,
     WalkRequest,
 )
-from augment.scene.intent_words import Body, LateralTarget, Nearness, Shape
 
 _LANES = {
     None: "the ego's lane",

@@ -31,8 +31,8 @@ from augment.checks.landmarks import find_picked, resolve_landmarks
 from augment.checks.lanes_across import LanesAcross
 from augment.checks.registry import findings_on
 from augment.checks.tolerances import USUAL, Tolerances
+from augment.scene.entities import Modification
 from augment.scene.intent import Intent, Move, VehicleRequest, resolve_anchors
-from augment.scene.modification import Modification
 
 ASKED_CHECKS: tuple[AskedCheck, ...] = (
     asked_count,

@@ -16,8 +16,18 @@ from augment.geometry.frames import difference
 from augment.geometry.polyline import FloatArray
 from augment.scene.ego_route import RoutePosition
 from augment.scene.entities import AgentType, AreaKind, LaneConnector, TrafficAgent
-from augment.scene.intent import Intent, Length, Spot, from_ego
-from augment.scene.landmarks import LaneChoice, MapPlace, Pick, Relation, Side, Sight
+from augment.scene.intent import (
+    Intent,
+    LaneChoice,
+    Length,
+    MapPlace,
+    Pick,
+    Relation,
+    Side,
+    Sight,
+    Spot,
+    from_ego,
+)
 
 _STANDS_BELOW_MPS = 0.5
 _BESIDE_M = 15.0

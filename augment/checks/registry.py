@@ -17,8 +17,7 @@ from augment.checks.geometric.places import ego_offset, lane, lane_distance, lan
 from augment.checks.geometric.walks import walk_blocked, walk_crossing
 from augment.checks.ground import Ground
 from augment.checks.situation import ChangedScene, Check
-from augment.scene.entities import Scene
-from augment.scene.modification import Modification
+from augment.scene.entities import Modification, Scene
 
 CHECKS: tuple[Check, ...] = (
     ego_offset,

@@ -13,8 +13,7 @@ from augment.checks.ground import Ground
 from augment.checks.lane_index import Beside, best_aligned
 from augment.checks.surfaces import gaps_m
 from augment.geometry.frames import Box
-from augment.scene.entities import AgentType, TrafficAgent
-from augment.scene.modification import Modification, apply
+from augment.scene.entities import AgentType, Modification, TrafficAgent, apply
 
 VEHICLES = frozenset({AgentType.VEHICLE, AgentType.BUS, AgentType.EGO_VEHICLE})
 STOPPED_BELOW_MPS = 0.5

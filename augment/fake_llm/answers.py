@@ -12,9 +12,8 @@ from dataclasses import replace
 from augment.fake_llm.sight import Task
 from augment.prompts.vectors import compass
 from augment.scene.ego_route import EgoRoute
-from augment.scene.entities import AgentType, Scene, TrafficAgent
+from augment.scene.entities import AgentType, Modification, Scene, TrafficAgent
 from augment.scene.lane_graph import LaneGraph
-from augment.scene.modification import Modification
 
 SEES_NOTHING = "I can't find a scene and an instruction in what I was given."
 

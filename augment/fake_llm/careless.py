@@ -14,9 +14,8 @@ from dataclasses import dataclass, replace
 
 from augment.geometry.frames import wrap
 from augment.scene.ego_route import EgoRoute
-from augment.scene.entities import AgentType, Scene, TrafficAgent
+from augment.scene.entities import AgentType, Modification, Scene, TrafficAgent
 from augment.scene.lane_graph import LaneGraph
-from augment.scene.modification import Modification
 
 SPARED_BY_TOOL = frozenset({"straight-line", "ego-heading"})
 """Mistakes that nobody makes who asks a function for poses on lanes."""

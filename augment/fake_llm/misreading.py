@@ -12,8 +12,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from augment.scene.entities import TurnType
-from augment.scene.intent import Intent, LaneChoice, Length, Relation, Spot, VehicleRequest
-from augment.scene.intent_words import Body
+from augment.scene.intent import Body, Intent, LaneChoice, Length, Relation, Spot, VehicleRequest
 
 _ATTEMPT_SHARE = 0.6
 """So many of the wishes that can't be met are carried out somehow."""

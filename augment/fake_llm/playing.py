@@ -21,9 +21,9 @@ from augment.fake_llm.sight import (
     list_of,
     task_of,
 )
+from augment.scene.codec import intent_to_parts
+from augment.scene.entities import Modification
 from augment.scene.intent import Intent
-from augment.scene.intent_codec import intent_to_parts
-from augment.scene.modification import Modification
 from augment.variants.transcript import ModelRole
 
 UNKNOWN = "I am a stand-in and read no English; this sentence is not on my list of intents."

@@ -9,9 +9,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from augment.geometry.frames import difference, wrap
-from augment.scene.entities import Scene, TrafficAgent
+from augment.scene.entities import Modification, Scene, TrafficAgent
 from augment.scene.lane_graph import LaneGraph
-from augment.scene.modification import Modification
 
 TOOL = "pose_on_lane"
 _MOST_CALLS = 8

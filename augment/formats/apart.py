@@ -22,9 +22,13 @@ from augment.formats.nuplan.scenario import tokens_in
 from augment.formats.readers import READERS, reader_of, recognise
 from augment.formats.reading import Moment, Reader, Reading
 from augment.formats.timeline import Timeline, timeline_of
-from augment.scene.codec import scene_from_document, scene_to_document
-from augment.scene.notes import notes_from_document, notes_to_document
-from augment.scene.recording_codec import recording_from_document, recording_to_document
+from augment.scene.codec import (
+    recording_from_document,
+    recording_to_document,
+    scene_from_document,
+    scene_to_document,
+)
+from augment.scene.recording import notes_from_document, notes_to_document
 
 _MOMENT, _MOMENTS = TypeAdapter(Moment), TypeAdapter(list[Moment])
 _TIMELINE, _TOKENS = TypeAdapter(Timeline), TypeAdapter(tuple[str, ...])

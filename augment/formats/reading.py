@@ -13,8 +13,7 @@ from typing import Protocol
 
 from augment.errors import InvalidDocument
 from augment.scene.entities import Scene
-from augment.scene.notes import Note
-from augment.scene.recording import Recording
+from augment.scene.recording import Note, Recording
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

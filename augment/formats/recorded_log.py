@@ -18,11 +18,9 @@ from augment.formats.road_map import FURTHEST_M, FloatArray, MapExtract, RoadMap
 from augment.formats.roads import road_around
 from augment.formats.strips import RADIUS_M
 from augment.geometry.frames import Pose, wrap
-from augment.scene.entities import AgentType, Origin, Scene, TrafficAgent
+from augment.scene.entities import LENGTH_WIDTH_M, AgentType, Origin, Scene, TrafficAgent
 from augment.scene.lane_graph import LaneGraph
-from augment.scene.notes import Note, SceneNoteKind
-from augment.scene.recording import Recording, Track
-from augment.scene.sizes import LENGTH_WIDTH_M
+from augment.scene.recording import Note, Recording, SceneNoteKind, Track
 
 LONGEST_M = 100.0
 """No road user is longer."""

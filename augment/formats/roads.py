@@ -16,8 +16,8 @@ from augment.formats.road_map import MapExtract, Name, RoadMap
 from augment.formats.strips import Strip, check_count, find_areas, find_strips, join
 from augment.geometry.frames import Pose, difference
 from augment.geometry.polyline import Polyline
-from augment.scene.directions import traffic_side_of, turn_type_of
 from augment.scene.entities import Lane, LaneConnector, TrafficLight
+from augment.scene.lane_graph import traffic_side_of, turn_type_of
 
 MOST_WAYS = 4_000
 

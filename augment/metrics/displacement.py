@@ -16,8 +16,7 @@ from enum import StrEnum
 import numpy as np
 
 from augment.geometry.frames import difference
-from augment.scene.entities import AgentType, TrafficAgent
-from augment.scene.modification import Modification
+from augment.scene.entities import AgentType, Modification, TrafficAgent
 
 
 class ObjectClass(StrEnum):

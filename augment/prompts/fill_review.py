@@ -19,8 +19,7 @@ from augment.prompts.texts import (
     said_by_user,
 )
 from augment.prompts.vectors import changes_text, scene_text
-from augment.scene.entities import Scene
-from augment.scene.modification import Modification
+from augment.scene.entities import Modification, Scene
 
 CANNOT_SEE = "cannot see"
 

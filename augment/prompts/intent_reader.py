@@ -13,8 +13,8 @@ from augment.errors import InvalidDocument, ReplyUnreadable
 from augment.llm.messages import Message, Speaker
 from augment.prompts.blocks import last_object
 from augment.prompts.texts import fill_text, quote, said_by_user
+from augment.scene.codec import intent_from_parts, parts_schema
 from augment.scene.intent import Intent
-from augment.scene.intent_codec import intent_from_parts, parts_schema
 
 _MOST_PROBLEMS = 8
 

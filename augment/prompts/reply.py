@@ -21,8 +21,7 @@ from augment.prompts.blocks import last_object
 from augment.prompts.names import ShortNames, short_names
 from augment.prompts.strict import Strict, validate
 from augment.prompts.vectors import DEFAULT_RADIUS_M
-from augment.scene.entities import AgentType, Scene, TrafficAgent
-from augment.scene.modification import Modification, check_fits
+from augment.scene.entities import AgentType, Modification, Scene, TrafficAgent, check_fits
 
 MOST_AGENTS = 64
 LONGEST_NOTES = 4000

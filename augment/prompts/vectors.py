@@ -25,12 +25,12 @@ from augment.scene.entities import (
     Area,
     Lane,
     LaneConnector,
+    Modification,
     Scene,
     TrafficAgent,
     TrafficDensity,
     TurnType,
 )
-from augment.scene.modification import Modification
 
 SPACING_M = 5.0
 DEFAULT_RADIUS_M = 80.0

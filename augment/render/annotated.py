@@ -18,8 +18,7 @@ from augment.render.camera import Camera
 from augment.render.canvas import Box, MetricCanvas, text_width_px
 from augment.render.edges import mark_box, overlap, within
 from augment.render.labels import draw_labels
-from augment.scene.entities import Point, Scene, TrafficAgent
-from augment.scene.modification import Modification, apply
+from augment.scene.entities import Modification, Point, Scene, TrafficAgent, apply
 
 _RADIUS_PX = 15.0
 _GAP_PX = 3.0

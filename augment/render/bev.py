@@ -22,8 +22,7 @@ from augment.render.palette import MarkStyle
 from augment.render.road import beyond_road, draw_ground
 from augment.render.scale import Corner, draw_grid, draw_scale, scale_box, scale_corner
 from augment.render.signals import draw_goal, draw_signals
-from augment.scene.entities import AgentType, Scene, TrafficAgent
-from augment.scene.modification import Modification, apply
+from augment.scene.entities import AgentType, Modification, Scene, TrafficAgent, apply
 
 
 def draw(

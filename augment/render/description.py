@@ -12,8 +12,7 @@ from dataclasses import dataclass
 
 from augment.geometry.frames import wrap
 from augment.render.marks import is_walking, stands
-from augment.scene.entities import AgentType, Point, Scene, TrafficAgent
-from augment.scene.modification import Modification
+from augment.scene.entities import AgentType, Modification, Point, Scene, TrafficAgent
 
 CHANGED, GONE = "changed", "gone"
 

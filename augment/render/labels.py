@@ -11,9 +11,8 @@ from augment.render import palette
 from augment.render.canvas import Box, MetricCanvas, text_width_px
 from augment.render.edges import mark_box, overlap, within
 from augment.render.scale import raster
-from augment.scene.entities import Scene, TrafficAgent
+from augment.scene.entities import Modification, Scene, TrafficAgent
 from augment.scene.lane_graph import AnyLane
-from augment.scene.modification import Modification
 
 _TEXT_PX = 14
 

@@ -13,9 +13,15 @@ from augment.render.camera import Camera
 from augment.render.canvas import Canvas, MetricCanvas, text_width_px
 from augment.render.marks import draw_mark, draw_motion, draw_walks
 from augment.render.palette import Colour, MarkStyle
-from augment.scene.entities import AgentType, AreaKind, Scene, TrafficAgent, TrafficLight
-from augment.scene.modification import Modification
-from augment.scene.sizes import LENGTH_WIDTH_M
+from augment.scene.entities import (
+    LENGTH_WIDTH_M,
+    AgentType,
+    AreaKind,
+    Modification,
+    Scene,
+    TrafficAgent,
+    TrafficLight,
+)
 
 _TEXT_PX = 14
 _ROW_PX, _SAMPLE_PX, _GAP_PX, _MARGIN_PX = 36.0, 56.0, 18.0, 10.0

@@ -11,8 +11,14 @@ from augment.geometry.polyline import FloatArray
 from augment.render.marks import is_walking, stands
 from augment.render.road import own_lanes
 from augment.render.shapes import resample_line
-from augment.scene.entities import AgentType, AreaKind, Scene, TrafficAgent, TrafficLight
-from augment.scene.modification import Modification
+from augment.scene.entities import (
+    AgentType,
+    AreaKind,
+    Modification,
+    Scene,
+    TrafficAgent,
+    TrafficLight,
+)
 
 _KINDS = {
     AgentType.BUS: "bus",

@@ -16,9 +16,8 @@ from augment.render.labels import draw_labels
 from augment.render.legend import draw_legend
 from augment.render.scale import draw_scale, scale_box, scale_corner
 from augment.render.shapes import sides
-from augment.scene.entities import LaneConnector, Scene, TrafficAgent
+from augment.scene.entities import LaneConnector, Modification, Scene, TrafficAgent, apply
 from augment.scene.lane_graph import AnyLane
-from augment.scene.modification import Modification, apply
 
 NEAR_M = 8.0
 """Lanes this near to something changed are named, and lie over the boxes."""

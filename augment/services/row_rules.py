@@ -25,10 +25,13 @@ from augment.models import (
     Simulation,
     UploadMoment,
 )
-from augment.scene.codec import modification_from_document, scene_from_document
-from augment.scene.intent_codec import intent_from_document
-from augment.scene.notes import notes_from_document
-from augment.scene.recording_codec import recording_from_document
+from augment.scene.codec import (
+    intent_from_document,
+    modification_from_document,
+    recording_from_document,
+    scene_from_document,
+)
+from augment.scene.recording import notes_from_document
 from augment.services.endpoints.editing import EndpointFacts, check_facts
 from augment.services.running.jobs import check_samples
 from augment.services.scenarios.scenes import (

@@ -9,7 +9,7 @@ from enum import StrEnum
 import numpy as np
 
 from augment.errors import CannotDrive
-from augment.scene.modification import Modification
+from augment.scene.entities import Modification
 from augment.scene.recording import Recording
 from augment.simulation.idm_planner import IdmPlanner
 from augment.simulation.planning import Plan, Planner, Situation

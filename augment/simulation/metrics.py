@@ -6,9 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from augment.scene.catalogue import ScenarioType
-from augment.scene.entities import AgentType, TrafficAgent
-from augment.scene.modification import Modification
+from augment.scene.entities import AgentType, Modification, ScenarioType, TrafficAgent
 from augment.simulation.contact import AHEAD_RAD, BEHIND_RAD, bearings, corners, meet, radii
 from augment.simulation.drive import Drive, Expert
 from augment.simulation.encounters import NO_WAY, Collision, off_one_way

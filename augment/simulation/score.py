@@ -11,8 +11,7 @@ from enum import StrEnum
 
 import numpy as np
 
-from augment.scene.catalogue import ScenarioType
-from augment.scene.modification import Modification
+from augment.scene.entities import Modification, ScenarioType
 from augment.simulation.comfort import comfort_signals, is_comfortable
 from augment.simulation.drive import Drive, Expert
 from augment.simulation.encounters import Collision, collisions, ego_ways

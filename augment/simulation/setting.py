@@ -5,8 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from functools import cached_property
 
-from augment.scene.entities import Scene
-from augment.scene.modification import Modification, apply
+from augment.scene.entities import Modification, Scene, apply
 from augment.scene.recording import Recording
 
 

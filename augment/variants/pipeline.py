@@ -13,9 +13,8 @@ from enum import StrEnum
 
 from augment.errors import ModelRefused, ReplyUnreadable, UnknownName
 from augment.llm.patience import Patience
-from augment.scene.entities import Scene
+from augment.scene.entities import Modification, Scene
 from augment.scene.intent import Intent
-from augment.scene.modification import Modification
 from augment.variants.modifier import Modifier
 from augment.variants.recipes import RECIPES, Recipe
 from augment.variants.respondents import RespondentClient, Respondents, Sampling

@@ -15,8 +15,7 @@ from functools import cached_property
 from augment.checks import Ground
 from augment.errors import ToolError
 from augment.geometry.frames import Box, Pose, overlap
-from augment.scene.entities import AgentType, TrafficAgent
-from augment.scene.sizes import LENGTH_WIDTH_M
+from augment.scene.entities import LENGTH_WIDTH_M, AgentType, TrafficAgent
 
 FURTHEST_EDGE_M = 30.0
 """The edge of the road is looked for as far beside a lane."""

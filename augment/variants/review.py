@@ -9,9 +9,8 @@ from augment.checks import Ground
 from augment.llm.messages import DEFAULT_MAX_TOKENS
 from augment.prompts.vectors import DEFAULT_RADIUS_M
 from augment.render.camera import WIDTH_PX
-from augment.scene.entities import Scene
+from augment.scene.entities import Modification, Scene
 from augment.scene.intent import Intent
-from augment.scene.modification import Modification
 from augment.variants.pose_call import CallLimits
 from augment.variants.respondents import Respondents
 from augment.variants.transcript import ModelRole

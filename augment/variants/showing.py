@@ -15,8 +15,7 @@ from augment.prompts import fill, fill_review
 from augment.prompts.lane_curves import lane_curves
 from augment.prompts.names import short_names
 from augment.prompts.vectors import LaneFormat
-from augment.scene.entities import Scene
-from augment.scene.modification import Modification
+from augment.scene.entities import Modification, Scene
 from augment.variants.modifier import form_of
 from augment.variants.recipes import Recipe
 from augment.variants.transcript import ModelRole

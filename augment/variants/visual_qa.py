@@ -17,8 +17,7 @@ from augment.prompts.review import read_questions, read_sight, read_verdict
 from augment.prompts.texts import model_message
 from augment.render.camera import WIDTH_PX, camera_for
 from augment.render.reviewed import draw_for_review
-from augment.scene.entities import Scene
-from augment.scene.modification import Modification
+from augment.scene.entities import Modification, Scene
 from augment.variants.respondents import Inquiry, Messages
 from augment.variants.review import Review, Submission, Verdict
 from augment.variants.transcript import ModelRole

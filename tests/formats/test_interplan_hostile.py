@@ -20,8 +20,7 @@ from augment.formats.yaml_file import (
     read_yaml,
     read_yaml_file,
 )
-from augment.scene.entities import Scene
-from augment.scene.modification import without_traffic
+from augment.scene.entities import Scene, without_traffic
 from tests.fixtures.shelf import whole_scene
 
 TOKEN = "00000000000000ab"

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from augment.scene.catalogue import ScenarioType
-from augment.scene.entities import Scene
-from augment.scene.modification import Modification
+from augment.scene.entities import Modification, ScenarioType, Scene
 from augment.simulation.drive import expert_of, run
 from augment.simulation.pdm_closed import PdmClosed
 from augment.simulation.road import Road

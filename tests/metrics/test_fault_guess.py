@@ -7,8 +7,7 @@ import pytest
 from augment.checks import FindingKind, findings
 from augment.checks.finding import FAULT_OF
 from augment.metrics.fault_guess import FaultClass, first_guess
-from augment.scene.entities import TrafficAgent
-from augment.scene.modification import Modification
+from augment.scene.entities import Modification, TrafficAgent
 from tests.scenes import scene, vehicle
 
 

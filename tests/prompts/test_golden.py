@@ -12,7 +12,7 @@ import pytest
 from augment.prompts.fill import regenerate_messages, result_text
 from augment.prompts.fill_review import viewer_messages
 from augment.prompts.texts import said_by_user
-from augment.scene.modification import Modification
+from augment.scene.entities import Modification
 from augment.variants.modifier import form_of
 from augment.variants.recipes import RECIPES, VQA
 from augment.variants.showing import Shown, shown_prompt

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from augment.scene.modification import without_traffic
+from augment.scene.entities import without_traffic
 from augment.simulation.drive import Drive, run
 from augment.simulation.pdm_closed import PdmClosed
 from augment.simulation.proposals import ORIGINAL_OFFSETS_M, PAPER_OFFSETS_M

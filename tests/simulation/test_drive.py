@@ -16,8 +16,7 @@ from hypothesis import strategies as st
 from augment.errors import CannotDrive
 from augment.geometry.frames import Pose
 from augment.geometry.polyline import Polyline
-from augment.scene.entities import Lane, Scene, TrafficAgent
-from augment.scene.modification import Modification
+from augment.scene.entities import Lane, Modification, Scene, TrafficAgent
 from augment.simulation.drive import ExpertKind, expert_of, run
 from augment.simulation.idm_planner import IdmPlanner
 from augment.simulation.pdm_closed import PdmClosed
@@ -88,7 +87,7 @@ def test_a_moved_or_mirrored_world_gives_the_moved_or_mirrored_drive(
 
 DRIVE = """
 import hashlib
-from augment.scene.modification import Modification
+from augment.scene.entities import Modification
 from augment.simulation.drive import run
 from augment.simulation.pdm_closed import PdmClosed
 from tests.simulation.test_drive import busy

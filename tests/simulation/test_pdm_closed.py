@@ -8,8 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from augment.scene.entities import Area, AreaKind, TrafficAgent
-from augment.scene.modification import Modification
+from augment.scene.entities import Area, AreaKind, Modification, TrafficAgent
 from augment.simulation.drive import run
 from augment.simulation.pdm_closed import PdmClosed, brake, must_brake
 from augment.simulation.planning import Plan, Situation

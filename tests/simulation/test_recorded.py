@@ -8,8 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from augment.scene.entities import AgentType, TrafficAgent
-from augment.scene.modification import Modification
+from augment.scene.entities import AgentType, Modification, TrafficAgent
 from augment.simulation.drive import ExpertKind, expert_of, run
 from augment.simulation.encounters import collisions
 from augment.simulation.pdm_closed import PdmClosed

@@ -10,9 +10,14 @@ import numpy as np
 import pytest
 
 from augment.geometry.polyline import Polyline
-from augment.scene.catalogue import ScenarioType
-from augment.scene.entities import LaneConnector, Scene, TrafficAgent, TrafficLight
-from augment.scene.modification import Modification
+from augment.scene.entities import (
+    LaneConnector,
+    Modification,
+    ScenarioType,
+    Scene,
+    TrafficAgent,
+    TrafficLight,
+)
 from augment.simulation.criticality import criticality
 from augment.simulation.drive import Expert, ExpertKind
 from augment.simulation.encounters import collisions

@@ -9,8 +9,13 @@ import numpy as np
 import pytest
 
 from augment.geometry.polyline import Polyline
-from augment.scene.entities import AgentType, LaneConnector, TrafficAgent, TrafficLight
-from augment.scene.modification import Modification
+from augment.scene.entities import (
+    AgentType,
+    LaneConnector,
+    Modification,
+    TrafficAgent,
+    TrafficLight,
+)
 from augment.scene.recording import Recording, Track
 from augment.simulation.road import Road
 from augment.simulation.setting import DriveSetting

@@ -15,7 +15,7 @@ from arena.config import env
 from augment.render.bev import draw
 from augment.render.camera import camera_for
 from augment.render.shrunken import shrink_png
-from augment.scene.modification import Modification
+from augment.scene.entities import Modification
 from augment.services.scenarios.pictures import store
 from augment.services.scenarios.thumbnails import WIDTHS_PX, thumbnail_of
 from tests import scenes

@@ -15,18 +15,19 @@ from augment.checks.asked.question import Asked, distance_outside, severity_of, 
 from augment.checks.finding import Finding, FindingKind
 from augment.checks.lanes_across import Band
 from augment.checks.tolerances import Tolerances
-from augment.scene.entities import AgentType, TrafficAgent
+from augment.scene.entities import LENGTH_WIDTH_M, AgentType, TrafficAgent
 from augment.scene.intent import (
     ConesRequest,
     CrashRequest,
     LaneChoice,
     Lateral,
+    LateralTarget,
+    Nearness,
+    Shape,
     Side,
     VehicleRequest,
     WalkRequest,
 )
-from augment.scene.intent_words import LateralTarget, Nearness, Shape
-from augment.scene.sizes import LENGTH_WIDTH_M
 
 _SLIGHT_M = 1.5
 """The end of the paper's range for a slight offset."""

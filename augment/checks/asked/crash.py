@@ -21,8 +21,7 @@ from augment.checks.tolerances import CRASH_M, USUAL
 from augment.geometry.frames import difference
 from augment.scene.ego_route import EgoRoute
 from augment.scene.entities import TrafficAgent
-from augment.scene.intent import CrashedCar, CrashRequest, LaneChoice
-from augment.scene.intent_words import Bearing, Facing
+from augment.scene.intent import Bearing, CrashedCar, CrashRequest, Facing, LaneChoice
 
 
 def asked_crash(asked: Asked) -> Iterator[Finding]:

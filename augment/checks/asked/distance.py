@@ -11,8 +11,14 @@ from augment.checks.asked.question import Asked, distance_outside, severity_of
 from augment.checks.finding import Finding, FindingKind
 from augment.checks.tolerances import CRASH_M
 from augment.scene.entities import TrafficAgent
-from augment.scene.intent import ConesRequest, CrashRequest, Relation, VehicleRequest, WalkRequest
-from augment.scene.intent_words import Shape
+from augment.scene.intent import (
+    ConesRequest,
+    CrashRequest,
+    Relation,
+    Shape,
+    VehicleRequest,
+    WalkRequest,
+)
 
 
 def asked_distance(asked: Asked) -> Iterator[Finding]:

@@ -9,8 +9,7 @@ from augment.checks.asked.question import Asked, facing_words, severity_of, side
 from augment.checks.finding import Finding, FindingKind
 from augment.geometry.frames import difference
 from augment.scene.entities import TrafficAgent
-from augment.scene.intent import VehicleRequest
-from augment.scene.intent_words import Body, Facing
+from augment.scene.intent import Body, Facing, VehicleRequest
 
 
 def asked_heading(asked: Asked) -> Iterator[Finding]:

@@ -11,6 +11,7 @@ from augment.checks.lanes_across import LanesAcross
 from augment.checks.tolerances import LONG_VEHICLE_M
 from augment.scene.entities import AgentType, Point, TrafficAgent
 from augment.scene.intent import (
+    Body,
     ConesRequest,
     CrashRequest,
     Intent,
@@ -20,7 +21,6 @@ from augment.scene.intent import (
     VehicleRequest,
     WalkRequest,
 )
-from augment.scene.intent_words import Body
 
 
 class Role(StrEnum):

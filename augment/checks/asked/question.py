@@ -10,9 +10,8 @@ from augment.checks.finding import Finding, Severity
 from augment.checks.lanes_across import LanesAcross
 from augment.checks.tolerances import Tolerances
 from augment.scene.ego_route import EgoRoute
-from augment.scene.entities import Scene, TrafficAgent, TrafficSide
-from augment.scene.intent_words import Facing
-from augment.scene.modification import Modification
+from augment.scene.entities import Modification, Scene, TrafficAgent, TrafficSide
+from augment.scene.intent import Facing
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -18,7 +18,7 @@ from augment.errors import InvalidDocument
 from augment.formats.json_file import read_json
 from augment.formats.road_map import RoadMap, Segment, count_notes
 from augment.scene.entities import AreaKind
-from augment.scene.notes import Note, SceneNoteKind
+from augment.scene.recording import Note, SceneNoteKind
 from augment.scene.schema import problems_of
 
 LICENCE = "CC BY-NC-SA 4.0"

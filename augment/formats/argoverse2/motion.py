@@ -23,9 +23,8 @@ from augment.formats.argoverse2.sensor import map_file_in
 from augment.formats.arrow_file import Columns, read_parquet
 from augment.formats.reading import Moment, Reading, frames_every
 from augment.formats.recorded_log import Log, LoggedTrack, reading_at
-from augment.scene.entities import AgentType
-from augment.scene.notes import Note, SceneNoteKind
-from augment.scene.sizes import LENGTH_WIDTH_M
+from augment.scene.entities import LENGTH_WIDTH_M, AgentType
+from augment.scene.recording import Note, SceneNoteKind
 
 WHAT = "Argoverse 2 forecasting scenario"
 EGO = "AV"

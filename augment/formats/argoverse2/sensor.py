@@ -17,7 +17,7 @@ from augment.formats.argoverse2.log import BOXES, WHAT, read_log
 from augment.formats.argoverse2.map_file import LICENCE, read_map
 from augment.formats.reading import Moment, Reading, frames_every
 from augment.formats.recorded_log import reading_at
-from augment.scene.notes import Note, SceneNoteKind
+from augment.scene.recording import Note, SceneNoteKind
 
 
 class ArgoverseSensor:

@@ -27,9 +27,9 @@ from augment.formats.road_map import (
 from augment.formats.strips import midline
 from augment.formats.xml_file import Element
 from augment.geometry.polyline import Polyline
-from augment.scene.directions import turn_type_of
 from augment.scene.entities import AreaKind, TrafficLight, TurnType
-from augment.scene.notes import Note, SceneNoteKind
+from augment.scene.lane_graph import turn_type_of
+from augment.scene.recording import Note, SceneNoteKind
 
 SPEED_SIGNS = frozenset({"274", "R2-1"})
 """The speed limit of Germany (and of Zamunda), and of the United States; values in m/s."""

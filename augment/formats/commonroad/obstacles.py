@@ -11,9 +11,8 @@ from augment.formats.commonroad.fields import fault, point_of, points_of, real, 
 from augment.formats.recorded_log import LoggedTrack
 from augment.formats.road_map import left_out_notes
 from augment.formats.xml_file import Element
-from augment.scene.entities import AgentType
-from augment.scene.notes import Note, SceneNoteKind
-from augment.scene.sizes import LENGTH_WIDTH_M
+from augment.scene.entities import LENGTH_WIDTH_M, AgentType
+from augment.scene.recording import Note, SceneNoteKind
 
 MOST_STEPS = 100_000
 TYPE_OF = {

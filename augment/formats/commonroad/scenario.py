@@ -19,9 +19,8 @@ from augment.formats.reading import Moment, Reading, frame_in, frames_every
 from augment.formats.recorded_log import LONGEST_GAP_S, Log, reading_at
 from augment.formats.road_map import FloatArray
 from augment.formats.xml_file import Element, read_xml
-from augment.scene.entities import AgentType
-from augment.scene.notes import Note, SceneNoteKind
-from augment.scene.sizes import EGO_LENGTH_M, EGO_WIDTH_M
+from augment.scene.entities import EGO_LENGTH_M, EGO_WIDTH_M, AgentType
+from augment.scene.recording import Note, SceneNoteKind
 
 VERSIONS = ("2018b", "2020a")
 

@@ -16,9 +16,13 @@ import yaml
 
 from augment.checks.ground import Ground
 from augment.escaping import escape_controls
-from augment.scene.catalogue import ScenarioType
-from augment.scene.entities import SceneOptions, TrafficDensity, TurnType
-from augment.scene.modification import Modification
+from augment.scene.entities import (
+    Modification,
+    ScenarioType,
+    SceneOptions,
+    TrafficDensity,
+    TurnType,
+)
 
 STANDING_WALK_M: Final = 1.5
 """A walk up to here is a worker's: interPlan's construction workers step 1.0 m."""

@@ -34,9 +34,14 @@ from augment.formats.interplan.schema import (
 from augment.formats.yaml_file import read_yaml
 from augment.geometry.frames import Pose, wrap
 from augment.scene.density import ExtraAgent, spawn_traffic
-from augment.scene.entities import AgentType, Point, Scene, TrafficAgent
-from augment.scene.modification import Modification
-from augment.scene.sizes import LENGTH_WIDTH_M
+from augment.scene.entities import (
+    LENGTH_WIDTH_M,
+    AgentType,
+    Modification,
+    Point,
+    Scene,
+    TrafficAgent,
+)
 
 Place = tuple[str, int]
 """A key of a special scenario and the number of a row under it."""

@@ -12,7 +12,7 @@ from typing import Annotated, Any, TypeVar
 from pydantic import BaseModel, ConfigDict, Field, Strict, ValidationError
 
 from augment.errors import InvalidDocument
-from augment.scene.catalogue import ScenarioType
+from augment.scene.entities import ScenarioType
 from augment.scene.schema import path, problems_of
 
 WHAT = "interPlan file"

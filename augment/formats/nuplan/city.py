@@ -22,9 +22,9 @@ from augment.formats.nuplan.sqlite import WHAT, open_tables
 from augment.formats.road_map import RoadMap, Segment, count_notes, limit_notes
 from augment.formats.strips import RADIUS_M
 from augment.geometry.polyline import Polyline
-from augment.scene.directions import turn_type_of
 from augment.scene.entities import AreaKind, TrafficLight, TrafficSide, TurnType
-from augment.scene.notes import Note, SceneNoteKind
+from augment.scene.lane_graph import turn_type_of
+from augment.scene.recording import Note, SceneNoteKind
 
 BICYCLE_LANE = 1
 TURN_OF = {0: TurnType.STRAIGHT, 1: TurnType.LEFT, 2: TurnType.RIGHT, 3: TurnType.U_TURN}

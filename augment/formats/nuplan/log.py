@@ -17,8 +17,7 @@ import numpy as np
 from augment.errors import InvalidDocument
 from augment.formats.nuplan.sqlite import WHAT, Tables
 from augment.formats.recorded_log import Log, LoggedTrack
-from augment.scene.entities import AgentType, TrafficLight
-from augment.scene.sizes import EGO_LENGTH_M, EGO_WIDTH_M
+from augment.scene.entities import EGO_LENGTH_M, EGO_WIDTH_M, AgentType, TrafficLight
 
 REAR_AXLE_TO_CENTER_M = 1.461
 STEP_US = 100_000

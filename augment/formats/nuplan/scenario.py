@@ -31,7 +31,7 @@ from augment.formats.nuplan.sqlite import WHAT, Tables, open_tables
 from augment.formats.reading import Moment, Reading, frames_every
 from augment.formats.recorded_log import reading_at
 from augment.geometry.frames import Pose
-from augment.scene.notes import Note, SceneNoteKind
+from augment.scene.recording import Note, SceneNoteKind
 
 LICENCE = "nuPlan, CC BY-NC-SA 4.0"
 TAG = "tag:"

@@ -23,7 +23,7 @@ from augment.formats.road_map import (
 )
 from augment.formats.scenarionet.unpickling import WHAT
 from augment.scene.entities import AreaKind, TrafficLight, TrafficSide
-from augment.scene.notes import Note, SceneNoteKind
+from augment.scene.recording import Note, SceneNoteKind
 
 CONNECTOR = "LANE_SURFACE_UNSTRUCTURE"
 LANES = frozenset(

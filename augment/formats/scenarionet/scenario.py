@@ -20,9 +20,8 @@ from augment.formats.road_map import FloatArray, left_out_notes
 from augment.formats.scenarionet.city import city_of
 from augment.formats.scenarionet.folder import file_in, is_data_set, names_in
 from augment.formats.scenarionet.unpickling import WHAT, read_pickle
-from augment.scene.entities import AgentType
-from augment.scene.notes import Note, SceneNoteKind
-from augment.scene.sizes import LENGTH_WIDTH_M
+from augment.scene.entities import LENGTH_WIDTH_M, AgentType
+from augment.scene.recording import Note, SceneNoteKind
 
 TYPE_OF = {
     "VEHICLE": AgentType.VEHICLE,

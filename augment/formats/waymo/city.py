@@ -28,7 +28,7 @@ from augment.formats.road_map import (
 from augment.formats.waymo.messages import MapFeatures, features_of
 from augment.formats.waymo.tfrecord import WHAT
 from augment.scene.entities import AreaKind, TrafficLight
-from augment.scene.notes import Note, SceneNoteKind
+from augment.scene.recording import Note, SceneNoteKind
 
 BICYCLE_LANE = 3
 MPS_OF_MPH = 0.44704

@@ -20,7 +20,7 @@ from augment.formats.waymo.city import city_of
 from augment.formats.waymo.messages import read_scenario, states_of
 from augment.formats.waymo.tfrecord import WHAT, read_records, starts_a_record
 from augment.scene.entities import AgentType
-from augment.scene.notes import SceneNoteKind
+from augment.scene.recording import SceneNoteKind
 
 LICENCE = "Waymo Open Dataset licence, non-commercial use"
 TYPE_OF = {

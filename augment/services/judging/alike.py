@@ -8,7 +8,7 @@ from itertools import combinations
 from augment.metrics.displacement import are_alike
 from augment.models import Augmentation
 from augment.scene.codec import modification_from_document
-from augment.scene.modification import Modification
+from augment.scene.entities import Modification
 
 
 def alike_pairs(cells: Mapping[tuple[str, str], Augmentation]) -> tuple[tuple[str, str, str], ...]:

@@ -10,8 +10,7 @@ from typing import NamedTuple
 from augment.metrics.displacement import CLASS_OF, Displacement, ObjectClass
 from augment.models import Augmentation, GenerationJob
 from augment.scene.codec import modification_from_document
-from augment.scene.entities import TrafficAgent
-from augment.scene.modification import Modification
+from augment.scene.entities import Modification, TrafficAgent
 from augment.services.judging.displacement import of_job
 from augment.services.scenarios.scenes import reference_of
 

@@ -19,9 +19,8 @@ from augment.metrics.displacement import (
     summarise,
 )
 from augment.models import Augmentation, GenerationJob, Scenario
-from augment.scene.catalogue import ScenarioType
 from augment.scene.codec import modification_from_document
-from augment.scene.modification import Modification
+from augment.scene.entities import Modification, ScenarioType
 from augment.services.scenarios.scenes import reference_of
 from augment.services.scenarios.types import type_choices, type_rank
 from augment.variants.recipes import SPELLING, spell_variant

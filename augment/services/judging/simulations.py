@@ -14,9 +14,8 @@ from django.db.models import QuerySet
 
 from augment.errors import Conflict
 from augment.models import Augmentation, GenerationJob, Scenario, Simulation
-from augment.scene.codec import modification_from_document
-from augment.scene.modification import Modification
-from augment.scene.recording_codec import recording_from_document
+from augment.scene.codec import modification_from_document, recording_from_document
+from augment.scene.entities import Modification
 from augment.services.scenarios.scenes import reference_of, scene_of
 from augment.services.scenarios.types import type_of
 from augment.services.work import Lease, Settlement, WorkKind

@@ -11,7 +11,7 @@ from django.db.models import Q, QuerySet
 
 from augment.errors import Conflict, UnknownName
 from augment.models import Contestant, GenerationJob, Scenario
-from augment.scene.catalogue import CatalogueSet
+from augment.scene.entities import CatalogueSet
 from augment.services.running.feasible import RUNNABLE
 
 ALL, SET = "all", "set:"

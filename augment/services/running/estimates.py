@@ -12,7 +12,7 @@ from django.db.models import Count, Q, Sum
 from augment.llm.costs import Price, usd_of, worst_case
 from augment.llm.messages import Request
 from augment.models import Augmentation, Contestant, ModelCall, Scenario
-from augment.scene.modification import Modification
+from augment.scene.entities import Modification
 from augment.services.endpoints.prices import price_of
 from augment.services.endpoints.respondents import Respondent, respondents_of
 from augment.services.endpoints.treatments import options_of

@@ -19,7 +19,7 @@ from augment.errors import (
 from augment.llm.client import ChatClient
 from augment.llm.costs import Price, WorstCase
 from augment.models import Endpoint, IntentReading, ModelCall, Scenario
-from augment.scene.intent_codec import intent_to_document
+from augment.scene.codec import intent_to_document
 from augment.services.clock import DATABASE_TIME
 from augment.services.endpoints.call_limits import Queue
 from augment.services.endpoints.client import EndpointClient

@@ -31,8 +31,7 @@ from augment.llm.client import ChatClient
 from augment.llm.cutting import shorten
 from augment.models import Augmentation, Contestant, Endpoint
 from augment.scene.codec import modification_from_document, modification_to_document
-from augment.scene.entities import Scene
-from augment.scene.modification import Modification
+from augment.scene.entities import Modification, Scene
 from augment.services.clock import Moment
 from augment.services.endpoints.call_limits import Queue
 from augment.services.endpoints.client import EndpointClient

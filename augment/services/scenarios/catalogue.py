@@ -17,12 +17,14 @@ from django.db import transaction
 
 from augment.errors import Conflict, UnknownName
 from augment.models import Augmentation, BaseScene, Scenario
-from augment.scene.catalogue import CatalogueSet
-from augment.scene.catalogue_codec import CatalogueEntry
-from augment.scene.codec import modification_to_document, scene_to_document
-from augment.scene.entities import Scene
-from augment.scene.intent_codec import intent_to_document
-from augment.scene.intent_words import IntentOrigin
+from augment.scene.codec import (
+    CatalogueEntry,
+    intent_to_document,
+    modification_to_document,
+    scene_to_document,
+)
+from augment.scene.entities import CatalogueSet, Scene
+from augment.scene.intent import IntentOrigin
 from augment.services.events import log_event
 from augment.services.scenarios.catalogue_files import folder_of, read_catalogue
 from augment.services.scenarios.scenes import add_scenario, content_hash

@@ -22,12 +22,9 @@ from augment.checks.tolerances import AUTHORED
 from augment.geometry.polyline import FloatArray
 from augment.prompts.vectors import DEFAULT_RADIUS_M
 from augment.render.camera import Camera, camera_for
-from augment.scene.catalogue import CatalogueSet
-from augment.scene.catalogue_codec import CatalogueEntry
-from augment.scene.entities import Scene
-from augment.scene.intent_codec import intent_to_parts
+from augment.scene.codec import CatalogueEntry, intent_to_parts
+from augment.scene.entities import CatalogueSet, Scene, without_traffic
 from augment.scene.intent_statements import list_statements
-from augment.scene.modification import without_traffic
 from augment.services.scenarios.catalogue_files import folder_of, read_catalogue
 from augment.services.scenarios.catalogue_rules import RULES, StagedScenario, find_sparse
 from augment.services.scenarios.way_past import WayPast, way_past

@@ -11,11 +11,8 @@ from typing import TypeVar
 
 from augment.errors import InvalidDocument, InvalidModification
 from augment.formats.json_file import read_json
-from augment.scene.catalogue import CatalogueSet
-from augment.scene.catalogue_codec import CatalogueEntry, entry_from_document
-from augment.scene.codec import scene_from_document
-from augment.scene.entities import Scene
-from augment.scene.modification import without_traffic
+from augment.scene.codec import CatalogueEntry, entry_from_document, scene_from_document
+from augment.scene.entities import CatalogueSet, Scene, without_traffic
 from augment.services.scenarios.scenes import check_reference, check_slug
 
 Read = TypeVar("Read")

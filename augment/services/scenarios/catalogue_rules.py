@@ -20,12 +20,9 @@ from augment.checks.situation import VEHICLES, is_stopped
 from augment.checks.surfaces import gaps_m
 from augment.geometry.frames import Box, Pose, overlap
 from augment.render.camera import Camera, camera_for
-from augment.scene.catalogue import ScenarioType
-from augment.scene.catalogue_codec import ENGLISH, CatalogueEntry
-from augment.scene.entities import AgentType, Scene, TrafficAgent
-from augment.scene.intent import LaneChoice
-from augment.scene.intent_words import Setting
-from augment.scene.landmarks import MapPlace
+from augment.scene.codec import ENGLISH, CatalogueEntry
+from augment.scene.entities import AgentType, ScenarioType, Scene, TrafficAgent
+from augment.scene.intent import LaneChoice, MapPlace, Setting
 
 TOUCH_M = 0.1
 """The widest gap between cars that have crashed."""

@@ -10,7 +10,7 @@ from typing import Any
 from augment.models import Augmentation, Scenario
 from augment.render.description import describe
 from augment.scene.codec import modification_from_document
-from augment.scene.modification import Modification
+from augment.scene.entities import Modification
 from augment.services.scenarios.scenes import scene_of
 
 Description = list[dict[str, Any]]

@@ -15,10 +15,15 @@ from augment.geometry.frames import Pose, difference, wrap
 from augment.models import Scenario
 from augment.render.camera import AROUND_THE_EGO
 from augment.scene.codec import modification_from_document, modification_to_document
-from augment.scene.entities import AgentType, Point, Scene, TrafficAgent
+from augment.scene.entities import (
+    LENGTH_WIDTH_M,
+    AgentType,
+    Modification,
+    Point,
+    Scene,
+    TrafficAgent,
+)
 from augment.scene.lane_graph import LaneGraph
-from augment.scene.modification import Modification
-from augment.scene.sizes import LENGTH_WIDTH_M
 from augment.services.scenarios.scenes import check_reference, scene_key, scene_of
 
 PLACED = tuple(one for one in AgentType if one is not AgentType.EGO_VEHICLE)

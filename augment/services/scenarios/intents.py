@@ -9,9 +9,9 @@ from django.db import transaction
 
 from augment.errors import Conflict, UnknownName
 from augment.models import IntentReading, Scenario
-from augment.scene.intent_codec import intent_from_document
+from augment.scene.codec import intent_from_document
+from augment.scene.intent import IntentOrigin
 from augment.scene.intent_statements import list_statements
-from augment.scene.intent_words import IntentOrigin
 from augment.services.events import log_event
 from augment.services.scenarios.scenes import placeable_intent
 

@@ -15,7 +15,7 @@ from augment.formats.writing import Cell, Loss
 from augment.formats.yaml_file import read_yaml_file
 from augment.models import Augmentation, BaseScene, GenerationJob, Scenario
 from augment.scene.codec import modification_from_document, scene_from_document
-from augment.scene.modification import without_traffic
+from augment.scene.entities import without_traffic
 from augment.services.scenarios.scenes import scene_of
 from augment.services.scenarios.types import type_of
 

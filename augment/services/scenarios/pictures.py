@@ -16,8 +16,7 @@ from augment.render.bev import draw
 from augment.render.camera import Camera, camera_for
 from augment.render.shrunken import shrink
 from augment.scene.codec import modification_from_document
-from augment.scene.entities import Scene
-from augment.scene.modification import Modification
+from augment.scene.entities import Modification, Scene
 from augment.services.scenarios.scenes import reference_of, scene_of
 
 FOLDER = "bev"

@@ -14,7 +14,7 @@ from augment.errors import Conflict, UnknownName
 from augment.models import Contestant, Scenario
 from augment.prompts.texts import prompt_version
 from augment.render.camera import LOOK
-from augment.scene.modification import Modification
+from augment.scene.entities import Modification
 from augment.services.scenarios.pictures import store
 from augment.services.scenarios.scenes import reference_of, scene_key, scene_of
 from augment.variants.options import ContestantOptions, recipe_with

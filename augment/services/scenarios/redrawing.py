@@ -6,7 +6,7 @@ from django.db import transaction
 
 from augment.models import Augmentation, Scenario
 from augment.scene.codec import modification_from_document
-from augment.scene.modification import Modification
+from augment.scene.entities import Modification
 from augment.services.scenarios.pictures import camera_of, original_picture, picture_of, window_of
 from augment.services.scenarios.scenes import scene_of
 

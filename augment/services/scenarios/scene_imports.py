@@ -14,9 +14,8 @@ from augment.errors import Conflict
 from augment.formats.apart import UntrustedInput
 from augment.formats.reading import Moment, Reading
 from augment.models import BaseScene
-from augment.scene.codec import scene_to_document
-from augment.scene.notes import notes_to_document
-from augment.scene.recording_codec import recording_to_document
+from augment.scene.codec import recording_to_document, scene_to_document
+from augment.scene.recording import notes_to_document
 from augment.services.events import log_event
 from augment.services.scenarios.scenes import SLUG_LENGTH, check_slug, content_hash
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from augment.models import BaseScene
-from augment.scene.notes import Note, SceneNoteKind, notes_from_document
+from augment.scene.recording import Note, SceneNoteKind, notes_from_document
 from augment.simulation.proposals import FALLBACK_LIMIT_MPS
 from augment.simulation.road_users import FALLBACK_MPS
 

@@ -6,8 +6,8 @@ from django.db import connection
 
 from augment.fake_llm.sight import same_text
 from augment.models import Scenario
+from augment.scene.codec import intent_from_document
 from augment.scene.intent import Intent
-from augment.scene.intent_codec import intent_from_document
 
 
 class StoredIntents:

@@ -6,8 +6,7 @@ import re
 
 from augment.errors import Conflict, InvalidDocument
 from augment.models import Scenario
-from augment.scene.catalogue import ScenarioType as ScenarioType
-from augment.scene.catalogue import in_type_order as in_type_order
+from augment.scene.entities import ScenarioType
 from augment.services.texts import one_line
 
 LONGEST_TYPE = 40

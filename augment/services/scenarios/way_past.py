@@ -16,9 +16,14 @@ from augment.checks import Ground
 from augment.checks.situation import is_stopped
 from augment.geometry.frames import difference
 from augment.scene.ego_route import EgoRoute
-from augment.scene.entities import Scene, TrafficAgent
-from augment.scene.modification import Modification, apply
-from augment.scene.sizes import EGO_LENGTH_M, EGO_WIDTH_M
+from augment.scene.entities import (
+    EGO_LENGTH_M,
+    EGO_WIDTH_M,
+    Modification,
+    Scene,
+    TrafficAgent,
+    apply,
+)
 
 FloatArray = NDArray[np.float64]
 
