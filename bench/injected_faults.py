@@ -14,8 +14,8 @@ from dataclasses import dataclass, field
 from functools import cache
 
 from augment.checks import Ground
-from augment.checks.against_intent import check_against_intent
 from augment.checks.finding import FaultClass
+from augment.checks.registry import check_against_intent
 from augment.metrics.fault_guess import first_guess
 from augment.scene.ego_route import EgoRoute
 from augment.scene.entities import Modification

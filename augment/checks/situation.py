@@ -9,9 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from augment.checks.finding import Finding
-from augment.checks.ground import Ground
-from augment.checks.lane_index import Beside, best_aligned
-from augment.checks.surfaces import gaps_m
+from augment.checks.ground import Beside, Ground, best_aligned, gaps_m
 from augment.geometry.frames import Box
 from augment.scene.entities import AgentType, Modification, TrafficAgent, apply
 

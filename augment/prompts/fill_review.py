@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from augment.checks.tolerances import USUAL, Tolerances
+from augment.checks.parties import USUAL, Tolerances
 from augment.llm.messages import Message, Speaker
 from augment.prompts.fill import input_format
 from augment.prompts.texts import (

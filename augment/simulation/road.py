@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from augment.checks.surfaces import rings, strips
+from augment.checks.ground import rings, strips
 from augment.errors import CannotDrive
 from augment.geometry.frames import difference
 from augment.scene.ego_route import find_ego_lane

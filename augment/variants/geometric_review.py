@@ -9,7 +9,7 @@ modification in spite of doubts has the last word, in spite of what is wrong it 
 from __future__ import annotations
 
 from augment.checks import Finding, Severity
-from augment.checks.against_intent import check_against_intent
+from augment.checks.registry import check_against_intent
 from augment.prompts.names import short_names
 from augment.variants.review import Review, Submission, Verdict
 

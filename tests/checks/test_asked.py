@@ -8,8 +8,8 @@ from dataclasses import replace
 import pytest
 
 from augment.checks import Finding, FindingKind, Ground, Severity
-from augment.checks.against_intent import check_against_intent
-from augment.checks.tolerances import AUTHORED
+from augment.checks.parties import AUTHORED
+from augment.checks.registry import check_against_intent
 from augment.scene.entities import AgentType, Modification, TrafficAgent, TrafficSide
 from augment.scene.intent import (
     Body,

@@ -8,7 +8,7 @@ from dataclasses import replace
 import pytest
 
 from augment.checks import FindingKind, Ground
-from augment.checks.against_intent import check_against_intent
+from augment.checks.registry import check_against_intent
 from augment.scene.entities import Modification, TrafficAgent
 from augment.scene.intent import (
     Bearing,

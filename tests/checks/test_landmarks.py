@@ -7,9 +7,14 @@ from dataclasses import replace
 import pytest
 
 from augment.checks import Ground
-from augment.checks.against_intent import check_against_intent
-from augment.checks.landmarks import find_mark, find_picked, list_absent, resolve_landmarks
-from augment.checks.lanes_across import LanesAcross
+from augment.checks.lanes_across import (
+    LanesAcross,
+    find_mark,
+    find_picked,
+    list_absent,
+    resolve_landmarks,
+)
+from augment.checks.registry import check_against_intent
 from augment.scene.entities import Modification, TurnType
 from augment.scene.intent import (
     Intent,

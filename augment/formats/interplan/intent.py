@@ -12,9 +12,9 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 from statistics import median
 
-from augment.checks.against_intent import check_against_intent
 from augment.checks.ground import Ground
 from augment.checks.lanes_across import Band, LanesAcross
+from augment.checks.registry import check_against_intent
 from augment.geometry.frames import difference
 from augment.scene.entities import (
     AgentType,

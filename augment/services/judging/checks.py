@@ -6,7 +6,7 @@ The reference and anybody's labels stay out of it.
 from __future__ import annotations
 
 from augment.checks import Finding, Ground
-from augment.checks.against_intent import check_against_intent
+from augment.checks.registry import check_against_intent
 from augment.models import Augmentation
 from augment.scene.codec import modification_from_document
 from augment.services.scenarios.scenes import intent_of, scene_of

@@ -7,7 +7,7 @@ from functools import lru_cache
 from typing import Any
 
 from augment.checks import Ground
-from augment.checks.against_intent import check_against_intent
+from augment.checks.registry import check_against_intent
 from augment.errors import InvalidDocument, InvalidModification
 from augment.models import Scenario
 from augment.scene.entities import Scene

@@ -17,8 +17,8 @@ from typing import Any
 import numpy as np
 
 from augment.checks import Ground
-from augment.checks.against_intent import check_against_intent
-from augment.checks.tolerances import AUTHORED
+from augment.checks.parties import AUTHORED
+from augment.checks.registry import check_against_intent
 from augment.geometry.polyline import FloatArray
 from augment.prompts.vectors import DEFAULT_RADIUS_M
 from augment.render.camera import Camera, camera_for

@@ -14,10 +14,9 @@ from functools import cached_property
 import numpy as np
 
 from augment.checks import Ground
-from augment.checks.landmarks import find_mark
-from augment.checks.lanes_across import LanesAcross
+from augment.checks.ground import gaps_m
+from augment.checks.lanes_across import LanesAcross, find_mark
 from augment.checks.situation import VEHICLES, is_stopped
-from augment.checks.surfaces import gaps_m
 from augment.geometry.frames import Box, Pose, overlap
 from augment.render.camera import Camera, camera_for
 from augment.scene.codec import ENGLISH, CatalogueEntry

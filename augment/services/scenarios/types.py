@@ -6,7 +6,8 @@ import re
 
 from augment.errors import Conflict, InvalidDocument
 from augment.models import Scenario
-from augment.scene.entities import ScenarioType
+from augment.scene.entities import ScenarioType as ScenarioType
+from augment.scene.entities import in_type_order as in_type_order
 from augment.services.texts import one_line
 
 LONGEST_TYPE = 40
