@@ -21,8 +21,8 @@ from augment.simulation.pdm_closed import PdmClosed
 from augment.simulation.planners import OFFSETS_M
 from augment.simulation.road import Road
 from augment.simulation.score import ScoreKind, score_drive
-from augment.simulation.setting import DriveSetting
 from augment.simulation.states import SPEED
+from augment.simulation.traffic import DriveSetting
 from bench.report import table
 from tests.fixtures.shelf import SLUGS, entry, shown_scene
 

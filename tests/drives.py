@@ -16,8 +16,8 @@ from augment.simulation.drive import expert_of, run
 from augment.simulation.pdm_closed import PdmClosed
 from augment.simulation.road import Road
 from augment.simulation.score import ScoreKind, score_drive
-from augment.simulation.setting import DriveSetting
 from augment.simulation.trace import trace_of
+from augment.simulation.traffic import DriveSetting
 from tests.scenes import cone, scene
 
 

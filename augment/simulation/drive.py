@@ -11,13 +11,22 @@ import numpy as np
 from augment.errors import CannotDrive
 from augment.scene.entities import Modification
 from augment.scene.recording import Recording
-from augment.simulation.idm_planner import IdmPlanner
-from augment.simulation.planning import Plan, Planner, Situation
+from augment.simulation.planners import IdmPlanner
 from augment.simulation.road import Road
-from augment.simulation.setting import DriveSetting
-from augment.simulation.states import STEP_S, EgoBody, FloatArray, Objects, X, Y, start_state
+from augment.simulation.states import (
+    STEP_S,
+    EgoBody,
+    FloatArray,
+    Objects,
+    Plan,
+    Planner,
+    Situation,
+    X,
+    Y,
+    start_state,
+)
 from augment.simulation.tracker import drive_steps
-from augment.simulation.traffic import Traffic
+from augment.simulation.traffic import DriveSetting, Traffic
 
 DURATION_STEPS = 150
 

@@ -20,8 +20,7 @@ from augment.scene.ego_route import find_ego_lane
 from augment.scene.entities import AreaKind, Lane, LaneConnector, Scene, TrafficLight, TurnType
 from augment.scene.lane_graph import AnyLane, LaneGraph
 from augment.scene.recording import Recording
-from augment.simulation.path import Path, dense
-from augment.simulation.region import Region
+from augment.simulation.path import Path, Region, dense
 from augment.simulation.states import BoolArray, FloatArray, IntArray
 
 ROUTE_M = 600.0

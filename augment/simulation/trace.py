@@ -16,8 +16,8 @@ from augment.scene.entities import AreaKind
 from augment.simulation.drive import Drive
 from augment.simulation.metrics import OFF_ROAD_M
 from augment.simulation.score import Score
-from augment.simulation.setting import DriveSetting
 from augment.simulation.states import ACCELERATION, SPEED, STEP_S, BoolArray, FloatArray, Kind
+from augment.simulation.traffic import DriveSetting
 
 HARD_BRAKING_MPS2 = -3.0
 

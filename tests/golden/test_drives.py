@@ -7,8 +7,8 @@ from augment.simulation.drive import expert_of, run
 from augment.simulation.pdm_closed import PdmClosed
 from augment.simulation.road import Road
 from augment.simulation.score import ScoreKind, score_drive
-from augment.simulation.setting import DriveSetting
 from augment.simulation.states import SPEED, X, Y
+from augment.simulation.traffic import DriveSetting
 from tests.golden.conftest import Check
 from tests.scenes import junction, pedestrian, vehicle
 from tests.simulation.worlds import street

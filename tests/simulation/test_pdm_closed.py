@@ -10,13 +10,16 @@ import pytest
 
 from augment.scene.entities import Area, AreaKind, Modification, TrafficAgent
 from augment.simulation.drive import run
-from augment.simulation.pdm_closed import PdmClosed, brake, must_brake
-from augment.simulation.planning import Plan, Situation
-from augment.simulation.proposals import ORIGINAL_OFFSETS_M, PAPER_OFFSETS_M
+from augment.simulation.pdm_closed import (
+    ORIGINAL_OFFSETS_M,
+    PAPER_OFFSETS_M,
+    PdmClosed,
+    brake,
+    must_brake,
+)
 from augment.simulation.road import Road
-from augment.simulation.road_users import objects_of
-from augment.simulation.setting import DriveSetting
-from augment.simulation.states import FloatArray, start_state
+from augment.simulation.states import FloatArray, Plan, Situation, start_state
+from augment.simulation.traffic import DriveSetting, objects_of
 from tests.scenes import cone, pedestrian, vehicle
 from tests.simulation.worlds import BODY, states_along, street
 

@@ -18,11 +18,9 @@ from augment.scene.entities import (
     TrafficAgent,
     TrafficLight,
 )
-from augment.simulation.criticality import criticality
 from augment.simulation.drive import Expert, ExpertKind
-from augment.simulation.encounters import collisions
-from augment.simulation.metrics import Metric, combine, red_lights
-from augment.simulation.score import Score, ScoreKind, score_drive
+from augment.simulation.metrics import Metric, collisions, combine, red_lights
+from augment.simulation.score import Score, ScoreKind, criticality, score_drive
 from augment.simulation.states import FloatArray
 from tests.scenes import cone, pedestrian, vehicle
 from tests.simulation.worlds import driven, states_along, street

@@ -18,9 +18,8 @@ from augment.scene.entities import (
 )
 from augment.scene.recording import Recording, Track
 from augment.simulation.road import Road
-from augment.simulation.setting import DriveSetting
 from augment.simulation.states import Objects, start_state
-from augment.simulation.traffic import Traffic
+from augment.simulation.traffic import DriveSetting, Traffic
 from tests.scenes import pedestrian, vehicle
 from tests.simulation.worlds import BODY, street
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from augment.models import BaseScene
 from augment.scene.recording import Note, SceneNoteKind, notes_from_document
-from augment.simulation.proposals import FALLBACK_LIMIT_MPS
-from augment.simulation.road_users import FALLBACK_MPS
+from augment.simulation.pdm_closed import FALLBACK_LIMIT_MPS
+from augment.simulation.traffic import FALLBACK_MPS
 
 
 def notes_of(scene: BaseScene) -> list[str]:
