@@ -17,8 +17,9 @@ import numpy as np
 from augment.scene.entities import Modification, TrafficAgent
 from augment.simulation.drive import run
 from augment.simulation.pdm_closed import ORIGINAL_OFFSETS_M, PAPER_OFFSETS_M, PdmClosed
+from augment.simulation.planning import Plan, Situation
 from augment.simulation.road import Road
-from augment.simulation.states import EgoBody, Plan, Situation
+from augment.simulation.states import EgoBody
 from augment.simulation.tracker import track
 from augment.simulation.traffic import DriveSetting
 from bench.report import load, table, write_section

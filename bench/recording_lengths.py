@@ -19,9 +19,10 @@ from augment.scene.entities import Scene
 from augment.scene.recording import Recording, Track
 from augment.simulation.drive import Drive, Expert, expert_of, run
 from augment.simulation.metrics import progress_ratio
+from augment.simulation.planning import Plan, Situation
 from augment.simulation.road import Road
 from augment.simulation.score import score_drive
-from augment.simulation.states import STEP_S, EgoBody, Plan, Situation
+from augment.simulation.states import STEP_S, EgoBody
 from augment.simulation.traffic import DriveSetting
 from bench.report import ROOT, table, write_block
 from tests.recorded import recorded

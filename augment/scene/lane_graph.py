@@ -72,6 +72,20 @@ class LaneGraph:
             sorted(self._previous[lane_id], key=lambda name: self._bend_back(name, lane_id))
         )
 
+    def abreast(self, lane_id: str) -> tuple[str, ...]:
+        """Return a lane and its neighbours of the same direction; a connector alone."""
+        names, waiting = [lane_id], [self.lane(lane_id)]
+        while waiting:
+            here = waiting.pop()
+            if not isinstance(here, Lane):
+                continue
+            for name in (here.left_neighbor, here.right_neighbor):
+                beside = self.lanes.get(name or "")
+                if isinstance(beside, Lane) and beside.id not in names:
+                    names.append(beside.id)
+                    waiting.append(beside)
+        return tuple(names)
+
     def under(self, x_m: float, y_m: float, heading_rad: float | None = None) -> str | None:
         """The lane whose width covers the point; of several the best aligned, else the nearest."""
         covering = [

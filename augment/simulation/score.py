@@ -1,7 +1,8 @@
-"""The driving score: nuPlan's closed-loop score, or interPlan's by scenario type.
+"""The driving score, and how close a drive came to going wrong.
 
-Sources: nuPlan's metric configuration and interPlan's aggregator, by the facts in
-docs/simulation.md, which also says what differs.
+The score is nuPlan's closed-loop score, or interPlan's by scenario type. Sources: nuPlan's metric
+configuration and interPlan's aggregator, by the facts in docs/simulation.md, which also says what
+differs.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from augment.simulation.metrics import (
     allows_detour,
     collisions,
     combine,
+    comfort,
     direction,
     drivable_area,
     ego_ways,
@@ -32,7 +34,6 @@ from augment.simulation.metrics import (
     time_to_collision,
     ttc_series,
 )
-from augment.simulation.proposal_scores import comfort_signals, is_comfortable
 from augment.simulation.states import (
     HEADING,
     SPEED,
@@ -43,6 +44,10 @@ from augment.simulation.states import (
     meet,
     radii,
 )
+
+CROSSING_RAD = math.radians(20.0)
+"""Paths that meet at a flatter angle follow each other; they have no encroachment."""
+_CLOSEST_M = 0.1
 
 
 class ScoreKind(StrEnum):
@@ -91,7 +96,7 @@ def score_drive(
     ways = ego_ways(drive.road, drive.boxes[:, :2], drive.states[:, HEADING])
     is_special = kind is ScoreKind.INTERPLAN and allows_detour(scenario_type)
     parts = [
-        no_fault_collisions(drive, met),
+        no_fault_collisions(met),
         drivable_area(drive),
         making_progress(drive, expert),
         direction(drive, ways, weight=1.0 if is_special else None),
@@ -108,29 +113,9 @@ def score_drive(
     return Score(kind=kind, value=combine(metrics), metrics=metrics, collisions=met, expert=expert)
 
 
-def comfort(drive: Drive) -> Metric:
-    """1 if every signal stays within its limits throughout."""
-    if len(drive.states) < 2:
-        return Metric(name="ego_is_comfortable", value=None, weight=2.0)
-    signals = comfort_signals(drive.states, drive.body)
-    parts = {f"most_{name}": float(np.abs(series).max()) for name, series in signals.items()}
-    return Metric(
-        name="ego_is_comfortable",
-        value=float(is_comfortable(signals).all()),
-        weight=2.0,
-        parts=parts,
-        series=signals,
-    )
-
-
-CROSSING_RAD = math.radians(20.0)
-"""Paths that meet at a flatter angle follow each other; they have no encroachment."""
-_CLOSEST_M = 0.1
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Criticality:
-    """None where nothing of the kind happened.
+    """Measures of the safety literature; None where nothing of the kind happened.
 
     Attributes:
         least_ttc_s: The shortest time, below 3 s, to a collision if both go on as they do.
@@ -148,16 +133,17 @@ class Criticality:
 
 
 def criticality(drive: Drive, met: tuple[Collision, ...]) -> Criticality:
-    """The measures of one drive."""
-    ttc = float(ttc_series(drive, met, only_relevant=False).min())
-    needed = [_deceleration(drive, moment) for moment in range(len(drive.states))]
-    closest = [_distance(drive, moment) for moment in range(len(drive.states))]
-    pet = _encroachment(drive)
+    """Measure one drive."""
+    ttc_s = float(ttc_series(drive, met, only_relevant=False).min())
+    busy = [moment for moment, objects in enumerate(drive.objects) if len(objects)]
+    needed = [_deceleration(drive, moment) for moment in busy]
+    closest = [_distance(drive.boxes[moment], drive.objects[moment]) for moment in busy]
+    pet_s = min((_encroachment(drive, name) for name in _names(drive)), default=math.inf)
     return Criticality(
-        least_ttc_s=None if math.isinf(ttc) else ttc,
-        least_pet_s=None if math.isinf(pet) else pet,
-        most_deceleration_mps2=max(needed) or None,
-        least_distance_m=None if math.isinf(min(closest)) else min(closest),
+        least_ttc_s=None if math.isinf(ttc_s) else ttc_s,
+        least_pet_s=None if math.isinf(pet_s) else pet_s,
+        most_deceleration_mps2=max(needed, default=0.0) or None,
+        least_distance_m=min(closest, default=None),
     )
 
 
@@ -167,8 +153,6 @@ def criticality(drive: Drive, met: tuple[Collision, ...]) -> Criticality:
 def _deceleration(drive: Drive, moment: int) -> float:
     """(closing speed)^2 / (2 gap) to whoever is in the strip straight ahead, the largest."""
     objects, state = drive.objects[moment], drive.states[moment]
-    if not len(objects):
-        return 0.0
     cos, sin = math.cos(state[HEADING]), math.sin(state[HEADING])
     rim = corners(objects.boxes) - drive.boxes[moment, :2]
     along = rim[..., 0] * cos + rim[..., 1] * sin
@@ -182,47 +166,29 @@ def _deceleration(drive: Drive, moment: int) -> float:
     return float(needed.max())
 
 
-def _distance(drive: Drive, moment: int) -> float:
+def _distance(box: FloatArray, objects: Objects) -> float:
     """From the ego's body to the nearest other."""
     import shapely
 
-    objects, box = drive.objects[moment], drive.boxes[moment]
-    if not len(objects):
-        return math.inf
-    apart = np.hypot(*(objects.boxes[:, :2] - box[:2]).T)
-    least = apart - radii(objects.boxes) - radii(box)
-    most = apart - objects.boxes[:, 4] / 2.0 - box[4] / 2.0
-    near = objects.chosen(least <= most.min())
-    bodies = shapely.polygons(corners(near.boxes))
+    bodies = shapely.polygons(corners(objects.boxes))
     return float(shapely.distance(bodies, shapely.Polygon(corners(box))).min())
 
 
-def _encroachment(drive: Drive) -> float:
-    """The least |time of the ego - time of the other| at one place, over crossing ways."""
-    least_s = math.inf
-    mine = drive.boxes
-    for moments, boxes in _tracks(drive.objects).values():
-        if np.ptp(boxes[:, :2], axis=0).max() < 1.0:
-            continue
-        reach = radii(mine[0]) + radii(boxes[0])
-        apart = ((mine[:, None, :2] - boxes[None, :, :2]) ** 2).sum(axis=-1)
-        ego, other = np.nonzero(apart <= reach**2)
-        angle = np.abs(np.sin(mine[ego, 2] - boxes[other, 2]))
-        crossing = angle >= math.sin(CROSSING_RAD)
-        ego, other = ego[crossing], other[crossing]
-        hit = meet(mine[ego], boxes[other])
-        if hit.any():
-            lag = np.abs(ego[hit] - moments[other[hit]]).min() * STEP_S
-            least_s = min(least_s, float(lag))
-    return least_s
+def _names(drive: Drive) -> list[str]:
+    return list(dict.fromkeys(name for objects in drive.objects for name in objects.ids))
 
 
-def _tracks(rows: list[Objects]) -> dict[str, tuple[FloatArray, FloatArray]]:
-    """Moments (K,) and boxes (K, 5) of each object."""
-    moments: dict[str, list[int]] = {}
-    boxes: dict[str, list[FloatArray]] = {}
-    for moment, objects in enumerate(rows):
-        for name, box in zip(objects.ids, objects.boxes, strict=True):
-            moments.setdefault(name, []).append(moment)
-            boxes.setdefault(name, []).append(box)
-    return {name: (np.array(moments[name]), np.array(boxes[name])) for name in moments}
+def _encroachment(drive: Drive, name: str) -> float:
+    """The least |time of the ego - time of an object| at one place, over crossing ways."""
+    moments = np.array([t for t, objects in enumerate(drive.objects) if name in objects.ids])
+    rows = [drive.objects[moment] for moment in moments]
+    theirs = np.array([objects.boxes[objects.ids.index(name)] for objects in rows])
+    if np.ptp(theirs[:, :2], axis=0).max() < 1.0:
+        return math.inf
+    reach = radii(drive.boxes[0]) + radii(theirs[0])
+    apart = ((drive.boxes[:, None, :2] - theirs[None, :, :2]) ** 2).sum(axis=-1)
+    turns = np.abs(np.sin(drive.boxes[:, None, 2] - theirs[None, :, 2]))
+    ego, other = np.nonzero((apart <= reach**2) & (turns >= math.sin(CROSSING_RAD)))
+    hit = meet(drive.boxes[ego], theirs[other])
+    lags = np.abs(ego[hit] - moments[other[hit]])
+    return float(lags.min()) * STEP_S if len(lags) else math.inf

@@ -19,8 +19,9 @@ from augment.models import GenerationJob, Simulation
 from augment.services.judging import driving_scores, simulations
 from augment.services.judging.simulations import DRIVES, Options
 from augment.services.work import Settlement
+from augment.simulation.planning import Plan, Situation
 from augment.simulation.road import Road
-from augment.simulation.states import EgoBody, Plan, Situation
+from augment.simulation.states import EgoBody
 from tests.jobs import rows
 
 pytestmark = pytest.mark.django_db

@@ -20,9 +20,10 @@ from augment.scene.entities import Lane, Modification, Scene, TrafficAgent
 from augment.simulation.drive import ExpertKind, expert_of, run
 from augment.simulation.pdm_closed import PdmClosed
 from augment.simulation.planners import IdmPlanner
+from augment.simulation.planning import Plan, Situation
 from augment.simulation.road import Road
 from augment.simulation.score import score_drive
-from augment.simulation.states import EgoBody, Plan, Situation, X, Y
+from augment.simulation.states import EgoBody, X, Y
 from augment.simulation.traffic import DriveSetting
 from tests.properties import examples
 from tests.scenes import pedestrian, vehicle

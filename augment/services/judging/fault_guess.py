@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from augment.checks.finding import FaultClass
 from augment.errors import InvalidDocument, InvalidModification
-from augment.metrics.fault_guess import FaultClass, first_guess
+from augment.metrics.fault_guess import first_guess
 from augment.models import Augmentation
 from augment.services.judging.checks import findings_of
 

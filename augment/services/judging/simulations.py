@@ -22,9 +22,9 @@ from augment.services.work import Lease, Settlement, WorkKind
 from augment.simulation.drive import Drive, expert_of, run
 from augment.simulation.metrics import red_lights
 from augment.simulation.planners import NAMED, PDM_CLOSED, planner_named
+from augment.simulation.planning import Planner
 from augment.simulation.road import Road
 from augment.simulation.score import Score, ScoreKind, criticality, score_drive
-from augment.simulation.states import Planner
 from augment.simulation.trace import trace_of
 from augment.simulation.traffic import DriveSetting
 

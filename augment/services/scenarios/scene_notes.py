@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from augment.models import BaseScene
 from augment.scene.recording import Note, SceneNoteKind, notes_from_document
-from augment.simulation.pdm_closed import FALLBACK_LIMIT_MPS
+from augment.simulation.planning import FALLBACK_LIMIT_MPS
 from augment.simulation.traffic import FALLBACK_MPS
 
 
