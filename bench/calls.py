@@ -16,9 +16,9 @@ from augment.models import EndpointModel
 from augment.services.endpoints.contestants import add_contestant
 from augment.services.endpoints.known_endpoints import ensure_endpoint
 from augment.services.running import jobs, runner
-from augment.services.running.caps import Caps
+from augment.services.running.budget import Caps
+from augment.services.running.calls import RowTranscript
 from augment.services.running.runner import AUGMENTATIONS
-from augment.services.running.transcripts import RowTranscript
 from augment.variants.recording_client import RecordingClient
 from augment.variants.transcript import ModelRole
 from tests.jobs.rows import add_scenario, only_row

@@ -11,12 +11,10 @@ from rest_framework.response import Response
 
 from arena.api.access import ADMINS, STAFF
 from arena.api.fields import StrictSerializer, TextField
-from arena.api.paging import PageQuery, answer_page, page_of
-from arena.api.schema import operation
-from arena.api.views import ApiView
+from arena.api.views import ApiView, PageQuery, answer_page, operation, page_of
 from augment.models import Contestant
-from augment.services.endpoints.entering import VARIANTS, EnteredEndpoint, enter_contestant
-from augment.services.running.transcript_export import contestant_documents
+from augment.services.endpoints.contestants import VARIANTS, EnteredEndpoint, enter_contestant
+from augment.services.running.transcript_records import contestant_documents
 
 KINDS = [kind.value for kind in Contestant.Kind if kind is not Contestant.Kind.CHECK]
 

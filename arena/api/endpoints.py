@@ -14,12 +14,11 @@ from rest_framework.request import Request
 
 from arena.api.access import ADMINS, STAFF
 from arena.api.fields import FlagField, StrictSerializer, TextField, WholeNumberField
-from arena.api.schema import operation
-from arena.api.views import ApiView, WarnedDocument, keep_and_send
-from arena.queries.probes import probe_lines
+from arena.api.views import ApiView, WarnedDocument, keep_and_send, operation
+from arena.contestants.queries import probe_lines
 from augment.models import Endpoint, EndpointModel, Probe
-from augment.services.endpoints import editing
-from augment.services.endpoints.editing import EndpointFacts
+from augment.services.endpoints import known_endpoints
+from augment.services.endpoints.known_endpoints import EndpointFacts
 from augment.services.endpoints.probing import plan_probe
 from augment.tasks import enqueue_probe
 
@@ -44,14 +43,14 @@ class EndpointBody(StrictSerializer):
     base_url = TextField(max_length=200)
     key_variable = TextField(max_length=80, required=False, default="", allow_blank=True)
     max_concurrency = WholeNumberField(
-        required=False, default=4, min_value=1, max_value=editing.HIGHEST_CONCURRENCY
+        required=False, default=4, min_value=1, max_value=known_endpoints.HIGHEST_CONCURRENCY
     )
     requests_per_minute = WholeNumberField(
         required=False,
         default=None,
         allow_null=True,
         min_value=1,
-        max_value=editing.HIGHEST_PER_MINUTE,
+        max_value=known_endpoints.HIGHEST_PER_MINUTE,
     )
 
 
@@ -124,7 +123,7 @@ class EndpointsView(ApiView):
     )
     def post(self, request: Request, given: dict[str, Any]) -> Endpoint:
         """409 where the label is taken."""
-        return editing.add_endpoint(
+        return known_endpoints.add_endpoint(
             label=given.pop("label"),
             is_simulated=given.pop("is_simulated"),
             facts=EndpointFacts(**given),
@@ -147,7 +146,7 @@ class ModelsView(ApiView):
     def post(self, request: Request, code: uuid.UUID, given: dict[str, Any]) -> EndpointModel:
         """Comes with its listed price; all else is unknown before a probe."""
         row = get_object_or_404(Endpoint, code=code)
-        return editing.add_model(row, model=given["model"], actor=self.user)
+        return known_endpoints.add_model(row, model=given["model"], actor=self.user)
 
 
 class ProbeView(ApiView):

@@ -14,36 +14,28 @@ from django.utils.text import slugify
 from rest_framework.request import Request
 
 from arena.api.access import STAFF
-from arena.api.schema import file_operation
-from arena.api.snapshots import get_snapshot
-from arena.api.views import FileView, as_file
+from arena.api.views import FileView, as_file, file_operation
 from arena.errors import NoSnapshot
 from arena.exports.bundle import bundle
 from arena.exports.charts.rating import CONTENT_TYPES, chart_bytes
 from arena.exports.formats import Format, format_named
-from arena.exports.jobs import (
-    analyses,
-    augmentations,
-    displacement_objects,
-    displacement_table,
-    faults,
-    tool_calls,
-)
-from arena.exports.jobs.displacement_writers import FORMATS as DISPLACEMENT
-from arena.exports.jobs.driving_table import DrivingTable
-from arena.exports.jobs.driving_writers import FORMATS as DRIVING
 from arena.exports.tables import leaderboard_table
 from arena.exports.votes import VOTE_FORMATS, vote_table
 from arena.exports.writers import FORMATS as LEADERBOARD
 from arena.exports.zips import CONTENT_TYPE as ZIP_TYPE
+from arena.jobs.exports import displacement, faults, tables
+from arena.jobs.exports.displacement import FORMATS as DISPLACEMENT
+from arena.jobs.exports.driving import FORMATS as DRIVING
+from arena.jobs.exports.driving import DrivingTable
+from arena.jobs.queries import analysis_of
 from arena.models import Snapshot
-from arena.queries.analyses import analysis_of
+from arena.results.api import get_snapshot
 from augment.errors import UnknownName
 from augment.models import GenerationJob
 from augment.services.judging.displacement import By
 from augment.services.judging.driving_scores import options_driven, scores_of_job
 from augment.services.judging.simulations import SCORES, Options
-from augment.services.running.tool_calls import tool_calls_by_augmentation
+from augment.services.running.progress import tool_calls_by_augmentation
 
 Export = tuple[Mapping[str, Format[Any]], Callable[[GenerationJob], Any]]
 CHARTS = ("pairs", "types")
@@ -56,27 +48,24 @@ def _driving(score: str, job: GenerationJob) -> DrivingTable:
 
 
 def _displacement(by: By, job: GenerationJob) -> Any:
-    return displacement_table.displacement_table(job, by=by, types=None)
+    return displacement.displacement_table(job, by=by, types=None)
 
 
 def _analysis(part: str, job: GenerationJob) -> Any:
-    return analyses.analysis_table(analysis_of(job), part)
+    return tables.analysis_table(analysis_of(job), part)
 
 
 OF_JOBS: dict[str, Export] = {
-    "tool-calls": (tool_calls.FORMATS, tool_calls_by_augmentation),
-    "augmentations": (augmentations.AUGMENTATION_FORMATS, augmentations.augmentation_rows),
-    "repeats": (augmentations.REPEAT_FORMATS, augmentations.repeat_rows),
+    "tool-calls": (tables.FORMATS, tool_calls_by_augmentation),
+    "augmentations": (tables.AUGMENTATION_FORMATS, tables.augmentation_rows),
+    "repeats": (tables.REPEAT_FORMATS, tables.repeat_rows),
     "faults": (faults.FORMATS, faults.fault_table),
-    "displacement-objects": (
-        displacement_objects.OBJECT_FORMATS,
-        displacement_objects.object_rows,
-    ),
+    "displacement-objects": (displacement.OBJECT_FORMATS, displacement.object_rows),
     **{f"displacement-by-{by.value}": (DISPLACEMENT, partial(_displacement, by)) for by in By},
     **{f"driving-{score}": (DRIVING, partial(_driving, score)) for score in SCORES},
     **{
-        f"analyses-{part}": (analyses.ANALYSIS_FORMATS, partial(_analysis, part))
-        for part in analyses.PARTS
+        f"analyses-{part}": (tables.ANALYSIS_FORMATS, partial(_analysis, part))
+        for part in tables.PARTS
     },
 }
 """Exports of a job by name: their formats, and what makes their table."""

@@ -13,14 +13,20 @@ from rest_framework.response import Response
 
 from arena.api.access import ADMINS, STAFF
 from arena.api.fields import FlagField, StrictSerializer, TextField, WholeNumberField
-from arena.api.paging import PageQuery, answer_page, page_of
-from arena.api.schema import operation
-from arena.api.views import ApiView, WarnedDocument, keep_and_send
+from arena.api.views import (
+    ApiView,
+    PageQuery,
+    WarnedDocument,
+    answer_page,
+    keep_and_send,
+    operation,
+    page_of,
+)
 from augment.models import GenerationJob
-from augment.services.running import caps, jobs
-from augment.services.running.caps import Caps
+from augment.services.running import budget, jobs
+from augment.services.running.budget import Caps
 from augment.services.running.estimates import estimate
-from augment.services.running.summary import JobCounts, count_each, count_rows
+from augment.services.running.progress import JobCounts, count_each, count_rows
 from augment.services.running.workers import workforce
 from augment.tasks import enqueue_job
 
@@ -108,10 +114,10 @@ class JobBody(EstimateBody):
     name = TextField(max_length=120)
     cap_usd = serializers.DecimalField(16, 9, required=False, default=None)
     cap_calls = WholeNumberField(
-        required=False, default=None, min_value=1, max_value=caps.HIGHEST_CALLS
+        required=False, default=None, min_value=1, max_value=budget.HIGHEST_CALLS
     )
     cap_tokens = WholeNumberField(
-        required=False, default=None, min_value=1, max_value=caps.HIGHEST_TOKENS
+        required=False, default=None, min_value=1, max_value=budget.HIGHEST_TOKENS
     )
 
 

@@ -12,8 +12,7 @@ from rest_framework.request import Request
 
 from arena.api.access import ADMINS
 from arena.api.fields import StrictSerializer, TextField
-from arena.api.schema import operation
-from arena.api.views import ApiView
+from arena.api.views import ApiView, operation
 from arena.queries.people import ROLES, role_given, role_of
 from arena.services.accounts import accept_welcome, check_password_strength, make_welcome_token
 from arena.services.api_tokens import make_api_token

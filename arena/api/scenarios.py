@@ -12,19 +12,26 @@ from rest_framework.response import Response
 
 from arena.api.access import STAFF
 from arena.api.fields import FlagField, StrictSerializer, TextField
-from arena.api.paging import PageQuery, answer_page, page_of
-from arena.api.schema import operation
-from arena.api.views import ApiView, WarnedDocument, keep_and_send
-from arena.queries.scenarios import OWN
+from arena.api.views import (
+    ApiView,
+    PageQuery,
+    WarnedDocument,
+    answer_page,
+    keep_and_send,
+    operation,
+    page_of,
+)
+from arena.scenarios.queries import OWN
 from augment.models import Scenario
 from augment.models.scenes import DENSITIES, GOALS
 from augment.services.scenarios.scenes import (
     INSTRUCTION_LENGTH,
+    LONGEST_LABEL,
+    LONGEST_TYPE,
     SLUG_LENGTH,
     add_scenario,
     read_circumstances,
 )
-from augment.services.scenarios.types import LONGEST_LABEL, LONGEST_TYPE
 from augment.tasks import enqueue_scenario
 
 

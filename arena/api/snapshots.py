@@ -16,9 +16,7 @@ from rest_framework.request import Request
 from arena import tasks
 from arena.api.access import STAFF
 from arena.api.fields import FlagField, StrictSerializer, TextField, WholeNumberField
-from arena.api.schema import operation
-from arena.api.studies import get_study
-from arena.api.views import ApiView, keep_and_send
+from arena.api.views import ApiView, keep_and_send, operation
 from arena.exports.tables import LeaderboardTable, leaderboard_table
 from arena.models import Snapshot, Study
 from arena.models.ratings import STORED
@@ -29,7 +27,8 @@ from arena.rating.bootstrap import Unit
 from arena.rating.leaderboard import Intervals, Line, Method
 from arena.services.ratings import DEFAULT_ROUNDS, MOST_ROUNDS, is_big, plan_snapshot, rate
 from arena.services.study_plan import HIGHEST_SEED
-from augment.services.scenarios.types import type_choices
+from arena.studies.api import get_study
+from augment.services.scenarios.scenes import type_choices
 
 _FIELDS: dict[str, Callable[[], serializers.Field[Any, Any, Any, Any]]] = {
     "str": serializers.CharField,

@@ -11,11 +11,8 @@ from rest_framework.request import Request
 from rest_framework.response import Response
 
 from arena.api.access import ADMINS, EXPERTS, STAFF
-from arena.api.fields import StrictSerializer
-from arena.api.input_fields import Field, body_field
-from arena.api.paging import PageQuery, answer_page, page_of
-from arena.api.schema import operation
-from arena.api.views import ApiView
+from arena.api.fields import Field, StrictSerializer, body_field
+from arena.api.views import ApiView, PageQuery, answer_page, operation, page_of
 from arena.models import Study
 from arena.queries.people import role_of
 from arena.queries.studies.progress import StudyProgress, of_these, studies_seen_by

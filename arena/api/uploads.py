@@ -14,11 +14,11 @@ from rest_framework.request import Request
 
 from arena.api.access import STAFF
 from arena.api.fields import StrictSerializer, TextField, WholeNumberField
-from arena.api.schema import operation
-from arena.api.views import ApiView, WarnedDocument, keep_and_send
+from arena.api.views import ApiView, WarnedDocument, keep_and_send, operation
 from arena.services.sent_files import was_too_large
 from augment.models import SceneUpload, UploadMoment
-from augment.services.scenarios import upload_moments, uploads
+from augment.services.scenarios import uploads
+from augment.services.scenarios import uploads as upload_moments
 from augment.tasks import enqueue_moment, enqueue_upload
 
 HIGHEST_FRAME = 2**31 - 1

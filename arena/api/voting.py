@@ -22,8 +22,7 @@ from arena.api.fields import (
     TextField,
     WholeNumberField,
 )
-from arena.api.schema import file_operation, operation
-from arena.api.views import ApiView, FileView
+from arena.api.views import ApiView, FileView, file_operation, operation
 from arena.errors import StudyNotOpen
 from arena.models import AIDS, OUTCOME_LETTERS, Matchup, Report, Study, Vote
 from arena.queries.studies.lists import voting_study

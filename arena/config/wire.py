@@ -10,7 +10,7 @@ REST_FRAMEWORK = {
     "DEFAULT_PERMISSION_CLASSES": ["rest_framework.permissions.IsAuthenticated"],
     "DEFAULT_RENDERER_CLASSES": ["rest_framework.renderers.JSONRenderer"],
     "DEFAULT_PARSER_CLASSES": ["rest_framework.parsers.JSONParser"],
-    "DEFAULT_SCHEMA_CLASS": "arena.api.schema.ArenaSchema",
+    "DEFAULT_SCHEMA_CLASS": "arena.api.views.ArenaSchema",
 }
 SPECTACULAR_SETTINGS = {
     "TITLE": "Scenario Arena",

@@ -12,7 +12,7 @@ from django.db.models import Q
 from arena.models import Study
 from arena.queries.remembering import Remembered, plan_of
 from augment.models import Contestant, EndpointModel
-from augment.services.endpoints.spending import CONTESTANT, Spending, sum_spending
+from augment.services.endpoints.known_models import CONTESTANT, Spending, sum_spending
 
 
 def shown_augmentations(study: Study) -> frozenset[int]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from arena.queries.job_grid import GridPart, Part, View, grid_part
+from arena.jobs.queries import GridPart, Part, View, grid_part
 from augment.models import GenerationJob, Simulation
 from augment.services.judging.simulations import Options
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from augment.errors import UnknownName
 from augment.models import Augmentation, Contestant, GenerationJob, Scenario
-from augment.services.running.summary import cells_of
+from augment.services.running.progress import cells_of
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from django.db.models import Count
 
 from augment.models import Augmentation, Contestant, Scenario
-from augment.services.scenarios.types import type_choices
+from augment.services.scenarios.scenes import type_choices
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from arena.models import LabelTask, Study
 from augment.errors import AugmentError
 from augment.models import Scenario
-from augment.services.scenarios.redrawing import redraw
+from augment.services.scenarios.pictures import redraw
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -5,10 +5,10 @@ from __future__ import annotations
 from django.contrib.auth.models import User
 from django.db import transaction
 
-from arena.services.redrawing import find_judged_now
+from arena.scenarios.services import find_judged_now
 from augment.errors import Conflict
 from augment.models import Scenario
-from augment.services.scenarios import references
+from augment.services.scenarios import editing
 
 
 @transaction.atomic
@@ -22,7 +22,7 @@ def set_reference(scenario: Scenario, document: object, *, actor: User | None = 
             changes.
     """
     _hold_unjudged(scenario)
-    return references.set_reference(scenario, document, actor=actor)
+    return editing.set_reference(scenario, document, actor=actor)
 
 
 @transaction.atomic
@@ -33,13 +33,13 @@ def drop_reference(scenario: Scenario, *, actor: User | None = None) -> Scenario
         Conflict: As above, or it has none.
     """
     _hold_unjudged(scenario)
-    return references.drop_reference(scenario, actor=actor)
+    return editing.drop_reference(scenario, actor=actor)
 
 
 def why_not_editable(scenario: Scenario) -> str:
     """Why the reference of a scenario can't be changed now, empty where it can."""
     try:
-        references.refuse_catalogue(scenario)
+        editing.refuse_catalogue(scenario)
         _refuse_judged(scenario)
     except Conflict as conflict:
         return conflict.args[0]  # type: ignore[no-any-return]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from django.contrib.auth.models import User
 from django.db import transaction
 
-from arena.services.removal import refuse_needed_scenario, refuse_needed_scene
+from arena.scenarios.services import refuse_needed_scenario, refuse_needed_scene
 from augment.errors import Conflict
 from augment.models import BaseScene, Scenario
 from augment.services.events import log_event

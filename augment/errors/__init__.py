@@ -1,37 +1,33 @@
 """Every error of augment says what its reader should do; it carries data and knows no HTTP."""
 
-from augment.errors.answers import (
-    ContextTruncated,
-    EndpointBusy,
-    ModelFault,
-    ModelRefused,
-    NotSent,
-    ParameterRefused,
-    ReplyUnreadable,
-    ReviewUnusable,
-    ToolError,
-)
-from augment.errors.inputs import (
+from augment.errors import (
+    Abandoned,
     AugmentError,
+    BudgetSpent,
     CannotDrive,
     CannotPlace,
     Conflict,
+    ContextTruncated,
+    DatabaseLocked,
+    EndpointBusy,
     InvalidDocument,
     InvalidModification,
-    UnknownName,
-)
-from augment.errors.work import (
-    Abandoned,
-    BudgetSpent,
-    DatabaseLocked,
     JobCancelled,
     KeyMissing,
     KeyNotAllowed,
     LeaseLost,
     MediaFault,
+    ModelFault,
+    ModelRefused,
+    NotSent,
+    ParameterRefused,
     QueueFault,
     QueueRefused,
     QueueUnreachable,
+    ReplyUnreadable,
+    ReviewUnusable,
+    ToolError,
+    UnknownName,
     Unwanted,
     WorkerStopping,
 )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from augment.errors.inputs import AugmentError
+from augment.errors import AugmentError
 
 
 class ReplyUnreadable(AugmentError):

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from augment.errors.answers import ModelFault
-from augment.errors.inputs import AugmentError
+from augment.errors import AugmentError, ModelFault
 
 
 class QueueFault(AugmentError):

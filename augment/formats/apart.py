@@ -17,11 +17,10 @@ from pydantic import TypeAdapter
 
 from augment.errors import InvalidDocument
 from augment.formats import sandbox
-from augment.formats.archive import find_input, is_zip, unpack_zip
-from augment.formats.nuplan.scenario import tokens_in
-from augment.formats.readers import READERS, reader_of, recognise
+from augment.formats.apart import find_input, is_zip, unpack_zip
+from augment.formats.nuplan_log import tokens_in
+from augment.formats.readers import READERS, Timeline, reader_of, recognise, timeline_of
 from augment.formats.reading import Moment, Reader, Reading
-from augment.formats.timeline import Timeline, timeline_of
 from augment.scene.codec import (
     recording_from_document,
     recording_to_document,

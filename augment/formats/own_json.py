@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from augment.errors import InvalidDocument
-from augment.formats.json_file import read_json
+from augment.formats.documents import read_json
 from augment.formats.reading import Moment, Reading
 from augment.formats.writing import Cell, LossReport, Written, write_each
 from augment.scene.codec import (

@@ -10,10 +10,10 @@ from __future__ import annotations
 from pathlib import Path
 
 from augment.errors import InvalidDocument, UnknownName
-from augment.formats.argoverse2.motion import ArgoverseMotion
-from augment.formats.argoverse2.sensor import ArgoverseSensor
+from augment.formats.argoverse2 import ArgoverseSensor
+from augment.formats.argoverse2_motion import ArgoverseMotion
 from augment.formats.commonroad.scenario import CommonRoad
-from augment.formats.nuplan.scenario import NuPlan
+from augment.formats.nuplan_log import NuPlan
 from augment.formats.own_json import OwnJson
 from augment.formats.reading import Reader
 from augment.formats.scenarionet.scenario import ScenarioNet

@@ -15,8 +15,7 @@ import numpy as np
 from augment.errors import InvalidDocument
 from augment.formats.reading import Moment, Reading, frame_in
 from augment.formats.road_map import FURTHEST_M, FloatArray, MapExtract, RoadMap
-from augment.formats.roads import road_around
-from augment.formats.strips import RADIUS_M
+from augment.formats.roads import RADIUS_M, road_around
 from augment.geometry.frames import Pose, wrap
 from augment.scene.entities import LENGTH_WIDTH_M, AgentType, Origin, Scene, TrafficAgent
 from augment.scene.lane_graph import LaneGraph

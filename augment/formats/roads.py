@@ -11,9 +11,8 @@ import math
 from collections.abc import Iterable, Sequence
 from itertools import islice
 
-from augment.formats.intersection_ways import Way, following_of, ways_through
-from augment.formats.road_map import MapExtract, Name, RoadMap
-from augment.formats.strips import Strip, check_count, find_areas, find_strips, join
+from augment.formats.road_map import MapExtract, Name, RoadMap, Way, following_of, ways_through
+from augment.formats.roads import Strip, check_count, find_areas, find_strips, join
 from augment.geometry.frames import Pose, difference
 from augment.geometry.polyline import Polyline
 from augment.scene.entities import Lane, LaneConnector, TrafficLight

@@ -10,7 +10,7 @@ from django.db import models
 class AppendOnly(models.Model):
     """A row that is never changed or deleted: what changes it is another row.
 
-    The database refuses it as well, whoever asks: see `augment.models.triggers`.
+    The database refuses it as well, whoever asks: see `augment.models.work`.
     """
 
     removable: ClassVar[str] = ""

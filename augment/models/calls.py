@@ -9,8 +9,7 @@ from django.db import models
 from django.db.models import Q
 
 from augment.llm.costs import usd_of
-from augment.models.jobs import Attempt
-from augment.models.readings import IntentReading
+from augment.models.jobs import Attempt, IntentReading
 
 
 class ModelCall(models.Model):

@@ -7,7 +7,7 @@ import uuid
 from django.db import models
 from django.db.models import Q
 
-from augment.models.endpoints import Endpoint
+from augment.models.contestants import Endpoint
 from augment.models.scenes import SLUG_HELP
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from django.conf import settings
 from django.db import models
 
-from augment.models.append_only import AppendOnly
+from augment.models.work import AppendOnly
 
 
 class Event(AppendOnly):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from django.conf import settings
 from django.db import models
 
-from augment.models.endpoints import EndpointModel
+from augment.models.contestants import EndpointModel
 from augment.models.work import Work
 
 

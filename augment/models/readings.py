@@ -6,7 +6,7 @@ from django.conf import settings
 from django.db import models
 from django.db.models import Q
 
-from augment.models.endpoints import Endpoint
+from augment.models.contestants import Endpoint
 from augment.models.scenes import Scenario
 from augment.models.work import Work
 

@@ -17,7 +17,7 @@ from django.db.models import Model
 from django.db.models.signals import post_migrate, pre_migrate
 from django.dispatch import receiver
 
-from augment.models.append_only import AppendOnly
+from augment.models.work import AppendOnly
 
 
 @receiver(pre_migrate)

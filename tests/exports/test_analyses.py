@@ -12,7 +12,7 @@ from django.db import connection
 from django.test.utils import CaptureQueriesContext
 from django.urls import reverse
 
-from arena.queries.analyses import analysis_of
+from arena.jobs.queries import analysis_of
 from augment.models import Augmentation, Contestant, GenerationJob, Scenario
 from augment.scene.codec import intent_to_document, modification_to_document
 from augment.scene.entities import Modification

@@ -7,8 +7,13 @@ from pathlib import Path
 import pytest
 from django.core.management import call_command
 
-from arena.exports.jobs.displacement_table import DisplacementTable, displacement_table
-from arena.exports.jobs.displacement_writers import COLUMNS, FORMATS, csv_bytes
+from arena.jobs.exports.displacement import (
+    COLUMNS,
+    FORMATS,
+    DisplacementTable,
+    csv_bytes,
+    displacement_table,
+)
 from augment.models import Augmentation, Contestant, GenerationJob
 from augment.scene.codec import modification_to_document
 from augment.scene.entities import Modification, ScenarioType

@@ -17,7 +17,7 @@ from django.core.management.base import CommandError
 from django.test import Client
 from django.urls import reverse
 
-from arena.exports.jobs.scenario_files import SCENARIO_FILES
+from arena.jobs.exports.files import SCENARIO_FILES
 from arena.models import ScenarioFile
 from arena.services.written_files import keep_file
 from augment.formats.writers import WRITERS

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from augment.errors import InvalidDocument
-from augment.formats.argoverse2.categories import TYPE_OF
-from augment.formats.argoverse2.sensor import ArgoverseSensor
+from augment.formats.argoverse2 import TYPE_OF, ArgoverseSensor
 from augment.scene.codec import recording_to_document, scene_from_document, scene_to_document
 from augment.scene.entities import AgentType, AreaKind, Scene, TrafficLight, TrafficSide, TurnType
 from augment.scene.lane_graph import LaneGraph

@@ -12,7 +12,7 @@ import pytest
 from augment.formats import own_json, writers
 from augment.formats.readers import READERS
 from augment.formats.reading import Reading
-from augment.formats.strips import RADIUS_M
+from augment.formats.roads import RADIUS_M
 from augment.formats.writing import Cell
 from augment.geometry.polyline import Polyline
 from augment.scene.entities import (

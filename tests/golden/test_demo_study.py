@@ -22,9 +22,9 @@ from django.core.files.storage import default_storage
 from django.utils import timezone
 from pytest_django import Settings
 
-from arena.exports.jobs.displacement_table import displacement_table
-from arena.exports.jobs.displacement_writers import FORMATS as DISPLACEMENT
 from arena.exports.study_folder.writing import MANIFEST, write_study
+from arena.jobs.exports.displacement import FORMATS as DISPLACEMENT
+from arena.jobs.exports.displacement import displacement_table
 from arena.management.demo import JOB, RATED, SIMULATED_EXPERTS, SIMULATED_STUDY, vote_and_rate
 from arena.models import Person, Study
 from arena.models.tokens import fresh_token

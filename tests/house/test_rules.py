@@ -15,7 +15,7 @@ HEAVY = {
     "openai": ("augment.llm.openai_wire",),
     "httpx2": (*("augment.llm.openai_wire", "augment.llm.wire_transport"),),
     "httpcore2": ("augment.llm.wire_transport", "augment.llm.wire_network"),
-    "genai_prices": ("augment.services.endpoints.price_list",),
+    "genai_prices": ("augment.services.endpoints.known_models",),
     "shapely": (
         *("augment.checks", "augment.scene", "augment.simulation", "augment.formats"),
         "augment.prompts.clip",

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from augment.models import ModelCall, TranscriptNote
-from augment.services.running.call_changes import changes_of
+from augment.services.running.transcript_records import changes_of
 
 pytestmark = pytest.mark.django_db
 

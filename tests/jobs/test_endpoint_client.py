@@ -13,8 +13,7 @@ from augment.llm.messages import Message, Request, Speaker
 from augment.llm.openai_wire import OpenAIWire
 from augment.llm.patience import Patience
 from augment.models import Augmentation, CallLease, Endpoint, EndpointModel, Event, ModelCall
-from augment.services.endpoints.call_limits import Queue
-from augment.services.endpoints.client import EndpointClient
+from augment.services.endpoints.client import EndpointClient, Queue
 from augment.services.running import jobs, runner
 from augment.variants.recording_client import RecordingClient
 from augment.variants.transcript import MemoryTranscript, ModelRole

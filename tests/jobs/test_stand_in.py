@@ -6,7 +6,7 @@ import pytest
 
 from augment.models import Scenario
 from augment.scene.intent import Shape
-from augment.services.scenarios.stand_in import StoredIntents
+from augment.services.scenarios.prompts import StoredIntents
 from tests.intents import cones
 from tests.jobs.rows import INSTRUCTION, add_scenario
 

@@ -10,10 +10,9 @@ from django.urls import reverse
 
 from augment.llm.fingerprint import request_hash
 from augment.models import Augmentation, Endpoint, ModelCall, TranscriptNote
-from augment.services.running import caps, pausing, runner
-from augment.services.running.caps import Caps
-from augment.services.running.transcript_export import transcript_of
-from augment.services.running.transcript_steps import totals_of, tries_of
+from augment.services.running import budget, jobs, runner
+from augment.services.running.budget import Caps
+from augment.services.running.transcript_records import totals_of, transcript_of, tries_of
 from augment.variants.transcript import NoteKind
 from tests.jobs.models import Model, after_a_second_look, llama_job, reply
 from tests.jobs.rows import INSTRUCTION, only_row
@@ -84,8 +83,8 @@ def test_a_call_from_the_store_names_its_source() -> None:
     job = llama_job(price="1", caps=Caps(calls=1))
     model = Model(after_a_second_look)
     row = ran(only_row(job), model)
-    caps.raise_cap(job, caps=Caps(calls=2))
-    pausing.resume(job)
+    budget.raise_cap(job, caps=Caps(calls=2))
+    jobs.resume(job)
     document = transcript_of(ran(row, model))
     paid = document["attempts"][0]["steps"][0]
     copied, last = document["attempts"][1]["steps"]

@@ -13,7 +13,7 @@ from augment.geometry.frames import corners
 from augment.render.bev import draw
 from augment.render.camera import MARGIN_M, Camera, camera_for
 from augment.scene.entities import Modification, without_traffic
-from augment.services.scenarios.catalogue_files import read_catalogue
+from augment.services.scenarios.catalogue import read_catalogue
 from tests import scenes
 from tests.properties import examples
 from tests.recorded import recorded_moments

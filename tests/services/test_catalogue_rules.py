@@ -14,7 +14,7 @@ import pytest
 from augment.scene.codec import CatalogueEntry
 from augment.scene.entities import AgentType, Modification, ScenarioType, Scene, TrafficAgent
 from augment.scene.intent import Intent, Setting, Side
-from augment.services.scenarios.catalogue_rules import (
+from augment.services.scenarios.catalogue_check import (
     StagedScenario,
     find_apart,
     find_sparse,

@@ -16,7 +16,7 @@ from augment.scene.codec import (
 from augment.scene.entities import Modification
 from augment.scene.intent import Shape
 from augment.services.endpoints.known_endpoints import ensure_endpoint
-from augment.services.scenarios.intents import accept_reading, enter_intent
+from augment.services.scenarios.editing import accept_reading, enter_intent
 from augment.services.scenarios.scene_imports import import_scene
 from augment.services.scenarios.scenes import add_scenario, reference_of
 from tests.formats.av2_logs import write_log

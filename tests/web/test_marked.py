@@ -12,8 +12,7 @@ from django.urls import reverse
 
 from augment.models import Augmentation
 from augment.scene.codec import intent_to_document
-from augment.services.judging.findings import check_augmentation
-from augment.services.judging.marked_pictures import draw_marked
+from augment.services.judging.findings import check_augmentation, draw_marked
 from tests.intents import parked
 from tests.jobs import rows
 from tests.web.cast import people, signed_in

@@ -12,8 +12,13 @@ from arena.exports.formats import Format, formats, round_value
 from arena.exports.parquet import NUMBER, TEXT, WHOLE, YES_NO, parquet_bytes
 from arena.services.cells import cell
 from augment.models import GenerationJob
-from augment.services.judging.augmentation_rows import AugmentationLine, augmentation_lines
-from augment.services.judging.repeatability import RepeatLine, SampleSpread, repeatability
+from augment.services.judging.analyses import (
+    AugmentationLine,
+    RepeatLine,
+    SampleSpread,
+    augmentation_lines,
+    repeatability,
+)
 
 COLUMNS = {
     "job": TEXT, "scenario": TEXT, "type": TEXT, "contestant": TEXT, "name": TEXT, "model": TEXT,

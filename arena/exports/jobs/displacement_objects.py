@@ -11,7 +11,7 @@ from arena.exports.formats import Format, formats
 from arena.exports.parquet import NUMBER, TEXT, WHOLE, YES_NO, parquet_bytes
 from arena.services.cells import cell
 from augment.models import GenerationJob
-from augment.services.judging.displaced_objects import DisplacedObject, ObjectPosition, objects_of
+from augment.services.judging.displacement import DisplacedObject, ObjectPosition, objects_of
 
 BY_OBJECT = "object"
 """How it is asked for, beside the groupings."""

@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from arena.exports.jobs.published import BY_VARIANT, PublishedBox
+from arena.jobs.exports.displacement import BY_VARIANT, PublishedBox
 from augment.models import GenerationJob
 from augment.services.judging.displacement import (
     PLACED_EXACTLY,
@@ -16,7 +16,7 @@ from augment.services.judging.displacement import (
     groups,
     of_job,
 )
-from augment.services.scenarios.types import ScenarioType, in_type_order
+from augment.services.scenarios.scenes import ScenarioType, in_type_order
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -8,9 +8,8 @@ from typing import Any
 
 from arena.exports.charts.displacement import box_plot
 from arena.exports.formats import Format, drawings, formats, round_value
-from arena.exports.jobs.displacement_table import DisplacementTable
-from arena.exports.jobs.published import SOURCE, PublishedBox
 from arena.exports.tables import shown_name
+from arena.jobs.exports.displacement import SOURCE, DisplacementTable, PublishedBox
 from arena.services.cells import csv_text
 from augment.services.judging.displacement import BoxSummary, Group, Measured
 

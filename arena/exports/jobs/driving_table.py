@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from augment.services.judging.driving_scores import CLOSE_M, DrivingLine, DrivingScores
-from augment.services.scenarios.types import type_choices
+from augment.services.scenarios.scenes import type_choices
 
 SOURCE = "reported in the paper"
 REPORTED = (

@@ -6,12 +6,12 @@ import json
 from typing import Any
 
 from arena.exports.formats import Format, formats, round_value
-from arena.exports.jobs.driving_table import SOURCE, DrivingTable
 from arena.exports.tables import shown_name
+from arena.jobs.exports.driving import SOURCE, DrivingTable
 from arena.rating.printed import escape
 from arena.services.cells import csv_text
 from augment.services.judging.driving_scores import DrivingLine
-from augment.services.scenarios.types import ScenarioType, in_type_order
+from augment.services.scenarios.scenes import ScenarioType, in_type_order
 
 MEASURED = "own simulator"
 _BEFORE = (

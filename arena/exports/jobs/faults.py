@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 from arena.exports.formats import Format, formats
 from arena.exports.latex import escape
 from arena.exports.tables import shown_name
+from arena.jobs.queries import contestants_of, labels_of
 from arena.models import FaultLabel
-from arena.queries.faults import contestants_of, labels_of
 from arena.rating.reliability import DifferenceMetric, cohens_kappa, krippendorff_alpha
 from arena.services.cells import csv_text
 from augment.models import Contestant, GenerationJob
-from augment.services.judging.fault_guess import FaultClass
+from augment.services.judging.findings import FaultClass
 
 COLUMNS = (
     "contestant", "slug", "simulated", "all", "position", "heading", "logic",

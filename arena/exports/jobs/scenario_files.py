@@ -8,8 +8,8 @@ from contextlib import contextmanager
 from django.core.files.base import ContentFile
 from django.utils.text import slugify
 
-from arena.exports.jobs.scenarios import scenario_zip, zip_name
 from arena.exports.written_files import FileWork, MadeFile
+from arena.jobs.exports.files import scenario_zip, zip_name
 from arena.models import ScenarioFile
 from augment.services.judging.scenario_export import Exported, export_job
 

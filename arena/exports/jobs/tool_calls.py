@@ -6,7 +6,7 @@ import json
 
 from arena.exports.formats import Format, formats
 from arena.services.cells import csv_text
-from augment.services.running.tool_calls import ToolCallLine
+from augment.services.running.progress import ToolCallLine
 
 COLUMNS = (
     "contestant", "name", "simulated", "scenario", "augmentation", "attempted", "understood",

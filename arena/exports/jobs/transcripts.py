@@ -11,9 +11,8 @@ from django.core.files.storage import default_storage
 from arena.exports.formats import Format, formats
 from arena.exports.zips import zip_bytes
 from augment.models import Augmentation, GenerationJob
-from augment.services.running.transcript_export import record_of
-from augment.services.running.transcript_steps import tries_by_augmentation
-from augment.services.running.transcripts import IMAGES
+from augment.services.running.calls import IMAGES
+from augment.services.running.transcript_records import record_of, tries_by_augmentation
 
 AT_ONCE = 50
 """So many transcripts are read and held in memory together."""

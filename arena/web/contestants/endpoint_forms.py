@@ -9,8 +9,8 @@ from django.utils.text import capfirst
 
 from augment.errors import InvalidDocument
 from augment.models import Endpoint, EndpointModel
-from augment.services.endpoints.editing import FACTS, EndpointFacts, ModelFacts
-from augment.services.endpoints.entering import REASONING_EFFORTS
+from augment.services.endpoints.contestants import REASONING_EFFORTS
+from augment.services.endpoints.known_endpoints import FACTS, EndpointFacts, ModelFacts
 
 _UNKNOWN = [("", "unknown"), ("yes", "yes"), ("no", "no")]
 

@@ -15,9 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from augment.errors import InvalidDocument
-from augment.formats.argoverse2.categories import EGO, TYPE_OF
-from augment.formats.arrow_file import TextColumn, read_arrow
-from augment.formats.recorded_log import Log, LoggedTrack, speeds
+from augment.formats.argoverse2 import EGO, TYPE_OF, TextColumn, read_arrow
+from augment.formats.reading import Log, LoggedTrack, speeds
 
 WHAT = "Argoverse 2 log"
 BOXES = "annotations.feather"

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from augment.errors import InvalidDocument
-from augment.formats.json_file import read_json
+from augment.formats.documents import read_json
 from augment.formats.road_map import RoadMap, Segment, count_notes
 from augment.scene.entities import AreaKind
 from augment.scene.recording import Note, SceneNoteKind

@@ -17,12 +17,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from augment.errors import InvalidDocument
-from augment.formats.argoverse2.log import EGO_LENGTH_M, EGO_WIDTH_M, MOST_NAMED, FloatArray
-from augment.formats.argoverse2.map_file import LICENCE, read_map
-from augment.formats.argoverse2.sensor import map_file_in
-from augment.formats.arrow_file import Columns, read_parquet
-from augment.formats.reading import Moment, Reading, frames_every
-from augment.formats.recorded_log import Log, LoggedTrack, reading_at
+from augment.formats.argoverse2 import (
+    EGO_LENGTH_M,
+    EGO_WIDTH_M,
+    LICENCE,
+    MOST_NAMED,
+    Columns,
+    FloatArray,
+    map_file_in,
+    read_map,
+    read_parquet,
+)
+from augment.formats.reading import Log, LoggedTrack, Moment, Reading, frames_every, reading_at
 from augment.scene.entities import LENGTH_WIDTH_M, AgentType
 from augment.scene.recording import Note, SceneNoteKind
 

@@ -13,10 +13,8 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from augment.errors import InvalidDocument
-from augment.formats.argoverse2.log import BOXES, WHAT, read_log
-from augment.formats.argoverse2.map_file import LICENCE, read_map
-from augment.formats.reading import Moment, Reading, frames_every
-from augment.formats.recorded_log import reading_at
+from augment.formats.argoverse2 import BOXES, LICENCE, WHAT, read_log, read_map
+from augment.formats.reading import Moment, Reading, frames_every, reading_at
 from augment.scene.recording import Note, SceneNoteKind
 
 

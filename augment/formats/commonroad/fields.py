@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from augment.errors import InvalidDocument
+from augment.formats.documents import Element
 from augment.formats.road_map import FURTHEST_M
-from augment.formats.xml_file import Element
 
 WHAT = "CommonRoad scenario"
 

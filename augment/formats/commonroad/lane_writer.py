@@ -11,10 +11,9 @@ from xml.etree import ElementTree as ET
 
 import numpy as np
 
-from augment.formats.bounds import bounds_of
-from augment.formats.commonroad.elements import Ids, add, number
-from augment.formats.strips import width_between
-from augment.formats.writing import Cell, LossReport
+from augment.formats.commonroad.writer import Ids, add, number
+from augment.formats.roads import width_between
+from augment.formats.writing import Cell, LossReport, bounds_of
 from augment.geometry.polyline import FloatArray, Polyline
 from augment.scene.entities import (
     Area,

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from augment.formats.commonroad.fields import fault, whole
-from augment.formats.xml_file import Element
+from augment.formats.commonroad.network import fault, whole
+from augment.formats.documents import Element
 from augment.scene.entities import TrafficLight, TurnType
 
 COLOURS = {

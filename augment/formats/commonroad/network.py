@@ -13,19 +13,27 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from augment.formats.commonroad.fields import WHAT, fault, points_of, real, references, whole
-from augment.formats.commonroad.lights import Light, lights_of
-from augment.formats.intersection_ways import crossing_segments
+from augment.formats.commonroad.network import (
+    WHAT,
+    Light,
+    fault,
+    lights_of,
+    points_of,
+    real,
+    references,
+    whole,
+)
+from augment.formats.documents import Element
 from augment.formats.road_map import (
     FloatArray,
     RoadMap,
     Segment,
     count_notes,
+    crossing_segments,
     left_out_notes,
     limit_notes,
 )
-from augment.formats.strips import midline
-from augment.formats.xml_file import Element
+from augment.formats.roads import midline
 from augment.geometry.polyline import Polyline
 from augment.scene.entities import AreaKind, TrafficLight, TurnType
 from augment.scene.lane_graph import turn_type_of

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from augment.formats.commonroad.fields import fault, point_of, points_of, real, value_of, whole
-from augment.formats.recorded_log import LoggedTrack
+from augment.formats.commonroad.network import fault, point_of, points_of, real, value_of, whole
+from augment.formats.documents import Element
+from augment.formats.reading import LoggedTrack
 from augment.formats.road_map import left_out_notes
-from augment.formats.xml_file import Element
 from augment.scene.entities import LENGTH_WIDTH_M, AgentType
 from augment.scene.recording import Note, SceneNoteKind
 

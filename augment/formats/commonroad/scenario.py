@@ -12,13 +12,19 @@ from pathlib import Path
 
 import numpy as np
 
-from augment.formats.commonroad.fields import WHAT, fault, real, whole
-from augment.formats.commonroad.network import network_of
-from augment.formats.commonroad.obstacles import Obstacles, obstacles_of, rows_of, state_of
-from augment.formats.reading import Moment, Reading, frame_in, frames_every
-from augment.formats.recorded_log import LONGEST_GAP_S, Log, reading_at
+from augment.formats.commonroad.network import WHAT, fault, network_of, real, whole
+from augment.formats.commonroad.scenario import Obstacles, obstacles_of, rows_of, state_of
+from augment.formats.documents import Element, read_xml
+from augment.formats.reading import (
+    LONGEST_GAP_S,
+    Log,
+    Moment,
+    Reading,
+    frame_in,
+    frames_every,
+    reading_at,
+)
 from augment.formats.road_map import FloatArray
-from augment.formats.xml_file import Element, read_xml
 from augment.scene.entities import EGO_LENGTH_M, EGO_WIDTH_M, AgentType
 from augment.scene.recording import Note, SceneNoteKind
 

@@ -11,8 +11,7 @@ from xml.etree import ElementTree as ET
 
 import numpy as np
 
-from augment.formats.commonroad.elements import Ids, add, number, text_of
-from augment.formats.commonroad.lane_writer import write_lanes
+from augment.formats.commonroad.writer import Ids, add, number, text_of, write_lanes
 from augment.formats.writing import (
     CannotExpress,
     Cell,

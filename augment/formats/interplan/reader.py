@@ -14,24 +14,22 @@ import numpy as np
 
 from augment.checks.ground import Ground
 from augment.errors import InvalidDocument
+from augment.formats.documents import read_yaml
 from augment.formats.interplan.file import (
     STANDING_WALK_M,
     WALK_S,
-    ReadEntry,
-    ReadFile,
-    cone_heading,
-    options_of,
-)
-from augment.formats.interplan.schema import (
     WHAT,
     Details,
+    ReadEntry,
+    ReadFile,
     SpecialScenario,
+    cone_heading,
     file_of,
     left_out_of_details,
     left_out_of_file,
+    options_of,
     place_of,
 )
-from augment.formats.yaml_file import read_yaml
 from augment.geometry.frames import Pose, wrap
 from augment.scene.density import ExtraAgent, spawn_traffic
 from augment.scene.entities import (

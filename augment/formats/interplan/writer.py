@@ -18,9 +18,11 @@ from augment.checks.ground import Ground
 from augment.errors import Conflict
 from augment.formats.interplan.file import (
     MOST_ENTRIES,
+    OBJECTS,
     STANDING_WALK_M,
     WALK_S,
     InterplanSource,
+    SpecialScenario,
     cone_heading,
     config_of,
     details,
@@ -28,7 +30,6 @@ from augment.formats.interplan.file import (
     yaml_text,
 )
 from augment.formats.interplan.reader import read_entry
-from augment.formats.interplan.schema import OBJECTS, SpecialScenario
 from augment.formats.writing import Cell, Loss, Written
 from augment.geometry.frames import difference, wrap
 from augment.scene.entities import (

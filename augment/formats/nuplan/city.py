@@ -15,12 +15,10 @@ from typing import Any
 import numpy as np
 
 from augment.errors import InvalidDocument
-from augment.formats.lane_edges import USUAL_M
-from augment.formats.nuplan.geopackage import Layers
-from augment.formats.nuplan.mercator import FloatArray
-from augment.formats.nuplan.sqlite import WHAT, open_tables
-from augment.formats.road_map import RoadMap, Segment, count_notes, limit_notes
-from augment.formats.strips import RADIUS_M
+from augment.formats.nuplan_log import WHAT, open_tables
+from augment.formats.nuplan_map import FloatArray, Layers
+from augment.formats.road_map import USUAL_M, RoadMap, Segment, count_notes, limit_notes
+from augment.formats.roads import RADIUS_M
 from augment.geometry.polyline import Polyline
 from augment.scene.entities import AreaKind, TrafficLight, TrafficSide, TurnType
 from augment.scene.lane_graph import turn_type_of

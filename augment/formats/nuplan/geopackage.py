@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 
 from augment.errors import InvalidDocument
-from augment.formats.nuplan.mercator import FloatArray, to_utm
-from augment.formats.nuplan.sqlite import WHAT, Tables
+from augment.formats.nuplan_log import WHAT, Tables
+from augment.formats.nuplan_map import FloatArray, to_utm
 
 _ENVELOPE_BYTES = (0, 32, 48, 48, 64)
 GEOGRAPHIC = 4326

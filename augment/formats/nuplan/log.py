@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 
 from augment.errors import InvalidDocument
-from augment.formats.nuplan.sqlite import WHAT, Tables
-from augment.formats.recorded_log import Log, LoggedTrack
+from augment.formats.nuplan_log import WHAT, Tables
+from augment.formats.reading import Log, LoggedTrack
 from augment.scene.entities import EGO_LENGTH_M, EGO_WIDTH_M, AgentType, TrafficLight
 
 REAR_AXLE_TO_CENTER_M = 1.461

@@ -15,21 +15,22 @@ from pathlib import Path
 import numpy as np
 
 from augment.errors import InvalidDocument
-from augment.formats.nuplan.city import city_around
-from augment.formats.nuplan.log import (
+from augment.formats.nuplan_log import (
+    WHAT,
     LogPlace,
     Mission,
+    Tables,
     check_tables,
     has_token,
     lights_at,
     mission_at,
+    open_tables,
     place_of,
     read_log,
     tokens_of,
 )
-from augment.formats.nuplan.sqlite import WHAT, Tables, open_tables
-from augment.formats.reading import Moment, Reading, frames_every
-from augment.formats.recorded_log import reading_at
+from augment.formats.nuplan_map import city_around
+from augment.formats.reading import Moment, Reading, frames_every, reading_at
 from augment.geometry.frames import Pose
 from augment.scene.recording import Note, SceneNoteKind
 

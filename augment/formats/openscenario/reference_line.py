@@ -11,8 +11,7 @@ from typing import Final
 
 import numpy as np
 
-from augment.formats.bounds import bounds_of
-from augment.formats.writing import CannotExpress
+from augment.formats.writing import CannotExpress, bounds_of
 from augment.geometry.frames import difference
 from augment.geometry.polyline import FloatArray, Polyline
 from augment.scene.lane_graph import AnyLane

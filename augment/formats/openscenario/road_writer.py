@@ -13,7 +13,7 @@ from xml.etree import ElementTree as ET
 
 import numpy as np
 
-from augment.formats.openscenario.reference_line import (
+from augment.formats.openscenario.roads import (
     End,
     ReferenceLine,
     deviation_m,

@@ -10,16 +10,21 @@ from typing import Any
 import numpy as np
 
 from augment.errors import InvalidDocument
-from augment.formats.intersection_ways import crossing_segments, take_end_widths
-from augment.formats.lane_edges import NARROWEST_M, USUAL_M, WIDEST_M, edge_of, width_of
 from augment.formats.road_map import (
     FURTHEST_M,
+    NARROWEST_M,
+    USUAL_M,
+    WIDEST_M,
     FloatArray,
     RoadMap,
     Segment,
     count_notes,
+    crossing_segments,
+    edge_of,
     left_out_notes,
     limit_notes,
+    take_end_widths,
+    width_of,
 )
 from augment.formats.scenarionet.unpickling import WHAT
 from augment.scene.entities import AreaKind, TrafficLight, TrafficSide

@@ -14,11 +14,17 @@ from typing import Any
 import numpy as np
 
 from augment.errors import InvalidDocument
-from augment.formats.reading import Moment, Reading, frame_in, frames_every
-from augment.formats.recorded_log import Log, LoggedTrack, reading_at
+from augment.formats.reading import (
+    Log,
+    LoggedTrack,
+    Moment,
+    Reading,
+    frame_in,
+    frames_every,
+    reading_at,
+)
 from augment.formats.road_map import FloatArray, left_out_notes
-from augment.formats.scenarionet.city import city_of
-from augment.formats.scenarionet.folder import file_in, is_data_set, names_in
+from augment.formats.scenarionet.scenario import city_of, file_in, is_data_set, names_in
 from augment.formats.scenarionet.unpickling import WHAT, read_pickle
 from augment.scene.entities import LENGTH_WIDTH_M, AgentType
 from augment.scene.recording import Note, SceneNoteKind

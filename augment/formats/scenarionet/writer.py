@@ -16,8 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from augment.formats.bounds import bounds_of
-from augment.formats.writing import Cell, LossReport, Written, report_motion, write_each
+from augment.formats.writing import Cell, LossReport, Written, bounds_of, report_motion, write_each
 from augment.scene.entities import (
     AgentType,
     Area,

@@ -14,19 +14,22 @@ from typing import Any
 
 import numpy as np
 
-from augment.formats.intersection_ways import crossing_segments, take_end_widths
-from augment.formats.lane_edges import USUAL_M, edge_of, whole_edge, width_of
 from augment.formats.road_map import (
+    USUAL_M,
     FloatArray,
     Name,
     RoadMap,
     Segment,
     count_notes,
+    crossing_segments,
+    edge_of,
     left_out_notes,
     limit_notes,
+    take_end_widths,
+    whole_edge,
+    width_of,
 )
-from augment.formats.waymo.messages import MapFeatures, features_of
-from augment.formats.waymo.tfrecord import WHAT
+from augment.formats.waymo.scenario import WHAT, MapFeatures, features_of
 from augment.scene.entities import AreaKind, TrafficLight
 from augment.scene.recording import Note, SceneNoteKind
 

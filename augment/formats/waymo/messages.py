@@ -14,8 +14,8 @@ from google.protobuf.message import DecodeError
 
 from augment.errors import InvalidDocument
 from augment.formats.road_map import FURTHEST_M, FloatArray
+from augment.formats.waymo.scenario import WHAT
 from augment.formats.waymo.scenario_pb2 import Scenario
-from augment.formats.waymo.tfrecord import WHAT
 
 
 @dataclass(slots=True, kw_only=True)

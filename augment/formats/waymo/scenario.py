@@ -13,12 +13,24 @@ from typing import Any
 import numpy as np
 
 from augment.errors import InvalidDocument
-from augment.formats.reading import Moment, Reading, frame_in, frames_every
-from augment.formats.recorded_log import Log, LoggedTrack, reading_at
+from augment.formats.reading import (
+    Log,
+    LoggedTrack,
+    Moment,
+    Reading,
+    frame_in,
+    frames_every,
+    reading_at,
+)
 from augment.formats.road_map import left_out_notes
-from augment.formats.waymo.city import city_of
-from augment.formats.waymo.messages import read_scenario, states_of
-from augment.formats.waymo.tfrecord import WHAT, read_records, starts_a_record
+from augment.formats.waymo.scenario import (
+    WHAT,
+    city_of,
+    read_records,
+    read_scenario,
+    starts_a_record,
+    states_of,
+)
 from augment.scene.entities import AgentType
 from augment.scene.recording import SceneNoteKind
 

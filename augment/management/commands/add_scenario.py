@@ -9,7 +9,7 @@ from typing import Any
 from django.core.management.base import CommandError
 
 from augment.errors import AugmentError
-from augment.formats.json_file import read_json
+from augment.formats.documents import read_json
 from augment.models.scenes import GOALS
 from augment.scene.codec import modification_from_document, modification_to_document
 from augment.scene.entities import ScenarioType, TrafficDensity

@@ -12,7 +12,7 @@ from django.core.management.base import CommandError, CommandParser
 
 from augment.fake_llm.models import MODELS
 from augment.fake_llm.server import running
-from augment.services.scenarios.stand_in import StoredIntents
+from augment.services.scenarios.prompts import StoredIntents
 from augment.services.terminal import TerminalCommand
 
 _STOP = (signal.SIGINT, signal.SIGTERM)

@@ -21,8 +21,7 @@ from django.db.models import Q
 
 from augment.errors import EndpointBusy
 from augment.models import CallLease, Endpoint
-from augment.services.clock import database_now
-from augment.services.repeating import repeating
+from augment.services.clock import database_now, repeating
 
 logger = logging.getLogger(__name__)
 

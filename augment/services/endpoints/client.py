@@ -11,7 +11,7 @@ from augment.llm.messages import Reply, Request
 from augment.llm.openai_wire import OpenAIWire
 from augment.llm.profile import ModelProfile
 from augment.models import Endpoint
-from augment.services.endpoints.call_limits import Queue, place_at
+from augment.services.endpoints.client import Queue, place_at
 from augment.services.endpoints.known_models import profile_of, remember_refusal
 from augment.services.endpoints.treatments import Treatment
 

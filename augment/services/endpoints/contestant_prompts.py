@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from augment.errors import Conflict
 from augment.models import Contestant, Scenario
-from augment.services.endpoints.respondents import respondents_of
-from augment.services.endpoints.treatments import options_of, other_prompts
+from augment.services.endpoints.treatments import options_of, other_prompts, respondents_of
 from augment.services.scenarios.prompts import Preview, preview_prompt
 from augment.variants.options import ToolProtocol
 from augment.variants.recipes import Tools, find_recipe

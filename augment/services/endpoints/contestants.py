@@ -12,7 +12,7 @@ from augment.errors import Conflict, UnknownName
 from augment.models import Contestant, Endpoint
 from augment.services.endpoints.known_endpoints import find_endpoint
 from augment.services.endpoints.known_models import model_at
-from augment.services.endpoints.respondents import Respondent, check_roles, documents_of
+from augment.services.endpoints.treatments import Respondent, check_roles, documents_of
 from augment.services.events import log_event
 from augment.services.scenarios.scenes import check_slug
 from augment.services.texts import one_line

@@ -14,7 +14,7 @@ from django.db import models, transaction
 from augment.errors import Conflict, InvalidDocument
 from augment.llm.addresses import check_base_url
 from augment.models import Endpoint, EndpointModel
-from augment.services.endpoints.keys import check_key_variable, log_move, move_of
+from augment.services.endpoints.known_endpoints import check_key_variable, log_move, move_of
 from augment.services.endpoints.known_models import facts_of, model_at
 from augment.services.events import log_event
 from augment.services.scenarios.scenes import check_slug

@@ -10,7 +10,7 @@ from django.db import transaction
 from augment.errors import Conflict, UnknownName
 from augment.llm.addresses import check_base_url
 from augment.models import Endpoint
-from augment.services.endpoints.keys import check_key_variable, log_move, move_of
+from augment.services.endpoints.known_endpoints import check_key_variable, log_move, move_of
 from augment.services.events import log_event
 from augment.services.scenarios.scenes import check_slug
 

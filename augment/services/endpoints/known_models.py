@@ -14,7 +14,7 @@ from django.utils import timezone
 
 from augment.llm.profile import ModelProfile
 from augment.models import Endpoint, EndpointModel
-from augment.services.endpoints.price_list import listed_price
+from augment.services.endpoints.known_models import listed_price
 from augment.services.events import log_event
 
 _LIMITS = (

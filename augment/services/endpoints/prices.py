@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 from augment.llm.costs import Price
 from augment.models import Contestant, Endpoint, EndpointModel
-from augment.services.endpoints.respondents import respondents_of
+from augment.services.endpoints.treatments import respondents_of
 
 
 def price_of(endpoint: Endpoint, model: str) -> Price | None:

@@ -26,10 +26,8 @@ from augment.llm.profile import ModelProfile
 from augment.llm.questions import Ability, ProbeQuestion, questions_for
 from augment.llm.window import cut_of
 from augment.models import Endpoint, EndpointModel
-from augment.services.endpoints.call_limits import Queue, place_at
-from augment.services.endpoints.known_models import model_at
-from augment.services.endpoints.prices import price_of
-from augment.services.endpoints.wires import wire_to
+from augment.services.endpoints.client import Queue, place_at, wire_to
+from augment.services.endpoints.known_models import model_at, price_of
 from augment.services.events import log_event
 from augment.services.texts import make_document_storable
 

@@ -10,7 +10,7 @@ from django.db import IntegrityError, transaction
 from augment.errors import Conflict
 from augment.llm.questions import Ability
 from augment.models import EndpointModel, Probe
-from augment.services.endpoints.probe import ProbeFinding, probe
+from augment.services.endpoints.probing import ProbeFinding, probe
 from augment.services.texts import make_document_storable
 from augment.services.work import Lease, Settlement, WorkKind
 

@@ -21,7 +21,7 @@ from augment.llm.profile import ModelProfile
 from augment.models import Augmentation, Contestant, Endpoint, ModelCall
 from augment.prompts.texts import prompt_version
 from augment.services.endpoints.known_models import profile_of, profiles_of
-from augment.services.endpoints.respondents import Respondent, respondents_of_each
+from augment.services.endpoints.treatments import Respondent, respondents_of_each
 from augment.services.events import log_event
 from augment.variants.options import (
     NAMES,

@@ -9,7 +9,7 @@ from django.conf import settings
 from augment.llm.client import watch_nothing
 from augment.llm.openai_wire import MEGABYTE, OpenAIWire
 from augment.models import Endpoint
-from augment.services.endpoints.keys import key_of
+from augment.services.endpoints.known_endpoints import key_of
 
 
 def wire_to(endpoint: Endpoint, *, still_wanted: Callable[[], None] = watch_nothing) -> OpenAIWire:

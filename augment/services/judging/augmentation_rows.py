@@ -11,9 +11,9 @@ from augment.checks import Severity
 from augment.errors import InvalidDocument, InvalidModification
 from augment.metrics.displacement import Displacement
 from augment.models import Augmentation, GenerationJob
-from augment.services.endpoints.spending import AUGMENTATION, Spending, sum_spending
-from augment.services.judging.checks import findings_of
+from augment.services.endpoints.known_models import AUGMENTATION, Spending, sum_spending
 from augment.services.judging.displacement import of_job
+from augment.services.judging.findings import findings_of
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

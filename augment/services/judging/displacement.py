@@ -21,8 +21,7 @@ from augment.metrics.displacement import (
 from augment.models import Augmentation, GenerationJob, Scenario
 from augment.scene.codec import modification_from_document
 from augment.scene.entities import Modification, ScenarioType
-from augment.services.scenarios.scenes import reference_of
-from augment.services.scenarios.types import type_choices, type_rank
+from augment.services.scenarios.scenes import reference_of, type_choices, type_rank
 from augment.variants.recipes import SPELLING, spell_variant
 
 __all__ = [

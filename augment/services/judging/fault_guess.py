@@ -6,7 +6,7 @@ from augment.checks.finding import FaultClass
 from augment.errors import InvalidDocument, InvalidModification
 from augment.metrics.fault_guess import first_guess
 from augment.models import Augmentation
-from augment.services.judging.checks import findings_of
+from augment.services.judging.findings import findings_of
 
 __all__ = ["FaultClass", "guess_faults"]
 

@@ -11,8 +11,7 @@ from augment.checks import Severity
 from augment.errors import InvalidDocument, InvalidModification
 from augment.models import Augmentation
 from augment.scene.codec import EGO_ID as EGO_ID
-from augment.services.judging.checks import findings_of
-from augment.services.judging.marked_pictures import is_drawn, marked_name, order_faults
+from augment.services.judging.findings import findings_of, is_drawn, marked_name, order_faults
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

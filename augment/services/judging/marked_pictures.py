@@ -16,7 +16,7 @@ from augment.checks import Finding, Severity
 from augment.models import Augmentation
 from augment.render.annotated import FaultMark, draw_annotated
 from augment.scene.codec import modification_from_document
-from augment.services.judging.checks import findings_of
+from augment.services.judging.findings import findings_of
 from augment.services.scenarios.pictures import camera_of, store_as
 from augment.services.scenarios.scenes import scene_of
 

@@ -6,7 +6,7 @@ from augment.checks.measures import LaneEdges as LaneEdges
 from augment.checks.measures import MeasureLine as MeasureLine
 from augment.checks.measures import Measures, find_measures, lane_edges_at
 from augment.models import Scenario
-from augment.services.judging.edits import ground_of
+from augment.services.judging.findings import ground_of
 from augment.services.scenarios.scenes import intent_of
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from augment.metrics.paired import SampleSpread, spread_of, within_sd
 from augment.models import Augmentation, GenerationJob
-from augment.services.judging.augmentation_rows import AugmentationLine, augmentation_lines
+from augment.services.judging.analyses import AugmentationLine, augmentation_lines
 
 __all__ = ["RepeatLine", "SampleSpread", "repeatability"]
 

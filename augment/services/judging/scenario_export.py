@@ -19,8 +19,7 @@ from augment.scene.motion import Motion, MotionSource, Movement
 from augment.scene.recording import Recording
 from augment.services.judging.simulations import trace_document
 from augment.services.scenarios.interplan import refuse_changes
-from augment.services.scenarios.scenes import scene_of
-from augment.services.scenarios.types import type_of
+from augment.services.scenarios.scenes import scene_of, type_of
 
 FORMATS = tuple(WRITERS)
 RECORDED = "recorded"

@@ -16,8 +16,7 @@ from augment.errors import Conflict
 from augment.models import Augmentation, GenerationJob, Scenario, Simulation
 from augment.scene.codec import modification_from_document, recording_from_document
 from augment.scene.entities import Modification
-from augment.services.scenarios.scenes import reference_of, scene_of
-from augment.services.scenarios.types import type_of
+from augment.services.scenarios.scenes import reference_of, scene_of, type_of
 from augment.services.work import Lease, Settlement, WorkKind
 from augment.simulation.drive import Drive, expert_of, run
 from augment.simulation.metrics import red_lights

@@ -12,7 +12,7 @@ from django.db import transaction
 from augment.errors import Conflict
 from augment.llm.costs import nano_usd_of
 from augment.models import Contestant, GenerationJob
-from augment.services.endpoints.prices import list_unpriced_models
+from augment.services.endpoints.known_models import list_unpriced_models
 from augment.services.events import log_event
 from augment.services.running.budget import limit_of, limits_of
 

@@ -15,7 +15,7 @@ from django.db.models.functions import Substr
 
 from augment.errors import UnknownName
 from augment.models import Augmentation, GenerationJob
-from augment.services.running.summary import cells_of
+from augment.services.running.progress import cells_of
 
 State = Augmentation.State
 

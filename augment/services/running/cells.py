@@ -15,7 +15,7 @@ from django.db import transaction
 from augment.errors import UnknownName
 from augment.models import Contestant, Endpoint, EndpointModel
 from augment.services.endpoints.contestants import LONGEST_NAME, add_contestant
-from augment.services.endpoints.keys import may_hold_key
+from augment.services.endpoints.known_endpoints import may_hold_key
 from augment.services.running.matrix import ContestantDocument, pick_slug
 from augment.variants.options import ContestantOptions, names_for, options_from_document
 from augment.variants.recipes import RECIPES, Recipe, find_recipe, spell_variant

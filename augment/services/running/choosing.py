@@ -12,7 +12,7 @@ from django.db.models import Q, QuerySet
 from augment.errors import Conflict, UnknownName
 from augment.models import Contestant, GenerationJob, Scenario
 from augment.scene.entities import CatalogueSet
-from augment.services.running.feasible import RUNNABLE
+from augment.services.running.choosing import RUNNABLE
 
 ALL, SET = "all", "set:"
 

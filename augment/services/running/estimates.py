@@ -13,10 +13,9 @@ from augment.llm.costs import Price, usd_of, worst_case
 from augment.llm.messages import Request
 from augment.models import Augmentation, Contestant, ModelCall, Scenario
 from augment.scene.entities import Modification
-from augment.services.endpoints.prices import price_of
-from augment.services.endpoints.respondents import Respondent, respondents_of
-from augment.services.endpoints.treatments import options_of
-from augment.services.running.reuse import count_answered, latency_of, seconds_for
+from augment.services.endpoints.known_models import price_of
+from augment.services.endpoints.treatments import Respondent, options_of, respondents_of
+from augment.services.running.estimates import count_answered, latency_of, seconds_for
 from augment.services.scenarios.scenes import reference_of, scene_of
 from augment.variants.forecast import TokenUse, calls_of, most_tokens
 from augment.variants.options import recipe_with

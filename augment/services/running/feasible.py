@@ -9,9 +9,15 @@ from django.db.models import Q
 from augment.baselines.registry import PLACERS
 from augment.errors import AugmentError, Conflict, KeyMissing, KeyNotAllowed
 from augment.models import Contestant, Scenario
-from augment.services.endpoints.keys import key_of, may_hold_key
-from augment.services.endpoints.respondents import Respondent, respondents_of, sight_of, viewer_of
-from augment.services.endpoints.treatments import options_of, other_prompts
+from augment.services.endpoints.known_endpoints import key_of, may_hold_key
+from augment.services.endpoints.treatments import (
+    Respondent,
+    options_of,
+    other_prompts,
+    respondents_of,
+    sight_of,
+    viewer_of,
+)
 from augment.variants.options import ToolProtocol
 from augment.variants.transcript import ModelRole
 

@@ -21,14 +21,12 @@ from augment.llm.costs import Price, WorstCase
 from augment.models import Endpoint, IntentReading, ModelCall, Scenario
 from augment.scene.codec import intent_to_document
 from augment.services.clock import DATABASE_TIME
-from augment.services.endpoints.call_limits import Queue
-from augment.services.endpoints.client import EndpointClient
-from augment.services.endpoints.prices import price_of
-from augment.services.endpoints.wires import wire_to
+from augment.services.endpoints.client import EndpointClient, Queue, wire_to
+from augment.services.endpoints.known_models import price_of
 from augment.services.events import log_event
-from augment.services.running import answers, budget
-from augment.services.running.caps import Caps
-from augment.services.running.transcripts import CallTranscript, sentence_of
+from augment.services.running import budget, calls
+from augment.services.running.budget import Caps
+from augment.services.running.calls import CallTranscript, sentence_of
 from augment.services.work import Lease, Settlement, WorkKind
 from augment.variants.intent_reader import ask_for_intent
 from augment.variants.transcript import NoteKind
@@ -179,7 +177,7 @@ class ReadingTranscript(CallTranscript):
     def earlier_answer(self, request_hash: str) -> ModelCall | None:  # noqa: D102
         if self._is_fresh:
             return None
-        return answers.find_earlier_answer(
+        return calls.find_earlier_answer(
             request_hash=request_hash, augmentation_pk=0, attempt_pk=0, is_fresh=False
         )
 

@@ -15,9 +15,8 @@ from augment.models import Augmentation, Contestant, GenerationJob, Scenario
 from augment.services.clock import DATABASE_TIME, Moment
 from augment.services.endpoints.treatments import loosen_unanswered
 from augment.services.events import log_event
-from augment.services.running.budget import limit_of
-from augment.services.running.caps import NO_CAPS, Caps, check_caps, over_already
-from augment.services.running.feasible import refuse_impossible
+from augment.services.running.budget import NO_CAPS, Caps, check_caps, limit_of, over_already
+from augment.services.running.choosing import refuse_impossible
 from augment.services.texts import one_line
 from augment.services.work import change_all
 from augment.variants.options import MOST_SAMPLES

@@ -18,7 +18,7 @@ from django.db import transaction
 from pydantic import Field, ValidationError
 
 from augment.errors import AugmentError, InvalidDocument, UnknownName
-from augment.formats.yaml_file import read_yaml
+from augment.formats.documents import read_yaml
 from augment.models import Contestant
 from augment.scene.schema import Document, problems_of
 from augment.services.endpoints.contestants import add_contestant, ensure_builtin

@@ -9,7 +9,7 @@ from django.db.models import Count, Min
 
 from augment.models import Attempt, Augmentation, ModelCall
 from augment.services.clock import database_now
-from augment.services.running.summary import JobCounts
+from augment.services.running.progress import JobCounts
 
 WINDOW = timedelta(minutes=5)
 """What ended within it tells the rate."""

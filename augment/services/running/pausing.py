@@ -8,7 +8,7 @@ from django.db import transaction
 from augment.errors import Conflict
 from augment.models import Augmentation, GenerationJob
 from augment.services.events import log_event
-from augment.services.running.caps import NO_CAPS, Caps, over_already, raise_cap
+from augment.services.running.budget import NO_CAPS, Caps, over_already, raise_cap
 from augment.services.work import change_all
 
 State = GenerationJob.State

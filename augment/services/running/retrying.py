@@ -10,8 +10,8 @@ from augment.errors import Conflict
 from augment.models import Augmentation, GenerationJob
 from augment.services.clock import database_now
 from augment.services.events import log_event
-from augment.services.running.causes import rows_of_cause
 from augment.services.running.jobs import open_again
+from augment.services.running.progress import rows_of_cause
 from augment.services.work import change_all
 
 State = Augmentation.State

@@ -10,7 +10,7 @@ from django.db.models import Avg, Count, Exists, OuterRef, Q
 
 from augment.models import Augmentation, Contestant, Endpoint, ModelCall
 from augment.prompts.texts import prompt_version
-from augment.services.endpoints.moves import Spell, spells_at_address
+from augment.services.running.estimates import Spell, spells_at_address
 
 GUESSED_LATENCY_S = 10.0
 """Of a call to a model that nobody has asked yet: a guess."""

@@ -8,8 +8,8 @@ from django.core.files.storage import default_storage
 from django.db.models import QuerySet
 
 from augment.models import ModelCall
-from augment.services.running.transcript_steps import images_in
-from augment.services.running.transcripts import IMAGES
+from augment.services.running.calls import IMAGES
+from augment.services.running.transcript_records import images_in
 from augment.variants.transcript import ModelRole
 
 AT_ONCE = 200

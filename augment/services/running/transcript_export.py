@@ -12,14 +12,14 @@ from django.core.files.storage import default_storage
 
 from augment.models import Augmentation, Contestant, ModelCall
 from augment.services.endpoints.treatments import left_out_of_each
-from augment.services.running.transcript_steps import (
+from augment.services.running.calls import IMAGES
+from augment.services.running.transcript_records import (
     TranscriptStep,
     Try,
     images_in,
     totals_of,
     tries_of,
 )
-from augment.services.running.transcripts import IMAGES
 
 FORMAT, VERSION = "scenario-arena/transcript", 3
 

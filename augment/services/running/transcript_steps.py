@@ -15,7 +15,7 @@ from django.db.models import Prefetch
 from augment.llm.cutting import shorten
 from augment.llm.fingerprint import IMAGE_SCHEME
 from augment.models import Attempt, Augmentation, ModelCall, TranscriptNote
-from augment.services.running.call_changes import changes_of
+from augment.services.running.transcript_records import changes_of
 
 LONGEST_SHOWN = 100_000
 """Of one text of a record on a page, in characters; the document has all of it."""

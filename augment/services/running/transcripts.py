@@ -21,9 +21,9 @@ from augment.llm.costs import Price, WorstCase, worst_case
 from augment.llm.fingerprint import image_reference, request_hash
 from augment.llm.messages import Reply, Request
 from augment.models import Augmentation, Endpoint, GenerationJob, ModelCall, TranscriptNote
-from augment.services.endpoints.prices import price_of
-from augment.services.running import answers, budget, stopping
-from augment.services.running.attempts import insist_wanted
+from augment.services.endpoints.known_models import price_of
+from augment.services.running import budget, calls, workers
+from augment.services.running.calls import insist_wanted
 from augment.services.scenarios.pictures import store
 from augment.services.texts import make_document_storable, make_storable
 from augment.services.work import Lease
@@ -125,11 +125,11 @@ class CallTranscript(ABC):
             self.insist()
             ModelCall.objects.create(
                 **columns,
-                **answers.columns_of_copy(earlier, now=timezone.now()),
+                **calls.columns_of_copy(earlier, now=timezone.now()),
                 number=self._numbers + 1,
             )
         self._numbers += 1
-        return answers.reply_of(earlier)
+        return calls.reply_of(earlier)
 
     def asked(self, role: ModelRole, request: Request, prompt_version: str) -> int:
         """Reserve the worst case of a request and store it; returns its number, from 1.
@@ -150,7 +150,7 @@ class CallTranscript(ABC):
         worst, price = worst_case(request), self._price_of(self._at(role), request.model)
         wait_s = FIRST_WAIT_S
         while True:
-            stopping.insist_on_going_on()
+            workers.insist_on_going_on()
             room, pk = self._try(columns, worst, price)
             if room == budget.Room.TAKEN:
                 self._numbers += 1
@@ -168,7 +168,7 @@ class CallTranscript(ABC):
             LeaseLost: Somebody took the row over and settled the call as one that never was.
             WorkerStopping: It waited for its place for so long that this worker is to stop.
         """
-        stopping.insist_on_going_on()
+        workers.insist_on_going_on()
         call = ModelCall.objects.filter(pk=self._open[number].pk, settled_at=None)
         if not call.update(sent_at=timezone.now()):
             raise LeaseLost
@@ -180,7 +180,7 @@ class CallTranscript(ABC):
         """
         call = self._open.pop(number)
         used = budget.used_by_reply(reply, worst=call.worst, price=call.price)
-        answer = answers.columns_of(reply)
+        answer = calls.columns_of(reply)
         # Also where there is none: the worker may have been thought dead meanwhile.
         answer["fault"] = "" if fault is None else make_storable(sentence_of(fault))
         self._settle(call, used, answer)
@@ -298,7 +298,7 @@ class RowTranscript(CallTranscript):
         insist_wanted(self._held, lock=True)
 
     def earlier_answer(self, request_hash: str) -> ModelCall | None:  # noqa: D102
-        return answers.find_earlier_answer(
+        return calls.find_earlier_answer(
             request_hash=request_hash,
             augmentation_pk=self._row.pk,
             attempt_pk=self._attempt.pk,

@@ -13,8 +13,7 @@ from augment.baselines.registry import break_reference
 from augment.models import Augmentation, Contestant, GenerationJob, Scenario
 from augment.scene.codec import modification_to_document
 from augment.services.events import log_event
-from augment.services.scenarios.pictures import camera_of, picture_of
-from augment.services.scenarios.redrawing import redraw
+from augment.services.scenarios.pictures import camera_of, picture_of, redraw
 from augment.services.scenarios.scenes import reference_of, scene_of
 
 ATTENTION_CHECK = "attention-check"

@@ -16,8 +16,7 @@ from django.contrib.auth.models import User
 from django.db import transaction
 
 from augment.errors import AugmentError, InvalidDocument
-from augment.formats.json_file import read_json
-from augment.formats.yaml_file import MAX_CHARACTERS, read_yaml_file
+from augment.formats.documents import MAX_CHARACTERS, read_json, read_yaml_file
 from augment.models import Scenario
 from augment.scene.codec import modification_from_document, modification_to_document
 from augment.services.scenarios.scenes import add_scenario, read_circumstances

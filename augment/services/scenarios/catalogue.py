@@ -26,7 +26,7 @@ from augment.scene.codec import (
 from augment.scene.entities import CatalogueSet, Scene
 from augment.scene.intent import IntentOrigin
 from augment.services.events import log_event
-from augment.services.scenarios.catalogue_files import folder_of, read_catalogue
+from augment.services.scenarios.catalogue import folder_of, read_catalogue
 from augment.services.scenarios.scenes import add_scenario, content_hash
 
 SOURCE = "authored"

@@ -25,9 +25,14 @@ from augment.render.camera import Camera, camera_for
 from augment.scene.codec import CatalogueEntry, intent_to_parts
 from augment.scene.entities import CatalogueSet, Scene, without_traffic
 from augment.scene.intent_statements import list_statements
-from augment.services.scenarios.catalogue_files import folder_of, read_catalogue
-from augment.services.scenarios.catalogue_rules import RULES, StagedScenario, find_sparse
-from augment.services.scenarios.way_past import WayPast, way_past
+from augment.services.scenarios.catalogue import folder_of, read_catalogue
+from augment.services.scenarios.catalogue_check import (
+    RULES,
+    StagedScenario,
+    WayPast,
+    find_sparse,
+    way_past,
+)
 
 MOST_ON_ONE_SCENE = 8
 

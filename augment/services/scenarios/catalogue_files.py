@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from augment.errors import InvalidDocument, InvalidModification
-from augment.formats.json_file import read_json
+from augment.formats.documents import read_json
 from augment.scene.codec import CatalogueEntry, entry_from_document, scene_from_document
 from augment.scene.entities import CatalogueSet, Scene, without_traffic
 from augment.services.scenarios.scenes import check_reference, check_slug

@@ -6,18 +6,16 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from augment.errors import Conflict, InvalidDocument, UnknownName
-from augment.formats.interplan.file import InterplanSource, ReadFile, token_of
+from augment.formats.documents import read_yaml_file
+from augment.formats.interplan.file import WHAT, InterplanSource, ReadFile, token_of
 from augment.formats.interplan.reader import read_document
-from augment.formats.interplan.schema import WHAT
 from augment.formats.interplan.writer import interplan_text
-from augment.formats.nuplan.scenario import NuPlan
+from augment.formats.nuplan_log import NuPlan
 from augment.formats.writing import Cell, Loss
-from augment.formats.yaml_file import read_yaml_file
 from augment.models import Augmentation, BaseScene, GenerationJob, Scenario
 from augment.scene.codec import modification_from_document, scene_from_document
 from augment.scene.entities import without_traffic
-from augment.services.scenarios.scenes import scene_of
-from augment.services.scenarios.types import type_of
+from augment.services.scenarios.scenes import scene_of, type_of
 
 NUPLAN = NuPlan.name
 _MOST_LISTED = 12

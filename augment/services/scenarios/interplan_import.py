@@ -18,10 +18,8 @@ from pydantic import BaseModel
 
 from augment.errors import AugmentError, InvalidDocument
 from augment.formats.apart import UntrustedInput
-from augment.formats.interplan.file import options_of
-from augment.formats.interplan.intent import describe_reference
-from augment.formats.interplan.reader import goal_place, read_entry, traffic_of
-from augment.formats.interplan.schema import (
+from augment.formats.documents import MAX_CHARACTERS, read_yaml_file
+from augment.formats.interplan.file import (
     WHAT,
     Details,
     File,
@@ -29,10 +27,12 @@ from augment.formats.interplan.schema import (
     file_of,
     left_out_of_details,
     left_out_of_file,
+    options_of,
     place_of,
 )
+from augment.formats.interplan.intent import describe_reference
+from augment.formats.interplan.reader import goal_place, read_entry, traffic_of
 from augment.formats.reading import Reading
-from augment.formats.yaml_file import MAX_CHARACTERS, read_yaml_file
 from augment.models import BaseScene, Scenario
 from augment.scene.codec import intent_to_document, modification_to_document
 from augment.scene.entities import Scene, SceneOptions, without_traffic

@@ -17,8 +17,7 @@ from augment.render.bev import draw
 from augment.render.camera import AROUND_THE_EGO, LOOK, camera_for
 from augment.scene.codec import scene_from_document
 from augment.scene.entities import Modification, without_traffic
-from augment.services.scenarios.pictures import store_as
-from augment.services.scenarios.redrawing import redraw
+from augment.services.scenarios.pictures import redraw, store_as
 from augment.services.scenarios.scenes import content_hash, reference_of, scene_key, scene_of
 
 FOLDER = "scenes"

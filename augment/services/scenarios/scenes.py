@@ -38,7 +38,7 @@ from augment.scene.entities import (
 from augment.scene.intent import Intent, IntentOrigin
 from augment.scene.lane_graph import LaneGraph
 from augment.services.events import log_event
-from augment.services.scenarios.types import label_for, type_of
+from augment.services.scenarios.scenes import label_for, type_of
 from augment.services.texts import check_prose
 
 SLUG_LENGTH = 80

@@ -16,8 +16,7 @@ from augment.render.camera import camera_for
 from augment.scene.entities import Modification
 from augment.scene.recording import notes_from_document, notes_to_document
 from augment.services.scenarios.pictures import store_as
-from augment.services.scenarios.scene_imports import keep_reading
-from augment.services.scenarios.scene_notes import said_of
+from augment.services.scenarios.scene_imports import keep_reading, said_of
 from augment.services.scenarios.scenes import check_slug
 from augment.services.scenarios.uploads import open_upload
 from augment.services.work import Lease, Settlement, WorkKind

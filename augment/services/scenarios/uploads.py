@@ -19,8 +19,7 @@ from django.db import transaction
 
 from augment.errors import Conflict, InvalidDocument
 from augment.formats.apart import UntrustedInput
-from augment.formats.readers import READERS, reader_of
-from augment.formats.timeline import RecordingPart, Timeline
+from augment.formats.readers import READERS, RecordingPart, Timeline, reader_of
 from augment.models import SceneUpload
 from augment.services.events import log_event
 from augment.services.work import Lease, Settlement, WorkKind
