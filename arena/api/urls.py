@@ -4,15 +4,14 @@ from __future__ import annotations
 
 from django.urls import URLPattern, path
 
-from arena.api import exports, reference
+from arena.api import reference
 from arena.api.views import ApiView
-from arena.contestants import api
-from arena.jobs import api
-from arena.people import api
-from arena.results import api
-from arena.scenarios import api
-from arena.studies import api
-from arena.voting import api
+from arena.contestants import api as contestants
+from arena.jobs import api as jobs
+from arena.people import api as people
+from arena.results import api as results
+from arena.scenarios import api as scenarios
+from arena.studies import api as studies
 
 
 def _at(address: str, view: type[ApiView], name: str) -> URLPattern:
@@ -23,32 +22,32 @@ def _at(address: str, view: type[ApiView], name: str) -> URLPattern:
 urlpatterns: list[URLPattern] = [
     path("reference/", reference.reference_page, name="api-reference"),
     _at("openapi.json", reference.DocumentView, "api-document"),
-    _at("people", api.PeopleView, "api-people"),
-    _at("first", api.FirstView, "api-first"),
-    _at("welcome", api.WelcomeView, "api-welcome"),
-    _at("uploads", api.UploadsView, "api-uploads"),
-    _at("uploads/<uuid:code>", api.UploadView, "api-upload"),
-    _at("uploads/<uuid:code>/moments", api.MomentsView, "api-moments"),
-    _at("moments/<uuid:code>", api.MomentView, "api-moment"),
-    _at("moments/<uuid:code>/keep", api.KeepMomentView, "api-moment-keep"),
-    _at("scenarios", api.ScenariosView, "api-scenarios"),
-    _at("endpoints", api.EndpointsView, "api-endpoints"),
-    _at("endpoints/<uuid:code>/models", api.ModelsView, "api-endpoint-models"),
-    _at("models/<uuid:code>/probe", api.ProbeView, "api-probe"),
-    _at("contestants", api.ContestantsView, "api-contestants"),
-    _at("jobs", api.JobsView, "api-jobs"),
-    _at("jobs/estimate", api.EstimateView, "api-job-estimate"),
-    _at("jobs/<uuid:code>", api.JobView, "api-job"),
-    _at("jobs/<uuid:code>/progress", api.JobProgressView, "job-progress"),
-    _at("jobs/<uuid:code>/exports/<slug:name>.<slug:form>", exports.JobExportView, "api-job-file"),
-    _at("studies", api.StudiesView, "api-studies"),
-    _at("studies/<uuid:code>", api.StudyView, "api-study"),
-    _at("studies/<uuid:code>/close", api.CloseStudyView, "api-study-close"),
-    _at("studies/<uuid:code>/snapshots", api.SnapshotsView, "api-snapshots"),
-    _at("snapshots/<uuid:code>", api.SnapshotView, "api-snapshot"),
+    _at("people", people.PeopleView, "api-people"),
+    _at("first", people.FirstView, "api-first"),
+    _at("welcome", people.WelcomeView, "api-welcome"),
+    _at("uploads", scenarios.UploadsView, "api-uploads"),
+    _at("uploads/<uuid:code>", scenarios.UploadView, "api-upload"),
+    _at("uploads/<uuid:code>/moments", scenarios.MomentsView, "api-moments"),
+    _at("moments/<uuid:code>", scenarios.MomentView, "api-moment"),
+    _at("moments/<uuid:code>/keep", scenarios.KeepMomentView, "api-moment-keep"),
+    _at("scenarios", scenarios.ScenariosView, "api-scenarios"),
+    _at("endpoints", contestants.EndpointsView, "api-endpoints"),
+    _at("endpoints/<uuid:code>/models", contestants.ModelsView, "api-endpoint-models"),
+    _at("models/<uuid:code>/probe", contestants.ProbeView, "api-probe"),
+    _at("contestants", contestants.ContestantsView, "api-contestants"),
+    _at("jobs", jobs.JobsView, "api-jobs"),
+    _at("jobs/estimate", jobs.EstimateView, "api-job-estimate"),
+    _at("jobs/<uuid:code>", jobs.JobView, "api-job"),
+    _at("jobs/<uuid:code>/progress", jobs.JobProgressView, "job-progress"),
+    _at("jobs/<uuid:code>/exports/<slug:name>.<slug:form>", jobs.JobExportView, "api-job-file"),
+    _at("studies", studies.StudiesView, "api-studies"),
+    _at("studies/<uuid:code>", studies.StudyView, "api-study"),
+    _at("studies/<uuid:code>/close", studies.CloseStudyView, "api-study-close"),
+    _at("studies/<uuid:code>/snapshots", results.SnapshotsView, "api-snapshots"),
+    _at("snapshots/<uuid:code>", results.SnapshotView, "api-snapshot"),
     _at(
         "snapshots/<uuid:code>/exports/<slug:name>.<slug:form>",
-        exports.SnapshotExportView,
+        results.SnapshotExportView,
         "api-snapshot-file",
     ),
     _at("matchups", api.MatchupsView, "api-matchups"),

@@ -7,13 +7,8 @@ from pathlib import Path
 import pytest
 from django.core.management import call_command
 
-from arena.jobs.exports.displacement import (
-    COLUMNS,
-    FORMATS,
-    DisplacementTable,
-    csv_bytes,
-    displacement_table,
-)
+from arena.jobs.exports.displacement import DisplacementTable, displacement_table
+from arena.jobs.exports.displacement_files import COLUMNS, FORMATS, csv_bytes
 from augment.models import Augmentation, Contestant, GenerationJob
 from augment.scene.codec import modification_to_document
 from augment.scene.entities import Modification, ScenarioType

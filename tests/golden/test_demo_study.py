@@ -23,8 +23,8 @@ from django.utils import timezone
 from pytest_django import Settings
 
 from arena.exports.study_folder.writing import MANIFEST, write_study
-from arena.jobs.exports.displacement import FORMATS as DISPLACEMENT
 from arena.jobs.exports.displacement import displacement_table
+from arena.jobs.exports.displacement_files import FORMATS as DISPLACEMENT
 from arena.management.demo import JOB, RATED, SIMULATED_EXPERTS, SIMULATED_STUDY, vote_and_rate
 from arena.models import Person, Study
 from arena.models.tokens import fresh_token

@@ -91,7 +91,7 @@ def test_a_call_from_the_store_names_its_source() -> None:
     assert (copied["served_from"], copied["cost_usd"]) == (paid["code"], "0")
     assert (paid["served_from"], last["served_from"]) == (None, None)
     totals = totals_of(tries_of(row))
-    assert (totals.calls, totals.cached, totals.spent_tokens) == (2, 1, 6040)
+    assert (totals.calls, totals.calls_from_store, totals.spent_tokens) == (2, 1, 6040)
 
 
 def test_the_order_in_which_a_database_keeps_keys_does_not_show() -> None:

@@ -12,8 +12,8 @@ from django.db.models import QuerySet
 from arena.exports.bundle import MANIFEST as RATING_MANIFEST
 from arena.exports.bundle import bundle_files
 from arena.exports.study_folder.closure import Closure
-from arena.jobs.exports.displacement import object_csv as objects_csv
-from arena.jobs.exports.displacement import object_rows
+from arena.jobs.exports.displacement_files import object_csv as objects_csv
+from arena.jobs.exports.displacement_files import object_rows
 from arena.models import Matchup, Snapshot, Vote
 from arena.services.cells import csv_text
 from arena.services.preregistration import FILE_NAME, preregistration_bytes

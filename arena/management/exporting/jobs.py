@@ -7,13 +7,9 @@ from typing import Any
 
 from arena.exports.formats import format_named
 from arena.exports.samples import SHEET_FORMATS, sheet_bytes, sheet_of
-from arena.jobs.exports import displacement, driving, faults, tables
-from arena.jobs.exports.displacement import (
-    BY_OBJECT,
-    OBJECT_FORMATS,
-    displacement_table,
-    object_rows,
-)
+from arena.jobs.exports import displacement_files, driving, faults, tables
+from arena.jobs.exports.displacement import displacement_table
+from arena.jobs.exports.displacement_files import BY_OBJECT, OBJECT_FORMATS, object_rows
 from arena.jobs.exports.driving import DrivingTable
 from arena.jobs.exports.files import TRANSCRIPT_FORMATS
 from arena.jobs.exports.tables import (
@@ -51,7 +47,7 @@ def add_jobs(kinds: Any) -> None:
     )
     _add_driving(kinds)
     add_table(
-        *(kinds, "tool-calls", tables.FORMATS, tool_calls_by_augmentation),
+        *(kinds, "tool-calls", tables.CALL_FORMATS, tool_calls_by_augmentation),
         help="calls of the function: tried, understood, mended",
     )
     add_table(
@@ -84,7 +80,7 @@ def _add_displacement(kinds: Any) -> None:
         nargs="+",
         help="scenario types, or all; by variant only those with definite places unless given",
     )
-    add_format(kind, displacement.FORMATS)
+    add_format(kind, displacement_files.FORMATS)
 
 
 def write_displacement(options: Chosen, say: Say) -> ExportedFile:
@@ -93,7 +89,7 @@ def write_displacement(options: Chosen, say: Say) -> ExportedFile:
     if options["by"] == BY_OBJECT:
         of_objects = format_named(OBJECT_FORMATS, options["format"])
         return fill(of_objects, object_rows(find_job(options["job"]), types=types))
-    chosen = format_named(displacement.FORMATS, options["format"])
+    chosen = format_named(displacement_files.FORMATS, options["format"])
     if options["by"] not in set(By):
         raise UnknownName("grouping", options["by"], [*By, BY_OBJECT])
     table = displacement_table(find_job(options["job"]), by=By(options["by"]), types=types)
