@@ -28,7 +28,6 @@ HEAVY = {
     "scipy.optimize": ("augment.metrics",),
     "scipy.signal": ("augment.simulation",),
     "scipy.sparse": ("arena.rating",),
-    "scipy.spatial": ("augment.simulation",),
     "scipy.stats": ("arena.rating", "augment.metrics"),
 }
 READS_SETTINGS = (

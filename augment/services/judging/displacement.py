@@ -25,7 +25,7 @@ from augment.metrics.displacement import (
 )
 from augment.models import Augmentation, GenerationJob, Scenario
 from augment.scene.codec import modification_from_document
-from augment.scene.entities import Modification, TrafficAgent
+from augment.scene.entities import Modification, ScenarioType, TrafficAgent
 from augment.services.scenarios.scenes import reference_of, type_choices, type_rank
 from augment.variants.recipes import SPELLING, spell_variant
 

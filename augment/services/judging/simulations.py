@@ -24,7 +24,7 @@ from augment.simulation.metrics import red_lights
 from augment.simulation.planners import NAMED, PDM_CLOSED, planner_named
 from augment.simulation.planning import Planner
 from augment.simulation.road import Road
-from augment.simulation.score import Score, ScoreKind, score_drive
+from augment.simulation.score import Score, ScoreKind, criticality, score_drive
 from augment.simulation.trace import blind_trace, trace_of
 from augment.simulation.traffic import DriveSetting
 
