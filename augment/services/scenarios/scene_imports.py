@@ -18,7 +18,7 @@ from augment.scene.codec import recording_to_document, scene_to_document
 from augment.scene.recording import Note, SceneNoteKind, notes_from_document, notes_to_document
 from augment.services.events import log_event
 from augment.services.scenarios.scenes import SLUG_LENGTH, check_slug, content_hash
-from augment.simulation.pdm_closed import FALLBACK_LIMIT_MPS
+from augment.simulation.planning import FALLBACK_LIMIT_MPS
 from augment.simulation.traffic import FALLBACK_MPS
 
 

@@ -1,19 +1,25 @@
-"""Who answers which part of an instruction: added agents, dealt out to the requests."""
+"""How far off what was asked for something may be before it is a fault.
+
+One set for every scenario and contestant; docs/method.md says where each number comes from. The
+references of the catalogue are held by a narrower one: their authors measured them.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
+from augment.checks.finding import Finding, Severity
 from augment.checks.lanes_across import LanesAcross
-from augment.checks.parties import LONG_VEHICLE_M
-from augment.scene.entities import AgentType, Point, TrafficAgent
+from augment.scene.ego_route import EgoRoute
+from augment.scene.entities import AgentType, Modification, Point, Scene, TrafficAgent, TrafficSide
 from augment.scene.intent import (
     Body,
     ConesRequest,
     CrashRequest,
+    Facing,
     Intent,
     LaneChoice,
     Request,
@@ -21,6 +27,76 @@ from augment.scene.intent import (
     VehicleRequest,
     WalkRequest,
 )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Tolerances:
+    """Of each kind of statement, in its unit.
+
+    Attributes:
+        distance_m, distance_share: Along the lane, whichever is more; 3 m at 60 m.
+        across_m: Across the lane, where an offset is asked for.
+        middle_m: From the lane centre, where that is asked for.
+        edge_m: Beyond the edge of the lane that was asked for.
+        heading_deg: Of what is turned against its lane or a neighbour.
+        spacing_m, spacing_share: Between neighbours, whichever is more.
+        drift_m: How much further along the lane a walk ends.
+    """
+
+    distance_m: float
+    distance_share: float
+    across_m: float
+    middle_m: float
+    edge_m: float
+    heading_deg: float
+    spacing_m: float
+    spacing_share: float
+    drift_m: float
+
+
+USUAL = Tolerances(
+    # In the paper's figures GPT-4o's plain variant has a third quartile of 2.1 m and a whisker of
+    # 2.9 m, and its table counts 3 position errors in 50: people accept that.
+    distance_m=2.5,
+    distance_share=0.05,
+    # Half the width of the paper's "slight random offset of 0 to 1.5 m".
+    across_m=0.75,
+    # A car there still blocks its lane.
+    middle_m=1.0,
+    edge_m=0.25,
+    # Half of what the check without an intent takes for a vehicle that follows its lane.
+    heading_deg=15.0,
+    # interPlan's cones stand 1.6 to 3.9 m apart.
+    spacing_m=0.75,
+    spacing_share=0.3,
+    drift_m=5.0,
+)
+"""Of what contestants hand in."""
+
+AUTHORED = Tolerances(
+    distance_m=0.5,
+    distance_share=0.0,
+    across_m=0.1,
+    middle_m=0.1,
+    edge_m=0.25,
+    heading_deg=3.0,
+    spacing_m=0.15,
+    spacing_share=0.0,
+    drift_m=0.5,
+)
+"""Of the catalogue's references."""
+
+CRASH_M = 6.0
+"""From one crashed vehicle to the next at most: the widest of interPlan's."""
+
+WORKER_M = 6.0
+"""From a worker to the nearest cone; interPlan's stand 0.8 to 4.0 m off."""
+
+SPEED_MPS, SPEED_SHARE = 1.0, 0.2
+"""Of what moves, whichever is more."""
+
+LONG_VEHICLE_M = 7.0
+"""A vehicle of this length passes for a bus, as interPlan's file has it."""
 
 
 class Role(StrEnum):
@@ -220,3 +296,79 @@ def _party(
             if n not in taken.values() and _suits(own[0][1], agent)
         ),
     )
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Asked:
+    """One modification, held against one intent.
+
+    Attributes:
+        to_move, to_remove: Ids of the scene's agents that are to be elsewhere, or to go.
+        unmet: Why the wish can't be met; None where it can.
+    """
+
+    modification: Modification
+    lanes: LanesAcross
+    matching: RequestMatching
+    tolerances: Tolerances
+    to_move: frozenset[str] = frozenset()
+    to_remove: frozenset[str] = frozenset()
+    unmet: str | None = None
+
+    @property
+    def route(self) -> EgoRoute:
+        """The ego's path over lanes."""
+        return self.lanes.route
+
+    @property
+    def kerb(self) -> float:
+        """On which side the kerb is: 1 left, -1 right."""
+        return kerb_of(self.route.scene)
+
+    @property
+    def parties(self) -> tuple[Party, ...]:
+        """The requests with those who answer them."""
+        return self.matching.parties
+
+    def ahead_m(self, agent: TrafficAgent) -> float:
+        """How far along the ego's route an agent is."""
+        return self.route.locate_agent(agent).ahead_m
+
+    def left_m(self, agent: TrafficAgent) -> float:
+        """How far left of the ego's route an agent is."""
+        return self.route.locate_agent(agent).left_m
+
+
+AskedCheck = Callable[[Asked], Iterator[Finding]]
+
+
+def kerb_of(scene: Scene) -> float:
+    """On which side of the ego's lane the kerb is: 1 left, -1 right."""
+    return 1.0 if scene.traffic_side is TrafficSide.LEFT else -1.0
+
+
+def distance_outside(value: float, low: float, high: float) -> float:
+    """How far a value is outside a range, 0 within it."""
+    return max(low - value, value - high, 0.0)
+
+
+def severity_of(*, fits: bool) -> Severity:
+    """What was asked for in so many words is there, or it is wrong."""
+    return Severity.FACT if fits else Severity.WRONG
+
+
+def facing_words(facing: Facing | None) -> str:
+    """Which way something is to face, as its lane leads where nothing is said."""
+    return _FACING[facing or Facing.WITH_LANE]
+
+
+def side_of(left: float) -> str:
+    """The side of a number whose left is positive."""
+    return "left" if left >= 0.0 else "right"
+
+
+_FACING = {
+    Facing.WITH_LANE: "facing with the lane",
+    Facing.AGAINST_LANE: "facing against the lane",
+    Facing.ACROSS: "facing across the lane",
+}
