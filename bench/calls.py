@@ -18,7 +18,7 @@ from augment.services.running import jobs, runner
 from augment.services.running.budget import Caps
 from augment.services.running.calls import RowTranscript
 from augment.services.running.runner import AUGMENTATIONS
-from augment.variants.respondents import ModelRole
+from augment.variants.respondents import ModelRole, RespondentClient, Respondents
 from tests.jobs.rows import add_scenario, only_row
 
 Call = Callable[[int], object]

@@ -12,6 +12,7 @@ from arena.people import api as people
 from arena.results import api as results
 from arena.scenarios import api as scenarios
 from arena.studies import api as studies
+from arena.voting import api as voting
 
 
 def _at(address: str, view: type[ApiView], name: str) -> URLPattern:
@@ -50,9 +51,9 @@ urlpatterns: list[URLPattern] = [
         results.SnapshotExportView,
         "api-snapshot-file",
     ),
-    _at("matchups", api.MatchupsView, "api-matchups"),
-    _at("pictures/<str:token>", api.ShownPictureView, "api-picture"),
-    _at("preferences", api.PreferencesView, "api-preferences"),
-    _at("reports", api.ReportsView, "api-reports"),
-    _at("votes", api.VotesView, "api-votes"),
+    _at("matchups", voting.MatchupsView, "api-matchups"),
+    _at("pictures/<str:token>", voting.ShownPictureView, "api-picture"),
+    _at("preferences", voting.PreferencesView, "api-preferences"),
+    _at("reports", voting.ReportsView, "api-reports"),
+    _at("votes", voting.VotesView, "api-votes"),
 ]

@@ -30,7 +30,6 @@ from augment.simulation.states import (
     meet,
     radii,
 )
-from augment.simulation.traffic import DriveSetting, LaneDrivers, Walkers, lane_under, objects_of
 
 TRAFFIC_IDM = Idm(1.0, 2.0, 4.0)
 """nuPlan's reactive traffic."""

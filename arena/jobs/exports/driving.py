@@ -8,7 +8,6 @@ from typing import Any
 
 from arena.exports.formats import Format, formats, round_value
 from arena.exports.tables import shown_name
-from arena.jobs.exports.driving import SOURCE, DrivingTable
 from arena.rating.printed import escape
 from arena.services.cells import csv_text
 from augment.services.judging.driving_scores import CLOSE_M, DrivingLine, DrivingScores
