@@ -21,7 +21,7 @@ class LoginLimit(AxesDatabaseHandler):  # type: ignore[misc] # untyped
     """
 
     def get_failures(self, request: HttpRequest, credentials: dict[str, Any] | None = None) -> int:
-        """Return the failures of the account here; at least the limit if the address has its own."""
+        """Return the failures of the account here; the limit if the address reached its own."""
         failures = int(super().get_failures(request, credentials))
         if _of_address(request) < settings.ADDRESS_FAILURE_LIMIT:
             return failures
