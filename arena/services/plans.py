@@ -19,8 +19,12 @@ from arena.services.attention_checks import check_pictures, placed_checks
 from arena.services.frames import Cells, ScenarioFrame, find_frames, frames_shown, sides_of
 from arena.services.showable import find_showable, windows_of, with_picture
 from augment.models import Augmentation, Scenario
-from augment.services.scenarios.descriptions import Description, descriptions
-from augment.services.scenarios.legends import legend_of_scene, legends_of_changes
+from augment.services.scenarios.pictures import (
+    Description,
+    descriptions,
+    legend_of_scene,
+    legends_of_changes,
+)
 
 SoFar = dict[str, list[PlannedMatchup]]
 """Every expert's showings as they are stored, by position."""

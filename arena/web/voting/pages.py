@@ -29,7 +29,7 @@ from arena.web.forms import ReportForm, VoteForm
 from arena.web.pictures import picture_response
 from arena.web.screen import over_context, vote_context
 from augment.errors import Conflict
-from augment.services.judging.measures import LaneEdges
+from augment.services.judging.findings import LaneEdges
 
 
 @allow_only(EXPERT)
