@@ -9,18 +9,15 @@ from typing import cast
 from django.contrib import messages
 from django.contrib.auth.models import User
 from django.db import transaction
-from django.http import Http404, HttpRequest, HttpResponse
+from django.http import HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, redirect, render
 from django.urls import reverse
-from django.utils.text import slugify
 from django.views.decorators.http import require_http_methods, require_POST, require_safe
 
-from arena.exports.formats import format_named
-from arena.jobs.exports.tables import CALL_FORMATS as TOOL_CALL_FORMATS
-from arena.jobs.pages.displacement import section
-from arena.jobs.pages.driving import section as driving_section
-from arena.jobs.pages.files import rows_of
+from arena.jobs.pages.driving import driving_section
+from arena.jobs.pages.exports import displacement_section
 from arena.jobs.queries import MARKS, VIEWS, Part, grid_part
+from arena.jobs.services import files_of
 from arena.queries.listings import MINE, Narrowing, find_jobs
 from arena.services.retrying import retry_cause as retry_one_cause
 from arena.web.access import ADMIN, STAFF, allow_only
@@ -34,9 +31,10 @@ from arena.web.listing import (
     search_asked,
 )
 from arena.web.questions import Confirmation, ask, is_sure
-from augment.errors import AugmentError, QueueFault, UnknownName
+from augment.errors import AugmentError, QueueFault
 from augment.models import Augmentation, GenerationJob
 from augment.services.judging.analyses import repeatability
+from augment.services.judging.scenario_export import FORMATS
 from augment.services.running import jobs
 from augment.services.running import jobs as service
 from augment.services.running.budget import costs_of
@@ -47,7 +45,6 @@ from augment.services.running.progress import (
     failure_groups,
     pace_of,
     rows_of_cause,
-    tool_calls_by_augmentation,
     tool_calls_by_contestant,
 )
 from augment.services.running.workers import workforce
@@ -109,9 +106,10 @@ def job_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
 
 def _measured(request: HttpRequest, job: GenerationJob) -> dict[str, object]:
     """What a job that does not move is measured by."""
+    files = files_of(job)
     measured: dict[str, object] = {
-        "scenario_files": rows_of(job),
-        "displacement": section(request, job),
+        "scenario_files": [(form, files.get(form)) for form in FORMATS],
+        "displacement": displacement_section(request, job),
         "driving": driving_section(request, job),
         "tool_calls": tool_calls_by_contestant(job),
     }
@@ -131,23 +129,6 @@ def _part_asked(request: HttpRequest) -> Part:
         sample=page_asked(request, "sample"),
         state=choice_asked(request, "state", State.values),
         search=search_asked(request),
-    )
-
-
-@allow_only(*STAFF)
-@require_safe
-def export_tool_calls(request: HttpRequest, code: uuid.UUID, form: str) -> HttpResponse:
-    """How each augmentation's contestant called its function, as a file."""
-    job = get_object_or_404(GenerationJob, code=code)
-    try:
-        chosen = format_named(TOOL_CALL_FORMATS, form)
-    except UnknownName as error:
-        raise Http404 from error
-    name = f"{slugify(job.name) or 'job'}-tool-calls.{chosen.suffix}"
-    return HttpResponse(
-        chosen.write(tool_calls_by_augmentation(job)),
-        content_type=chosen.content_type,
-        headers={"Content-Disposition": f'attachment; filename="{name}"'},
     )
 
 

@@ -12,14 +12,12 @@ from django.db import transaction
 from django.http import Http404, HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, redirect, render
 from django.urls import reverse
-from django.utils.text import slugify
 from django.views.decorators.cache import never_cache
-from django.views.decorators.http import require_http_methods, require_safe
+from django.views.decorators.http import require_http_methods
 
 from arena.errors import AlreadyLabelled, ArenaError, LabellingClosed, NotYours
-from arena.exports.formats import format_named
 from arena.jobs import queries
-from arena.jobs.exports.faults import FORMATS, fault_table
+from arena.jobs.exports.faults import fault_table
 from arena.jobs.queries import of_job
 from arena.jobs.services import close_labelling, open_labelling, save_label
 from arena.models import FaultLabel, LabellingRound
@@ -28,7 +26,7 @@ from arena.queries.voting.showings import original_beside
 from arena.web.access import ADMIN, EXPERT, STAFF, allow_only
 from arena.web.forms import LabelForm, LabellingForm
 from arena.web.questions import Confirmation, ask, is_sure, wants_to_change
-from augment.errors import AugmentError, UnknownName
+from augment.errors import AugmentError
 from augment.models import GenerationJob
 from augment.services.judging.findings import FaultClass
 
@@ -123,23 +121,6 @@ def faults_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         "labellings": queries.of_job(job),
     }
     return render(request, "label/job.html", context, status=422 if form.errors else 200)
-
-
-@allow_only(*STAFF)
-@require_safe
-def export(request: HttpRequest, code: uuid.UUID, form: str) -> HttpResponse:
-    """The faults of a job as a file."""
-    job = get_object_or_404(GenerationJob, code=code)
-    try:
-        chosen = format_named(FORMATS, form)
-    except UnknownName as error:
-        raise Http404 from error
-    name = f"{slugify(job.name) or 'job'}-faults.{chosen.suffix}"
-    return HttpResponse(
-        chosen.write(fault_table(job)),
-        content_type=chosen.content_type,
-        headers={"Content-Disposition": f'attachment; filename="{name}"'},
-    )
 
 
 @allow_only(ADMIN)
