@@ -10,9 +10,8 @@ from django.core.management import call_command
 from arena.jobs.exports.displacement import DisplacementTable, displacement_table
 from arena.jobs.exports.displacement_files import COLUMNS, FORMATS, csv_bytes
 from augment.models import Augmentation, Contestant, GenerationJob
-from augment.scene.catalogue import ScenarioType
 from augment.scene.codec import modification_to_document
-from augment.scene.modification import Modification
+from augment.scene.entities import Modification, ScenarioType
 from augment.services.judging.displacement import By
 from augment.services.scenarios.pictures import store
 from tests.jobs import rows

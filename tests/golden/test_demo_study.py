@@ -29,9 +29,8 @@ from arena.management.demo import JOB, RATED, SIMULATED_EXPERTS, SIMULATED_STUDY
 from arena.models import Person, Study
 from arena.models.tokens import fresh_token
 from augment.models import Augmentation, GenerationJob
-from augment.scene.catalogue import ScenarioType
 from augment.scene.codec import modification_to_document
-from augment.scene.modification import Modification
+from augment.scene.entities import Modification, ScenarioType
 from augment.services.judging.displacement import By
 from tests.golden.conftest import Check
 from tests.render.pictures import opened

@@ -12,7 +12,7 @@ from arena.services.frames import find_frames
 from arena.services.plans import pictures_of, planned_so_far
 from augment.models import Augmentation, Scenario
 from augment.scene.codec import modification_to_document
-from augment.scene.modification import Modification
+from augment.scene.entities import Modification
 from augment.services.running import runner
 from augment.services.running.by_hand import keep_correction
 from augment.services.scenarios.pictures import camera_of, original_picture, view_of, window_of

@@ -11,7 +11,7 @@ from django.urls import reverse
 
 from augment.models import Augmentation, Scenario
 from augment.scene.codec import modification_to_document
-from augment.scene.modification import Modification
+from augment.scene.entities import Modification
 from augment.services.running import runner
 from augment.services.scenarios.pictures import draw_scenario, draw_scene
 from tests.jobs.rows import add_scenario, launch

@@ -9,8 +9,8 @@ from django.core.files.uploadedfile import SimpleUploadedFile
 from django.test import Client
 
 from augment.models import EndpointModel, IntentReading, Scenario
-from augment.scene.intent_codec import intent_to_document
-from augment.scene.intent_words import Shape
+from augment.scene.codec import intent_to_document
+from augment.scene.intent import Shape
 from augment.services.endpoints.known_endpoints import ensure_endpoint
 from tests.intents import cones
 from tests.jobs.rows import add_scenario

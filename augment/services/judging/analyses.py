@@ -15,12 +15,14 @@ from django.db.models import Q
 from augment.checks import Severity
 from augment.errors import InvalidDocument, InvalidModification
 from augment.metrics.displacement import Displacement
-from augment.metrics.paired import PairedComparison, compare_all
-from augment.metrics.refusals import RefusalScore, score_refusals
-from augment.metrics.repeats import (
+from augment.metrics.paired import (
+    PairedComparison,
+    RefusalScore,
     Robustness,
     SampleSpread,
+    compare_all,
     measure_robustness,
+    score_refusals,
     spread_of,
     within_sd,
 )
