@@ -24,7 +24,7 @@ from augment.errors import Conflict, InvalidDocument
 from augment.models import Augmentation, GenerationJob, ModelCall
 from augment.services.events import log_event
 from augment.services.running.jobs import OPEN
-from augment.services.running.shown_images import delete_unnamed, images_named_by
+from augment.services.running.transcript_records import delete_unnamed, images_named_by
 
 BATCH = 200
 """So many calls are emptied in one transaction, so that nobody waits for long."""

@@ -11,18 +11,16 @@ from django.db import models
 from django.db.models import F
 
 from arena.errors import ArenaError
+from arena.jobs.services import NOTE_LENGTH
 from arena.models import FaultLabel, Matchup, Report, Snapshot, Study, Vote
-from arena.rating.bootstrap import Unit
-from arena.rating.rules import Intervals, Method
-from arena.services.faults import NOTE_LENGTH
+from arena.rating.rules import Intervals, Method, Unit
 from arena.services.plans import rules_of
 from arena.services.reports import Complaint, check_complaint
 from arena.services.studies import check_seed
 from arena.voting.services.casting import decision_of
 from augment.errors import AugmentError
 from augment.services import row_rules
-from augment.services.stored_names import check_picture_name
-from augment.services.texts import one_line
+from augment.services.texts import check_picture_name, one_line
 
 REFUSALS = (AugmentError, ArenaError, ValidationError, ValueError, KeyError, TypeError)
 """What a rule raises."""

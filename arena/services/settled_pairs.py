@@ -5,7 +5,7 @@ from __future__ import annotations
 from arena.models import Study, Vote
 from arena.pairing.order import MAIN
 from arena.pairing.rules import scenario_of
-from arena.rating.printed import whole_percent
+from arena.rating.lines import whole_percent
 from arena.results.queries.votes import AUTOMATIC, VoteSet
 
 

@@ -35,7 +35,7 @@ from arena.voting.services.shown_pictures import (
 from augment.errors import Conflict, UnknownName
 from augment.models import Contestant, Scenario
 from augment.services.events import log_event
-from augment.services.judging.alike import alike_pairs
+from augment.services.judging.displacement import alike_pairs
 from augment.services.running.choosing import find_job
 from augment.services.texts import one_line
 

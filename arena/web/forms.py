@@ -11,12 +11,12 @@ from django.utils.translation import gettext_lazy as _
 
 from arena.models import Report, Vote
 from arena.queries.profiles import Language, Theme
-from arena.queries.scenarios import TypeGroup
+from arena.scenarios.queries import TypeGroup
 from arena.services.reports import SIDES, Complaint
 from arena.voting.services.casting import LONGEST_COMMENT, Decision, decision_of
 from augment.models import Contestant
-from augment.services.judging.fault_guess import FaultClass
-from augment.services.running.caps import Caps
+from augment.services.judging.findings import FaultClass
+from augment.services.running.budget import Caps
 
 
 class ThemeForm(forms.Form):

@@ -12,7 +12,7 @@ from arena.services.plans import rules_of
 from arena.services.studies import close_study
 from augment.models import Augmentation
 from augment.scene.codec import modification_to_document
-from augment.scene.modification import Modification
+from augment.scene.entities import Modification
 from tests.opening import open_study
 from tests.scenes import vehicle
 from tests.study_rows import cast_of, vote
