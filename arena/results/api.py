@@ -19,13 +19,20 @@ from rest_framework.request import Request
 from arena import tasks
 from arena.api.access import STAFF
 from arena.api.fields import FlagField, StrictSerializer, TextField, WholeNumberField
-from arena.api.views import ApiView, keep_and_send, operation
+from arena.api.views import ApiView, FileView, as_file, file_operation, keep_and_send, operation
+from arena.errors import NoSnapshot
+from arena.exports.files import CONTENT_TYPE as ZIP_TYPE
+from arena.exports.formats import download
 from arena.models import Snapshot, Study
 from arena.models.ratings import STORED
 from arena.pairing.order import MAIN, REPEAT
-from arena.rating.bootstrap import Unit
 from arena.rating.leaderboard import Intervals, Line, Method
+from arena.rating.rules import Unit
+from arena.results.exports.charts import CONTENT_TYPES, chart_bytes
 from arena.results.exports.tables import LeaderboardTable, leaderboard_table
+from arena.results.exports.votes import VOTE_FORMATS, vote_table
+from arena.results.exports.writers import FORMATS as LEADERBOARD
+from arena.results.exports.writers import bundle
 from arena.results.queries.access import must_read_results
 from arena.results.queries.votes import Filters
 from arena.results.services.ratings import DEFAULT_ROUNDS, MOST_ROUNDS, is_big, plan_snapshot

@@ -9,8 +9,8 @@ from arena.contestants.urls import urlpatterns as CONTESTANTS
 from arena.jobs.urls import urlpatterns as JOBS
 from arena.results.pages import evidence as results_votes
 from arena.results.pages import ratings as results
-from arena.results.pages import ratings as results_files
 from arena.scenarios.urls import urlpatterns as SCENARIOS
+from arena.voting import pages as voting
 from arena.web.people import accounts as people
 from arena.web.people import api_tokens, authorships, enrolments, invitations
 from arena.web.people.sign_in import SignIn
@@ -75,7 +75,7 @@ urlpatterns: list[URLPattern] = [
     path("studies/<uuid:code>/reports/<uuid:key>/", reports.report_page, name="report"),
     path("studies/<uuid:code>/vote/", voting.vote_page, name="vote"),
     path("studies/<uuid:code>/vote/help/", voting.help_page, name="vote-help"),
-    path("studies/<uuid:code>/vote/practice/", pages.practice_page, name="vote-practice"),
+    path("studies/<uuid:code>/vote/practice/", voting.practice_page, name="vote-practice"),
     path("studies/<uuid:code>/vote/skipped/", voting.skipped_page, name="vote-skipped"),
     path("studies/<uuid:code>/vote/report/", voting.report_pair, name="vote-report"),
     path("i/<str:token>", voting.matchup_image, name="matchup-image"),
@@ -102,15 +102,15 @@ urlpatterns: list[URLPattern] = [
     path("studies/<uuid:code>/results/<slug:tab>/", results.results_page, name="results-tab"),
     path("studies/<uuid:code>/files/<slug:kind>/write/", study_files.ask, name="study-write"),
     path("studies/<uuid:code>/files/<slug:kind>/", study_files.download, name="study-file"),
-    path("studies/<uuid:code>/results.<slug:form>", results_files.export, name="results-export"),
+    path("studies/<uuid:code>/results.<slug:form>", results.export, name="results-export"),
     path(
         "studies/<uuid:code>/results-votes.<slug:form>",
-        results_files.export_votes,
+        results.export_votes,
         name="results-votes-export",
     ),
     path(
         "studies/<uuid:code>/results-charts/<slug:name>.<slug:form>",
-        results_files.export_chart,
+        results.export_chart,
         name="results-chart",
     ),
     path("studies/<uuid:code>/rate/", results.rate_study, name="study-rate"),

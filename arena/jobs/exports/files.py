@@ -17,8 +17,8 @@ from django.utils.text import slugify
 from arena.exports.files import zip_bytes
 from arena.exports.formats import Format, formats
 from arena.models import ScenarioFile
-from arena.results.exports.written_files import FileWork, MadeFile
 from arena.results.services.vote_files import digest_of
+from arena.results.services.written_files import FileWork, MadeFile
 from augment.models import Augmentation, GenerationJob
 from augment.services.judging.scenario_export import Exported, export_job
 from augment.services.running.calls import IMAGES

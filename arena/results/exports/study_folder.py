@@ -16,8 +16,7 @@ from django.core.files.storage import default_storage
 from django.template.loader import render_to_string
 
 from arena.errors import ArenaError
-from arena.jobs.exports.displacement import object_csv as objects_csv
-from arena.jobs.exports.displacement import object_rows
+from arena.jobs.exports.tables import object_sheet, sheet_csv
 from arena.models import Matchup, Snapshot, Study, Vote
 from arena.results.exports.closure import Closure, close_over, travelling_rows
 from arena.results.exports.writers import MANIFEST as RATING_MANIFEST
@@ -228,7 +227,7 @@ def _files_for_people(closure: Closure) -> Iterator[File]:
     for scene in sorted(scenes, key=lambda row: row.slug):
         yield f"scenes/{scene.slug}.json", _json(scene.document)
     for job in GenerationJob.objects.filter(pk__in=jobs).order_by("pk"):
-        yield f"objects/{job.code}.csv", objects_csv(object_rows(job))
+        yield f"objects/{job.code}.csv", sheet_csv(object_sheet(job))
     for start in range(0, len(augmentations), _AT_ONCE):
         yield from _made(augmentations[start : start + _AT_ONCE])
     ready = study.snapshots.filter(state=Snapshot.State.READY).order_by("made_at", "pk")

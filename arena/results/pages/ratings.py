@@ -23,8 +23,8 @@ from arena.exports.formats import format_named
 from arena.models import Snapshot, Study
 from arena.pairing.order import MAIN, REPEAT
 from arena.queries.people import role_of
-from arena.rating.bootstrap import Unit
 from arena.rating.leaderboard import Intervals, Method
+from arena.rating.rules import Unit
 from arena.results.exports.charts import CONTENT_TYPES, chart_bytes
 from arena.results.exports.tables import EARLY_LOOK, for_experts, leaderboard_table
 from arena.results.exports.votes import VOTE_FORMATS, unrated_votes, vote_table

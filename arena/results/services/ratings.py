@@ -18,10 +18,9 @@ from arena.errors import StudyStillOpen
 from arena.models import EarlyLook, ImportedVote, Snapshot, Standing, Study, Vote
 from arena.models.ratings import stored_values
 from arena.queries.studies.authorships import authors_of
-from arena.rating.bootstrap import Unit
 from arena.rating.comparisons import Comparisons
 from arena.rating.leaderboard import Leaderboard, Method, rate
-from arena.rating.rules import Intervals, TooManyContestants, default_intervals, unit_for
+from arena.rating.rules import Intervals, TooManyContestants, Unit, default_intervals, unit_for
 from arena.rating.snapshot_document import VERSION as RESULTS_VERSION
 from arena.rating.snapshot_document import Results
 from arena.results.queries.access import votes_in

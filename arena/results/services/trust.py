@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import fields, replace
@@ -9,7 +10,6 @@ from dataclasses import fields, replace
 import numpy as np
 
 from arena.rating import models
-from arena.rating.bootstrap import Unit
 from arena.rating.comparisons import (
     Comparisons,
     FloatArray,
@@ -27,9 +27,10 @@ from arena.rating.influence import (
 from arena.rating.leaderboard import Intervals, Leaderboard, Method, rate
 from arena.rating.logistic import side_bias
 from arena.rating.models import ELO_PER_LOGIT, MEAN_ELO
-from arena.rating.planning import design_effects, votes_until
+from arena.rating.planning import design_effects
 from arena.rating.ranking import Separation
 from arena.rating.reliability import Repeats, agreement, raters, repeat_consistency
+from arena.rating.rules import Unit
 from arena.rating.snapshot_document import (
     BoardRemarks,
     OnlinePlace,
@@ -146,10 +147,7 @@ def precision(arrays: VoteArrays, board: Leaderboard, *, seed: int) -> Precision
         independent=_bounds(alone),
         design_effect=float(np.median(effects)) if effects else None,
         planning=tuple(
-            VotesWanted(
-                half_width=wanted,
-                votes=votes_until(votes=votes, half_width=typical, wanted=wanted),
-            )
+            VotesWanted(half_width=wanted, votes=math.ceil(votes * (typical / wanted) ** 2))
             for wanted in WANTED
             if typical is not None
         ),
