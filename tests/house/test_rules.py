@@ -37,7 +37,14 @@ HEAVY = {
 }
 READS_SETTINGS = (
     "arena.config",
-    *("arena.services", "arena.tasks", "arena.apps", "arena.management", "arena.serving"),
+    *(
+        "arena.services",
+        "arena.voting.services",
+        "arena.tasks",
+        "arena.apps",
+        "arena.management",
+        "arena.serving",
+    ),
     *("augment.services", "augment.tasks", "augment.apps", "augment.management"),
 )
 MOST_LINES = {

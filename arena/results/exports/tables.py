@@ -1,4 +1,8 @@
-"""A snapshot as a table: what every writer, chart and page shows of it."""
+"""A snapshot as a table, and its columns: what every writer, chart and page shows of it.
+
+In: a snapshot. Out: its lines in order with all that must be said with them, and the value of each
+column with its name wherever it stands.
+"""
 
 from __future__ import annotations
 
