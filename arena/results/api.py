@@ -37,8 +37,8 @@ from arena.results.queries.access import must_read_results
 from arena.results.queries.votes import Filters
 from arena.results.services.ratings import DEFAULT_ROUNDS, MOST_ROUNDS, is_big, plan_snapshot
 from arena.results.services.ratings import rate_now as rate
-from arena.services.study_plan import HIGHEST_SEED
 from arena.studies.api import get_study
+from arena.studies.services.plan import HIGHEST_SEED
 from augment.errors import UnknownName
 from augment.services.scenarios.scenes import type_choices
 

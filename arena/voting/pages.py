@@ -17,9 +17,16 @@ from django.views.decorators.http import require_http_methods, require_POST, req
 
 from arena.errors import AlreadyDecided, InvalidVote, NotYours, StudyNotOpen, TooFast
 from arena.models import PracticePair, Study
-from arena.queries.studies.lists import voting_study
-from arena.services.practice import answer_practice, is_due, practice_pairs, skip_practice
-from arena.services.reports import report
+from arena.site.access import ADMIN, EXPERT, allow_only
+from arena.site.forms import ReportForm, VoteForm
+from arena.studies.queries import voting_study
+from arena.studies.services.experts import (
+    answer_practice,
+    is_due,
+    practice_pairs,
+    report,
+    skip_practice,
+)
 from arena.voting.queries.ballots import skipped_pairs
 from arena.voting.queries.showings import (
     drives_of_pair,
@@ -27,11 +34,9 @@ from arena.voting.queries.showings import (
     measures_of_pair,
     picture_shown,
 )
+from arena.voting.screen import over_context, vote_context
 from arena.voting.services.casting import receive_vote
-from arena.web.access import ADMIN, EXPERT, allow_only
-from arena.web.forms import ReportForm, VoteForm
 from arena.web.pictures import picture_response
-from arena.web.screen import over_context, vote_context
 from augment.errors import Conflict
 from augment.services.judging.findings import (
     EGO_ID,

@@ -20,7 +20,7 @@ from arena.results.exports.votes import VOTE_FORMATS, vote_table
 from arena.results.exports.writers import FORMATS, MANIFEST, bundle, bundle_files
 from arena.results.queries.votes import Filters
 from arena.results.services.ratings import rate_now as rate
-from arena.services.studies import close_study
+from arena.studies.services.opening import close_study
 from augment.errors import UnknownName
 from augment.models import Event
 from tests.full_study import Size, full_study

@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 
 from arena.models import Snapshot, Study
 from arena.pairing.order import MAIN
+from arena.people.services import mark_author
 from arena.rating.leaderboard import rate as rate_votes
 from arena.rating.snapshot_document import OwnVotes
 from arena.results.exports.writers import bundle
@@ -22,7 +23,6 @@ from arena.results.services.analysis import vote_arrays
 from arena.results.services.ratings import rate_now as rate
 from arena.results.services.ratings import votes_of
 from arena.results.services.trust import OTHER_ROUNDS, with_and_without
-from arena.services.authorships import mark_author
 from augment.models import Event
 from tests.full_study import Size, full_study
 

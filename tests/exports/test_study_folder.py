@@ -27,7 +27,7 @@ from arena.models import Person, Study, Vote
 from arena.results.exports.closure import TRAVELLING, close_over
 from arena.results.services.ratings import rate_now as rate
 from arena.results.services.stored_rows import as_line, columns_of, find_filled_tables, label_of
-from arena.services.studies import close_study
+from arena.studies.services.opening import close_study
 from augment.models import Augmentation, Contestant, Endpoint, GenerationJob, Scenario, Simulation
 from tests.study_rows import a_study, hang, matchups_of, scenario, vote, write_changes
 

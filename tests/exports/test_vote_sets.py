@@ -15,7 +15,7 @@ from arena.results.queries.votes import Filters, last_vote_of, vote_set
 from arena.results.services.ratings import rate_now as rate
 from arena.results.services.ratings import votes_of
 from arena.results.services.vote_files import COLUMNS, digest_of, vote_rows, votes_csv
-from arena.services.studies import close_study
+from arena.studies.services.opening import close_study
 from augment.errors import Conflict
 from augment.models import Contestant, Scenario
 from augment.scene.entities import ScenarioType

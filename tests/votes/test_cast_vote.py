@@ -8,7 +8,7 @@ from django.db import IntegrityError, transaction
 
 from arena.errors import AlreadyDecided, InvalidVote, NotYours, StudyNotOpen, TooFast
 from arena.models import EarlyLook, Vote
-from arena.services.studies import close_study
+from arena.studies.services.opening import close_study
 from arena.voting.queries.ballots import current_votes, recent_votes, upcoming
 from arena.voting.services.casting import PACE_WINDOW, cast_vote, decision_of, receive_vote
 from augment.errors import Conflict

@@ -16,7 +16,7 @@ from arena.errors import VotesUnreadable
 from arena.models import ImportedVote, Matchup, Snapshot, Study, Vote, VoteFile
 from arena.results.services import ratings, vote_files
 from arena.results.services.vote_files import DEAD_AFTER, import_votes
-from arena.services.studies import close_study
+from arena.studies.services.opening import close_study
 from arena.voting.services.casting import decision_of, receive_vote
 from augment.errors import Conflict
 from augment.models import Event

@@ -16,7 +16,7 @@ from arena.results.queries.evidence import neighbours, vote_page
 from arena.results.queries.scores import VoteScore, read_evidence
 from arena.results.queries.search import VoteSearch
 from arena.results.services.ratings import rate_now as rate
-from arena.services.studies import close_study
+from arena.studies.services.opening import close_study
 from augment.models import Augmentation
 from augment.services.scenarios.pictures import store
 from tests.study_rows import a_study, hang, vote

@@ -11,7 +11,7 @@ from django.urls import reverse
 
 from arena.errors import NothingToPlan
 from arena.models import PracticePair, Study, Vote
-from arena.services.practice import practice_pairs
+from arena.studies.services.experts import practice_pairs
 from arena.voting.queries.ballots import voting_progress
 from augment.models import Augmentation, Scenario
 from augment.scene.codec import modification_to_document

@@ -11,7 +11,7 @@ from pytest_django import DjangoAssertNumQueries
 from arena.models import EarlyLook, Matchup, Study
 from arena.results.pages.tabs import TABS
 from arena.results.services.ratings import rate_now as rate
-from arena.services.studies import close_study
+from arena.studies.services.opening import close_study
 from augment.scene.entities import ScenarioType
 from tests import study_rows
 from tests.full_study import Size, full_study

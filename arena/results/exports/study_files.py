@@ -18,7 +18,7 @@ from arena.results.exports.sheets import contact_sheet
 from arena.results.exports.study_folder import write_study
 from arena.results.queries.access import snapshot_to_export
 from arena.results.services.written_files import FileWork, Kind, MadeFile, why_not
-from arena.services.plans import shown_augmentations
+from arena.studies.services.planning import shown_augmentations
 from augment.errors import Conflict
 from augment.services.judging.scenario_export import ExportOrigin, export_rows
 

@@ -29,8 +29,8 @@ from arena.results.services.stored_rows import (
     label_of,
 )
 from arena.services.cells import csv_text
-from arena.services.preregistration import FILE_NAME, preregistration_bytes, preregistration_sha256
-from arena.services.unfinished_work import UNFINISHED
+from arena.site.services import UNFINISHED
+from arena.studies.services.opening import FILE_NAME, preregistration_bytes, preregistration_sha256
 from augment.models import Augmentation, Contestant, GenerationJob, Scenario
 from augment.services.running.transcript_records import record_of, tries_by_augmentation
 

@@ -27,8 +27,8 @@ from arena.results.exports.tables import (
 from arena.results.exports.votes import VOTE_FORMATS, vote_table
 from arena.results.services.vote_files import digest_of
 from arena.services.cells import csv_text
-from arena.services.hypotheses import Answered
-from arena.services.preregistration import FILE_NAME, preregistration_bytes
+from arena.studies.services.opening import FILE_NAME, preregistration_bytes
+from arena.studies.services.plan import Answered
 
 MANIFEST = "manifest.json"
 

@@ -15,16 +15,16 @@ from django.views.decorators.http import require_safe
 
 from arena.models import ImportedVote, Matchup, Snapshot, Study
 from arena.models.votes import AID_LABELS
-from arena.queries.people import natural_order
+from arena.people.queries import natural_order
 from arena.results.exports.tables import shown_name
 from arena.results.exports.votes import vote_list_csv
 from arena.results.pages.ratings import get_readable_study, get_snapshot
 from arena.results.queries.evidence import neighbours, vote_in, vote_page
 from arena.results.queries.search import MARKS, ORDERS, OUTCOMES, PARTS, VoteSearch
 from arena.results.queries.votes import AUTOMATIC, COUNTED, is_imported
+from arena.site.access import STAFF, allow_only
+from arena.site.listing import page_asked
 from arena.voting.queries.showings import describe_in_words, picture_of_side
-from arena.web.access import STAFF, allow_only
-from arena.web.listing import page_asked
 from arena.web.pictures import sized_picture_response
 from augment.services.running.jobs import HIGHEST_SAMPLES
 from augment.services.scenarios.scenes import type_choices

@@ -22,7 +22,7 @@ from arena.exports.files import CONTENT_TYPE, ZIP
 from arena.exports.formats import format_named
 from arena.models import Snapshot, Study
 from arena.pairing.order import MAIN, REPEAT
-from arena.queries.people import role_of
+from arena.people.queries import role_of
 from arena.rating.leaderboard import Intervals, Method
 from arena.rating.rules import Unit
 from arena.results.exports.charts import CONTENT_TYPES, chart_bytes
@@ -50,8 +50,8 @@ from arena.results.services.ratings import (
     rate_now,
 )
 from arena.services.covariates import COVARIATES, WITHOUT_PICTURES
-from arena.web.access import ADMIN, ANALYST, EXPERT, STAFF, allow_only
-from arena.web.studies.files import export_place
+from arena.site.access import ADMIN, ANALYST, EXPERT, STAFF, allow_only
+from arena.studies.pages.studies import export_place
 from augment.errors import AugmentError, Conflict, UnknownName
 from augment.services.scenarios.scenes import type_choices
 

@@ -10,7 +10,7 @@ from typing import Any
 from arena.jobs.pages.driving import driving
 from arena.models import Snapshot
 from arena.models.votes import AIDS
-from arena.queries.people import natural_order
+from arena.people.queries import natural_order
 from arena.rating.lines import rating_text
 from arena.rating.snapshot_document import (
     Adjustment,

@@ -17,7 +17,6 @@ from django.utils import timezone
 from arena.errors import StudyStillOpen
 from arena.models import EarlyLook, ImportedVote, Snapshot, Standing, Study, Vote
 from arena.models.ratings import stored_values
-from arena.queries.studies.authorships import authors_of
 from arena.rating.comparisons import Comparisons
 from arena.rating.leaderboard import Leaderboard, Method, rate
 from arena.rating.rules import Intervals, TooManyContestants, Unit, default_intervals, unit_for
@@ -40,6 +39,7 @@ from arena.results.services.vote_files import VERSION as VOTES_VERSION
 from arena.results.services.vote_files import digest_of, vote_rows, votes_csv
 from arena.services.covariates import COVARIATES, WITHOUT_PICTURES, adjustment, with_covariates
 from arena.services.settled_pairs import settled_remark
+from arena.studies.queries import authors_of
 from arena.voting.services.turns import in_turn
 from augment.errors import Conflict, LeaseLost, UnknownName
 from augment.services.clock import Moment

@@ -16,7 +16,7 @@ from django.core.files.storage import default_storage
 from django.db import transaction
 
 from arena.models import ScenarioFile, Snapshot, Study, StudyFile
-from arena.models.written_files import WrittenFile
+from arena.models.files import WrittenFile
 from arena.results.queries.votes import is_imported
 from augment.errors import Conflict, UnknownName
 from augment.services.events import log_event

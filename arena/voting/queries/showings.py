@@ -15,7 +15,7 @@ from django.utils.translation import gettext, gettext_noop
 
 from arena.errors import NotYours
 from arena.models import LabelTask, Matchup, PracticePair
-from arena.queries.people import role_of
+from arena.people.queries import role_of
 from augment.models import Augmentation, Simulation
 from augment.services.judging.findings import LaneEdges, MeasureLine, lane_edges_of, measures_of
 from augment.services.judging.simulations import blind_drive

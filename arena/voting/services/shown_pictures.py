@@ -16,7 +16,7 @@ from arena.errors import NothingToPlan
 from arena.models import Matchup, Study
 from arena.pairing.plan import PlannedMatchup
 from arena.pairing.rules import place_of, scenario_of
-from arena.services.showable import MOST_NAMED, find_showable, refuse_missing
+from arena.studies.services.pictures import MOST_NAMED, find_showable, refuse_missing
 from arena.voting.queries.showings import VIEW_OF_OLD
 from augment.errors import Conflict
 from augment.models import Augmentation, Contestant, GenerationJob, Scenario, Simulation
