@@ -19,10 +19,11 @@ from augment.formats.documents import (
     read_yaml_file,
 )
 from augment.formats.documents import MOST_YAML_VALUES as MOST_VALUES
-from augment.formats.interplan.reader import FURTHEST_FROM_EGO_M, read
+from augment.formats.interplan.file import FURTHEST_FROM_EGO_M
 from augment.scene.entities import Scene
 from augment.scene.modification import without_traffic
 from tests.fixtures.shelf import whole_scene
+from tests.formats.interplan_files import entries_of
 
 TOKEN = "00000000000000ab"
 TOP = "modification_details_dictionary"
@@ -99,7 +100,7 @@ HOSTILE = [
 @pytest.mark.parametrize(("text", "said"), HOSTILE, ids=range(len(HOSTILE)))
 def test_a_hostile_file_is_our_own_error_and_says_where(text: str, said: str) -> None:
     with pytest.raises(InvalidDocument) as caught:
-        read(text, {TOKEN: scene()})
+        entries_of(text, {TOKEN: scene()})
     assert said in str(caught.value)
     assert len(str(caught.value)) < 2_000
 
@@ -157,12 +158,12 @@ def test_what_is_nowhere_near_its_scene_is_refused(away_m: float, is_read: bool)
     x_m = pose.x_m + FURTHEST_FROM_EGO_M + away_m
     text = special(f"cones: [[{pose.x_m}, {pose.y_m}], [{x_m}, {pose.y_m}]]")
     if is_read:
-        (entry,) = read(text, {TOKEN: scene()}).entries
+        (entry,) = entries_of(text, {TOKEN: scene()})
         far = entry.modification.added[1]
         assert math.hypot(far.x_m, far.y_m) == pytest.approx(999.5)
     else:
         with pytest.raises(InvalidDocument, match=r"cones\[1\]: is 100[01] m from the ego"):
-            read(text, {TOKEN: scene()})
+            entries_of(text, {TOKEN: scene()})
 
 
 def test_a_large_file_is_refused_unread(tmp_path: Path) -> None:
