@@ -62,7 +62,7 @@ _Iteration = Annotated[int, Field(ge=0, le=1_000_000)]
 _Walk = Annotated[tuple[_Metres, _Metres, _Metres, _Metres, _Iteration | None], Strict(False)]
 _GoalPlace = Annotated[str, Field(pattern=r"^\s*-?\d{1,9}(\.\d+)?\s*,\s*-?\d{1,9}(\.\d+)?\s*$")]
 _Token = Annotated[str, Field(pattern=r"^[0-9a-f]{16}$")]
-_Index = Annotated[str, Field(pattern=r"^[0-9]{1,2}$")] | Annotated[int, Field(ge=0, le=99)]
+_Index = Annotated[str, Field(pattern=r"^[0-9]{1,2}$")]
 _Config = Annotated[str, Field(pattern=r"^(d[lmh]|g[lrs]|o[amc]|a\d|s\d{1,2})*$")]
 """Density, goal, observation, amount of agents and special scenario, as one suffix."""
 
