@@ -32,10 +32,9 @@ from augment.formats.reading import (
     speeds,
 )
 from augment.formats.road_map import FloatArray, RoadMap, Segment
-from augment.scene.entities import AgentType, AreaKind
-from augment.scene.notes import Note, SceneNoteKind
+from augment.scene.entities import LENGTH_WIDTH_M, AgentType, AreaKind
+from augment.scene.recording import Note, SceneNoteKind
 from augment.scene.schema import problems_of
-from augment.scene.sizes import LENGTH_WIDTH_M
 
 WHAT = "Argoverse 2 log"
 MOTION = "Argoverse 2 forecasting scenario"

@@ -23,9 +23,8 @@ from augment.formats.nuplan_map import WHAT, city_around, open_tables
 from augment.formats.reading import Log, LoggedTrack, Moment, Reading, frames_every, reading_at
 from augment.formats.road_map import FloatArray
 from augment.geometry.frames import Pose
-from augment.scene.entities import AgentType, TrafficLight
-from augment.scene.notes import Note, SceneNoteKind
-from augment.scene.sizes import EGO_LENGTH_M, EGO_WIDTH_M
+from augment.scene.entities import EGO_LENGTH_M, EGO_WIDTH_M, AgentType, TrafficLight
+from augment.scene.recording import Note, SceneNoteKind
 
 LICENCE = "nuPlan, CC BY-NC-SA 4.0"
 TAG = "tag:"

@@ -24,9 +24,9 @@ from augment.errors import InvalidDocument
 from augment.formats.road_map import FloatArray, RoadMap, Segment, fill_widths, map_notes
 from augment.formats.roads import RADIUS_M
 from augment.geometry.polyline import Polyline
-from augment.scene.directions import turn_type_of
 from augment.scene.entities import AreaKind, TrafficLight, TrafficSide, TurnType
-from augment.scene.notes import SceneNoteKind
+from augment.scene.lane_graph import turn_type_of
+from augment.scene.recording import SceneNoteKind
 
 WHAT = "nuPlan log"
 BICYCLE_LANE = 1

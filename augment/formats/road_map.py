@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from augment.scene.entities import AreaKind, TrafficLight, TrafficSide, TurnType
-from augment.scene.notes import Note, SceneNoteKind
+from augment.scene.recording import Note, SceneNoteKind
 
 FloatArray = NDArray[np.float64]
 Name = int | str

@@ -12,10 +12,14 @@ from augment.formats.documents import read_yaml
 from augment.formats.interplan.file import WHAT, ReadEntry, file_of, token_of
 from augment.formats.interplan.writer import interplan_text as write
 from augment.formats.writing import Cell
-from augment.geometry.angles import difference
-from augment.scene.catalogue import ScenarioType
-from augment.scene.entities import AgentType, TrafficAgent
-from augment.scene.modification import Modification, without_traffic
+from augment.geometry.frames import difference
+from augment.scene.entities import (
+    AgentType,
+    Modification,
+    ScenarioType,
+    TrafficAgent,
+    without_traffic,
+)
 from tests.fixtures.shelf import SLUGS, entry, shown_scene, whole_scene
 from tests.formats.interplan_files import entries_of
 

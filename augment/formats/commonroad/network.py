@@ -25,9 +25,9 @@ from augment.formats.road_map import (
 )
 from augment.formats.roads import midline
 from augment.geometry.polyline import Polyline
-from augment.scene.directions import turn_type_of
 from augment.scene.entities import AreaKind, TrafficLight, TurnType
-from augment.scene.notes import SceneNoteKind
+from augment.scene.lane_graph import turn_type_of
+from augment.scene.recording import SceneNoteKind
 
 WHAT = "CommonRoad scenario"
 SPEED_SIGNS = frozenset({"274", "R2-1"})

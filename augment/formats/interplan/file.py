@@ -21,22 +21,21 @@ from pydantic import BaseModel, ConfigDict, Field, Strict, ValidationError
 from augment.checks.ground import Ground
 from augment.errors import InvalidDocument
 from augment.escaping import escape_controls
-from augment.geometry.angles import wrap
-from augment.geometry.frames import Pose
-from augment.scene.catalogue import ScenarioType
+from augment.geometry.frames import Pose, wrap
 from augment.scene.density import ExtraAgent, spawn_traffic
 from augment.scene.entities import (
+    LENGTH_WIDTH_M,
     AgentType,
+    Modification,
     Point,
+    ScenarioType,
     Scene,
     SceneOptions,
     TrafficAgent,
     TrafficDensity,
     TurnType,
 )
-from augment.scene.modification import Modification
 from augment.scene.schema import path, problems_of
-from augment.scene.sizes import LENGTH_WIDTH_M
 
 WHAT = "interPlan file"
 OBJECTS = ("stopped_vehicle", "stopped_bus", "cones", "pedestrian")

@@ -29,11 +29,15 @@ from augment.formats.interplan.file import (
     yaml_text,
 )
 from augment.formats.writing import Cell, Loss, LossReport, Written
-from augment.geometry.angles import difference, wrap
-from augment.scene.catalogue import ScenarioType
-from augment.scene.entities import AgentType, Point, TrafficAgent
-from augment.scene.modification import without_traffic
-from augment.scene.sizes import LENGTH_WIDTH_M
+from augment.geometry.frames import difference, wrap
+from augment.scene.entities import (
+    LENGTH_WIDTH_M,
+    AgentType,
+    Point,
+    ScenarioType,
+    TrafficAgent,
+    without_traffic,
+)
 
 BUS_LENGTH_M = 7.0
 """A vehicle from here on is written as a bus: clearly longer than any car."""

@@ -36,7 +36,7 @@ from augment.formats.road_map import (
 )
 from augment.formats.waymo.scenario_pb2 import Scenario
 from augment.scene.entities import AgentType, AreaKind, TrafficLight
-from augment.scene.notes import SceneNoteKind
+from augment.scene.recording import SceneNoteKind
 
 WHAT = "Waymo Open Motion file"
 LICENCE = "Waymo Open Dataset licence, non-commercial use"
