@@ -87,7 +87,7 @@ AXES_RESET_ON_SUCCESS = True
 AXES_DISABLE_ACCESS_LOG = True
 AXES_VERBOSE = False
 AXES_CLIENT_IP_CALLABLE = "arena.config.client_address.client_address"
-AXES_LOCKOUT_CALLABLE = "arena.web.faults.answer_locked"
+AXES_LOCKOUT_CALLABLE = "arena.site.faults.answer_locked"
 
 # --- What it is made of ------------------------------------------------------------------------
 
@@ -112,11 +112,11 @@ MIDDLEWARE = [
     "csp.middleware.CSPMiddleware",
     "whitenoise.middleware.WhiteNoiseMiddleware",
     "django.contrib.sessions.middleware.SessionMiddleware",
-    "arena.web.language.VoterLanguageMiddleware",
+    "arena.site.language.VoterLanguageMiddleware",
     "django.middleware.common.CommonMiddleware",
     "django.middleware.csrf.CsrfViewMiddleware",
     "django.contrib.auth.middleware.AuthenticationMiddleware",
-    "arena.web.kept_forms.SignInMiddleware",
+    "arena.site.access.SignInMiddleware",
     "django.contrib.messages.middleware.MessageMiddleware",
     "django.middleware.clickjacking.XFrameOptionsMiddleware",
     "axes.middleware.AxesMiddleware",

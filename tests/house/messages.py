@@ -15,9 +15,9 @@ VOTER_MODULES = (
     *("arena/queries/voting/descriptions.py", "arena/queries/voting/measures.py"),
     *("arena/queries/voting/keys.py", "arena/services/api_tokens.py"),
     *("arena/services/enrolments.py", "arena/services/preferences.py"),
-    *("arena/web/people/api_tokens.py", "arena/web/people/enrolments.py", "arena/web/forms.py"),
+    *("arena/web/people/api_tokens.py", "arena/web/people/enrolments.py", "arena/site/forms.py"),
     *("arena/web/people/accounts.py", "arena/web/voting/practice.py"),
-    *("arena/web/screen.py", "arena/web/voting/pages.py"),
+    *("arena/voting/screen.py", "arena/web/voting/pages.py"),
 )
 """Modules whose messages stand on pages that voters are shown."""
 

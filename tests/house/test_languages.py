@@ -7,7 +7,7 @@ import ast
 from tests.house.messages import VOTER_MODULES
 from tests.house.source import walked
 
-CHOOSING = {"arena.web.language", "arena.web.people.sign_in"}
+CHOOSING = {"arena.site.language", "arena.web.people.sign_in"}
 """Modules that choose the language of an answer and mark no text."""
 
 

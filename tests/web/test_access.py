@@ -7,7 +7,7 @@ from django.test import Client
 from django.urls import reverse
 
 from arena.services.studies import close_study
-from arena.web.urls import urlpatterns
+from arena.site.urls import urlpatterns
 from tests.web.addresses import STRANGER, address
 from tests.web.cast import people, signed_in, status, world
 

@@ -34,7 +34,7 @@ def working(monkeypatch: pytest.MonkeyPatch, django_capture_on_commit_callbacks:
         "arena.web.scenarios.uploads.enqueue_moment", upload_moments.MOMENTS.perform
     )
     monkeypatch.setattr("arena.web.scenarios.scenes.enqueue_scene", scene_pictures.draw_scene)
-    monkeypatch.setattr("arena.web.sending.transaction.on_commit", lambda done: done())
+    monkeypatch.setattr("arena.site.acts.transaction.on_commit", lambda done: done())
 
 
 def send(client: Client, content: bytes = STREET, name: str = "street.json") -> str:

@@ -17,7 +17,7 @@ from django.views.decorators.http import require_http_methods, require_POST, req
 
 from arena.queries.people import role_of
 from arena.queries.probes import probe_lines
-from arena.web.access import ADMIN, STAFF, allow_only
+from arena.site.access import ADMIN, STAFF, allow_only
 from arena.web.contestants.endpoint_forms import EndpointPageForm, ModelPageForm, place_problems
 from augment.errors import AugmentError, InvalidDocument, QueueFault
 from augment.models import Endpoint, EndpointModel, Probe

@@ -11,7 +11,7 @@ from django.http import HttpRequest, HttpResponse
 from django.shortcuts import redirect, render
 from django.views.decorators.http import require_http_methods
 
-from arena.web.access import ADMIN, allow_only
+from arena.site.access import ADMIN, allow_only
 from arena.web.contestants.endpoint_forms import SLUG_RULE
 from augment.errors import AugmentError
 from augment.models import Endpoint

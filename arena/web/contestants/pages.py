@@ -14,9 +14,9 @@ from django.views.decorators.http import require_POST, require_safe
 
 from arena.queries.listings import Narrowing, find_contestants
 from arena.queries.scenarios import by_type
-from arena.web.access import ADMIN, STAFF, allow_only
+from arena.site.access import ADMIN, STAFF, allow_only
+from arena.site.listing import read_listing, read_page, said_choices
 from arena.web.contestants.asking import asking_of
-from arena.web.listing import read_listing, read_page, said_choices
 from augment.errors import AugmentError
 from augment.models import Augmentation, Contestant, GenerationJob
 from augment.services.endpoints.respondents import respondents_of

@@ -15,9 +15,9 @@ from django.urls import reverse
 from django.views.decorators.http import require_http_methods, require_POST
 
 from arena.services.retrying import retry_cause as retry_one_cause
-from arena.web.access import ADMIN, allow_only
-from arena.web.forms import CapsForm
-from arena.web.questions import Confirmation, ask, is_sure
+from arena.site.access import ADMIN, allow_only
+from arena.site.acts import Confirmation, ask, is_sure
+from arena.site.forms import CapsForm
 from augment.errors import AugmentError, QueueFault
 from augment.models import Augmentation, GenerationJob
 from augment.services.running import jobs as service

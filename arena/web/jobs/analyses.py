@@ -12,7 +12,7 @@ from django.views.decorators.http import require_safe
 from arena.exports.formats import format_named
 from arena.exports.jobs.analyses import ANALYSIS_FORMATS, PARTS, analysis_table
 from arena.queries.analyses import analysis_of
-from arena.web.access import STAFF, allow_only
+from arena.site.access import STAFF, allow_only
 from augment.errors import UnknownName
 from augment.models import GenerationJob
 

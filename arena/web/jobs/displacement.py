@@ -13,7 +13,7 @@ from arena.exports.formats import format_named
 from arena.exports.jobs.displacement_objects import BY_OBJECT, OBJECT_FORMATS, object_rows
 from arena.exports.jobs.displacement_table import displacement_table
 from arena.exports.jobs.displacement_writers import FORMATS
-from arena.web.access import STAFF, allow_only
+from arena.site.access import STAFF, allow_only
 from augment.errors import UnknownName
 from augment.models import GenerationJob
 from augment.services.judging.displacement import By, types_named

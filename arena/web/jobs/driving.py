@@ -22,8 +22,8 @@ from arena.models import Snapshot
 from arena.queries.costs import shown_augmentations
 from arena.queries.driving import DRIVES, before_of, cells_of
 from arena.queries.job_grid import Part
-from arena.web.access import ADMIN, STAFF, allow_only
-from arena.web.listing import choice_asked, page_asked
+from arena.site.access import ADMIN, STAFF, allow_only
+from arena.site.listing import choice_asked, page_asked
 from augment.errors import AugmentError, QueueFault, UnknownName
 from augment.models import GenerationJob, Simulation
 from augment.services.judging import simulations

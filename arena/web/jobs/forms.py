@@ -7,7 +7,7 @@ from typing import Any
 
 from django import forms
 
-from arena.web.forms import CapsForm, ChoiceForm, Offer
+from arena.site.forms import CapsForm, ChoiceForm, Offer
 from augment.errors import AugmentError
 from augment.models import Contestant, EndpointModel
 from augment.services.endpoints.entering import PROTOCOLS, REASONING_EFFORTS

@@ -21,10 +21,10 @@ from arena.queries import faults
 from arena.queries.people import by_pseudonym, experts, role_of
 from arena.queries.voting.showings import original_beside
 from arena.services.faults import close_labelling, open_labelling, save_label
-from arena.web.access import ADMIN, EXPERT, STAFF, allow_only
-from arena.web.forms import LabelForm, LabellingForm
+from arena.site.access import ADMIN, EXPERT, STAFF, allow_only
+from arena.site.acts import ask, is_sure, wants_to_change
+from arena.site.forms import LabelForm, LabellingForm
 from arena.web.jobs.labelling_questions import closing, opening
-from arena.web.questions import ask, is_sure, wants_to_change
 from augment.errors import AugmentError, UnknownName
 from augment.models import GenerationJob
 from augment.services.judging.fault_guess import FaultClass

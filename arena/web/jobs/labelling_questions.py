@@ -10,7 +10,7 @@ from django.urls import reverse
 from arena.models import LabellingRound
 from arena.queries.faults import of_job
 from arena.services.faults import open_labelling
-from arena.web.questions import Confirmation
+from arena.site.acts import Confirmation
 from augment.models import GenerationJob
 
 

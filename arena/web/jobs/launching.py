@@ -15,7 +15,7 @@ from django.shortcuts import redirect, render
 from django.views.decorators.http import require_http_methods
 
 from arena.queries import scenarios
-from arena.web.access import ADMIN, allow_only
+from arena.site.access import ADMIN, allow_only
 from arena.web.jobs.actions import send_rows
 from arena.web.jobs.forms import LaunchForm
 from augment.errors import AugmentError

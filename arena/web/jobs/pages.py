@@ -15,11 +15,8 @@ from arena.exports.formats import format_named
 from arena.exports.jobs.tool_calls import FORMATS as TOOL_CALL_FORMATS
 from arena.queries.job_grid import MARKS, VIEWS, Part, grid_part
 from arena.queries.listings import MINE, Narrowing, find_jobs
-from arena.web.access import STAFF, allow_only
-from arena.web.jobs.displacement import section
-from arena.web.jobs.driving import section as driving_section
-from arena.web.jobs.scenario_files import rows_of
-from arena.web.listing import (
+from arena.site.access import STAFF, allow_only
+from arena.site.listing import (
     choice_asked,
     page_asked,
     read_listing,
@@ -27,6 +24,9 @@ from arena.web.listing import (
     said_choices,
     search_asked,
 )
+from arena.web.jobs.displacement import section
+from arena.web.jobs.driving import section as driving_section
+from arena.web.jobs.scenario_files import rows_of
 from augment.errors import UnknownName
 from augment.models import Augmentation, GenerationJob
 from augment.services.judging.repeatability import repeatability

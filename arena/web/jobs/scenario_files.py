@@ -18,8 +18,8 @@ from arena import tasks
 from arena.exports.zips import CONTENT_TYPE
 from arena.models import ScenarioFile
 from arena.services.scenario_files import ask_for_file, files_of
-from arena.web.access import STAFF, allow_only
-from arena.web.sending import send_later
+from arena.site.access import STAFF, allow_only
+from arena.site.acts import send_later
 from augment.errors import AugmentError
 from augment.models import GenerationJob
 from augment.services.judging.scenario_export import FORMATS

@@ -10,7 +10,7 @@ from django.utils.text import slugify
 from django.views.decorators.http import require_safe
 
 from arena.exports.jobs.transcripts import TRANSCRIPT_FORMATS, transcript_lines
-from arena.web.access import STAFF, allow_only
+from arena.site.access import STAFF, allow_only
 from augment.models import GenerationJob
 
 

@@ -31,9 +31,9 @@ from arena.services.accounts import (
 )
 from arena.services.first_start import check_first_link, make_first_admin
 from arena.services.people import create_person
-from arena.web.access import ADMIN, allow_only
+from arena.site.access import ADMIN, allow_only
+from arena.site.acts import Confirmation, ask, is_sure
 from arena.web.people.invitations import BACKEND, GONE
-from arena.web.questions import Confirmation, ask, is_sure
 from augment.errors import AugmentError
 
 PAGES = ["GET", "HEAD", "POST"]

@@ -18,7 +18,7 @@ from django.views.decorators.http import require_http_methods, require_POST
 from arena.models import ApiToken
 from arena.queries.api_tokens import api_tokens_of, roles_offered
 from arena.services.api_tokens import DAYS, REQUESTS, make_api_token, revoke_api_token
-from arena.web.access import ADMIN, ANALYST, EXPERT, STAFF, allow_only
+from arena.site.access import ADMIN, ANALYST, EXPERT, STAFF, allow_only
 from arena.web.people.accounts import ROLE_NAMES
 from augment.errors import AugmentError
 

@@ -16,7 +16,7 @@ from arena.errors import ArenaError
 from arena.models import Authorship, Study
 from arena.queries.people import by_pseudonym
 from arena.services.authorships import mark_author, take_back_author
-from arena.web.access import ADMIN, allow_only
+from arena.site.access import ADMIN, allow_only
 from augment.errors import AugmentError
 
 

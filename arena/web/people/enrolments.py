@@ -36,7 +36,7 @@ from arena.services.enrolments import (
     enrol,
     set_enrolment,
 )
-from arena.web.access import ADMIN, allow_only
+from arena.site.access import ADMIN, allow_only
 from arena.web.people.invitations import BACKEND, GONE, SESSION_S
 from augment.errors import AugmentError
 

@@ -21,7 +21,7 @@ from arena.models import Invitation, Study
 from arena.queries.studies.authorships import authorships_of
 from arena.queries.studies.invitations import expert_lines, invitation_by_token, may_be_let_in
 from arena.services.invitations import SESSION_KEY, FreshLink, accept, invite, revoke
-from arena.web.access import ADMIN, allow_only
+from arena.site.access import ADMIN, allow_only
 from arena.web.people.authorships import AuthorForm
 from arena.web.people.sign_in import with_own_language
 from augment.errors import AugmentError

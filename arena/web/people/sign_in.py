@@ -12,7 +12,7 @@ from django.shortcuts import render
 
 from arena.queries.people import has_admin
 from arena.queries.profiles import Language, language_of
-from arena.web.kept_forms import KEPT, read_form
+from arena.site.access import KEPT, read_form
 
 LANGUAGE_COOKIE = "django_language"
 """Django's own name for it, which its locale middleware reads."""

@@ -22,7 +22,7 @@ from arena.queries.studies.results import ResultsAccess, results_access, snapsho
 from arena.queries.votes.judged import is_imported
 from arena.queries.votes.lists import settled_counted
 from arena.services.early_looks import open_early
-from arena.web.access import ADMIN, ANALYST, EXPERT, STAFF, allow_only
+from arena.site.access import ADMIN, ANALYST, EXPERT, STAFF, allow_only
 from arena.web.results.adjustment import show_adjustment
 from arena.web.results.authors import both_versions
 from arena.web.results.rating import rate_or_send

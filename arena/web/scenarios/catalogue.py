@@ -10,7 +10,7 @@ from django.http import HttpRequest, HttpResponse
 from django.shortcuts import redirect
 from django.views.decorators.http import require_POST
 
-from arena.web.access import ADMIN, allow_only
+from arena.site.access import ADMIN, allow_only
 from augment.errors import AugmentError
 from augment.services.endpoints.contestants import ensure_builtin
 from augment.services.scenarios.catalogue import load_own_catalogue

@@ -12,8 +12,8 @@ from django.http import Http404, HttpRequest, HttpResponse, JsonResponse
 from django.shortcuts import get_object_or_404, redirect
 from django.views.decorators.http import require_POST, require_safe
 
-from arena.web.access import ADMIN, STAFF, allow_only
-from arena.web.json_text import read_json
+from arena.site.access import ADMIN, STAFF, allow_only
+from arena.site.forms import read_json
 from augment.errors import AugmentError, Conflict, QueueFault
 from augment.models import EndpointModel, Scenario
 from augment.services.running.intent_readings import plan_reading

@@ -12,10 +12,10 @@ from django.shortcuts import get_object_or_404, redirect, render
 from django.urls import reverse
 from django.views.decorators.http import require_safe
 
-from arena.web.access import STAFF, allow_only
+from arena.site.access import STAFF, allow_only
+from arena.site.acts import looks_again, send_later
 from arena.web.contestants.asking import asking_of
 from arena.web.pictures import picture_response
-from arena.web.sending import looks_again, send_later
 from augment.errors import AugmentError, UnknownName
 from augment.models import Contestant, Scenario
 from augment.services.endpoints.contestant_prompts import asking_contestants, preview_contestant

@@ -14,8 +14,8 @@ from django.views.decorators.http import require_http_methods, require_POST
 
 from arena.services.removal import delete_scenario, delete_scene
 from arena.services.scenario_edits import rename_scene
-from arena.web.access import ADMIN, STAFF, allow_only
-from arena.web.questions import Confirmation, ask, is_sure
+from arena.site.access import ADMIN, STAFF, allow_only
+from arena.site.acts import Confirmation, ask, is_sure
 from augment.errors import AugmentError
 from augment.models import BaseScene, Scenario
 from augment.services.retirement import retire, take_back

@@ -9,8 +9,8 @@ from django.shortcuts import get_object_or_404, render
 from django.views.decorators.http import require_safe
 
 from arena.queries.scenes import counts_of, scene_rows, upload_rows
-from arena.web.access import STAFF, allow_only
-from arena.web.sending import looks_again, send_later
+from arena.site.access import STAFF, allow_only
+from arena.site.acts import looks_again, send_later
 from augment.models import BaseScene
 from augment.services.scenarios import uploads
 from augment.services.scenarios.scene_notes import notes_of

@@ -21,8 +21,8 @@ from arena.models import Study, StudyFile
 from arena.queries.studies.results import ResultsAccess, latest_snapshot, results_access
 from arena.queries.votes.judged import is_imported
 from arena.services.study_files import SHOWS_RESULTS, ask_for_study_file, study_files_of, why_not
-from arena.web.access import STAFF, allow_only
-from arena.web.sending import send_later
+from arena.site.access import STAFF, allow_only
+from arena.site.acts import send_later
 from augment.errors import AugmentError
 
 

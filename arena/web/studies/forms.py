@@ -12,8 +12,7 @@ from arena.errors import NothingToPlan
 from arena.pairing.target_lines import read_targets
 from arena.services.study_drafts import SWITCHES
 from arena.services.study_plan import PLAN_INPUTS, StudyPlan
-from arena.web.forms import ChoiceForm
-from arena.web.input_fields import form_field
+from arena.site.forms import ChoiceForm, form_field
 from augment.models import GenerationJob
 from augment.services.inputs import InputKind
 

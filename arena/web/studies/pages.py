@@ -26,9 +26,9 @@ from arena.services.hypotheses import hypotheses_of
 from arena.services.preregistration import preregistration_bytes, preregistration_sha256
 from arena.services.studies import cancel_study, close_study
 from arena.services.study_plan import PLAN_INPUTS, plan_of
-from arena.web.access import ADMIN, STAFF, allow_only
-from arena.web.listing import read_listing, read_page, said_choices
-from arena.web.questions import WHY, ask, is_sure, is_typed, wants_to_change
+from arena.site.access import ADMIN, STAFF, allow_only
+from arena.site.acts import WHY, ask, is_sure, is_typed, wants_to_change
+from arena.site.listing import read_listing, read_page, said_choices
 from arena.web.results.rating import rate_or_send
 from arena.web.studies.files import export_place
 from arena.web.studies.forms import HandOverForm

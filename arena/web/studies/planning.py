@@ -17,7 +17,7 @@ from arena.models import Study
 from arena.rating.planning import Outlook, Prospect, Question, Wish, foretell
 from arena.services.prospects import Known, known_of, usual_seconds
 from arena.services.study_estimate import ESTIMATE_INPUTS, StudyEstimate
-from arena.web.access import STAFF, allow_only
+from arena.site.access import STAFF, allow_only
 from arena.web.studies.planning_form import EXPECTED, ON_TOP, WANTED, WHO, PlanningForm
 from augment.errors import AugmentError
 

@@ -7,7 +7,7 @@ from typing import Any
 from django import forms
 
 from arena.services.study_estimate import ESTIMATE_INPUTS, StudyEstimate
-from arena.web.input_fields import form_field
+from arena.site.forms import form_field
 
 WHO = ("contestants", "experts", "scenarios")
 EXPECTED = ("spread", "ties", "expert_sd", "scenario_sd", "seconds")

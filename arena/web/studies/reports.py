@@ -14,7 +14,7 @@ from django.views.decorators.http import require_safe
 from arena.models import Report, Study
 from arena.queries.studies.coverage import reports_of
 from arena.queries.voting.showings import view_shown
-from arena.web.access import ADMIN, allow_only
+from arena.site.access import ADMIN, allow_only
 from augment.models import Augmentation
 
 _LEFT, _RIGHT = Report.Side.LEFT, Report.Side.RIGHT

@@ -31,8 +31,8 @@ from arena.services.study_drafts import (
     keep_draft,
     open_draft,
 )
-from arena.web.access import ADMIN, allow_only
-from arena.web.questions import ask, is_sure, wants_to_change
+from arena.site.access import ADMIN, allow_only
+from arena.site.acts import ask, is_sure, wants_to_change
 from arena.web.studies.forms import StudyForm
 from arena.web.studies.study_questions import discarding, opening
 from augment.errors import AugmentError

@@ -13,7 +13,7 @@ from arena.queries.voting.ballots import tallies
 from arena.services.handing_over import hand_over
 from arena.services.previews import preview_study
 from arena.services.study_plan import StudyPlan
-from arena.web.questions import Confirmation
+from arena.site.acts import Confirmation
 
 
 def opening(study_plan: StudyPlan, draft: StudyDraft | None = None) -> Confirmation:

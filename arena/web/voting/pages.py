@@ -24,10 +24,10 @@ from arena.queries.voting.showings import picture_shown
 from arena.services.practice import is_due
 from arena.services.reports import report
 from arena.services.votes import receive_vote
-from arena.web.access import ADMIN, EXPERT, allow_only
-from arena.web.forms import ReportForm, VoteForm
+from arena.site.access import ADMIN, EXPERT, allow_only
+from arena.site.forms import ReportForm, VoteForm
+from arena.voting.screen import over_context, vote_context
 from arena.web.pictures import picture_response
-from arena.web.screen import over_context, vote_context
 from augment.errors import Conflict
 from augment.services.judging.measures import LaneEdges
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from django.contrib.auth import views as auth
 from django.urls import URLPattern, path
 
+from arena.site import pages
 from arena.web.contestants import endpoints
 from arena.web.contestants import forms as contestant_form
 from arena.web.contestants import pages as contestants
@@ -21,7 +22,6 @@ from arena.web.results import pages as results
 from arena.web.scenarios import catalogue, editing, intents, prompts, removing, scenes, uploads
 from arena.web.scenarios import forms as scenario_form
 from arena.web.scenarios import pages as scenarios
-from arena.web.site import audit, health, home
 from arena.web.studies import files as study_files
 from arena.web.studies import pages as studies
 from arena.web.studies import planning, reports, vote_uploads
@@ -30,12 +30,12 @@ from arena.web.voting import pages as voting
 from arena.web.voting import practice
 
 urlpatterns: list[URLPattern] = [
-    path("", home.home, name="home"),
-    path("healthz", health.healthz, name="healthz"),
-    path("readyz", health.readyz, name="readyz"),
-    path("metrics", health.metrics, name="metrics"),
-    path("theme/", home.theme, name="theme"),
-    path("language/", home.language, name="language"),
+    path("", pages.home, name="home"),
+    path("healthz", pages.healthz, name="healthz"),
+    path("readyz", pages.readyz, name="readyz"),
+    path("metrics", pages.metrics, name="metrics"),
+    path("theme/", pages.theme, name="theme"),
+    path("language/", pages.language, name="language"),
     path("login/", SignIn.as_view(), name="login"),
     path("logout/", auth.LogoutView.as_view(), name="logout"),
     path("invitation/<str:token>/", invitations.invitation_page, name="invitation"),
@@ -132,8 +132,8 @@ urlpatterns: list[URLPattern] = [
     path("augmentations/<uuid:code>/correct/", editing.correct_page, name="correct"),
     path("augmentations/<uuid:code>/transcript.json", scenarios.transcript, name="transcript"),
     path("asked/<slug:digest>.png", scenarios.asked_image, name="asked-image"),
-    path("audit/", audit.audit_page, name="audit"),
-    path("audit.<slug:form>", audit.audit_file, name="audit-export"),
+    path("audit/", pages.audit_page, name="audit"),
+    path("audit.<slug:form>", pages.audit_file, name="audit-export"),
     path("studies/", studies.studies_page, name="studies"),
     path("studies/plan/", planning.planning_page, name="study-plan"),
     path("studies/checks/", study_setup.draw_checks, name="checks-draw"),

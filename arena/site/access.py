@@ -1,17 +1,45 @@
-"""A form that is sent after its session expired: kept in the page over the sign-in."""
+"""Who may open which page, said once in front of each view."""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Callable
-from typing import Any
+from functools import wraps
+from typing import Any, Concatenate, ParamSpec
 
 from django.contrib.auth.forms import AuthenticationForm
 from django.contrib.auth.middleware import LoginRequiredMiddleware
+from django.core.exceptions import PermissionDenied
 from django.http import HttpRequest, HttpResponseBase, QueryDict
 from django.shortcuts import render
 
-from arena.queries.people import has_admin
+from arena.queries.people import has_admin, role_of
+
+P = ParamSpec("P")
+View = Callable[Concatenate[HttpRequest, P], HttpResponseBase]
+
+ADMIN, ANALYST, EXPERT = "admin", "analyst", "expert"
+
+STAFF = (ADMIN, ANALYST)
+"""Who may know which contestant made what."""
+
+
+def allow_only(*roles: str) -> Callable[[View[P]], View[P]]:
+    """Refuse everybody else with 403; who is not signed in never gets this far."""
+
+    def wrap(view: View[P]) -> View[P]:
+        @wraps(view)
+        def guarded(
+            request: HttpRequest, /, *args: P.args, **kwargs: P.kwargs
+        ) -> HttpResponseBase:
+            if role_of(request.user) not in roles:
+                raise PermissionDenied
+            return view(request, *args, **kwargs)
+
+        return guarded
+
+    return wrap
+
 
 KEPT = "kept_form"
 """The field of the sign-in page that holds what was typed elsewhere."""
