@@ -1,4 +1,4 @@
-"""Files that workers write and pages offer: asked for, being written, ready, failed."""
+"""Files that workers write and pages offer."""
 
 from __future__ import annotations
 
@@ -6,9 +6,10 @@ from typing import Any, ClassVar, Self
 
 from django.conf import settings
 from django.db import models
-from django.db.models import Q
+from django.db.models import F, Q
 
-from augment.models import Work
+from arena.models.studies import Study
+from augment.models import GenerationJob, Work
 
 
 class WrittenFile(Work):
@@ -65,3 +66,54 @@ def state_is_known(name: str) -> models.CheckConstraint:
 def ready_is_stored(name: str) -> models.CheckConstraint:
     """What is ready can be read."""
     return models.CheckConstraint(name=name, condition=~Q(state="ready") | ~Q(stored=""))
+
+
+class StudyFile(WrittenFile):
+    """One file of a study; the newest of a study and kind counts."""
+
+    FOLDER = "study-files"
+    OWN = ("study", "kind")
+
+    class Kind(models.TextChoices):
+        STUDY = "study", "The whole study"
+        CONTACT_SHEET = "contact-sheet", "Contact sheet"
+        INTERPLAN = "interplan", "Scenarios for interPlan"
+
+    study = models.ForeignKey(Study, on_delete=models.CASCADE, related_name="files")
+    kind = models.CharField(max_length=20, choices=Kind.choices)
+
+    class Meta:
+        ordering = ("study", "kind", "-pk")
+        constraints = (
+            state_is_known("study_file_state_is_known"),
+            ready_is_stored("ready_study_file_is_stored"),
+            models.CheckConstraint(
+                name="study_file_kind_is_known",
+                condition=Q(kind__in=["study", "contact-sheet", "interplan"]),
+            ),
+        )
+        indexes = (models.Index(F("study"), F("kind"), name="study_file_of_study"),)
+
+    def __str__(self) -> str:
+        return f"{self.study}: {self.kind}"
+
+
+class ScenarioFile(WrittenFile):
+    """All that a job made, in one format, as one zip; the newest of a job and format counts."""
+
+    FOLDER = "scenario-files"
+    OWN = ("job", "format")
+
+    job = models.ForeignKey(GenerationJob, on_delete=models.CASCADE, related_name="files")
+    format = models.CharField(max_length=40, help_text="commonroad, scenarionet, ...")
+
+    class Meta:
+        ordering = ("job", "format", "-pk")
+        constraints = (
+            state_is_known("scenario_file_state_is_known"),
+            ready_is_stored("ready_scenario_file_is_stored"),
+        )
+        indexes = (models.Index(F("job"), F("format"), name="scenario_file_of_job"),)
+
+    def __str__(self) -> str:
+        return f"{self.job} as {self.format}"
