@@ -97,9 +97,9 @@ def _fill(size: str) -> None:
     from django.core.management import call_command
     from django.db import transaction
 
-    from arena.services.people import create_person
+    from arena.people.services import create_person
     from arena.services.ratings import rate
-    from arena.services.studies import close_study
+    from arena.studies.services.opening import close_study
     from augment.models import Augmentation, Scenario
     from augment.scene.codec import modification_to_document
     from tests import full_study as made

@@ -28,7 +28,7 @@ from arena.queries.votes.sets import Filters
 from arena.rating.bootstrap import Unit
 from arena.rating.leaderboard import Intervals, Line, Method
 from arena.services.ratings import DEFAULT_ROUNDS, MOST_ROUNDS, is_big, plan_snapshot, rate
-from arena.services.study_plan import HIGHEST_SEED
+from arena.studies.services.plan import HIGHEST_SEED
 from augment.services.scenarios.types import type_choices
 
 _FIELDS: dict[str, Callable[[], serializers.Field[Any, Any, Any, Any]]] = {

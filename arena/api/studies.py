@@ -17,10 +17,10 @@ from arena.api.paging import PageQuery, answer_page, page_of
 from arena.api.schema import operation
 from arena.api.views import ApiView
 from arena.models import Study
-from arena.queries.people import role_of
-from arena.queries.studies.progress import StudyProgress, of_these, studies_seen_by
-from arena.services.studies import close_study, open_study
-from arena.services.study_plan import PLAN_INPUTS, SWITCH_COLUMNS, StudyPlan
+from arena.people.queries import role_of
+from arena.studies.queries import StudyProgress, of_these, studies_seen_by
+from arena.studies.services.opening import close_study, open_study
+from arena.studies.services.plan import PLAN_INPUTS, SWITCH_COLUMNS, StudyPlan
 
 
 class StudyBody(StrictSerializer):

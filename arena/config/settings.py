@@ -144,7 +144,7 @@ LOGIN_REDIRECT_URL = "home"
 LOGOUT_REDIRECT_URL = "login"
 AUTHENTICATION_BACKENDS = [
     "axes.backends.AxesStandaloneBackend",  # refuses before a password is looked at
-    "arena.queries.accounts.AccountBackend",
+    "arena.people.queries.AccountBackend",
 ]
 PASSWORD_RESET_TIMEOUT = 14 * 24 * 3600  # how long a link to set a password works
 AUTH_PASSWORD_VALIDATORS = [

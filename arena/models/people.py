@@ -70,7 +70,7 @@ def fresh_token() -> str:
 class ApiToken(Coded):
     """One token of one account. It is shown once and kept only as a hash.
 
-    The role is never more than the owner's of the moment; see `arena.queries.api_tokens`.
+    The role is never more than the owner's of the moment; see `arena.people.queries`.
     """
 
     class State(models.TextChoices):

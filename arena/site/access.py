@@ -1,19 +1,20 @@
-"""Who may open which page, said once in front of each view."""
+"""Who may open which page, and signing in."""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Callable
 from functools import wraps
-from typing import Any, Concatenate, ParamSpec
+from typing import Any, Concatenate, ParamSpec, cast
 
 from django.contrib.auth.forms import AuthenticationForm
 from django.contrib.auth.middleware import LoginRequiredMiddleware
+from django.contrib.auth.models import User
 from django.core.exceptions import PermissionDenied
-from django.http import HttpRequest, HttpResponseBase, QueryDict
+from django.http import HttpRequest, HttpResponse, HttpResponseBase, QueryDict
 from django.shortcuts import render
 
-from arena.queries.people import has_admin, role_of
+from arena.people.queries import has_admin, role_of
 
 P = ParamSpec("P")
 View = Callable[Concatenate[HttpRequest, P], HttpResponseBase]
@@ -23,9 +24,13 @@ ADMIN, ANALYST, EXPERT = "admin", "analyst", "expert"
 STAFF = (ADMIN, ANALYST)
 """Who may know which contestant made what."""
 
+BACKEND = "arena.people.queries.AccountBackend"
+GONE = 410
+"""The status of a link that is over."""
+
 
 def allow_only(*roles: str) -> Callable[[View[P]], View[P]]:
-    """Refuse everybody else with 403; who is not signed in never gets this far."""
+    """Refuse other roles with 403; SignInMiddleware stops who is not signed in."""
 
     def wrap(view: View[P]) -> View[P]:
         @wraps(view)
@@ -41,6 +46,21 @@ def allow_only(*roles: str) -> Callable[[View[P]], View[P]]:
     return wrap
 
 
+def user_of(request: HttpRequest) -> User:
+    """Return who is signed in, for a view that others can't reach."""
+    return cast(User, request.user)
+
+
+def keep_secret(answer: HttpResponse) -> HttpResponse:
+    """Let nobody learn the address of a page that is a key: no referrer, no search engine.
+
+    With "no-referrer" browsers hide the origin of the page's form as well, and it is refused.
+    """
+    answer["Referrer-Policy"] = "strict-origin"
+    answer["X-Robots-Tag"] = "noindex, nofollow"
+    return answer
+
+
 KEPT = "kept_form"
 """The field of the sign-in page that holds what was typed elsewhere."""
 
@@ -48,7 +68,7 @@ _LEFT_OUT = ("csrfmiddlewaretoken", "password")
 
 
 class SignInMiddleware(LoginRequiredMiddleware):
-    """Ask who is not signed in to do so; what they sent comes along in the sign-in page."""
+    """Ask who is not signed in to do so; the sign-in page keeps what they sent."""
 
     def handle_no_permission(  # type: ignore[override]
         self, request: HttpRequest, view_func: Callable[..., Any]

@@ -11,25 +11,14 @@ from django.contrib.auth.models import User
 from django.utils.translation import gettext_lazy as _
 
 from arena.models import Report, Vote
-from arena.queries.profiles import Language, Theme
 from arena.queries.scenarios import TypeGroup
 from arena.services.decisions import LONGEST_COMMENT, Decision, decision_of
-from arena.services.reports import SIDES, Complaint
+from arena.studies.services.experts import SIDES, Complaint
 from augment.errors import Conflict
 from augment.models import Contestant
 from augment.services.inputs import Input, InputKind
 from augment.services.judging.fault_guess import FaultClass
 from augment.services.running.caps import Caps
-
-
-class ThemeForm(forms.Form):
-    """The switch in the account menu."""
-
-    theme = forms.ChoiceField(choices=[(theme.value, theme.value) for theme in Theme])
-
-    def theme_value(self) -> Theme:
-        """What was chosen, once the form is valid."""
-        return Theme(self.cleaned_data["theme"])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -43,16 +32,6 @@ class Offer:
     row: Contestant
     obstacle: str = ""
     keys_missing: tuple[str, ...] = ()
-
-
-class LanguageForm(forms.Form):
-    """The other switch in the account menu."""
-
-    language = forms.ChoiceField(choices=[(one.value, one.label) for one in Language])
-
-    def language_value(self) -> Language:
-        """What was chosen, once the form is valid."""
-        return Language(self.cleaned_data["language"])
 
 
 class ChoiceForm(forms.Form):

@@ -9,7 +9,7 @@ from django.http import HttpRequest
 from django.middleware.locale import LocaleMiddleware
 from django.utils import translation
 
-from arena.queries.profiles import Language
+from arena.people.queries import Language
 
 VOTER_VIEWS = frozenset(
     {

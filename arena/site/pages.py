@@ -1,144 +1,50 @@
-"""What an admin does next, from an empty house to a rated table."""
+"""Home of each role with its first steps, the audit log, and what monitoring asks."""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
 from typing import Any, cast
 
 from django import forms
 from django.contrib.auth.decorators import login_not_required
-from django.contrib.auth.models import User
 from django.http import Http404, HttpRequest, HttpResponse, JsonResponse, StreamingHttpResponse
 from django.shortcuts import redirect, render
 from django.utils.http import url_has_allowed_host_and_scheme
 from django.views.decorators.http import require_POST, require_safe
 from prometheus_client import CollectorRegistry, generate_latest
-from prometheus_client.core import GaugeMetricFamily
 from prometheus_client.exposition import CONTENT_TYPE_LATEST
 from prometheus_client.registry import Collector
 
 from arena.exports.audit import AUDIT_FORMATS
 from arena.exports.formats import format_named
 from arena.models import Study
-from arena.queries import faults, inventory
-from arena.queries.audit import MACHINE, AuditFilters, actors, acts, object_kinds, verbs
-from arena.queries.gauges import read_gauges
-from arena.queries.inventory import Inventory
-from arena.queries.people import role_of
-from arena.queries.studies import progress
+from arena.people.pages import keep_language
+from arena.people.queries import Language, Theme, role_of
+from arena.people.services import keep_preference
+from arena.queries import faults
 from arena.queries.studies.results import ResultsAccess, results_access
-from arena.services.preferences import choose_language, choose_theme
 from arena.serving.metrics_key import opens_metrics
 from arena.serving.readiness import look_at_parts
-from arena.site.access import ADMIN, allow_only
-from arena.site.forms import LanguageForm, ThemeForm
+from arena.site.access import ADMIN, allow_only, user_of
 from arena.site.language import use_english
-from arena.site.listing import choice_asked, read_page
-from arena.web.people.sign_in import keep_language
+from arena.site.listing import read_page
+from arena.site.queries import MACHINE, actors, acts, distinct, read_gauges, take_inventory
+from arena.studies import queries as studies
+from arena.templatetags.results import verb_label
 from augment.errors import UnknownName
 from augment.models import Event, GenerationJob
 from augment.services.running.summary import count_each
 
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Step:
-    """One step on the way; the first that is not done is the next one.
-
-    Attributes:
-        link: The name of the page where it is done, empty where it is done by a command.
-    """
-
-    title: str
-    detail: str
-    done: bool
-    link: str
-    action: str
-    is_next: bool = False
-
-
-def steps(found: Inventory) -> list[Step]:
-    """The way through the house, with what is done and what comes next."""
-    return _with_next([*_preparing(found), *_studying(found)])
-
-
-def _preparing(found: Inventory) -> list[Step]:
-    return [
-        Step(
-            title="Load the catalogue",
-            detail=f"{found.scenarios} scenarios are here."
-            if found.scenarios
-            else "No scenario yet. What comes with the project is loaded by a button.",
-            done=found.scenarios > 0,
-            link="scenarios",
-            action="Scenarios",
-        ),
-        Step(
-            title="Have at least two contestants",
-            detail=f"{found.contestants} contestants are registered."
-            if found.contestants
-            else "None yet. A model at an endpoint, or one of those that ask nobody.",
-            done=found.contestants >= 2,
-            link="contestants",
-            action="Contestants",
-        ),
-        Step(
-            title="Run a job",
-            detail=f"{found.done} augmentations are done."
-            if found.done
-            else "A job lets contestants carry out the instructions of scenarios.",
-            done=found.done > 0,
-            link="job-new",
-            action="New job",
-        ),
-    ]
-
-
-def _studying(found: Inventory) -> list[Step]:
-    return [
-        Step(
-            title="Open a study",
-            detail=f"{found.studies} so far, {found.studies_open} open now."
-            if found.studies
-            else "Experts compare two results of a scenario without knowing whose they are.",
-            done=found.studies > 0,
-            link="studies",
-            action="Studies",
-        ),
-        Step(
-            title="Let the experts vote",
-            detail=f"{found.votes:,} votes are saved; studies open: {found.studies_open}."
-            if found.votes
-            else "No vote yet.",
-            done=found.votes > 0 and found.studies_open == 0,
-            link="studies",
-            action="Progress",
-        ),
-        Step(
-            title="Close and read the results",
-            detail=f"{found.studies_closed} closed."
-            if found.studies_closed
-            else "Results show once a study is closed.",
-            done=found.studies_closed > 0,
-            link="studies",
-            action="Results",
-        ),
-    ]
-
-
-def _with_next(way: list[Step]) -> list[Step]:
-    """The same steps, the first open one marked."""
-    position = next((n for n, step in enumerate(way) if not step.done), None)
-    return [replace(step, is_next=n == position) for n, step in enumerate(way)]
-
-
 LATEST_JOBS = 5
+ACTS_AT_ONCE = 50
+
+# --- Home --------------------------------------------------------------------------------------
 
 
 @require_safe
 def home(request: HttpRequest) -> HttpResponse:
-    """The page of the role that somebody has; without a role, a page that says so."""
+    """Show the page of the role that somebody has."""
     match role_of(request.user):
         case "expert":
             return _expert(request)
@@ -152,44 +58,16 @@ def home(request: HttpRequest) -> HttpResponse:
             return render(request, "home/nobody.html")
 
 
-@require_POST
-def theme(request: HttpRequest) -> HttpResponse:
-    """Keep how the pages look, then go back to where the switch was pressed."""
-    form = ThemeForm(request.POST)
-    if form.is_valid():
-        choose_theme(user=cast(User, request.user), theme=form.theme_value())
-    return _back(request)
-
-
-@require_POST
-def language(request: HttpRequest) -> HttpResponse:
-    """Keep the language with the account, and in this browser for the pages before the login."""
-    form = LanguageForm(request.POST)
-    answer = _back(request)
-    if form.is_valid():
-        chosen = form.language_value()
-        choose_language(user=cast(User, request.user), language=chosen)
-        keep_language(answer, chosen)
-    return answer
-
-
-def _back(request: HttpRequest) -> HttpResponse:
-    """To where the switch was pressed, if that is a page of ours."""
-    back = request.POST.get("next", "")
-    is_ours = url_has_allowed_host_and_scheme(back, {request.get_host()}, request.is_secure())
-    return redirect(back if is_ours and "/" in back else "home")  # else it names a view
-
-
 def _expert(request: HttpRequest) -> HttpResponse:
-    expert = cast(User, request.user)
-    found = progress.of_expert(expert)
-    closed = [line for line in found if line.study.state == Study.State.CLOSED]
-    is_open = [line for line in found if line.study.state == Study.State.OPEN]
+    expert = user_of(request)
+    lines = studies.of_expert(expert)
+    closed = [line for line in lines if line.study.state == Study.State.CLOSED]
+    is_open = [line for line in lines if line.study.state == Study.State.OPEN]
     context = {
         "to_do": [line for line in is_open if line.left],
         "finished": [line for line in is_open if not line.left],
         "closed": closed,
-        "cancelled": [line for line in found if line.study.state == Study.State.CANCELLED],
+        "cancelled": [line for line in lines if line.study.state == Study.State.CANCELLED],
         "labellings": faults.of_expert(expert),
         "readable": {
             line.study.pk: results_access(user=expert, study=line.study) is ResultsAccess.FULL
@@ -200,94 +78,173 @@ def _expert(request: HttpRequest) -> HttpResponse:
 
 
 def _analyst(request: HttpRequest) -> HttpResponse:
-    found = progress.of_studies()
+    lines = studies.of_studies()
     context = {
-        "running": [line for line in found if line.study.state == Study.State.OPEN],
-        "closed": [line for line in found if line.study.state == Study.State.CLOSED],
+        "running": [line for line in lines if line.study.state == Study.State.OPEN],
+        "closed": [line for line in lines if line.study.state == Study.State.CLOSED],
     }
     return render(request, "home/analyst.html", context)
 
 
 def _admin(request: HttpRequest) -> HttpResponse:
-    found = inventory.take_inventory()
-    studies = progress.of_studies()
+    inventory = take_inventory()
     context = {
-        "inventory": found,
-        "steps": steps(found),
+        "inventory": inventory,
+        "steps": list_steps(inventory),
         "jobs": count_each(list(GenerationJob.objects.all()[:LATEST_JOBS])),
-        "running": [line for line in studies if line.study.state == Study.State.OPEN],
+        "running": [line for line in studies.of_studies() if line.study.state == Study.State.OPEN],
     }
     return render(request, "home/admin.html", context)
 
 
-ON_A_PAGE = 50
+STEPS = (
+    (
+        *("Load the catalogue", "scenarios", "Scenarios", "{scenarios} scenarios are here."),
+        "No scenario yet. What comes with the project is loaded by a button.",
+    ),
+    (
+        *("Have at least two contestants", "contestants", "Contestants"),
+        "{contestants} contestants are registered.",
+        "None yet. A model at an endpoint, or one of those that ask nobody.",
+    ),
+    (
+        *("Run a job", "job-new", "New job", "{done} augmentations are done."),
+        "A job lets contestants carry out the instructions of scenarios.",
+    ),
+    (
+        *("Open a study", "studies", "Studies", "{studies} so far, {studies_open} open now."),
+        "Experts compare two results of a scenario without knowing whose they are.",
+    ),
+    (
+        *("Let the experts vote", "studies", "Progress"),
+        "{votes:,} votes are saved; studies open: {studies_open}.",
+        "No vote yet.",
+    ),
+    (
+        *("Close and read the results", "studies", "Results", "{studies_closed} closed."),
+        "Results show once a study is closed.",
+    ),
+)
+"""From an empty installation to a rated table: a title, the page where it is done and its
+button, and what is said once there is something and before."""
 
 
-class DaysForm(forms.Form):
-    """From when to when; what is no day filters nothing and is said."""
+def list_steps(counts: dict[str, int]) -> list[dict[str, Any]]:
+    """Return the first steps of an admin, with what is done and what comes next."""
+    begun = ("scenarios", "contestants", "done", "studies", "votes", "studies_closed")
+    done = [counts[name] > 0 for name in begun]
+    done[1] = counts["contestants"] >= 2
+    done[4] = done[4] and counts["studies_open"] == 0
+    following = done.index(False) if False in done else None
+    return [
+        {
+            "title": title,
+            "link": link,
+            "action": action,
+            "detail": there.format(**counts) if counts[begun[n]] else before,
+            "done": done[n],
+            "is_next": n == following,
+        }
+        for n, (title, link, action, there, before) in enumerate(STEPS)
+    ]
 
-    since = forms.DateField(required=False)
-    until = forms.DateField(required=False)
+
+@require_POST
+def theme(request: HttpRequest) -> HttpResponse:
+    """Keep how the pages look, then go back to where the switch was pressed."""
+    chosen = request.POST.get("theme")
+    if chosen in set(Theme):
+        keep_preference(user_of(request), theme=chosen)
+    return _back(request)
+
+
+@require_POST
+def language(request: HttpRequest) -> HttpResponse:
+    """Keep the language with the account, and in this browser for the pages before the login."""
+    chosen, answer = request.POST.get("language"), _back(request)
+    if chosen in set(Language):
+        keep_preference(user_of(request), language=chosen)
+        keep_language(answer, Language(chosen))
+    return answer
+
+
+def _back(request: HttpRequest) -> HttpResponse:
+    """Return to where the switch was pressed, if that is a page of ours."""
+    back = request.POST.get("next", "")
+    is_ours = url_has_allowed_host_and_scheme(back, {request.get_host()}, request.is_secure())
+    return redirect(back if is_ours and "/" in back else "home")  # else it names a view
+
+
+# --- The audit log -----------------------------------------------------------------------------
+
+
+class AuditForm(forms.Form):
+    """Which acts the log shows; what is empty filters nothing."""
+
+    actor = forms.ChoiceField(required=False, label="By")
+    verb = forms.ChoiceField(required=False, label="What")
+    kind = forms.ChoiceField(required=False, label="To")
+    object = forms.CharField(
+        required=False, max_length=120, label="Code, or name of a study", strip=True
+    )
+    since = forms.DateField(required=False, label="From", widget=forms.DateInput())
+    until = forms.DateField(required=False, label="To and with", widget=forms.DateInput())
+
+    def __init__(self, *args: Any, **kwargs: Any) -> None:
+        super().__init__(*args, **kwargs)
+        people = [(str(user.person.code), user.person.pseudonym) for user in actors()]
+        offered = {
+            "actor": [("", "anybody"), (MACHINE, "the machine"), *people],
+            "verb": [("", "anything"), *((verb, verb_label(verb)) for verb in distinct("verb"))],
+            "kind": [("", "anything"), *((kind, kind) for kind in distinct("object_kind"))],
+        }
+        for name, choices in offered.items():
+            cast(forms.ChoiceField, self.fields[name]).choices = choices
+        for name in ("since", "until"):
+            self.fields[name].widget.input_type = "date"
 
 
 @allow_only(ADMIN)
 @require_safe
 def audit_page(request: HttpRequest) -> HttpResponse:
     """A page of acts, the newest first."""
-    people, filters, days = _asked(request)
-    page = read_page(request, acts(filters), size=ON_A_PAGE)
-    context: dict[str, Any] = {
+    form = AuditForm(request.GET)
+    is_valid = form.is_valid()
+    page = read_page(request, acts(form.cleaned_data), size=ACTS_AT_ONCE)
+    context = {
         "page": page,
         "lines": [(event, _details(event)) for event in page],
-        "filters": filters,
-        "days": days,
-        "actors": people,
-        "machine": MACHINE,
-        "verbs": verbs(),
-        "kinds": object_kinds(),
+        "form": form,
         "query": request.GET.urlencode(),
     }
-    return render(request, "audit.html", context, status=422 if days.errors else 200)
+    return render(request, "audit.html", context, status=200 if is_valid else 422)
 
 
 @allow_only(ADMIN)
 @require_safe
 def audit_file(request: HttpRequest, form: str) -> StreamingHttpResponse:
     """All acts that the page's filters name, as a file that is sent while it is read."""
+    asked = AuditForm(request.GET)
     try:
         chosen = format_named(AUDIT_FORMATS, form)
     except UnknownName as error:
         raise Http404 from error
-    _, filters, days = _asked(request)
-    if days.errors:
+    if not asked.is_valid():
         raise Http404
     return StreamingHttpResponse(
-        chosen.parts(acts(filters).iterator()),
+        chosen.parts(acts(asked.cleaned_data).iterator()),
         content_type=chosen.content_type,
         headers={"Content-Disposition": f'attachment; filename="audit.{chosen.suffix}"'},
     )
 
 
 def _details(event: Event) -> str:
-    """What changed: before, an arrow, after; empty where the log keeps nothing of it."""
-    kept = [one for one in (event.before, event.after) if one]
-    return " → ".join(json.dumps(one, ensure_ascii=False) for one in kept)
+    """Return what changed: before, an arrow, after."""
+    kept = [change for change in (event.before, event.after) if change]
+    return " → ".join(json.dumps(change, ensure_ascii=False) for change in kept)
 
 
-def _asked(request: HttpRequest) -> tuple[list[Any], AuditFilters, DaysForm]:
-    people = actors()
-    days = DaysForm(request.GET)
-    days.is_valid()
-    codes = [MACHINE, *(str(one.person.code) for one in people)]
-    filters = AuditFilters(
-        actor=choice_asked(request, "actor", codes),
-        verb=choice_asked(request, "verb", verbs()),
-        object_kind=choice_asked(request, "kind", object_kinds()),
-        object_code=request.GET.get("object", "").replace("\0", "").strip()[:120],
-        since=days.cleaned_data.get("since"),
-        until=days.cleaned_data.get("until"),
-    )
-    return people, filters, days
+# --- Monitoring --------------------------------------------------------------------------------
 
 
 @login_not_required
@@ -317,25 +274,19 @@ def readyz(request: HttpRequest) -> HttpResponse:
 @login_not_required
 @require_safe
 def metrics(request: HttpRequest) -> HttpResponse:
-    """Numbers in the form of Prometheus, for an admin or who has the token of the settings."""
+    """Numbers in Prometheus's format, for an admin or who has the token of the settings."""
     if role_of(request.user) != ADMIN and not opens_metrics(request.headers.get("Authorization")):
-        answer = HttpResponse("Send the token of ARENA_METRICS_TOKEN.\n", status=401)
-        answer.headers["WWW-Authenticate"] = "Bearer"
-        answer.headers["Content-Type"] = "text/plain; charset=utf-8"
-        return answer
+        return HttpResponse(
+            "Send the token of ARENA_METRICS_TOKEN.\n",
+            status=401,
+            content_type="text/plain; charset=utf-8",
+            headers={"WWW-Authenticate": "Bearer"},
+        )
     registry = CollectorRegistry(auto_describe=False)
-    registry.register(_Rows())
+    registry.register(_Gauges())
     return HttpResponse(generate_latest(registry), content_type=CONTENT_TYPE_LATEST)
 
 
-class _Rows(Collector):
-    """The gauges in the words of the client library."""
-
-    def collect(self) -> Iterator[GaugeMetricFamily]:
-        for gauge in read_gauges():
-            family = GaugeMetricFamily(
-                gauge.name, gauge.help, labels=[gauge.label] if gauge.label else None
-            )
-            for value, number in gauge.values:
-                family.add_metric([value] if gauge.label else [], number)
-            yield family
+class _Gauges(Collector):
+    def collect(self) -> Iterator[Any]:
+        yield from read_gauges()

@@ -5,7 +5,9 @@ from __future__ import annotations
 from django.contrib.auth import views as auth
 from django.urls import URLPattern, path
 
+from arena.people import pages as people
 from arena.site import pages
+from arena.studies.pages import experts, planning, setup, studies
 from arena.web.contestants import endpoints
 from arena.web.contestants import forms as contestant_form
 from arena.web.contestants import pages as contestants
@@ -13,19 +15,12 @@ from arena.web.jobs import actions as job_actions
 from arena.web.jobs import analyses, displacement, driving, labelling, scenario_files, transcripts
 from arena.web.jobs import launching as new_job
 from arena.web.jobs import pages as jobs
-from arena.web.people import accounts as people
-from arena.web.people import api_tokens, authorships, enrolments, invitations
-from arena.web.people.sign_in import SignIn
 from arena.web.results import evidence as results_votes
 from arena.web.results import files as results_files
 from arena.web.results import pages as results
 from arena.web.scenarios import catalogue, editing, intents, prompts, removing, scenes, uploads
 from arena.web.scenarios import forms as scenario_form
 from arena.web.scenarios import pages as scenarios
-from arena.web.studies import files as study_files
-from arena.web.studies import pages as studies
-from arena.web.studies import planning, reports, vote_uploads
-from arena.web.studies import setup as study_setup
 from arena.web.voting import pages as voting
 from arena.web.voting import practice
 
@@ -36,19 +31,19 @@ urlpatterns: list[URLPattern] = [
     path("metrics", pages.metrics, name="metrics"),
     path("theme/", pages.theme, name="theme"),
     path("language/", pages.language, name="language"),
-    path("login/", SignIn.as_view(), name="login"),
+    path("login/", people.SignIn.as_view(), name="login"),
     path("logout/", auth.LogoutView.as_view(), name="logout"),
-    path("invitation/<str:token>/", invitations.invitation_page, name="invitation"),
-    path("enrol/<str:token>/", enrolments.enrol_page, name="enrol"),
+    path("invitation/<str:token>/", experts.invitation_page, name="invitation"),
+    path("enrol/<str:token>/", experts.enrol_page, name="enrol"),
     path("first/<str:token>/", people.first_page, name="first"),
     path("welcome/<str:token>/", people.welcome_page, name="welcome"),
     path("password/", people.password_page, name="password"),
-    path("tokens/", api_tokens.tokens_page, name="api-tokens"),
-    path("tokens/<uuid:code>/revoke/", api_tokens.revoke, name="api-token-revoke"),
+    path("tokens/", people.tokens_page, name="api-tokens"),
+    path("tokens/<uuid:code>/revoke/", people.revoke_token, name="api-token-revoke"),
     path("people/", people.people_page, name="people"),
     path("people/<uuid:code>/link/", people.make_link, name="person-link"),
     path("people/<uuid:code>/change/", people.change_person, name="person-change"),
-    path("people/<uuid:code>/forget/", people.forget_person, name="person-forget"),
+    path("people/<uuid:code>/forget/", experts.forget_person, name="person-forget"),
     path("scenes/", scenes.scenes_page, name="scenes"),
     path("scenes/send/", uploads.send_file, name="scene-send"),
     path("scenes/<uuid:code>/", scenes.scene_page, name="scene"),
@@ -136,32 +131,30 @@ urlpatterns: list[URLPattern] = [
     path("audit.<slug:form>", pages.audit_file, name="audit-export"),
     path("studies/", studies.studies_page, name="studies"),
     path("studies/plan/", planning.planning_page, name="study-plan"),
-    path("studies/checks/", study_setup.draw_checks, name="checks-draw"),
-    path("studies/import/", vote_uploads.upload_votes_page, name="import-votes"),
-    path("studies/new/", study_setup.new_study_page, name="study-new"),
-    path("studies/drafts/<uuid:code>/", study_setup.draft_page, name="study-draft"),
-    path("studies/drafts/<uuid:code>/discard/", study_setup.discard, name="study-draft-discard"),
+    path("studies/checks/", setup.draw_checks, name="checks-draw"),
+    path("studies/import/", setup.upload_votes_page, name="import-votes"),
+    path("studies/new/", setup.new_study_page, name="study-new"),
+    path("studies/drafts/<uuid:code>/", setup.draft_page, name="study-draft"),
+    path("studies/drafts/<uuid:code>/discard/", setup.discard, name="study-draft-discard"),
     path("studies/<uuid:code>/", studies.study_page, name="study"),
-    path("studies/<uuid:code>/again/", study_setup.use_again, name="study-again"),
+    path("studies/<uuid:code>/again/", setup.use_again, name="study-again"),
     path("studies/<uuid:code>/cancel/", studies.cancel, name="study-cancel"),
     path(
         "studies/<uuid:code>/preregistration.json",
         studies.preregistration_file,
         name="preregistration",
     ),
-    path("studies/<uuid:code>/experts/", invitations.experts_page, name="experts"),
-    path("studies/<uuid:code>/enrolment/", enrolments.enrolment_page, name="enrolment"),
-    path("studies/<uuid:code>/enrolment/drop/", enrolments.drop_out, name="enrolment-drop"),
-    path(
-        "studies/<uuid:code>/enrolment/voters.csv", enrolments.voters_file, name="enrolment-voters"
-    ),
-    path("studies/<uuid:code>/experts/invite/", invitations.invite_experts, name="invite"),
-    path("invitations/<uuid:code>/revoke/", invitations.revoke_invitation, name="revoke"),
-    path("studies/<uuid:code>/experts/authors/", authorships.mark, name="author"),
-    path("authorships/<uuid:code>/take-back/", authorships.take_back, name="author-back"),
+    path("studies/<uuid:code>/experts/", experts.experts_page, name="experts"),
+    path("studies/<uuid:code>/enrolment/", experts.enrolment_page, name="enrolment"),
+    path("studies/<uuid:code>/enrolment/drop/", experts.drop_out, name="enrolment-drop"),
+    path("studies/<uuid:code>/enrolment/voters.csv", experts.voters_file, name="enrolment-voters"),
+    path("studies/<uuid:code>/experts/invite/", experts.invite_experts, name="invite"),
+    path("invitations/<uuid:code>/revoke/", experts.revoke_invitation, name="revoke"),
+    path("studies/<uuid:code>/experts/authors/", experts.mark, name="author"),
+    path("authorships/<uuid:code>/take-back/", experts.take_back, name="author-back"),
     path("studies/<uuid:code>/close/", studies.close, name="study-close"),
     path("studies/<uuid:code>/hand-over/", studies.hand_over_pairs, name="study-hand-over"),
-    path("studies/<uuid:code>/reports/<uuid:key>/", reports.report_page, name="report"),
+    path("studies/<uuid:code>/reports/<uuid:key>/", studies.report_page, name="report"),
     path("studies/<uuid:code>/vote/", voting.vote_page, name="vote"),
     path("studies/<uuid:code>/vote/help/", voting.help_page, name="vote-help"),
     path("studies/<uuid:code>/vote/practice/", practice.practice_page, name="vote-practice"),
@@ -189,8 +182,8 @@ urlpatterns: list[URLPattern] = [
         name="shown-picture",
     ),
     path("studies/<uuid:code>/results/<slug:tab>/", results.results_page, name="results-tab"),
-    path("studies/<uuid:code>/files/<slug:kind>/write/", study_files.ask, name="study-write"),
-    path("studies/<uuid:code>/files/<slug:kind>/", study_files.download, name="study-file"),
+    path("studies/<uuid:code>/files/<slug:kind>/write/", studies.ask_for_file, name="study-write"),
+    path("studies/<uuid:code>/files/<slug:kind>/", studies.download, name="study-file"),
     path("studies/<uuid:code>/results.<slug:form>", results_files.export, name="results-export"),
     path(
         "studies/<uuid:code>/results-votes.<slug:form>",

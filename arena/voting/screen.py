@@ -13,8 +13,6 @@ from django.utils.translation import gettext as _
 from django.utils.translation import pgettext
 
 from arena.models import OUTCOME_LETTERS, Report, Study, Vote
-from arena.queries.studies.enrolments import own_enrolment
-from arena.queries.studies.lists import longest_instructions
 from arena.queries.voting.ballots import VotingProgress, recent_votes, skip_of, voting_progress
 from arena.queries.voting.keys import (
     KEY_LABELS,
@@ -24,8 +22,9 @@ from arena.queries.voting.keys import (
     voting_preferences,
 )
 from arena.queries.voting.showings import as_shown
-from arena.services.replanning import next_pairs
-from arena.services.reports import SIDES
+from arena.studies.queries import longest_instructions, own_enrolment
+from arena.studies.services.experts import SIDES
+from arena.studies.services.planning import next_pairs
 
 AHEAD = 5
 """The pair on the screen and four that are decoded ahead."""

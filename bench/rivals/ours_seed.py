@@ -9,8 +9,8 @@ import django
 
 django.setup()
 
-from arena.services.invitations import invite  # noqa: E402
-from arena.services.people import create_person  # noqa: E402
+from arena.people.links import invite  # noqa: E402
+from arena.people.services import create_person  # noqa: E402
 from augment.models import Augmentation, Contestant, GenerationJob, Scenario  # noqa: E402
 from augment.services.scenarios.catalogue import load_catalogue  # noqa: E402
 from augment.services.scenarios.pictures import store  # noqa: E402

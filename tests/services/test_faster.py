@@ -15,8 +15,8 @@ from django.db.models.signals import pre_save
 
 from arena.errors import NothingToPlan
 from arena.models import Invitation, LabellingRound
+from arena.people.links import FreshLink, invite
 from arena.services.faults import open_labelling
-from arena.services.invitations import FreshLink, invite
 from augment.errors import Conflict
 from augment.models import GenerationJob
 from tests.exports.test_displacement import a_job

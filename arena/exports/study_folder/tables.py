@@ -16,7 +16,7 @@ from arena.exports.jobs.displacement_objects import object_rows
 from arena.exports.study_folder.closure import Closure
 from arena.models import Matchup, Snapshot, Vote
 from arena.services.cells import csv_text
-from arena.services.preregistration import FILE_NAME, preregistration_bytes
+from arena.studies.services.opening import FILE_NAME, preregistration_bytes
 from augment.models import Augmentation, Contestant, GenerationJob, Scenario
 from augment.services.running.transcript_export import record_of
 from augment.services.running.transcript_steps import Try, tries_by_augmentation

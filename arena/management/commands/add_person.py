@@ -10,7 +10,7 @@ from typing import Any
 from django.core.management.base import CommandError, CommandParser
 
 from arena.errors import ArenaError
-from arena.services.people import create_person
+from arena.people.services import create_person
 from augment.errors import AugmentError
 from augment.services.terminal import TerminalCommand
 

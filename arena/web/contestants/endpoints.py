@@ -15,7 +15,7 @@ from django.http import HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, redirect, render
 from django.views.decorators.http import require_http_methods, require_POST, require_safe
 
-from arena.queries.people import role_of
+from arena.people.queries import role_of
 from arena.queries.probes import probe_lines
 from arena.site.access import ADMIN, STAFF, allow_only
 from arena.web.contestants.endpoint_forms import EndpointPageForm, ModelPageForm, place_problems

@@ -17,8 +17,8 @@ from arena.errors import AlreadyLabelled, ArenaError, LabellingClosed, NotYours
 from arena.exports.formats import format_named
 from arena.exports.jobs.faults import FORMATS, fault_table
 from arena.models import FaultLabel, LabellingRound
+from arena.people.queries import by_pseudonym, experts, role_of
 from arena.queries import faults
-from arena.queries.people import by_pseudonym, experts, role_of
 from arena.queries.voting.showings import original_beside
 from arena.services.faults import close_labelling, open_labelling, save_label
 from arena.site.access import ADMIN, EXPERT, STAFF, allow_only

@@ -14,7 +14,6 @@ from django.views.decorators.http import require_safe
 from arena.exports.formats import format_named
 from arena.exports.jobs.tool_calls import FORMATS as TOOL_CALL_FORMATS
 from arena.queries.job_grid import MARKS, VIEWS, Part, grid_part
-from arena.queries.listings import MINE, Narrowing, find_jobs
 from arena.site.access import STAFF, allow_only
 from arena.site.listing import (
     choice_asked,
@@ -24,6 +23,7 @@ from arena.site.listing import (
     said_choices,
     search_asked,
 )
+from arena.site.queries import MINE, Narrowing, find_jobs
 from arena.web.jobs.displacement import section
 from arena.web.jobs.driving import section as driving_section
 from arena.web.jobs.scenario_files import rows_of

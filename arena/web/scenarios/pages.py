@@ -13,12 +13,12 @@ from django.shortcuts import get_object_or_404, render
 from django.views.decorators.http import require_safe
 
 from arena.queries import scenarios
-from arena.queries.listings import Narrowing, find_scenarios, group_by_type
 from arena.queries.modifications import modification_lines
 from arena.services.references import why_not_editable
 from arena.site.access import STAFF, allow_only
 from arena.site.acts import looks_again, send_later
 from arena.site.listing import read_listing, read_page, said_choices
+from arena.site.queries import Narrowing, find_scenarios, group_by_type
 from arena.web.contestants.asking import asking_of
 from arena.web.pictures import picture_response, sized_picture_response
 from augment.errors import QueueFault
