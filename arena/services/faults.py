@@ -17,7 +17,7 @@ from arena.people.queries import experts as expert_accounts
 from augment.errors import Conflict, UnknownName
 from augment.models import Augmentation, GenerationJob
 from augment.services.events import log_event
-from augment.services.judging.fault_guess import FaultClass, guess_faults
+from augment.services.judging.findings import FaultClass, guess_faults
 from augment.services.texts import make_storable, one_line
 
 NOTE_LENGTH = 2000

@@ -11,14 +11,14 @@ from django.contrib.auth.models import User
 from django.utils.translation import gettext_lazy as _
 
 from arena.models import Report, Vote
-from arena.queries.scenarios import TypeGroup
+from arena.scenarios.queries import TypeGroup
 from arena.services.decisions import LONGEST_COMMENT, Decision, decision_of
 from arena.studies.services.experts import SIDES, Complaint
 from augment.errors import Conflict
 from augment.models import Contestant
 from augment.services.inputs import Input, InputKind
-from augment.services.judging.fault_guess import FaultClass
-from augment.services.running.caps import Caps
+from augment.services.judging.findings import FaultClass
+from augment.services.running.budget import Caps
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -18,14 +18,13 @@ from prometheus_client.registry import Collector
 
 from arena.exports.audit import AUDIT_FORMATS
 from arena.exports.formats import format_named
+from arena.jobs import queries
 from arena.models import Study
 from arena.people.pages import keep_language
 from arena.people.queries import Language, Theme, role_of
 from arena.people.services import keep_preference
-from arena.queries import faults
 from arena.queries.studies.results import ResultsAccess, results_access
-from arena.serving.metrics_key import opens_metrics
-from arena.serving.readiness import look_at_parts
+from arena.serving.readiness import look_at_parts, opens_metrics
 from arena.site.access import ADMIN, allow_only, user_of
 from arena.site.language import use_english
 from arena.site.listing import read_page
@@ -34,7 +33,7 @@ from arena.studies import queries as studies
 from arena.templatetags.results import verb_label
 from augment.errors import UnknownName
 from augment.models import Event, GenerationJob
-from augment.services.running.summary import count_each
+from augment.services.running.progress import count_each
 
 LATEST_JOBS = 5
 ACTS_AT_ONCE = 50
@@ -68,7 +67,7 @@ def _expert(request: HttpRequest) -> HttpResponse:
         "finished": [line for line in is_open if not line.left],
         "closed": closed,
         "cancelled": [line for line in lines if line.study.state == Study.State.CANCELLED],
-        "labellings": faults.of_expert(expert),
+        "labellings": queries.of_expert(expert),
         "readable": {
             line.study.pk: results_access(user=expert, study=line.study) is ResultsAccess.FULL
             for line in closed

@@ -14,7 +14,7 @@ from django.utils import timezone
 from prometheus_client.core import GaugeMetricFamily
 
 from arena.models import Matchup, Study, Vote
-from arena.queries.scenarios import OWN, TypeGroup
+from arena.scenarios.queries import OWN, TypeGroup
 from augment.models import (
     Augmentation,
     Contestant,
@@ -25,7 +25,7 @@ from augment.models import (
     Work,
 )
 from augment.services.running.workers import workforce
-from augment.services.scenarios.types import type_choices
+from augment.services.scenarios.scenes import type_choices
 
 MACHINE = "machine"
 """Asked for as an actor: what nobody did but the machine itself."""

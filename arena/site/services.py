@@ -23,11 +23,11 @@ from django.db.models import Count, F, Q, QuerySet, Sum, TextField
 from django.db.models.functions import Cast, Coalesce, Length
 
 from arena.errors import ArenaError
+from arena.jobs.services import NOTE_LENGTH
 from arena.models import FaultLabel, Matchup, Report, Snapshot, Study, Vote
 from arena.rating.bootstrap import Unit
 from arena.rating.rules import Intervals, Method
 from arena.services.decisions import decision_of
-from arena.services.faults import NOTE_LENGTH
 from arena.studies.services.experts import Complaint, check_complaint
 from arena.studies.services.opening import check_seed
 from arena.studies.services.planning import rules_of
@@ -36,9 +36,8 @@ from augment.models import FAILED, Augmentation, GenerationJob, ModelCall, Work
 from augment.services import row_rules
 from augment.services.events import log_event
 from augment.services.running.jobs import OPEN
-from augment.services.running.shown_images import delete_unnamed, images_named_by
-from augment.services.stored_names import check_picture_name
-from augment.services.texts import one_line
+from augment.services.running.transcript_records import delete_unnamed, images_named_by
+from augment.services.texts import check_picture_name, one_line
 
 BATCH = 200
 """So many calls are emptied in one transaction, so that nobody waits for long."""

@@ -5,22 +5,23 @@ from __future__ import annotations
 from django.contrib.auth import views as auth
 from django.urls import URLPattern, path
 
+from arena.contestants.pages import contestants, endpoints
+from arena.contestants.pages import contestants as contestant_form
+from arena.jobs.pages import displacement, driving, files, jobs, labelling
+from arena.jobs.pages import jobs as job_actions
+from arena.jobs.pages import launching as new_job
 from arena.people import pages as people
+from arena.scenarios.pages import editing, prompts, scenarios, uploads
+from arena.scenarios.pages import forms as scenario_form
+from arena.scenarios.pages import scenarios as catalogue
+from arena.scenarios.pages import scenarios as intents
+from arena.scenarios.pages import scenarios as removing
+from arena.scenarios.pages import uploads as scenes
 from arena.site import pages
 from arena.studies.pages import experts, planning, setup, studies
-from arena.web.contestants import endpoints
-from arena.web.contestants import forms as contestant_form
-from arena.web.contestants import pages as contestants
-from arena.web.jobs import actions as job_actions
-from arena.web.jobs import analyses, displacement, driving, labelling, scenario_files, transcripts
-from arena.web.jobs import launching as new_job
-from arena.web.jobs import pages as jobs
 from arena.web.results import evidence as results_votes
 from arena.web.results import files as results_files
 from arena.web.results import pages as results
-from arena.web.scenarios import catalogue, editing, intents, prompts, removing, scenes, uploads
-from arena.web.scenarios import forms as scenario_form
-from arena.web.scenarios import pages as scenarios
 from arena.web.voting import pages as voting
 from arena.web.voting import practice
 
@@ -102,18 +103,16 @@ urlpatterns: list[URLPattern] = [
         displacement.export,
         name="displacement-export",
     ),
-    path("jobs/<uuid:code>/analyses/", analyses.page, name="analyses"),
+    path("jobs/<uuid:code>/analyses/", files.page, name="analyses"),
     path(
-        "jobs/<uuid:code>/analyses-<slug:part>.<slug:form>",
-        analyses.export,
-        name="analyses-export",
+        "jobs/<uuid:code>/analyses-<slug:part>.<slug:form>", files.export, name="analyses-export"
     ),
-    path("jobs/<uuid:code>/transcripts.jsonl", transcripts.export, name="transcripts-export"),
+    path("jobs/<uuid:code>/transcripts.jsonl", files.export, name="transcripts-export"),
     path(
         "jobs/<uuid:code>/tool-calls.<slug:form>", jobs.export_tool_calls, name="tool-calls-export"
     ),
-    path("jobs/<uuid:code>/scenarios-<slug:form>/", scenario_files.ask, name="scenarios-write"),
-    path("scenarios-<uuid:code>.zip", scenario_files.download, name="scenarios-export"),
+    path("jobs/<uuid:code>/scenarios-<slug:form>/", files.ask, name="scenarios-write"),
+    path("scenarios-<uuid:code>.zip", files.download, name="scenarios-export"),
     path("jobs/<uuid:code>/simulate/", driving.simulate_job, name="job-simulate"),
     path("jobs/<uuid:code>/drives/", driving.drives_page, name="drives"),
     path("jobs/<uuid:code>/driving.<slug:form>", driving.export, name="driving-export"),

@@ -13,7 +13,7 @@ from arena.studies.services.opening import close_study
 from arena.studies.services.planning import rules_of
 from augment.models import Augmentation
 from augment.scene.codec import modification_to_document
-from augment.scene.modification import Modification
+from augment.scene.entities import Modification
 from tests.opening import open_study
 from tests.scenes import vehicle
 from tests.study_rows import cast_of, vote

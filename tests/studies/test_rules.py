@@ -12,8 +12,8 @@ from arena.studies.services.planning import pictures_of, plan_batch
 from arena.studies.services.taking_part import hand_over
 from augment.models import Augmentation, Scenario
 from augment.scene.codec import modification_to_document
-from augment.scene.modification import Modification
-from augment.services.scenarios.attention import draw_checks
+from augment.scene.entities import Modification
+from augment.services.scenarios.pictures import draw_checks
 from tests.opening import open_study
 from tests.scenes import vehicle
 from tests.study_rows import KINDS, Cast, a_study, cast_of, contestant, picture

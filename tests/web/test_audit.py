@@ -94,7 +94,7 @@ GIVES_RESULTS = re.compile(
 )
 DOORS = {
     "arena/api/exports.py": "by get_snapshot, which asks must_read_results",
-    "arena/api/snapshots.py": "asks must_read_results",
+    "arena/results/api.py": "asks must_read_results",
     "arena/management/commands/export.py": "refuses open studies",
     "arena/management/commands/plan_study.py": "reads closed studies alone",
     "arena/management/commands/rate.py": "--early, logged",

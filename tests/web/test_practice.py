@@ -15,9 +15,8 @@ from arena.queries.voting.ballots import voting_progress
 from arena.studies.services.experts import practice_pairs
 from augment.models import Augmentation, Scenario
 from augment.scene.codec import modification_to_document
-from augment.scene.modification import Modification
-from augment.services.scenarios.attention import draw_checks
-from augment.services.scenarios.pictures import store
+from augment.scene.entities import Modification
+from augment.services.scenarios.pictures import draw_checks, store
 from tests.opening import open_study
 from tests.scenes import vehicle
 from tests.study_rows import KINDS, cast_of, contestant, picture, scenario

@@ -13,7 +13,8 @@ from django.urls import reverse
 
 from augment.models import BaseScene, SceneUpload, UploadMoment
 from augment.scene.codec import scene_to_document
-from augment.services.scenarios import scene_pictures, upload_moments, uploads
+from augment.services.scenarios import pictures, uploads
+from augment.services.scenarios import uploads as upload_moments
 from tests.scenes import scene, vehicle
 from tests.web.cast import people, signed_in
 
@@ -29,11 +30,11 @@ def analyst() -> Client:
 @pytest.fixture(autouse=True)
 def working(monkeypatch: pytest.MonkeyPatch, django_capture_on_commit_callbacks: object) -> None:
     """What is sent to a worker is done at once."""
-    monkeypatch.setattr("arena.web.scenarios.uploads.enqueue_upload", uploads.UPLOADS.perform)
+    monkeypatch.setattr("arena.scenarios.pages.uploads.enqueue_upload", uploads.UPLOADS.perform)
     monkeypatch.setattr(
-        "arena.web.scenarios.uploads.enqueue_moment", upload_moments.MOMENTS.perform
+        "arena.scenarios.pages.uploads.enqueue_moment", upload_moments.MOMENTS.perform
     )
-    monkeypatch.setattr("arena.web.scenarios.scenes.enqueue_scene", scene_pictures.draw_scene)
+    monkeypatch.setattr("arena.scenarios.pages.uploads.enqueue_scene", pictures.draw_scene)
     monkeypatch.setattr("arena.site.acts.transaction.on_commit", lambda done: done())
 
 

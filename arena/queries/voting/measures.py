@@ -14,7 +14,7 @@ from arena.errors import NotYours
 from arena.models import Matchup
 from arena.people.queries import role_of
 from arena.queries.voting.showings import view_shown
-from augment.services.judging.measures import LaneEdges, MeasureLine, lane_edges_of, measures_of
+from augment.services.judging.findings import LaneEdges, MeasureLine, lane_edges_of, measures_of
 
 _Point = list[float]
 

@@ -11,7 +11,7 @@ from arena.errors import NotYours
 from arena.models import Matchup
 from arena.people.queries import role_of
 from augment.models import Simulation
-from augment.services.judging.drive_files import blind_drive
+from augment.services.judging.simulations import blind_drive
 
 
 def drives_of_pair(*, user: User, code: UUID) -> dict[str, dict[str, Any]] | None:

@@ -21,7 +21,7 @@ from django.views.decorators.http import require_http_methods, require_POST
 from arena import tasks
 from arena.models import Study, StudyDraft
 from arena.people.queries import by_pseudonym, experts
-from arena.queries import scenarios
+from arena.scenarios import queries
 from arena.services.sent_files import was_too_large
 from arena.services.vote_imports import ImportedVotes, import_votes
 from arena.site.access import ADMIN, allow_only, user_of
@@ -172,7 +172,7 @@ def _form(**given: Any) -> StudyForm:
     offered = Contestant.objects.exclude(kind=Contestant.Kind.CHECK).filter(retired_at=None)
     return StudyForm(
         contestants=list(offered.select_related("endpoint").order_by("name")),
-        groups=scenarios.by_type(),
+        groups=queries.by_type(),
         experts=by_pseudonym(experts()),
         jobs=list(GenerationJob.objects.all()),
         **given,
@@ -184,7 +184,7 @@ def _entered(posted: QueryDict) -> dict[str, object]:
     entered: dict[str, object] = {name: posted.get(name, "") for name in drafts.TEXTS}
     entered |= {name: name in posted for name in drafts.SWITCHES}
     entered |= {name: posted.getlist(name) for name in drafts.NAMES}
-    groups = [group for group in scenarios.by_type() if group.type in posted.getlist("types")]
+    groups = [group for group in queries.by_type() if group.type in posted.getlist("types")]
     whole = [row.slug for group in groups for row in group.scenarios]
     return entered | {"scenarios": [*posted.getlist("scenarios"), *whole]}
 

@@ -38,7 +38,7 @@ from augment.errors import Conflict, UnknownName
 from augment.models import Contestant, Scenario
 from augment.services.endpoints.treatments import options_of
 from augment.services.events import log_event
-from augment.services.judging.alike import alike_pairs
+from augment.services.judging.displacement import alike_pairs
 from augment.services.running.choosing import find_job
 from augment.services.texts import check_prose, one_line
 

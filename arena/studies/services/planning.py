@@ -34,8 +34,12 @@ from arena.studies.services.pictures import (
 )
 from augment.models import Augmentation, Scenario
 from augment.services.events import log_event
-from augment.services.scenarios.descriptions import Description, descriptions
-from augment.services.scenarios.legends import legend_of_scene, legends_of_changes
+from augment.services.scenarios.pictures import (
+    Description,
+    descriptions,
+    legend_of_scene,
+    legends_of_changes,
+)
 
 SoFar = dict[str, list[PlannedMatchup]]
 """Every expert's showings as they are stored, by position."""

@@ -15,14 +15,14 @@ from django.http import HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, redirect, render
 from django.views.decorators.http import require_http_methods, require_POST, require_safe
 
+from arena.contestants.pages.endpoints import EndpointPageForm, ModelPageForm, place_problems
+from arena.contestants.queries import probe_lines
 from arena.people.queries import role_of
-from arena.queries.probes import probe_lines
 from arena.site.access import ADMIN, STAFF, allow_only
-from arena.web.contestants.endpoint_forms import EndpointPageForm, ModelPageForm, place_problems
 from augment.errors import AugmentError, InvalidDocument, QueueFault
 from augment.models import Endpoint, EndpointModel, Probe
-from augment.services.endpoints import editing
-from augment.services.endpoints.keys import is_key_here, list_key_variables
+from augment.services.endpoints import known_endpoints
+from augment.services.endpoints.known_endpoints import is_key_here, list_key_variables
 from augment.services.endpoints.probing import plan_probe
 from augment.services.running.workers import workforce
 from augment.tasks import enqueue_probe
@@ -47,7 +47,7 @@ def new_endpoint_page(request: HttpRequest) -> HttpResponse:
     form = EndpointPageForm(request.POST if request.method == "POST" else None)
     if request.method == "POST" and form.is_valid():
         try:
-            row = editing.add_endpoint(
+            row = known_endpoints.add_endpoint(
                 label=form.cleaned_data["label"],
                 facts=form.facts(),
                 is_simulated=form.cleaned_data["is_simulated"],
@@ -78,7 +78,7 @@ def add_model(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Note a model of an endpoint; its listed price comes with it."""
     endpoint = get_object_or_404(Endpoint, code=code)
     try:
-        row = editing.add_model(
+        row = known_endpoints.add_model(
             endpoint, model=request.POST.get("model", ""), actor=cast(User, request.user)
         )
     except AugmentError as error:
@@ -98,7 +98,9 @@ def model_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         form = ModelPageForm(request.POST, row=row)
         if form.is_valid():
             try:
-                editing.change_model(row, facts=form.facts(), actor=cast(User, request.user))
+                known_endpoints.change_model(
+                    row, facts=form.facts(), actor=cast(User, request.user)
+                )
             except AugmentError as error:
                 _tell(form, error)
             else:
@@ -139,7 +141,7 @@ def _change(request: HttpRequest, row: Endpoint) -> HttpResponse:
     form = EndpointPageForm(request.POST, row=row)
     if form.is_valid():
         try:
-            editing.change_endpoint(
+            known_endpoints.change_endpoint(
                 row,
                 facts=form.facts(),
                 may_move_key=form.cleaned_data["move_key"],

@@ -11,11 +11,11 @@ from django.http import HttpRequest, HttpResponse
 from django.shortcuts import redirect, render
 from django.views.decorators.http import require_http_methods
 
+from arena.contestants.pages.endpoints import SLUG_RULE
 from arena.site.access import ADMIN, allow_only
-from arena.web.contestants.endpoint_forms import SLUG_RULE
 from augment.errors import AugmentError
 from augment.models import Endpoint
-from augment.services.endpoints.entering import (
+from augment.services.endpoints.contestants import (
     OPTION_NAMES,
     PROTOCOLS,
     REASONING_EFFORTS,

@@ -12,15 +12,15 @@ from django.http import HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, redirect, render
 from django.views.decorators.http import require_POST, require_safe
 
-from arena.queries.scenarios import by_type
+from arena.contestants.queries import asking_of
+from arena.scenarios.queries import by_type
 from arena.site.access import ADMIN, STAFF, allow_only
 from arena.site.listing import read_listing, read_page, said_choices
 from arena.site.queries import Narrowing, find_contestants
-from arena.web.contestants.asking import asking_of
 from augment.errors import AugmentError
 from augment.models import Augmentation, Contestant, GenerationJob
-from augment.services.endpoints.respondents import respondents_of
-from augment.services.retirement import retire, take_back
+from augment.services.endpoints.treatments import respondents_of
+from augment.services.events import retire, take_back
 
 CONTESTANTS_AT_ONCE = 50
 

@@ -20,10 +20,9 @@ from arena.site.acts import Confirmation, ask, is_sure
 from arena.site.forms import CapsForm
 from augment.errors import AugmentError, QueueFault
 from augment.models import Augmentation, GenerationJob
+from augment.services.running import jobs
 from augment.services.running import jobs as service
-from augment.services.running import pausing, retrying
-from augment.services.running.causes import rows_of_cause
-from augment.services.running.summary import count_rows
+from augment.services.running.progress import count_rows, rows_of_cause
 from augment.tasks import enqueue_job
 
 State = Augmentation.State
@@ -36,7 +35,7 @@ def retry_job(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     job = get_object_or_404(GenerationJob, code=code)
     try:
         with transaction.atomic():
-            retrying.retry_failed(job=job, actor=cast(User, request.user))
+            jobs.retry_failed(job=job, actor=cast(User, request.user))
             transaction.on_commit(partial(send_rows, request, job.pk))
     except AugmentError as error:
         messages.error(request, str(error))
@@ -70,7 +69,7 @@ def pause_job(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Start nothing new; what is in flight ends."""
     job = get_object_or_404(GenerationJob, code=code)
     try:
-        pausing.pause(job, actor=cast(User, request.user))
+        jobs.pause(job, actor=cast(User, request.user))
     except AugmentError as error:
         messages.error(request, str(error))
     else:
@@ -107,7 +106,7 @@ def resume_job(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         return redirect("job", code=code)
     try:
         with transaction.atomic():
-            pausing.resume(job, higher=form.caps(), actor=cast(User, request.user))
+            jobs.resume(job, higher=form.caps(), actor=cast(User, request.user))
             transaction.on_commit(partial(send_rows, request, job.pk))
     except AugmentError as error:
         messages.error(request, str(error))

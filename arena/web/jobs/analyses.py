@@ -10,8 +10,8 @@ from django.utils.text import slugify
 from django.views.decorators.http import require_safe
 
 from arena.exports.formats import format_named
-from arena.exports.jobs.analyses import ANALYSIS_FORMATS, PARTS, analysis_table
-from arena.queries.analyses import analysis_of
+from arena.jobs.exports.tables import ANALYSIS_FORMATS, PARTS, analysis_table
+from arena.jobs.queries import analysis_of
 from arena.site.access import STAFF, allow_only
 from augment.errors import UnknownName
 from augment.models import GenerationJob

@@ -10,9 +10,13 @@ from django.utils.text import slugify
 from django.views.decorators.http import require_safe
 
 from arena.exports.formats import format_named
-from arena.exports.jobs.displacement_objects import BY_OBJECT, OBJECT_FORMATS, object_rows
-from arena.exports.jobs.displacement_table import displacement_table
-from arena.exports.jobs.displacement_writers import FORMATS
+from arena.jobs.exports.displacement import (
+    BY_OBJECT,
+    FORMATS,
+    OBJECT_FORMATS,
+    displacement_table,
+    object_rows,
+)
 from arena.site.access import STAFF, allow_only
 from augment.errors import UnknownName
 from augment.models import GenerationJob

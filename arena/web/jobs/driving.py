@@ -15,26 +15,23 @@ from django.utils.text import slugify
 from django.views.decorators.http import require_POST, require_safe
 
 from arena.exports.formats import format_named
-from arena.exports.jobs.driving_table import DrivingTable
-from arena.exports.jobs.driving_writers import FORMATS
 from arena.exports.tables import LeaderboardTable
+from arena.jobs.exports.driving import FORMATS, DrivingTable
+from arena.jobs.queries import DRIVES, Part, before_of, shown_augmentations
+from arena.jobs.queries import drive_cells as cells_of
 from arena.models import Snapshot
-from arena.queries.costs import shown_augmentations
-from arena.queries.driving import DRIVES, before_of, cells_of
-from arena.queries.job_grid import Part
 from arena.site.access import ADMIN, STAFF, allow_only
 from arena.site.listing import choice_asked, page_asked
 from augment.errors import AugmentError, QueueFault, UnknownName
 from augment.models import GenerationJob, Simulation
 from augment.services.judging import simulations
-from augment.services.judging.drive_files import FILES, drive_file
 from augment.services.judging.driving_scores import (
     least_clearance_m,
     options_driven,
     scores_of_augmentations,
     scores_of_job,
 )
-from augment.services.judging.simulations import NUPLAN, SCORES, Options
+from augment.services.judging.simulations import FILES, NUPLAN, SCORES, Options, drive_file
 from augment.tasks import enqueue_simulations
 
 LABELS = {"nuplan": "nuPlan", "interplan": "interPlan"}

@@ -10,12 +10,12 @@ from django import forms
 from arena.site.forms import CapsForm, ChoiceForm, Offer
 from augment.errors import AugmentError
 from augment.models import Contestant, EndpointModel
-from augment.services.endpoints.entering import PROTOCOLS, REASONING_EFFORTS
-from augment.services.endpoints.keys import is_key_here
-from augment.services.running.cells import ChosenCells, MatrixCell, matrix_of, read_cells
+from augment.services.endpoints.contestants import PROTOCOLS, REASONING_EFFORTS
+from augment.services.endpoints.known_endpoints import is_key_here
+from augment.services.running.choosing import find_obstacle, keys_missing
 from augment.services.running.estimates import JobEstimate, estimate_rows
-from augment.services.running.feasible import find_obstacle, keys_missing
 from augment.services.running.jobs import HIGHEST_SAMPLES
+from augment.services.running.matrix import ChosenCells, MatrixCell, matrix_of, read_cells
 
 OF_CELLS = (
     *("temperature", "seed", "reasoning_effort", "max_output_tokens"),

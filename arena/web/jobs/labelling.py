@@ -15,19 +15,19 @@ from django.views.decorators.http import require_http_methods, require_safe
 
 from arena.errors import AlreadyLabelled, ArenaError, LabellingClosed, NotYours
 from arena.exports.formats import format_named
-from arena.exports.jobs.faults import FORMATS, fault_table
+from arena.jobs import queries
+from arena.jobs.exports.faults import FORMATS, fault_table
+from arena.jobs.pages.labelling import closing, opening
+from arena.jobs.services import close_labelling, open_labelling, save_label
 from arena.models import FaultLabel, LabellingRound
 from arena.people.queries import by_pseudonym, experts, role_of
-from arena.queries import faults
 from arena.queries.voting.showings import original_beside
-from arena.services.faults import close_labelling, open_labelling, save_label
 from arena.site.access import ADMIN, EXPERT, STAFF, allow_only
 from arena.site.acts import ask, is_sure, wants_to_change
 from arena.site.forms import LabelForm, LabellingForm
-from arena.web.jobs.labelling_questions import closing, opening
 from augment.errors import AugmentError, UnknownName
 from augment.models import GenerationJob
-from augment.services.judging.fault_guess import FaultClass
+from augment.services.judging.findings import FaultClass
 
 
 @allow_only(EXPERT)
@@ -37,12 +37,12 @@ def label_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """The next picture; a label is saved and followed by a redirect."""
     expert = cast(User, request.user)
     try:
-        progress = faults.labelling_of(expert=expert, code=code)
+        progress = queries.labelling_of(expert=expert, code=code)
         if request.method == "POST":
             return _save(request, expert, code)
     except NotYours as error:
         raise Http404 from error
-    task = faults.next_task(labelling=progress.labelling, expert=expert)
+    task = queries.next_task(labelling=progress.labelling, expert=expert)
     context = {
         **{"progress": progress, "task": task, "faults": list(FaultClass)},
         "has_original": task is not None and bool(original_beside(task.augmentation)),
@@ -67,7 +67,7 @@ def faults_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         "job": job,
         "form": form,
         "table": fault_table(job),
-        "labellings": faults.of_job(job),
+        "labellings": queries.of_job(job),
     }
     return render(request, "label/job.html", context, status=422 if form.errors else 200)
 
@@ -141,8 +141,8 @@ def _guess(label: FaultLabel) -> str:
         FaultClass.LOGIC: "logic",
     }
     seen = [name for fault, name in names.items() if getattr(label, f"guessed_{fault.value}")]
-    faults = ", ".join(seen) or "no fault"
-    return f"The automatic checks had guessed: {faults}."
+    queries = ", ".join(seen) or "no fault"
+    return f"The automatic checks had guessed: {queries}."
 
 
 def _open(request: HttpRequest, job: GenerationJob, form: LabellingForm) -> HttpResponse | None:

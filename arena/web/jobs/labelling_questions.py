@@ -7,9 +7,9 @@ from collections.abc import Sequence
 from django.db import transaction
 from django.urls import reverse
 
+from arena.jobs.queries import of_job
+from arena.jobs.services import open_labelling
 from arena.models import LabellingRound
-from arena.queries.faults import of_job
-from arena.services.faults import open_labelling
 from arena.site.acts import Confirmation
 from augment.models import GenerationJob
 

@@ -14,15 +14,14 @@ from django.http import HttpRequest, HttpResponse
 from django.shortcuts import redirect, render
 from django.views.decorators.http import require_http_methods
 
-from arena.queries import scenarios
+from arena.jobs.pages.jobs import send_rows
+from arena.jobs.pages.launching import LaunchForm
+from arena.scenarios import queries
 from arena.site.access import ADMIN, allow_only
-from arena.web.jobs.actions import send_rows
-from arena.web.jobs.forms import LaunchForm
 from augment.errors import AugmentError
 from augment.models import Contestant, EndpointModel, GenerationJob
 from augment.services.running import jobs as service
-from augment.services.running.cells import add_cells
-from augment.services.running.matrix import matrix_text, read_matrix
+from augment.services.running.matrix import add_cells, matrix_text, read_matrix
 
 LONGEST_FILE = 1_000_000
 LONGEST_NAME = 120
@@ -60,7 +59,7 @@ def _form(request: HttpRequest, data: Any, *, initial: dict[str, Any] | None = N
         contestants=list(
             Contestant.objects.filter(retired_at=None).select_related("endpoint").order_by("name")
         ),
-        groups=scenarios.by_type(scenarios.set_asked(request.GET.get("set"))),
+        groups=queries.by_type(queries.set_asked(request.GET.get("set"))),
         models=list(
             EndpointModel.objects.select_related("endpoint").order_by("endpoint__label", "model")
         ),
@@ -70,8 +69,8 @@ def _form(request: HttpRequest, data: Any, *, initial: dict[str, Any] | None = N
 def _page(
     request: HttpRequest, form: LaunchForm, *, status: int = 200, **more: object
 ) -> HttpResponse:
-    chosen_set = scenarios.set_asked(request.GET.get("set"))
-    context = {"form": form, "sets": scenarios.set_choices(chosen_set), **more}
+    chosen_set = queries.set_asked(request.GET.get("set"))
+    context = {"form": form, "sets": queries.set_choices(chosen_set), **more}
     return render(request, "jobs/new.html", context, status=status)
 
 

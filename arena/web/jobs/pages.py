@@ -12,8 +12,11 @@ from django.utils.text import slugify
 from django.views.decorators.http import require_safe
 
 from arena.exports.formats import format_named
-from arena.exports.jobs.tool_calls import FORMATS as TOOL_CALL_FORMATS
-from arena.queries.job_grid import MARKS, VIEWS, Part, grid_part
+from arena.jobs.exports.tables import CALL_FORMATS as TOOL_CALL_FORMATS
+from arena.jobs.pages.displacement import section
+from arena.jobs.pages.driving import section as driving_section
+from arena.jobs.pages.files import rows_of
+from arena.jobs.queries import MARKS, VIEWS, Part, grid_part
 from arena.site.access import STAFF, allow_only
 from arena.site.listing import (
     choice_asked,
@@ -24,17 +27,16 @@ from arena.site.listing import (
     search_asked,
 )
 from arena.site.queries import MINE, Narrowing, find_jobs
-from arena.web.jobs.displacement import section
-from arena.web.jobs.driving import section as driving_section
-from arena.web.jobs.scenario_files import rows_of
 from augment.errors import UnknownName
 from augment.models import Augmentation, GenerationJob
-from augment.services.judging.repeatability import repeatability
-from augment.services.running.causes import SHOWN, failure_groups
-from augment.services.running.costs import costs_of
-from augment.services.running.pace import pace_of
-from augment.services.running.summary import count_each, count_rows
-from augment.services.running.tool_calls import (
+from augment.services.judging.analyses import repeatability
+from augment.services.running.budget import costs_of
+from augment.services.running.progress import (
+    SHOWN,
+    count_each,
+    count_rows,
+    failure_groups,
+    pace_of,
     tool_calls_by_augmentation,
     tool_calls_by_contestant,
 )

@@ -16,8 +16,8 @@ from django.views.decorators.http import require_POST, require_safe
 
 from arena import tasks
 from arena.exports.zips import CONTENT_TYPE
+from arena.jobs.services import ask_for_file, files_of
 from arena.models import ScenarioFile
-from arena.services.scenario_files import ask_for_file, files_of
 from arena.site.access import STAFF, allow_only
 from arena.site.acts import send_later
 from augment.errors import AugmentError

@@ -9,7 +9,7 @@ from django.shortcuts import get_object_or_404
 from django.utils.text import slugify
 from django.views.decorators.http import require_safe
 
-from arena.exports.jobs.transcripts import TRANSCRIPT_FORMATS, transcript_lines
+from arena.jobs.exports.files import TRANSCRIPT_FORMATS, transcript_lines
 from arena.site.access import STAFF, allow_only
 from augment.models import GenerationJob
 

@@ -23,7 +23,7 @@ from arena.queries.votes.search import (
 )
 from arena.queries.votes.sets import is_scenario_of
 from augment.services.running.jobs import HIGHEST_SAMPLES
-from augment.services.scenarios.types import type_choices
+from augment.services.scenarios.scenes import type_choices
 
 OUTCOMES = {
     SoughtOutcome.WON: "The contestant won",

@@ -12,16 +12,16 @@ from django.http import HttpRequest, HttpResponse, JsonResponse
 from django.shortcuts import get_object_or_404, redirect, render
 from django.views.decorators.http import require_http_methods, require_POST
 
-from arena.services.references import drop_reference, set_reference, why_not_editable
+from arena.scenarios.services import drop_reference, set_reference, why_not_editable
 from arena.site.access import STAFF, allow_only
 from arena.site.acts import looks_again, send_later
 from arena.site.forms import read_json
 from augment.errors import AugmentError, Conflict
 from augment.models import Augmentation, Scenario
-from augment.services.judging.edits import check_edit
+from augment.services.judging.findings import check_edit
 from augment.services.running import by_hand
 from augment.services.scenarios.editing import PLACED, editor_document
-from augment.services.scenarios.scene_pictures import SceneView, is_drawn, scene_picture
+from augment.services.scenarios.pictures import SceneView, is_drawn, scene_picture
 from augment.tasks import enqueue_job, enqueue_scenario, enqueue_scene
 
 LONGEST = 1_000_000

@@ -14,7 +14,7 @@ from django.http import HttpRequest, HttpResponse, QueryDict
 from django.shortcuts import get_object_or_404, redirect, render
 from django.views.decorators.http import require_http_methods
 
-from arena.services.scenario_edits import change_scenario
+from arena.scenarios.services import change_scenario
 from arena.services.sent_files import was_too_large
 from arena.site.access import STAFF, allow_only
 from arena.site.acts import looks_again, send_later
@@ -22,8 +22,13 @@ from arena.site.forms import read_json
 from augment.errors import AugmentError, Conflict
 from augment.models import BaseScene, Scenario
 from augment.models.scenes import DENSITIES, GOALS
-from augment.services.scenarios.bulk import MOST_ROWS_AT_ONCE, BulkReport
-from augment.services.scenarios.bulk_files import MOST_FILES, add_from_files
+from augment.services.scenarios.bulk import (
+    MOST_FILES,
+    MOST_ROWS_AT_ONCE,
+    BulkReport,
+    add_from_files,
+)
+from augment.services.scenarios.editing import enter_intent, waiting_reading
 from augment.services.scenarios.intent_fields import (
     CHOICES,
     FIELDS,
@@ -33,15 +38,16 @@ from augment.services.scenarios.intent_fields import (
     fields_of_intent,
     intent_of_fields,
 )
-from augment.services.scenarios.intents import enter_intent, waiting_reading
-from augment.services.scenarios.scene_pictures import SceneView, is_drawn, scene_picture
+from augment.services.scenarios.pictures import SceneView, is_drawn, scene_picture
 from augment.services.scenarios.scenes import (
     INSTRUCTION_LENGTH,
+    LONGEST_LABEL,
+    LONGEST_TYPE,
     SLUG_LENGTH,
     add_scenario,
     read_circumstances,
+    type_choices,
 )
-from augment.services.scenarios.types import LONGEST_LABEL, LONGEST_TYPE, type_choices
 from augment.tasks import enqueue_scenario, enqueue_scene
 
 OWN = ""

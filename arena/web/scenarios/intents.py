@@ -17,7 +17,7 @@ from arena.site.forms import read_json
 from augment.errors import AugmentError, Conflict, QueueFault
 from augment.models import EndpointModel, Scenario
 from augment.services.running.intent_readings import plan_reading
-from augment.services.scenarios.intents import accept_reading, enter_intent
+from augment.services.scenarios.editing import accept_reading, enter_intent
 from augment.tasks import enqueue_reading
 
 LONGEST_FILE = 200_000

@@ -12,14 +12,14 @@ from django.http import Http404, HttpRequest, HttpResponse, HttpResponseBase, Js
 from django.shortcuts import get_object_or_404, render
 from django.views.decorators.http import require_safe
 
-from arena.queries import scenarios
-from arena.queries.modifications import modification_lines
-from arena.services.references import why_not_editable
+from arena.contestants.queries import asking_of
+from arena.scenarios import queries
+from arena.scenarios.queries import modification_lines
+from arena.scenarios.services import why_not_editable
 from arena.site.access import STAFF, allow_only
 from arena.site.acts import looks_again, send_later
 from arena.site.listing import read_listing, read_page, said_choices
 from arena.site.queries import Narrowing, find_scenarios, group_by_type
-from arena.web.contestants.asking import asking_of
 from arena.web.pictures import picture_response, sized_picture_response
 from augment.errors import QueueFault
 from augment.models import (
@@ -32,18 +32,17 @@ from augment.models import (
 )
 from augment.services.judging.displacement import of_augmentation
 from augment.services.judging.findings import Checked, check_augmentation
-from augment.services.running.transcript_export import transcript_of
-from augment.services.running.transcript_steps import totals_of, tries_of
-from augment.services.running.transcripts import IMAGES
-from augment.services.scenarios.intents import last_reading, statements_of, waiting_reading
-from augment.services.scenarios.scene_notes import notes_of
-from augment.services.scenarios.scene_pictures import (
+from augment.services.running.calls import IMAGES
+from augment.services.running.transcript_records import totals_of, transcript_of, tries_of
+from augment.services.scenarios.editing import last_reading, statements_of, waiting_reading
+from augment.services.scenarios.pictures import (
     SceneView,
     is_drawn,
     reference_picture,
     scene_picture,
 )
-from augment.services.scenarios.types import type_choices
+from augment.services.scenarios.scene_imports import notes_of
+from augment.services.scenarios.scenes import type_choices
 from augment.tasks import enqueue_marks, enqueue_scenario
 
 LOOKS = tuple(str(number) for number in range(6))
@@ -57,7 +56,7 @@ SCENARIOS_AT_ONCE = 60
 @require_safe
 def scenarios_page(request: HttpRequest) -> HttpResponse:
     """The contact sheet: scenarios of a set by type, the reference where it was drawn."""
-    chosen = scenarios.set_asked(request.GET.get("set"))
+    chosen = queries.set_asked(request.GET.get("set"))
     choices = {
         "type": ("Type", said_choices(type_choices())),
         "offered": ("In forms", [("retired", "retired")]),
@@ -73,8 +72,8 @@ def scenarios_page(request: HttpRequest) -> HttpResponse:
     rows = list(page.object_list)
     context = {
         "groups": group_by_type(rows),
-        "sets": scenarios.set_choices(chosen),
-        "references": scenarios.reference_pictures(rows),
+        "sets": queries.set_choices(chosen),
+        "references": queries.reference_pictures(rows),
         "page": page,
         "listing": listing,
     }
@@ -111,7 +110,7 @@ def scenario_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
             "endpoint__label", "model"
         ),
         "notes": notes_of(scenario.base_scene),
-        "augmentations": scenarios.augmentations_of(scenario),
+        "augmentations": queries.augmentations_of(scenario),
     }
     return render(request, "scenarios/scenario.html", context)
 

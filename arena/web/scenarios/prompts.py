@@ -12,14 +12,14 @@ from django.shortcuts import get_object_or_404, redirect, render
 from django.urls import reverse
 from django.views.decorators.http import require_safe
 
+from arena.contestants.queries import asking_of
 from arena.site.access import STAFF, allow_only
 from arena.site.acts import looks_again, send_later
-from arena.web.contestants.asking import asking_of
 from arena.web.pictures import picture_response
 from augment.errors import AugmentError, UnknownName
 from augment.models import Contestant, Scenario
-from augment.services.endpoints.contestant_prompts import asking_contestants, preview_contestant
-from augment.services.endpoints.respondents import respondents_of
+from augment.services.endpoints.contestants import asking_contestants, preview_contestant
+from augment.services.endpoints.treatments import respondents_of
 from augment.services.scenarios.prompts import Preview, list_choices, preview_prompt
 from augment.tasks import enqueue_prompts
 

@@ -12,13 +12,12 @@ from django.shortcuts import get_object_or_404, redirect
 from django.urls import reverse
 from django.views.decorators.http import require_http_methods, require_POST
 
-from arena.services.removal import delete_scenario, delete_scene
-from arena.services.scenario_edits import rename_scene
+from arena.scenarios.services import delete_scenario, delete_scene, rename_scene
 from arena.site.access import ADMIN, STAFF, allow_only
 from arena.site.acts import Confirmation, ask, is_sure
 from augment.errors import AugmentError
 from augment.models import BaseScene, Scenario
-from augment.services.retirement import retire, take_back
+from augment.services.events import retire, take_back
 
 
 @allow_only(ADMIN)

@@ -8,13 +8,13 @@ from django.http import HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, render
 from django.views.decorators.http import require_safe
 
-from arena.queries.scenes import counts_of, scene_rows, upload_rows
+from arena.scenarios.queries import counts_of, scene_rows, upload_rows
 from arena.site.access import STAFF, allow_only
 from arena.site.acts import looks_again, send_later
 from augment.models import BaseScene
 from augment.services.scenarios import uploads
-from augment.services.scenarios.scene_notes import notes_of
-from augment.services.scenarios.scene_pictures import SceneView, is_drawn, scene_picture
+from augment.services.scenarios.pictures import SceneView, is_drawn, scene_picture
+from augment.services.scenarios.scene_imports import notes_of
 from augment.tasks import enqueue_scene
 
 

@@ -12,13 +12,14 @@ from django.shortcuts import get_object_or_404, redirect, render
 from django.urls import reverse
 from django.views.decorators.http import require_POST, require_safe
 
-from arena.queries.uploads import place_of, track_maps
+from arena.scenarios.queries import place_of, track_maps
 from arena.services.sent_files import was_too_large
 from arena.site.access import STAFF, allow_only
 from arena.site.acts import looks_again, send_later
 from augment.errors import AugmentError
 from augment.models import SceneUpload, UploadMoment
-from augment.services.scenarios import upload_moments, uploads
+from augment.services.scenarios import uploads
+from augment.services.scenarios import uploads as upload_moments
 from augment.tasks import enqueue_moment, enqueue_upload
 
 

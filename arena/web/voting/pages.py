@@ -28,7 +28,7 @@ from arena.studies.services.experts import is_due, report
 from arena.voting.screen import over_context, vote_context
 from arena.web.pictures import picture_response
 from augment.errors import Conflict
-from augment.services.judging.measures import LaneEdges
+from augment.services.judging.findings import LaneEdges
 
 
 @allow_only(EXPERT)
