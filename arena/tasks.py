@@ -5,12 +5,12 @@ from __future__ import annotations
 from celery import shared_task
 from django.contrib.auth.models import User
 
-from arena.exports.jobs.scenario_files import SCENARIO_FILES
 from arena.exports.study_files import STUDY_FILES
+from arena.jobs.exports.files import SCENARIO_FILES
 from arena.services.ratings import RATINGS
 from augment.broker import send
 from augment.models import Scenario
-from augment.services.scenarios import attention
+from augment.services.scenarios import pictures
 from augment.services.work import register
 from augment.tasks import sender
 
@@ -25,7 +25,7 @@ send_study_file = sender(STUDY_FILES)
 def draw_checks(actor_pk: int) -> None:
     """Draw the attention checks that scenarios with a reference lack; again, none is left."""
     slugs = list(Scenario.objects.exclude(reference=None).values_list("slug", flat=True))
-    attention.draw_checks(scenarios=slugs, actor=User.objects.filter(pk=actor_pk).first())
+    pictures.draw_checks(scenarios=slugs, actor=User.objects.filter(pk=actor_pk).first())
 
 
 def send_checks(actor_pk: int) -> None:

@@ -24,14 +24,14 @@ from django.db.models import Q
 from augment.broker import open_broker, send
 from augment.services.clock import DATABASE_TIME, Moment
 from augment.services.endpoints.probing import PROBES
-from augment.services.judging import marked_pictures
+from augment.services.judging import findings
 from augment.services.judging.simulations import DRIVES
-from augment.services.running import stopping, workers
+from augment.services.running import workers
+from augment.services.running import workers as stopping
 from augment.services.running.intent_readings import READINGS
 from augment.services.running.runner import AUGMENTATIONS
-from augment.services.scenarios import prompts, scene_pictures
-from augment.services.scenarios.upload_moments import MOMENTS
-from augment.services.scenarios.uploads import UPLOADS
+from augment.services.scenarios import pictures, prompts
+from augment.services.scenarios.uploads import MOMENTS, UPLOADS
 from augment.services.work import KINDS, WorkKind, register
 
 logger = logging.getLogger(__name__)
@@ -49,9 +49,9 @@ BATCH = 100
 register(AUGMENTATIONS, DRIVES, READINGS, PROBES, UPLOADS, MOMENTS)
 
 DRAWN: Mapping[str, Callable[[int], object]] = {
-    "marks": lambda pk: marked_pictures.draw_marked(augmentation_pk=pk),
-    "scene": scene_pictures.draw_scene,
-    "scenario": scene_pictures.draw_scenario,
+    "marks": lambda pk: findings.draw_marked(augmentation_pk=pk),
+    "scene": pictures.draw_scene,
+    "scenario": pictures.draw_scenario,
     "prompts": prompts.draw_prompts,
 }
 """Pictures of the row with that key, as far as they are not there yet."""

@@ -10,7 +10,7 @@ import os
 
 import django
 
-from augment.services.scenarios.way_past import WayPast
+from augment.services.scenarios.catalogue_check import WayPast
 from bench import displacement, injected_faults
 from bench.report import ROOT, table, write_block
 from tests.fixtures.shelf import FOLDER, SLUGS

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 
-from augment.formats.argoverse2.sensor import ArgoverseSensor
+from augment.formats.argoverse2 import ArgoverseSensor
 from augment.formats.readers import READERS, recognise
 from augment.scene.entities import Scene
 from augment.scene.recording import Recording

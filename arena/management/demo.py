@@ -32,7 +32,7 @@ from augment.services.judging.driving_scores import scores_of_job
 from augment.services.judging.simulations import NUPLAN, Options, plan_scenario
 from augment.services.running.choosing import ALL, resolve_contestants
 from augment.services.running.jobs import launch
-from augment.services.running.summary import count_rows
+from augment.services.running.progress import count_rows
 from augment.services.scenarios.catalogue import load_catalogue
 from augment.tasks import enqueue_job, enqueue_simulations
 

@@ -27,7 +27,7 @@ from arena.serving.readiness import look_at_broker, look_at_database, look_at_wo
 from augment.errors import KeyMissing, KeyNotAllowed, MediaFault
 from augment.models import Contestant, Endpoint, EndpointModel, GenerationJob
 from augment.services.clock import database_now
-from augment.services.endpoints.keys import key_of
+from augment.services.endpoints.known_endpoints import key_of
 
 ENOUGH_BYTES = 1 << 30
 FAR_APART_S = 60.0

@@ -11,8 +11,8 @@ from typing import Any
 
 from django.db.models import Count
 
+from arena.jobs.queries import model_classes, shown_augmentations, spent_on
 from arena.models import Matchup, Study
-from arena.queries.costs import model_classes, shown_augmentations, spent_on
 from arena.queries.votes.judged import Entrant, Judged, is_imported
 from arena.queries.votes.sets import Filters
 from arena.rating.comparisons import Comparisons, select_votes, win_rates
@@ -26,7 +26,7 @@ from arena.rating.snapshot_document import (
 )
 from arena.services.vote_arrays import VoteArrays
 from augment.services.judging.displacement import of_rows, summarise
-from augment.services.scenarios.types import in_type_order, type_label
+from augment.services.scenarios.scenes import in_type_order, type_label
 
 FEW_VOTES = 30
 """Below so many votes of a contestant a part of the table says that they are too few."""

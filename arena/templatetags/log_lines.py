@@ -10,7 +10,7 @@ from django import template
 
 from arena.templatetags.results import left_out, method_label
 from augment.models import Event
-from augment.services.scenarios.types import type_label
+from augment.services.scenarios.scenes import type_label
 
 register = template.Library()
 

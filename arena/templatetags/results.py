@@ -13,7 +13,7 @@ from arena.models.votes import AID_LABELS
 from arena.rating.estimate import Estimate
 from arena.rating.printed import interval_text, rating_text, whole_percent, with_minus
 from augment.services.judging.driving_scores import clearance_text
-from augment.services.scenarios.types import type_label
+from augment.services.scenarios.scenes import type_label
 
 register = template.Library()
 

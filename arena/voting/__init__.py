@@ -1,1 +1,1 @@
-"""Blind voting: planned pairs, decisions, and the page on which they are made."""
+"""What experts see and decide."""

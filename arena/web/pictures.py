@@ -5,7 +5,7 @@ from __future__ import annotations
 from django.core.files.storage import default_storage
 from django.http import FileResponse, Http404, HttpRequest
 
-from augment.services.scenarios.thumbnails import WIDTHS_PX, thumbnail_of
+from augment.services.scenarios.pictures import WIDTHS_PX, thumbnail_of
 
 
 def picture_response(name: str) -> FileResponse:

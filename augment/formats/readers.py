@@ -7,17 +7,25 @@ open. A new format is a class that fits `Reader`, and its entry in READERS.
 
 from __future__ import annotations
 
+import itertools
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, field
 from pathlib import Path
 
+import numpy as np
+
 from augment.errors import InvalidDocument, UnknownName
-from augment.formats.argoverse2.motion import ArgoverseMotion
-from augment.formats.argoverse2.sensor import ArgoverseSensor
+from augment.formats.argoverse2 import ArgoverseSensor
+from augment.formats.argoverse2_motion import ArgoverseMotion
 from augment.formats.commonroad.scenario import CommonRoad
-from augment.formats.nuplan.scenario import NuPlan
+from augment.formats.nuplan_log import NuPlan
 from augment.formats.own_json import OwnJson
-from augment.formats.reading import Reader
+from augment.formats.reading import Moment, Reader, Reading
 from augment.formats.scenarionet.scenario import ScenarioNet
 from augment.formats.waymo.scenario import WaymoMotion
+from augment.geometry.frames import Pose
+from augment.scene.lane_graph import AnyLane
 
 READERS: dict[str, Reader] = {
     reader.name: reader
@@ -71,3 +79,141 @@ def recognise(path: Path) -> Reader:
 def _is_123d(path: Path) -> bool:
     """A log that py123d converted has a table of its synchronised times."""
     return (path / "sync.arrow").is_file() or path.suffix == ".arrow"
+
+
+EVERY_S = 0.5
+MOST_STOPS = 2_000
+"""Moments that are offered; later ones of a longer recording are not."""
+LOOKS_S = 3.0
+"""So long moments are read for the maps, each of them the whole file once more: seconds of
+computing, of those that its process has (`sandbox.ProcessLimits`)."""
+_LOOKS_OF_A_TRACK = 6
+_ROAD_POINT_EVERY_M = 4.0
+_MOST_ROADS = 600
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Stop:
+    """A moment that can become t0.
+
+    Attributes:
+        place_m: Of the ego, None where nobody looked so far.
+    """
+
+    moment: Moment
+    place_m: tuple[float, float] | None = None
+
+
+@dataclass(slots=True, kw_only=True)
+class RecordingPart:
+    """One part of a recording: a log, a record, a planning problem, a vehicle as the ego.
+
+    Attributes:
+        name: Its item, empty where there is one part alone.
+        roads_m: Points of centrelines around the places that were looked at, to 0.1 m.
+        is_seen: Whether anybody looked: a part beyond the bounds has neither places nor roads.
+    """
+
+    name: str
+    stops: list[Stop]
+    roads_m: list[list[tuple[float, float]]] = field(default_factory=list)
+    is_seen: bool = False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Timeline:
+    """All of a recording.
+
+    Attributes:
+        is_cut: Whether it holds more moments than are offered.
+    """
+
+    tracks: tuple[RecordingPart, ...]
+    is_cut: bool
+
+
+def timeline_of(reader: Reader, path: Path, *, every_s: float = EVERY_S) -> Timeline:
+    """The moments of a recording that lie so far apart, with maps as far as the bounds reach.
+
+    Raises:
+        InvalidDocument: The input breaks its format.
+    """
+    moments = list(itertools.islice(reader.moments(path, every_s=every_s), MOST_STOPS + 1))
+    tracks = [_track(name, stops) for name, stops in _parts(moments[:MOST_STOPS])]
+    until_s = time.process_time() + LOOKS_S
+    for track in tracks:
+        _look(track, reader, path, until_s)
+    return Timeline(tracks=tuple(tracks), is_cut=len(moments) > MOST_STOPS)
+
+
+# Private
+
+
+def _parts(moments: list[Moment]) -> Iterator[tuple[str, list[Moment]]]:
+    """The moments by their part, in their order.
+
+    Where each moment has an item of its own and a time, the items name frames of one recording.
+    """
+    items = [moment.item for moment in moments]
+    if len(set(items)) == len(items) and all(one.time_s is not None for one in moments):
+        yield "", moments
+        return
+    groups: dict[str, list[Moment]] = {}
+    for moment in moments:
+        groups.setdefault(moment.item or "", []).append(moment)
+    yield from groups.items()
+
+
+def _track(name: str, moments: list[Moment]) -> RecordingPart:
+    return RecordingPart(name=name, stops=[Stop(moment=moment) for moment in moments])
+
+
+def _look(track: RecordingPart, reader: Reader, path: Path, until_s: float) -> None:
+    """Find the ego's places by reading the first moment that has none, again and again."""
+    frame: Pose | None = None
+    looks = 0
+    for index in range(len(track.stops)):
+        if looks >= _LOOKS_OF_A_TRACK or time.process_time() > until_s:
+            return
+        if track.stops[index].place_m is not None:
+            continue
+        moment = track.stops[index].moment
+        reading = reader.read(path, item=moment.item, frame=moment.frame, name="look")
+        looks += 1
+        here = reading.scene.origin.pose
+        track.is_seen = True
+        frame = frame or here
+        seen = frame.pose_to_local(here)
+        _fill_in(track, index, reading, seen)
+        _add_roads(track, reading, seen)
+
+
+def _fill_in(track: RecordingPart, first: int, reading: Reading, seen: Pose) -> None:
+    """The ego's places from this moment on, as far as its recording tells them."""
+    moment = track.stops[first].moment
+    track.stops[first] = Stop(moment=moment, place_m=(seen.x_m, seen.y_m))
+    recording = reading.recording
+    if recording is None or moment.time_s is None:
+        return
+    places_m = seen.to_parent(recording.ego[:, :2])
+    for index in range(first + 1, len(track.stops)):
+        later = track.stops[index].moment
+        if later.time_s is None:
+            continue
+        after_s = later.time_s - moment.time_s
+        nearest = int(np.argmin(np.abs(recording.times_s - after_s)))
+        x_m, y_m = places_m[nearest].tolist()
+        if (
+            abs(float(recording.times_s[nearest]) - after_s) < 0.06
+            and np.isfinite([x_m, y_m]).all()
+        ):
+            track.stops[index] = Stop(moment=later, place_m=(x_m, y_m))
+
+
+def _add_roads(track: RecordingPart, reading: Reading, seen: Pose) -> None:
+    ways: list[AnyLane] = [*reading.scene.lanes, *reading.scene.connectors]
+    for way in ways[: _MOST_ROADS - len(track.roads_m)]:
+        line = way.centerline
+        every_m = max(_ROAD_POINT_EVERY_M, line.length_m / 60.0)
+        points_m = seen.to_parent(line.resampled(every_m).points_m)
+        track.roads_m.append([(round(x, 1), round(y, 1)) for x, y in points_m.tolist()])

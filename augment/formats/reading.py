@@ -6,15 +6,20 @@ is wrong with the file is raised as `InvalidDocument`.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Protocol
 
+import numpy as np
+
 from augment.errors import InvalidDocument
-from augment.scene.entities import Scene
-from augment.scene.notes import Note
-from augment.scene.recording import Recording
+from augment.formats.road_map import FURTHEST_M, FloatArray, MapExtract, RoadMap
+from augment.formats.roads import RADIUS_M, road_around
+from augment.geometry.frames import Pose, wrap
+from augment.scene.entities import LENGTH_WIDTH_M, AgentType, Origin, Scene, TrafficAgent
+from augment.scene.lane_graph import LaneGraph
+from augment.scene.recording import Note, Recording, SceneNoteKind, Track
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -103,3 +108,258 @@ def frames_every(times_s: list[float], every_s: float) -> Iterator[int]:
         if last is None or time_s - last >= every_s - 1e-6:
             last = time_s
             yield frame
+
+
+LONGEST_M = 100.0
+"""No road user is longer."""
+LONGEST_GAP_S = 0.35
+"""Steps are 0.1 s apart; over a longer gap no speed is taken."""
+
+NEIGHBOURS = 2
+"""Steps on either side that a speed is taken over: one alone shows the annotators' jitter."""
+
+_STANDING = (AgentType.TRAFFIC_CONE, AgentType.BARRIER, AgentType.CONSTRUCTION_SIGN)
+_HEADED = (AgentType.VEHICLE, AgentType.BUS, AgentType.BICYCLE)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class LoggedTrack:
+    """One object.
+
+    Attributes:
+        name: Its id in the source; an order among those that are equally near.
+        states: (T, 4): x_m, y_m, heading_rad, speed_mps in the world frame; NaN where unseen.
+    """
+
+    name: str
+    type: AgentType
+    length_m: float
+    width_m: float
+    states: FloatArray
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Log:
+    """What was recorded.
+
+    Attributes:
+        what: What the source is called in faults.
+        times_s: (T,) ascending.
+        ego: (T, 4), as a track's states, of the ego's geometric centre.
+    """
+
+    what: str
+    times_s: FloatArray
+    ego: FloatArray
+    ego_length_m: float
+    ego_width_m: float
+    tracks: tuple[LoggedTrack, ...]
+
+    def ego_pose(self, frame: int) -> Pose:
+        """Where the ego is at a frame.
+
+        Raises:
+            InvalidDocument: There is no such frame, or no ego in it.
+        """
+        frame_in(self.what, frame, len(self.times_s))
+        x_m, y_m, heading_rad, _ = self.ego[frame].tolist()
+        if not np.isfinite(self.ego[frame]).all():
+            raise InvalidDocument(self.what, [("frame", f"{frame} has no ego in it")])
+        for name, states in (
+            ("ego", self.ego),
+            *((track.name, track.states) for track in self.tracks),
+        ):
+            if (np.abs(states) > FURTHEST_M).any():
+                raise InvalidDocument(self.what, [(name, f"has a number over {FURTHEST_M:.0e}")])
+        return Pose(x_m=x_m, y_m=y_m, heading_rad=wrap(heading_rad))
+
+
+def reading_at(
+    log: Log,
+    frame: int,
+    city: RoadMap,
+    *,
+    name: str,
+    world: str,
+    provenance: str,
+    licence: str | None,
+    notes: Iterable[Note] = (),
+    item: str | None = None,
+) -> Reading:
+    """The scene at a frame, what was recorded from there on, and what the source did not say.
+
+    Args:
+        log: The whole log.
+        frame: What becomes t0.
+        city: The map, as far as the ego can see at least.
+        name: The scene's slug.
+        world: What the source's frame is called.
+        provenance: Where it comes from and under which licence.
+        licence: One that forbids commercial use; None where there is none such.
+        notes: What neither the log nor the map tells.
+        item: Which part of the source it is.
+
+    Raises:
+        InvalidDocument: No such frame, no ego in it, or a part of the map without a shape.
+    """
+    origin = log.ego_pose(frame)
+    road = road_around(city, origin)
+    named = _named(log, frame)
+    scene = _on_lanes(
+        Scene(
+            name=name,
+            ego=_ego(log, frame),
+            traffic_side=road.traffic_side,
+            origin=Origin.at(origin, frame=world),
+            provenance=provenance,
+            agents=_agents(named, frame, origin),
+            lanes=road.lanes,
+            connectors=road.connectors,
+            areas=road.areas,
+        )
+    )
+    return Reading(
+        scene=scene,
+        recording=_recording(log, named, frame, origin),
+        notes=(*city.notes, *notes, *_own_notes(log, frame, road, licence)),
+        moment=Moment(item=item, frame=frame),
+    )
+
+
+def speeds(times_s: FloatArray, xy_m: FloatArray) -> FloatArray:
+    """Speeds (K,) over the neighbouring rows, one-sided where they end, 0 for a lone row."""
+    rows = np.arange(len(times_s))
+    gap = np.diff(times_s) > LONGEST_GAP_S
+    first = np.maximum.accumulate(np.where(np.concatenate([[True], gap]), rows, 0))
+    last = np.where(np.concatenate([gap, [True]]), rows, len(rows))
+    last = np.minimum.accumulate(last[::-1])[::-1]
+    before = np.maximum(rows - NEIGHBOURS, first)
+    after = np.minimum(rows + NEIGHBOURS, last)
+    apart = times_s[after] - times_s[before]
+    moved = np.hypot(*(xy_m[after] - xy_m[before]).T)
+    return np.divide(moved, apart, out=np.zeros(len(rows)), where=apart > 0.0)
+
+
+# Private
+
+
+def _own_notes(log: Log, frame: int, road: MapExtract, licence: str | None) -> Iterator[Note]:
+    sizeless = sum(not _has_size(track) for track in log.tracks)
+    if sizeless:
+        yield Note(kind=SceneNoteKind.SOME_BOX_SIZES, number=sizeless, of=len(log.tracks))
+    away_m = [np.hypot(*(track.states[frame, :2] - log.ego[frame, :2])) for track in log.tracks]
+    number = road.far + sum(bool(distance_m > RADIUS_M) for distance_m in away_m)
+    if number:
+        yield Note(kind=SceneNoteKind.FAR_PARTS_LEFT_OUT, number=number, value=RADIUS_M)
+    if road.side_is_assumed:
+        side = (road.traffic_side.value,)
+        yield Note(kind=SceneNoteKind.TRAFFIC_SIDE_ASSUMED, names=side)
+    if licence:
+        yield Note(kind=SceneNoteKind.NON_COMMERCIAL, names=(licence,))
+
+
+def _ego(log: Log, frame: int) -> TrafficAgent:
+    return TrafficAgent(
+        id="Agent1",
+        type=AgentType.EGO_VEHICLE,
+        x_m=0.0,
+        y_m=0.0,
+        heading_rad=0.0,
+        width_m=round(log.ego_width_m, 3),
+        length_m=round(log.ego_length_m, 3),
+        speed_mps=round(float(log.ego[frame, 3]), 3),
+    )
+
+
+def _has_size(track: LoggedTrack) -> bool:
+    return 0.0005 < track.length_m <= LONGEST_M and 0.0005 < track.width_m <= LONGEST_M
+
+
+def _sized(track: LoggedTrack) -> LoggedTrack:
+    """With the usual size of its class where its own can't be."""
+    if _has_size(track):
+        return track
+    length_m, width_m = LENGTH_WIDTH_M[track.type]
+    return replace(track, length_m=length_m, width_m=width_m)
+
+
+def _named(log: Log, frame: int) -> dict[str, LoggedTrack]:
+    """The tracks near the ego from t0 on, by agent id: who is there at t0 first, then by time.
+
+    Within one step the nearest comes first.
+    """
+    met = []
+    ego = log.ego[frame:, :2]
+    # Where the ego's way is not known, near is near to where it was.
+    seen = np.isfinite(ego).all(axis=1)
+    ego = ego[np.maximum.accumulate(np.where(seen, np.arange(len(ego)), 0))]
+    for track in log.tracks:
+        distances = np.hypot(*(track.states[frame:, :2] - ego).T)
+        near = np.flatnonzero(distances <= RADIUS_M)  # NaN is not near
+        if len(near):
+            first = near[0]
+            away_m = round(float(distances[first]), 3)
+            met.append((int(first), away_m, track.name, _sized(track)))
+    met.sort(key=lambda item: item[:3])
+    return {f"Agent{number}": track for number, (*_, track) in enumerate(met, start=2)}
+
+
+def _agents(named: dict[str, LoggedTrack], frame: int, origin: Pose) -> tuple[TrafficAgent, ...]:
+    agents = []
+    for agent_id, track in named.items():
+        states = _local(track.states[frame : frame + 1], origin)
+        if not np.hypot(*states[0, :2]) <= RADIUS_M:
+            continue
+        x_m, y_m, heading_rad, speed_mps = states[0].tolist()
+        agents.append(
+            TrafficAgent(
+                id=agent_id,
+                type=track.type,
+                x_m=x_m,
+                y_m=y_m,
+                heading_rad=heading_rad,
+                width_m=round(track.width_m, 3),
+                length_m=round(track.length_m, 3),
+                speed_mps=0.0 if track.type in _STANDING else speed_mps,
+            )
+        )
+    return tuple(agents)
+
+
+def _on_lanes(scene: Scene) -> Scene:
+    """Everyone with the lane under them; only of what drives does the heading count."""
+    graph = LaneGraph(scene)
+
+    def placed(agent: TrafficAgent) -> TrafficAgent:
+        heading_rad = agent.heading_rad if agent.type in _HEADED else None
+        return replace(agent, lane_id=graph.under(agent.x_m, agent.y_m, heading_rad))
+
+    ego = replace(scene.ego, lane_id=graph.under(0.0, 0.0, 0.0))
+    return replace(scene, ego=ego, agents=tuple(placed(agent) for agent in scene.agents))
+
+
+def _recording(log: Log, named: dict[str, LoggedTrack], frame: int, origin: Pose) -> Recording:
+    return Recording(
+        times_s=np.round(log.times_s[frame:] - log.times_s[frame], 6),
+        ego=_local(log.ego[frame:], origin),
+        tracks=tuple(
+            Track(
+                agent_id=agent_id,
+                type=track.type,
+                length_m=round(track.length_m, 3),
+                width_m=round(track.width_m, 3),
+                states=_local(track.states[frame:], origin),
+            )
+            for agent_id, track in named.items()
+        ),
+    )
+
+
+def _local(states: FloatArray, origin: Pose) -> FloatArray:
+    """States (K, 4) of the world frame in the frame of t0's ego, rounded."""
+    xy = np.round(origin.to_local(states[:, :2]), 3)
+    turn = np.remainder(states[:, 2] - origin.heading_rad + np.pi, 2.0 * np.pi) - np.pi
+    headings = np.round(np.where(turn == -np.pi, np.pi, turn), 4)
+    made = np.column_stack([xy, headings, np.round(states[:, 3], 3)])
+    made[~np.isfinite(made).all(axis=1)] = np.nan
+    return made

@@ -11,7 +11,7 @@ import pytest
 from django.urls import reverse
 from playwright.sync_api import Browser, Page, expect
 
-from augment.services.scenarios.scene_pictures import draw_scene
+from augment.services.scenarios.pictures import draw_scene
 from tests.browser.held import Held, hold
 from tests.jobs.rows import add_scenario
 from tests.scenes import scene

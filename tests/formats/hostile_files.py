@@ -16,7 +16,7 @@ import numpy as np
 import pyarrow as pa
 from pyarrow import feather, parquet
 
-from augment.formats.waymo.tfrecord import masked_crc32c
+from augment.formats.waymo.scenario import masked_crc32c
 from augment.scene.codec import SCENE_FORMAT
 from tests.formats import av2_logs, av2_motion, nuplan_files, waymo_files
 from tests.formats.test_commonroad import HEAD, PROBLEM

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from augment.formats.nuplan.mercator import to_utm
+from augment.formats.nuplan_map import to_utm
 
 CITIES = {
     "sg-one-north": (32648, 365_000.0, 143_000.0, "9.17.1964"),

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from augment.errors import InvalidDocument
-from augment.formats.archive import ZipBounds, find_input, unpack_zip
+from augment.formats.apart import ZipBounds, find_input, unpack_zip
 from augment.formats.readers import READERS
 from tests.formats.av2_logs import write_log
 

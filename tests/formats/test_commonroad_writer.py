@@ -43,7 +43,7 @@ def test_commonroad_io_loads_every_file_and_the_schema_allows_it(
     for name, given in cells.items():
         files.append(tmp_path / f"{name}.xml")
         files[-1].write_bytes(write([given]).files[NAME])
-    told = dict(zip(cells, told_by("read_commonroad.py", *files), strict=True))
+    told = dict(zip(cells, told_by(*files), strict=True))
     assert {name: one["faults"] for name, one in told.items()} == {key: [] for key in cells}
     check_street(told["street"])
     check_crossing(told["crossing"])

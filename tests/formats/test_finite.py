@@ -17,9 +17,9 @@ from hypothesis import strategies as st
 from augment.formats.readers import READERS
 from augment.formats.writers import WRITERS, writer_named
 from augment.formats.writing import Cell, Written
+from augment.scene.codec import recording_from_document
 from augment.scene.motion import MotionSource
 from augment.scene.recording import Recording
-from augment.scene.recording_codec import recording_from_document
 from tests.formats.cells import cell, crossing, recorded_street
 from tests.formats.receivers import told_by
 from tests.formats.sanity import check_sanity, loaded
@@ -131,11 +131,11 @@ def test_every_receiver_finds_an_unrecorded_ego_at_every_step(
         for name, content in one.files.items():
             (tmp_path / name).write_bytes(content)
     stem, steps = without_ego.stem, len(without_ego.motion.times_s)
-    (told,) = told_by("read_commonroad.py", tmp_path / f"{stem}.xml")
+    (told,) = told_by(tmp_path / f"{stem}.xml")
     assert told["faults"] == []
     goal = [*without_ego.motion.ego.states[-1, :2], steps - 1]
     assert told["goals"][0] == pytest.approx(goal, abs=1e-6)
-    for checked in told_by("check_asam.py", tmp_path / f"{stem}.xosc"):
+    for checked in told_by(tmp_path / f"{stem}.xosc"):
         assert checked["issues"] == []
     check_openscenario(tmp_path / f"{stem}.xosc", steps)
     (pickled,) = tmp_path.glob("sd_*.pkl")

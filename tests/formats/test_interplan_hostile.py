@@ -11,17 +11,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from augment.errors import InvalidDocument
-from augment.formats.interplan.reader import FURTHEST_FROM_EGO_M, read
-from augment.formats.yaml_file import (
+from augment.formats.documents import (
     DEEPEST,
     LONGEST_TEXT,
     MAX_CHARACTERS,
-    MOST_VALUES,
     read_yaml,
     read_yaml_file,
 )
-from augment.scene.entities import Scene
-from augment.scene.modification import without_traffic
+from augment.formats.documents import MOST_YAML_VALUES as MOST_VALUES
+from augment.formats.interplan.reader import FURTHEST_FROM_EGO_M, read
+from augment.scene.entities import Scene, without_traffic
 from tests.fixtures.shelf import whole_scene
 
 TOKEN = "00000000000000ab"

@@ -9,9 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from augment.formats.intersection_ways import crossing_segments, take_end_widths
 from augment.formats.readers import READERS
-from augment.formats.road_map import Segment
+from augment.formats.road_map import Segment, crossing_segments, take_end_widths
 from augment.scene.entities import TurnType
 
 Points = Sequence[tuple[float, float]]

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from augment.errors import InvalidDocument
-from augment.formats.json_file import read_json
+from augment.formats.documents import read_json
 
 
 @pytest.mark.parametrize(

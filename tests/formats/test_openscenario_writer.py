@@ -55,7 +55,7 @@ def test_asams_checks_find_no_fault_in_any_file(realdata: Path, tmp_path: Path) 
     made = write(cells).files
     for name, content in made.items():
         (tmp_path / name).write_bytes(content)
-    told = told_by("check_asam.py", *(tmp_path / name for name in made))
+    told = told_by(*(tmp_path / name for name in made))
     for name, one in zip(made, told, strict=True):
         assert one["issues"] == [], name
         skipped = {check for check, status in one["status"].items() if status != "completed"}

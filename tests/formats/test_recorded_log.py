@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from augment.formats.recorded_log import Log, LoggedTrack, reading_at, speeds
+from augment.formats.reading import Log, LoggedTrack, reading_at, speeds
 from augment.formats.road_map import RoadMap
 from augment.scene.entities import AgentType
 

@@ -7,9 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from augment.formats import timeline
-from augment.formats.readers import READERS, recognise
-from augment.formats.timeline import timeline_of
+from augment.formats import readers
+from augment.formats.readers import READERS, recognise, timeline_of
 from augment.scene.codec import scene_to_document
 from tests.formats.av2_logs import write_log
 from tests.scenes import scene
@@ -38,6 +37,6 @@ def test_a_single_scene_is_one_moment_at_the_origin(tmp_path: Path) -> None:
 def test_of_a_long_recording_the_first_moments_are_offered(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(timeline, "MOST_STOPS", 3)
+    monkeypatch.setattr(readers, "MOST_STOPS", 3)
     found = timeline_of(READERS["av2"], write_log(tmp_path / "log"), every_s=0.1)
     assert (len(found.tracks[0].stops), found.is_cut) == (3, True)

@@ -9,9 +9,7 @@ from hypothesis import strategies as st
 
 from augment.errors import InvalidDocument
 from augment.formats.reading import Reading
-from augment.formats.waymo.messages import read_scenario
-from augment.formats.waymo.scenario import WaymoMotion
-from augment.formats.waymo.tfrecord import masked_crc32c
+from augment.formats.waymo.scenario import WaymoMotion, masked_crc32c, read_scenario
 from augment.scene.codec import scene_to_document
 from augment.scene.entities import TrafficLight, TurnType
 from tests.formats.waymo_files import record, scenario, state, track, write

@@ -5,7 +5,7 @@ from __future__ import annotations
 import struct
 from pathlib import Path
 
-from augment.formats.waymo.tfrecord import masked_crc32c
+from augment.formats.waymo.scenario import masked_crc32c
 
 Fields = list[tuple[int, object]]
 

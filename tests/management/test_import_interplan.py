@@ -9,12 +9,12 @@ from django.core.management import call_command
 from django.core.management.base import CommandError
 
 from augment.baselines.rule_placer import place
-from augment.checks.against_intent import check_against_intent
 from augment.checks.ground import Ground
+from augment.checks.registry import check_against_intent
 from augment.errors import CannotPlace
 from augment.models import Augmentation, BaseScene, GenerationJob, Scenario
 from augment.scene.entities import AgentType
-from augment.services.scenarios.scene_notes import notes_of
+from augment.services.scenarios.scene_imports import notes_of
 from augment.services.scenarios.scenes import intent_of, reference_of, scene_of
 from tests.formats.interplan_files import ELSEWHERE, HERE, fifty_entries, write_folder
 from tests.jobs import rows

@@ -8,7 +8,7 @@ import pytest
 from django.core.management import CommandError, call_command
 
 from augment.errors import InvalidDocument
-from augment.formats.yaml_file import read_yaml
+from augment.formats.documents import read_yaml
 from augment.models import Contestant, Event, GenerationJob
 from augment.services.endpoints.known_endpoints import ensure_endpoint
 from augment.services.running.matrix import load_matrix, matrix_text

@@ -13,7 +13,8 @@ from django.core.files.storage import default_storage
 
 from augment.errors import Conflict, InvalidDocument
 from augment.models import BaseScene, Event, SceneUpload, UploadMoment
-from augment.services.scenarios import upload_moments, uploads
+from augment.services.scenarios import uploads
+from augment.services.scenarios import uploads as upload_moments
 from tests.formats.av2_logs import write_log
 
 pytestmark = pytest.mark.django_db

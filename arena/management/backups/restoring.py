@@ -32,7 +32,7 @@ from arena.services import stored_rows
 from arena.site.services import check_row, check_votes, end_restored_work, is_unfinished
 from augment.models import Endpoint, Simulation
 from augment.services.judging.simulations import allowed_planners
-from augment.services.stored_names import is_stored_name
+from augment.services.texts import is_stored_name
 
 EXPERTS = "expert"
 """The role of every account of a study's folder."""

@@ -24,7 +24,7 @@ from arena.services.stored_rows import (
 )
 from arena.services.written_files import FOLDERS
 from arena.serving.readiness import find_unapplied_migrations
-from augment.services.scenarios.thumbnails import FOLDER as THUMBNAILS
+from augment.services.scenarios.pictures import THUMBNAILS
 
 
 def take_backup(path: Path, *, now: datetime, say: Callable[[str], None]) -> Manifest:

@@ -28,7 +28,7 @@ from arena.queries.votes.judged import (
 from arena.queries.votes.search import COUNTED
 from augment.errors import UnknownName
 from augment.models import Contestant
-from augment.services.scenarios.types import ScenarioType
+from augment.services.scenarios.scenes import ScenarioType
 
 KINDS = (MAIN, REPEAT)
 """What may be rated: planned showings, and on demand the hidden repeats of them."""

@@ -14,7 +14,7 @@ from arena.rating.bootstrap import Unit
 from arena.rating.leaderboard import Intervals, Method
 from arena.services.covariates import COVARIATES, WITHOUT_PICTURES
 from arena.services.ratings import DEFAULT_ROUNDS, MOST_ROUNDS
-from augment.services.scenarios.types import type_choices
+from augment.services.scenarios.scenes import type_choices
 
 METHOD_LABELS = {"bt": "Bradley-Terry", "davidson": "Davidson (ties)", "elo": "Online Elo"}
 UNIT_LABELS = {

@@ -7,29 +7,195 @@ do. Turn types are those that it names; a light holds for the ways in its direct
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
-from augment.formats.commonroad.fields import WHAT, fault, points_of, real, references, whole
-from augment.formats.commonroad.lights import Light, lights_of
-from augment.formats.intersection_ways import crossing_segments
+from augment.errors import InvalidDocument
+from augment.formats.documents import Element
 from augment.formats.road_map import (
+    FURTHEST_M,
     FloatArray,
     RoadMap,
     Segment,
     count_notes,
+    crossing_segments,
     left_out_notes,
     limit_notes,
 )
-from augment.formats.strips import midline
-from augment.formats.xml_file import Element
+from augment.formats.roads import midline
 from augment.geometry.polyline import Polyline
-from augment.scene.directions import turn_type_of
 from augment.scene.entities import AreaKind, TrafficLight, TurnType
-from augment.scene.notes import Note, SceneNoteKind
+from augment.scene.lane_graph import turn_type_of
+from augment.scene.recording import Note, SceneNoteKind
+
+WHAT = "CommonRoad scenario"
+
+
+def fault(place: str, text: str) -> InvalidDocument:
+    """What is wrong, and where."""
+    return InvalidDocument(WHAT, [(place, text)])
+
+
+def whole(text: str | None, place: str) -> int:
+    """A whole number such as an id.
+
+    Raises:
+        InvalidDocument: It is none.
+    """
+    try:
+        number = int((text or "").strip())
+    except ValueError:
+        raise fault(place, f"expected a whole number, got {(text or '')[:40]!r}") from None
+    if abs(number) > 10**15:
+        raise fault(place, f"{str(number)[:20]}... is too large")
+    return number
+
+
+def real(text: str, place: str) -> float:
+    """A finite number.
+
+    Raises:
+        InvalidDocument: It is none.
+    """
+    try:
+        number = float(text.strip())
+    except ValueError:
+        number = math.nan
+    if not abs(number) <= FURTHEST_M:
+        raise fault(place, f"expected a finite number up to {FURTHEST_M:.0e}, got {text[:40]!r}")
+    return number
+
+
+def value_of(parent: Element, name: str, place: str) -> float | None:
+    """A value given exactly or as an interval, whose middle is taken; None where it is not given.
+
+    Raises:
+        InvalidDocument: It is no number.
+    """
+    element = parent.first(name)
+    if element is None:
+        return None
+    exact = element.first("exact")
+    if exact is not None:
+        return real(exact.text, f"{place}.{name}")
+    low, high = element.first("intervalStart"), element.first("intervalEnd")
+    if low is not None and high is not None:
+        ends = (real(low.text, f"{place}.{name}"), real(high.text, f"{place}.{name}"))
+        return sum(ends) / 2.0
+    return real(element.text, f"{place}.{name}")
+
+
+def points_of(parent: Element, place: str) -> NDArray[np.float64]:
+    """The points (P, 2) of a bound or polygon."""
+    rows = [point_of(point, place) for point in parent.all("point")]
+    return np.array(rows, dtype=np.float64).reshape(-1, 2)
+
+
+def point_of(point: Element, place: str) -> tuple[float, float]:
+    """X and y of a point.
+
+    Raises:
+        InvalidDocument: One is missing or no number.
+    """
+    x, y = point.first("x"), point.first("y")
+    if x is None or y is None:
+        raise fault(place, "a point needs x and y")
+    return real(x.text, place), real(y.text, place)
+
+
+def references(parent: Element, *names: str) -> Iterator[int]:
+    """The ids that children of these names refer to."""
+    for child in parent.all(*names):
+        yield whole(child.attributes.get("ref"), f"{parent.name}.{child.name}")
+
+
+COLOURS = {
+    "green": TrafficLight.GREEN,
+    "yellow": TrafficLight.YELLOW,
+    "red": TrafficLight.RED,
+    "redYellow": TrafficLight.RED,
+    "inactive": TrafficLight.UNKNOWN,
+}
+_DIRECTIONS = {TurnType.LEFT: "left", TurnType.RIGHT: "right", TurnType.STRAIGHT: "straight"}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Light:
+    """One light.
+
+    Attributes:
+        cycle: Colour and steps, in order.
+        offset: The step at which the cycle begins.
+        direction: "all", or words like "leftStraight".
+    """
+
+    cycle: tuple[tuple[TrafficLight, int], ...]
+    offset: int
+    direction: str
+    is_active: bool
+
+    def holds_for(self, turn: TurnType | None) -> bool:
+        """Whether a way of that turn obeys this light."""
+        if turn is None or self.direction in ("", "all") or turn not in _DIRECTIONS:
+            return True
+        return _DIRECTIONS[turn] in self.direction.lower()
+
+    def state_at(self, step: int) -> TrafficLight:
+        """The colour at a time step."""
+        total = sum(duration for _, duration in self.cycle)
+        if not self.is_active or total == 0:
+            return TrafficLight.UNKNOWN
+        place = (step - self.offset) % total
+        for colour, duration in self.cycle:
+            if place < duration:
+                return colour
+            place -= duration
+        raise AssertionError("a place in a cycle lies in one of its parts")
+
+
+def lights_of(root: Element) -> dict[int, Light]:
+    """Every light by its id.
+
+    Raises:
+        InvalidDocument: A colour or a duration breaks the format.
+    """
+    lights = {}
+    for element in root.all("trafficLight"):
+        light_id = whole(element.attributes.get("id"), "trafficLight")
+        place = f"trafficLight {light_id}"
+        cycle = element.first("cycle")
+        parts: list[tuple[TrafficLight, int]] = []
+        offset = 0
+        if cycle is not None:
+            parts = [_part(one, place) for one in cycle.all("cycleElement")]
+            given = cycle.first("timeOffset")
+            offset = 0 if given is None else whole(given.text, f"{place}.timeOffset")
+        direction, active = element.first("direction"), element.first("active")
+        lights[light_id] = Light(
+            cycle=tuple(parts),
+            offset=offset,
+            direction="" if direction is None else direction.text.strip(),
+            is_active=active is None or active.text.strip() != "false",
+        )
+    return lights
+
+
+def _part(element: Element, place: str) -> tuple[TrafficLight, int]:
+    colour, duration = element.first("color"), element.first("duration")
+    text = "" if colour is None else colour.text.strip()
+    if text not in COLOURS:
+        allowed = ", ".join(COLOURS)
+        raise fault(place, f"unknown colour {text[:20]!r}; known: {allowed}")
+    steps = whole(None if duration is None else duration.text, f"{place}.duration")
+    if steps < 0:
+        raise fault(place, f"a duration of {steps} steps is none")
+    return COLOURS[text], steps
+
 
 SPEED_SIGNS = frozenset({"274", "R2-1"})
 """The speed limit of Germany (and of Zamunda), and of the United States; values in m/s."""

@@ -14,30 +14,32 @@ import numpy as np
 
 from augment.checks.ground import Ground
 from augment.errors import InvalidDocument
+from augment.formats.documents import read_yaml
 from augment.formats.interplan.file import (
     STANDING_WALK_M,
     WALK_S,
-    ReadEntry,
-    ReadFile,
-    cone_heading,
-    options_of,
-)
-from augment.formats.interplan.schema import (
     WHAT,
     Details,
+    ReadEntry,
+    ReadFile,
     SpecialScenario,
+    cone_heading,
     file_of,
     left_out_of_details,
     left_out_of_file,
+    options_of,
     place_of,
 )
-from augment.formats.yaml_file import read_yaml
-from augment.geometry.angles import wrap
-from augment.geometry.frames import Pose
+from augment.geometry.frames import Pose, wrap
 from augment.scene.density import ExtraAgent, spawn_traffic
-from augment.scene.entities import AgentType, Point, Scene, TrafficAgent
-from augment.scene.modification import Modification
-from augment.scene.sizes import LENGTH_WIDTH_M
+from augment.scene.entities import (
+    LENGTH_WIDTH_M,
+    AgentType,
+    Modification,
+    Point,
+    Scene,
+    TrafficAgent,
+)
 
 Place = tuple[str, int]
 """A key of a special scenario and the number of a row under it."""

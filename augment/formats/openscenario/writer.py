@@ -15,7 +15,7 @@ from xml.etree import ElementTree as ET
 
 import numpy as np
 
-from augment.formats.openscenario.road_writer import map_of
+from augment.formats.openscenario.roads import map_of
 from augment.formats.writing import (
     Cell,
     LossReport,

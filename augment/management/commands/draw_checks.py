@@ -8,12 +8,12 @@ from django.core.management.base import CommandError, CommandParser
 
 from augment.errors import AugmentError
 from augment.services.running.choosing import resolve_scenarios
-from augment.services.scenarios.attention import draw_checks
+from augment.services.scenarios.pictures import draw_checks
 from augment.services.terminal import TerminalCommand
 
 
 class Command(TerminalCommand):
-    """The door to augment.services.scenarios.attention.draw_checks."""
+    """The door to augment.services.scenarios.pictures.draw_checks."""
 
     help = (
         "Draw, for scenarios with a reference, a picture that is broken on purpose: everything "

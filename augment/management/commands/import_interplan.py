@@ -10,7 +10,7 @@ from typing import Any
 from django.core.management.base import CommandError
 
 from augment.errors import AugmentError
-from augment.services.scenarios.interplan_import import (
+from augment.services.scenarios.interplan import (
     FileLeftOut,
     LogLooked,
     ScenarioDone,

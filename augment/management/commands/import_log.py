@@ -10,8 +10,7 @@ from django.core.management.base import CommandError
 
 from augment.errors import AugmentError
 from augment.formats.readers import READERS
-from augment.services.scenarios.scene_imports import ImportedMoment, import_log
-from augment.services.scenarios.scene_notes import notes_of
+from augment.services.scenarios.scene_imports import ImportedMoment, import_log, notes_of
 from augment.services.terminal import TerminalCommand
 
 

@@ -11,7 +11,7 @@ from augment.errors import AugmentError, UnknownName
 from augment.llm.questions import Ability
 from augment.models import Endpoint
 from augment.services.endpoints.known_models import tell_sight
-from augment.services.endpoints.probe import ProbeFinding, ProbeReport, probe
+from augment.services.endpoints.probing import ProbeFinding, ProbeReport, probe
 from augment.services.terminal import TerminalCommand
 from augment.services.texts import one_line
 

@@ -11,10 +11,10 @@ from django.db import transaction
 from augment.broker import check_broker
 from augment.errors import AugmentError
 from augment.management.arguments import add_cap_arguments, caps_of
-from augment.services.running import pausing
+from augment.services.running import jobs
 from augment.services.running.budget import limit_of
 from augment.services.running.choosing import find_job
-from augment.services.running.summary import count_rows
+from augment.services.running.progress import count_rows
 from augment.services.terminal import TerminalCommand
 from augment.tasks import enqueue_job
 
@@ -39,7 +39,7 @@ class Command(TerminalCommand):
             job = find_job(options["job"])
             check_broker()
             with transaction.atomic():
-                job = pausing.resume(job, higher=wanted)
+                job = jobs.resume(job, higher=wanted)
                 pk = job.pk
                 transaction.on_commit(lambda: enqueue_job(pk))
         except AugmentError as error:

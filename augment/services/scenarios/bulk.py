@@ -7,20 +7,22 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Mapping
+import tempfile
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from django.contrib.auth.models import User
+from django.core.files.base import File
 from django.db import transaction
 
-from augment.errors import AugmentError, InvalidDocument
-from augment.formats.json_file import read_json
-from augment.formats.yaml_file import MAX_CHARACTERS, read_yaml_file
+from augment.errors import AugmentError, Conflict, InvalidDocument
+from augment.formats.documents import MAX_CHARACTERS, read_json, read_yaml_file
 from augment.models import Scenario
 from augment.scene.codec import modification_from_document, modification_to_document
 from augment.services.scenarios.scenes import add_scenario, read_circumstances
+from augment.services.scenarios.uploads import plain_name
 
 WHAT = "list of scenarios"
 NEEDED = ("scene", "type", "instruction")
@@ -205,3 +207,43 @@ def _document(name: str, folder: Path, what: str) -> object:
     if not (folder / name).resolve().is_relative_to(folder.resolve()):
         raise InvalidDocument(what, [(name, "lies outside of the folder of the list")])
     return read_json(folder / name, what=what)
+
+
+MOST_FILES = 500
+
+
+def add_from_files(
+    table: File[bytes], documents: Sequence[File[bytes]], *, keeps: bool, actor: User | None = None
+) -> BulkReport:
+    """Add the scenarios of a list, all or none, and say of each what became of it.
+
+    Args:
+        table: A CSV or YAML file.
+        documents: The JSON files that it names, at most `MOST_FILES`.
+        keeps: False to try only: nothing is added then.
+        actor: Who adds them.
+
+    Raises:
+        InvalidDocument: The list can't be read.
+        Conflict: It has too many rows to be waited for.
+    """
+    with tempfile.TemporaryDirectory(prefix="arena-bulk-") as name:
+        folder = Path(name)
+        for one in documents:
+            write_plain(one, folder)
+        rows = read_rows(write_plain(table, folder))
+        if len(rows) > MOST_ROWS_AT_ONCE:
+            raise Conflict(
+                f"{len(rows)} rows are too many for a page, at most {MOST_ROWS_AT_ONCE}: use "
+                "manage.py add_scenario --file."
+            )
+        return report_rows(rows, folder=folder, keeps=keeps, actor=actor)
+
+
+def write_plain(file: File[bytes], folder: Path) -> Path:
+    """The file in the folder, under a name without folders."""
+    path = folder / plain_name(file.name or "")
+    with path.open("wb") as written:
+        for piece in file.chunks():
+            written.write(piece)
+    return path

@@ -11,16 +11,37 @@ from dataclasses import replace
 from functools import lru_cache
 from typing import Any
 
-from augment.geometry.angles import difference, wrap
-from augment.geometry.frames import Pose
-from augment.models import Scenario
+from django.contrib.auth.models import User
+from django.db import transaction
+
+from augment.errors import Conflict, UnknownName
+from augment.geometry.frames import Pose, difference, wrap
+from augment.models import IntentReading, Scenario
 from augment.render.camera import AROUND_THE_EGO
-from augment.scene.codec import modification_from_document, modification_to_document
-from augment.scene.entities import AgentType, Point, Scene, TrafficAgent
+from augment.scene.codec import (
+    intent_from_document,
+    modification_from_document,
+    modification_to_document,
+)
+from augment.scene.entities import (
+    LENGTH_WIDTH_M,
+    AgentType,
+    Modification,
+    Point,
+    Scene,
+    TrafficAgent,
+)
+from augment.scene.intent import IntentOrigin
+from augment.scene.intent_statements import list_statements
 from augment.scene.lane_graph import LaneGraph
-from augment.scene.modification import Modification
-from augment.scene.sizes import LENGTH_WIDTH_M
-from augment.services.scenarios.scenes import check_reference, scene_key, scene_of
+from augment.services.events import log_event
+from augment.services.scenarios.scenes import (
+    check_reference,
+    intent_of,
+    placeable_intent,
+    scene_key,
+    scene_of,
+)
 
 PLACED = tuple(one for one in AgentType if one is not AgentType.EGO_VEHICLE)
 _HALF_TURN_RAD = math.pi
@@ -138,3 +159,150 @@ def _towards(point: Point, pose: Pose, *, instead: float) -> float:
     """The heading from the pose to the point; `instead` where they are the same."""
     away = (point[0] - pose.x_m, point[1] - pose.y_m)
     return math.atan2(away[1], away[0]) if any(away) else instead
+
+
+@transaction.atomic
+def set_reference(scenario: Scenario, document: object, *, actor: User | None = None) -> Scenario:
+    """Give a scenario the reference of a document, in the place of the one that it had.
+
+    Raises:
+        InvalidDocument: The document breaks its format.
+        InvalidModification: It does not fit the scene.
+        Conflict: The scenario is the catalogue's, or nothing changes though the wish can be met.
+    """
+    row = Scenario.objects.select_for_update(of=("self",)).get(pk=scenario.pk)
+    refuse_catalogue(row)
+    modification = read_edit(row, document)
+    intent = intent_of(row)
+    if modification.is_empty and not (intent and intent.unmet):
+        raise Conflict(
+            "Nothing is added, moved or removed. An empty reference is for wishes that can't "
+            "be met, whose intent says so."
+        )
+    return _set(row, modification_to_document(modification), actor)
+
+
+@transaction.atomic
+def drop_reference(scenario: Scenario, *, actor: User | None = None) -> Scenario:
+    """Leave a scenario without a reference.
+
+    Raises:
+        Conflict: The scenario is the catalogue's, or has none.
+    """
+    row = Scenario.objects.select_for_update(of=("self",)).get(pk=scenario.pk)
+    refuse_catalogue(row)
+    if row.reference is None:
+        raise Conflict(f"'{row.slug}' has no reference.")
+    return _set(row, None, actor)
+
+
+def refuse_catalogue(row: Scenario) -> None:
+    """Raise Conflict for a scenario whose files alone change it."""
+    if row.in_catalogue:
+        raise Conflict(
+            f"The reference of '{row.slug}' is the catalogue's own; change it in its file."
+        )
+
+
+def _set(row: Scenario, document: dict[str, object] | None, actor: User | None) -> Scenario:
+    before = row.reference
+    row.reference = document
+    row.save(update_fields=["reference"])
+    log_event(
+        actor=actor,
+        verb="set reference",
+        object_kind="scenario",
+        object_code=row.code,
+        before={"reference": before},
+        after={"reference": document},
+    )
+    return row
+
+
+State = IntentReading.State
+
+
+@transaction.atomic
+def enter_intent(*, scenario: str, document: object, actor: User | None = None) -> Scenario:
+    """Give a scenario the intent of a document, in the place of the one that it had.
+
+    Raises:
+        UnknownName: No such scenario.
+        InvalidDocument: The document breaks the format, or leaves open what jobs need.
+        Conflict: The scenario is the catalogue's, whose intents are authored.
+    """
+    row = _scenario(scenario)
+    if row.in_catalogue:
+        raise Conflict(
+            f"The intent of '{row.slug}' is the catalogue's own; change it in its file."
+        )
+    return _set_intents(row, placeable_intent(document), IntentOrigin.ENTERED, actor)
+
+
+@transaction.atomic
+def accept_reading(*, scenario: str, actor: User | None = None) -> Scenario:
+    """Let the last reading of a scenario count, in the place of the intent that it had.
+
+    Raises:
+        UnknownName: No such scenario.
+        InvalidDocument: What was read leaves open what jobs need.
+        Conflict: Nothing that was read waits to be accepted, or the scenario is the catalogue's.
+    """
+    row = _scenario(scenario)
+    reading = waiting_reading(row)
+    if reading is None:
+        raise Conflict(f"No reading of '{row.slug}' waits to be accepted.")
+    if row.in_catalogue:
+        raise Conflict(
+            f"The intent of '{row.slug}' is the catalogue's own; change it in its file."
+        )
+    document = placeable_intent(reading.document)
+    IntentReading.objects.filter(pk=reading.pk).update(state=State.ACCEPTED)
+    return _set_intents(row, document, IntentOrigin.READ, actor)
+
+
+def waiting_reading(scenario: Scenario) -> IntentReading | None:
+    """The last reading, where it was read and nobody has accepted it yet."""
+    last = scenario.readings.select_related("endpoint").first()
+    return last if last is not None and last.state == State.READ else None
+
+
+def last_reading(scenario: Scenario) -> IntentReading | None:
+    """The last reading, whatever became of it."""
+    return scenario.readings.select_related("endpoint").first()
+
+
+def statements_of(document: object) -> tuple[str, ...]:
+    """What an intent document says, as short statements; none where there is no document.
+
+    Raises:
+        InvalidDocument: The document breaks the format.
+    """
+    return () if document is None else list_statements(intent_from_document(document))
+
+
+# --- Private -----------------------------------------------------------------------------------
+
+
+def _scenario(slug: str) -> Scenario:
+    row = Scenario.objects.select_for_update(of=("self",)).filter(slug=slug).first()
+    if row is None:
+        raise UnknownName("scenario", slug, list(Scenario.objects.values_list("slug", flat=True)))
+    return row
+
+
+def _set_intents(
+    row: Scenario, document: dict[str, Any], origin: IntentOrigin, actor: User | None
+) -> Scenario:
+    before = {"intent": row.intent, "origin": row.intent_origin or None}
+    row.intent, row.intent_origin = document, origin
+    row.save(update_fields=["intent", "intent_origin"])
+    log_event(
+        actor=actor,
+        verb="set intent",
+        object_kind="scenario",
+        object_code=row.code,
+        before=before,
+        after={"intent": document, "origin": origin.value},
+    )
+    return row

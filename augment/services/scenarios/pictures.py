@@ -3,22 +3,36 @@
 from __future__ import annotations
 
 import hashlib
+import json
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict
+from enum import StrEnum
+from functools import cache
 from typing import Any
 
 import numpy as np
+from django.contrib.auth.models import User
 from django.core.files.base import ContentFile
 from django.core.files.storage import default_storage
 from django.db import transaction
+from django.db.models import QuerySet
+from django.utils import timezone
 from numpy.typing import NDArray
 
-from augment.models import Scenario
+from augment.baselines.registry import break_reference
+from augment.models import Augmentation, BaseScene, Contestant, GenerationJob, Scenario
 from augment.render.bev import draw
-from augment.render.camera import Camera, camera_for
-from augment.render.shrunken import shrink
-from augment.scene.codec import modification_from_document
-from augment.scene.entities import Scene
-from augment.scene.modification import Modification
-from augment.services.scenarios.scenes import reference_of, scene_of
+from augment.render.camera import AROUND_THE_EGO, LOOK, Camera, camera_for
+from augment.render.canvas import shrink, shrink_png
+from augment.render.legend import change_keys, describe, scene_keys
+from augment.scene.codec import (
+    modification_from_document,
+    modification_to_document,
+    scene_from_document,
+)
+from augment.scene.entities import Modification, Scene, without_traffic
+from augment.services.events import log_event
+from augment.services.scenarios.scenes import content_hash, reference_of, scene_key, scene_of
 
 FOLDER = "bev"
 
@@ -112,3 +126,283 @@ def store_as(name: str, png: bytes) -> None:
     if default_storage.exists(name) and default_storage.size(name) == len(png):
         return
     default_storage.save(name, ContentFile(png))
+
+
+def redraw(scenario: Scenario) -> int:
+    """Draw what shows another window than today's, until nothing does.
+
+    Old files stay where they are and rows keep their names, for the studies that show them.
+    Call it from a worker or a command, not in a request.
+
+    Returns:
+        How many augmentations have a new picture.
+
+    Raises:
+        InvalidDocument: What is stored can't be read.
+        InvalidModification: A modification does not fit the scene.
+    """
+    redrawn = 0
+    # Another worker may store a change that widens the window while this one draws.
+    while outdated := _find_outdated(scenario):
+        redrawn += _redraw_rows(scenario, outdated)
+    original_picture(scenario)
+    return redrawn
+
+
+# --- Private -----------------------------------------------------------------------------------
+
+
+def _find_outdated(scenario: Scenario) -> list[Augmentation]:
+    key = camera_of(scenario).key
+    rows = scenario.augmentations.exclude(image="")
+    rows = rows.only("image", "earlier_images", "state", "modification")
+    return [row for row in rows if window_of(row.image) != key]
+
+
+def _redraw_rows(scenario: Scenario, outdated: list[Augmentation]) -> int:
+    scene, camera = scene_of(scenario), camera_of(scenario)
+    drawn = [(row, picture_of(scene, _shown(row), camera)) for row in outdated]
+    with transaction.atomic():
+        Scenario.objects.select_for_update(no_key=True).get(pk=scenario.pk)
+        original_picture(scenario)
+        return sum(
+            Augmentation.objects.filter(pk=row.pk, image=row.image).update(
+                image=name, earlier_images=[*row.earlier_images, row.image]
+            )
+            for row, name in drawn
+        )
+
+
+def _shown(row: Augmentation) -> Modification:
+    """What its picture shows: an answer that could not be read changes nothing."""
+    if row.state != Augmentation.State.DONE or not row.modification:
+        return Modification()
+    return modification_from_document(row.modification)
+
+
+SCENES = "scenes"
+
+
+class SceneView(StrEnum):
+    """What a picture of a scene shows."""
+
+    KEPT = "kept"  # with the recorded traffic
+    CLEARED = "cleared"  # the ego alone
+    BACKDROP = "backdrop"  # the ego alone, from far: others are placed on it
+
+
+def scene_picture(row: BaseScene, view: SceneView) -> str:
+    """The name of a scene's picture, whether it is drawn yet or not."""
+    content = row.content_hash or content_hash(row.document)
+    key = AROUND_THE_EGO.key if view is SceneView.BACKDROP else str(LOOK)
+    return f"{SCENES}/{content}-{key}-{view.value}.png"
+
+
+def reference_picture(scenario: Scenario) -> str:
+    """The name of the picture of a scenario's reference; empty where it has none."""
+    if scenario.reference is None:
+        return ""
+    shown = [LOOK, scene_key(scenario), scenario.reference]
+    digest = hashlib.sha256(json.dumps(shown, sort_keys=True).encode()).hexdigest()
+    return f"references/{digest}.png"
+
+
+def is_drawn(name: str) -> bool:
+    """Whether a worker has drawn the picture of that name."""
+    return bool(name) and default_storage.exists(name)
+
+
+def draw_scene(scene_pk: int) -> None:
+    """What a worker does: every picture of a scene that is not drawn yet.
+
+    Raises:
+        InvalidDocument: The stored scene can't be read.
+    """
+    row = BaseScene.objects.defer("recording").get(pk=scene_pk)
+    missing = [view for view in SceneView if not is_drawn(scene_picture(row, view))]
+    if not missing:
+        return
+    scene = scene_from_document(row.document)
+    for view in missing:
+        shown = scene if view is SceneView.KEPT else without_traffic(scene)
+        camera = AROUND_THE_EGO if view is SceneView.BACKDROP else camera_for(scene, None)
+        store_as(scene_picture(row, view), draw(shown, Modification(), camera))
+
+
+def draw_scenario(scenario_pk: int) -> None:
+    """What a worker does: a scenario before any change, and with its reference.
+
+    Raises:
+        InvalidDocument: The stored scene or reference can't be read.
+        InvalidModification: They do not fit together.
+    """
+    row = Scenario.objects.select_related("base_scene").get(pk=scenario_pk)
+    draw_scene(row.base_scene_id)
+    redraw(row)
+    name, reference = reference_picture(row), reference_of(row)
+    if reference is None or is_drawn(name):
+        return
+    scene = scene_of(row)
+    store_as(name, draw(scene, reference, camera_for(scene, reference)))
+
+
+THUMBNAILS = "thumbnails"
+WIDTHS_PX = (400, 800)
+"""How wide they are at most: for a cell of a grid, and for one of a gallery; twice that on fine
+screens."""
+# Raised whenever the same picture is made smaller in another way.
+_LOOK = 1
+
+
+def thumbnail_of(name: str, widest_px: int) -> str:
+    """The name of a stored picture made smaller; "" where there is no such picture.
+
+    Args:
+        name: Of the picture.
+        widest_px: One of `WIDTHS_PX`.
+
+    Raises:
+        ValueError: There are no thumbnails of that width.
+    """
+    if widest_px not in WIDTHS_PX:
+        raise ValueError(f"thumbnails are {WIDTHS_PX} pixels wide, not {widest_px}")
+    small = f"{THUMBNAILS}/{_LOOK}-{widest_px}/{name}"
+    if not name or default_storage.exists(small):
+        return small if name else ""
+    if not default_storage.exists(name):
+        return ""
+    with default_storage.open(name) as file:
+        store_as(small, shrink_png(file.read(), widest_px))
+    return small
+
+
+def legend_of_scene(scenario: Scenario, view: Mapping[str, Any]) -> list[str]:
+    """Return the entries for what a window of a scenario shows before any change.
+
+    Raises:
+        InvalidDocument: The stored scene can't be read.
+    """
+    return sorted(scene_keys(scene_of(scenario), view))
+
+
+def legends_of_changes(views: Mapping[int, Mapping[str, Any]]) -> dict[int, set[str]]:
+    """Return the entries for what each augmentation adds, by its key; one query.
+
+    Args:
+        views: By the keys of augmentations, where metres lie in their pictures.
+
+    Raises:
+        InvalidDocument: A stored modification can't be read.
+    """
+    rows = Augmentation.objects.filter(pk__in=views.keys()).order_by()
+    return {
+        key: set()
+        if not document
+        else change_keys(modification_from_document(document), views[key])
+        for key, document in rows.values_list("pk", "modification")
+    }
+
+
+Description = list[dict[str, Any]]
+"""The lines of augment.render.legend, ready to be stored."""
+
+
+def descriptions(
+    *, augmentations: Iterable[int], scenarios: Mapping[int, Scenario]
+) -> dict[int, Description]:
+    """The description of each augmentation, by its key; one query.
+
+    One without a modification has the picture of the unchanged scene, and the empty description.
+
+    Args:
+        augmentations: Keys.
+        scenarios: Theirs by key, with their base scenes.
+
+    Raises:
+        InvalidDocument: A stored scene or modification can't be read.
+    """
+    scene = cache(lambda key: scene_of(scenarios[key]))
+    rows = Augmentation.objects.filter(pk__in=set(augmentations)).order_by()
+    by_pk = {}
+    for key, scenario, document in rows.values_list("pk", "scenario", "modification"):
+        change = Modification() if document is None else modification_from_document(document)
+        by_pk[key] = [asdict(line) for line in describe(scene(scenario), change)]
+    return by_pk
+
+
+ATTENTION_CHECK = "attention-check"
+JOB = "Attention checks"
+
+State = Augmentation.State
+
+
+def draw_checks(*, scenarios: Sequence[str], actor: User | None = None) -> list[Augmentation]:
+    """Draw the broken picture of every scenario that has none yet for its reference.
+
+    They belong to a contestant of kind check, which no job runs and no study rates. Drawing takes
+    a tenth of a second each: call it from a command or a worker, not in a request.
+
+    Args:
+        scenarios: Slugs; those without a reference, or whose reference only removes, have no
+            check.
+        actor: Who wants them.
+
+    Returns:
+        The new rows.
+
+    Raises:
+        InvalidDocument: A stored scene or reference can't be read.
+    """
+    drawn = []
+    for row in Scenario.objects.filter(slug__in=scenarios).select_related("base_scene"):
+        reference = reference_of(row)
+        change = None if reference is None else break_reference(reference)
+        if change is None:
+            continue
+        document = modification_to_document(change)
+        if not _pictures(row).filter(modification=document).exists():
+            drawn.append((row, document, picture_of(scene_of(row), change, camera_of(row))))
+    kept = _keep(drawn, actor) if drawn else []
+    for row, _, _ in drawn:
+        redraw(row)
+    return kept
+
+
+def _pictures(scenario: Scenario) -> QuerySet[Augmentation]:
+    kind = Contestant.Kind.CHECK
+    return scenario.augmentations.filter(contestant__kind=kind, state=State.DONE)
+
+
+@transaction.atomic
+def _keep(
+    drawn: list[tuple[Scenario, dict[str, object], str]], actor: User | None
+) -> list[Augmentation]:
+    contestant, _ = Contestant.objects.get_or_create(
+        slug=ATTENTION_CHECK, defaults={"name": "Attention check", "kind": Contestant.Kind.CHECK}
+    )
+    now = timezone.now()
+    job = GenerationJob.objects.create(
+        name=JOB, state=GenerationJob.State.FINISHED, launched_by=actor, finished_at=now
+    )
+    job.contestants.set([contestant])
+    job.scenarios.set([scenario for scenario, _, _ in drawn])
+    rows = Augmentation.objects.bulk_create(
+        Augmentation(
+            job=job,
+            scenario=scenario,
+            contestant=contestant,
+            state=State.DONE,
+            modification=document,
+            image=image,
+            finished_at=now,
+        )
+        for scenario, document, image in drawn
+    )
+    log_event(
+        actor=actor,
+        verb="draw checks",
+        object_kind="job",
+        object_code=job.code,
+        after={"scenarios": [scenario.slug for scenario, _, _ in drawn]},
+    )
+    return rows

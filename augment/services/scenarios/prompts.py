@@ -9,19 +9,23 @@ from typing import Any
 
 from django.core.files.base import ContentFile
 from django.core.files.storage import default_storage
+from django.db import connection
 
 from augment.errors import Conflict, UnknownName
+from augment.fake_llm.sight import same_text
 from augment.models import Contestant, Scenario
-from augment.prompts.texts import prompt_version
+from augment.prompts.fill import prompt_version
 from augment.render.camera import LOOK
-from augment.scene.modification import Modification
+from augment.scene.codec import intent_from_document
+from augment.scene.entities import Modification
+from augment.scene.intent import Intent
 from augment.services.scenarios.pictures import store
 from augment.services.scenarios.scenes import reference_of, scene_key, scene_of
 from augment.variants.options import ContestantOptions, recipe_with
 from augment.variants.recipes import RECIPES, Tools, find_recipe
+from augment.variants.respondents import ModelRole
+from augment.variants.reviews import pictures
 from augment.variants.showing import Shown, shown_prompt
-from augment.variants.transcript import ModelRole
-from augment.variants.visual_qa import pictures
 
 FOLDER = "prompts"
 """Where pictures lie that a viewer would be shown."""
@@ -212,3 +216,29 @@ def _bytes(name: str) -> bytes:
     with default_storage.open(name) as file:
         found: bytes = file.read()
     return found
+
+
+class StoredIntents:
+    """The intents of all scenarios, by the texts of their instructions.
+
+    Asked from the threads of a server: each leaves no connection behind. What was found once is
+    remembered; what was not is looked for again, because scenarios and intents come later.
+    """
+
+    def __init__(self) -> None:
+        self._found: dict[str, Intent] = {}
+
+    def __call__(self, instruction: str) -> Intent | None:
+        """The intent of the first scenario with that instruction, None where none has one."""
+        text = same_text(instruction)
+        if text not in self._found:
+            try:
+                self._look_again()
+            finally:
+                connection.close()
+        return self._found.get(text)
+
+    def _look_again(self) -> None:
+        rows = Scenario.objects.exclude(intent=None).order_by("-pk")
+        for instruction, document in rows.values_list("instruction", "intent"):
+            self._found[same_text(instruction)] = intent_from_document(document)

@@ -15,8 +15,8 @@ PYTHON = ROOT / ".bench" / "receivers" / "bin" / "python"
 HERE = Path(__file__).parent
 
 
-def told_by(script: str, *files: Path) -> list[dict[str, Any]]:
-    """What a script beside this file prints about each of the files: one JSON object a line.
+def told_by(*files: Path) -> list[dict[str, Any]]:
+    """What the script beside this file prints about each of the files.
 
     Without the environment (`make receivers`) a named skip, in CI a failure.
     """
@@ -24,7 +24,7 @@ def told_by(script: str, *files: Path) -> list[dict[str, Any]]:
         if os.environ.get("CI"):
             pytest.fail("make receivers was not run, and in CI nothing is skipped")
         pytest.skip("the receivers are not installed: make receivers")
-    command = [str(PYTHON), "-I", str(HERE / script), *(str(file) for file in files)]
+    command = [str(PYTHON), "-I", str(HERE / "script.py"), *(str(file) for file in files)]
     done = subprocess.run(command, capture_output=True, text=True, timeout=240, check=False)
     assert done.returncode == 0, done.stderr
     return [json.loads(line) for line in done.stdout.splitlines()]

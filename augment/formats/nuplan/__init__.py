@@ -1,1 +1,0 @@
-"""nuPlan: a log database and the vector map of its city."""
