@@ -103,16 +103,22 @@ urlpatterns: list[URLPattern] = [
         displacement.export,
         name="displacement-export",
     ),
-    path("jobs/<uuid:code>/analyses/", files.page, name="analyses"),
+    path("jobs/<uuid:code>/analyses/", files.analyses_page, name="analyses"),
     path(
-        "jobs/<uuid:code>/analyses-<slug:part>.<slug:form>", files.export, name="analyses-export"
+        "jobs/<uuid:code>/analyses-<slug:part>.<slug:form>",
+        files.export_analysis,
+        name="analyses-export",
     ),
-    path("jobs/<uuid:code>/transcripts.jsonl", files.export, name="transcripts-export"),
+    path(
+        "jobs/<uuid:code>/transcripts.jsonl", files.export_transcripts, name="transcripts-export"
+    ),
     path(
         "jobs/<uuid:code>/tool-calls.<slug:form>", jobs.export_tool_calls, name="tool-calls-export"
     ),
-    path("jobs/<uuid:code>/scenarios-<slug:form>/", files.ask, name="scenarios-write"),
-    path("scenarios-<uuid:code>.zip", files.download, name="scenarios-export"),
+    path(
+        "jobs/<uuid:code>/scenarios-<slug:form>/", files.ask_for_scenarios, name="scenarios-write"
+    ),
+    path("scenarios-<uuid:code>.zip", files.download_scenarios, name="scenarios-export"),
     path("jobs/<uuid:code>/simulate/", driving.simulate_job, name="job-simulate"),
     path("jobs/<uuid:code>/drives/", driving.drives_page, name="drives"),
     path("jobs/<uuid:code>/driving.<slug:form>", driving.export, name="driving-export"),

@@ -14,6 +14,7 @@ from django.views.decorators.http import require_safe
 
 from arena.contestants.queries import asking_of
 from arena.site.access import STAFF, allow_only
+from arena.site.acts import looks_again, send_later
 from arena.web.pictures import picture_response
 from augment.errors import AugmentError, UnknownName
 from augment.models import Contestant, Scenario
