@@ -11,6 +11,7 @@ from django.utils import timezone
 from arena.models import Study
 from arena.people.links import LINK_LIVES, invite
 from arena.serving.stack import Web, served_address
+from arena.studies.queries import ExpertLine, expert_lines, study_named
 from augment.errors import UnknownName
 from augment.services.terminal import TerminalCommand
 

@@ -8,7 +8,7 @@ from django.contrib.auth.models import User
 from django.core.management.base import CommandParser
 
 from arena.models import Study
-from arena.people.services import mark_author, take_back_author
+from arena.people.links import mark_author, take_back_author
 from arena.studies.queries import study_named
 from augment.errors import UnknownName
 from augment.services.terminal import TerminalCommand

@@ -14,6 +14,7 @@ from arena.rating.rules import Intervals
 from arena.services.covariates import COVARIATES
 from arena.services.early_looks import log_early_look
 from arena.services.ratings import DEFAULT_ROUNDS, rate
+from arena.studies.queries import study_named
 from augment.services.terminal import TerminalCommand
 
 
