@@ -10,8 +10,7 @@ from django.db.models import F
 from arena.models import Snapshot, Standing
 from arena.models.ratings import stored_values
 from arena.queries.votes.sets import LeftOut
-from arena.rating.lines import Line
-from arena.rating.printed import notes_by_reason
+from arena.rating.lines import Line, notes_by_reason
 from arena.rating.rules import METHOD_TEXTS, UNIT_TEXTS, Intervals
 from arena.studies.services.opening import preregistration_sha256
 from arena.studies.services.plan import Answered, answer_hypotheses
