@@ -25,8 +25,7 @@ from django.db.models.functions import Cast, Coalesce, Length
 from arena.errors import ArenaError
 from arena.jobs.services import NOTE_LENGTH
 from arena.models import FaultLabel, Matchup, Report, Snapshot, Study, Vote
-from arena.rating.bootstrap import Unit
-from arena.rating.rules import Intervals, Method
+from arena.rating.rules import Intervals, Method, Unit
 from arena.services.decisions import decision_of
 from arena.studies.services.experts import Complaint, check_complaint
 from arena.studies.services.opening import check_seed

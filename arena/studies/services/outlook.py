@@ -10,8 +10,7 @@ from django.contrib.auth.models import User
 
 from arena.models import Snapshot, Study, Vote
 from arena.queries.studies.results import ResultsAccess, latest_snapshot, results_access
-from arena.rating.planning import Question, estimate_effects
-from arena.rating.sample_size import StudyDesign
+from arena.rating.planning import Question, StudyDesign, estimate_effects
 from arena.services.snapshots import votes_of
 from arena.services.vote_arrays import vote_arrays
 from augment.services.inputs import InputKind, input_field, inputs_of
