@@ -37,7 +37,8 @@ def seed(voters: int, votes_each: int) -> None:
     import django
 
     django.setup()
-    from arena.people.services import create_person, invite
+    from arena.people.links import invite
+    from arena.people.services import create_person
     from augment.models import Augmentation, Contestant, GenerationJob, Scenario
     from augment.services.scenarios.catalogue import load_catalogue
     from augment.services.scenarios.pictures import store
