@@ -21,7 +21,7 @@ from augment.models import (
     ModelCall,
     Scenario,
 )
-from augment.services.endpoints.keys import check_key_variable, log_move, move_of
+from augment.services.endpoints.known_endpoints import check_key_variable, log_move, move_of
 from augment.services.endpoints.known_models import facts_of
 from augment.services.events import log_event
 

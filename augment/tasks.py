@@ -24,9 +24,10 @@ from django.db.models import Q
 from augment.broker import open_broker, send
 from augment.services.clock import DATABASE_TIME, Moment
 from augment.services.endpoints.probing import PROBES
-from augment.services.judging import marked_pictures
+from augment.services.judging import findings
 from augment.services.judging.simulations import DRIVES
-from augment.services.running import stopping, workers
+from augment.services.running import workers
+from augment.services.running import workers as stopping
 from augment.services.running.intent_readings import READINGS
 from augment.services.running.runner import AUGMENTATIONS
 from augment.services.scenarios import pictures, prompts
@@ -48,7 +49,7 @@ BATCH = 100
 register(AUGMENTATIONS, DRIVES, READINGS, PROBES, UPLOADS, MOMENTS)
 
 DRAWN: Mapping[str, Callable[[int], object]] = {
-    "marks": lambda pk: marked_pictures.draw_marked(augmentation_pk=pk),
+    "marks": lambda pk: findings.draw_marked(augmentation_pk=pk),
     "scene": pictures.draw_scene,
     "scenario": pictures.draw_scenario,
     "prompts": prompts.draw_prompts,

@@ -20,17 +20,16 @@ from statistics import fmean, mean, median
 
 from augment.baselines.rule_placer import place
 from augment.errors import CannotPlace
-from augment.fake_llm.requests import SpokenMessage
 from augment.fake_llm.sight import task_of
+from augment.fake_llm.wire import SpokenMessage
 from augment.metrics.displacement import displacement
 from augment.prompts.fill import Form, modifier_messages
 from augment.prompts.vectors import LaneFormat
-from augment.scene.entities import Scene
-from augment.scene.modification import Modification
+from augment.scene.entities import Modification, Scene
 from augment.variants.recipes import RECIPES
 from augment.variants.showing import shown_prompt
+from bench.environments import BENCH, python_of
 from bench.report import PAGE, table, write_block
-from bench.rivals.environments import RIVALS, python_of
 from tests.fixtures.shelf import HARD_SLUGS, SLUGS, entry, shown_scene, whole_scene
 from tests.intents import intents
 from tests.variants.pose_accuracy import recorded_scenes
@@ -89,7 +88,7 @@ def tokens(slug: str, scenes: list[Scene]) -> list[int]:
 def counted(texts: list[str]) -> list[int]:
     """How many tokens each text has."""
     ended = subprocess.run(
-        [str(python_of("tokens")), str(RIVALS / "tokens" / "counter.py"), VOCABULARY],
+        [str(python_of("tokens")), str(BENCH / "tokens" / "counter.py"), VOCABULARY],
         input=json.dumps(texts),
         stdout=subprocess.PIPE,
         text=True,

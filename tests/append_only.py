@@ -11,7 +11,7 @@ from django.db import connection
 from django.db.backends.base.operations import BaseDatabaseOperations
 
 from augment.models import AppendOnly, after_migrations
-from augment.models.triggers import dropping
+from augment.models.work import dropping
 
 
 def empty_with_triggers() -> None:

@@ -8,8 +8,8 @@ from django.db.models import Q, QuerySet
 
 from augment.errors import Conflict
 from augment.models import Augmentation, GenerationJob, Scenario
-from augment.services.running import retrying
-from augment.services.running.causes import rows_of_cause
+from augment.services.running import jobs
+from augment.services.running.progress import rows_of_cause
 
 _BATCH = 500
 
@@ -43,7 +43,7 @@ def retry_cause(job: GenerationJob, *, key: str, actor: User | None = None) -> G
             f"Experts are shown {shown} of these {len(pks)} in a study or a labelling: what "
             "is judged stays as it is. Launch a new job instead."
         )
-    return retrying.retry_cause(job, key=key, actor=actor)
+    return jobs.retry_cause(job, key=key, actor=actor)
 
 
 # --- Private -----------------------------------------------------------------------------------

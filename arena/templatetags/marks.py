@@ -11,7 +11,7 @@ from django.utils.safestring import SafeString
 from arena.models import Study
 from augment.models import Augmentation, GenerationJob
 from augment.services.judging.findings import Finding
-from augment.services.running.summary import JobCounts
+from augment.services.running.progress import JobCounts
 
 register = template.Library()
 

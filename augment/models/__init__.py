@@ -4,20 +4,26 @@ Rows are the truth; a Celery message carries the key of a row. Every row that a 
 a URL has a random `code`; primary keys stay inside.
 """
 
-from augment.models.append_only import AppendOnly
-from augment.models.calls import ModelCall, TranscriptNote
-from augment.models.contestants import Contestant
-from augment.models.endpoints import CallLease, Endpoint, EndpointModel
-from augment.models.events import Event
-from augment.models.jobs import Attempt, Augmentation, GenerationJob
-from augment.models.probes import Probe
-from augment.models.readings import IntentReading
-from augment.models.scenes import SLUG_HELP, BaseScene, Scenario
-from augment.models.simulations import Simulation
-from augment.models.triggers import after_migrations, before_migrations
-from augment.models.uploads import SceneUpload, UploadMoment
-from augment.models.work import FAILED, Work
-from augment.models.workers import Worker
+from augment.models.contestants import CallLease, Contestant, Endpoint, EndpointModel, Probe
+from augment.models.jobs import (
+    Attempt,
+    Augmentation,
+    GenerationJob,
+    IntentReading,
+    ModelCall,
+    Simulation,
+    TranscriptNote,
+)
+from augment.models.scenes import SLUG_HELP, BaseScene, Scenario, SceneUpload, UploadMoment
+from augment.models.work import (
+    FAILED,
+    AppendOnly,
+    Event,
+    Work,
+    Worker,
+    after_migrations,
+    before_migrations,
+)
 
 __all__ = [
     "FAILED",

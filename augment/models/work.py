@@ -3,10 +3,16 @@
 from __future__ import annotations
 
 import uuid
-from collections.abc import Mapping
-from typing import ClassVar
+from collections.abc import Iterable, Mapping
+from typing import Any, ClassVar
 
-from django.db import models
+from django.apps import AppConfig
+from django.conf import settings
+from django.db import connections, models
+from django.db.backends.base.base import BaseDatabaseWrapper
+from django.db.models import Model
+from django.db.models.signals import post_migrate, pre_migrate
+from django.dispatch import receiver
 
 FAILED = "failed"
 """The state of work that the machinery could not bring to another outcome; each kind has it."""
@@ -50,3 +56,179 @@ class Work(models.Model):
         is_waiting = bool(failed.update(**(again | columns)))
         self.refresh_from_db()
         return is_waiting
+
+
+class AppendOnly(models.Model):
+    """A row that is never changed or deleted: what changes it is another row.
+
+    The database refuses it as well, whoever asks: see `augment.models.work`.
+    """
+
+    removable: ClassVar[str] = ""
+    """Which rows may be deleted all the same: an SQL condition on OLD, none by default."""
+
+    class Meta:
+        abstract = True
+
+    def save(self, *args: Any, **kwargs: Any) -> None:
+        """Insert the row.
+
+        Raises:
+            TypeError: It is stored already.
+        """
+        if not self._state.adding:
+            name = self._meta.verbose_name
+            raise TypeError(f"a {name} is append-only: a stored one can't be changed")
+        super().save(*args, **kwargs)
+
+    def delete(self, *args: Any, **kwargs: Any) -> tuple[int, dict[str, int]]:
+        """Never.
+
+        Raises:
+            TypeError: Always.
+        """
+        name = self._meta.verbose_name
+        raise TypeError(f"a {name} is append-only: a stored one can't be deleted")
+
+
+@receiver(pre_migrate)
+def before_migrations(
+    sender: AppConfig, using: str, plan: Iterable[object] = (), **_: Any
+) -> None:
+    """Take the triggers away where there is something to apply."""
+    if plan:
+        connection = connections[using]
+        with connection.cursor() as cursor:
+            for statement in dropping(connection, sender.get_models()):
+                cursor.execute(statement)
+
+
+@receiver(post_migrate)
+def after_migrations(sender: AppConfig, using: str, **_: Any) -> None:
+    """Make the triggers that are missing."""
+    connection = connections[using]
+    with connection.cursor() as cursor:
+        for model in _stored(connection, sender.get_models()):
+            for statement in _MAKING[connection.vendor](model):
+                cursor.execute(statement)
+
+
+def dropping(connection: BaseDatabaseWrapper, models: Iterable[type[Model]]) -> list[str]:
+    """Statements that take the triggers of these models away."""
+    tables = [model._meta.db_table for model in _stored(connection, models)]
+    where = "" if connection.vendor == "sqlite" else " ON {table}"
+    return [
+        f"DROP TRIGGER IF EXISTS {table}_refuses_{what}{where.format(table=table)}"
+        for table in tables
+        for what in ("update", "delete", "truncate")
+    ]
+
+
+# --- Private -----------------------------------------------------------------------------------
+
+
+def _stored(
+    connection: BaseDatabaseWrapper, models: Iterable[type[Model]]
+) -> list[type[AppendOnly]]:
+    """Those of the models that are append-only and have a table already."""
+    tables = [model for model in models if issubclass(model, AppendOnly)]
+    kept = connection.introspection.table_names() if tables else []
+    return [model for model in tables if model._meta.db_table in kept]
+
+
+def _for_sqlite(model: type[AppendOnly]) -> list[str]:
+    table = model._meta.db_table
+    stays = f"WHEN NOT ({model.removable})" if model.removable else ""
+    return [
+        f"CREATE TRIGGER IF NOT EXISTS {table}_refuses_{what} BEFORE {what} ON {table} {when} "
+        f"BEGIN SELECT RAISE(ABORT, '{_said(table)}'); END"
+        for what, when in (("update", ""), ("delete", stays))
+    ]
+
+
+def _for_postgresql(model: type[AppendOnly]) -> list[str]:
+    table = model._meta.db_table
+    goes = model.removable or "FALSE"
+    function = f"""
+        CREATE OR REPLACE FUNCTION {table}_refuses() RETURNS trigger LANGUAGE plpgsql AS $$
+        BEGIN
+            IF TG_OP = 'DELETE' THEN
+                IF {goes} THEN
+                    RETURN OLD;
+                END IF;
+            END IF;
+            RAISE EXCEPTION '{_said(table)}' USING ERRCODE = 'integrity_constraint_violation';
+        END $$
+    """
+    # CREATE OR REPLACE would wait for everybody who reads the table, also where nothing is new.
+    made = [
+        f"""
+        DO $$ BEGIN
+            IF NOT EXISTS (
+                SELECT 1 FROM pg_trigger
+                WHERE tgrelid = '{table}'::regclass AND tgname = '{table}_refuses_{what}'
+            ) THEN
+                CREATE TRIGGER {table}_refuses_{what} BEFORE {what} ON {table}
+                FOR EACH {each} EXECUTE FUNCTION {table}_refuses();
+            END IF;
+        END $$
+        """
+        for what, each in (("update", "ROW"), ("delete", "ROW"), ("truncate", "STATEMENT"))
+    ]
+    return [function, *made]
+
+
+def _said(table: str) -> str:
+    return f"{table} is append-only: a stored row can not be changed or deleted"
+
+
+_MAKING = {"sqlite": _for_sqlite, "postgresql": _for_postgresql}
+
+
+class Event(AppendOnly):
+    """One line of the append-only log: who did what to which object, when, before and after."""
+
+    actor = models.ForeignKey(
+        settings.AUTH_USER_MODEL,
+        null=True,
+        blank=True,
+        on_delete=models.PROTECT,
+        related_name="events",
+        help_text="null for the machine itself",
+    )
+    verb = models.CharField(max_length=60)
+    object_kind = models.CharField(max_length=40)
+    object_code = models.CharField(max_length=64)
+    before = models.JSONField(null=True, blank=True)
+    after = models.JSONField(null=True, blank=True)
+    at = models.DateTimeField(auto_now_add=True)
+
+    class Meta:
+        ordering = ("-at", "-pk")
+        indexes = (models.Index(fields=("object_kind", "object_code")),)
+
+    def __str__(self) -> str:
+        return f"{self.verb} {self.object_kind} {self.object_code}"
+
+
+class Worker(models.Model):
+    """A worker process: when it was last heard, and whether it brings lost work back.
+
+    All times are the database's.
+    """
+
+    name = models.CharField(max_length=120)
+    started_at = models.DateTimeField()
+    seen_at = models.DateTimeField()
+    ended_at = models.DateTimeField(null=True, blank=True, help_text="it ended in order")
+    recovered_at = models.DateTimeField(
+        null=True, blank=True, help_text="it last brought lost work back, or saw that none is lost"
+    )
+    fault = models.TextField(blank=True, help_text="why it could not since then")
+
+    class Meta:
+        ordering = ("-seen_at",)
+        indexes = (models.Index(fields=("seen_at",)),)
+
+    def __str__(self) -> str:
+        return self.name

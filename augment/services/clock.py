@@ -7,7 +7,10 @@ compared by the database; on SQLite that is the clock of its only machine.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from datetime import UTC, datetime
+from threading import Event, Thread
 
 from django.db import connection
 from django.db.models import Expression
@@ -33,3 +36,29 @@ def database_now() -> datetime:
     read = parse_datetime(now)  # SQLite has texts
     assert read is not None
     return read.replace(tzinfo=UTC)
+
+
+@contextmanager
+def repeating(beat: Callable[[], bool], *, every_s: float, name: str) -> Iterator[None]:
+    """Beat every so many seconds until the block is left, or until a beat says False.
+
+    The thread has a database connection of its own, which is closed with it.
+    """
+    stop = Event()
+    thread = Thread(target=_beat_until, args=(beat, every_s, stop), name=name, daemon=True)
+    thread.start()
+    try:
+        yield
+    finally:
+        stop.set()
+        thread.join()
+
+
+def _beat_until(beat: Callable[[], bool], every_s: float, stop: Event) -> None:
+    """Wait, then beat, until told to stop."""
+    try:
+        while not stop.wait(every_s):
+            if not beat():
+                return
+    finally:
+        connection.close()

@@ -11,7 +11,7 @@ from django.core.management import call_command
 
 from augment.models import Augmentation, GenerationJob
 from augment.services.running import runner
-from augment.services.running.transcript_export import transcript_of
+from augment.services.running.transcript_records import transcript_of
 from tests.jobs.models import Model, after_a_second_look, llama_job
 
 pytestmark = pytest.mark.django_db

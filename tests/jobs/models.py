@@ -13,7 +13,7 @@ from augment.llm.client import ChatClient, Sending, watch_nothing
 from augment.llm.messages import Reply, Request
 from augment.models import Contestant, Endpoint, EndpointModel, GenerationJob
 from augment.services.running import jobs
-from augment.services.running.caps import NO_CAPS, Caps
+from augment.services.running.budget import NO_CAPS, Caps
 from tests.jobs.rows import INSTRUCTION, add_model, add_scenario
 from tests.variants.answers import GOOD
 

@@ -9,7 +9,8 @@ import pytest
 from augment.errors import ModelFault
 from augment.llm.messages import Reply
 from augment.models import Augmentation, GenerationJob, ModelCall
-from augment.services.running import jobs, retrying, runner
+from augment.services.running import jobs, runner
+from augment.services.running import jobs as retrying
 from tests.jobs.models import Model, llama_job, reply
 from tests.jobs.rows import only_row
 from tests.variants.answers import GOOD

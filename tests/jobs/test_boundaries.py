@@ -8,11 +8,11 @@ from decimal import Decimal
 import pytest
 
 from augment.errors import ModelFault
+from augment.llm.client import Patience
 from augment.llm.costs import Price, WorstCase
-from augment.llm.patience import Patience
-from augment.llm.wire_faults import fault_of_status
+from augment.llm.openai_wire import fault_of_status
 from augment.models import Augmentation, CallLease, Endpoint, GenerationJob
-from augment.services.endpoints import call_limits
+from augment.services.endpoints import client
 from augment.services.running import budget
 from augment.services.running.budget import Room
 from augment.services.running.runner import AUGMENTATIONS
@@ -157,27 +157,19 @@ def test_how_many_workers_may_die_at_one_row(lost: int, state: str) -> None:
 
 @pytest.mark.parametrize(
     ("age", "is_free"),
-    [
-        (call_limits.LEASE - INSTANT, False),
-        (call_limits.LEASE, True),
-        (call_limits.LEASE + INSTANT, True),
-    ],
+    [(client.LEASE - INSTANT, False), (client.LEASE, True), (client.LEASE + INSTANT, True)],
 )
 def test_when_the_place_of_a_dead_worker_is_free(age: timedelta, is_free: bool) -> None:
     endpoint = Endpoint.objects.create(label="x", base_url="http://x/v1", max_concurrency=1)
-    call_limits.admit(endpoint_pk=endpoint.pk, clock=lambda: NOON)
-    found = call_limits.admit(endpoint_pk=endpoint.pk, clock=lambda: NOON + age)
+    client.admit(endpoint_pk=endpoint.pk, clock=lambda: NOON)
+    found = client.admit(endpoint_pk=endpoint.pk, clock=lambda: NOON + age)
     assert (not isinstance(found, float)) is is_free
     assert CallLease.objects.count() == 1 + is_free
 
 
 @pytest.mark.parametrize(
     ("age", "wait_s"),
-    [
-        (call_limits.MINUTE - INSTANT, 1e-6),
-        (call_limits.MINUTE, None),
-        (call_limits.MINUTE + INSTANT, None),
-    ],
+    [(client.MINUTE - INSTANT, 1e-6), (client.MINUTE, None), (client.MINUTE + INSTANT, None)],
 )
 def test_when_a_start_no_longer_counts_for_its_minute(
     age: timedelta, wait_s: float | None
@@ -185,6 +177,6 @@ def test_when_a_start_no_longer_counts_for_its_minute(
     endpoint = Endpoint.objects.create(
         label="x", base_url="http://x/v1", max_concurrency=9, requests_per_minute=1
     )
-    call_limits.admit(endpoint_pk=endpoint.pk, clock=lambda: NOON)
-    found = call_limits.admit(endpoint_pk=endpoint.pk, clock=lambda: NOON + age)
+    client.admit(endpoint_pk=endpoint.pk, clock=lambda: NOON)
+    found = client.admit(endpoint_pk=endpoint.pk, clock=lambda: NOON + age)
     assert (found if isinstance(found, float) else None) == wait_s

@@ -12,10 +12,9 @@ from augment.errors import EndpointBusy, LeaseLost, ModelFault
 from augment.llm.costs import Price, WorstCase
 from augment.llm.messages import Reply
 from augment.models import Attempt, Augmentation, Event, GenerationJob, ModelCall
-from augment.services.running import budget, caps, pausing, runner
-from augment.services.running.budget import Room
-from augment.services.running.caps import Caps
-from augment.services.running.costs import costs_of
+from augment.services.running import budget, jobs, runner
+from augment.services.running import budget as caps
+from augment.services.running.budget import Caps, Room, costs_of
 from augment.services.running.runner import AUGMENTATIONS, Held
 from tests.jobs.models import Model, after_a_second_look, llama_job, reply
 from tests.jobs.rows import NOON, STALE, only_row
@@ -130,7 +129,7 @@ def test_a_stopped_attempt_is_replayed_from_its_answers_also_in_a_fresh_job() ->
     model = Model(after_a_second_look)
     assert ran(job, model).state == ROW.QUEUED
     caps.raise_cap(job, caps=Caps(calls=2))
-    pausing.resume(job)
+    jobs.resume(job)
     assert ran(job, model).state == ROW.DONE
     assert len(model.requests) == len(set(model.requests)) == 2
     served = ModelCall.objects.get(served_from__isnull=False)

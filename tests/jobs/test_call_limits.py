@@ -13,7 +13,7 @@ from django.db import connection
 
 from augment.errors import EndpointBusy, LeaseLost
 from augment.models import CallLease, Endpoint
-from augment.services.endpoints.call_limits import Queue, place_at
+from augment.services.endpoints.client import Queue, place_at
 from tests.processes import wait_until
 
 THREADS = 8

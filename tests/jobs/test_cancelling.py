@@ -13,7 +13,7 @@ from augment.errors import JobCancelled
 from augment.llm.messages import Message, Request, Speaker
 from augment.llm.openai_wire import OpenAIWire
 from augment.models import Augmentation, CallLease, Endpoint, GenerationJob, ModelCall
-from augment.services.endpoints.call_limits import Queue, place_at
+from augment.services.endpoints.client import Queue, place_at
 from augment.services.running import budget, jobs, runner
 from augment.services.running.runner import AUGMENTATIONS
 from tests.jobs.models import llama_job, reply

@@ -12,10 +12,10 @@ from django.db import connection
 from django.db.models import Q
 
 from augment.models import Augmentation, GenerationJob, ModelCall
-from augment.services.running import caps, pausing, runner
-from augment.services.running.caps import Caps
+from augment.services.running import budget, jobs, runner
+from augment.services.running.budget import Caps
+from augment.services.running.progress import count_rows
 from augment.services.running.runner import AUGMENTATIONS
-from augment.services.running.summary import count_rows
 from tests.jobs.models import (
     COMPLETION_TOKENS,
     PROMPT_TOKENS,
@@ -105,8 +105,8 @@ def test_eight_workers_stay_below_the_cap_and_resume_pays_for_nothing_twice(kind
     asked_before = len(model.requests)
     check_the_books(job)
 
-    caps.raise_cap(job, caps=ALL[kind])
-    pausing.resume(job)
+    budget.raise_cap(job, caps=ALL[kind])
+    jobs.resume(job)
     run_all(job, model, watcher)
 
     assert job.state == GenerationJob.State.FINISHED

@@ -9,7 +9,7 @@ import pytest
 from augment.errors import Conflict
 from augment.models import Event, GenerationJob
 from augment.services.running import jobs
-from augment.services.running.caps import Caps
+from augment.services.running.budget import Caps
 from tests.jobs.models import add_llama, llama_job
 from tests.jobs.rows import add_scenario, launch
 

@@ -11,7 +11,7 @@ from django.utils import timezone
 from augment import tasks
 from augment.models import Augmentation, CallLease
 from augment.services.clock import DATABASE_TIME, database_now
-from augment.services.endpoints import call_limits
+from augment.services.endpoints import client
 from augment.services.running.runner import AUGMENTATIONS, Held
 from tests.brokers import MEMORY, broker_at
 from tests.jobs.models import add_llama
@@ -97,9 +97,9 @@ def test_a_wrong_clock_takes_no_place_that_is_taken(skew: Skew, seconds: float) 
     assert endpoint is not None
     endpoint.max_concurrency = 1
     endpoint.save()
-    clock = call_limits.Queue(longest_s=0.0).clock
+    clock = client.Queue(longest_s=0.0).clock
     skew(seconds)
-    assert not isinstance(call_limits.admit(endpoint_pk=endpoint.pk, clock=clock), float)
+    assert not isinstance(client.admit(endpoint_pk=endpoint.pk, clock=clock), float)
     skew(-seconds)
-    assert call_limits.admit(endpoint_pk=endpoint.pk, clock=clock) == 0.0
+    assert client.admit(endpoint_pk=endpoint.pk, clock=clock) == 0.0
     assert CallLease.objects.get().started_at <= database_now()

@@ -7,7 +7,7 @@ from django.core.management import CommandError, call_command
 
 from augment.errors import Conflict, InvalidDocument
 from augment.models import Contestant, Endpoint, Event
-from augment.services.endpoints import contestants, keys
+from augment.services.endpoints import contestants, known_endpoints
 from augment.services.endpoints.known_endpoints import ensure_endpoint
 
 pytestmark = pytest.mark.django_db
@@ -73,7 +73,7 @@ def test_openai_can_be_named_where_its_key_is_set(monkeypatch: pytest.MonkeyPatc
     assert made.endpoint is not None
     assert made.endpoint.base_url == "https://api.openai.com/v1"
     assert made.endpoint.key_variable == "OPENAI_API_KEY"
-    assert keys.key_of(made.endpoint) == "sk-very-secret"
+    assert known_endpoints.key_of(made.endpoint) == "sk-very-secret"
     assert "sk-very-secret" not in str(list(Endpoint.objects.values()))
     assert "sk-very-secret" not in str(list(Event.objects.values()))
 

@@ -6,11 +6,11 @@ import pytest
 
 from augment.errors import Conflict
 from augment.models import Augmentation, Contestant, EndpointModel, GenerationJob
-from augment.prompts.texts import prompt_version
+from augment.prompts.fill import prompt_version
 from augment.services.endpoints import contestants
 from augment.services.endpoints.treatments import options_of
 from augment.services.running import runner
-from augment.services.running.feasible import find_obstacle
+from augment.services.running.choosing import find_obstacle
 from tests.jobs.scripted import Scripted, add, run
 from tests.llm.json_server import serving
 

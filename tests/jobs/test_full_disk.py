@@ -11,7 +11,7 @@ import pytest
 from django.conf import LazySettings
 
 from augment.models import Augmentation, ModelCall
-from augment.services.running import retrying
+from augment.services.running import jobs
 from augment.services.scenarios.pictures import original_picture
 from tests.jobs.models import llama_job
 from tests.jobs.running import Wire, ran
@@ -61,7 +61,7 @@ def test_a_full_disk_fails_the_row_and_a_retry_asks_nobody_again(disk: Path) -> 
     assert ModelCall.objects.count() == 1
 
     filler.unlink()
-    retrying.retry_failed(row.job)
+    jobs.retry_failed(row.job)
     ran(row, Wire())
     assert row.state == State.DONE
     assert (disk / row.image).read_bytes().endswith(b"IEND\xaeB`\x82")

@@ -5,9 +5,10 @@ from django.contrib.auth.models import User
 
 from augment.errors import Conflict, UnknownName
 from augment.models import Augmentation, Contestant, Event, GenerationJob
-from augment.services.running import jobs, retrying
+from augment.services.running import jobs
+from augment.services.running import jobs as retrying
+from augment.services.running.progress import count_rows
 from augment.services.running.runner import AUGMENTATIONS
-from augment.services.running.summary import count_rows
 from tests.jobs.rows import NOON, add_kind, add_scenario, done, failed, launch, leased
 
 pytestmark = pytest.mark.django_db

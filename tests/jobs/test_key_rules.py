@@ -12,10 +12,9 @@ from django.urls import reverse
 
 from augment.errors import Conflict, InvalidDocument
 from augment.models import Augmentation, Contestant, Endpoint, Event
-from augment.services.endpoints.keys import may_hold_key, move_of
-from augment.services.endpoints.known_endpoints import ensure_endpoint
+from augment.services.endpoints.known_endpoints import ensure_endpoint, may_hold_key, move_of
 from augment.services.running import jobs, runner
-from augment.services.running.feasible import find_obstacle, keys_missing
+from augment.services.running.choosing import find_obstacle, keys_missing
 from tests.jobs.models import add_llama, llama_job
 from tests.jobs.rows import add_scenario, only_row
 from tests.jobs.test_endpoint_rows import form, problems

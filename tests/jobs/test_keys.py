@@ -12,7 +12,7 @@ from django.urls import reverse
 
 from augment.models import Augmentation, Endpoint, ModelCall
 from augment.services.running import runner
-from augment.services.running.transcript_export import transcript_of
+from augment.services.running.transcript_records import transcript_of
 from tests.jobs.models import llama_job
 from tests.jobs.rows import only_row
 from tests.llm.recorder import recorder

@@ -6,7 +6,8 @@ import pytest
 from django.db import IntegrityError, transaction
 
 from augment.models import Attempt, Augmentation, GenerationJob
-from augment.services.running import jobs, retrying
+from augment.services.running import jobs
+from augment.services.running import jobs as retrying
 from augment.services.running.runner import AUGMENTATIONS
 from tests.jobs.rows import NOON, done, failed, launch, leased, only_row
 

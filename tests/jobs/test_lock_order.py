@@ -12,11 +12,12 @@ from django.utils import timezone
 
 from augment.errors import Conflict
 from augment.models import GenerationJob
-from augment.services.running import jobs, pausing, retrying, runner
-from augment.services.running.caps import Caps
-from augment.services.running.causes import failure_groups
+from augment.services.running import jobs, runner
+from augment.services.running import jobs as pausing
+from augment.services.running import jobs as retrying
+from augment.services.running.budget import Caps
+from augment.services.running.progress import count_rows, failure_groups
 from augment.services.running.runner import AUGMENTATIONS
-from augment.services.running.summary import count_rows
 from augment.services.work import change_all
 from tests.jobs.models import Model, llama_job
 from tests.jobs.rows import failed, launch, leased

@@ -12,11 +12,11 @@ from django.core.management import CommandError, call_command
 
 from augment.errors import InvalidDocument
 from augment.models import Contestant, ModelCall
-from augment.prompts.texts import prompt_version
+from augment.prompts.fill import prompt_version
 from augment.services.endpoints import contestants
 from augment.services.endpoints.known_endpoints import ensure_endpoint
 from augment.services.endpoints.treatments import options_of
-from augment.services.running.transcript_export import transcript_of
+from augment.services.running.transcript_records import transcript_of
 from augment.variants.options import NAMES, ContestantOptions, options_from_document
 from tests.jobs.scripted import SCRIPTS, Bodies, Scripted, add, run
 from tests.llm.json_server import serving

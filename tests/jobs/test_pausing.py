@@ -7,10 +7,11 @@ from datetime import timedelta
 import pytest
 
 from augment.models import Augmentation, Event, GenerationJob
-from augment.services.running import jobs, pausing, runner
-from augment.services.running.caps import Caps
+from augment.services.running import jobs, runner
+from augment.services.running import jobs as pausing
+from augment.services.running.budget import Caps
+from augment.services.running.progress import count_rows
 from augment.services.running.runner import AUGMENTATIONS
-from augment.services.running.summary import count_rows
 from tests.jobs.models import Model, after_a_second_look, llama_job
 from tests.jobs.rows import done, launch, leased, only_row
 

@@ -8,8 +8,9 @@ from django.test.utils import CaptureQueriesContext
 
 from arena.services.retrying import retry_cause as retry_unless_shown
 from augment.models import Augmentation, GenerationJob, ModelCall
-from augment.services.running import jobs, retrying, runner
-from augment.services.running.causes import cause_of, failure_groups
+from augment.services.running import jobs, runner
+from augment.services.running import jobs as retrying
+from augment.services.running.progress import cause_of, failure_groups
 from tests.jobs.models import Model, llama_job, reply
 from tests.jobs.rows import failed, launch, leased, only_row
 from tests.variants.answers import GOOD

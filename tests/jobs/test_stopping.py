@@ -14,8 +14,8 @@ from augment.errors import WorkerStopping
 from augment.llm.client import Sending, watch_nothing
 from augment.llm.messages import Reply, Request
 from augment.models import Augmentation, Endpoint, GenerationJob, ModelCall
-from augment.services.endpoints.call_limits import Queue, place_at
-from augment.services.running import runner, stopping
+from augment.services.endpoints.client import Queue, place_at
+from augment.services.running import runner, workers
 from tests.jobs.models import llama_job
 from tests.jobs.rows import launch, only_row
 from tests.jobs.running import Wire
@@ -28,9 +28,9 @@ State = Augmentation.State
 
 @pytest.fixture(autouse=True)
 def _going_on() -> Iterator[None]:
-    stopping.withdraw_stop()
+    workers.withdraw_stop()
     yield
-    stopping.withdraw_stop()
+    workers.withdraw_stop()
 
 
 class StoppedAt:
@@ -48,9 +48,9 @@ class StoppedAt:
 
     def complete(self, request: Request, *, sending: Sending = watch_nothing) -> Reply:
         if self._before:
-            stopping.request_stop()
+            workers.request_stop()
         reply = self._client.complete(request, sending=sending)
-        stopping.request_stop()
+        workers.request_stop()
         return reply
 
 
@@ -62,7 +62,7 @@ def only(job: GenerationJob) -> tuple[Augmentation, list[ModelCall]]:
 
 def test_no_row_is_claimed_any_more_and_its_message_goes_back() -> None:
     row = only_row(launch())
-    stopping.request_stop()
+    workers.request_stop()
     with pytest.raises(Reject) as caught:
         tasks.work.run("augmentation", row.pk)
     assert caught.value.requeue
@@ -97,7 +97,7 @@ def test_an_answer_before_the_stop_is_not_asked_for_again() -> None:
     row, calls = only(job)
     assert row.state == State.QUEUED
     assert len(calls) == 1
-    stopping.withdraw_stop()
+    workers.withdraw_stop()
     assert runner.work_on(augmentation_pk=row.pk, connect=Wire(GOOD))
     row, calls = only(job)
     assert row.state == State.DONE
@@ -115,9 +115,9 @@ def test_who_waits_for_a_place_gives_up_the_wait() -> None:
 
     def sleep(seconds: float) -> None:
         looks.append(seconds)
-        stopping.request_stop()
+        workers.request_stop()
 
-    queue = Queue(longest_s=600.0, still_wanted=stopping.insist_on_going_on, sleep=sleep)
+    queue = Queue(longest_s=600.0, still_wanted=workers.insist_on_going_on, sleep=sleep)
     with (
         place_at(endpoint, Queue(longest_s=settings.LLM_QUEUE_S)),
         pytest.raises(WorkerStopping),

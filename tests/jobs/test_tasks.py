@@ -13,8 +13,8 @@ from augment.broker import check_broker
 from augment.errors import QueueUnreachable
 from augment.management.commands.generate import Command
 from augment.models import Augmentation, GenerationJob
+from augment.services.running.progress import count_rows
 from augment.services.running.runner import AUGMENTATIONS
-from augment.services.running.summary import count_rows
 from tests.brokers import Broker
 from tests.jobs.rows import add_scenario, done, launch, leased, only_row
 

@@ -9,7 +9,7 @@ import pytest
 from django.core.management import call_command
 
 from augment.models import Attempt, Augmentation, TranscriptNote
-from augment.services.running.tool_calls import tool_calls_by_contestant
+from augment.services.running.progress import tool_calls_by_contestant
 from tests.jobs.rows import NOON, launch
 from tests.web.cast import people, signed_in
 

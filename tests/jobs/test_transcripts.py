@@ -8,13 +8,12 @@ from typing import Any
 import pytest
 from django.urls import reverse
 
-from augment.llm.fingerprint import request_hash
+from augment.llm.messages import request_hash
 from augment.models import Augmentation, Endpoint, ModelCall, TranscriptNote
-from augment.services.running import caps, pausing, runner
-from augment.services.running.caps import Caps
-from augment.services.running.transcript_export import transcript_of
-from augment.services.running.transcript_steps import totals_of, tries_of
-from augment.variants.transcript import NoteKind
+from augment.services.running import budget, jobs, runner
+from augment.services.running.budget import Caps
+from augment.services.running.transcript_records import totals_of, transcript_of, tries_of
+from augment.variants.respondents import NoteKind
 from tests.jobs.models import Model, after_a_second_look, llama_job, reply
 from tests.jobs.rows import INSTRUCTION, only_row
 from tests.llm.raw_server import speaking, whole
@@ -84,15 +83,15 @@ def test_a_call_from_the_store_names_its_source() -> None:
     job = llama_job(price="1", caps=Caps(calls=1))
     model = Model(after_a_second_look)
     row = ran(only_row(job), model)
-    caps.raise_cap(job, caps=Caps(calls=2))
-    pausing.resume(job)
+    budget.raise_cap(job, caps=Caps(calls=2))
+    jobs.resume(job)
     document = transcript_of(ran(row, model))
     paid = document["attempts"][0]["steps"][0]
     copied, last = document["attempts"][1]["steps"]
     assert (copied["served_from"], copied["cost_usd"]) == (paid["code"], "0")
     assert (paid["served_from"], last["served_from"]) == (None, None)
     totals = totals_of(tries_of(row))
-    assert (totals.calls, totals.cached, totals.spent_tokens) == (2, 1, 6040)
+    assert (totals.calls, totals.calls_from_store, totals.spent_tokens) == (2, 1, 6040)
 
 
 def test_the_order_in_which_a_database_keeps_keys_does_not_show() -> None:

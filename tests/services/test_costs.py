@@ -6,11 +6,11 @@ from collections.abc import Iterator
 
 import pytest
 
-from arena.queries.costs import spent_on
+from arena.jobs.queries import spent_on
 from augment.errors import ModelFault
 from augment.llm.messages import Reply, Request
 from augment.models import Augmentation, Contestant, GenerationJob
-from augment.services.endpoints.spending import Spending
+from augment.services.endpoints.known_models import Spending
 from augment.services.running import jobs, runner
 from tests.jobs.models import Model, llama_job, reply
 from tests.jobs.rows import only_row

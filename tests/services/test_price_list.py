@@ -5,7 +5,7 @@ from decimal import Decimal
 
 import pytest
 
-from augment.services.endpoints.price_list import listed_price
+from augment.services.endpoints.known_models import listed_price
 
 NOW = datetime(2026, 11, 20, tzinfo=UTC)
 OPENAI = "https://api.openai.com/v1"

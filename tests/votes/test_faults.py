@@ -11,12 +11,12 @@ from django.core.management import call_command
 from django.db import IntegrityError, transaction
 
 from arena.errors import LabellingClosed, NotYours
-from arena.exports.jobs.faults import csv_bytes, fault_table, latex
+from arena.jobs.exports.faults import csv_bytes, fault_table, latex
+from arena.jobs.queries import labelling_of, next_task
+from arena.jobs.services import close_labelling, open_labelling, save_label
 from arena.models import FaultLabel, LabellingRound, LabelTask
-from arena.queries.faults import labelling_of, next_task
-from arena.services.faults import close_labelling, open_labelling, save_label
 from augment.models import Event, GenerationJob
-from augment.services.judging.fault_guess import FaultClass
+from augment.services.judging.findings import FaultClass
 from tests.exports.test_displacement import a_job
 from tests.study_rows import expert
 
@@ -134,7 +134,7 @@ def test_the_files_have_the_papers_columns(job: GenerationJob, eva: User) -> Non
         ("ann", "1"),
         ("sim (simulated)", "2"),
     ]
-    text = latex(table)
+    text = latex(table).decode()
     assert r"    ann & 1 & 1 & 0 & 0 & 0 & 1\\" in text
     # Two unreadable answers and nothing to label: two misses, of two.
     assert r"    sim (simulated) & 2 & -- & -- & -- & 2 & 2\\" in text

@@ -10,7 +10,7 @@ from django.urls import reverse
 from arena.templatetags.money import usd
 from augment.models import GenerationJob
 from augment.services.running import runner
-from augment.services.running.caps import Caps
+from augment.services.running.budget import Caps
 from tests.jobs.models import Model, add_llama, llama_job
 from tests.jobs.rows import add_scenario, only_row
 from tests.web.cast import people, signed_in

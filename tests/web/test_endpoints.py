@@ -12,7 +12,7 @@ from django.urls import reverse
 from augment.fake_llm.server import FakeServer, running
 from augment.llm.questions import Ability
 from augment.models import Endpoint, EndpointModel, Event, Probe
-from augment.services.endpoints import editing, probing
+from augment.services.endpoints import known_endpoints, probing
 from augment.services.work import Lease
 from tests.web.cast import people, signed_in
 
@@ -34,10 +34,10 @@ def admin() -> Client:
 
 @pytest.fixture
 def model() -> EndpointModel:
-    site = editing.add_endpoint(
-        label="here", facts=editing.EndpointFacts(base_url="http://127.0.0.1:9/v1")
+    site = known_endpoints.add_endpoint(
+        label="here", facts=known_endpoints.EndpointFacts(base_url="http://127.0.0.1:9/v1")
     )
-    return editing.add_model(site, model="m")
+    return known_endpoints.add_model(site, model="m")
 
 
 def post(admin: Client, name: str, given: dict[str, str], **where: object) -> str:

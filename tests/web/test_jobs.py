@@ -9,7 +9,7 @@ from django.test import Client
 from django.urls import reverse
 
 from augment.models import Augmentation, GenerationJob, Worker
-from augment.services.running.causes import failure_groups
+from augment.services.running.progress import failure_groups
 from augment.services.running.workers import Presence
 from tests.jobs import rows
 from tests.web.cast import people, signed_in, world

@@ -11,9 +11,8 @@ from django.core.files.storage import default_storage
 from django.urls import reverse
 
 from augment.models import Augmentation
-from augment.scene.intent_codec import intent_to_document
-from augment.services.judging.findings import check_augmentation
-from augment.services.judging.marked_pictures import draw_marked
+from augment.scene.codec import intent_to_document
+from augment.services.judging.findings import check_augmentation, draw_marked
 from tests.intents import parked
 from tests.jobs import rows
 from tests.web.cast import people, signed_in

@@ -6,7 +6,7 @@ import pytest
 
 from arena.templatetags.marks import job_mark, percent, segments
 from augment.models import Augmentation, GenerationJob
-from augment.services.running.summary import JobCounts
+from augment.services.running.progress import JobCounts
 
 State = Augmentation.State
 

@@ -12,7 +12,7 @@ from django.urls import reverse
 
 from augment.models import Contestant, Endpoint, EndpointModel, GenerationJob
 from augment.services.running import jobs
-from augment.services.running.caps import Caps
+from augment.services.running.budget import Caps
 from tests.jobs import rows
 from tests.web.cast import people, signed_in
 

@@ -7,14 +7,14 @@ from django.utils.translation import override
 
 from arena.errors import InvalidPreference
 from arena.models import Snapshot
+from arena.people.links import invite
+from arena.people.services import keep_voting
 from arena.queries.votes.sets import Filters
-from arena.services.handing_over import hand_over
-from arena.services.invitations import invite
-from arena.services.preferences import keep_voting
 from arena.services.ratings import RATINGS, plan_snapshot
+from arena.studies.services.taking_part import hand_over
 from augment.models import Event
-from augment.services.running import caps, jobs
-from augment.services.running.caps import Caps
+from augment.services.running import budget, jobs
+from augment.services.running.budget import Caps
 from tests import study_rows
 from tests.jobs import rows
 
@@ -42,7 +42,7 @@ def test_nothing_that_is_stored_is_german() -> None:
             scenarios=["street-1"],
             caps=Caps(calls=5, tokens=900),
         )
-        caps.raise_cap(capped, caps=Caps(calls=50))
+        budget.raise_cap(capped, caps=Caps(calls=50))
         rows.leased(rows.only_row(job)).settle(rows.failed(), now=rows.NOON)
         invite(study=study, expert=study.experts.get(username="eva"))
         hand_over(study=study, username="eva", to=["finn"])

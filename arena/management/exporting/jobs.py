@@ -6,18 +6,12 @@ from pathlib import Path
 from typing import Any
 
 from arena.exports.formats import format_named
-from arena.exports.jobs import analyses, displacement_writers, driving_writers, faults, tool_calls
-from arena.exports.jobs.augmentations import (
-    AUGMENTATION_FORMATS,
-    REPEAT_FORMATS,
-    augmentation_rows,
-    repeat_rows,
-)
-from arena.exports.jobs.displacement_objects import BY_OBJECT, OBJECT_FORMATS, object_rows
-from arena.exports.jobs.displacement_table import displacement_table
-from arena.exports.jobs.driving_table import DrivingTable
-from arena.exports.jobs.transcripts import TRANSCRIPT_FORMATS
 from arena.exports.samples import SHEET_FORMATS, sheet_bytes, sheet_of
+from arena.jobs.exports import displacement_files, driving
+from arena.jobs.exports.displacement import displacement_table
+from arena.jobs.exports.registry import PLAIN_TABLES, TRANSCRIPTS
+from arena.jobs.exports.tables import ANALYSES, TABLE_FORMATS, analysis_sheet, object_sheet
+from arena.jobs.queries import grid
 from arena.management.exporting.kinds import (
     Chosen,
     ExportedFile,
@@ -27,40 +21,25 @@ from arena.management.exporting.kinds import (
     add_table,
     fill,
 )
-from arena.queries.jobs import grid
 from augment.errors import Conflict, UnknownName
 from augment.services.judging.analyses import analyse_job
 from augment.services.judging.displacement import By, types_named
-from augment.services.judging.driving_scores import options_driven, scores_of_job
+from augment.services.judging.driving_scores import options_driven
 from augment.services.judging.simulations import SCORES, Options
 from augment.services.running.choosing import find_job
-from augment.services.running.tool_calls import tool_calls_by_augmentation
+
+BY_OBJECT = "object"
 
 
 def add_jobs(kinds: Any) -> None:
     """What can be written of a job, but for its scenarios."""
     _add_displacement(kinds)
     _add_samples(kinds)
-    add_table(
-        *(kinds, "faults", faults.FORMATS, faults.fault_table),
-        help="how often experts saw which fault",
-    )
     _add_driving(kinds)
+    for name, table in PLAIN_TABLES.items():
+        add_table(kinds, name, table.formats, table.make, help=table.help)
     add_table(
-        *(kinds, "tool-calls", tool_calls.FORMATS, tool_calls_by_augmentation),
-        help="calls of the function: tried, understood, mended",
-    )
-    add_table(
-        *(kinds, "augmentations", AUGMENTATION_FORMATS, augmentation_rows),
-        help="one row for each augmentation of a job",
-    )
-    add_table(
-        *(kinds, "repeats", REPEAT_FORMATS, repeat_rows),
-        help="what varies between the samples of a job",
-    )
-    add_table(
-        *(kinds, "transcripts", TRANSCRIPT_FORMATS, lambda job: job),
-        help="every transcript of a job: a line of JSON each, or with their images as a zip",
+        *(kinds, "transcripts", TRANSCRIPTS.formats, TRANSCRIPTS.make), help=TRANSCRIPTS.help
     ).set_defaults(format="jsonl")
     _add_analyses(kinds)
 
@@ -73,23 +52,23 @@ def _add_displacement(kinds: Any) -> None:
         "--by",
         default="type",
         help=f"one of {', '.join(By)}; or {BY_OBJECT}, for one row an object "
-        f"({', '.join(OBJECT_FORMATS)})",
+        f"({', '.join(TABLE_FORMATS)})",
     )
     kind.add_argument(
         "--types",
         nargs="+",
         help="scenario types, or all; by variant only those with definite places unless given",
     )
-    add_format(kind, displacement_writers.FORMATS)
+    add_format(kind, displacement_files.FORMATS)
 
 
 def write_displacement(options: Chosen, say: Say) -> ExportedFile:
     """How far from the references: in groups, or one row an object."""
     types = None if options["types"] is None else types_named(options["types"])
     if options["by"] == BY_OBJECT:
-        of_objects = format_named(OBJECT_FORMATS, options["format"])
-        return fill(of_objects, object_rows(find_job(options["job"]), types=types))
-    chosen = format_named(displacement_writers.FORMATS, options["format"])
+        of_objects = format_named(TABLE_FORMATS, options["format"])
+        return fill(of_objects, object_sheet(find_job(options["job"]), types=types))
+    chosen = format_named(displacement_files.FORMATS, options["format"])
     if options["by"] not in set(By):
         raise UnknownName("grouping", options["by"], [*By, BY_OBJECT])
     table = displacement_table(find_job(options["job"]), by=By(options["by"]), types=types)
@@ -136,12 +115,12 @@ def _add_driving(kinds: Any) -> None:
     kind.add_argument(
         "--with-paper", action="store_true", help="add the paper's rows below a rule"
     )
-    add_format(kind, driving_writers.FORMATS)
+    add_format(kind, driving.FORMATS)
 
 
 def write_driving(options: Chosen, say: Say) -> ExportedFile:
     """Mean scores of the drives that were made just so."""
-    chosen = format_named(driving_writers.FORMATS, options["format"])
+    chosen = format_named(driving.FORMATS, options["format"])
     job = find_job(options["job"])
     if options["score"] not in SCORES:
         raise UnknownName("score", options["score"], list(SCORES))
@@ -150,8 +129,9 @@ def write_driving(options: Chosen, say: Say) -> ExportedFile:
     )
     if how not in options_driven(job):
         raise Conflict(f"Job {job.name!r} was not driven so; manage.py simulate does it.")
-    scores = scores_of_job(job, options=how, score=options["score"])
-    table = DrivingTable(title=job.name, scores=scores, with_paper=options["with_paper"])
+    table = driving.driving_table(
+        job, options=how, score=options["score"], with_paper=options["with_paper"]
+    )
     return fill(chosen, table)
 
 
@@ -161,14 +141,14 @@ def _add_analyses(kinds: Any) -> None:
         of="job",
         help="pairs of contestants, wordings, refusals",
     )
-    kind.add_argument("--part", required=True, help=f"one of {', '.join(analyses.PARTS)}")
-    add_format(kind, analyses.ANALYSIS_FORMATS)
+    kind.add_argument("--part", required=True, help=f"one of {', '.join(ANALYSES)}")
+    add_format(kind, TABLE_FORMATS)
 
 
 def write_analyses(options: Chosen, say: Say) -> ExportedFile:
     """One part of what can be said of a job."""
-    chosen = format_named(analyses.ANALYSIS_FORMATS, options["format"])
-    if options["part"] not in analyses.PARTS:
-        raise UnknownName("part", options["part"], list(analyses.PARTS))
+    chosen = format_named(TABLE_FORMATS, options["format"])
+    if options["part"] not in ANALYSES:
+        raise UnknownName("part", options["part"], list(ANALYSES))
     found = analyse_job(find_job(options["job"]))
-    return fill(chosen, analyses.analysis_table(found, options["part"]))
+    return fill(chosen, analysis_sheet(found, options["part"]))

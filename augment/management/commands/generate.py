@@ -12,18 +12,21 @@ from django.db import transaction
 from django.utils import timezone
 
 from augment.broker import check_broker
-from augment.errors import AugmentError
 from augment.formats.documents import read_yaml_file
 from augment.management.arguments import add_cap_arguments, caps_of
 from augment.models import Augmentation, GenerationJob
 from augment.services.endpoints.contestants import ensure_builtin
 from augment.services.running import jobs
 from augment.services.running.budget import limit_of
-from augment.services.running.causes import failure_groups
 from augment.services.running.choosing import resolve_contestants, resolve_scenarios
 from augment.services.running.estimates import estimate
 from augment.services.running.matrix import WHAT, Matrix, load_matrix
-from augment.services.running.summary import JobCounts, contestant_lines, count_rows
+from augment.services.running.progress import (
+    JobCounts,
+    contestant_lines,
+    count_rows,
+    failure_groups,
+)
 from augment.services.terminal import TerminalCommand
 from augment.tasks import enqueue_job
 
@@ -80,16 +83,13 @@ class Command(TerminalCommand):
     def handle(self, *args: Any, **options: Any) -> None:
         """Launch the job, then wait if asked to."""
         _refuse_both(options)
-        try:
-            if options["estimate"]:
-                with transaction.atomic():
-                    self._estimate(options)
-                    transaction.set_rollback(True)
-                return
-            check_broker()
-            job = self._launch(options)
-        except AugmentError as error:
-            raise CommandError(str(error)) from error
+        if options["estimate"]:
+            with transaction.atomic():
+                self._estimate(options)
+                transaction.set_rollback(True)
+            return
+        check_broker()
+        job = self._launch(options)
         total = count_rows(job).total
         self.stdout.write(f"Job {job.code}, {job.name!r}: {total} to run.")
         if options["wait"]:

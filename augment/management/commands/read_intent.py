@@ -8,11 +8,10 @@ from typing import Any
 
 from django.core.management.base import CommandError
 
-from augment.errors import AugmentError
 from augment.formats.documents import read_json
 from augment.management.arguments import add_cap_arguments, caps_of
 from augment.models import IntentReading
-from augment.scene.intent_codec import intent_from_document
+from augment.scene.codec import intent_from_document
 from augment.scene.intent_statements import list_statements
 from augment.services.running.intent_readings import USUAL_CAPS, read_intent
 from augment.services.scenarios.editing import accept_reading, enter_intent
@@ -50,18 +49,13 @@ class Command(TerminalCommand):
         if asks and (options["endpoint"] is None or options["model"] is None):
             raise CommandError("--endpoint and --model go together.")
         slug = options["scenario"]
-        try:
-            if asks:
-                self._read(slug, options)
-                return
-            if options["accept"]:
-                row = accept_reading(scenario=slug)
-            else:
-                row = enter_intent(
-                    scenario=slug, document=read_json(options["enter"], what="intent")
-                )
-        except AugmentError as fault:
-            raise CommandError(str(fault)) from fault
+        if asks:
+            self._read(slug, options)
+            return
+        if options["accept"]:
+            row = accept_reading(scenario=slug)
+        else:
+            row = enter_intent(scenario=slug, document=read_json(options["enter"], what="intent"))
         self._print(row.intent)
         self.stdout.write(f"This is the intent of {slug} now ({row.intent_origin}).")
 

@@ -9,7 +9,7 @@ from django.core.management.base import CommandError
 
 from augment.errors import UnknownName
 from augment.models import Contestant
-from augment.services.retirement import retire, take_back
+from augment.services.events import retire, take_back
 from augment.services.terminal import TerminalCommand
 
 

@@ -11,7 +11,7 @@ from typing import Any
 from django.core.management.base import CommandError
 
 from augment.models import Augmentation
-from augment.services.running.transcript_export import transcript_of
+from augment.services.running.transcript_records import transcript_of
 from augment.services.terminal import TerminalCommand
 
 

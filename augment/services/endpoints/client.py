@@ -3,19 +3,167 @@
 from __future__ import annotations
 
 import logging
-from contextlib import AbstractContextManager
+import random
+import time
+import uuid
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
+from dataclasses import dataclass, field
+from datetime import datetime, timedelta
 
-from augment.errors import ParameterRefused
-from augment.llm.client import Sending, watch_nothing
+from django.conf import settings
+from django.db import Error, OperationalError, connection, transaction
+from django.db.models import Q
+
+from augment.errors import EndpointBusy, ParameterRefused
+from augment.llm.client import ModelProfile, Sending, watch_nothing
 from augment.llm.messages import Reply, Request
-from augment.llm.openai_wire import OpenAIWire
-from augment.llm.profile import ModelProfile
-from augment.models import Endpoint
-from augment.services.endpoints.call_limits import Queue, place_at
+from augment.llm.openai_wire import MEGABYTE, OpenAIWire
+from augment.models import CallLease, Endpoint
+from augment.services.clock import database_now, repeating
+from augment.services.endpoints.known_endpoints import key_of
 from augment.services.endpoints.known_models import profile_of, remember_refusal
 from augment.services.endpoints.treatments import Treatment
 
 logger = logging.getLogger(__name__)
+
+LEASE = timedelta(seconds=60)
+RENEW_EVERY_S = 15.0
+MINUTE = timedelta(seconds=61)
+"""A second more than a minute, because a call is sent a little after it was admitted."""
+
+_CLEAR_EVERY = 64
+_FIRST_WAIT_S, _LONGEST_WAIT_S = 0.05, 2.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Queue:
+    """How a call waits for its place.
+
+    Attributes:
+        longest_s: Who has waited that long gives up.
+        still_wanted: Asked at every look; raises where nobody needs the call any more.
+        clock: What time it is, the same for every worker.
+        sleep: Waits for that many seconds.
+        rng: Where the jitter comes from, so that those who wait do not look in step.
+        minute: Within which starts are counted.
+        renew_every_s: How often the lease of a long call is renewed.
+    """
+
+    longest_s: float
+    still_wanted: Callable[[], None] = lambda: None
+    clock: Callable[[], datetime] = database_now
+    sleep: Callable[[float], None] = time.sleep
+    rng: random.Random = field(default_factory=random.Random)
+    minute: timedelta = MINUTE
+    renew_every_s: float = RENEW_EVERY_S
+
+
+@contextmanager
+def place_at(endpoint: Endpoint, queue: Queue) -> Iterator[None]:
+    """Hold one of the endpoint's places while the block runs, after waiting for it.
+
+    Raises:
+        EndpointBusy: None was free for as long as the queue allows.
+    """
+    token = _wait_for(endpoint, queue)
+    renewing = repeating(
+        lambda: _renewed(token, queue.clock), every_s=queue.renew_every_s, name="call lease"
+    )
+    try:
+        with renewing:
+            yield
+    finally:
+        _give_back(token, queue.clock)
+
+
+@transaction.atomic
+def admit(
+    *, endpoint_pk: int, clock: Callable[[], datetime], minute: timedelta = MINUTE
+) -> uuid.UUID | float:
+    """Take a place, or say in how many seconds to look again (0: when a call ends).
+
+    The clock is read after the lock is held: the wait for it may have been long.
+    """
+    endpoint = Endpoint.objects.select_for_update(no_key=True).get(pk=endpoint_pk)
+    now = clock()
+    wait_s = _wait_s(endpoint, now, minute)
+    if wait_s is not None:
+        return wait_s
+    lease = CallLease.objects.create(endpoint=endpoint, started_at=now, expires_at=now + LEASE)
+    if lease.pk % _CLEAR_EVERY == 0:
+        clear_old(endpoint_pk=endpoint_pk, now=now, minute=minute)
+    return lease.token
+
+
+def clear_old(*, endpoint_pk: int, now: datetime, minute: timedelta = MINUTE) -> None:
+    """Delete the leases that count for nothing any more."""
+    old = CallLease.objects.filter(endpoint=endpoint_pk, started_at__lt=now - 2 * minute)
+    old.filter(Q(finished_at__isnull=False) | Q(expires_at__lt=now)).delete()
+
+
+# --- Private -----------------------------------------------------------------------------------
+
+
+def _wait_s(endpoint: Endpoint, now: datetime, minute: timedelta) -> float | None:
+    """None where there is room for a call now, else when to look again."""
+    leases = CallLease.objects.filter(endpoint=endpoint)
+    if leases.filter(finished_at=None, expires_at__gt=now).count() >= endpoint.max_concurrency:
+        return 0.0
+    limit = endpoint.requests_per_minute
+    if limit is None:
+        return None
+    recent = leases.filter(started_at__gt=now - minute).order_by("-started_at")
+    # With as many starts in the last minute as are allowed, the oldest of them has to age.
+    oldest = recent.values_list("started_at", flat=True)[limit - 1 : limit].first()
+    return None if oldest is None else (oldest + minute - now).total_seconds()
+
+
+def _wait_for(endpoint: Endpoint, queue: Queue) -> uuid.UUID:
+    """The token of a place, after waiting for it."""
+    give_up_at = time.monotonic() + queue.longest_s
+    backoff_s = _FIRST_WAIT_S
+    wait_s = admit(endpoint_pk=endpoint.pk, clock=queue.clock, minute=queue.minute)
+    while not isinstance(wait_s, uuid.UUID):
+        queue.still_wanted()
+        if time.monotonic() > give_up_at:
+            raise EndpointBusy(endpoint.label, queue.longest_s)
+        backoff_s = min(2.0 * backoff_s, _LONGEST_WAIT_S)
+        shortest_s = min(max(wait_s, 0.5 * backoff_s), _LONGEST_WAIT_S)
+        queue.sleep(shortest_s + 0.5 * backoff_s * queue.rng.random())
+        wait_s = _look(endpoint, queue)
+    return wait_s
+
+
+def _look(endpoint: Endpoint, queue: Queue) -> uuid.UUID | float:
+    """Look without a lock first: who waits must not keep those who work from writing."""
+    limits = Endpoint.objects.filter(pk=endpoint.pk).first()
+    if limits is not None:
+        wait_s = _wait_s(limits, queue.clock(), queue.minute)
+        if wait_s is not None:
+            return wait_s
+    return admit(endpoint_pk=endpoint.pk, clock=queue.clock, minute=queue.minute)
+
+
+def _give_back(token: uuid.UUID, clock: Callable[[], datetime]) -> None:
+    """Free the place; where the database can't take it now it runs out, and no answer is lost."""
+    try:
+        CallLease.objects.filter(token=token).update(finished_at=clock())
+    except OperationalError as error:
+        logger.warning("A call's place was not given back and runs out by itself: %s", error)
+        if not connection.in_atomic_block:
+            connection.close_if_unusable_or_obsolete()
+
+
+def _renewed(token: uuid.UUID, clock: Callable[[], datetime]) -> bool:
+    """One renewal; a database that can't take it now gets the next one."""
+    try:
+        lease = CallLease.objects.filter(token=token, finished_at=None)
+        return bool(lease.update(expires_at=clock() + LEASE))
+    except Error as error:
+        logger.warning("A call's lease was not renewed: %s", error)
+        connection.close()
+        return True
 
 
 class EndpointClient(AbstractContextManager["EndpointClient"]):
@@ -91,3 +239,21 @@ class EndpointClient(AbstractContextManager["EndpointClient"]):
         if self._treatment is not None:
             known = self._treatment.without(refused, endpoint=self._endpoint, model=model)
         self._profiles[model] = known
+
+
+def wire_to(endpoint: Endpoint, *, still_wanted: Callable[[], None] = watch_nothing) -> OpenAIWire:
+    """A wire; its calls are given up where `still_wanted` raises.
+
+    Raises:
+        KeyNotAllowed: The variable that the endpoint names is not meant for keys.
+        KeyMissing: It is not set here.
+        ModelFault: The key can't be sent, or the address is forbidden.
+    """
+    return OpenAIWire(
+        base_url=endpoint.base_url,
+        api_key=key_of(endpoint),
+        timeout_s=settings.LLM_TIMEOUT_S,
+        most_bytes=settings.LLM_ANSWER_MB * MEGABYTE,
+        still_wanted=still_wanted,
+        proxy_url=settings.LLM_PROXY,
+    )

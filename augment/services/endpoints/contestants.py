@@ -3,27 +3,39 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 from django.contrib.auth.models import User
 from django.db import transaction
 
 from augment.baselines.registry import PLACERS
 from augment.errors import Conflict, UnknownName
-from augment.models import Contestant, Endpoint
-from augment.services.endpoints.known_endpoints import find_endpoint
+from augment.models import Contestant, Endpoint, Scenario
+from augment.services.endpoints.known_endpoints import ensure_endpoint, find_endpoint
 from augment.services.endpoints.known_models import model_at
-from augment.services.endpoints.respondents import Respondent, check_roles, documents_of
+from augment.services.endpoints.treatments import (
+    Respondent,
+    check_roles,
+    documents_of,
+    options_of,
+    other_prompts,
+    respondents_of,
+)
 from augment.services.events import log_event
+from augment.services.scenarios.prompts import Preview, preview_prompt
 from augment.services.scenarios.scenes import check_slug
 from augment.services.texts import one_line
 from augment.variants.options import (
+    EFFORTS,
+    NAMES,
     ContestantOptions,
+    ToolProtocol,
     check_options,
     names_for,
     options_from_document,
 )
-from augment.variants.recipes import Recipe, find_recipe, spell_variant
-from augment.variants.transcript import ModelRole
+from augment.variants.recipes import RECIPES, Recipe, Tools, find_recipe, spell_variant
+from augment.variants.respondents import ModelRole
 
 Kind = Contestant.Kind
 LONGEST_NAME = 120
@@ -238,3 +250,111 @@ def _refuse_another(contestant: Contestant, wanted: dict[str, object], *, named:
             f"There is another contestant called {contestant.slug!r} already: "
             f"{contestant.name} ({contestant.kind}); choose another slug."
         )
+
+
+VARIANTS = tuple(RECIPES)
+PROTOCOLS = tuple(protocol.value for protocol in ToolProtocol)
+REASONING_EFFORTS = tuple(EFFORTS)
+OPTION_NAMES = tuple(NAMES)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class EnteredEndpoint:
+    """Where its model is: a label alone for an endpoint that is there already."""
+
+    label: str
+    base_url: str = ""
+    key_variable: str = ""
+    is_simulated: bool = False
+
+
+@transaction.atomic
+def enter_contestant(
+    *,
+    slug: str,
+    name: str,
+    variant: str,
+    model: str,
+    endpoint: EnteredEndpoint,
+    options: Mapping[str, object],
+    actor: User,
+) -> Contestant:
+    """Endpoint and contestant, or neither of them.
+
+    Args:
+        slug: Lower-case letters, digits and hyphens.
+        name: What people read; empty to have it made from model and variant.
+        variant: The name of a recipe.
+        model: The model id on the endpoint.
+        endpoint: Made where an address is given; one that is there is never moved.
+        options: By name; what is missing stays open.
+        actor: Who enters it.
+
+    Raises:
+        AugmentError: Something can't be used; the sentence says what and what is allowed.
+        Conflict: There is an endpoint of that label already, and an address was given.
+    """
+    chosen = options_from_document(options)
+    if endpoint.base_url:
+        _refuse_known(endpoint.label)
+        ensure_endpoint(
+            label=endpoint.label,
+            base_url=endpoint.base_url,
+            key_variable=endpoint.key_variable,
+            is_simulated=endpoint.is_simulated,
+            actor=actor,
+        )
+    return add_contestant(
+        slug=slug,
+        variant=variant,
+        endpoint=endpoint.label,
+        model=model,
+        name=name or None,
+        options=chosen,
+        actor=actor,
+    )
+
+
+# --- Private -----------------------------------------------------------------------------------
+
+
+def _refuse_known(label: str) -> None:
+    """Raise Conflict where an endpoint is called so: others ask it at the address it has."""
+    if Endpoint.objects.filter(label=label).exists():
+        raise Conflict(
+            f"There is an endpoint “{label}” already. Choose it from the list, or give the "
+            "new one another label."
+        )
+
+
+def asking_contestants() -> list[Contestant]:
+    """Those that ask a model, by name; who is retired comes last."""
+    rows = Contestant.objects.exclude(endpoint=None).select_related("endpoint")
+    return sorted(rows, key=lambda row: (row.retired_at is not None, row.name, row.pk))
+
+
+def preview_contestant(scenario: Scenario, contestant: Contestant, *, role: str) -> Preview:
+    """The first messages to a role, as the contestant's options have them.
+
+    Options are those of its first run; of one that has not run yet, those that it would run with
+    now.
+
+    Raises:
+        Conflict: It asks no model, nobody plays that role, an endpoint of it is gone, or it asks
+            with prompts that are not installed any more.
+        UnknownName: Its variant is none of ours any more, or there is no such role.
+    """
+    if not respondents_of(contestant):
+        raise Conflict(f"{contestant.slug} asks no model.")
+    options = options_of(contestant)
+    if (unlike := other_prompts(contestant.slug, options)) is not None:
+        raise Conflict(unlike)
+    calls = find_recipe(contestant.variant).tools is not Tools.NONE
+    is_native = options.protocol is ToolProtocol.NATIVE
+    return preview_prompt(
+        scenario,
+        variant=contestant.variant,
+        role=role,
+        native_tools=calls and is_native and role == ModelRole.MODIFIER,
+        options=options,
+    )

@@ -2,17 +2,260 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, field, replace
+from datetime import datetime
+from decimal import Decimal
+from typing import Any
 
+from django.conf import settings
 from django.contrib.auth.models import User
 from django.db import IntegrityError, transaction
+from django.utils import timezone
 
-from augment.errors import Conflict
-from augment.llm.questions import Ability
-from augment.models import EndpointModel, Probe
-from augment.services.endpoints.probe import ProbeFinding, probe
+from augment.errors import Conflict, ModelFault, ParameterRefused
+from augment.llm.client import ChatClient, ModelProfile, Patience
+from augment.llm.costs import Price, cut_of, usd_of
+from augment.llm.messages import LengthName, Reply, Request, shorten
+from augment.llm.questions import Ability, ProbeQuestion, questions_for
+from augment.models import Endpoint, EndpointModel, Probe
+from augment.services.endpoints.client import Queue, place_at, wire_to
+from augment.services.endpoints.known_models import model_at, price_of
+from augment.services.events import log_event
 from augment.services.texts import make_document_storable
 from augment.services.work import Lease, Settlement, WorkKind
+
+_REFUSALS = frozenset({400, 404, 415, 422})
+"""With these an endpoint answers to what it can't do; with others to how it is today."""
+
+_STORED = (Ability.TEMPERATURE, Ability.JSON_SCHEMA, Ability.NATIVE_TOOLS, Ability.VISION)
+_LONGEST_NOTE = 200
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ProbeFinding:
+    """What one question showed.
+
+    Attributes:
+        ability: Which.
+        has_it: None where the answer does not tell.
+        note: What the model said, or what broke.
+    """
+
+    ability: str
+    has_it: bool | None
+    note: str
+    model_returned: str = ""
+    prompt_tokens: int | None = None
+    completion_tokens: int | None = None
+    latency_s: float | None = None
+    cost_usd: str | None = None
+
+
+@dataclass(slots=True, kw_only=True)
+class ProbeReport:
+    """All findings, and what asking has cost as far as it is known.
+
+    Attributes:
+        refused: Parameters that the endpoint answered 400 to, or passed over.
+        cost_usd: None where the price or a count of tokens is unknown.
+    """
+
+    probed_at: datetime
+    findings: list[ProbeFinding] = field(default_factory=list)
+    refused: list[str] = field(default_factory=list)
+    calls: int = 0
+    cost_usd: str | None = None
+
+    def has(self, ability: Ability) -> bool | None:
+        """What was found of the ability, None where nothing was."""
+        return next((made.has_it for made in self.findings if made.ability == ability), None)
+
+    @property
+    def counts_tokens(self) -> bool:
+        """Whether every answer came with its usage."""
+        answered = [made for made in self.findings if made.latency_s is not None]
+        return bool(answered) and all(made.prompt_tokens is not None for made in answered)
+
+    @property
+    def models_returned(self) -> list[str]:
+        """The model ids that the server named."""
+        return sorted({made.model_returned for made in self.findings if made.model_returned})
+
+
+def probe(
+    *,
+    label: str,
+    model: str,
+    actor: User | None = None,
+    patience: Patience | None = None,
+    on_finding: Callable[[ProbeFinding], None] = lambda found: None,
+) -> ProbeReport:
+    """Ask the questions and store what they show.
+
+    Args:
+        label: Of the endpoint.
+        model: The model id there.
+        actor: Who wants it.
+        patience: How faults that may pass are waited for.
+        on_finding: Told what each question showed as soon as it is known.
+
+    Raises:
+        Endpoint.DoesNotExist: There is no endpoint of that label.
+        KeyNotAllowed, KeyMissing: The key's variable is not meant for keys, or not set here.
+        ModelFault: The wire can't be opened.
+    """
+    endpoint = Endpoint.objects.get(label=label)
+    row = model_at(endpoint=endpoint, model=model)
+    with wire_to(endpoint) as wire:
+        prober = _Prober(
+            client=wire,
+            endpoint=endpoint,
+            price=price_of(endpoint, model),
+            patience=patience or Patience(attempts=2),
+            profile=ModelProfile(
+                reasoning_effort=row.reasoning_effort, max_output_tokens=row.max_output_tokens
+            ),
+            context_tokens=row.context_tokens,
+        )
+        report = prober.report(questions_for(model), now=timezone.now(), on_finding=on_finding)
+    _store(row, report, actor)
+    return report
+
+
+# --- Private -----------------------------------------------------------------------------------
+
+
+@dataclass(slots=True, kw_only=True)
+class _Prober:
+    """Asks within the endpoint's limits, and goes without what it was refused."""
+
+    client: ChatClient
+    endpoint: Endpoint
+    price: Price | None
+    patience: Patience
+    profile: ModelProfile
+    context_tokens: int | None
+    calls: int = 0
+
+    def report(
+        self,
+        questions: tuple[ProbeQuestion, ...],
+        *,
+        now: datetime,
+        on_finding: Callable[[ProbeFinding], None],
+    ) -> ProbeReport:
+        report = ProbeReport(probed_at=now)
+        for question in questions:
+            report.findings.append(self._finding(question))
+            on_finding(report.findings[-1])
+            if report.findings[0].latency_s is None:
+                break  # nobody answers: the other questions would say the same
+        report.refused = sorted(self.profile.refused)
+        report.calls = self.calls
+        costs = [made.cost_usd for made in report.findings if made.latency_s is not None]
+        if costs and None not in costs:
+            report.cost_usd = f"{sum(Decimal(cost) for cost in costs if cost):f}"
+        return report
+
+    def _finding(self, question: ProbeQuestion) -> ProbeFinding:
+        ability = question.ability
+        try:
+            request, reply = self._answer(question)
+        except ParameterRefused as refused:
+            self.profile = self.profile.without(refused.parameter)
+            return ProbeFinding(ability=ability, has_it=False, note=_short(str(refused)))
+        except ModelFault as fault:
+            refuses = fault.status in _REFUSALS and ability != Ability.ANSWERS
+            has_it = False if refuses or ability == Ability.ANSWERS else None
+            return ProbeFinding(ability=ability, has_it=has_it, note=_short(str(fault)))
+        cut = cut_of(request, reply, context_tokens=self.context_tokens)
+        is_good = question.is_good(reply) if cut is None else False
+        if ability == Ability.ANSWER_LIMIT and is_good is False and self._renames_limit(request):
+            return replace(self._finding(question), cost_usd=None)
+        # Any answer shows that the parameter is taken.
+        has_it = True if ability in (Ability.ANSWERS, Ability.TEMPERATURE) else is_good
+        return ProbeFinding(
+            ability=ability,
+            has_it=has_it,
+            note=_short(str(cut) if cut else reply.text or reply.refusal or _called(reply)),
+            model_returned=reply.model,
+            prompt_tokens=reply.prompt_tokens,
+            completion_tokens=reply.completion_tokens,
+            latency_s=reply.latency_s,
+            cost_usd=self._cost_usd(reply),
+        )
+
+    def _answer(self, question: ProbeQuestion) -> tuple[Request, Reply]:
+        """The request as it was sent, and its answer."""
+        attempt = 1
+        while True:
+            request = self.profile.fitted(question.request)
+            try:
+                with place_at(self.endpoint, Queue(longest_s=settings.LLM_QUEUE_S)):
+                    self.calls += 1
+                    return request, self.client.complete(request)
+            except ParameterRefused as refused:
+                if refused.parameter == question.parameter:
+                    raise
+                self.profile = self.profile.without(refused.parameter)
+            except ModelFault as fault:
+                wait_s = self.patience.wait_s(fault, attempt=attempt)
+                if wait_s is None:
+                    raise
+                self.patience.sleep(wait_s)
+                attempt += 1
+
+    def _renames_limit(self, request: Request) -> bool:
+        """Use the limit's other name from now on; return whether there is one left.
+
+        Some servers pass over a parameter that they do not know instead of refusing it.
+        """
+        profile = self.profile.without(request.length_name)
+        if profile.refused.issuperset(LengthName):
+            return False
+        self.profile = profile
+        return True
+
+    def _cost_usd(self, reply: Reply) -> str | None:
+        prompt, completion = reply.prompt_tokens, reply.completion_tokens
+        if self.price is None or prompt is None or completion is None:
+            return None
+        nano_usd = self.price.nano_usd(prompt_tokens=prompt, completion_tokens=completion)
+        return f"{usd_of(nano_usd):f}"
+
+
+def _called(reply: Reply) -> str:
+    return ", ".join(f"{call.name}({call.arguments})" for call in reply.tool_calls)
+
+
+def _short(text: str) -> str:
+    line = " ".join(text.split())
+    return shorten(line, _LONGEST_NOTE)
+
+
+@transaction.atomic
+def _store(row: EndpointModel, report: ProbeReport, actor: User | None) -> None:
+    """Write the report, and each ability that it tells of."""
+    document: dict[str, Any] = asdict(report)
+    document["probed_at"] = report.probed_at.isoformat()
+    changes: dict[str, Any] = {
+        "probed_at": report.probed_at,
+        "probe_report": make_document_storable(document),
+    }
+    found = {ability.value: report.has(ability) for ability in _STORED}
+    changes |= {name: has_it for name, has_it in found.items() if has_it is not None}
+    if report.has(Ability.ANSWERS):
+        changes["refused_parameters"] = report.refused
+    EndpointModel.objects.filter(pk=row.pk).update(**changes)
+    log_event(
+        actor=actor,
+        verb="probe",
+        object_kind="model",
+        object_code=row.code,
+        after={"model": row.model, "calls": report.calls, "cost_usd": report.cost_usd} | found,
+    )
+
 
 State = Probe.State
 ABILITIES = tuple(ability.value for ability in Ability)

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from django.db.models import Q, QuerySet
 
 from augment.models import GenerationJob, Scenario, Simulation
-from augment.scene.catalogue import ScenarioType, in_type_order
+from augment.scene.entities import ScenarioType, in_type_order
 from augment.services.judging.simulations import SCORES, Options
 
 State, Subject = Simulation.State, Simulation.Subject

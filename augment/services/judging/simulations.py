@@ -14,20 +14,19 @@ from django.db.models import QuerySet
 
 from augment.errors import Conflict
 from augment.models import Augmentation, GenerationJob, Scenario, Simulation
-from augment.scene.codec import modification_from_document
-from augment.scene.modification import Modification
-from augment.scene.recording_codec import recording_from_document
+from augment.render.film import animation, strip
+from augment.scene.codec import modification_from_document, recording_from_document
+from augment.scene.entities import Modification
 from augment.services.scenarios.scenes import reference_of, scene_of, type_of
 from augment.services.work import Lease, Settlement, WorkKind
-from augment.simulation.criticality import criticality
 from augment.simulation.drive import Drive, expert_of, run
 from augment.simulation.metrics import red_lights
 from augment.simulation.planners import NAMED, PDM_CLOSED, planner_named
 from augment.simulation.planning import Planner
 from augment.simulation.road import Road
-from augment.simulation.score import Score, ScoreKind, score_drive
-from augment.simulation.setting import DriveSetting
-from augment.simulation.trace import trace_of
+from augment.simulation.score import Score, ScoreKind, criticality, score_drive
+from augment.simulation.trace import blind_trace, trace_of
+from augment.simulation.traffic import DriveSetting
 
 State, Subject = Simulation.State, Simulation.Subject
 NUPLAN, INTERPLAN = ScoreKind.NUPLAN.value, ScoreKind.INTERPLAN.value
@@ -251,3 +250,28 @@ def _modification(row: Simulation) -> Modification:
     if row.augmentation is None or row.augmentation.modification is None:
         return Modification()
     return modification_from_document(row.augmentation.modification)
+
+
+FILES = {"json": "application/json", "gif": "image/gif", "apng": "image/apng", "png": "image/png"}
+"""Content types by the name of the form; png is the strip."""
+
+
+def drive_file(row: Simulation, form: str, *, before: Simulation | None = None) -> bytes:
+    """A driven row as a file.
+
+    Args:
+        row: With its trace.
+        form: One of `FILES`.
+        before: The same scene before the change, to be drawn above it.
+    """
+    traces = [trace_document(one) for one in (before, row) if one is not None]
+    if form == "json":
+        return json.dumps(traces[-1], separators=(",", ":")).encode()
+    if form == "png":
+        return strip(traces)
+    return animation(traces, file_format=form)
+
+
+def blind_drive(row: Simulation) -> dict[str, Any]:
+    """A driven row as experts see it who must not learn who changed the scene."""
+    return blind_trace(trace_document(row))

@@ -9,18 +9,22 @@ saw the end of counts with its worst case if it was sent, and for nothing if it 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from decimal import Decimal
 from enum import StrEnum
 from typing import Any
 
+from django.contrib.auth.models import User
 from django.db import transaction
-from django.db.models import F, Q
+from django.db.models import Count, F, Q
 
 from augment.errors import Conflict, ModelFault, NotSent
-from augment.llm.costs import Price, WorstCase, usd_of
+from augment.llm.costs import Price, WorstCase, nano_usd_of, usd_of
 from augment.llm.messages import Reply
-from augment.models import GenerationJob, ModelCall
+from augment.models import Contestant, GenerationJob, ModelCall
 from augment.services.clock import Moment
+from augment.services.endpoints.treatments import list_unpriced_models
 from augment.services.events import log_event
 
 State = GenerationJob.State
@@ -228,4 +232,138 @@ def _log_stop(job: GenerationJob) -> None:
         object_code=job.code,
         before={"state": State.RUNNING.value},
         after={"state": State.STOPPED_AT_CAP.value, "cap": limit_of(job)},
+    )
+
+
+HIGHEST_USD = Decimal(1_000_000)
+HIGHEST_CALLS = 2_000_000_000
+HIGHEST_TOKENS = 10**15
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Caps:
+    """What a job may use at most; None is no cap. Of several, the first that is reached counts."""
+
+    usd: Decimal | None = None
+    calls: int | None = None
+    tokens: int | None = None
+
+    def columns(self) -> dict[str, int]:
+        """Those that there are, as columns of a job.
+
+        Raises:
+            Conflict: A cap is nothing or less, or too high to be counted to.
+        """
+        given: dict[str, int] = {}
+        if self.usd is not None:
+            if not (self.usd.is_finite() and Decimal(0) < self.usd <= HIGHEST_USD):
+                raise Conflict(f"A cap in USD is more than 0 and at most {HIGHEST_USD}.")
+            given["cap_nano_usd"] = nano_usd_of(self.usd)
+        for name, value, highest in (
+            ("calls", self.calls, HIGHEST_CALLS),
+            ("tokens", self.tokens, HIGHEST_TOKENS),
+        ):
+            if value is None:
+                continue
+            if not 0 < value <= highest:
+                raise Conflict(f"A cap in {name} is more than 0 and at most {highest}.")
+            given[f"cap_{name}"] = value
+        return given
+
+
+NO_CAPS = Caps()
+
+
+def check_caps(caps: Caps, contestants: Sequence[Contestant]) -> dict[str, int]:
+    """The caps as columns of a new job.
+
+    Raises:
+        Conflict: A cap can't be, or there is one in USD and a price that nobody knows.
+    """
+    columns = caps.columns()
+    unknown = list_unpriced_models(contestants) if caps.usd is not None else []
+    if unknown:
+        raise Conflict(
+            f"A cap in USD needs prices, and nobody knows that of {', '.join(unknown)}: cap "
+            "the job by calls or tokens instead, or enter the price at the endpoint."
+        )
+    return columns
+
+
+def over_already(job: GenerationJob) -> str:
+    """Why nothing can be changed at a job that has ended."""
+    state = job.get_state_display().lower()
+    return f"Job '{job.name}' is {state} already."
+
+
+@transaction.atomic
+def raise_cap(job: GenerationJob, *, caps: Caps, actor: User | None = None) -> GenerationJob:
+    """Raise the caps that are given; the others stay. What stopped waits on until `resume`.
+
+    Raises:
+        Conflict: Nothing is given, a cap would not be higher than it is, or the job is over.
+    """
+    columns = caps.columns()
+    if not columns:
+        raise Conflict("Say which cap to raise, and to what.")
+    job = GenerationJob.objects.select_for_update().get(pk=job.pk)
+    if job.state not in (State.RUNNING, *GenerationJob.HELD):
+        raise Conflict(over_already(job))
+    before, limits = limit_of(job), limits_of(job)
+    for name, value in columns.items():
+        held = getattr(job, name)
+        if held is None:
+            raise Conflict(f"Job '{job.name}' has no such cap; its cap is {', '.join(limits)}.")
+        if value <= held:
+            raise Conflict(f"The new cap must be higher than the one of {', '.join(limits)}.")
+        setattr(job, name, value)
+    job.save(update_fields=list(columns))
+    log_event(
+        actor=actor,
+        verb="raise cap",
+        object_kind="job",
+        object_code=job.code,
+        before={"cap": before},
+        after={"cap": limit_of(job)},
+    )
+    return job
+
+
+_PAID = Q(served_from=None, sent_at__isnull=False, settled_at__isnull=False)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class JobCosts:
+    """The calls of a job by what is known of their cost.
+
+    Attributes:
+        paid: Calls that were sent and ended; those from the store are not among them.
+        priced: Those of them that used something whose price is known.
+        unpriced: Those of them whose price is unknown.
+        estimated: Those of them that count with their worst case, because usage is unknown.
+        cached: Calls that were answered from the store.
+    """
+
+    paid: int
+    priced: int
+    unpriced: int
+    estimated: int
+    cached: int
+
+    @property
+    def is_money_unknown(self) -> bool:
+        """Whether nothing can be said about money."""
+        return self.unpriced > 0 == self.priced
+
+
+def costs_of(job: GenerationJob) -> JobCosts:
+    """By one query."""
+    return JobCosts(
+        **ModelCall.objects.filter(attempt__augmentation__job=job).aggregate(
+            paid=Count("pk", filter=_PAID),
+            priced=Count("pk", filter=_PAID & Q(cost_nano_usd__isnull=False, spent_tokens__gt=0)),
+            unpriced=Count("pk", filter=_PAID & Q(cost_nano_usd=None)),
+            estimated=Count("pk", filter=_PAID & Q(is_cost_estimated=True)),
+            cached=Count("pk", filter=Q(served_from__isnull=False)),
+        )
     )

@@ -12,12 +12,19 @@ from django.utils import timezone
 
 from augment.errors import Conflict, UnknownName
 from augment.models import Augmentation, Contestant, GenerationJob, Scenario
-from augment.services.clock import DATABASE_TIME, Moment
+from augment.services.clock import DATABASE_TIME, Moment, database_now
 from augment.services.endpoints.treatments import loosen_unanswered
 from augment.services.events import log_event
-from augment.services.running.budget import limit_of
-from augment.services.running.caps import NO_CAPS, Caps, check_caps, over_already
-from augment.services.running.feasible import refuse_impossible
+from augment.services.running.budget import (
+    NO_CAPS,
+    Caps,
+    check_caps,
+    limit_of,
+    over_already,
+    raise_cap,
+)
+from augment.services.running.choosing import refuse_impossible
+from augment.services.running.progress import rows_of_cause
 from augment.services.texts import one_line
 from augment.services.work import change_all
 from augment.variants.options import MOST_SAMPLES
@@ -219,3 +226,156 @@ def _in_order(rows: QuerySet[_Row], slugs: Sequence[str], what: str) -> list[_Ro
         if slug not in by_slug:
             raise UnknownName(what, slug, list(rows.values_list("slug", flat=True)))
     return [by_slug[slug] for slug in dict.fromkeys(slugs)]
+
+
+@transaction.atomic
+def pause(job: GenerationJob, *, actor: User | None = None) -> GenerationJob:
+    """Start nothing new; what is in flight ends and keeps its results.
+
+    Raises:
+        Conflict: The job is not running.
+    """
+    running = GenerationJob.objects.filter(pk=job.pk, state=GenerationJob.State.RUNNING)
+    if not running.update(state=GenerationJob.State.PAUSED):
+        job.refresh_from_db()
+        if job.state in GenerationJob.HELD:
+            raise Conflict(
+                f"Job '{job.name}' is {job.get_state_display().lower()} already: it starts "
+                "nothing until it is resumed."
+            )
+        raise Conflict(over_already(job))
+    log_event(
+        actor=actor,
+        verb="pause",
+        object_kind="job",
+        object_code=job.code,
+        before={"state": GenerationJob.State.RUNNING.value},
+        after={
+            "state": GenerationJob.State.PAUSED.value,
+            "waiting": _count(job, Augmentation.State.QUEUED),
+            "in_flight": _count(job, Augmentation.State.RUNNING),
+        },
+    )
+    job.refresh_from_db()
+    return job
+
+
+@transaction.atomic
+def resume(
+    job: GenerationJob, *, higher: Caps = NO_CAPS, actor: User | None = None
+) -> GenerationJob:
+    """Let a job that is paused or stopped at its cap go on; the door sends the messages.
+
+    Attempts that were stopped are replayed from the answers that they had, and pay for none twice.
+
+    Args:
+        job: Which.
+        higher: The caps that are raised first; the others stay.
+        actor: Who wants it.
+
+    Raises:
+        Conflict: The job is not held, or a cap would not be higher than it is.
+    """
+    held = GenerationJob.objects.filter(pk=job.pk, state__in=GenerationJob.HELD)
+    waiting = Augmentation.objects.filter(job=job.pk, state=Augmentation.State.QUEUED)
+    again = change_all(waiting, sent_at=None)
+    if higher != NO_CAPS:
+        raise_cap(job, caps=higher, actor=actor)
+    before = held.select_for_update().values_list("state", flat=True).first()
+    if not held.update(state=GenerationJob.State.RUNNING):
+        job.refresh_from_db()
+        raise Conflict(
+            f"Job '{job.name}' is {job.get_state_display().lower()}; only one that is paused "
+            "or stopped at its cap can be resumed."
+        )
+    log_event(
+        actor=actor,
+        verb="resume",
+        object_kind="job",
+        object_code=job.code,
+        before={"state": before},
+        after={"state": GenerationJob.State.RUNNING.value, "queued": again},
+    )
+    job.refresh_from_db()
+    return job
+
+
+# --- Private -----------------------------------------------------------------------------------
+
+
+def _count(job: GenerationJob, state: Augmentation.State) -> int:
+    return Augmentation.objects.filter(job=job.pk, state=state).count()
+
+
+RETRIED = (State.FAILED, State.UNREADABLE)
+"""What may be tried again. Who declined has answered, and is not asked until it says yes."""
+
+
+@transaction.atomic
+def retry_cause(job: GenerationJob, *, key: str, actor: User | None = None) -> GenerationJob:
+    """Let the rows that ended for one cause wait again; the door sends the messages.
+
+    What failed goes on from the answers that it had. What was unreadable is asked anew, because
+    the same answer would be read the same way; the attempt that counted so far stays on record.
+
+    Args:
+        job: Whose rows they are.
+        key: Of the cause, as `failure_groups` gives it.
+        actor: Who wants it.
+
+    Raises:
+        UnknownName: No row has that cause (any more).
+        Conflict: The job was cancelled, or the contestants have refused.
+    """
+    state, cause, pks = rows_of_cause(job, key)
+    if state not in RETRIED:
+        raise Conflict(
+            "Who refused has answered: it is not asked again. Launch a new job instead."
+        )
+    anew: dict[str, object] = {}
+    if state == State.UNREADABLE:
+        anew = {"image": "", "notes": "", "asked_anew_at": database_now()}
+    rows = Augmentation.objects.filter(pk__in=pks, state=state)
+    _let_wait(job, rows, actor, told={"state": state.value, "cause": cause}, **anew)
+    return job
+
+
+@transaction.atomic
+def retry_failed(job: GenerationJob, actor: User | None = None) -> GenerationJob:
+    """Let every failed row wait again; outcomes of the contestants themselves stay.
+
+    In a job that is paused or stopped at its cap they wait, with the others, until it is resumed.
+
+    Raises:
+        Conflict: The job was cancelled, or nothing in it failed.
+    """
+    failed = Augmentation.objects.filter(job=job, state=State.FAILED)
+    if not _let_wait(job, failed, actor, told={}):
+        raise Conflict(f"Nothing in job '{job.name}' failed; there is nothing to try again.")
+    return job
+
+
+# --- Private -----------------------------------------------------------------------------------
+
+
+def _let_wait(
+    job: GenerationJob,
+    rows: QuerySet[Augmentation],
+    actor: User | None,
+    *,
+    told: dict[str, str],
+    **columns: object,
+) -> int:
+    """Returns how many wait again; the job goes on with them."""
+    waiting = {"state": State.QUEUED, "reason": "", "finished_at": None, "sent_at": None}
+    again = change_all(rows, **waiting, **columns)
+    open_again(job)
+    log_event(
+        actor=actor,
+        verb="retry",
+        object_kind="job",
+        object_code=job.code,
+        after={"queued": again, **told},
+    )
+    job.refresh_from_db()
+    return again

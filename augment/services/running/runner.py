@@ -28,26 +28,28 @@ from augment.errors import (
     Unwanted,
 )
 from augment.llm.client import ChatClient
-from augment.llm.cutting import shorten
+from augment.llm.messages import shorten
 from augment.models import Augmentation, Contestant, Endpoint
 from augment.scene.codec import modification_from_document, modification_to_document
-from augment.scene.entities import Scene
-from augment.scene.modification import Modification
+from augment.scene.entities import Modification, Scene
 from augment.services.clock import Moment
-from augment.services.endpoints.call_limits import Queue
-from augment.services.endpoints.client import EndpointClient
-from augment.services.endpoints.respondents import Respondent, respondents_of
-from augment.services.endpoints.treatments import Treatment, treatment_of
-from augment.services.endpoints.wires import wire_to
-from augment.services.running import jobs, stopping
-from augment.services.running.attempts import (
+from augment.services.endpoints.client import EndpointClient, Queue, wire_to
+from augment.services.endpoints.treatments import (
+    Respondent,
+    Treatment,
+    respondents_of,
+    treatment_of,
+)
+from augment.services.running import jobs, workers
+from augment.services.running.calls import (
     CANCELLED,
     CLOSED,
+    RowTranscript,
     close_attempt,
     insist_wanted,
     open_attempt,
+    sentence_of,
 )
-from augment.services.running.transcripts import RowTranscript, sentence_of
 from augment.services.scenarios.pictures import camera_of, original_picture, picture_of, redraw
 from augment.services.scenarios.scenes import intent_of, reference_of, scene_of, seed_of
 from augment.services.texts import LONGEST_NOTES, make_document_storable, make_storable
@@ -55,8 +57,7 @@ from augment.services.work import Lease, Settlement, WorkKind, change_all
 from augment.variants import pipeline
 from augment.variants.options import ToolProtocol, recipe_with
 from augment.variants.recipes import find_recipe
-from augment.variants.respondents import RespondentClient
-from augment.variants.transcript import ModelRole
+from augment.variants.respondents import ModelRole, RespondentClient
 
 logger = logging.getLogger(__name__)
 
@@ -198,7 +199,7 @@ def run(row: Augmentation, *, held: Held, connect: Connect | None = None) -> Set
 
 def _insist_before_sending(held: Held) -> None:
     """A worker that is to stop sends nothing more; what it has sent it waits for."""
-    stopping.insist_on_going_on()
+    workers.insist_on_going_on()
     insist_wanted(held)
 
 

@@ -7,12 +7,13 @@ import socket
 from collections.abc import Callable
 from dataclasses import dataclass
 from datetime import datetime, timedelta
-from threading import Lock
+from threading import Event, Lock
 from types import TracebackType
 from typing import Self
 
 from django.conf import settings
 
+from augment.errors import WorkerStopping
 from augment.models import Worker
 from augment.services.clock import DATABASE_TIME, database_now
 from augment.services.texts import make_storable
@@ -212,3 +213,36 @@ def _forget_old() -> None:
     last = Worker.objects.first()
     if last is not None:
         old.exclude(pk=last.pk).delete()
+
+
+_told = Event()
+
+
+def request_stop() -> None:
+    """Let nothing new begin; safe to call from a signal handler."""
+    _told.set()
+
+
+def withdraw_stop() -> None:
+    """As at the start of a process."""
+    _told.clear()
+
+
+def is_stop_requested() -> bool:
+    """Whether this process is to stop."""
+    return _told.is_set()
+
+
+def wait(seconds: float) -> None:
+    """Until so many seconds have passed or the process is to stop."""
+    _told.wait(seconds)
+
+
+def insist_on_going_on() -> None:
+    """Return while there is no reason to stop.
+
+    Raises:
+        WorkerStopping: The process was told to.
+    """
+    if is_stop_requested():
+        raise WorkerStopping("this worker was told to stop")

@@ -1,0 +1,216 @@
+"""Pages of generation jobs, and what an admin does with one: pause, resume, cancel, try again."""
+
+from __future__ import annotations
+
+import uuid
+
+from django.contrib import messages
+from django.db import transaction
+from django.http import HttpRequest, HttpResponse
+from django.shortcuts import get_object_or_404, redirect, render
+from django.urls import reverse
+from django.views.decorators.http import require_http_methods, require_POST, require_safe
+
+from arena.jobs.pages.driving import driving_section
+from arena.jobs.pages.exports import displacement_section
+from arena.jobs.queries import MARKS, VIEWS, Part, grid_part
+from arena.jobs.services import files_of
+from arena.services.retrying import retry_cause as retry_one_cause
+from arena.site.access import ADMIN, STAFF, allow_only, user_of
+from arena.site.acts import Confirmation, ask, is_sure, refusals_told, send_later
+from arena.site.forms import CapsForm
+from arena.site.listing import (
+    choice_asked,
+    page_asked,
+    read_listing,
+    read_page,
+    said_choices,
+    search_asked,
+)
+from arena.site.queries import MINE, Narrowing, find_jobs
+from augment.models import Augmentation, GenerationJob
+from augment.services.judging.analyses import repeatability
+from augment.services.judging.scenario_export import FORMATS
+from augment.services.running import jobs, progress
+from augment.services.running.budget import costs_of
+from augment.services.running.workers import workforce
+from augment.tasks import enqueue_job
+
+State = Augmentation.State
+JOBS_AT_ONCE = 25
+MEASURED_AT_ONCE = 1000
+"""Of a job with more augmentations the page measures nothing until somebody asks for it."""
+
+_ASK_TO_MEASURE = frozenset({"measures", "by", "types", "checks"})
+
+
+@allow_only(*STAFF)
+@require_safe
+def jobs_page(request: HttpRequest) -> HttpResponse:
+    """List jobs with their bars, page by page."""
+    choices = {
+        "state": ("State", said_choices(GenerationJob.State.choices)),
+        "by": ("Started by", [(MINE, "me")]),
+    }
+    listing = read_listing(request, choices)
+    wanted = Narrowing(
+        search=listing.search, kind=listing.chosen("state"), part=listing.chosen("by")
+    )
+    page = read_page(request, find_jobs(wanted, user=user_of(request)), size=JOBS_AT_ONCE)
+    counted = progress.count_each(list(page.object_list))
+    context: dict[str, object] = {"jobs": counted, "page": page, "listing": listing}
+    if any(counts.is_moving for counts in counted):
+        context["workforce"] = workforce()
+    return render(request, "jobs/list.html", context)
+
+
+@allow_only(*STAFF)
+@require_safe
+def job_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
+    """Show progress, a part of the grid, and failures by their cause."""
+    job = get_object_or_404(GenerationJob.objects.select_related("launched_by__person"), code=code)
+    counts = progress.count_rows(job)
+    part = Part(
+        view=VIEWS.get(request.GET.get("view", ""), MARKS),
+        row=page_asked(request, "row"),
+        column=page_asked(request, "column"),
+        sample=page_asked(request, "sample"),
+        state=choice_asked(request, "state", State.values),
+        search=search_asked(request),
+    )
+    context: dict[str, object] = {
+        "counts": counts,
+        "costs": costs_of(job),
+        "grid": grid_part(job, part),
+        "failures": progress.failure_groups(job),
+        "shown_causes": progress.SHOWN,
+    }
+    if counts.is_moving:  # a page that reloads every two seconds measures nothing
+        context |= {"workforce": workforce(), "pace": progress.pace_of(counts)}
+    elif counts.total <= MEASURED_AT_ONCE or _ASK_TO_MEASURE & request.GET.keys():
+        context |= _measure(request, job)
+    else:
+        context["could_measure"] = True
+    return render(request, "jobs/job.html", context)
+
+
+def _measure(request: HttpRequest, job: GenerationJob) -> dict[str, object]:
+    """Return the context of all that a settled job is measured by."""
+    files = files_of(job)
+    measured: dict[str, object] = {
+        "scenario_files": [(form, files.get(form)) for form in FORMATS],
+        "displacement": displacement_section(request, job),
+        "driving": driving_section(request, job),
+        "tool_calls": progress.tool_calls_by_contestant(job),
+    }
+    if job.samples > 1:
+        is_checked = request.GET.get("checks") == "1"
+        measured["repeats"] = repeatability(job, with_checks=is_checked)
+        measured["is_checked"] = is_checked
+    return measured
+
+
+@allow_only(ADMIN)
+@require_POST
+def retry_job(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
+    """Queue again what failed."""
+    job = get_object_or_404(GenerationJob, code=code)
+    with refusals_told(request), transaction.atomic():
+        jobs.retry_failed(job=job, actor=user_of(request))
+        send_later(request, enqueue_job, job.pk)
+        messages.success(request, "What failed is queued again.")
+    return redirect("job", code=code)
+
+
+@allow_only(ADMIN)
+@require_POST
+def retry_cause(request: HttpRequest, code: uuid.UUID, key: str) -> HttpResponse:
+    """Queue again what ended for one cause; ask first before an answer gets a second chance."""
+    job = get_object_or_404(GenerationJob, code=code)
+    with refusals_told(request), transaction.atomic():
+        state, _cause, pks = progress.rows_of_cause(job, key)
+        if state == State.UNREADABLE and not is_sure(request):
+            return ask(
+                request,
+                Confirmation(
+                    title=f"Ask again for {len(pks)} unreadable answers?",
+                    facts=(
+                        "An unreadable answer is the contestant’s own and counts as a miss.",
+                        "Asked again it has a second chance that the others did not have; that "
+                        "is logged.",
+                        "The attempts so far stay in the transcripts; what counts is the last "
+                        "one.",
+                    ),
+                    button="Ask again",
+                    back=reverse("job", args=[job.code]),
+                    is_final=False,
+                    crumbs=crumbs_of(job),
+                ),
+            )
+        retry_one_cause(job, key=key, actor=user_of(request))
+        send_later(request, enqueue_job, job.pk)
+        messages.success(request, f"Queued again: {len(pks)} with this cause.")
+    return redirect("job", code=code)
+
+
+@allow_only(ADMIN)
+@require_POST
+def pause_job(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
+    """Start nothing new; what is in flight ends."""
+    job = get_object_or_404(GenerationJob, code=code)
+    with refusals_told(request):
+        jobs.pause(job, actor=user_of(request))
+        messages.success(request, "Paused: nothing new is started; what is in flight ends.")
+    return redirect("job", code=code)
+
+
+@allow_only(ADMIN)
+@require_POST
+def resume_job(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
+    """Raise the caps that are given, then go on with what is left."""
+    job = get_object_or_404(GenerationJob, code=code)
+    form = CapsForm(request.POST)
+    if not form.is_valid():
+        messages.error(request, "A cap is a number; nothing was changed.")
+        return redirect("job", code=code)
+    with refusals_told(request), transaction.atomic():
+        jobs.resume(job, higher=form.caps(), actor=user_of(request))
+        send_later(request, enqueue_job, job.pk)
+        messages.success(request, "What is left is queued again.")
+    return redirect("job", code=code)
+
+
+@allow_only(ADMIN)
+@require_http_methods(["GET", "HEAD", "POST"])
+def cancel_job(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
+    """Start nothing new; what is done stays. There is no way back, so ask first."""
+    job = get_object_or_404(GenerationJob, code=code)
+    if is_sure(request):
+        with refusals_told(request):
+            jobs.cancel(job=job, actor=user_of(request))
+            messages.success(request, "Cancelled. What is done stays.")
+    elif job.state in jobs.OPEN:
+        return ask(request, _cancelling(job))
+    return redirect("job", code=code)
+
+
+def _cancelling(job: GenerationJob) -> Confirmation:
+    counts = progress.count_rows(job).by_state
+    waiting, running = counts[State.QUEUED], counts[State.RUNNING]
+    return Confirmation(
+        title=f"Cancel “{job.name}”?",
+        facts=(
+            f"Augmentations that wait and are never made: {waiting}.",
+            f"Running now, which end and keep their results: {running}.",
+            f"Settled, which stay as they are: {sum(counts.values()) - waiting - running}.",
+            "A cancelled job can’t go on; what is missing takes a new one.",
+        ),
+        button="Cancel the job",
+        back=reverse("job", args=[job.code]),
+        crumbs=crumbs_of(job),
+    )
+
+
+def crumbs_of(job: GenerationJob) -> tuple[tuple[str, str], ...]:
+    """Return the way to a job's page: names and addresses."""
+    return (("Jobs", reverse("jobs")), (job.name, reverse("job", args=[job.code])))

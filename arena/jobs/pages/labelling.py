@@ -1,0 +1,156 @@
+"""Fault labels: the page of an expert, which tells nothing of who made what, and that of a job."""
+
+from __future__ import annotations
+
+import uuid
+from typing import Any
+
+from django.contrib import messages
+from django.contrib.auth.models import User
+from django.core.exceptions import PermissionDenied
+from django.db import transaction
+from django.http import Http404, HttpRequest, HttpResponse
+from django.shortcuts import get_object_or_404, redirect, render
+from django.urls import reverse
+from django.views.decorators.cache import never_cache
+from django.views.decorators.http import require_http_methods
+
+from arena.errors import AlreadyLabelled, LabellingClosed, NotYours
+from arena.jobs import queries
+from arena.jobs.exports.faults import fault_table
+from arena.jobs.pages.jobs import crumbs_of
+from arena.jobs.services import close_labelling, open_labelling, save_label
+from arena.models import FaultLabel, LabellingRound
+from arena.people.queries import by_pseudonym, experts, role_of
+from arena.queries.voting.showings import original_beside
+from arena.site.access import ADMIN, EXPERT, STAFF, allow_only, user_of
+from arena.site.acts import Confirmation, ask, is_sure, refusals_in, refusals_told, wants_to_change
+from arena.site.forms import LabelForm, LabellingForm
+from augment.models import GenerationJob
+from augment.services.judging.findings import FaultClass
+
+
+@allow_only(EXPERT)
+@never_cache
+@require_http_methods(["GET", "HEAD", "POST"])
+def label_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
+    """Show the next picture; a label is saved and followed by a redirect."""
+    expert = user_of(request)
+    try:
+        progress = queries.labelling_of(expert=expert, code=code)
+        if request.method == "POST":
+            _save(request, expert)
+            return redirect("label", code=code)
+    except NotYours as error:
+        raise Http404 from error
+    task = queries.next_task(labelling=progress.labelling, expert=expert)
+    context = {
+        **{"progress": progress, "task": task, "faults": list(FaultClass)},
+        "has_original": task is not None and bool(original_beside(task.augmentation)),
+    }
+    return render(request, "label/label.html" if task else "label/done.html", context)
+
+
+def _save(request: HttpRequest, expert: User) -> None:
+    form = LabelForm(request.POST)
+    if not form.is_valid():
+        messages.error(request, "That could not be read; nothing was saved.")
+        return
+    task, note = form.cleaned_data["task"], form.cleaned_data["note"]
+    try:
+        label = save_label(expert=expert, task_code=task, faults=form.faults(), note=note)
+    except AlreadyLabelled as error:
+        messages.info(request, str(error))
+    except LabellingClosed as error:
+        messages.error(request, str(error))
+    else:
+        messages.success(request, f"Saved. {_guess(label)}")
+
+
+def _guess(label: FaultLabel) -> str:
+    """Return what the checks had guessed, told only now."""
+    if label.guessed_position is None:
+        return "The automatic checks could not look at that picture."
+    guessed = [fault.value for fault in FaultClass if getattr(label, f"guessed_{fault.value}")]
+    return f"The automatic checks had guessed: {', '.join(guessed) or 'no fault'}."
+
+
+@allow_only(*STAFF)
+@require_http_methods(["GET", "HEAD", "POST"])
+def faults_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
+    """Show what was labelled in a job, and the form that opens a labelling."""
+    job = get_object_or_404(GenerationJob, code=code)
+    form = LabellingForm(request.POST or None, experts=by_pseudonym(experts()))
+    if request.method == "POST" and role_of(request.user) != ADMIN:
+        raise PermissionDenied
+    if form.is_bound and form.is_valid() and not wants_to_change(request):
+        given = {name: form.cleaned_data[name] for name in ("name", "experts", "seed")}
+        with refusals_in(form):
+            if not is_sure(request):
+                return ask(request, _opening(job, given))
+            labelling = open_labelling(job=job, **given, actor=user_of(request))
+            messages.success(request, f"“{labelling.name}” is open; its experts can label now.")
+            return redirect("faults", code=job.code)
+    context = {
+        "job": job,
+        "form": form,
+        "table": fault_table(job),
+        "labellings": queries.labellings_of(job),
+    }
+    return render(request, "label/job.html", context, status=422 if form.errors else 200)
+
+
+@allow_only(ADMIN)
+@require_http_methods(["GET", "HEAD", "POST"])
+def close(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
+    """Take no more labels; there is no way back, so ask first."""
+    labelling = get_object_or_404(LabellingRound.objects.select_related("job"), code=code)
+    if is_sure(request):
+        with refusals_told(request):
+            close_labelling(labelling=labelling, actor=user_of(request))
+            messages.success(request, f"“{labelling.name}” is closed; its labels stay.")
+    elif labelling.closed_at is None:
+        return ask(request, _closing(labelling))
+    return redirect("faults", code=labelling.job.code)
+
+
+def _opening(job: GenerationJob, given: dict[str, Any]) -> Confirmation:
+    """Return what is asked before: counted by opening it and taking that back at once."""
+    with transaction.atomic():
+        labelling = open_labelling(job=job, **given)
+        tasks = labelling.tasks.count()
+        pictures = labelling.tasks.values("augmentation").distinct().count()
+        experts_asked = labelling.experts.count()
+        transaction.set_rollback(True)
+    return Confirmation(
+        title=f"Open the labelling “{given['name']}”?",
+        facts=(
+            f"Pictures: {pictures}. Experts: {experts_asked}. Labels planned: {tasks}.",
+            "Experts see it at once; who labels, and in which order, can’t be changed afterwards.",
+        ),
+        button="Open the labelling",
+        back=reverse("faults", args=[job.code]),
+        is_final=False,
+        crumbs=_crumbs(job),
+    )
+
+
+def _closing(labelling: LabellingRound) -> Confirmation:
+    (line,) = (
+        line for line in queries.labellings_of(labelling.job) if line.labelling.pk == labelling.pk
+    )
+    return Confirmation(
+        title=f"Close the labelling “{labelling.name}”?",
+        facts=(
+            f"Labels saved, which stay: {line.labelled}.",
+            f"Planned labels that will be missing: {line.left}.",
+            "It takes no more labels. This can’t be taken back.",
+        ),
+        button="Close the labelling",
+        back=reverse("faults", args=[labelling.job.code]),
+        crumbs=_crumbs(labelling.job),
+    )
+
+
+def _crumbs(job: GenerationJob) -> tuple[tuple[str, str], ...]:
+    return (*crumbs_of(job), ("Fault labels", reverse("faults", args=[job.code])))

@@ -1,0 +1,257 @@
+"""The page of a new job: choose, see what it would use, try one scenario first, launch."""
+
+from __future__ import annotations
+
+import uuid
+from decimal import Decimal
+from typing import Any
+
+from django import forms
+from django.contrib import messages
+from django.db import transaction
+from django.http import HttpRequest, HttpResponse
+from django.shortcuts import redirect, render
+from django.views.decorators.http import require_http_methods
+
+from arena.contestants.pages import OptionsForm
+from arena.scenarios.queries import by_type, set_asked, set_choices
+from arena.site.access import ADMIN, allow_only, user_of
+from arena.site.acts import refusals_in, send_later
+from arena.site.forms import CapsForm, ChoiceForm, Offer
+from augment.errors import AugmentError, Conflict
+from augment.models import Contestant, EndpointModel, GenerationJob
+from augment.services.endpoints.known_endpoints import is_key_here
+from augment.services.running import jobs
+from augment.services.running.choosing import find_obstacle, keys_missing
+from augment.services.running.estimates import JobEstimate, estimate_rows
+from augment.services.running.matrix import (
+    ChosenCells,
+    add_cells,
+    matrix_of,
+    matrix_text,
+    read_cells,
+    read_matrix,
+)
+from augment.tasks import enqueue_job
+
+LONGEST_FILE = 1_000_000
+LONGEST_NAME = 120
+
+
+class LaunchForm(ChoiceForm, CapsForm, OptionsForm):
+    """A new job: cells of the matrix, contestants, scenarios and caps."""
+
+    contestants = forms.MultipleChoiceField(required=False)
+    cells = forms.MultipleChoiceField(required=False)
+    samples = forms.IntegerField(
+        min_value=1, max_value=jobs.HIGHEST_SAMPLES, initial=1, required=False
+    )
+    is_fresh = forms.BooleanField(required=False)
+
+    def __init__(self, *args: Any, models: list[EndpointModel], **kwargs: Any) -> None:
+        super().__init__(*args, **kwargs)
+        self.models = models
+        self.matrix = matrix_of(models)
+        keys = [cell.key for row in self.matrix for cell, obstacle in row.cells if not obstacle]
+        self._offer("cells", [(key, key) for key in keys])
+        self.cells_chosen = ChosenCells()
+
+    def clean_samples(self) -> int:
+        """Return 1 for an empty field."""
+        return self.cleaned_data["samples"] or 1
+
+    def clean(self) -> dict[str, Any]:
+        """Check that somebody is chosen, by name or by a cell, and the options of the cells."""
+        cleaned = super().clean()
+        if not (cleaned.get("contestants") or cleaned.get("cells")):
+            self.add_error("contestants", "Choose at least one contestant.")
+        with refusals_in(self):
+            self.cells_chosen = read_cells(cleaned.get("cells", []), self.options())
+        return cleaned
+
+    @property
+    def offers(self) -> list[Offer]:
+        """For the template: contestants, with the reason where no job can run them."""
+        offers = []
+        for row in self.offered:
+            obstacle = find_obstacle(row)
+            missing = () if obstacle else tuple(keys_missing(row))
+            offers.append(Offer(row=row, obstacle=obstacle, keys_missing=missing))
+        return offers
+
+    @property
+    def missing_keys(self) -> set[str]:
+        """For the template: variables of the models' keys that are not set here."""
+        names = {known.endpoint.key_variable for known in self.models} - {""}
+        return {name for name in names if not is_key_here(name)}
+
+    @property
+    def chosen_cells(self) -> list[str]:
+        """For the template: the keys that are ticked."""
+        return self.chosen("cells")
+
+    def chosen_rows(self) -> list[Contestant]:
+        """Return whoever is chosen, each once; those of cells may not be stored yet."""
+        named = Contestant.objects.filter(slug__in=self.cleaned_data.get("contestants", []))
+        rows = [*named.select_related("endpoint"), *self.cells_chosen.contestants()]
+        return list({row.slug: row for row in rows}.values())
+
+    def estimated(self) -> JobEstimate | None:
+        """Return what the job would use, as far as it is chosen, without a name or caps."""
+        self.is_valid()
+        for name in ("name", "contestants", "scenarios"):
+            self.errors.pop(name, None)
+        contestants, scenarios = self.chosen_rows(), self.cleaned_data.get("scenarios", [])
+        if not (contestants and scenarios):
+            return None
+        return estimate_rows(
+            contestants,
+            scenarios,
+            samples=self.cleaned_data.get("samples", 1),
+            is_fresh=self.cleaned_data.get("is_fresh", False),
+        )
+
+
+@allow_only(ADMIN)
+@require_http_methods(["GET", "HEAD", "POST"])
+def new_job_page(request: HttpRequest) -> HttpResponse:
+    """Choose contestants and scenarios, then launch."""
+    if "read" in request.POST:
+        return _read_file(request)
+    form = _form(request, request.POST or None, initial=_like(request))
+    if "matrix" in request.POST:
+        return _matrix_file(request, form)
+    if "estimate" in request.POST:
+        return _estimated(request, form)
+    if form.is_bound and form.is_valid():
+        with refusals_in(form), transaction.atomic():
+            job = _launch(request, form)
+            send_later(request, enqueue_job, job.pk)
+            messages.success(request, f"“{job.name}” is launched.")
+            return redirect("job", code=job.code)
+    return _page(request, form, status=422 if form.errors else 200)
+
+
+def _form(request: HttpRequest, data: Any, *, initial: dict[str, Any] | None = None) -> LaunchForm:
+    contestants = Contestant.objects.filter(retired_at=None).select_related("endpoint")
+    models = EndpointModel.objects.select_related("endpoint")
+    return LaunchForm(
+        data,
+        initial=initial,
+        contestants=list(contestants.order_by("name")),
+        groups=by_type(set_asked(request.GET.get("set"))),
+        models=list(models.order_by("endpoint__label", "model")),
+    )
+
+
+def _page(
+    request: HttpRequest, form: LaunchForm, *, status: int = 200, **more: object
+) -> HttpResponse:
+    chosen_set = set_asked(request.GET.get("set"))
+    context = {"form": form, "sets": set_choices(chosen_set), **more}
+    return render(request, "jobs/new.html", context, status=status)
+
+
+def _like(request: HttpRequest) -> dict[str, Any]:
+    """Return the values of another job where the address names one."""
+    try:
+        code = uuid.UUID(request.GET.get("like", ""))
+    except ValueError:
+        return {}
+    job = GenerationJob.objects.filter(code=code).first()
+    if job is None:
+        return {}
+    caps: dict[str, Any] = {"cap_calls": job.cap_calls, "cap_tokens": job.cap_tokens}
+    if job.cap_usd is not None:
+        caps["cap_usd"] = f"{job.cap_usd.normalize():f}"
+    like = {
+        "name": f"{job.name} (2)"[:LONGEST_NAME],
+        "contestants": list(job.contestants.values_list("slug", flat=True)),
+        "scenarios": list(job.scenarios.values_list("slug", flat=True)),
+        "samples": job.samples,
+        "is_fresh": job.is_fresh,
+        **caps,
+    }
+    is_all = request.GET.get("all") == "1"
+    return like | (job.full_plan or {}) if is_all else like
+
+
+def _estimated(request: HttpRequest, form: LaunchForm) -> HttpResponse:
+    """Show the form as it came in, with what the job would use; nothing is launched."""
+    more: dict[str, Any] = {}
+    with refusals_in(form):
+        estimate, cap = form.estimated(), form.cleaned_data.get("cap_usd")
+        more = {"estimate": estimate, "cap_usd": cap}
+        if estimate is not None and cap is not None:
+            more["rows_within"] = estimate.rows_within(cap)
+    return _page(request, form, **more)
+
+
+def _matrix_file(request: HttpRequest, form: LaunchForm) -> HttpResponse:
+    """Answer with what is chosen as a file for `generate --matrix`, which needs no name."""
+    form.is_valid()
+    form.errors.pop("name", None)
+    if form.errors:
+        return _page(request, form, status=422)
+    text = matrix_text(
+        form.chosen_rows(),
+        form.cleaned_data["scenarios"],
+        samples=form.cleaned_data["samples"],
+        name=form.cleaned_data.get("name", ""),
+    )
+    return HttpResponse(
+        text,
+        content_type="application/yaml; charset=utf-8",
+        headers={"Content-Disposition": 'attachment; filename="matrix.yaml"'},
+    )
+
+
+def _read_file(request: HttpRequest) -> HttpResponse:
+    """Fill in the form from a matrix file; contestants that it has in full are made."""
+    file = request.FILES.get("file")
+    try:
+        if file is None:
+            raise Conflict("Choose a matrix file.")
+        if file.size is None or file.size > LONGEST_FILE:
+            raise Conflict("The file is too long for a matrix: at most 1 MB.")
+        matrix = read_matrix(file.read().decode(), actor=user_of(request))
+    except UnicodeDecodeError:
+        problem = "The file is not UTF-8."
+    except AugmentError as error:
+        problem = str(error)
+    else:
+        for slug in matrix.made:
+            messages.success(request, f"“{slug}” is added.")
+        initial = {
+            "name": matrix.name or "",
+            "contestants": list(matrix.contestants),
+            "scenarios": list(matrix.scenarios),
+            "samples": matrix.samples,
+        }
+        return _page(request, _form(request, None, initial=initial))
+    return _page(request, _form(request, None), status=422, file_problem=problem)
+
+
+def _launch(request: HttpRequest, form: LaunchForm) -> GenerationJob:
+    """Launch the job; of one that tries first, one scenario with a memory of the rest."""
+    chosen = form.cleaned_data
+    scenarios, samples, name, plan = chosen["scenarios"], chosen["samples"], chosen["name"], None
+    if "try" in request.POST:
+        names = ("name", "scenarios", "samples", "is_fresh", "cap_usd", "cap_calls", "cap_tokens")
+        plan = {
+            field: str(value) if isinstance(value, Decimal) else value
+            for field in names
+            if (value := chosen.get(field)) is not None
+        }
+        scenarios, samples, name = scenarios[:1], 1, f"{name}, first try"
+    made = add_cells(form.cells_chosen, actor=user_of(request))
+    return jobs.launch(
+        name=name[:LONGEST_NAME],
+        contestants=list(dict.fromkeys([*chosen["contestants"], *made])),
+        scenarios=scenarios,
+        caps=form.caps(),
+        samples=samples,
+        is_fresh=chosen["is_fresh"],
+        full_plan=plan,
+        actor=user_of(request),
+    )

@@ -1,0 +1,1 @@
+"""Studies: set up, opened, planned on, handed over and closed."""

@@ -1,0 +1,365 @@
+"""Every error of augment says what its reader should do; it carries data and knows no HTTP."""
+
+from __future__ import annotations
+
+
+class AugmentError(Exception):
+    """The root of augment's own errors: its text is a sentence for the person who caused it."""
+
+
+class InvalidDocument(AugmentError):
+    """A file or document breaks its format. Mend the input; nothing of it was kept.
+
+    Args:
+        what: The kind of document, such as "scene" or "Argoverse 2 log".
+        problems: One entry a fault: the path inside the document and what is allowed there.
+    """
+
+    def __init__(self, what: str, problems: list[tuple[str, str]]) -> None:
+        self.what = what
+        self.problems = problems
+        shown = "; ".join(f"{path or '(document)'}: {text}" for path, text in problems[:8])
+        more = f" (and {len(problems) - 8} more)" if len(problems) > 8 else ""
+        super().__init__(f"This {what} can't be read: {shown}{more}")
+
+
+class InvalidModification(AugmentError):
+    """A modification does not fit its scene (unknown id, id taken twice). Ask again or mend it."""
+
+
+class UnknownName(AugmentError):
+    """A name that nobody registered; the sentence lists what is allowed.
+
+    Args:
+        kind: What was looked up ("contestant", "scenario", "variant").
+        name: The value that was given.
+        allowed: The names that would have been understood.
+    """
+
+    def __init__(self, kind: str, name: str, allowed: list[str]) -> None:
+        self.kind = kind
+        self.name = name
+        self.allowed = allowed
+        super().__init__(
+            f"Unknown {kind} '{name}'. Known: {', '.join(allowed)}."
+            if allowed
+            else f"Unknown {kind} '{name}'. Known: none yet."
+        )
+
+
+class Conflict(AugmentError):
+    """The request contradicts what is stored already (a taken slug, a finished job)."""
+
+
+class CannotDrive(AugmentError):
+    """A scene or a planner does not allow a drive. Mend what the sentence names."""
+
+
+class CannotPlace(AugmentError):
+    """A contestant without a language model refuses rather than guesses. An outcome, no retry.
+
+    Args:
+        reason: What is open that it needs, or why the map or the traffic leaves no room.
+    """
+
+    def __init__(self, reason: str) -> None:
+        self.reason = reason
+        super().__init__(reason)
+
+
+class ReplyUnreadable(AugmentError):
+    """A model's answer could not be read. Ask once more with the problems, then give up.
+
+    Args:
+        problems: What was wrong, each a sentence that can go back to the model.
+    """
+
+    def __init__(self, problems: list[str]) -> None:
+        self.problems = problems
+        super().__init__("The answer can't be read: " + "; ".join(problems))
+
+
+class ToolError(AugmentError):
+    """A model called a tool in a way that has no answer. Give it the sentence; it may call again.
+
+    Args:
+        tool: The name of the tool.
+        problem: What is wrong, and what would be right.
+    """
+
+    def __init__(self, tool: str, problem: str) -> None:
+        self.tool = tool
+        self.problem = problem
+        super().__init__(f"{tool}: {problem}")
+
+
+class ModelFault(AugmentError):
+    """The wire or the endpoint broke before there was an answer.
+
+    Args:
+        message: What happened, free of keys.
+        retryable: Whether the same request may succeed later.
+        status: The HTTP status, if there was one.
+        retry_after_s: How long the endpoint asked to be left alone.
+    """
+
+    def __init__(
+        self,
+        message: str,
+        *,
+        retryable: bool,
+        status: int | None = None,
+        retry_after_s: float | None = None,
+    ) -> None:
+        self.retryable = retryable
+        self.status = status
+        self.retry_after_s = retry_after_s
+        super().__init__(message)
+
+
+class ParameterRefused(ModelFault):
+    """The endpoint does not take one parameter of the request. Send it again without.
+
+    Args:
+        parameter: Its name on the wire.
+        message: What the endpoint said, free of keys.
+        status: The HTTP status.
+    """
+
+    def __init__(self, parameter: str, message: str, *, status: int) -> None:
+        self.parameter = parameter
+        super().__init__(message, retryable=True, status=status)
+
+
+class NotSent(ModelFault):
+    """The request never left this computer: there is nothing to be billed for.
+
+    Args:
+        message: What kept it here.
+        retryable: Whether it may get through later.
+    """
+
+    def __init__(self, message: str, *, retryable: bool = False) -> None:
+        super().__init__(message, retryable=retryable)
+
+
+class EndpointBusy(NotSent):
+    """No place was free at the endpoint; nothing was sent. Raise its limits or wait.
+
+    Args:
+        endpoint: Its label.
+        waited_s: For how long somebody waited.
+    """
+
+    def __init__(self, endpoint: str, waited_s: float) -> None:
+        self.endpoint = endpoint
+        super().__init__(
+            f"no place was free at endpoint {endpoint!r} for {waited_s:g} s: "
+            "raise its limits or run fewer workers"
+        )
+
+
+class ContextTruncated(ModelFault):
+    """The endpoint silently cut the prompt. Give it a larger window; asking again cuts again.
+
+    Args:
+        message: What shows it, with numbers.
+    """
+
+    def __init__(self, message: str) -> None:
+        super().__init__(message, retryable=False)
+
+
+class ModelRefused(AugmentError):
+    """The model answered that it will not do this. An outcome, never retried."""
+
+
+class ReviewUnusable(AugmentError):
+    """A review could not be had. What was reviewed stands without one.
+
+    Args:
+        reason: Who failed and how.
+    """
+
+    def __init__(self, reason: str) -> None:
+        self.reason = reason
+        super().__init__(f"The review is unusable: {reason}")
+
+
+class QueueFault(AugmentError):
+    """No message can be sent. The rows wait and are sent by a worker as soon as it can."""
+
+
+class QueueRefused(QueueFault):
+    """There is a broker and it takes no messages: its memory is full, it is read only.
+
+    Args:
+        address: Where it is, free of passwords.
+        said: What it answered.
+    """
+
+    def __init__(self, address: str, said: str) -> None:
+        self.address = address
+        self.said = said
+        super().__init__(
+            f"Redis at {address} takes no messages: {said.rstrip('.')}. What was queued is "
+            "kept and runs as soon as Redis takes messages again."
+        )
+
+
+class QueueUnreachable(QueueFault):
+    """No broker takes messages. The rows wait and are sent by the next worker that starts.
+
+    Args:
+        address: Where a broker was looked for, free of passwords.
+    """
+
+    def __init__(self, address: str) -> None:
+        self.address = address
+        super().__init__(
+            f"No Redis at {address}: start `manage.py serve` or set REDIS_URL. What was "
+            "queued is kept and runs as soon as a worker starts."
+        )
+
+
+class Unwanted(AugmentError):
+    """Nobody needs the answer of a call any more. Ask nothing further; give up what is asked."""
+
+
+class WorkerStopping(Unwanted):
+    """This worker was told to stop and asks nobody any more. The row goes back to the queue."""
+
+
+class LeaseLost(Unwanted):
+    """Somebody else works on this row now. Drop the result; the new holder brings its own."""
+
+    def __init__(self) -> None:
+        super().__init__("the row was taken back")
+
+
+class JobCancelled(Unwanted):
+    """The job was cancelled while one of its rows was worked on. The row is cancelled with it."""
+
+    def __init__(self) -> None:
+        super().__init__("The job was cancelled.")
+
+
+class Abandoned(ModelFault):
+    """A call in flight was given up, because nobody needs its answer; it may be billed.
+
+    Args:
+        why: Who does not need it.
+    """
+
+    def __init__(self, why: Unwanted) -> None:
+        self.why = why
+        super().__init__(f"given up before there was an answer: {why}", retryable=False)
+
+
+class KeyMissing(AugmentError):
+    """The environment variable that should hold an endpoint's key is not set. Set and retry.
+
+    Args:
+        variable: The name of the variable; its value is never part of any text.
+        endpoint: The label of the endpoint that needs it.
+    """
+
+    def __init__(self, variable: str, endpoint: str) -> None:
+        self.variable = variable
+        self.endpoint = endpoint
+        super().__init__(
+            f"The environment variable {variable}, which holds the key of endpoint "
+            f"{endpoint!r}, is not set where the worker runs."
+        )
+
+
+class KeyNotAllowed(AugmentError):
+    """An endpoint names an environment variable that is not meant for keys. Nothing was read.
+
+    Args:
+        variable: Its name.
+        endpoint: The label of the endpoint that names it.
+        rule: Which may be named.
+    """
+
+    def __init__(self, variable: str, endpoint: str, rule: str) -> None:
+        self.variable = variable
+        self.endpoint = endpoint
+        super().__init__(
+            f"Endpoint {endpoint!r} names the environment variable {variable}, which may not be "
+            f"sent to an endpoint: {rule} is needed."
+        )
+
+
+class DatabaseLocked(AugmentError):
+    """The database took nothing for longer than anybody waits. Try again when it is less busy.
+
+    Args:
+        what: What could not be stored or read.
+    """
+
+    def __init__(self, what: str) -> None:
+        super().__init__(f"The database was locked for too long: {what}.")
+
+
+class MediaFault(AugmentError):
+    """Pictures can't be kept or read just now. What models answered is kept: mend it and retry.
+
+    The text is the same for every file, so that rows which failed by one cause are retried as one;
+    which file it was stands in the log.
+
+    Args:
+        deed: What was to be done with the file: read, write, look for, list, delete.
+        place: The folder or bucket.
+        cause: What the folder or bucket said, in a few words.
+    """
+
+    def __init__(self, deed: str, place: str, cause: str) -> None:
+        super().__init__(
+            f"The storage of pictures failed: could not {deed} a file in {place}: {cause}."
+        )
+
+
+class BudgetSpent(AugmentError):
+    """The next call could pass the cap of its job. Stop; raising the cap lets the job go on.
+
+    Args:
+        limit: Which cap, as a person reads it: "2.50 USD", "100 calls".
+    """
+
+    def __init__(self, limit: str) -> None:
+        self.limit = limit
+        super().__init__(f"The next call could pass the job's cap of {limit}.")
+
+
+__all__ = [
+    "Abandoned",
+    "AugmentError",
+    "BudgetSpent",
+    "CannotDrive",
+    "CannotPlace",
+    "Conflict",
+    "ContextTruncated",
+    "DatabaseLocked",
+    "EndpointBusy",
+    "InvalidDocument",
+    "InvalidModification",
+    "JobCancelled",
+    "KeyMissing",
+    "KeyNotAllowed",
+    "LeaseLost",
+    "MediaFault",
+    "ModelFault",
+    "ModelRefused",
+    "NotSent",
+    "ParameterRefused",
+    "QueueFault",
+    "QueueRefused",
+    "QueueUnreachable",
+    "ReplyUnreadable",
+    "ReviewUnusable",
+    "ToolError",
+    "UnknownName",
+    "Unwanted",
+    "WorkerStopping",
+]

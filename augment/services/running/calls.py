@@ -1,0 +1,458 @@
+"""The tries at an augmentation: opened with its lease, closed with its outcome."""
+
+from __future__ import annotations
+
+import logging
+import time
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass
+from datetime import datetime
+from typing import Any
+
+from django.db import OperationalError, connection, transaction
+from django.db.models import Max
+from django.utils import timezone
+
+from augment.errors import (
+    BudgetSpent,
+    DatabaseLocked,
+    JobCancelled,
+    LeaseLost,
+    ModelFault,
+    NotSent,
+)
+from augment.llm.costs import Price, WorstCase, worst_case
+from augment.llm.messages import Reply, Request, ToolCall, image_reference, request_hash
+from augment.models import (
+    Attempt,
+    Augmentation,
+    Endpoint,
+    GenerationJob,
+    ModelCall,
+    TranscriptNote,
+)
+from augment.services.clock import Moment
+from augment.services.endpoints.known_models import price_of
+from augment.services.running import budget, workers
+from augment.services.scenarios.pictures import store
+from augment.services.texts import make_document_storable, make_storable
+from augment.services.work import Lease, TryEnd
+from augment.variants.respondents import ModelRole, NoteKind
+
+CANCELLED = GenerationJob.objects.filter(state=GenerationJob.State.CANCELLED)
+CLOSED = GenerationJob.objects.filter(
+    state__in=(GenerationJob.State.CANCELLED, *GenerationJob.HELD)
+)
+"""Jobs in which nothing is started any more, or not for now."""
+
+
+def open_attempt(pk: int, worker: str, now: Moment) -> None:
+    """The next try at an augmentation."""
+    tries = Attempt.objects.filter(augmentation_id=pk)
+    number = (tries.aggregate(last=Max("number"))["last"] or 0) + 1
+    Attempt.objects.create(augmentation_id=pk, number=number, worker=worker, started_at=now)
+
+
+def close_attempt(pk: int, end: str, reason: str, now: Moment) -> None:
+    """How the current try ended. One that was lost stays without a time: nobody saw its end."""
+    budget.settle_unseen(row_pk=pk, now=now)
+    finished_at = None if end == TryEnd.LOST else now
+    Attempt.objects.filter(augmentation_id=pk, finished_at=None, outcome="").update(
+        finished_at=finished_at, outcome=end, reason=reason
+    )
+
+
+def insist_wanted(held: Lease[Augmentation], *, lock: bool = False) -> None:
+    """Return while the row is the holder's and its job goes on.
+
+    Raises:
+        LeaseLost: The row is somebody else's now.
+        JobCancelled: Its job is cancelled.
+    """
+    if not held.is_held(lock=lock):
+        raise LeaseLost
+    if CANCELLED.filter(augmentations=held.pk).exists():
+        raise JobCancelled
+
+
+_COPIED = ("answer", "refusal", "extras", "model_returned", "finish_reason")
+_COUNTS = ("prompt_tokens", "completion_tokens")
+
+
+def find_earlier_answer(
+    *,
+    request_hash: str,
+    augmentation_pk: int,
+    attempt_pk: int,
+    is_fresh: bool,
+    since: datetime | None = None,
+) -> ModelCall | None:
+    """The last call that answered the same request, None where it is to be asked.
+
+    Args:
+        request_hash: Of the request.
+        augmentation_pk: The row that asks; an attempt that was stopped is replayed for it.
+        attempt_pk: The attempt that asks.
+        is_fresh: Whether only that replay counts: each earlier answer once, none of this attempt.
+        since: The row is asked anew: as if fresh, and no answer from before counts.
+    """
+    calls = ModelCall.objects.filter(
+        request_hash=request_hash, served_from=None, answer__isnull=False, fault=""
+    )
+    if since is not None:
+        calls = calls.filter(started_at__gte=since)
+    if is_fresh or since is not None:
+        calls = (
+            calls.filter(attempt__augmentation=augmentation_pk)
+            .exclude(attempt=attempt_pk)
+            .exclude(copies__attempt=attempt_pk)
+        )
+    return calls.order_by("-pk").first()
+
+
+def columns_of(reply: Reply) -> dict[str, Any]:
+    """The answer as columns of its call; a refusal that says nothing else is the answer."""
+    return {
+        "answer": make_storable(reply.text or reply.refusal or ""),
+        "refusal": None if reply.refusal is None else make_storable(reply.refusal),
+        "extras": _extras_of(reply),
+        "model_returned": make_storable(reply.model)[:120],
+        "finish_reason": make_storable(reply.finish_reason)[:40],
+        "prompt_tokens": reply.prompt_tokens,
+        "completion_tokens": reply.completion_tokens,
+        "latency_s": reply.latency_s,
+    }
+
+
+def reply_of(call: ModelCall) -> Reply:
+    """The answer that a call had, as it would come again; it took no time."""
+    return Reply(
+        text=call.answer or "",
+        model=call.model_returned,
+        finish_reason=call.finish_reason,
+        refusal=call.refusal,
+        tool_calls=tuple(ToolCall(**made) for made in (call.extras or {}).get("tool_calls", [])),
+        prompt_tokens=call.prompt_tokens,
+        completion_tokens=call.completion_tokens,
+    )
+
+
+def columns_of_copy(source: ModelCall, *, now: datetime) -> dict[str, Any]:
+    """A call that was answered from another one: the same answer, and nothing spent."""
+    copied = {name: getattr(source, name) for name in (*_COPIED, *_COUNTS)}
+    nothing = {"spent_tokens": 0, "cost_nano_usd": 0, "started_at": now, "settled_at": now}
+    return copied | nothing | {"served_from_id": source.served_from_id or source.pk}
+
+
+# --- Private -----------------------------------------------------------------------------------
+
+
+def _extras_of(reply: Reply) -> dict[str, Any] | None:
+    """What a reply carries beside its text, None for most."""
+    if not reply.tool_calls:
+        return None
+    extras: dict[str, Any] = {"tool_calls": [asdict(made) for made in reply.tool_calls]}
+    if reply.calls_left_out:
+        extras["calls_left_out"] = reply.calls_left_out
+    return dict(make_document_storable(extras))
+
+
+IMAGES = "asked"
+"""The folder in the media storage of the images that models are shown."""
+
+FIRST_WAIT_S, LONGEST_WAIT_S = 0.05, 1.0
+"""Between looks at a budget whose room is held by calls in flight, and at a locked database."""
+
+STORE_WITHIN_S = 600.0
+"""For so many seconds of such waits an answer that was paid for is held until it is stored."""
+
+logger = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Open:
+    """A call in flight."""
+
+    pk: int
+    worst: WorstCase
+    price: Price | None
+
+
+class CallTranscript(ABC):
+    """A transcript that writes calls as rows, one after the other.
+
+    Args:
+        owner: The column that says whose calls they are, with its value.
+        endpoint: Who is asked.
+        others: Who is asked in the roles that have an endpoint of their own.
+        key: What keeps its answers apart from those of other options and samples.
+        numbers: How many calls the owner has already.
+        sleep: Waits for that many seconds.
+    """
+
+    def __init__(
+        self,
+        owner: Mapping[str, object],
+        endpoint: Endpoint,
+        *,
+        others: Mapping[ModelRole, Endpoint] | None = None,
+        key: Mapping[str, object] | None = None,
+        numbers: int = 0,
+        sleep: Callable[[float], None] = time.sleep,
+    ) -> None:
+        self._owner = owner
+        self._endpoint = endpoint
+        self._others = dict(others or {})
+        self._key = key
+        self._numbers = numbers
+        self._sleep = sleep
+        self._open: dict[int, _Open] = {}
+        self._prices: dict[tuple[int, str], Price | None] = {}
+        self._last: tuple[ModelRole, Request, str, dict[str, Any]] | None = None
+
+    @abstractmethod
+    def insist(self) -> None:
+        """Return while the calls are wanted; the row is locked until the transaction ends.
+
+        Raises:
+            LeaseLost: The row is somebody else's now.
+            JobCancelled: Its job is cancelled.
+        """
+
+    @abstractmethod
+    def earlier_answer(self, request_hash: str) -> ModelCall | None:
+        """The call whose answer serves that request again."""
+
+    @abstractmethod
+    def reserve(self, worst: WorstCase, price: Price | None) -> budget.Room:
+        """Take room for a call.
+
+        Raises:
+            Conflict: There is a cap in USD and the price is unknown.
+        """
+
+    @abstractmethod
+    def limit(self) -> str:
+        """The cap that leaves no room, as a person reads it."""
+
+    @abstractmethod
+    def note(self, kind: NoteKind, document: dict[str, object]) -> None:
+        """Store what happened since the last call."""
+
+    def known(self, role: ModelRole, request: Request, prompt_version: str) -> Reply | None:
+        """The answer that this request had before, recorded as a call that cost nothing.
+
+        Raises:
+            LeaseLost: The row is somebody else's now.
+        """
+        columns = self._columns(role, request, prompt_version)
+        earlier = self.earlier_answer(columns["request_hash"])
+        if earlier is None:
+            return None
+        with transaction.atomic():
+            self.insist()
+            ModelCall.objects.create(
+                **columns, **columns_of_copy(earlier, now=timezone.now()), number=self._numbers + 1
+            )
+        self._numbers += 1
+        return reply_of(earlier)
+
+    def asked(self, role: ModelRole, request: Request, prompt_version: str) -> int:
+        """Reserve the worst case of a request and store it; returns its number, from 1.
+
+        Where calls in flight hold the room that this one needs, waits for them to end.
+
+        Raises:
+            LeaseLost: The row is somebody else's now.
+            JobCancelled: Its job is cancelled.
+            BudgetSpent: The job has no room for the call, and is stopped.
+            WorkerStopping: This worker is to stop; what it was answered so far is kept.
+            Conflict: The job is capped in USD and the price is unknown.
+        """
+        columns = self._columns(role, request, prompt_version)
+        for message in request.messages:
+            for png in message.images:
+                store(png, folder=IMAGES)
+        worst, price = worst_case(request), self._price_of(self._at(role), request.model)
+        wait_s = FIRST_WAIT_S
+        while True:
+            workers.insist_on_going_on()
+            room, pk = self._try(columns, worst, price)
+            if room == budget.Room.TAKEN:
+                self._numbers += 1
+                self._open[self._numbers] = _Open(pk=pk, worst=worst, price=price)
+                return self._numbers
+            if room == budget.Room.SPENT:
+                raise BudgetSpent(self.limit())
+            self._sleep(wait_s)
+            wait_s = min(1.5 * wait_s, LONGEST_WAIT_S)
+
+    def sending(self, number: int) -> None:
+        """Store that the call is sent now; from here on it may be billed.
+
+        Raises:
+            LeaseLost: Somebody took the row over and settled the call as one that never was.
+            WorkerStopping: It waited for its place for so long that this worker is to stop.
+        """
+        workers.insist_on_going_on()
+        call = ModelCall.objects.filter(pk=self._open[number].pk, settled_at=None)
+        if not call.update(sent_at=timezone.now()):
+            raise LeaseLost
+
+    def answered(self, number: int, reply: Reply, fault: ModelFault | None = None) -> None:
+        """Store the raw answer to that call and what it used.
+
+        An answer with a fault is kept and paid for, but never served again.
+        """
+        call = self._open.pop(number)
+        used = budget.used_by_reply(reply, worst=call.worst, price=call.price)
+        answer = columns_of(reply)
+        # Also where there is none: the worker may have been thought dead meanwhile.
+        answer["fault"] = "" if fault is None else make_storable(sentence_of(fault))
+        self._settle(call, used, answer)
+
+    def broke(self, number: int, fault: ModelFault) -> None:
+        """Store why there was no answer to that call, and what it may have used."""
+        call = self._open.pop(number)
+        used = budget.used_by_fault(fault, worst=call.worst, price=call.price)
+        broken: dict[str, Any] = {"fault": make_storable(sentence_of(fault))}
+        if isinstance(fault, NotSent):
+            broken["sent_at"] = None
+        self._settle(call, used, broken)
+
+    def _settle(self, call: _Open, used: budget.Used, answer: dict[str, Any]) -> None:
+        """Store how a call ended. It was paid for, so a locked database is waited out.
+
+        Raises:
+            DatabaseLocked: It never took it.
+        """
+        wait_s, waited_s = FIRST_WAIT_S, 0.0
+        while True:
+            try:
+                budget.settle(call_pk=call.pk, used=used, now=timezone.now(), answer=answer)
+                return
+            except OperationalError as error:
+                if waited_s >= STORE_WITHIN_S:
+                    raise DatabaseLocked(f"the end of a call was not stored ({error})") from error
+                logger.warning("The end of a call is not stored yet, trying again: %s", error)
+                if not connection.in_atomic_block:
+                    connection.close_if_unusable_or_obsolete()
+            self._sleep(wait_s)
+            waited_s += wait_s
+            wait_s = min(1.5 * wait_s, LONGEST_WAIT_S)
+
+    def _columns(self, role: ModelRole, request: Request, version: str) -> dict[str, Any]:
+        """What a call's row says about the request, whoever answers it.
+
+        Asked of one request several times in a row: whether it is known, and for each attempt.
+        """
+        if self._last is not None and self._last[:3] == (role, request, version):
+            return self._last[3]
+        document = make_document_storable(request.to_document(image_url=image_reference))
+        columns = {
+            **self._owner,
+            "role": role,
+            "request": document,
+            "request_hash": request_hash(
+                base_url=self._at(role).base_url,
+                document=document,
+                prompt_version=version,
+                options=self._key,
+            ),
+            "prompt_version": version,
+        }
+        self._last = (role, request, version, columns)
+        return columns
+
+    @transaction.atomic
+    def _try(
+        self, columns: dict[str, Any], worst: WorstCase, price: Price | None
+    ) -> tuple[budget.Room, int]:
+        """Take room and write the row in one transaction, or nothing of both."""
+        self.insist()
+        room = self.reserve(worst, price)
+        if room != budget.Room.TAKEN:
+            return room, 0
+        call = ModelCall.objects.create(
+            **columns,
+            number=self._numbers + 1,
+            started_at=timezone.now(),
+            reserved_tokens=worst.tokens,
+            reserved_nano_usd=worst.nano_usd(price),
+        )
+        return room, call.pk
+
+    def _at(self, role: ModelRole) -> Endpoint:
+        return self._others.get(role, self._endpoint)
+
+    def _price_of(self, endpoint: Endpoint, model: str) -> Price | None:
+        asked = (endpoint.pk, model)
+        if asked not in self._prices:
+            self._prices[asked] = price_of(endpoint, model)
+        return self._prices[asked]
+
+
+class RowTranscript(CallTranscript):
+    """The calls of one attempt at an augmentation, within the budget of its job.
+
+    Nothing more is asked for an attempt whose lease was taken back (its result would be dropped)
+    or whose job has no room for the call.
+
+    Args:
+        held: The lease on the row.
+        row: The augmentation, with its job.
+        endpoint: As for every transcript, and so are the others.
+    """
+
+    def __init__(
+        self,
+        held: Lease[Augmentation],
+        row: Augmentation,
+        endpoint: Endpoint,
+        *,
+        others: Mapping[ModelRole, Endpoint] | None = None,
+        key: Mapping[str, object] | None = None,
+        sleep: Callable[[float], None] = time.sleep,
+    ) -> None:
+        self._held = held
+        self._row = row
+        self._attempt = row.attempts.latest("number")
+        self._notes = 0
+        super().__init__({"attempt": self._attempt}, endpoint, others=others, key=key, sleep=sleep)
+
+    def insist(self) -> None:
+        insist_wanted(self._held, lock=True)
+
+    def earlier_answer(self, request_hash: str) -> ModelCall | None:
+        return find_earlier_answer(
+            request_hash=request_hash,
+            augmentation_pk=self._row.pk,
+            attempt_pk=self._attempt.pk,
+            is_fresh=self._row.job.is_fresh,
+            since=self._row.asked_anew_at,
+        )
+
+    def reserve(self, worst: WorstCase, price: Price | None) -> budget.Room:
+        return budget.reserve(job_pk=self._row.job_id, worst=worst, price=price)
+
+    def limit(self) -> str:
+        return budget.limit_of(GenerationJob.objects.get(pk=self._row.job_id))
+
+    def note(self, kind: NoteKind, document: dict[str, object]) -> None:
+        self._notes += 1
+        TranscriptNote.objects.create(
+            attempt=self._attempt,
+            number=self._notes,
+            after_call=self._numbers,
+            kind=kind,
+            document=make_document_storable(document),
+        )
+
+
+def sentence_of(fault: ModelFault) -> str:
+    """What broke, with the HTTP status where there was one."""
+    text = str(fault)
+    if fault.status is None or str(fault.status) in text:
+        return text
+    return f"HTTP {fault.status}: {text}"
