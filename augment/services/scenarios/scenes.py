@@ -27,7 +27,6 @@ from augment.scene.codec import (
 from augment.scene.density import spawn_traffic
 from augment.scene.entities import (
     Modification,
-    ScenarioType,
     Scene,
     TrafficAgent,
     TrafficDensity,
@@ -36,6 +35,8 @@ from augment.scene.entities import (
     check_fits,
     without_traffic,
 )
+from augment.scene.entities import ScenarioType as ScenarioType
+from augment.scene.entities import in_type_order as in_type_order
 from augment.scene.intent import Intent, IntentOrigin
 from augment.scene.lane_graph import LaneGraph
 from augment.services.events import log_event
