@@ -6,6 +6,7 @@ Frame: ego frame. P points of a boundary.
 from __future__ import annotations
 
 import numpy as np
+import shapely
 from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
@@ -26,8 +27,6 @@ def boundary_within(
 
 def distance_to_area_m(boundary_m: FloatArray, points_m: FloatArray) -> float:
     """From the nearest of points (N, 2) to an area with a boundary (P, 2), 0 inside."""
-    import shapely
-
     area = shapely.make_valid(shapely.Polygon(boundary_m))
     return float(shapely.distance(area, shapely.MultiPoint(points_m)))
 
@@ -40,8 +39,6 @@ def simplify_boundary(boundary_m: FloatArray, tolerance_m: float) -> FloatArray:
     end of that edge to the other, every point of the edge is within the tolerance of that piece.
     A boundary that would be less than a triangle stays as it is.
     """
-    import shapely
-
     closed = shapely.LineString([*boundary_m, boundary_m[0]])
     kept = shapely.get_coordinates(shapely.simplify(closed, tolerance_m, preserve_topology=False))[
         :-1

@@ -16,10 +16,6 @@ HEAVY = {
     "httpx2": (*("augment.llm.openai_wire", "augment.llm.wire_transport"),),
     "httpcore2": ("augment.llm.wire_transport", "augment.llm.wire_network"),
     "genai_prices": ("augment.services.endpoints.known_models",),
-    "shapely": (
-        *("augment.checks", "augment.scene", "augment.simulation", "augment.formats"),
-        "augment.prompts.clip",
-    ),
     "pandas": ("augment.formats", "arena.exports"),
     "pyarrow": ("augment.formats", "arena.exports", "arena.rating.votes_file"),
     "scenariogeneration": ("augment.formats",),
