@@ -20,8 +20,8 @@ from statistics import fmean, mean, median
 
 from augment.baselines.rule_placer import place
 from augment.errors import CannotPlace
-from augment.fake_llm.requests import SpokenMessage
 from augment.fake_llm.sight import task_of
+from augment.fake_llm.wire import SpokenMessage
 from augment.metrics.displacement import displacement
 from augment.prompts.fill import Form, modifier_messages
 from augment.prompts.vectors import LaneFormat

@@ -2,11 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, field
+from functools import partial
+from typing import cast
 
+from django.contrib import messages
+from django.forms import BaseForm
 from django.http import HttpRequest, HttpResponse
 from django.shortcuts import render
 from django.utils.text import slugify
+
+from arena.errors import ArenaError
+from augment.errors import AugmentError
 
 SURE = "sure"
 """What the page's own button sends; without it nothing is done."""
@@ -16,6 +25,28 @@ CHANGE = "change"
 
 TYPED, WHY = "typed", "why"
 """What the question's own fields send: a name as it was typed, and a reason."""
+
+
+REFUSALS = (ArenaError, AugmentError)
+"""What a service raises; its text is for whoever asked."""
+
+
+@contextmanager
+def _told_by(tell: Callable[[str], object]) -> Iterator[None]:
+    try:
+        yield
+    except REFUSALS as error:
+        tell(str(error))
+
+
+def refusals_told(request: HttpRequest) -> AbstractContextManager[None, bool]:
+    """Show what a service refuses as a message on the next page."""
+    return cast(AbstractContextManager[None, bool], _told_by(partial(messages.error, request)))
+
+
+def refusals_in(form: BaseForm, field: str | None = None) -> AbstractContextManager[None, bool]:
+    """Show what a service refuses as an error of the form."""
+    return cast(AbstractContextManager[None, bool], _told_by(partial(form.add_error, field)))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

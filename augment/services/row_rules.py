@@ -44,7 +44,7 @@ from augment.services.scenarios.scenes import (
 from augment.services.texts import check_picture_name, check_prose, check_stored_name, one_line
 from augment.simulation.planners import OFFSETS_M
 from augment.variants.options import options_from_document
-from augment.variants.transcript import ModelRole
+from augment.variants.respondents import ModelRole
 
 LONGEST_TRACE = 1 << 26
 """Of a drive to look at, unpacked: some hundred times what 15 s take."""

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import hashlib
 
-from augment.render.bev import draw
+from augment.render.bev import draw, draw_for_review
 from augment.render.camera import camera_for
-from augment.render.reviewed import draw_for_review
 from augment.scene.entities import Modification, Scene
 from tests.golden.conftest import Check
 from tests.render.pictures import opened

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from augment.render.legend_keys import change_keys, scene_keys
+from augment.render.legend import change_keys, scene_keys
 from augment.scene.entities import AgentType, Modification, SceneOptions, TurnType
 from tests.scenes import cone, junction, pedestrian, scene, vehicle
 

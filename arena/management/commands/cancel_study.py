@@ -6,10 +6,8 @@ from typing import Any
 
 from django.core.management.base import CommandError, CommandParser
 
-from arena.errors import ArenaError
 from arena.queries.studies.lists import study_named
 from arena.services.ending import cancel_study
-from augment.errors import AugmentError
 from augment.services.terminal import TerminalCommand
 
 
@@ -26,11 +24,8 @@ class Command(TerminalCommand):
 
     def handle(self, *args: Any, **options: Any) -> None:
         """Cancel the study and say so."""
-        try:
-            study = study_named(options["study"])
-            if options["sure"] != study.name:
-                raise CommandError(f"Nothing was cancelled: --sure must say {study.name!r}.")
-            cancel_study(study=study, why=options["why"])
-        except (ArenaError, AugmentError) as error:
-            raise CommandError(str(error)) from error
+        study = study_named(options["study"])
+        if options["sure"] != study.name:
+            raise CommandError(f"Nothing was cancelled: --sure must say {study.name!r}.")
+        cancel_study(study=study, why=options["why"])
         self.stdout.write(f"Cancelled {study.name!r}. Its votes stay: export votes.")

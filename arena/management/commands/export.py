@@ -40,10 +40,7 @@ class Command(TerminalCommand):
         if options["what"] == "study":
             self._study(options)
             return
-        try:
-            written: ExportedFile = options["write"](options, self.stderr.write)
-        except (ArenaError, AugmentError) as error:
-            raise CommandError(str(error)) from error
+        written: ExportedFile = options["write"](options, self.stderr.write)
         self._deliver(written, options["out"])
 
     def _study(self, options: dict[str, Any]) -> None:

@@ -51,10 +51,7 @@ class Command(TerminalCommand):
         study = Study.objects.filter(name=name).first()
         if study is None:
             raise CommandError(f"There is no study named {name!r}.")
-        try:
-            return known_of(study).values
-        except AugmentError as error:
-            raise CommandError(str(error)) from error
+        return known_of(study).values
 
     def _say(self, question: Question, found: Outlook) -> None:
         self.stdout.write("")

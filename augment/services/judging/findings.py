@@ -22,7 +22,7 @@ from augment.checks.registry import check_against_intent
 from augment.errors import InvalidDocument, InvalidModification
 from augment.metrics.fault_guess import first_guess
 from augment.models import Augmentation, Scenario
-from augment.render.annotated import FaultMark, draw_annotated
+from augment.render.bev import FaultMark, draw_annotated
 from augment.scene.codec import EGO_ID as EGO_ID
 from augment.scene.codec import modification_from_document
 from augment.scene.entities import Scene

@@ -23,8 +23,7 @@ from augment.errors import (
     NotSent,
 )
 from augment.llm.costs import Price, WorstCase, worst_case
-from augment.llm.fingerprint import image_reference, request_hash
-from augment.llm.messages import Reply, Request, ToolCall
+from augment.llm.messages import Reply, Request, ToolCall, image_reference, request_hash
 from augment.models import (
     Attempt,
     Augmentation,
@@ -39,7 +38,7 @@ from augment.services.running import budget, workers
 from augment.services.scenarios.pictures import store
 from augment.services.texts import make_document_storable, make_storable
 from augment.services.work import Lease, TryEnd
-from augment.variants.transcript import ModelRole, NoteKind
+from augment.variants.respondents import ModelRole, NoteKind
 
 CANCELLED = GenerationJob.objects.filter(state=GenerationJob.State.CANCELLED)
 CLOSED = GenerationJob.objects.filter(
@@ -422,10 +421,10 @@ class RowTranscript(CallTranscript):
         self._notes = 0
         super().__init__({"attempt": self._attempt}, endpoint, others=others, key=key, sleep=sleep)
 
-    def insist(self) -> None:  # noqa: D102
+    def insist(self) -> None:
         insist_wanted(self._held, lock=True)
 
-    def earlier_answer(self, request_hash: str) -> ModelCall | None:  # noqa: D102
+    def earlier_answer(self, request_hash: str) -> ModelCall | None:
         return find_earlier_answer(
             request_hash=request_hash,
             augmentation_pk=self._row.pk,
@@ -434,13 +433,13 @@ class RowTranscript(CallTranscript):
             since=self._row.asked_anew_at,
         )
 
-    def reserve(self, worst: WorstCase, price: Price | None) -> budget.Room:  # noqa: D102
+    def reserve(self, worst: WorstCase, price: Price | None) -> budget.Room:
         return budget.reserve(job_pk=self._row.job_id, worst=worst, price=price)
 
-    def limit(self) -> str:  # noqa: D102
+    def limit(self) -> str:
         return budget.limit_of(GenerationJob.objects.get(pk=self._row.job_id))
 
-    def note(self, kind: NoteKind, document: dict[str, object]) -> None:  # noqa: D102
+    def note(self, kind: NoteKind, document: dict[str, object]) -> None:
         self._notes += 1
         TranscriptNote.objects.create(
             attempt=self._attempt,

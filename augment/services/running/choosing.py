@@ -23,7 +23,7 @@ from augment.services.endpoints.treatments import (
     viewer_of,
 )
 from augment.variants.options import ToolProtocol
-from augment.variants.transcript import ModelRole
+from augment.variants.respondents import ModelRole
 
 Kind = Contestant.Kind
 

@@ -28,7 +28,7 @@ from augment.errors import (
     Unwanted,
 )
 from augment.llm.client import ChatClient
-from augment.llm.cutting import shorten
+from augment.llm.messages import shorten
 from augment.models import Augmentation, Contestant, Endpoint
 from augment.scene.codec import modification_from_document, modification_to_document
 from augment.scene.entities import Modification, Scene
@@ -57,8 +57,7 @@ from augment.services.work import Lease, Settlement, WorkKind, change_all
 from augment.variants import pipeline
 from augment.variants.options import ToolProtocol, recipe_with
 from augment.variants.recipes import find_recipe
-from augment.variants.respondents import RespondentClient
-from augment.variants.transcript import ModelRole
+from augment.variants.respondents import ModelRole, RespondentClient
 
 logger = logging.getLogger(__name__)
 

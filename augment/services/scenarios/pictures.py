@@ -23,9 +23,8 @@ from augment.baselines.registry import break_reference
 from augment.models import Augmentation, BaseScene, Contestant, GenerationJob, Scenario
 from augment.render.bev import draw
 from augment.render.camera import AROUND_THE_EGO, LOOK, Camera, camera_for
-from augment.render.description import describe
-from augment.render.legend_keys import change_keys, scene_keys
-from augment.render.shrunken import shrink, shrink_png
+from augment.render.canvas import shrink, shrink_png
+from augment.render.legend import change_keys, describe, scene_keys
 from augment.scene.codec import (
     modification_from_document,
     modification_to_document,
@@ -305,7 +304,7 @@ def legends_of_changes(views: Mapping[int, Mapping[str, Any]]) -> dict[int, set[
 
 
 Description = list[dict[str, Any]]
-"""The lines of augment.render.description, ready to be stored."""
+"""The lines of augment.render.legend, ready to be stored."""
 
 
 def descriptions(

@@ -1,7 +1,4 @@
-"""The requests of the OpenAI-compatible wire as the stand-in takes them.
-
-Stricter than most servers on purpose: a client that passes here sends nothing odd.
-"""
+"""Whether bytes are a whole picture: every chunk intact, every row there."""
 
 from __future__ import annotations
 
@@ -9,11 +6,58 @@ import base64
 import binascii
 import hashlib
 import json
+import struct
+import zlib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
 
-from augment.fake_llm.png import size_of
+from augment.llm.costs import least_tokens
+
+_SIGNATURE = b"\x89PNG\r\n\x1a\n"
+_CHANNELS = {0: 1, 2: 3, 3: 1, 4: 2, 6: 4}
+_MOST_PIXELS = 16_000_000
+
+
+def size_of(png: bytes) -> tuple[int, int]:
+    """Width and height in pixels of a PNG that can be decoded to its last row.
+
+    Raises:
+        ValueError: It can't be; the text says why.
+    """
+    if not png.startswith(_SIGNATURE):
+        raise ValueError("the image is not a PNG")
+    try:
+        header, packed = _chunks(png)
+        width, height, depth, colour, _, _, interlaced = struct.unpack(">IIBBBBB", header)
+        if not 0 < width * height <= _MOST_PIXELS or colour not in _CHANNELS or interlaced:
+            raise ValueError("the PNG has a form that is not taken")
+        row = 1 + (width * depth * _CHANNELS[colour] + 7) // 8
+        rows = zlib.decompressobj().decompress(packed, row * height + 1)
+    except (struct.error, zlib.error):
+        raise ValueError("the PNG is damaged") from None
+    if len(rows) != row * height or max(rows[::row]) > 4:
+        raise ValueError("the PNG lacks rows or has too many")
+    return width, height
+
+
+def _chunks(png: bytes) -> tuple[bytes, bytes]:
+    """The header and the packed rows; every checksum is looked at."""
+    header, packed, at = b"", b"", len(_SIGNATURE)
+    while True:
+        length, kind = struct.unpack_from(">I4s", png, at)
+        data = png[at + 8 : at + 8 + length]
+        (checksum,) = struct.unpack_from(">I", png, at + 8 + length)
+        if checksum != zlib.crc32(kind + data):
+            raise ValueError("a checksum of the PNG is wrong")
+        if kind == b"IEND":
+            return header, packed
+        header = data if kind == b"IHDR" else header
+        packed += data if kind == b"IDAT" else b""
+        at += 12 + length
+
 
 _PNG = "data:image/png;base64,"
 
@@ -231,3 +275,109 @@ def _check_end(request: ChatRequest) -> None:
         raise BadRequest("there are no tools to choose from", "tool_choice")
     if any(message.tool_calls for message in request.messages):
         raise BadRequest("tools are called and none is named", "tools")
+
+
+_CHARACTERS_PER_TOKEN = 4
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Response:
+    """What goes back over HTTP.
+
+    Attributes:
+        wait_s: How long nothing is sent before.
+        cut_at: After how many bytes of the body the connection drops; None sends all.
+    """
+
+    status: int = 200
+    body: bytes = b""
+    content_type: str = "application/json"
+    headers: Mapping[str, str] = field(default_factory=dict)
+    wait_s: float = 0.0
+    cut_at: int | None = None
+
+
+def tool_calls(calls: Sequence[tuple[str, str]], seed: str) -> list[dict[str, object]]:
+    """Calls (name, arguments) in the form of the wire, numbered and signed."""
+    entries: list[dict[str, object]] = []
+    for number, (name, arguments) in enumerate(calls):
+        digest = hashlib.sha256(f"{seed}:{number}".encode()).hexdigest()
+        call_id = f"call_{digest[:16]}"
+        entries.append(
+            {
+                "id": call_id,
+                "type": "function",
+                "function": {"name": name, "arguments": arguments},
+                "extra_content": {"fake": {"signature": signature_of(call_id)}},
+            }
+        )
+    return entries
+
+
+def completion(
+    request: ChatRequest,
+    text: str | None,
+    *,
+    finish_reason: str = "stop",
+    refusal: str | None = None,
+    with_usage: bool = True,
+    calls: Sequence[tuple[str, str]] = (),
+) -> dict[str, object]:
+    """A chat completion with that text; the same request and text give the same document."""
+    prompt_tokens = prompt_tokens_of(request)
+    completion_tokens = 1 + _tokens(text or refusal or "")
+    digest = hashlib.sha256((request.model_dump_json() + str(text)).encode()).hexdigest()
+    message: dict[str, object] = {"role": "assistant", "content": text, "refusal": refusal}
+    if calls:
+        message["tool_calls"] = tool_calls(calls, digest)
+    document: dict[str, object] = {
+        "id": f"chatcmpl-{digest[:24]}",
+        "object": "chat.completion",
+        "created": 0,
+        "model": request.model,
+        "choices": [
+            {
+                "index": 0,
+                "message": message,
+                "finish_reason": "tool_calls" if calls else finish_reason,
+                "logprobs": None,
+            }
+        ],
+    }
+    if with_usage:
+        document["usage"] = {
+            "prompt_tokens": prompt_tokens,
+            "completion_tokens": completion_tokens,
+            "total_tokens": prompt_tokens + completion_tokens,
+        }
+    return document
+
+
+def prompt_tokens_of(request: ChatRequest) -> int:
+    """About as many tokens as the messages have."""
+    return 1 + sum(_tokens(message.text) for message in request.messages)
+
+
+def _tokens(text: str) -> int:
+    """About as many as a vocabulary makes of it: words of four characters, single numbers."""
+    return max(len(text) // _CHARACTERS_PER_TOKEN, least_tokens(text))
+
+
+def as_json(document: object, **changes: object) -> Response:
+    """A response with that document as its body."""
+    body = json.dumps(document).encode()
+    return Response(body=body, **changes)  # type: ignore[arg-type]
+
+
+def error(
+    status: int,
+    message: str,
+    *,
+    kind: str = "invalid_request_error",
+    param: str | None = None,
+    code: str | None = None,
+    headers: Mapping[str, str] | None = None,
+) -> Response:
+    """A response with OpenAI's error body."""
+    body = {"error": {"message": message, "type": kind, "param": param, "code": code}}
+    return as_json(body, status=status, headers=headers or {})
