@@ -33,8 +33,8 @@ from arena.models.ratings import STORED
 from arena.pairing.order import MAIN, REPEAT
 from arena.queries.studies.results import must_read_results
 from arena.queries.votes.sets import Filters
-from arena.rating.bootstrap import Unit
 from arena.rating.leaderboard import Intervals, Line, Method
+from arena.rating.rules import Unit
 from arena.services.ratings import DEFAULT_ROUNDS, MOST_ROUNDS, is_big, plan_snapshot, rate
 from arena.services.study_plan import HIGHEST_SEED
 from arena.studies.api import get_study

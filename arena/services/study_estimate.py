@@ -5,8 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from arena.rating.planning import Question
-from arena.rating.sample_size import StudyDesign
+from arena.rating.planning import Question, StudyDesign
 from augment.services.inputs import InputKind, input_field, inputs_of
 
 POINTS = "Elo points"

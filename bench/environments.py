@@ -1,4 +1,4 @@
-"""Making a rival's environment from its lock file, once."""
+"""Making a bench's own environment from its lock file, once."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ from collections.abc import Mapping
 from pathlib import Path
 from types import MappingProxyType
 
-ROOT = Path(__file__).resolve().parents[2]
-RIVALS = Path(__file__).parent
+ROOT = Path(__file__).resolve().parents[1]
+BENCH = Path(__file__).parent
 
 
 class NotInstalled(Exception):
-    """A rival can't be installed here (no package index, no room); the text is pip's last line."""
+    """It can't be installed here (no package index, no room); the text is pip's last line."""
 
 
 def python_of(
     name: str, lock: Path | None = None, settings: Mapping[str, str] = MappingProxyType({})
 ) -> Path:
-    """Return the interpreter of a rival's environment, made or renewed where the lock changed.
+    """Return the interpreter of a bench's own environment, made or renewed where the lock changed.
 
     Args:
         settings: Environment variables for what pip compiles.
@@ -30,7 +30,7 @@ def python_of(
     Raises:
         NotInstalled: pip could not install what the lock names.
     """
-    lock = lock or RIVALS / name / "requirements.txt"
+    lock = lock or BENCH / name / "requirements.txt"
     folder = ROOT / ".bench" / name
     stamp = folder / "installed"
     digest = hashlib.sha256(lock.read_bytes()).hexdigest()
