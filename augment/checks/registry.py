@@ -1,8 +1,8 @@
 """Every check of a modification, and the functions that run them.
 
-In: a `Scene` and a `Modification`, and what its instruction asks for where that is stored. Out:
-`Finding`s, each a measured fact with its numbers, its severity and the class of fault that it
-speaks for. Nothing else is looked at: never a reference, never anybody's label.
+In: a `Scene`, a `Modification`, and what its instruction asks for where that is stored.
+Out: `Finding`s, each a measured fact with its numbers, its severity and the class of fault that
+it speaks for. Nothing else is looked at: never a reference, never anybody's label.
 
 Adding a check is adding one function to `CHECKS`, which never ask what was wanted, or to
 `ASKED_CHECKS`.
