@@ -155,8 +155,6 @@ class _Layers:
 
     def _lines(self, blocks: list[Any], system: int, layer: str) -> list[FloatArray]:
         """The points (P, 2) of each geometry; all of a layer are projected in one go."""
-        import shapely
-
         if not blocks:
             return []
         try:
