@@ -19,6 +19,7 @@ from typing import Any
 from urllib.parse import quote
 
 import numpy as np
+import shapely
 
 from augment.errors import InvalidDocument
 from augment.formats.road_map import FloatArray, RoadMap, Segment, fill_widths, map_notes
@@ -184,8 +185,6 @@ def _well_known_binary(block: Any) -> bytes:
 
 def _longest_line(geometry: Any) -> Any:
     """The longest part of a line, or the longest outline of a polygon."""
-    import shapely
-
     parts = [
         part.exterior if part.geom_type == "Polygon" else part
         for part in shapely.get_parts(geometry).tolist()

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from statistics import fmean
 
 import numpy as np
+import shapely
 from numpy.typing import NDArray
 
 from augment.scene.entities import AreaKind, TrafficLight, TrafficSide, TurnType
@@ -133,8 +134,6 @@ def edge_of(line: FloatArray, parts: Iterable[tuple[int, int, FloatArray]]) -> F
         line: The lane's middle (P, 2).
         parts: From which of its points to which (both among them) what line is its edge.
     """
-    import shapely
-
     edge = np.full(line.shape, np.nan)
     for start, end, beside in parts:
         rows = slice(max(start, 0), max(end + 1, 0))
@@ -240,8 +239,6 @@ def crossing_segments(segments: Mapping[Name, Segment]) -> set[Name]:
     A segment of a fork or a merge does if its line crosses another's, unless both are of the same
     fork or merge; so does one that leads from a fork to a merge beside such a segment.
     """
-    import shapely
-
     names, lines = [], []
     for name, segment in segments.items():
         points = segment.centerline

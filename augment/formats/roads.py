@@ -13,6 +13,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import shapely
 
 from augment.errors import InvalidDocument
 from augment.formats.road_map import (
@@ -116,8 +117,6 @@ def width_between(line: Polyline, left: Polyline, right: Polyline) -> float:
 
     Points at the same part of both boundaries lie askew where the lane begins askew.
     """
-    import shapely
-
     middle = shapely.points(line.points_m[:: max(1, len(line.points_m) // 100)])
     widths = sum(
         shapely.distance(shapely.LineString(side.points_m), middle) for side in (left, right)
