@@ -9,7 +9,7 @@ from django.contrib.auth.models import User
 from django.utils import timezone
 
 from arena.models import Matchup, Study, Vote
-from arena.services.people import create_person
+from arena.people.services import create_person
 from arena.voting.services.casting import cast_vote, decision_of
 from augment.models import Augmentation, BaseScene, Contestant, GenerationJob, Scenario
 from augment.scene.codec import modification_to_document, scene_to_document

@@ -16,7 +16,7 @@ import numpy as np
 from django.db import transaction
 
 from arena.models import Matchup, Study, Vote
-from arena.services.replanning import plan_batch
+from arena.studies.services.planning import plan_batch
 from arena.voting.services.casting import cast_vote, decision_of
 from augment.errors import Conflict
 from augment.models import Augmentation

@@ -10,7 +10,7 @@ from django.utils import timezone
 from pytest_django import Settings
 
 from arena.models import Study, Vote
-from arena.services.studies import close_study
+from arena.studies.services.opening import close_study
 from arena.voting.queries.showings import VIEW_OF_OLD
 from augment.models import Contestant, Event, GenerationJob
 from tests.api.asking import body_for, error_of, post, signed_in

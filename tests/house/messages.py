@@ -13,11 +13,10 @@ from tests.house.source import ROOT
 VOTER_MODULES = (
     *("arena/api/errors.py", "arena/models/votes.py", "arena/templatetags/shell.py"),
     *("arena/voting/queries/showings.py", "arena/voting/queries/showings.py"),
-    *("arena/voting/queries/keys.py", "arena/services/api_tokens.py"),
-    *("arena/services/enrolments.py", "arena/services/preferences.py"),
-    *("arena/web/people/api_tokens.py", "arena/web/people/enrolments.py", "arena/web/forms.py"),
-    *("arena/web/people/accounts.py", "arena/voting/pages.py"),
-    *("arena/web/screen.py", "arena/voting/pages.py"),
+    *("arena/voting/queries/keys.py", "arena/people/services.py", "arena/people/links.py"),
+    *("arena/people/pages.py", "arena/site/forms.py", "arena/voting/screen.py"),
+    *("arena/studies/pages/experts.py", "arena/studies/services/taking_part.py"),
+    *("arena/voting/pages.py", "arena/voting/pages.py"),
 )
 """Modules whose messages stand on pages that voters are shown."""
 

@@ -8,8 +8,8 @@ from arena.models import Study
 from arena.pairing.plan import plan
 from arena.results.queries.votes import Filters, last_vote_of, vote_set
 from arena.results.services.ratings import rate_now as rate
-from arena.services.plans import rules_of
-from arena.services.studies import close_study
+from arena.studies.services.opening import close_study
+from arena.studies.services.planning import rules_of
 from augment.models import Augmentation
 from augment.scene.codec import modification_to_document
 from augment.scene.entities import Modification

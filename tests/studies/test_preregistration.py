@@ -13,12 +13,13 @@ from django.urls import reverse
 from arena.errors import NothingToPlan
 from arena.models import Study
 from arena.rating.snapshot_document import PairP
-from arena.results.exports.tables import leaderboard_table
-from arena.results.exports.writers import FORMATS, bundle_files, plain_text
 from arena.results.services.ratings import rate_now as rate
-from arena.services.hypotheses import HypothesisVerdict
-from arena.services.preregistration import preregistration_bytes, preregistration_sha256
-from arena.services.studies import close_study
+from arena.studies.services.opening import (
+    close_study,
+    preregistration_bytes,
+    preregistration_sha256,
+)
+from arena.studies.services.plan import HypothesisVerdict
 from augment.models import Contestant
 from tests import study_rows
 from tests.opening import open_study

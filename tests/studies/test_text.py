@@ -6,8 +6,8 @@ import pytest
 from django.utils.translation import override
 
 from arena.models import Study
-from arena.services.handing_over import hand_over
-from arena.services.replanning import plan_batch
+from arena.studies.services.planning import plan_batch
+from arena.studies.services.taking_part import hand_over
 from arena.voting.queries.showings import as_shown, describe_in_words
 from augment.models import Augmentation
 from tests.described import a_described_study, draw_changes, said_of, with_text

@@ -60,9 +60,7 @@ def test_a_second_look_asks_for_no_votes() -> None:
     study = mixed_study()
     snapshot = rate(study=study)
     for look in (
-        lambda: coverage(study),
         lambda: tallies(study),
-        lambda: expert_lines(study, timezone.now()),
         lambda: read_evidence(snapshot),
         lambda: list(vote_page(snapshot, VoteSearch(order="disputed"), 1)),
     ):

@@ -11,8 +11,8 @@ from django.test import Client
 from django.urls import reverse
 
 from arena.models import Authorship, Snapshot, Study
+from arena.people.links import mark_author
 from arena.results.services.ratings import rate_now as rate
-from arena.services.authorships import mark_author
 from augment.models import Event
 from tests.full_study import Size, full_study
 from tests.study_rows import a_study, matchups_of, vote

@@ -17,9 +17,8 @@ from arena.jobs.exports.driving import FORMATS, SCORE_LABELS, DrivingTable, driv
 from arena.jobs.queries import DRIVES, Part, before_of, shown_augmentations
 from arena.jobs.queries import drive_cells as cells_of
 from arena.models import Snapshot
-from arena.results.exports.tables import LeaderboardTable
-from arena.web.access import ADMIN, STAFF, allow_only
-from arena.web.listing import choice_asked, page_asked
+from arena.site.access import ADMIN, STAFF, allow_only
+from arena.site.listing import choice_asked, page_asked
 from augment.errors import AugmentError, QueueFault, UnknownName
 from augment.models import GenerationJob, Simulation
 from augment.services.judging import simulations

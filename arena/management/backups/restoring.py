@@ -26,11 +26,8 @@ from arena.management.backups.archive import (
     ZipSource,
     read_manifest,
 )
-from arena.results.exports.closure import TRAVELLING
-from arena.results.exports.study_folder import FORMAT as STUDY
 from arena.results.services import stored_rows
-from arena.services.row_rules import check_row, check_votes
-from arena.services.unfinished_work import end_restored_work, is_unfinished
+from arena.site.services import check_row, check_votes, end_restored_work, is_unfinished
 from augment.models import Endpoint, Simulation
 from augment.services.judging.simulations import allowed_planners
 from augment.services.texts import is_stored_name

@@ -6,7 +6,6 @@ from typing import Any
 
 from django.core.management.base import CommandParser
 
-from arena.queries.studies.lists import study_named
 from arena.rating.rules import Intervals, Unit
 from arena.results.exports.tables import leaderboard_table
 from arena.results.exports.writers import plain_text
@@ -14,6 +13,7 @@ from arena.results.queries.votes import Filters
 from arena.results.services.ratings import DEFAULT_ROUNDS, log_early_look
 from arena.results.services.ratings import rate_now as rate
 from arena.services.covariates import COVARIATES
+from arena.studies.queries import study_named
 from augment.services.terminal import TerminalCommand
 
 
