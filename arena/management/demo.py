@@ -19,6 +19,8 @@ from arena.errors import ArenaError
 from arena.exports.files import write_whole
 from arena.models import Study
 from arena.people.services import create_person
+from arena.results.exports.tables import leaderboard_table
+from arena.results.exports.writers import FORMATS, plain_text
 from arena.results.services.ratings import rate_now as rate
 from arena.services.simulation import simulate_votes
 from arena.studies.services.opening import close_study, open_study

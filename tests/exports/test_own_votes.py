@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from arena.models import Snapshot, Study
 from arena.pairing.order import MAIN
-from arena.people.services import mark_author
+from arena.people.links import mark_author
 from arena.rating.leaderboard import rate as rate_votes
 from arena.rating.snapshot_document import OwnVotes
 from arena.results.exports.writers import bundle

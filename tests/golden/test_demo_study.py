@@ -27,6 +27,7 @@ from arena.jobs.exports.displacement_files import FORMATS as DISPLACEMENT
 from arena.management.demo import JOB, RATED, SIMULATED_EXPERTS, SIMULATED_STUDY, vote_and_rate
 from arena.models import Person, Study
 from arena.models.people import fresh_token
+from arena.results.exports.study_folder import MANIFEST, write_study
 from augment.models import Augmentation, GenerationJob
 from augment.scene.codec import modification_to_document
 from augment.scene.entities import Modification, ScenarioType

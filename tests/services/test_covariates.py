@@ -16,7 +16,7 @@ from arena.results.exports.writers import bundle_files
 from arena.results.queries.votes import Filters, vote_set
 from arena.results.services import ratings
 from arena.results.services.analysis import vote_arrays
-from arena.services.covariates import COVARIATES, with_covariates
+from arena.results.services.covariates import COVARIATES, with_covariates
 from augment.errors import Conflict, UnknownName
 from augment.models import Augmentation
 from tests.full_study import Size, full_study

@@ -36,7 +36,7 @@ def test_a_skip_is_counted_apart_everywhere_and_a_vote_instead_of_it_counts() ->
             (line.voted, line.skipped, line.left),
             (eva.voted, eva.skips, eva.left),
             (own.voted, own.skipped, own.left),
-            (main.decided, take_inventory().votes, queries.of_studies()[0].voted),
+            (main.decided, take_inventory()["votes"], queries.of_studies()[0].voted),
         )
 
     assert counted() == ((1, 3, 2), (1, 2, 0), (1, 2, 0), (1, 1, 1))

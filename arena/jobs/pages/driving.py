@@ -17,6 +17,7 @@ from arena.jobs.exports.driving import FORMATS, SCORE_LABELS, DrivingTable, driv
 from arena.jobs.queries import DRIVES, Part, before_of, shown_augmentations
 from arena.jobs.queries import drive_cells as cells_of
 from arena.models import Snapshot
+from arena.results.exports.tables import LeaderboardTable
 from arena.site.access import ADMIN, STAFF, allow_only
 from arena.site.listing import choice_asked, page_asked
 from augment.errors import AugmentError, QueueFault, UnknownName

@@ -26,6 +26,8 @@ from arena.management.backups.archive import (
     ZipSource,
     read_manifest,
 )
+from arena.results.exports.closure import TRAVELLING
+from arena.results.exports.study_folder import FORMAT as STUDY
 from arena.results.services import stored_rows
 from arena.site.services import check_row, check_votes, end_restored_work, is_unfinished
 from augment.models import Endpoint, Simulation

@@ -13,6 +13,7 @@ from arena.management.exporting.jobs import add_jobs
 from arena.management.exporting.kinds import ExportedFile
 from arena.management.exporting.scenarios import add_scenarios
 from arena.management.exporting.studies import add_studies
+from arena.results.exports.study_folder import write_study
 from arena.studies.queries import study_named
 from augment.errors import AugmentError
 from augment.services.terminal import TerminalCommand

@@ -10,9 +10,9 @@ from arena.rating.rules import Intervals, Unit
 from arena.results.exports.tables import leaderboard_table
 from arena.results.exports.writers import plain_text
 from arena.results.queries.votes import Filters
+from arena.results.services.covariates import COVARIATES
 from arena.results.services.ratings import DEFAULT_ROUNDS, log_early_look
 from arena.results.services.ratings import rate_now as rate
-from arena.services.covariates import COVARIATES
 from arena.studies.queries import study_named
 from augment.services.terminal import TerminalCommand
 

@@ -10,6 +10,11 @@ from arena.exports.files import ZIP
 from arena.exports.formats import format_named
 from arena.management.exporting.kinds import Chosen, ExportedFile, Say, add_format, add_kind, fill
 from arena.models import Snapshot, Study
+from arena.results.exports.charts import CONTENT_TYPES, chart_bytes
+from arena.results.exports.sheets import contact_sheet
+from arena.results.exports.tables import leaderboard_table
+from arena.results.exports.votes import VOTE_FORMATS, unrated_votes, vote_table
+from arena.results.exports.writers import FORMATS, bundle
 from arena.results.queries.access import snapshot_to_export
 from arena.results.queries.votes import is_imported
 from arena.results.services.ratings import log_early_look

@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import uuid
-from functools import partial
-from typing import Any, Unpack, cast
+from typing import cast
 
-from django import forms
 from django.contrib import messages
 from django.contrib.auth.models import User
 from django.core.exceptions import PermissionDenied
-from django.db import transaction
 from django.http import Http404, HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, redirect, render
 from django.utils.text import slugify
@@ -21,15 +18,13 @@ from arena.errors import ArenaError, NoSnapshot
 from arena.exports.files import CONTENT_TYPE, ZIP
 from arena.exports.formats import format_named
 from arena.models import Snapshot, Study
-from arena.pairing.order import MAIN, REPEAT
 from arena.people.queries import role_of
-from arena.rating.leaderboard import Intervals, Method
-from arena.rating.rules import Unit
 from arena.results.exports.charts import CONTENT_TYPES, chart_bytes
 from arena.results.exports.tables import EARLY_LOOK, for_experts, leaderboard_table
 from arena.results.exports.votes import VOTE_FORMATS, unrated_votes, vote_table
 from arena.results.exports.writers import FORMATS, bundle
-from arena.results.pages.tabs import COVARIATE_LABELS, TABS, both_versions, show_adjustment
+from arena.results.pages.rating_form import RatingForm, rate_or_send
+from arena.results.pages.tabs import TABS, both_versions, show_adjustment
 from arena.results.queries.access import STAFF as STAFF_ROLES
 from arena.results.queries.access import (
     ResultsAccess,
@@ -39,99 +34,14 @@ from arena.results.queries.access import (
     votes_in,
 )
 from arena.results.queries.evidence import count_settled
-from arena.results.queries.votes import Filters, is_imported
-from arena.results.services.ratings import (
-    DEFAULT_ROUNDS,
-    MOST_ROUNDS,
-    Choices,
-    is_big,
-    open_early,
-    plan_snapshot,
-    rate_now,
-)
-from arena.services.covariates import COVARIATES, WITHOUT_PICTURES
+from arena.results.queries.votes import is_imported
+from arena.results.services.ratings import open_early
 from arena.site.access import ADMIN, ANALYST, EXPERT, STAFF, allow_only
 from arena.studies.pages.studies import export_place
 from augment.errors import AugmentError, Conflict, UnknownName
-from augment.services.scenarios.scenes import type_choices
-
-METHODS = {
-    Method.BRADLEY_TERRY: "Bradley-Terry",
-    Method.DAVIDSON: "Davidson (ties)",
-    Method.ELO: "Online Elo",
-}
-UNITS = {
-    "": "as the votes allow",
-    Unit.TWO_WAY: "experts and scenarios",
-    Unit.SCENARIO: "scenarios",
-    Unit.EXPERT: "experts",
-    Unit.VOTE: "votes, as in the paper",
-}
-INTERVALS = {
-    "": "right for the method",
-    Intervals.CLOSED_FORM: "in closed form",
-    Intervals.RESAMPLES: "by resamples",
-}
 
 SHOWN = 12
 """So many ratings can be chosen on the page; the log lists all."""
-
-
-class AnyOf(forms.MultipleChoiceField):
-    """Codes of experts; rating itself refuses those that do not occur."""
-
-    def valid_value(self, value: Any) -> bool:
-        """Whatever was ticked."""
-        return True
-
-
-class RatingForm(forms.Form):
-    """Method, resampling and which votes count; experts are offered as a rating names them."""
-
-    method = forms.ChoiceField(choices=[*METHODS.items()], required=False)
-    resample = forms.ChoiceField(choices=[*UNITS.items()], required=False)
-    intervals = forms.ChoiceField(choices=[*INTERVALS.items()], required=False)
-    rounds = forms.IntegerField(
-        min_value=1, max_value=MOST_ROUNDS, initial=DEFAULT_ROUNDS, required=False
-    )
-    seed = forms.IntegerField(min_value=0, max_value=2**63 - 1, initial=0, required=False)
-    types = forms.MultipleChoiceField(choices=type_choices, required=False)
-    experts = AnyOf(required=False)
-    adjust = forms.MultipleChoiceField(choices=[*COVARIATE_LABELS.items()], required=False)
-    with_repeats = forms.BooleanField(required=False)
-    leave_out_settled = forms.BooleanField(required=False)
-    leave_out_own = forms.BooleanField(required=False)
-
-    def __init__(
-        self, data: dict[str, Any] | None = None, *, snapshot: Snapshot | None = None
-    ) -> None:
-        super().__init__(data)
-        for name in ("method", "resample", "intervals", "rounds", "seed"):
-            self.fields[name].widget.attrs["class"] = "input"
-        names = snapshot.results.judges if snapshot is not None else {}
-        imported = snapshot is not None and is_imported(snapshot.study)
-        known = WITHOUT_PICTURES if imported else COVARIATES
-        self.adjustable = [(name, COVARIATE_LABELS[name]) for name in known]
-        self.judges = sorted(names.items(), key=lambda item: item[1])
-
-    def choices(self) -> Choices:
-        """As `rate_now` takes it; what was not filled in is the default."""
-        asked = self.cleaned_data
-        return Choices(
-            method=asked["method"] or Method.BRADLEY_TERRY.value,
-            unit=asked["resample"] or None,
-            intervals=asked["intervals"] or None,
-            covariates=asked["adjust"],
-            rounds=asked["rounds"] or DEFAULT_ROUNDS,
-            seed=asked["seed"] or 0,
-            filters=Filters(
-                types=tuple(asked["types"]),
-                experts=tuple(asked["experts"]),
-                kinds=(MAIN, REPEAT) if asked["with_repeats"] else (MAIN,),
-                leave_out_settled=asked["leave_out_settled"],
-                leave_out_own=asked["leave_out_own"],
-            ),
-        )
 
 
 @allow_only(ADMIN, ANALYST, EXPERT)
@@ -205,21 +115,6 @@ def rate_study(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     except (ArenaError, AugmentError) as error:
         messages.error(request, str(error))
     return redirect("results", code=code)
-
-
-def rate_or_send(request: HttpRequest, study: Study, **choices: Unpack[Choices]) -> None:
-    """Rate a study's current votes; with many of them a worker does, and a message says so.
-
-    Raises:
-        ArenaError, AugmentError: Those of `plan_snapshot`; QueueFault where no worker is reached.
-    """
-    if not is_big(study):
-        rate_now(study=study, **choices)
-        return
-    with transaction.atomic():
-        planned = plan_snapshot(study=study, **choices)
-        transaction.on_commit(partial(tasks.send_snapshot, planned.pk))
-    messages.success(request, "The rating is being computed.")
 
 
 @allow_only(*STAFF)

@@ -16,7 +16,6 @@ from uuid import UUID
 from django.core.paginator import Page, Paginator
 
 from arena.models import ImportedVote, Report, Snapshot, Vote
-from arena.queries.remembering import Remembered
 from arena.results.queries.scores import (
     Evidence,
     Faults,
@@ -40,6 +39,7 @@ from arena.results.queries.votes import (
     is_imported,
     settled_ties,
 )
+from arena.voting.queries.remembering import Remembered
 from augment.models import Augmentation
 
 PER_PAGE = 25

@@ -11,9 +11,9 @@ from typing import Any, NamedTuple
 from django.db.models import Count, F, Max, Q, QuerySet, Value
 
 from arena.models import FaultLabel, Matchup, Snapshot, Vote
-from arena.queries.remembering import Remembered, plan_types
 from arena.results.queries.search import VoteSearch, find_votes
 from arena.results.queries.votes import counted_votes
+from arena.voting.queries.remembering import Remembered, plan_types
 from augment.models import Contestant
 
 

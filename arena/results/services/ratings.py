@@ -34,11 +34,16 @@ from arena.results.queries.votes import (
 )
 from arena.results.services import analysis
 from arena.results.services.analysis import VoteArrays, vote_arrays
+from arena.results.services.covariates import (
+    COVARIATES,
+    WITHOUT_PICTURES,
+    adjustment,
+    settled_remark,
+    with_covariates,
+)
 from arena.results.services.trust import board_remarks, precision, trust, with_and_without
 from arena.results.services.vote_files import VERSION as VOTES_VERSION
 from arena.results.services.vote_files import digest_of, vote_rows, votes_csv
-from arena.services.covariates import COVARIATES, WITHOUT_PICTURES, adjustment, with_covariates
-from arena.services.settled_pairs import settled_remark
 from arena.studies.queries import authors_of
 from arena.voting.services.turns import in_turn
 from augment.errors import Conflict, LeaseLost, UnknownName

@@ -44,7 +44,7 @@ from arena.rating.snapshot_document import (
 )
 from arena.results.queries.votes import AUTOMATIC, Filters, VoteSet, is_own_vote
 from arena.results.services.analysis import SCORES, VoteArrays, vote_arrays
-from arena.services.covariates import both_ranks, largest_move, with_covariates
+from arena.results.services.covariates import both_ranks, largest_move, with_covariates
 
 AGREEMENT_ROUNDS = 1000
 FIT_ROUNDS = 200

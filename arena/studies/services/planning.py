@@ -21,6 +21,7 @@ from arena.pairing.later import judges, units_of
 from arena.pairing.plan import Check, Entry, PlannedMatchup, PlanRules
 from arena.pairing.rules import place_of, scenario_of
 from arena.studies.services.pictures import (
+    Cells,
     check_pictures,
     find_showable,
     placed_checks,
@@ -31,13 +32,7 @@ from arena.studies.services.pictures import (
 from arena.voting.queries.ballots import upcoming
 from arena.voting.queries.showings import LEGEND
 from arena.voting.services.casting import mark_served
-from arena.voting.services.shown_pictures import (
-    Cells,
-    ScenarioFrame,
-    find_frames,
-    frames_shown,
-    sides_of,
-)
+from arena.voting.services.shown_pictures import ScenarioFrame, find_frames, frames_shown, sides_of
 from augment.models import Augmentation, Scenario
 from augment.services.events import log_event
 from augment.services.scenarios.pictures import (

@@ -26,7 +26,7 @@ from arena.people.queries import forgotten_name
 from arena.people.services import check_may_change, create_person, log_person, sign_out
 from arena.studies.queries import enrolment_by_token, find_silent, find_unfinished, has_free_place
 from arena.studies.services.drafts import rename_in_drafts
-from arena.studies.services.pictures import without_lost_checks
+from arena.studies.services.pictures import Cells, without_lost_checks
 from arena.studies.services.planning import (
     next_batch,
     pictures_of,

@@ -16,7 +16,7 @@ from django.utils import timezone
 from arena.errors import NotYours
 from arena.models import Matchup, Study, Vote
 from arena.people.queries import by_pseudonym
-from arena.queries.remembering import Remembered, plan_and_votes
+from arena.voting.queries.remembering import Remembered, plan_and_votes
 
 LONGEST_LOOK_MS = 60_000
 """A pair that stayed on screen longer counts as this long in the pace: the expert was away."""

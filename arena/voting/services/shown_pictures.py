@@ -16,15 +16,12 @@ from arena.errors import NothingToPlan
 from arena.models import Matchup, Study
 from arena.pairing.plan import PlannedMatchup
 from arena.pairing.rules import place_of, scenario_of
-from arena.studies.services.pictures import MOST_NAMED, find_showable, refuse_missing
+from arena.studies.services.pictures import MOST_NAMED, Cells, find_showable, refuse_missing
 from arena.voting.queries.showings import VIEW_OF_OLD
 from augment.errors import Conflict
 from augment.models import Augmentation, Contestant, GenerationJob, Scenario, Simulation
 from augment.services.judging.simulations import Options
 from augment.services.scenarios.pictures import camera_of, view_of, window_of
-
-Cells = dict[tuple[str, str], Augmentation]
-"""By place (a scenario, or one sample of it) and contestant, the augmentation that is shown."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,10 +8,14 @@ from typing import Any
 
 import numpy as np
 
+from arena.models import Study, Vote
+from arena.pairing.order import MAIN
+from arena.pairing.rules import scenario_of
 from arena.rating.comparisons import Comparisons, FloatArray
 from arena.rating.leaderboard import Leaderboard
+from arena.rating.lines import whole_percent
 from arena.rating.snapshot_document import Adjustment, BothRanks, CovariateEffect, LargestMove
-from arena.results.queries.votes import Judged
+from arena.results.queries.votes import AUTOMATIC, Judged, VoteSet
 from augment.models import Augmentation
 
 SIDE, OBJECTS, VEHICLES = "side", "objects", "vehicles"
@@ -121,3 +125,45 @@ def _of_document(document: dict[str, Any] | None) -> tuple[int, int]:
     """An empty modification changes nothing."""
     changed = [*(document or {}).get("add", []), *(document or {}).get("move", [])]
     return len(changed), sum(agent["type"] in _VEHICLES for agent in changed)
+
+
+def settled_remark(study: Study, votes: VoteSet, *, left_out: bool) -> str:
+    """Return what the table estimates where pairs were settled, empty where none was.
+
+    Args:
+        study: What was planned.
+        votes: That count.
+        left_out: Whether settled pairs are left out.
+    """
+    settled = len(study.rules.get("identical", ()))
+    if not settled:
+        return ""
+    ties = sum(vote.kind == AUTOMATIC for vote in votes.counted)
+    said = (
+        f"The table says how contestants compare where their pictures differ: {settled} pairs "
+        "that nobody can tell apart were not shown and are left out."
+        if left_out
+        else f"The table says how contestants compare over all pairs of pictures: {settled} "
+        f"pairs that nobody can tell apart were not shown and count as {ties} ties, as many a "
+        "pair as others have votes on average."
+    )
+    return f"{said} {_on_those_shown(study, votes)}".strip()
+
+
+def _on_those_shown(study: Study, votes: VoteSet) -> str:
+    """The tie share of alike pairs that experts were shown all the same."""
+    shown = {
+        (scenario_of(place), frozenset((one, other)))
+        for place, one, other in study.rules.get("alike_shown", ())
+    }
+    given = [
+        vote.outcome == Vote.Outcome.EQUAL
+        for vote in votes.counted
+        if vote.kind == MAIN and (vote.item, frozenset((vote.left, vote.right))) in shown
+    ]
+    if not given:
+        return ""
+    return (
+        f"Of {len(given)} votes on {len(shown)} such pairs that were shown all the same, "
+        f"{sum(given)} are ties ({whole_percent(sum(given) / len(given))} %)."
+    )
