@@ -90,7 +90,8 @@ def test_an_endpoint_that_moves_is_logged_before_and_after() -> None:
     endpoint = Endpoint.objects.get()
     assert endpoint.base_url == "http://127.0.0.1:9/v1"
     event = Event.objects.filter(verb="change").get()
-    assert event.before == {"base_url": LOCAL, "key_variable": ""}
+    assert event.before is not None
+    assert event.before["base_url"] == LOCAL
 
 
 @pytest.mark.parametrize(

@@ -84,7 +84,7 @@ def test_a_contestant_with_such_a_variable_is_refused_at_launch() -> None:
     llama = Contestant.objects.get()
     assert "DATABASE_URL may not hold a key" in find_obstacle(llama)
     assert keys_missing(llama) == []
-    with pytest.raises(Conflict, match="llama names DATABASE_URL, which may not hold a key"):
+    with pytest.raises(Conflict, match="llama: the variable DATABASE_URL may not hold a key"):
         jobs.launch(name="J", contestants=["llama"], scenarios=["street"])
 
 
@@ -140,7 +140,7 @@ def test_a_key_goes_to_another_host_only_when_told_twice_and_is_logged() -> None
         *("add_contestant", "one", "--variant", "otm", "--endpoint", "local", "--model", "m"),
         *("--base-url", "https://thief.example/v1", "--key-variable", "MY_API_KEY"),
     )
-    with pytest.raises(CommandError, match=f"went to {OLD} and would go to {NEW}; say so with"):
+    with pytest.raises(CommandError, match=f"went to {OLD} and would go to {NEW}. Say"):
         call_command(*command)
     assert Endpoint.objects.get().base_url == "https://models.example/v1"
     assert not Event.objects.exists()

@@ -49,8 +49,8 @@ class Command(TerminalCommand):
             "--matrix",
             type=Path,
             metavar="FILE",
-            help="YAML with models x variants x options, scenarios and samples instead of the "
-            "arguments for these; checked as a whole before anything runs",
+            help="YAML with contestants, scenarios and samples instead of the arguments, "
+            "as the page of a new job writes it; checked as a whole before anything runs",
         )
         parser.add_argument("--contestants", nargs="+", help="slugs, or all")
         parser.add_argument(
@@ -202,13 +202,11 @@ class Command(TerminalCommand):
     def report(self, job: GenerationJob) -> None:
         """The table, the failures by reason, and exit code 1 if there is any."""
         lines = contestant_lines(job)
-        width = max(len(line.slug) for line in lines)
-        self.stdout.write(f"{'contestant':{max(width, 10)}}  done  unreadable  refused  failed")
+        width = max(10, *(len(line["slug"]) for line in lines))
+        self.stdout.write(f"{'contestant':{width}}  done  unreadable  refused  failed")
+        row = "{slug:{width}}  {done:4}  {unreadable:10}  {refused:7}  {failed:6}"
         for line in lines:
-            self.stdout.write(
-                f"{line.slug:{max(width, 10)}}  {line.done:4}  {line.unreadable:10}  "
-                f"{line.refused:7}  {line.failed:6}"
-            )
+            self.stdout.write(row.format(**line, width=width))
         failed = Augmentation.State.FAILED
         failures = [group for group in failure_groups(job) if group.state == failed]
         for group in failures:

@@ -1,22 +1,22 @@
-"""Contestants: who is there without being added, who is added, and what is refused."""
+"""Contestants: who is there without being added, who is added, and what they would send."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 from django.contrib.auth.models import User
 from django.db import transaction
 
 from augment.baselines.registry import PLACERS
 from augment.errors import Conflict, UnknownName
-from augment.models import Contestant, Endpoint, Scenario
-from augment.services.endpoints.known_endpoints import ensure_endpoint, find_endpoint
+from augment.models import Contestant, Scenario
+from augment.services.endpoints.known_endpoints import EndpointFacts, add_endpoint, find_endpoint
 from augment.services.endpoints.known_models import model_at
 from augment.services.endpoints.treatments import (
     Respondent,
     check_roles,
-    documents_of,
     options_of,
     other_prompts,
     respondents_of,
@@ -34,11 +34,16 @@ from augment.variants.options import (
     names_for,
     options_from_document,
 )
-from augment.variants.recipes import RECIPES, Recipe, Tools, find_recipe, spell_variant
+from augment.variants.recipes import RECIPES, Tools, find_recipe, spell_variant
 from augment.variants.transcript import ModelRole
 
 Kind = Contestant.Kind
 LONGEST_NAME = 120
+
+VARIANTS = tuple(RECIPES)
+PROTOCOLS = tuple(protocol.value for protocol in ToolProtocol)
+REASONING_EFFORTS = tuple(EFFORTS)
+OPTION_NAMES = tuple(NAMES)
 
 REFERENCE = "reference"
 _BUILTIN = {REFERENCE: ("Reference", Kind.REFERENCE)} | {
@@ -46,10 +51,24 @@ _BUILTIN = {REFERENCE: ("Reference", Kind.REFERENCE)} | {
     for slug, placer in PLACERS.items()
 }
 
+Roles = Mapping[ModelRole, tuple[str | None, str]]
+"""Who else plays a reviewer's role: the label of an endpoint (None: the contestant's own) and the
+model id there."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class EnteredEndpoint:
+    """Where a contestant's model is: a label alone for an endpoint that is there already."""
+
+    label: str
+    base_url: str = ""
+    key_variable: str = ""
+    is_simulated: bool = False
+
 
 @transaction.atomic
 def ensure_builtin() -> list[Contestant]:
-    """The contestants that need no endpoint: the reference, the rule placer, the baselines."""
+    """Return the contestants that need no endpoint: reference, rule placer, baselines."""
     return [
         Contestant.objects.get_or_create(slug=slug, defaults={"name": name, "kind": kind})[0]
         for slug, (name, kind) in _BUILTIN.items()
@@ -64,12 +83,12 @@ def add_contestant(
     endpoint: str,
     model: str,
     name: str | None = None,
-    roles: Mapping[ModelRole, tuple[str | None, str]] | None = None,
+    roles: Roles | None = None,
     options: ContestantOptions | None = None,
     spoken: ContestantOptions | None = None,
     actor: User | None = None,
 ) -> Contestant:
-    """A language model that runs one variant; a simulated one where the endpoint is simulated.
+    """Add a language model that runs one variant; simulated where its endpoint is.
 
     The same contestant twice is one. What the model can do and costs has a row of its own, made
     empty here where there is none; `openai` can be named without having been added where
@@ -82,10 +101,9 @@ def add_contestant(
         model: The model id on that endpoint.
         name: What people read; made from model and variant when None, and from the endpoint
             where another contestant is called so.
-        roles: Who else plays a reviewer's role: the label of an endpoint (None: the contestant's
-            own) and the model id there.
+        roles: Who else plays a role.
         options: How it asks; what is open is fixed at its first run.
-        spoken: Those of the options that a name made here tells; None for all.
+        spoken: The options that a name made here tells; None for all.
         actor: Who adds it.
 
     Raises:
@@ -95,27 +113,54 @@ def add_contestant(
     """
     check_slug(slug, what="contestant")
     recipe = find_recipe(variant)
-    address = find_endpoint(endpoint, actor)
-    model = one_line("model", model, what="contestant")
-    others = _respondents(recipe, roles or {}, address, actor)
-    respondents = (Respondent(endpoint=address, model=model), *others.values())
+    own = Respondent(
+        endpoint=find_endpoint(endpoint, actor), model=one_line("model", model, what="contestant")
+    )
+    check_roles(recipe, roles or {})
+    others = {
+        role: Respondent(
+            endpoint=own.endpoint if label is None else find_endpoint(label, actor),
+            model=one_line(f"roles.{role}", played_by, what="contestant"),
+        )
+        for role, (label, played_by) in sorted((roles or {}).items())
+    }
     chosen = options or ContestantOptions()
     check_options(recipe, chosen)
-    told = chosen if spoken is None else spoken
-    title = _title(slug, model, recipe, others, address, told) if name is None else name
-    simulated = any(respondent.endpoint.is_simulated for respondent in respondents)
-    wanted = {
-        "name": one_line("name", title, what="contestant"),
-        "kind": Kind.SIMULATED if simulated else Kind.LLM,
-        "variant": recipe.slug,
-        "endpoint": address,
-        "model": model,
-        "roles": documents_of(others),
-        "options": chosen.to_document(),
-    }
+    respondents = (own, *others.values())
     for respondent in respondents:
         model_at(endpoint=respondent.endpoint, model=respondent.model)
-    return _stored(slug, wanted, named=name is not None, actor=actor)
+    title = name
+    if title is None:
+        title = _title(slug, recipe.slug, own, others, spoken or chosen)
+    is_simulated = any(respondent.endpoint.is_simulated for respondent in respondents)
+    columns: dict[str, Any] = {
+        "name": one_line("name", title, what="contestant"),
+        "kind": Kind.SIMULATED if is_simulated else Kind.LLM,
+        "variant": recipe.slug,
+        "endpoint": own.endpoint,
+        "model": own.model,
+        "roles": {
+            role.value: {"endpoint": one.endpoint.label, "model": one.model}
+            for role, one in others.items()
+        },
+        "options": chosen.to_document(),
+    }
+    contestant, made = Contestant.objects.get_or_create(slug=slug, defaults=columns)
+    if made:
+        log_event(
+            actor=actor,
+            verb="add",
+            object_kind="contestant",
+            object_code=contestant.code,
+            after=columns | {"slug": slug, "endpoint": own.endpoint.label},
+        )
+    same = [field for field in columns if field != "name" or name is not None]
+    if any(getattr(contestant, field) != columns[field] for field in same):
+        raise Conflict(
+            f"There is another contestant called {contestant.slug!r} already: "
+            f"{contestant.name} ({contestant.kind}); choose another slug."
+        )
+    return contestant
 
 
 @transaction.atomic
@@ -125,11 +170,11 @@ def add_like(
     like: str,
     changes: Mapping[str, str] | None = None,
     name: str | None = None,
-    roles: Mapping[ModelRole, tuple[str | None, str]] | None = None,
+    roles: Roles | None = None,
     options: ContestantOptions | None = None,
     actor: User | None = None,
 ) -> Contestant:
-    """A contestant as another one, but for what is given; it asks with the installed prompts.
+    """Add a contestant as another one, but for what is given; it asks with the installed prompts.
 
     What the other one ran with counts, be it a default of then; options that another variant has
     no use for stay behind. A name made here tells only what somebody chose.
@@ -150,14 +195,13 @@ def add_like(
     """
     row = Contestant.objects.select_related("endpoint").filter(slug=like).first()
     if row is None:
-        raise UnknownName(
-            "contestant", like, list(Contestant.objects.values_list("slug", flat=True))
-        )
+        slugs = Contestant.objects.values_list("slug", flat=True)
+        raise UnknownName("contestant", like, list(slugs))
     if row.endpoint is None:
         raise Conflict(f"{like} asks no language model; there is nothing to be like.")
-    before = {"variant": row.variant, "endpoint": row.endpoint.label, "model": row.model}
+    wanted = {"variant": row.variant, "endpoint": row.endpoint.label, "model": row.model}
+    wanted |= changes or {}
     kept = {ModelRole(role): (one["endpoint"], one["model"]) for role, one in row.roles.items()}
-    wanted = before | dict(changes or {})
     usable = set(names_for(find_recipe(wanted["variant"]))) - {"prompt_version"}
     asked = (options or ContestantOptions()).to_document()
     chosen, ran = (
@@ -175,99 +219,6 @@ def add_like(
     )
 
 
-# --- Private -----------------------------------------------------------------------------------
-
-
-def _title(
-    slug: str,
-    model: str,
-    recipe: Recipe,
-    others: Mapping[ModelRole, Respondent],
-    own: Endpoint,
-    options: ContestantOptions,
-) -> str:
-    """What people read where nobody chose a name; not what another contestant is called."""
-    given = (f"{role} {respondent.model}" for role, respondent in others.items())
-    said = options.describe()
-    parts = [model, spell_variant(recipe.slug), *given, *([f"({said})"] if said else [])]
-    title = " ".join(parts)[:LONGEST_NAME]
-    if Contestant.objects.filter(name=title).exclude(slug=slug).exists():
-        title = f"{title} at {own.label}"[:LONGEST_NAME]
-    return title
-
-
-def _log_added(contestant: Contestant, actor: User | None) -> None:
-    facts = ("slug", "name", "kind", "variant", "model", "roles", "options")
-    assert contestant.endpoint is not None
-    log_event(
-        actor=actor,
-        verb="add",
-        object_kind="contestant",
-        object_code=contestant.code,
-        after={name: getattr(contestant, name) for name in facts}
-        | {"endpoint": contestant.endpoint.label},
-    )
-
-
-def _respondents(
-    recipe: Recipe,
-    roles: Mapping[ModelRole, tuple[str | None, str]],
-    own: Endpoint,
-    actor: User | None,
-) -> dict[ModelRole, Respondent]:
-    """Who plays the roles that were given away."""
-    check_roles(recipe, roles)
-    return {
-        role: Respondent(
-            endpoint=own if label is None else find_endpoint(label, actor),
-            model=one_line(f"roles.{role}", model, what="contestant"),
-        )
-        for role, (label, model) in sorted(roles.items())
-    }
-
-
-def _stored(
-    slug: str, wanted: dict[str, object], *, named: bool, actor: User | None
-) -> Contestant:
-    """The contestant of that slug, made where there is none.
-
-    Raises:
-        Conflict: The slug stands for another one.
-    """
-    contestant, made = Contestant.objects.get_or_create(slug=slug, defaults=wanted)
-    if made:
-        _log_added(contestant, actor)
-    else:
-        _refuse_another(contestant, wanted, named=named)
-    return contestant
-
-
-def _refuse_another(contestant: Contestant, wanted: dict[str, object], *, named: bool) -> None:
-    """Raise Conflict where the slug stands for something else."""
-    facts = [field for field in wanted if field != "name" or named]
-    if any(getattr(contestant, field) != wanted[field] for field in facts):
-        raise Conflict(
-            f"There is another contestant called {contestant.slug!r} already: "
-            f"{contestant.name} ({contestant.kind}); choose another slug."
-        )
-
-
-VARIANTS = tuple(RECIPES)
-PROTOCOLS = tuple(protocol.value for protocol in ToolProtocol)
-REASONING_EFFORTS = tuple(EFFORTS)
-OPTION_NAMES = tuple(NAMES)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class EnteredEndpoint:
-    """Where its model is: a label alone for an endpoint that is there already."""
-
-    label: str
-    base_url: str = ""
-    key_variable: str = ""
-    is_simulated: bool = False
-
-
 @transaction.atomic
 def enter_contestant(
     *,
@@ -279,7 +230,7 @@ def enter_contestant(
     options: Mapping[str, object],
     actor: User,
 ) -> Contestant:
-    """Endpoint and contestant, or neither of them.
+    """Add endpoint and contestant, or neither of them.
 
     Args:
         slug: Lower-case letters, digits and hyphens.
@@ -296,14 +247,9 @@ def enter_contestant(
     """
     chosen = options_from_document(options)
     if endpoint.base_url:
-        _refuse_known(endpoint.label)
-        ensure_endpoint(
-            label=endpoint.label,
-            base_url=endpoint.base_url,
-            key_variable=endpoint.key_variable,
-            is_simulated=endpoint.is_simulated,
-            actor=actor,
-        )
+        facts = EndpointFacts(base_url=endpoint.base_url, key_variable=endpoint.key_variable)
+        is_simulated = endpoint.is_simulated
+        add_endpoint(label=endpoint.label, facts=facts, is_simulated=is_simulated, actor=actor)
     return add_contestant(
         slug=slug,
         variant=variant,
@@ -315,26 +261,14 @@ def enter_contestant(
     )
 
 
-# --- Private -----------------------------------------------------------------------------------
-
-
-def _refuse_known(label: str) -> None:
-    """Raise Conflict where an endpoint is called so: others ask it at the address it has."""
-    if Endpoint.objects.filter(label=label).exists():
-        raise Conflict(
-            f"There is an endpoint “{label}” already. Choose it from the list, or give the "
-            "new one another label."
-        )
-
-
 def asking_contestants() -> list[Contestant]:
-    """Those that ask a model, by name; who is retired comes last."""
+    """Return the contestants that ask a model, by name; retired ones come last."""
     rows = Contestant.objects.exclude(endpoint=None).select_related("endpoint")
     return sorted(rows, key=lambda row: (row.retired_at is not None, row.name, row.pk))
 
 
 def preview_contestant(scenario: Scenario, contestant: Contestant, *, role: str) -> Preview:
-    """The first messages to a role, as the contestant's options have them.
+    """Return the first messages to a role, as the contestant's options have them.
 
     Options are those of its first run; of one that has not run yet, those that it would run with
     now.
@@ -349,12 +283,29 @@ def preview_contestant(scenario: Scenario, contestant: Contestant, *, role: str)
     options = options_of(contestant)
     if (unlike := other_prompts(contestant.slug, options)) is not None:
         raise Conflict(unlike)
-    calls = find_recipe(contestant.variant).tools is not Tools.NONE
-    is_native = options.protocol is ToolProtocol.NATIVE
+    has_tools = find_recipe(contestant.variant).tools is not Tools.NONE
+    is_native = options.protocol is ToolProtocol.NATIVE and role == ModelRole.MODIFIER
     return preview_prompt(
         scenario,
         variant=contestant.variant,
         role=role,
-        native_tools=calls and is_native and role == ModelRole.MODIFIER,
+        native_tools=has_tools and is_native,
         options=options,
     )
+
+
+def _title(
+    slug: str,
+    variant: str,
+    own: Respondent,
+    others: Mapping[ModelRole, Respondent],
+    options: ContestantOptions,
+) -> str:
+    """Return what people read where nobody chose a name; no other contestant's name."""
+    played = (f"{role} {respondent.model}" for role, respondent in others.items())
+    described = options.describe()
+    parts = [own.model, spell_variant(variant), *played, *([f"({described})"] * bool(described))]
+    title = " ".join(parts)[:LONGEST_NAME]
+    if Contestant.objects.filter(name=title).exclude(slug=slug).exists():
+        title = f"{title} at {own.endpoint.label}"[:LONGEST_NAME]
+    return title
