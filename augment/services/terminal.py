@@ -1,4 +1,4 @@
-"""What every command of ours is made of: it prints nothing that steers a terminal.
+"""The base of every command: it prints nothing that steers a terminal, and no traceback of ours.
 
 Names come out of files and rows, and answers out of models; a control character in one of them
 would move the cursor, recolour or rewrite what stands on the screen. So each text is escaped on
@@ -8,10 +8,12 @@ its way out, whoever wrote the command.
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
-from django.core.management.base import BaseCommand, OutputWrapper
+from django.core.management.base import BaseCommand, CommandError, OutputWrapper
 
+from augment.errors import AugmentError
 from augment.escaping import escape_controls
 
 
@@ -36,7 +38,7 @@ class TerminalOutput(OutputWrapper):
 
 
 class TerminalCommand(BaseCommand):
-    """A command whose output and errors are safe to look at."""
+    """A command whose output is safe to look at, and whose foreseen errors are one sentence."""
 
     # Django sets both again when it is called with streams of its own.
 
@@ -57,6 +59,20 @@ class TerminalCommand(BaseCommand):
     @stderr.setter
     def stderr(self, given: Any) -> None:
         self._stderr = _wrapped(given)
+
+    def execute(self, *args: Any, **options: Any) -> str | None:
+        """Run the command; an AugmentError ends it as a CommandError with the same sentence."""
+        try:
+            return super().execute(*args, **options)
+        except AugmentError as error:
+            raise CommandError(str(error)) from error
+
+    def write_file(self, path: Path, content: bytes) -> None:
+        """Write a file that somebody named; a CommandError says why it can't be written."""
+        try:
+            path.write_bytes(content)
+        except OSError as error:
+            raise CommandError(f"{path} can't be written: {error.strerror}.") from error
 
 
 def _wrapped(given: OutputWrapper) -> TerminalOutput:
