@@ -28,7 +28,7 @@ from augment.services.endpoints.known_endpoints import ensure_endpoint
 from augment.services.running import jobs, runner
 from augment.services.running.budget import Caps
 from augment.services.running.choosing import find_obstacle
-from augment.variants.transcript import ModelRole
+from augment.variants.respondents import ModelRole
 from tests.intents import intents
 from tests.jobs.rows import add_scenario, only_row
 

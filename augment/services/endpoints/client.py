@@ -22,10 +22,9 @@ from django.db import Error, OperationalError, connection, transaction
 from django.db.models import Q
 
 from augment.errors import EndpointBusy, ParameterRefused
-from augment.llm.client import Sending, watch_nothing
+from augment.llm.client import ModelProfile, Sending, watch_nothing
 from augment.llm.messages import Reply, Request
 from augment.llm.openai_wire import MEGABYTE, OpenAIWire
-from augment.llm.profile import ModelProfile
 from augment.models import CallLease, Endpoint
 from augment.services.clock import database_now, repeating
 from augment.services.endpoints.known_endpoints import key_of

@@ -35,7 +35,7 @@ from augment.variants.options import (
     options_from_document,
 )
 from augment.variants.recipes import RECIPES, Tools, find_recipe, spell_variant
-from augment.variants.transcript import ModelRole
+from augment.variants.respondents import ModelRole
 
 Kind = Contestant.Kind
 LONGEST_NAME = 120

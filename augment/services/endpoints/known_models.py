@@ -22,8 +22,8 @@ from django.db.models import BigIntegerField, Case, Count, F, Q, Sum, When
 from django.db.models.functions import Coalesce
 from django.utils import timezone
 
+from augment.llm.client import ModelProfile
 from augment.llm.costs import NANO_USD, Price
-from augment.llm.profile import ModelProfile
 from augment.models import Augmentation, Endpoint, EndpointModel, ModelCall
 from augment.services.events import log_event
 

@@ -17,14 +17,10 @@ from django.db import IntegrityError, transaction
 from django.utils import timezone
 
 from augment.errors import Conflict, ModelFault, ParameterRefused
-from augment.llm.client import ChatClient
-from augment.llm.costs import Price, usd_of
-from augment.llm.cutting import shorten
-from augment.llm.messages import LengthName, Reply, Request
-from augment.llm.patience import Patience
-from augment.llm.profile import ModelProfile
+from augment.llm.client import ChatClient, ModelProfile, Patience
+from augment.llm.costs import Price, cut_of, usd_of
+from augment.llm.messages import LengthName, Reply, Request, shorten
 from augment.llm.questions import Ability, ProbeQuestion, questions_for
-from augment.llm.window import cut_of
 from augment.models import Endpoint, EndpointModel, Probe
 from augment.services.endpoints.client import Queue, place_at, wire_to
 from augment.services.endpoints.known_models import model_at, price_of

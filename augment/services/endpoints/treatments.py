@@ -16,10 +16,10 @@ from django.db import transaction
 from django.db.models import Exists, OuterRef
 
 from augment.errors import Conflict, InvalidDocument, ModelFault, ParameterRefused
+from augment.llm.client import ModelProfile
 from augment.llm.messages import LengthName
-from augment.llm.profile import ModelProfile
 from augment.models import Augmentation, Contestant, Endpoint, EndpointModel, ModelCall
-from augment.prompts.texts import prompt_version
+from augment.prompts.fill import prompt_version
 from augment.services.endpoints.known_models import price_of, profile_of, profiles_at
 from augment.services.events import log_event
 from augment.variants.options import (
@@ -29,7 +29,7 @@ from augment.variants.options import (
     options_from_document,
 )
 from augment.variants.recipes import Recipe, find_recipe
-from augment.variants.transcript import ModelRole
+from augment.variants.respondents import ModelRole
 
 OPTIONS = NAMES
 """Of a contestant, in the order in which they are shown."""

@@ -13,10 +13,17 @@ from django.db.models import Q
 from augment.checks import Severity
 from augment.errors import InvalidDocument, InvalidModification
 from augment.metrics.displacement import Displacement
-from augment.metrics.paired import PairedComparison, compare_all
-from augment.metrics.refusals import RefusalScore, score_refusals
-from augment.metrics.repeats import Robustness, measure_robustness, spread_of, within_sd
-from augment.metrics.repeats import SampleSpread as SampleSpread
+from augment.metrics.paired import (
+    PairedComparison,
+    RefusalScore,
+    Robustness,
+    SampleSpread,
+    compare_all,
+    measure_robustness,
+    score_refusals,
+    spread_of,
+    within_sd,
+)
 from augment.models import Augmentation, Contestant, GenerationJob
 from augment.services.endpoints.known_models import AUGMENTATION, Spending, sum_spending
 from augment.services.judging.displacement import Measured, of_job

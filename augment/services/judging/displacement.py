@@ -12,16 +12,18 @@ from typing import NamedTuple
 from django.db.models import QuerySet
 
 from augment.errors import InvalidDocument, UnknownName
-from augment.metrics.alike import are_alike
-from augment.metrics.displacement import CLASS_OF, Displacement, ObjectClass, displacement
-from augment.metrics.summary import BoxSummary as BoxSummary
-from augment.metrics.summary import Summary
-from augment.metrics.summary import summarise as summarise
+from augment.metrics.displacement import (
+    CLASS_OF,
+    Displacement,
+    ObjectClass,
+    Summary,
+    are_alike,
+    displacement,
+    summarise,
+)
 from augment.models import Augmentation, GenerationJob
-from augment.scene.catalogue import ScenarioType
 from augment.scene.codec import modification_from_document
-from augment.scene.entities import TrafficAgent
-from augment.scene.modification import Modification
+from augment.scene.entities import Modification, ScenarioType, TrafficAgent
 from augment.services.scenarios.scenes import reference_of, type_choices, type_rank
 from augment.variants.recipes import SPELLING, spell_variant
 

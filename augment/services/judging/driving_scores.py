@@ -11,7 +11,7 @@ from typing import Any
 from django.db.models import Q
 
 from augment.models import GenerationJob, Scenario, Simulation
-from augment.scene.catalogue import ScenarioType, in_type_order
+from augment.scene.entities import ScenarioType, in_type_order
 from augment.services.judging.simulations import SCORES, Options
 
 State, Subject = Simulation.State, Simulation.Subject

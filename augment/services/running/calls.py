@@ -27,15 +27,14 @@ from augment.errors import (
     NotSent,
 )
 from augment.llm.costs import Price, WorstCase, worst_case
-from augment.llm.fingerprint import image_reference, request_hash
-from augment.llm.messages import Reply, Request, ToolCall
+from augment.llm.messages import Reply, Request, ToolCall, image_reference, request_hash
 from augment.models import Augmentation, Endpoint, GenerationJob, ModelCall, TranscriptNote
 from augment.services.endpoints.known_models import price_of
 from augment.services.running import budget, workers
 from augment.services.scenarios.pictures import store
 from augment.services.texts import make_document_storable, make_storable
 from augment.services.work import Lease
-from augment.variants.transcript import ModelRole, NoteKind
+from augment.variants.respondents import ModelRole, NoteKind
 
 logger = logging.getLogger(__name__)
 

@@ -12,11 +12,11 @@ from django.db.models import Q, QuerySet
 from augment.baselines.registry import PLACERS
 from augment.errors import AugmentError, Conflict, KeyMissing, KeyNotAllowed, UnknownName
 from augment.models import Contestant, GenerationJob, Scenario
-from augment.scene.catalogue import CatalogueSet
+from augment.scene.entities import CatalogueSet
 from augment.services.endpoints.known_endpoints import key_of, may_hold_key
 from augment.services.endpoints.treatments import options_of, other_prompts, respondents_of
 from augment.variants.options import ToolProtocol
-from augment.variants.transcript import ModelRole
+from augment.variants.respondents import ModelRole
 
 Kind = Contestant.Kind
 

@@ -13,16 +13,15 @@ from django.db.models import Count, Exists, OuterRef, Q, Sum
 from augment.llm.costs import usd_of, worst_case
 from augment.llm.messages import Request
 from augment.models import Augmentation, Contestant, ModelCall, Scenario
-from augment.prompts.texts import prompt_version
-from augment.scene.modification import Modification
+from augment.prompts.fill import prompt_version
+from augment.scene.entities import Modification
 from augment.services.endpoints.known_models import price_of
 from augment.services.endpoints.treatments import Respondent, options_of, respondents_of
 from augment.services.scenarios.scenes import reference_of, scene_of
-from augment.variants.forecast import TokenUse, calls_of, most_tokens
 from augment.variants.options import recipe_with
 from augment.variants.recipes import Recipe, find_recipe
-from augment.variants.showing import shown_prompt
-from augment.variants.transcript import ModelRole
+from augment.variants.respondents import ModelRole
+from augment.variants.showing import TokenUse, calls_of, most_tokens, shown_prompt
 
 ANSWER_TOKENS = 1_200
 PICTURE_TOKENS = 1_500

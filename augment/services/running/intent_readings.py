@@ -20,7 +20,7 @@ from augment.errors import (
 from augment.llm.client import ChatClient
 from augment.llm.costs import Price, WorstCase
 from augment.models import Endpoint, IntentReading, ModelCall, Scenario
-from augment.scene.intent_codec import intent_to_document
+from augment.scene.codec import intent_to_document
 from augment.services.clock import DATABASE_TIME
 from augment.services.endpoints.client import EndpointClient, Queue, wire_to
 from augment.services.endpoints.known_models import price_of
@@ -29,8 +29,8 @@ from augment.services.running import budget
 from augment.services.running.budget import Caps
 from augment.services.running.calls import CallTranscript, find_earlier_answer, sentence_of
 from augment.services.work import Lease, Settlement, WorkKind
-from augment.variants.intent_reader import ask_for_intent
-from augment.variants.transcript import NoteKind
+from augment.variants.pipeline import ask_for_intent
+from augment.variants.respondents import NoteKind
 
 State = IntentReading.State
 USUAL_CAPS = Caps(calls=6)

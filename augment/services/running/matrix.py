@@ -33,7 +33,7 @@ from augment.variants.options import (
     options_from_document,
 )
 from augment.variants.recipes import RECIPES, find_recipe, spell_variant
-from augment.variants.transcript import ModelRole
+from augment.variants.respondents import ModelRole
 
 WHAT = "matrix"
 MOST_CONTESTANTS = 500

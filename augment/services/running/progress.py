@@ -20,7 +20,7 @@ from django.db.models.functions import Substr
 from augment.errors import UnknownName
 from augment.models import Attempt, Augmentation, GenerationJob, ModelCall, TranscriptNote
 from augment.services.clock import database_now
-from augment.variants.transcript import NoteKind
+from augment.variants.respondents import NoteKind
 
 State = Augmentation.State
 

@@ -28,11 +28,10 @@ from augment.errors import (
     Unwanted,
 )
 from augment.llm.client import ChatClient
-from augment.llm.cutting import shorten
+from augment.llm.messages import shorten
 from augment.models import Attempt, Augmentation, Contestant, Endpoint, GenerationJob
 from augment.scene.codec import modification_from_document, modification_to_document
-from augment.scene.entities import Scene
-from augment.scene.modification import Modification
+from augment.scene.entities import Modification, Scene
 from augment.services.clock import Moment
 from augment.services.endpoints.client import EndpointClient, Queue, wire_to
 from augment.services.endpoints.treatments import (
@@ -50,8 +49,7 @@ from augment.services.work import Lease, Settlement, TryEnd, WorkKind, change_al
 from augment.variants import pipeline
 from augment.variants.options import ToolProtocol, recipe_with
 from augment.variants.recipes import find_recipe
-from augment.variants.respondents import RespondentClient
-from augment.variants.transcript import ModelRole
+from augment.variants.respondents import ModelRole, RespondentClient
 
 logger = logging.getLogger(__name__)
 
