@@ -5,8 +5,8 @@ from __future__ import annotations
 from celery import shared_task
 from django.contrib.auth.models import User
 
-from arena.exports.jobs.scenario_files import SCENARIO_FILES
 from arena.exports.study_files import STUDY_FILES
+from arena.jobs.exports.files import SCENARIO_FILES
 from arena.services.ratings import RATINGS
 from augment.broker import send
 from augment.models import Scenario

@@ -11,7 +11,6 @@ from django.core.management import call_command
 from django.utils import timezone
 
 from augment.llm.messages import Message, Request, Speaker
-from augment.llm.patience import Patience
 from augment.models import EndpointModel
 from augment.services.endpoints.contestants import add_contestant
 from augment.services.endpoints.known_endpoints import ensure_endpoint
@@ -19,8 +18,7 @@ from augment.services.running import jobs, runner
 from augment.services.running.budget import Caps
 from augment.services.running.calls import RowTranscript
 from augment.services.running.runner import AUGMENTATIONS
-from augment.variants.recording_client import RecordingClient
-from augment.variants.transcript import ModelRole
+from augment.variants.respondents import ModelRole, RespondentClient, Respondents
 from tests.jobs.rows import add_scenario, only_row
 
 Call = Callable[[int], object]
@@ -52,16 +50,15 @@ def conversation(base_url: str, model: str) -> Call:
     row = only_row(job)
     held = AUGMENTATIONS.take(row.pk, now=timezone.now(), worker="bench")
     assert held is not None
-    talk = RecordingClient(
-        client=runner.open_wire(endpoint, held).__enter__(),
-        model=model,
+    wire = runner.open_wire(endpoint, held).__enter__()
+    talk = Respondents(
+        clients={ModelRole.MODIFIER: RespondentClient(client=wire, model=model)},
         transcript=RowTranscript(held, row, endpoint),
-        patience=Patience(),
     )
 
     def call(number: int) -> object:
         request = _request(model, f"ours {number}")
-        return talk.ask(ModelRole.MODIFIER, request, "bench")
+        return talk.send(ModelRole.MODIFIER, request, "bench")
 
     return call
 

@@ -15,15 +15,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from augment.scene.catalogue import ScenarioType
-from augment.scene.modification import Modification
+from augment.scene.entities import Modification, ScenarioType
 from augment.simulation.drive import Drive, expert_of, run
 from augment.simulation.pdm_closed import PdmClosed
 from augment.simulation.planners import OFFSETS_M
 from augment.simulation.road import Road
 from augment.simulation.score import ScoreKind, score_drive
-from augment.simulation.setting import DriveSetting
 from augment.simulation.states import SPEED
+from augment.simulation.traffic import DriveSetting
 from bench.report import table
 from tests.fixtures.shelf import SLUGS, entry, shown_scene
 

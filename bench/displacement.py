@@ -11,10 +11,8 @@ from collections.abc import Sequence
 
 from augment.baselines.registry import PLACERS, PlaceIntent
 from augment.errors import CannotPlace
-from augment.metrics.displacement import Displacement, displacement
-from augment.metrics.summary import summarise
-from augment.scene.catalogue import ScenarioType
-from augment.scene.modification import Modification
+from augment.metrics.displacement import Displacement, displacement, summarise
+from augment.scene.entities import Modification, ScenarioType
 from bench.report import table
 from tests.fixtures.shelf import SLUGS, entry, shown_scene
 

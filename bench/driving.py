@@ -14,16 +14,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from augment.scene.entities import TrafficAgent
-from augment.scene.modification import Modification
+from augment.scene.entities import Modification, TrafficAgent
 from augment.simulation.drive import run
-from augment.simulation.pdm_closed import PdmClosed
+from augment.simulation.pdm_closed import ORIGINAL_OFFSETS_M, PAPER_OFFSETS_M, PdmClosed
 from augment.simulation.planning import Plan, Situation
-from augment.simulation.proposals import ORIGINAL_OFFSETS_M, PAPER_OFFSETS_M
 from augment.simulation.road import Road
-from augment.simulation.setting import DriveSetting
 from augment.simulation.states import EgoBody
 from augment.simulation.tracker import track
+from augment.simulation.traffic import DriveSetting
 from bench.report import load, table, write_section
 from tests.scenes import vehicle
 from tests.simulation.worlds import street

@@ -13,10 +13,15 @@ from dataclasses import replace
 from enum import StrEnum
 from itertools import pairwise
 
-from augment.geometry.angles import difference, wrap
+from augment.geometry.frames import difference, wrap
 from augment.scene.ego_route import EgoRoute
-from augment.scene.entities import AgentType, LaneConnector, TrafficAgent, TrafficSide
-from augment.scene.sizes import LENGTH_WIDTH_M
+from augment.scene.entities import (
+    LENGTH_WIDTH_M,
+    AgentType,
+    LaneConnector,
+    TrafficAgent,
+    TrafficSide,
+)
 from bench.shifts import Agents, change_each, move_along, name_lane, new_contacts
 
 VEHICLES = (AgentType.VEHICLE, AgentType.BUS)

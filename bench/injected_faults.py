@@ -14,12 +14,12 @@ from dataclasses import dataclass, field
 from functools import cache
 
 from augment.checks import Ground
-from augment.checks.against_intent import check_against_intent
 from augment.checks.finding import FaultClass
+from augment.checks.registry import check_against_intent
 from augment.metrics.fault_guess import first_guess
 from augment.scene.ego_route import EgoRoute
+from augment.scene.entities import Modification
 from augment.scene.intent import Intent
-from augment.scene.modification import Modification
 from bench.faults import HEADING_KINDS, LOGIC_KINDS, POSITION_KINDS, FaultKind, inject_fault
 from bench.report import table
 from bench.shifts import jitter, move_along

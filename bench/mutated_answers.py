@@ -20,14 +20,12 @@ from collections.abc import Sequence
 from functools import lru_cache
 
 from augment.fake_llm.playing import GOOD, LEARNING, Character
-from augment.fake_llm.requests import chat_request
-from augment.llm.client import Sending, watch_nothing
+from augment.fake_llm.wire import chat_request
+from augment.llm.client import Patience, Sending, watch_nothing
 from augment.llm.messages import Reply, Request
-from augment.llm.patience import Patience
 from augment.variants.pipeline import Outcome, run
 from augment.variants.recipes import RECIPES
-from augment.variants.respondents import RespondentClient
-from augment.variants.transcript import MemoryTranscript
+from augment.variants.respondents import MemoryTranscript, RespondentClient
 from tests.fixtures.shelf import SLUGS, entry, shown_scene
 from tests.intents import intents
 

@@ -20,13 +20,12 @@ from statistics import fmean, mean, median
 
 from augment.baselines.rule_placer import place
 from augment.errors import CannotPlace
-from augment.fake_llm.requests import SpokenMessage
 from augment.fake_llm.sight import task_of
+from augment.fake_llm.wire import SpokenMessage
 from augment.metrics.displacement import displacement
 from augment.prompts.fill import Form, modifier_messages
 from augment.prompts.vectors import LaneFormat
-from augment.scene.entities import Scene
-from augment.scene.modification import Modification
+from augment.scene.entities import Modification, Scene
 from augment.variants.recipes import RECIPES
 from augment.variants.showing import shown_prompt
 from bench.report import PAGE, table, write_block

@@ -22,8 +22,8 @@ from augment.simulation.metrics import progress_ratio
 from augment.simulation.planning import Plan, Situation
 from augment.simulation.road import Road
 from augment.simulation.score import score_drive
-from augment.simulation.setting import DriveSetting
 from augment.simulation.states import STEP_S, EgoBody
+from augment.simulation.traffic import DriveSetting
 from bench.report import ROOT, table, write_block
 from tests.recorded import recorded
 from tests.scenes import vehicle

@@ -18,8 +18,9 @@ from statistics import fmean, median
 from augment.baselines import rule_placer
 from augment.baselines.registry import PLACERS
 from augment.errors import CannotPlace
-from augment.fake_llm import careless, misreading
-from augment.scene.modification import Modification
+from augment.fake_llm import careless
+from augment.fake_llm import careless as misreading
+from augment.scene.entities import Modification
 from bench.displacement import made, measured
 from tests.fixtures.shelf import HARD_SLUGS, SLUGS, entry, shown_scene
 

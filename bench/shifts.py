@@ -10,11 +10,9 @@ import random
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 
-from augment.geometry.angles import wrap
-from augment.geometry.boxes import Box, overlap
+from augment.geometry.frames import Box, overlap, wrap
 from augment.scene.ego_route import EgoRoute
-from augment.scene.entities import Scene, TrafficAgent
-from augment.scene.modification import Modification
+from augment.scene.entities import Modification, Scene, TrafficAgent
 
 Agents = tuple[TrafficAgent, ...]
 

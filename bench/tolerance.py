@@ -23,9 +23,8 @@ from arena.rating.leaderboard import Leaderboard, rate
 from augment.baselines.rule_placer import place
 from augment.errors import CannotPlace
 from augment.fake_llm.server import running
-from augment.metrics.alike import Likeness, are_alike
-from augment.metrics.displacement import displacement
-from augment.scene.modification import Modification
+from augment.metrics.displacement import Likeness, are_alike, displacement
+from augment.scene.entities import Modification
 from tests.fake_llm.asking import outcome
 from tests.fixtures.shelf import SLUGS, entry, shown_scene
 from tests.intents import intents

@@ -5,7 +5,7 @@ from __future__ import annotations
 from arena.models import Study
 from augment.models import Augmentation
 from augment.scene.codec import modification_to_document
-from augment.scene.modification import Modification
+from augment.scene.entities import Modification
 from tests.opening import open_study
 from tests.scenes import vehicle
 from tests.study_rows import Cast, cast_of

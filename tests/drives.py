@@ -9,15 +9,15 @@ from functools import cache
 from typing import Any
 
 from augment.models import Augmentation, GenerationJob, Simulation
-from augment.scene.modification import Modification
+from augment.scene.entities import Modification
 from augment.services.judging import simulations
 from augment.services.judging.simulations import Options
 from augment.simulation.drive import expert_of, run
 from augment.simulation.pdm_closed import PdmClosed
 from augment.simulation.road import Road
 from augment.simulation.score import ScoreKind, score_drive
-from augment.simulation.setting import DriveSetting
 from augment.simulation.trace import trace_of
+from augment.simulation.traffic import DriveSetting
 from tests.scenes import cone, scene
 
 

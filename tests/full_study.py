@@ -18,8 +18,8 @@ from arena.models import Matchup, Study, Vote
 from arena.services.people import create_person
 from arena.services.studies import close_study
 from augment.models import Augmentation, BaseScene, Contestant, GenerationJob, Scenario
-from augment.scene.catalogue import ScenarioType
 from augment.scene.codec import scene_to_document
+from augment.scene.entities import ScenarioType
 from tests.opening import open_study
 from tests.scenes import scene as street
 

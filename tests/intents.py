@@ -8,20 +8,24 @@ from typing import Any
 
 from augment.fake_llm.sight import same_text
 from augment.scene.intent import (
+    Body,
     ConesRequest,
     CrashedCar,
     CrashRequest,
     Intent,
     LaneChoice,
     Lateral,
+    LateralTarget,
     Length,
+    Nearness,
     Relation,
+    Setting,
+    Shape,
     Side,
     Spot,
     VehicleRequest,
     WalkRequest,
 )
-from augment.scene.intent_words import Body, LateralTarget, Nearness, Setting, Shape
 from tests.fixtures.shelf import HARD_SLUGS, SLUGS, entry
 
 LEFT_EDGE, RIGHT_EDGE = LateralTarget.LEFT_BOUNDARY, LateralTarget.RIGHT_BOUNDARY

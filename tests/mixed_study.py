@@ -6,7 +6,7 @@ from arena.models import Matchup, Study
 from arena.services.authorships import mark_author
 from arena.services.studies import close_study
 from augment.models import Augmentation, Contestant, Scenario
-from augment.scene.catalogue import ScenarioType
+from augment.scene.entities import ScenarioType
 from tests.study_rows import a_study, contestant, matchups_of, picture, shown_again, vote
 
 OUTCOMES = ("left", "equal", "right", "right")

@@ -7,10 +7,9 @@ import re
 from pathlib import Path
 from typing import Any
 
-from augment.scene.codec import modification_to_document, scene_to_document
+from augment.scene.codec import intent_from_document, modification_to_document, scene_to_document
+from augment.scene.entities import Modification
 from augment.scene.intent import Intent
-from augment.scene.intent_codec import intent_from_document
-from augment.scene.modification import Modification
 from augment.services.scenarios.intent_fields import NEW_ROW, IntentFields, intent_of_fields
 from tests.scenes import scene, vehicle
 

@@ -13,9 +13,8 @@ from arena.services.decisions import decision_of
 from arena.services.people import create_person
 from arena.services.votes import cast_vote
 from augment.models import Augmentation, BaseScene, Contestant, GenerationJob, Scenario
-from augment.scene.catalogue import ScenarioType
 from augment.scene.codec import modification_to_document, scene_to_document
-from augment.scene.modification import Modification
+from augment.scene.entities import Modification, ScenarioType
 from tests.opening import open_study
 from tests.scenes import scene as street
 

@@ -11,6 +11,8 @@ from rest_framework import serializers
 from rest_framework.exceptions import ParseError
 from rest_framework.parsers import JSONParser
 
+from augment.services.inputs import Input, InputKind
+
 
 class SoundJSONParser(JSONParser):
     """JSON whose nesting can't exhaust the stack."""
@@ -115,3 +117,35 @@ class TextField(serializers.CharField):
         if not isinstance(data, str):
             self.fail("invalid")
         return super().to_internal_value(data)
+
+
+LONGEST_NAME = 150
+MOST_NAMES = 5_000
+LONGEST_LINE = 500
+MOST_LINES = 2_000
+
+Field = serializers.Field[Any, Any, Any, Any]
+
+
+def body_field(asked: Input) -> Field:
+    """Return the field of a body."""
+    given: dict[str, Any] = {"help_text": asked.explanation}
+    given |= {"required": True} if asked.is_required else {"default": asked.default}
+    bounds: dict[str, Any] = {"min_value": asked.least, "max_value": asked.most}
+    match asked.kind:
+        case InputKind.TEXT:
+            return TextField(**given | {"max_length": asked.most})
+        case InputKind.WHOLE:
+            return WholeNumberField(**given, **bounds)
+        case InputKind.NUMBER:
+            return NumberField(**given, **bounds)
+        case InputKind.SWITCH:
+            return FlagField(**given)
+        case InputKind.CHOICE:
+            return serializers.ChoiceField(**given, choices=list(asked.choices))
+        case InputKind.LINES:
+            line = TextField(max_length=LONGEST_LINE, allow_blank=True)
+            return serializers.ListField(**given, child=line, max_length=MOST_LINES)
+        case InputKind.NAMES:
+            name = TextField(max_length=LONGEST_NAME)
+            return serializers.ListField(**given, child=name, max_length=MOST_NAMES)

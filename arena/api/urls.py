@@ -4,20 +4,15 @@ from __future__ import annotations
 
 from django.urls import URLPattern, path
 
-from arena.api import (
-    contestants,
-    endpoints,
-    exports,
-    jobs,
-    people,
-    reference,
-    scenarios,
-    snapshots,
-    studies,
-    uploads,
-    voting,
-)
+from arena.api import reference
 from arena.api.views import ApiView
+from arena.contestants import api as contestants
+from arena.jobs import api as jobs
+from arena.people import api as people
+from arena.results import api as results
+from arena.scenarios import api as scenarios
+from arena.studies import api as studies
+from arena.voting import api as voting
 
 
 def _at(address: str, view: type[ApiView], name: str) -> URLPattern:
@@ -31,29 +26,29 @@ urlpatterns: list[URLPattern] = [
     _at("people", people.PeopleView, "api-people"),
     _at("first", people.FirstView, "api-first"),
     _at("welcome", people.WelcomeView, "api-welcome"),
-    _at("uploads", uploads.UploadsView, "api-uploads"),
-    _at("uploads/<uuid:code>", uploads.UploadView, "api-upload"),
-    _at("uploads/<uuid:code>/moments", uploads.MomentsView, "api-moments"),
-    _at("moments/<uuid:code>", uploads.MomentView, "api-moment"),
-    _at("moments/<uuid:code>/keep", uploads.KeepMomentView, "api-moment-keep"),
+    _at("uploads", scenarios.UploadsView, "api-uploads"),
+    _at("uploads/<uuid:code>", scenarios.UploadView, "api-upload"),
+    _at("uploads/<uuid:code>/moments", scenarios.MomentsView, "api-moments"),
+    _at("moments/<uuid:code>", scenarios.MomentView, "api-moment"),
+    _at("moments/<uuid:code>/keep", scenarios.KeepMomentView, "api-moment-keep"),
     _at("scenarios", scenarios.ScenariosView, "api-scenarios"),
-    _at("endpoints", endpoints.EndpointsView, "api-endpoints"),
-    _at("endpoints/<uuid:code>/models", endpoints.ModelsView, "api-endpoint-models"),
-    _at("models/<uuid:code>/probe", endpoints.ProbeView, "api-probe"),
+    _at("endpoints", contestants.EndpointsView, "api-endpoints"),
+    _at("endpoints/<uuid:code>/models", contestants.ModelsView, "api-endpoint-models"),
+    _at("models/<uuid:code>/probe", contestants.ProbeView, "api-probe"),
     _at("contestants", contestants.ContestantsView, "api-contestants"),
     _at("jobs", jobs.JobsView, "api-jobs"),
     _at("jobs/estimate", jobs.EstimateView, "api-job-estimate"),
     _at("jobs/<uuid:code>", jobs.JobView, "api-job"),
     _at("jobs/<uuid:code>/progress", jobs.JobProgressView, "job-progress"),
-    _at("jobs/<uuid:code>/exports/<slug:name>.<slug:form>", exports.JobExportView, "api-job-file"),
+    _at("jobs/<uuid:code>/exports/<slug:name>.<slug:form>", jobs.JobExportView, "api-job-file"),
     _at("studies", studies.StudiesView, "api-studies"),
     _at("studies/<uuid:code>", studies.StudyView, "api-study"),
     _at("studies/<uuid:code>/close", studies.CloseStudyView, "api-study-close"),
-    _at("studies/<uuid:code>/snapshots", snapshots.SnapshotsView, "api-snapshots"),
-    _at("snapshots/<uuid:code>", snapshots.SnapshotView, "api-snapshot"),
+    _at("studies/<uuid:code>/snapshots", results.SnapshotsView, "api-snapshots"),
+    _at("snapshots/<uuid:code>", results.SnapshotView, "api-snapshot"),
     _at(
         "snapshots/<uuid:code>/exports/<slug:name>.<slug:form>",
-        exports.SnapshotExportView,
+        results.SnapshotExportView,
         "api-snapshot-file",
     ),
     _at("matchups", voting.MatchupsView, "api-matchups"),

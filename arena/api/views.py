@@ -2,26 +2,35 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import partial
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import cache, partial, wraps
 from typing import Any, TypeVar, cast
+from urllib.parse import urlencode
 
 from django.contrib.auth.models import User
 from django.db import transaction
-from django.db.models import Model
-from django.http import HttpResponse
+from django.db.models import Model, QuerySet
+from django.http import Http404, HttpResponse
+from django.http.response import HttpResponseBase
 from django.views.decorators.cache import never_cache
 from django.views.decorators.http import conditional_page
+from drf_spectacular.extensions import OpenApiAuthenticationExtension
+from drf_spectacular.openapi import AutoSchema
+from drf_spectacular.types import OpenApiTypes
+from drf_spectacular.utils import OpenApiParameter, extend_schema, inline_serializer
 from rest_framework import serializers
+from rest_framework.exceptions import ValidationError
 from rest_framework.parsers import BaseParser
+from rest_framework.permissions import SAFE_METHODS
 from rest_framework.request import Request
 from rest_framework.response import Response
 from rest_framework.views import APIView
 
 from arena.api.access import RoleAllowed
 from arena.api.errors import error_response
-from arena.api.fields import SoundJSONParser
-from augment.errors import QueueFault
+from arena.api.fields import SoundJSONParser, StrictSerializer
+from arena.exports.formats import Format, format_named
+from augment.errors import QueueFault, UnknownName
 
 Row = TypeVar("Row", bound=Model)
 
@@ -121,3 +130,233 @@ def _send(warnings: list[str], send: Callable[[int], object], pk: int) -> None:
         send(pk)
     except QueueFault as error:
         warnings.append(str(error))
+
+
+JSON = "application/json"
+ERRORS = {
+    401: "Not signed in, or the token is not valid.",
+    403: "Not for this role, or the CSRF token is missing.",
+    404: "Nothing at this address, or nothing that this account may know of.",
+    406: "Answers are JSON.",
+    409: "In conflict with what there is.",
+    410: "Over: the study takes no votes, or the link has expired.",
+    422: "The address or the body is invalid; `fields` says where.",
+    429: "Too many requests; `Retry-After` says when the next one is accepted.",
+    503: "The database is busy or its disk is full; `Retry-After` says when to try again.",
+}
+ERRORS_OF_CHANGES = ERRORS | {
+    400: "Refused; the message says why and what is allowed.",
+    413: "The body is larger than 2.5 MB, or a file in it than the installation takes.",
+    415: "The body is not JSON, or not multipart where files are sent.",
+}
+
+
+class BearerScheme(OpenApiAuthenticationExtension):  # type: ignore[no-untyped-call]
+    """How the document describes tokens."""
+
+    target_class = "arena.api.access.BearerToken"
+    name = "token"
+
+    def get_security_definition(self, auto_schema: AutoSchema) -> dict[str, Any]:
+        """Return an HTTP scheme."""
+        return {
+            "type": "http",
+            "scheme": "bearer",
+            "description": "A token of the page “API tokens”.",
+        }
+
+
+class ErrorDetail(serializers.Serializer[Any]):
+    """What went wrong."""
+
+    code = serializers.CharField(help_text="For programs.")
+    message = serializers.CharField(help_text="A sentence for people.")
+    fields = serializers.DictField(  # type: ignore[assignment]
+        required=False, help_text="By field, what is wrong with it; with 422."
+    )
+    outcome = serializers.CharField(required=False, help_text="The stored one; with 409.")
+
+
+class ErrorBody(serializers.Serializer[Any]):
+    """The form of every error."""
+
+    error = ErrorDetail()
+
+
+class ArenaSchema(AutoSchema):
+    """Adds the errors that every operation can have."""
+
+    def _get_response_bodies(self, direction: Any = "response") -> dict[str, Any]:
+        found: dict[str, Any] = super()._get_response_bodies(direction)
+        reads = self.method in SAFE_METHODS
+        for status, meaning in (ERRORS if reads else ERRORS_OF_CHANGES).items():
+            answer: dict[str, Any] = self._get_response_for_code(  # type: ignore[no-untyped-call]
+                ErrorBody, str(status), [JSON]
+            )
+            found[str(status)] = answer | {"description": meaning}
+        if reads and not getattr(self.view, "is_never_cached", False):
+            found["304"] = {"description": "Unchanged since the ETag that came with the request."}
+        return dict(sorted(found.items()))
+
+
+def operation(
+    summary: str,
+    *,
+    name: str,
+    answers: Any,
+    takes: type[serializers.Serializer[Any]] | None = None,
+    query: type[serializers.Serializer[Any]] | None = None,
+    status: int = 200,
+) -> Callable[[Callable[..., Any]], Callable[..., HttpResponseBase]]:
+    """Describe an operation, validate its input, and serialize its result.
+
+    The method gets the validated body or query as `given`. It returns what `answers` serializes,
+    beside a list of warnings where workers are involved, or a finished response.
+
+    Args:
+        summary: One line for people.
+        name: Operation id.
+        answers: Serializer of the answer, `many` where it is a list.
+        takes: Serializer of the body.
+        query: Serializer of the address's parameters.
+        status: Of a successful answer.
+    """
+
+    def decorate(method: Callable[..., Any]) -> Callable[..., HttpResponseBase]:
+        @wraps(method)
+        def call(view: Any, request: Request, **path: Any) -> HttpResponseBase:
+            if takes is not None:
+                path["given"] = validate(takes, request.data)
+            elif query is not None:
+                path["given"] = validate(query, request.query_params.dict())
+            found = method(view, request, **path)
+            if isinstance(found, HttpResponseBase):
+                return found
+            row, warnings = found if isinstance(found, tuple) else (found, [])
+            return Response(answers(row, context={"warnings": warnings}).data, status=status)
+
+        described: Callable[..., HttpResponseBase] = extend_schema(
+            summary=summary,
+            request=takes,
+            responses={status: answers},
+            parameters=[] if query is None else [query],
+            operation_id=name,
+        )(call)
+        return described
+
+    return decorate
+
+
+def validate(serializer: type[serializers.Serializer[Any]], data: Any) -> dict[str, Any]:
+    """Return the validated input.
+
+    Raises:
+        ValidationError: A field is unknown, missing or invalid.
+    """
+    given = serializer(data=data)
+    given.is_valid(raise_exception=True)
+    return dict(given.validated_data)
+
+
+def file_operation(
+    summary: str,
+    *,
+    name: str,
+    types: Iterable[str],
+    words: Mapping[str, Iterable[str]] | None = None,
+) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """Describe an operation that answers with a file.
+
+    Args:
+        summary: One line for people.
+        name: Operation id.
+        types: Content types that it can have.
+        words: By part of the path, its allowed values.
+    """
+    parts = [
+        OpenApiParameter(one, OpenApiTypes.STR, OpenApiParameter.PATH, enum=sorted(set(allowed)))
+        for one, allowed in (words or {}).items()
+    ]
+    kinds = {kind.partition(";")[0] for kind in types}
+    described: Callable[[Callable[..., Any]], Callable[..., Any]] = extend_schema(
+        summary=summary,
+        operation_id=name,
+        parameters=parts,
+        responses={(200, kind): OpenApiTypes.BINARY for kind in sorted(kinds)},
+    )
+    return described
+
+
+USUAL, MOST = 100, 500
+
+
+class PageQuery(StrictSerializer):
+    """Which page of a list."""
+
+    limit = serializers.IntegerField(
+        min_value=1, max_value=MOST, default=USUAL, help_text="Rows of a page."
+    )
+    after = serializers.UUIDField(
+        required=False, help_text="The code of the last row of the page before."
+    )
+
+
+@cache
+def page_of(line: type[serializers.Serializer[Any]]) -> serializers.Serializer[Any]:
+    """Return the serializer of a page, for the document."""
+    return inline_serializer(
+        name=line.__name__.removesuffix("Document") + "Page",
+        fields={
+            "results": line(many=True),
+            "next": serializers.CharField(
+                allow_null=True, help_text="The address of the next page, null on the last one."
+            ),
+        },
+    )
+
+
+def answer_page(
+    request: Request,
+    rows: QuerySet[Row],
+    query: dict[str, Any],
+    line: type[serializers.Serializer[Any]],
+    *,
+    order: str = "-pk",
+    lines: Callable[[Sequence[Row]], Sequence[Any]] = list,
+) -> Response:
+    """Return a page of the rows.
+
+    Args:
+        request: Its address is that of the next page.
+        rows: All rows of the list, unless `query` names values of their columns.
+        query: The validated `PageQuery`; other names in it are columns to filter by.
+        line: Serializer of a row.
+        order: A unique column; a minus before it for descending order.
+        lines: Makes what `line` serializes of all rows of the page at once.
+
+    Raises:
+        ValidationError: No row has the code `after`.
+    """
+    limit, after = query.pop("limit"), query.pop("after", None)
+    column, sign = order.removeprefix("-"), "lt" if order.startswith("-") else "gt"
+    rows = rows.filter(**query).order_by(order)
+    if after is not None:
+        last = rows.filter(code=after).values_list(column, flat=True).first()
+        if last is None:
+            raise ValidationError({"after": ["No row of this list has that code."]})
+        rows = rows.filter(**{f"{column}__{sign}": last})
+    found = list(rows[: limit + 1])
+    shown = found[:limit]
+    body: dict[str, Any] = {"results": line(lines(shown), many=True).data, "next": None}
+    if len(found) > limit:
+        kept = request.query_params.dict() | {"after": str(shown[-1].code)}  # type: ignore[attr-defined]
+        body["next"] = f"{request.path}?{urlencode(kept)}"
+    return Response(body)
+
+
+def written_as(formats: Mapping[str, Format[Any]], form: str) -> Format[Any]:
+    """Return the format of that name, or raise 404."""
+    try:
+        return format_named(formats, form)
+    except UnknownName as error:
+        raise Http404 from error

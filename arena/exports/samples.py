@@ -12,7 +12,7 @@ from django.core.files.storage import default_storage
 
 from arena.exports.charts.drawing import INK, SIMULATED, SOFT, house_style, write_figure
 from arena.exports.tables import SIMULATED as SIMULATED_WORD
-from arena.queries.jobs import GridRow, JobGrid
+from arena.jobs.queries import GridRow, JobGrid
 from augment.errors import UnknownName
 from augment.models import Augmentation, Contestant
 

@@ -12,11 +12,11 @@ from django.core.files.base import ContentFile
 from django.utils.text import slugify
 
 from arena.exports.contact_sheet import contact_sheet, sheet_pdf
-from arena.exports.jobs.scenario_files import made_of
 from arena.exports.study_folder.writing import write_study
 from arena.exports.tables import leaderboard_table
 from arena.exports.written_files import FileWork, MadeFile
 from arena.exports.zips import zip_folder
+from arena.jobs.exports.files import made_of
 from arena.models import Study, StudyFile
 from arena.queries.studies.results import snapshot_to_export
 from arena.services.plans import shown_augmentations

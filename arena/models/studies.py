@@ -115,7 +115,7 @@ class Matchup(models.Model):
     )
     descriptions = models.JSONField(
         null=True,
-        help_text="what its pictures show, left and right, as augment.render.description gives "
+        help_text="what its pictures show, left and right, as augment.render.legend gives "
         "it; null where the study has no text description",
     )
     kind = models.CharField(max_length=10, choices=Kind.choices, default=Kind.MAIN)

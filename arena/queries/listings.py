@@ -8,7 +8,7 @@ from django.contrib.auth.models import User
 from django.db.models import Case, IntegerField, Q, QuerySet, Value, When
 
 from arena.models import Study
-from arena.queries.scenarios import OWN, TypeGroup
+from arena.scenarios.queries import OWN, TypeGroup
 from augment.models import Contestant, GenerationJob, Scenario
 from augment.services.scenarios.scenes import type_choices
 

@@ -11,8 +11,8 @@ from typing import Any
 
 from django.db.models import Count
 
+from arena.jobs.queries import model_classes, shown_augmentations, spent_on
 from arena.models import Matchup, Study
-from arena.queries.costs import model_classes, shown_augmentations, spent_on
 from arena.queries.votes.judged import Entrant, Judged, is_imported
 from arena.queries.votes.sets import Filters
 from arena.rating.comparisons import Comparisons, select_votes, win_rates

@@ -11,11 +11,11 @@ from django.db import models
 from django.db.models import F
 
 from arena.errors import ArenaError
+from arena.jobs.services import NOTE_LENGTH
 from arena.models import FaultLabel, Matchup, Report, Snapshot, Study, Vote
 from arena.rating.bootstrap import Unit
 from arena.rating.rules import Intervals, Method
 from arena.services.decisions import decision_of
-from arena.services.faults import NOTE_LENGTH
 from arena.services.plans import rules_of
 from arena.services.reports import Complaint, check_complaint
 from arena.services.studies import check_seed

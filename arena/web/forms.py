@@ -11,7 +11,7 @@ from django.utils.translation import gettext_lazy as _
 
 from arena.models import Report, Vote
 from arena.queries.profiles import Language, Theme
-from arena.queries.scenarios import TypeGroup
+from arena.scenarios.queries import TypeGroup
 from arena.services.decisions import LONGEST_COMMENT, Decision, decision_of
 from arena.services.reports import SIDES, Complaint
 from augment.models import Contestant

@@ -5,22 +5,23 @@ from __future__ import annotations
 from django.contrib.auth import views as auth
 from django.urls import URLPattern, path
 
-from arena.web.contestants import endpoints
-from arena.web.contestants import forms as contestant_form
-from arena.web.contestants import pages as contestants
-from arena.web.jobs import actions as job_actions
-from arena.web.jobs import analyses, displacement, driving, labelling, scenario_files, transcripts
-from arena.web.jobs import launching as new_job
-from arena.web.jobs import pages as jobs
+from arena.contestants.pages import contestants, endpoints
+from arena.contestants.pages import contestants as contestant_form
+from arena.jobs.pages import displacement, driving, files, jobs, labelling
+from arena.jobs.pages import jobs as job_actions
+from arena.jobs.pages import launching as new_job
+from arena.scenarios.pages import editing, prompts, scenarios, uploads
+from arena.scenarios.pages import forms as scenario_form
+from arena.scenarios.pages import scenarios as catalogue
+from arena.scenarios.pages import scenarios as intents
+from arena.scenarios.pages import scenarios as removing
+from arena.scenarios.pages import uploads as scenes
 from arena.web.people import accounts as people
 from arena.web.people import api_tokens, authorships, enrolments, invitations
 from arena.web.people.sign_in import SignIn
 from arena.web.results import evidence as results_votes
 from arena.web.results import files as results_files
 from arena.web.results import pages as results
-from arena.web.scenarios import catalogue, editing, intents, prompts, removing, scenes, uploads
-from arena.web.scenarios import forms as scenario_form
-from arena.web.scenarios import pages as scenarios
 from arena.web.site import audit, health, home
 from arena.web.studies import files as study_files
 from arena.web.studies import pages as studies
@@ -107,18 +108,22 @@ urlpatterns: list[URLPattern] = [
         displacement.export,
         name="displacement-export",
     ),
-    path("jobs/<uuid:code>/analyses/", analyses.page, name="analyses"),
+    path("jobs/<uuid:code>/analyses/", files.analyses_page, name="analyses"),
     path(
         "jobs/<uuid:code>/analyses-<slug:part>.<slug:form>",
-        analyses.export,
+        files.export_analysis,
         name="analyses-export",
     ),
-    path("jobs/<uuid:code>/transcripts.jsonl", transcripts.export, name="transcripts-export"),
+    path(
+        "jobs/<uuid:code>/transcripts.jsonl", files.export_transcripts, name="transcripts-export"
+    ),
     path(
         "jobs/<uuid:code>/tool-calls.<slug:form>", jobs.export_tool_calls, name="tool-calls-export"
     ),
-    path("jobs/<uuid:code>/scenarios-<slug:form>/", scenario_files.ask, name="scenarios-write"),
-    path("scenarios-<uuid:code>.zip", scenario_files.download, name="scenarios-export"),
+    path(
+        "jobs/<uuid:code>/scenarios-<slug:form>/", files.ask_for_scenarios, name="scenarios-write"
+    ),
+    path("scenarios-<uuid:code>.zip", files.download_scenarios, name="scenarios-export"),
     path("jobs/<uuid:code>/simulate/", driving.simulate_job, name="job-simulate"),
     path("jobs/<uuid:code>/drives/", driving.drives_page, name="drives"),
     path("jobs/<uuid:code>/driving.<slug:form>", driving.export, name="driving-export"),

@@ -6,13 +6,14 @@ entry of PLACERS; slugs are kept in databases, so they stay.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Protocol
 
 from augment.baselines import quantised, rule_placer
 from augment.baselines.rule_placer import Placement
-from augment.scene.entities import Scene
+from augment.scene.entities import Modification, Scene
 from augment.scene.intent import Intent
 
 RULE_PLACER = "rule-placer"
@@ -51,3 +52,35 @@ PLACERS: dict[str, Placer] = {
         name="Quantised code, 20 m", place=partial(quantised.place, bin_m=20.0)
     ),
 }
+
+
+SPACING_M = 0.6
+"""Between the centres of the objects, so that a pile of several is seen as a pile."""
+
+
+def break_reference(reference: Modification) -> Modification | None:
+    """The reference with everything that it places heaped across the ego.
+
+    No instruction asks for a collision with a standing ego, and no road user looks like that.
+
+    Args:
+        reference: A right change, in the ego frame.
+
+    Returns:
+        The wrong one, None where the reference places nothing.
+    """
+    if not reference.changed:
+        return None
+    heaped = [
+        replace(
+            agent,
+            x_m=SPACING_M * index,
+            y_m=0.0,
+            heading_rad=math.pi / 2,
+            lane_id=None,
+            walk_to_m=None,
+        )
+        for index, agent in enumerate(reference.changed)
+    ]
+    added = len(reference.added)
+    return replace(reference, added=tuple(heaped[:added]), moved=tuple(heaped[added:]))

@@ -10,38 +10,234 @@ refused. So is an intent that leaves open what a placement needs.
 from __future__ import annotations
 
 import itertools
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from augment.baselines.rule_placer_cones import cones
-from augment.baselines.rule_placer_crash import count_arrangements, crash
-from augment.baselines.rule_placer_ground import PlacingGround
-from augment.baselines.rule_placer_jury import Jury, number_agents
-from augment.baselines.rule_placer_vehicles import vehicle
-from augment.baselines.rule_placer_walkers import walkers
-from augment.baselines.rule_placer_words import describe, list_conventions, name_of
-from augment.checks import Ground
-from augment.checks.landmarks import find_picked, list_absent, resolve_landmarks
-from augment.checks.lanes_across import LanesAcross
+from augment.baselines.placed_things import (
+    APART_M,
+    BUMPER_GAP_M,
+    CONE_SPACING_M,
+    SLIGHT_OFFSET_M,
+    cones,
+    count_arrangements,
+    crash,
+    vehicle,
+    walkers,
+)
+from augment.baselines.placing_ground import PlacingGround
+from augment.checks import Ground, Severity
+from augment.checks.lanes_across import LanesAcross, find_picked, list_absent, resolve_landmarks
+from augment.checks.registry import check_against_intent
 from augment.errors import CannotPlace
-from augment.geometry.boxes import overlap
-from augment.scene.entities import AgentType, Scene, TrafficAgent, TurnType
+from augment.geometry.frames import overlap
+from augment.scene.entities import AgentType, Modification, Scene, TrafficAgent, TurnType, apply
 from augment.scene.intent import (
+    Body,
     ConesRequest,
     CrashRequest,
     Intent,
+    LaneChoice,
+    Lateral,
+    LateralTarget,
     Length,
     Move,
+    Nearness,
     Relation,
     Request,
+    Shape,
     VehicleRequest,
     WalkRequest,
     resolve_anchors,
 )
-from augment.scene.intent_words import Body
-from augment.scene.modification import Modification, apply
+
+_Agents = tuple[TrafficAgent, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PlacementVerdict:
+    """What was found about a placement.
+
+    Attributes:
+        wrong: The first finding that hardly any instruction can mean, in words.
+        doubts: How many findings are a fault unless the instruction asks for it.
+    """
+
+    wrong: str | None
+    doubts: int
+
+    @property
+    def is_clean(self) -> bool:
+        """Whether there is nothing but facts."""
+        return self.wrong is None and self.doubts == 0
+
+
+class Jury:
+    """The checks on one scene; they see the request and the placement, never a reference."""
+
+    def __init__(self, scene: Scene, route: TurnType = TurnType.STRAIGHT) -> None:
+        self._scene = scene
+        self._route = route
+        self._ground = Ground.of(scene)
+
+    def verdict(self, request: Request, before: _Agents, agents: _Agents) -> PlacementVerdict:
+        """What is found about the agents of one request.
+
+        Args:
+            request: What they answer.
+            before: Agents of earlier requests, which stand already.
+            agents: Those that are judged.
+        """
+        everyone = number_agents((*before, *agents), self._scene)
+        names = {agent.id for agent in everyone[len(before) :]}
+        after = replace(self._scene, agents=(*self._scene.agents, *everyone[: len(before)]))
+        ground = Ground.of(after) if before else self._ground
+        own = Modification(added=tuple(agent for agent in everyone if agent.id in names))
+        findings = check_against_intent(
+            ground, own, Intent(requests=(request,), route=self._route)
+        )
+        wrong = [one.sentence() for one in findings if one.severity is Severity.WRONG]
+        doubts = sum(one.severity is Severity.DOUBTFUL for one in findings)
+        return PlacementVerdict(wrong=wrong[0] if wrong else None, doubts=doubts)
+
+
+def number_agents(agents: _Agents, scene: Scene) -> _Agents:
+    """The agents with the ids that follow the highest AgentN of the scene."""
+    numbers = [
+        int(agent.id.removeprefix("Agent"))
+        for agent in scene.everyone
+        if agent.id.removeprefix("Agent").isdecimal()
+    ]
+    first = max(numbers, default=0) + 1
+    return tuple(
+        replace(agent, id=f"Agent{number}") for number, agent in enumerate(agents, start=first)
+    )
+
+
+_LANES = {
+    None: "the ego's lane",
+    LaneChoice.OWN: "the ego's lane",
+    LaneChoice.LEFT: "the lane on the left",
+    LaneChoice.RIGHT: "the lane on the right",
+    LaneChoice.ONCOMING: "the oncoming lane",
+}
+
+
+def describe(request: Request, distance_m: float, *, across_m: float) -> str:
+    """One sentence: what stands where.
+
+    Args:
+        request: What was asked for.
+        distance_m: Where it came to stand along the ego's lane, by its size.
+        across_m: How far from the centre of its lane, for a vehicle.
+    """
+    relation = "ahead of" if request.spot.relation is Relation.AHEAD else "behind"
+    where = (
+        f"{distance_m:.1f} m {relation} the ego along its lane{_why_there(request, distance_m)}"
+    )
+    lane = _LANES[request.spot.lane]
+    match request:
+        case VehicleRequest():
+            motion = f"driving at {request.speed_mps:.1f} m/s" if request.speed_mps else "standing"
+            across = _across(request.spot.lateral, abs(across_m))
+            return f"A {request.body}, {motion}, {where}, in {lane}, {across}."
+        case WalkRequest():
+            who = "A pedestrian" if request.count == 1 else f"{request.count} pedestrians"
+            end = request.start.other if request.start else "other side"
+            return f"{who}, {where}, crossing the road from the {request.start} to the {end}."
+        case ConesRequest():
+            worker = " and one worker" if request.has_worker else ""
+            return f"{request.count} cones in a {request.shape}{worker}, {where}, in {lane}."
+        case CrashRequest():
+            plural = "buses" if request.body is Body.BUS else f"{request.body}s"
+            return f"{request.count} crashed {plural}, the nearest {where}, in {lane}."
+
+
+def name_of(request: Request) -> str:
+    """What a request is about, in one word."""
+    match request:
+        case VehicleRequest():
+            return "vehicles"
+        case WalkRequest():
+            return "pedestrians"
+        case ConesRequest():
+            return "cones"
+        case CrashRequest():
+            return "crashed vehicles"
+
+
+def list_conventions(request: Request) -> Iterator[str]:
+    """What fills the open parts of a request, where it is no refusal."""
+    if request.spot.lane is None and not isinstance(request, WalkRequest):
+        yield "in the ego's lane"
+    match request:
+        case VehicleRequest():
+            yield from _vehicle_conventions(request)
+        case WalkRequest():
+            if len(request.behind) + 1 < (request.count or 0):
+                yield f"{APART_M:g} m from one to the next"
+        case ConesRequest():
+            yield from _cone_conventions(request)
+        case CrashRequest():
+            yield from _crash_conventions(request)
+
+
+def _vehicle_conventions(request: VehicleRequest) -> Iterator[str]:
+    yield from _across_conventions(request.spot.lateral)
+    if request.facing is None:
+        yield "facing as the lane leads"
+    if request.spacing is None and request.count != 1:
+        yield f"{BUMPER_GAP_M:g} m from bumper to bumper"
+
+
+def _cone_conventions(request: ConesRequest) -> Iterator[str]:
+    if request.spacing is None and request.reach_m is None:
+        yield f"{CONE_SPACING_M:g} m between the cones"
+    if request.shape is Shape.TAPER and request.start is None:
+        yield "the taper begins at the kerb's side of the lane"
+    if request.has_worker and request.post is None and request.shape is not Shape.RING:
+        yield "the worker stands where people do at such a shape"
+
+
+def _crash_conventions(request: CrashRequest) -> Iterator[str]:
+    if not any(other.turn_deg is not None for other in request.others):
+        yield "the angles between them"
+    if not request.others or any(other.gap is None for other in request.others):
+        yield "as near as they come without sharing ground"
+
+
+def _across_conventions(lateral: Lateral | None) -> Iterator[str]:
+    if lateral is None:
+        yield "in the middle of the lane"
+    elif (
+        lateral.target is not LateralTarget.LANE_CENTRE
+        and lateral.offset is None
+        and lateral.nearness in (None, Nearness.SLIGHTLY)
+    ):
+        yield f"slightly is {SLIGHT_OFFSET_M:g} m"
+
+
+def _why_there(request: Request, distance_m: float) -> str:
+    """A remark where the distance is not simply the one that is asked for."""
+    asked = request.spot.distance
+    if asked is None:
+        return ""
+    if asked.is_range:
+        return f" (drawn from {asked})"
+    if abs(distance_m - asked.low_m) > 0.01:
+        return f" (moved from {asked.low_m:g} m, where it had no room)"
+    return ""
+
+
+def _across(lateral: Lateral | None, offset_m: float) -> str:
+    if lateral is None or lateral.target is LateralTarget.LANE_CENTRE:
+        return "on the lane centre"
+    drawn = lateral.offset is not None and lateral.offset.is_range
+    remark = f" (drawn from {lateral.offset})" if drawn else ""
+    return f"{offset_m:.2f} m{remark} from the lane centre towards the {lateral.target}"
+
 
 _SHIFT_STEP_M = 0.25
 _SHIFT_EXACT_M = 0.5
@@ -49,8 +245,6 @@ _SHIFT_ABOUT_M = 1.5
 """How far along the lane a placement may give way, for an exact and for an "about" distance."""
 
 NO_INTENT = "The scenario has no intent: nobody has written down what its instruction asks for."
-
-_Agents = tuple[TrafficAgent, ...]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -6,14 +6,298 @@ Frame: the scene's. Places relative to the ego go by its pose, wherever that is.
 from __future__ import annotations
 
 import heapq
+import math
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
-from augment.checks.lane_index import LaneIndex
-from augment.checks.surfaces import Surface
+import numpy as np
+from numpy.typing import NDArray
+
+from augment.geometry.frames import difference
 from augment.scene.ego_route import REACH_M, EgoRoute
-from augment.scene.entities import AreaKind, Scene
-from augment.scene.lane_graph import LaneGraph
+from augment.scene.entities import Area, AreaKind, Scene
+from augment.scene.lane_graph import AnyLane, LaneGraph
+
+if TYPE_CHECKING:
+    from shapely.geometry.base import BaseGeometry
+
+
+FloatArray = NDArray[np.float64]
+
+
+SEAM_M = 0.3
+"""A gap between two pieces of ground up to this long is a seam of the map, not an edge."""
+
+
+class Surface:
+    """The union of polygons, which are joined only where somebody asks.
+
+    Args:
+        pieces: Valid shapely polygons (P,); empty ones are dropped.
+    """
+
+    def __init__(self, pieces: NDArray[np.object_]) -> None:
+        import shapely
+
+        self._pieces = pieces[~shapely.is_empty(pieces)]
+        self._tree = shapely.STRtree(self._pieces)
+
+    @classmethod
+    def of(cls, lanes: Iterable[AnyLane] = (), areas: Iterable[Area] = ()) -> Surface:
+        """The ground of lanes and connectors and of areas.
+
+        Lanes go by their boundaries where the map has both, else by their width. An area that
+        crosses itself is taken as the ground that it encloses.
+        """
+        return cls(np.concatenate([strips(list(lanes)), rings(list(areas))]))
+
+    def with_areas(self, areas: Iterable[Area]) -> Surface:
+        """This ground and more areas."""
+        return Surface(np.concatenate([self._pieces, rings(list(areas))]))
+
+    @property
+    def is_empty(self) -> bool:
+        """Whether the map has no such ground at all."""
+        return len(self._pieces) == 0
+
+    def share_outside(self, corners_m: FloatArray) -> float:
+        """The part, 0 to 1, of a box with the corners (4, 2) that lies off the surface."""
+        import shapely
+
+        box = shapely.Polygon(corners_m)
+        near = self._pieces[self._tree.query(box, predicate="intersects")]
+        if any(piece.covers(box) for piece in near):
+            return 0.0
+        left = float(shapely.difference(box, shapely.union_all(near)).area) / float(box.area)
+        return min(1.0, max(0.0, left))
+
+    def distance_m(self, x_m: float, y_m: float) -> float:
+        """From the point to the surface, 0 on it; infinite where there is none."""
+        import shapely
+
+        if self.is_empty:
+            return float("inf")
+        _, distances = self._tree.query_nearest(
+            shapely.Point(x_m, y_m), return_distance=True, all_matches=False
+        )
+        return float(distances[0])
+
+    def reach_m(self, x_m: float, y_m: float, heading_rad: float, most_m: float) -> float | None:
+        """How far the surface goes on from a point in a direction, up to `most_m`.
+
+        Neighbouring pieces seldom meet exactly: gaps up to `SEAM_M` are passed over. None where
+        the point is not on the surface, or the surface ends nowhere within `most_m`.
+        """
+        reached_m = 0.0
+        is_on = False
+        for low_m, high_m in self._spans_m(x_m, y_m, heading_rad, most_m):
+            if low_m > reached_m + SEAM_M:
+                break
+            is_on = is_on or high_m >= 0.0
+            reached_m = max(reached_m, high_m)
+        return reached_m if is_on and reached_m < most_m - SEAM_M else None
+
+    def begins_m(self, x_m: float, y_m: float, heading_rad: float, most_m: float) -> float | None:
+        """How far off a point the surface begins in a direction, 0 on it.
+
+        None where it begins nowhere within `most_m`.
+        """
+        ahead = (span for span in self._spans_m(x_m, y_m, heading_rad, most_m) if span[1] > 0.0)
+        first = next(ahead, None)
+        return None if first is None else max(0.0, first[0])
+
+    def _spans_m(
+        self, x_m: float, y_m: float, heading_rad: float, most_m: float
+    ) -> list[tuple[float, float]]:
+        """From where to where each piece lies under a ray; it begins a seam behind its point."""
+        import shapely
+
+        step = np.array([math.cos(heading_rad), math.sin(heading_rad)])
+        start = np.array([x_m, y_m])
+        ray = shapely.LineString([start - SEAM_M * step, start + most_m * step])
+        near = self._pieces[self._tree.query(ray, predicate="intersects")]
+        parts = shapely.get_parts(shapely.intersection(near, ray))
+        parts = parts[shapely.get_type_id(parts) == shapely.GeometryType.LINESTRING]
+        spans = (((shapely.get_coordinates(part) - start) @ step).tolist() for part in parts)
+        return sorted((min(span), max(span)) for span in spans)
+
+    def distance_to_hull_m(self, x_m: float, y_m: float) -> float:
+        """From the point to the smallest convex region around the whole surface, 0 inside."""
+        import shapely
+
+        return (
+            float("inf") if self.is_empty else float(self._hull.distance(shapely.Point(x_m, y_m)))
+        )
+
+    @cached_property
+    def _hull(self) -> BaseGeometry:
+        import shapely
+
+        points: BaseGeometry = shapely.MultiPoint(shapely.get_coordinates(self._pieces))
+        return points.convex_hull
+
+
+def gaps_m(boxes_m: FloatArray) -> FloatArray:
+    """The gap (N, N) between every two boxes with corners (N, 4, 2); 0 where they meet."""
+    import shapely
+
+    boxes = np.asarray(shapely.polygons(boxes_m), dtype=object)
+    return np.asarray(shapely.distance(boxes[:, None], boxes[None, :]), dtype=np.float64)
+
+
+# Private
+
+
+def strips(lanes: Sequence[AnyLane]) -> NDArray[np.object_]:
+    """One polygon a lane."""
+    import shapely
+
+    outlines = [_outline(lane) for lane in lanes]
+    strips = _polygons([outline for outline in outlines if outline is not None])
+    made = np.full(len(lanes), None, dtype=object)
+    made[[outline is not None for outline in outlines]] = strips
+    # Those without an outline, and those whose outline crosses itself.
+    broad = np.flatnonzero(~shapely.is_valid(made)).tolist()
+    lines = [shapely.LineString(lanes[index].centerline.points_m) for index in broad]
+    halves_m = [lanes[index].width_m / 2.0 for index in broad]
+    made[broad] = shapely.buffer(lines, halves_m, cap_style="flat", quad_segs=4)
+    return made
+
+
+def _outline(lane: AnyLane) -> FloatArray | None:
+    if lane.left_boundary is None or lane.right_boundary is None:
+        return None
+    return np.concatenate([lane.left_boundary.points_m, lane.right_boundary.points_m[::-1]])
+
+
+def rings(areas: Sequence[Area]) -> NDArray[np.object_]:
+    """One geometry an area."""
+    import shapely
+
+    made = _polygons([np.array(area.boundary_m, dtype=np.float64) for area in areas])
+    crossing = ~shapely.is_valid(made)
+    # A buffer of nothing keeps the polygons and drops the lines that mending may leave.
+    made[crossing] = shapely.buffer(shapely.make_valid(made[crossing]), 0.0)
+    return made
+
+
+def _polygons(outlines: Sequence[FloatArray]) -> NDArray[np.object_]:
+    """Polygons (N,) of outlines (P, 2), closed or not."""
+    import shapely
+
+    if not outlines:
+        return np.empty(0, dtype=object)
+    owners = np.repeat(np.arange(len(outlines)), [len(outline) for outline in outlines])
+    rings = shapely.linearrings(np.concatenate(outlines), indices=owners)
+    return np.asarray(shapely.polygons(rings), dtype=object)
+
+
+NEAR_M = 20.0
+"""How far beside a lane a point still has anything to do with it."""
+_JOINT_M = 0.5
+"""Where two lanes meet in a bend, a wedge beside the joint belongs to neither; it is as long."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Beside:
+    """How a point lies beside one lane.
+
+    Attributes:
+        s_m: Along the centreline, within its ends.
+        d_m: To the left of the centreline (right is negative).
+        beyond_m: How far past one of the ends the point lies, 0 beside the lane.
+        distance_m: To the centreline.
+        tangent_rad: The direction of travel there.
+    """
+
+    lane_id: str
+    s_m: float
+    d_m: float
+    beyond_m: float
+    distance_m: float
+    tangent_rad: float
+    width_m: float
+
+    @property
+    def covers(self) -> bool:
+        """Whether the lane lies under the point."""
+        return abs(self.d_m) <= self.width_m / 2.0 and self.beyond_m <= _JOINT_M
+
+    @property
+    def off_m(self) -> float:
+        """From the edge of the lane to the point, 0 where the lane covers it."""
+        return 0.0 if self.covers else max(0.0, self.distance_m - self.width_m / 2.0)
+
+
+class LaneIndex:
+    """The lanes of one scene, laid out for a search by place."""
+
+    def __init__(self, lanes: Iterable[AnyLane]) -> None:
+        self._lanes = tuple(lanes)
+        lines = [lane.centerline for lane in self._lanes]
+        counts = [len(line.points_m) - 1 for line in lines]
+        self._bounds: list[int] = np.cumsum([0, *counts]).tolist()
+        empty = np.zeros((0, 2))
+        self._halves_m = np.array([lane.width_m / 2.0 for lane in self._lanes])
+        self._starts = np.concatenate([empty, *(line.points_m[:-1] for line in lines)])
+        steps = np.concatenate([empty, *(np.diff(line.points_m, axis=0) for line in lines)])
+        self._lengths = np.hypot(steps[:, 0], steps[:, 1])
+        self._directions = steps / self._lengths[:, None]
+        self._stations = np.concatenate([empty[:, 0], *(line.stations_m[:-1] for line in lines)])
+
+    def beside(self, x_m: float, y_m: float) -> tuple[Beside, ...]:
+        """The point beside the lanes near it, in the order of the lanes.
+
+        Those are all whose edge is within `NEAR_M` of the point, else the nearest one.
+        """
+        if not self._lanes:
+            return ()
+        offset = np.array([x_m, y_m]) - self._starts
+        along = (offset * self._directions).sum(axis=1)
+        past = along - np.clip(along, 0.0, self._lengths)
+        left = self._directions[:, 0] * offset[:, 1] - self._directions[:, 1] * offset[:, 0]
+        distances = np.hypot(left, past)
+        edges_m = np.minimum.reduceat(distances, self._bounds[:-1]) - self._halves_m
+        near = np.flatnonzero(edges_m <= max(NEAR_M, float(edges_m.min()))).tolist()
+        return tuple(self._read(number, distances, along, past, left) for number in near)
+
+    def _read(
+        self,
+        number: int,
+        distances: FloatArray,
+        along: FloatArray,
+        past: FloatArray,
+        left: FloatArray,
+    ) -> Beside:
+        """One lane; the arrays (M,) tell how the point lies beside every segment."""
+        lane, start, end = self._lanes[number], *self._bounds[number : number + 2]
+        index = start + int(distances[start:end].argmin())
+        distance_m, past_m, left_m = (float(a[index]) for a in (distances, past, left))
+        is_past_end = (past_m < 0.0 and index == start) or (past_m > 0.0 and index == end - 1)
+        dx, dy = self._directions[index].tolist()
+        return Beside(
+            lane_id=lane.id,
+            s_m=float(self._stations[index] + along[index]) - past_m,
+            # On the outside of a bend the nearest place is a corner, which is past no end.
+            d_m=left_m if is_past_end else math.copysign(distance_m, left_m),
+            beyond_m=abs(past_m) if is_past_end else 0.0,
+            distance_m=distance_m,
+            tangent_rad=math.atan2(dy, dx),
+            width_m=lane.width_m,
+        )
+
+
+def best_aligned(beside: Iterable[Beside], heading_rad: float) -> Beside | None:
+    """Of the lanes under a point the one that fits the heading, of equal ones the nearest."""
+
+    def misfit(one: Beside) -> tuple[int, float]:
+        turn_deg = math.degrees(abs(difference(one.tangent_rad, heading_rad)))
+        return round(turn_deg / 15.0), round(one.distance_m, 4)
+
+    return min((one for one in beside if one.covers), key=misfit, default=None)
+
 
 _ROAD = (AreaKind.DRIVABLE, AreaKind.CARPARK, AreaKind.INTERSECTION)
 _WALKS = (AreaKind.WALKWAY, AreaKind.CROSSWALK)

@@ -6,14 +6,28 @@ Frame: the scene's. Left is left of the route, in its direction of travel.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-from augment.checks.ground import Ground
-from augment.checks.lane_index import Beside, LaneIndex, best_aligned
-from augment.geometry.angles import difference
-from augment.scene.ego_route import EgoRoute
-from augment.scene.entities import TurnType
-from augment.scene.intent import LaneChoice
+import numpy as np
+from numpy.typing import NDArray
+
+from augment.checks.ground import Beside, Ground, LaneIndex, best_aligned
+from augment.geometry.frames import difference
+from augment.geometry.polyline import FloatArray
+from augment.scene.ego_route import EgoRoute, RoutePosition
+from augment.scene.entities import AgentType, AreaKind, LaneConnector, TrafficAgent, TurnType
+from augment.scene.intent import (
+    Intent,
+    LaneChoice,
+    Length,
+    MapPlace,
+    Pick,
+    Relation,
+    Side,
+    Sight,
+    Spot,
+    from_ego,
+)
 
 _BESIDE_M = 1.0
 """A lane whose centre is nearer than this is the same lane."""
@@ -85,3 +99,153 @@ def _band(lane: Beside, tangent_rad: float, choice: LaneChoice) -> Band | None:
     if not fits[choice]:
         return None
     return Band(left_m=left_m, width_m=lane.width_m, tangent_rad=lane.tangent_rad)
+
+
+_STANDS_BELOW_MPS = 0.5
+_BESIDE_M_landmarks = 15.0
+"""Who is further from the route is on another road; prompts show as much beside it."""
+_ON_A_SIDE_M = 1.0
+_STEP_M = 0.1
+_ALONG_RAD, _AGAINST_RAD = math.radians(45.0), math.radians(135.0)
+_VEHICLES = (AgentType.VEHICLE, AgentType.BUS)
+
+
+def find_picked(lanes: LanesAcross, pick: Pick) -> tuple[TrafficAgent, ...]:
+    """Who is meant: one, or all of `every`; empty where nobody fits."""
+    sign = 1.0 if pick.relation is Relation.AHEAD else -1.0
+    agents = []
+    for agent in lanes.route.scene.agents:
+        place = lanes.route.locate_agent(agent)
+        if sign * place.ahead_m > 0.0 and _fits(lanes, pick, agent, place):
+            agents.append((sign * place.ahead_m, agent.id, agent))
+    ordered = tuple(agent for _, _, agent in sorted(agents, key=lambda one: one[:2]))
+    return ordered if pick.every else ordered[pick.ordinal - 1 : pick.ordinal]
+
+
+def find_mark(lanes: LanesAcross, mark: MapPlace) -> float | None:
+    """How far ahead of the ego a place of the map is, None where there is none ahead."""
+    if mark is MapPlace.CROSSWALK:
+        return _crosswalk_m(lanes)
+    route, begins_m = lanes.route, -lanes.route.ego_s_m
+    for name, ends_m in zip(route.lane_ids, route.ends_m, strict=True):
+        if isinstance(route.graph.lane(name), LaneConnector) and ends_m > 0.0:
+            return begins_m if mark is MapPlace.JUNCTION_START else ends_m
+        begins_m = ends_m
+    return None
+
+
+def resolve_landmarks(intent: Intent, lanes: LanesAcross) -> Intent:
+    """The intent with the distances from landmarks and marks as distances from the ego.
+
+    Where there is no such road user or place the distance is left open.
+    """
+    return replace(
+        intent,
+        requests=tuple(
+            replace(request, spot=_resolved(request.spot, lanes)) for request in intent.requests
+        ),
+        moves=tuple(replace(move, spot=_resolved(move.spot, lanes)) for move in intent.moves),
+    )
+
+
+def list_absent(intent: Intent, lanes: LanesAcross) -> tuple[str, ...]:
+    """In words what the intent names and the scene does not have."""
+    spots = [one.spot for one in (*intent.requests, *intent.moves)]
+    picks = [spot.landmark for spot in spots if spot.landmark is not None]
+    picks += [*(move.who for move in intent.moves), *intent.removals]
+    marks = [spot.mark for spot in spots if spot.mark is not None]
+    absent = [name_of_pick(pick) for pick in picks if not find_picked(lanes, pick)]
+    return (*absent, *(str(mark) for mark in marks if find_mark(lanes, mark) is None))
+
+
+def name_of_pick(pick: Pick) -> str:
+    """A road user in a few words: "parked vehicle 2 on the left"."""
+    parts = [f"every {pick.kind}" if pick.every else f"{pick.kind} {pick.ordinal}"]
+    parts += [] if pick.side is None else [f"on the {pick.side}"]
+    parts += [] if pick.lane is None else [f"in the {pick.lane} lane"]
+    where = "ahead of" if pick.relation is Relation.AHEAD else "behind"
+    return " ".join([*parts, f"{where} the ego"])
+
+
+# Private
+
+
+def _fits(lanes: LanesAcross, pick: Pick, agent: TrafficAgent, place: RoutePosition) -> bool:
+    is_standing = abs(agent.speed_mps) < _STANDS_BELOW_MPS
+    is_vehicle = agent.type in _VEHICLES
+    kinds = {
+        Sight.VEHICLE: is_vehicle,
+        Sight.PARKED: is_vehicle and is_standing,
+        Sight.MOVING: is_vehicle and not is_standing,
+        Sight.BUS: agent.type is AgentType.BUS,
+        Sight.BICYCLE: agent.type is AgentType.BICYCLE,
+        Sight.PEDESTRIAN: agent.type is AgentType.PEDESTRIAN,
+    }
+    if not kinds[pick.kind] or abs(place.left_m) > _BESIDE_M_landmarks:
+        return False
+    if pick.side is not None:
+        sign = 1.0 if pick.side is Side.LEFT else -1.0
+        if sign * place.left_m <= _ON_A_SIDE_M:
+            return False
+    return pick.lane is None or _is_in(lanes, pick.lane, agent, place)
+
+
+def _is_in(
+    lanes: LanesAcross, lane: LaneChoice, agent: TrafficAgent, place: RoutePosition
+) -> bool:
+    """Whether it is in that lane; what comes towards the ego is in the oncoming one."""
+    turned_rad = abs(difference(agent.heading_rad, place.tangent_rad))
+    if lane is LaneChoice.ONCOMING:
+        return turned_rad > _AGAINST_RAD
+    band = lanes.band(lane, place.ahead_m)
+    if band is None or turned_rad > _ALONG_RAD:
+        return False
+    return abs(place.left_m - band.left_m) <= band.width_m / 2.0
+
+
+def _resolved(spot: Spot, lanes: LanesAcross) -> Spot:
+    if spot.landmark is None and spot.mark is None:
+        return spot
+    ahead_m = _ahead_m(spot, lanes)
+    bare = replace(spot, landmark=None, mark=None)
+    if ahead_m is None:
+        return replace(bare, distance=None, relation=None)
+    where = Relation.AHEAD if ahead_m >= 0.0 else Relation.BEHIND
+    size_m = abs(ahead_m)
+    here = Spot(distance=Length(low_m=size_m, high_m=size_m), relation=where)
+    if bare.relation is None:  # level with it
+        return replace(bare, distance=here.distance, relation=where)
+    return from_ego(bare, here)
+
+
+def _ahead_m(spot: Spot, lanes: LanesAcross) -> float | None:
+    if spot.mark is not None:
+        return find_mark(lanes, spot.mark)
+    assert spot.landmark is not None
+    picked = find_picked(lanes, spot.landmark)
+    return lanes.route.locate_agent(picked[0]).ahead_m if picked else None
+
+
+def _crosswalk_m(lanes: LanesAcross) -> float | None:
+    """The middle of the first crosswalk that the route leads over."""
+    route = lanes.route
+    ahead_m = np.arange(0.0, route.line.length_m - route.ego_s_m, _STEP_M)
+    points = route.line.points_at(route.ego_s_m + ahead_m)
+    stations_m = []
+    for area in lanes.route.scene.areas:
+        if area.kind is not AreaKind.CROSSWALK:
+            continue
+        inside = np.flatnonzero(_inside(points, np.array(area.boundary_m)))
+        if len(inside):
+            stations_m.append(float(ahead_m[inside].mean()))
+    return min(stations_m, default=None)
+
+
+def _inside(points_m: FloatArray, boundary_m: FloatArray) -> NDArray[np.bool_]:
+    """Which points (N, 2) lie in a polygon (P, 2): an odd number of its sides is to the right."""
+    start, end = boundary_m, np.roll(boundary_m, -1, axis=0)
+    x, y = points_m[:, :1], points_m[:, 1:]
+    spans = (start[:, 1] > y) != (end[:, 1] > y)
+    rise = np.where(start[:, 1] == end[:, 1], 1.0, end[:, 1] - start[:, 1])
+    crossing = start[:, 0] + (y - start[:, 1]) * (end[:, 0] - start[:, 0]) / rise
+    return np.asarray((spans & (crossing > x)).sum(axis=1) % 2 == 1)

@@ -11,12 +11,11 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from augment.checks.asked.across import side_sign
-from augment.checks.asked.question import kerb_of
+from augment.checks.asked_places import side_sign
 from augment.checks.ground import Ground
-from augment.checks.landmarks import resolve_landmarks
-from augment.checks.lanes_across import LanesAcross
-from augment.geometry.angles import difference
+from augment.checks.lanes_across import LanesAcross, resolve_landmarks
+from augment.checks.parties import kerb_of
+from augment.geometry.frames import difference
 from augment.scene.entities import Point
 from augment.scene.intent import Intent, LaneChoice, Spot, WalkRequest, resolve_anchors
 

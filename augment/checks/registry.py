@@ -9,16 +9,39 @@ these here never ask what was wanted.
 
 from __future__ import annotations
 
-from augment.checks.finding import Finding
-from augment.checks.geometric.boxes import duplicate, overlap, size, speed
-from augment.checks.geometric.headings import degrees, heading, walk_heading
-from augment.checks.geometric.off_road import off_road, outside_map
-from augment.checks.geometric.places import ego_offset, lane, lane_distance, lane_named
-from augment.checks.geometric.walks import walk_blocked, walk_crossing
+from collections.abc import Iterable
+from dataclasses import replace
+
+from augment.checks.asked_places import asked_across, asked_crash, asked_distance, asked_spacing
+from augment.checks.asked_things import (
+    asked_changes,
+    asked_count,
+    asked_heading,
+    asked_motion,
+    asked_type,
+    asked_walk,
+    find_attempted,
+    find_unasked,
+)
+from augment.checks.bodies import duplicate, overlap, size, speed, walk_blocked, walk_crossing
+from augment.checks.finding import Finding, FindingKind, Severity
 from augment.checks.ground import Ground
+from augment.checks.lanes_across import LanesAcross, find_picked, resolve_landmarks
+from augment.checks.parties import USUAL, Asked, AskedCheck, Party, Tolerances, match_to_requests
+from augment.checks.places import (
+    degrees,
+    ego_offset,
+    heading,
+    lane,
+    lane_distance,
+    lane_named,
+    off_road,
+    outside_map,
+    walk_heading,
+)
 from augment.checks.situation import ChangedScene, Check
-from augment.scene.entities import Scene
-from augment.scene.modification import Modification
+from augment.scene.entities import Modification, Scene
+from augment.scene.intent import Intent, Move, VehicleRequest, resolve_anchors
 
 CHECKS: tuple[Check, ...] = (
     ego_offset,
@@ -62,3 +85,123 @@ def findings_on(ground: Ground, modification: Modification) -> tuple[Finding, ..
     found = [finding for check in CHECKS for finding in check(situation)]
     order = {agent.id: number for number, agent in enumerate(situation.changed)}
     return tuple(sorted(found, key=lambda finding: order[finding.agents[0]]))
+
+
+ASKED_CHECKS: tuple[AskedCheck, ...] = (
+    asked_count,
+    asked_type,
+    asked_distance,
+    asked_across,
+    asked_heading,
+    asked_crash,
+    asked_walk,
+    asked_motion,
+    asked_spacing,
+    asked_changes,
+    find_unasked,
+    find_attempted,
+)
+
+
+def check_against_intent(
+    ground: Ground,
+    modification: Modification,
+    intent: Intent | None,
+    tolerances: Tolerances = USUAL,
+) -> tuple[Finding, ...]:
+    """What was measured, what was asked for first, then agent by agent.
+
+    Args:
+        ground: Of the scene before the change.
+        modification: The change.
+        intent: What the instruction asks for; None where nobody has written it down. Then only
+            the checks that need none are made.
+        tolerances: How far off what is asked for something may be.
+
+    Raises:
+        InvalidModification: The modification does not fit the scene.
+    """
+    findings = findings_on(ground, modification)
+    lanes = None if intent is None else LanesAcross.of(ground, intent.route)
+    if intent is None or lanes is None:
+        return findings
+    asked = _asked(modification, intent, lanes, tolerances)
+    held = [one for check in ASKED_CHECKS for one in check(asked)]
+    return (*held, *_settled(findings, held, asked))
+
+
+def _asked(
+    modification: Modification, intent: Intent, lanes: LanesAcross, tolerances: Tolerances
+) -> Asked:
+    """The modification with who answers what; a move is a request for one vehicle elsewhere."""
+    counted = resolve_anchors(resolve_landmarks(intent, lanes))
+    matching = match_to_requests(counted, modification.added, lanes)
+    moved = {one.id: one for one in modification.moved}
+    picked = [(move, agent.id) for move in counted.moves for agent in find_picked(lanes, move.who)]
+    movers = [
+        Party(request=_as_request(move), agents=(moved[name],))
+        for move, name in picked
+        if name in moved
+    ]
+    return Asked(
+        modification=modification,
+        lanes=lanes,
+        matching=replace(matching, parties=(*matching.parties, *movers)),
+        tolerances=tolerances,
+        to_move=frozenset(name for _, name in picked),
+        to_remove=frozenset(
+            agent.id for pick in intent.removals for agent in find_picked(lanes, pick)
+        ),
+        unmet=intent.unmet,
+    )
+
+
+def _as_request(move: Move) -> VehicleRequest:
+    return VehicleRequest(
+        spot=move.spot,
+        facing=move.facing,
+        turn_deg=move.turn_deg,
+        speed_mps=move.speed_mps,
+        count=1,
+    )
+
+
+def _settled(found: Iterable[Finding], held: Iterable[Finding], asked: Asked) -> Iterable[Finding]:
+    """The findings of the checks that ask for nothing, now that it is known what was asked for.
+
+    What is doubtful "unless the instruction asks for it" is a fact where it does: a heading
+    against the lane of who has been held against a request; half off the road, of a car whose
+    place across it has been, or of what stands where that belongs which it is taken for. Where
+    and how a thing stands that nobody asked for is no fault of its own.
+    """
+    mistyped = {agent.id for party in asked.parties for agent, _ in party.mistyped}
+    answering = {
+        agent.id
+        for party in asked.parties
+        for agent in party.everyone
+        if not isinstance(party.request, VehicleRequest) or party.request.spot.lane is not None
+    }
+    surplus = {agent.id for agent in asked.matching.surplus}
+    across = {
+        name
+        for one in held
+        if one.kind in (FindingKind.ASKED_ACROSS, FindingKind.ASKED_SIDE)
+        for name in one.agents
+    }
+    for one in found:
+        name = one.agents[0]
+        is_settled = (
+            (one.kind is FindingKind.HEADING and name in answering)
+            or (
+                one.kind is FindingKind.OFF_ROAD
+                and one.severity is Severity.DOUBTFUL
+                and name in across | mistyped
+            )
+            or (one.kind in _OF_PLACE and name in surplus)
+        )
+        yield replace(one, severity=Severity.FACT) if is_settled else one
+
+
+_OF_PLACE = frozenset(
+    {FindingKind.HEADING, FindingKind.DEGREES, FindingKind.WALK_HEADING, FindingKind.OFF_ROAD}
+)

@@ -9,12 +9,9 @@ from functools import cached_property
 import numpy as np
 
 from augment.checks.finding import Finding
-from augment.checks.ground import Ground
-from augment.checks.lane_index import Beside, best_aligned
-from augment.checks.surfaces import gaps_m
-from augment.geometry.boxes import Box
-from augment.scene.entities import AgentType, TrafficAgent
-from augment.scene.modification import Modification, apply
+from augment.checks.ground import Beside, Ground, best_aligned, gaps_m
+from augment.geometry.frames import Box
+from augment.scene.entities import AgentType, Modification, TrafficAgent, apply
 
 VEHICLES = frozenset({AgentType.VEHICLE, AgentType.BUS, AgentType.EGO_VEHICLE})
 STOPPED_BELOW_MPS = 0.5

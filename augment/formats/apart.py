@@ -25,9 +25,13 @@ from augment.formats import sandbox
 from augment.formats.nuplan_log import tokens_in
 from augment.formats.readers import READERS, Timeline, reader_of, recognise, timeline_of
 from augment.formats.reading import Moment, Reader, Reading
-from augment.scene.codec import scene_from_document, scene_to_document
-from augment.scene.notes import notes_from_document, notes_to_document
-from augment.scene.recording_codec import recording_from_document, recording_to_document
+from augment.scene.codec import (
+    recording_from_document,
+    recording_to_document,
+    scene_from_document,
+    scene_to_document,
+)
+from augment.scene.recording import notes_from_document, notes_to_document
 
 WHAT = "zip"
 _DEEPEST = 50

@@ -29,7 +29,7 @@ from augment.formats.reading import (
 )
 from augment.formats.road_map import RoadMap, Segment, count_notes
 from augment.scene.entities import AgentType, AreaKind
-from augment.scene.notes import Note, SceneNoteKind
+from augment.scene.recording import Note, SceneNoteKind
 from augment.scene.schema import problems_of
 
 

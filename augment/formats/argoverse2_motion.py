@@ -29,9 +29,8 @@ from augment.formats.argoverse2 import (
     read_parquet,
 )
 from augment.formats.reading import Log, LoggedTrack, Moment, Reading, frames_every, reading_at
-from augment.scene.entities import AgentType
-from augment.scene.notes import Note, SceneNoteKind
-from augment.scene.sizes import LENGTH_WIDTH_M
+from augment.scene.entities import LENGTH_WIDTH_M, AgentType
+from augment.scene.recording import Note, SceneNoteKind
 
 WHAT = "Argoverse 2 forecasting scenario"
 EGO = "AV"

@@ -15,9 +15,8 @@ from augment.errors import InvalidDocument
 from augment.formats.nuplan_map import WHAT, Tables, city_around, open_tables
 from augment.formats.reading import Log, LoggedTrack, Moment, Reading, frames_every, reading_at
 from augment.geometry.frames import Pose
-from augment.scene.entities import AgentType, TrafficLight
-from augment.scene.notes import Note, SceneNoteKind
-from augment.scene.sizes import EGO_LENGTH_M, EGO_WIDTH_M
+from augment.scene.entities import EGO_LENGTH_M, EGO_WIDTH_M, AgentType, TrafficLight
+from augment.scene.recording import Note, SceneNoteKind
 
 REAR_AXLE_TO_CENTER_M = 1.461
 STEP_US = 100_000

@@ -23,9 +23,9 @@ from augment.errors import InvalidDocument
 from augment.formats.road_map import USUAL_M, RoadMap, Segment, count_notes, limit_notes
 from augment.formats.roads import RADIUS_M
 from augment.geometry.polyline import Polyline
-from augment.scene.directions import turn_type_of
 from augment.scene.entities import AreaKind, TrafficLight, TrafficSide, TurnType
-from augment.scene.notes import Note, SceneNoteKind
+from augment.scene.lane_graph import turn_type_of
+from augment.scene.recording import Note, SceneNoteKind
 
 WHAT = "nuPlan log"
 LONGEST_VALUE = 16 * 1024 * 1024

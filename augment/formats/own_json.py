@@ -20,12 +20,12 @@ from augment.formats.writing import Cell, LossReport, Written, write_each
 from augment.scene.codec import (
     SCENE_FORMAT,
     modification_to_document,
+    recording_to_document,
     scene_from_document,
     scene_to_document,
 )
 from augment.scene.motion import MotionSource, Movement
 from augment.scene.recording import Recording, Track
-from augment.scene.recording_codec import recording_to_document
 
 _SEEN = (MotionSource.RECORDED, MotionSource.SIMULATED)
 

@@ -16,13 +16,10 @@ import numpy as np
 from augment.errors import InvalidDocument
 from augment.formats.road_map import FURTHEST_M, FloatArray, MapExtract, RoadMap
 from augment.formats.roads import RADIUS_M, road_around
-from augment.geometry.angles import wrap
-from augment.geometry.frames import Pose
-from augment.scene.entities import AgentType, Origin, Scene, TrafficAgent
+from augment.geometry.frames import Pose, wrap
+from augment.scene.entities import LENGTH_WIDTH_M, AgentType, Origin, Scene, TrafficAgent
 from augment.scene.lane_graph import LaneGraph
-from augment.scene.notes import Note, SceneNoteKind
-from augment.scene.recording import Recording, Track
-from augment.scene.sizes import LENGTH_WIDTH_M
+from augment.scene.recording import Note, Recording, SceneNoteKind, Track
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

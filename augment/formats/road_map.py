@@ -19,7 +19,7 @@ from augment.scene.entities import (
     TrafficSide,
     TurnType,
 )
-from augment.scene.notes import Note, SceneNoteKind
+from augment.scene.recording import Note, SceneNoteKind
 
 FloatArray = NDArray[np.float64]
 Name = int | str

@@ -26,11 +26,10 @@ from augment.formats.road_map import (
     following_of,
     ways_through,
 )
-from augment.geometry.angles import difference
-from augment.geometry.frames import Pose
+from augment.geometry.frames import Pose, difference
 from augment.geometry.polyline import Polyline
-from augment.scene.directions import traffic_side_of, turn_type_of
 from augment.scene.entities import Area, Lane, LaneConnector, TrafficLight
+from augment.scene.lane_graph import traffic_side_of, turn_type_of
 
 RADIUS_M = 150.0
 """Map and agents further from the ego than this are left out."""

@@ -15,11 +15,9 @@ import numpy as np
 from augment.errors import InvalidDocument
 from augment.formats.interplan.file import InterplanSource
 from augment.geometry.polyline import Polyline
-from augment.scene.catalogue import ScenarioType
 from augment.scene.codec import scene_to_document
-from augment.scene.entities import Scene
+from augment.scene.entities import Modification, ScenarioType, Scene, apply
 from augment.scene.lane_graph import AnyLane
-from augment.scene.modification import Modification, apply
 from augment.scene.motion import SETS_OUT_WITHIN_M, Motion, MotionSource, Movement, motion_of
 from augment.scene.recording import Recording
 

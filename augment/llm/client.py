@@ -7,10 +7,14 @@ out.
 
 from __future__ import annotations
 
+import random
+import time
 from collections.abc import Callable
+from dataclasses import dataclass, field, replace
 from typing import Protocol
 
-from augment.llm.messages import Reply, Request
+from augment.errors import ModelFault
+from augment.llm.messages import LengthName, Reply, Request
 
 Sending = Callable[[], None]
 """Called once, when a request is about to leave this computer; what it raises keeps it here."""
@@ -48,3 +52,101 @@ class ChatClient(Protocol):
             Unwanted: Nobody needs the answer any more; nothing was sent.
         """
         ...
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Patience:
+    """Exponential back-off with jitter, bounded by a number of attempts and by a longest wait.
+
+    Attributes:
+        attempts: How often one request is sent at most.
+        first_wait_s: The wait after the first fault; it doubles from one to the next.
+        longest_wait_s: No wait is longer; who is asked to wait longer (Retry-After) gives up.
+        sleep: Waits for that many seconds.
+        rng: Where the jitter comes from.
+    """
+
+    attempts: int = 3
+    first_wait_s: float = 1.0
+    longest_wait_s: float = 30.0
+    sleep: Callable[[float], None] = time.sleep
+    rng: random.Random = field(default_factory=random.Random)
+
+    def wait_s(self, fault: ModelFault, *, attempt: int) -> float | None:
+        """Seconds to wait after that attempt (the first is 1), None to give up.
+
+        The jitter takes away up to half of the back-off. What the endpoint asked for with
+        Retry-After is never undercut.
+        """
+        if not fault.retryable or attempt >= self.attempts:
+            return None
+        asked_s = fault.retry_after_s or 0.0
+        if asked_s > self.longest_wait_s:
+            return None
+        backoff_s = min(self.first_wait_s * 2.0 ** (attempt - 1), self.longest_wait_s)
+        return max(asked_s, backoff_s * (1.0 - 0.5 * self.rng.random()))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ModelProfile:
+    """The abilities of a model at an endpoint.
+
+    Attributes:
+        native_tools, vision, json_schema, temperature: None where nobody knows.
+        refused: Names of further parameters that it does not take.
+        reasoning_effort: Sent with each request, empty for none.
+        max_output_tokens: No answer may be asked to be longer, None without a limit.
+    """
+
+    native_tools: bool | None = None
+    vision: bool | None = None
+    json_schema: bool | None = None
+    temperature: bool | None = None
+    refused: frozenset[str] = frozenset()
+    reasoning_effort: str = ""
+    max_output_tokens: int | None = None
+
+    def fitted(self, request: Request) -> Request:
+        """The request with what this model takes, and nothing else.
+
+        Raises:
+            ModelFault: It can't do without what the model lacks: sight, native tools, a limit of
+                the answer's length.
+        """
+        self._check(request)
+        effort = request.reasoning_effort or self.reasoning_effort or None
+        limits = [request.max_tokens]
+        if self.max_output_tokens is not None:
+            limits.append(self.max_output_tokens)
+        return replace(
+            request,
+            max_tokens=min(limits),
+            temperature=None if self.temperature is False else request.temperature,
+            seed=None if "seed" in self.refused else request.seed,
+            reasoning_effort=None if "reasoning_effort" in self.refused else effort,
+            answer_schema=None if self.json_schema is False else request.answer_schema,
+            length_name=self._length_name(request.length_name),
+        )
+
+    def without(self, parameter: str) -> ModelProfile:
+        """The same model, that does not take this parameter."""
+        if parameter == "temperature":
+            return replace(self, temperature=False)
+        if parameter == "response_format":
+            return replace(self, json_schema=False)
+        return replace(self, refused=self.refused | {parameter})
+
+    def _check(self, request: Request) -> None:
+        lacks = None
+        if self.vision is False and any(message.images for message in request.messages):
+            lacks = "can't see pictures, which this variant needs"
+        elif self.native_tools is False and request.tools:
+            lacks = "has no native tool calls, which this variant was told to use"
+        elif self.refused.issuperset(LengthName):
+            lacks = "takes no limit of the answer's length, so that its cost has no bound"
+        if lacks:
+            raise ModelFault(f"{request.model} at this endpoint {lacks}", retryable=False)
+
+    def _length_name(self, wanted: LengthName) -> LengthName:
+        left = [name for name in LengthName if name not in self.refused]
+        return wanted if wanted in left or not left else left[0]

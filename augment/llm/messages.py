@@ -6,8 +6,9 @@ Everything that is stored, replayed or shown goes through these values.
 from __future__ import annotations
 
 import base64
+import hashlib
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -214,3 +215,51 @@ class Reply:
     def is_cut_off(self) -> bool:
         """Whether the answer stopped at its length limit."""
         return self.finish_reason == "length"
+
+
+IMAGE_SCHEME = "sha256:"
+
+
+def image_reference(png: bytes) -> str:
+    """How a stored request names an image: by the hash of its bytes."""
+    return IMAGE_SCHEME + hashlib.sha256(png).hexdigest()
+
+
+def request_hash(
+    *,
+    base_url: str,
+    document: dict[str, object],
+    prompt_version: str,
+    options: Mapping[str, object] | None = None,
+) -> str:
+    """The SHA-256 of everything that an answer depends on, as 64 hexadecimal digits.
+
+    Args:
+        base_url: Where the request goes.
+        document: The stored request: model, messages with references to images, parameters.
+        prompt_version: Of the texts that the messages were made from.
+        options: What else keeps answers apart: options of who asks, the number of the sample.
+    """
+    asked: dict[str, object] = {
+        "base_url": base_url.rstrip("/"),
+        "prompt_version": prompt_version,
+        "request": document,
+    }
+    if options:
+        asked["options"] = dict(options)
+    canonical = json.dumps(asked, sort_keys=True, separators=(",", ":"), ensure_ascii=True)
+    return hashlib.sha256(canonical.encode("ascii")).hexdigest()
+
+
+def shorten(text: str, most: int) -> str:
+    """The text, or its beginning with a mark of how long it was: at most `most` characters.
+
+    Raises:
+        ValueError: There is no room for the mark.
+    """
+    if len(text) <= most:
+        return text
+    mark = f"… [cut: {len(text)} characters]"
+    if len(mark) >= most:
+        raise ValueError(f"{most} characters leave no room for {mark!r}")
+    return text[: most - len(mark)] + mark

@@ -6,26 +6,269 @@ Reply or a ModelFault. Retries are made above, where every attempt is recorded.
 
 from __future__ import annotations
 
+import json
+import math
 import os
+import re
 import socket
 import time
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import AbstractContextManager
+from dataclasses import dataclass
+from datetime import UTC
+from email.utils import parsedate_to_datetime
 from typing import TYPE_CHECKING
 from urllib.parse import urlsplit
 
-from augment.errors import Abandoned, InvalidDocument, ModelFault, NotSent, Unwanted
+from augment.errors import (
+    Abandoned,
+    InvalidDocument,
+    ModelFault,
+    NotSent,
+    ParameterRefused,
+    Unwanted,
+)
 from augment.llm.addresses import Resolve, check_resolved
 from augment.llm.client import Sending, watch_nothing
-from augment.llm.messages import Reply, Request
-from augment.llm.wire_faults import Secret, fault_of_status, retry_after_s
-from augment.llm.wire_network import CONNECT_TIMEOUT_S, Network
-from augment.llm.wire_reply import reply_of
-from augment.llm.wire_transport import ACCEPTED, BadPacking, Transport
-from augment.llm.wire_watch import LOOK_EVERY_S, OutOfTime, TooLong, Watch, Watches
+from augment.llm.messages import LengthName, Reply, Request, ToolCall, shorten
+from augment.llm.wire_transport import (
+    ACCEPTED,
+    CONNECT_TIMEOUT_S,
+    LOOK_EVERY_S,
+    BadPacking,
+    Network,
+    OutOfTime,
+    TooLong,
+    Transport,
+    Watch,
+    Watches,
+)
 
 if TYPE_CHECKING:
     import openai
+
+
+_PASSING = frozenset({408, 409, 425, 429})
+_SPENT = frozenset({"insufficient_quota", "billing_hard_limit_reached", "billing_not_active"})
+_ABOUT_THE_REQUEST = frozenset({400, 422})
+_LENGTHS = frozenset(LengthName)
+_DROPPABLE = frozenset({"temperature", "seed", "reasoning_effort", "response_format"}) | _LENGTHS
+"""What a request can do without, or say in another way."""
+_NOT_TAKEN = frozenset({"unsupported_parameter", "unknown_parameter"})
+_SAYS_UNKNOWN = re.compile(
+    r"unsupported|unknown|unrecognized|unexpected|not (supported|permitted|allowed)|"
+    r"extra (inputs|fields)|cannot find field",
+    re.IGNORECASE,
+)
+LONGEST_MESSAGE = 300
+LONGEST_CODE = 80
+"""Of what an error body says, in characters."""
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class Secret:
+    """A key that must not turn up in anything that is kept."""
+
+    key: str
+
+    def out_of(self, text: str) -> str:
+        """The text without the key, and without what a database can't hold."""
+        storable = text.replace("\0", "\ufffd").encode("utf-8", "replace").decode("utf-8")
+        # A stand-in server is used with keys like "x"; those are no secret.
+        return storable.replace(self.key, "[key]") if len(self.key) >= 8 else storable
+
+    def cleared(self, fault: ModelFault) -> ModelFault:
+        """The same fault with the key taken out of its text."""
+        fault.args = (self.out_of(str(fault)),)
+        return fault
+
+
+def fault_of_status(
+    status: int, body: object, wait_s: float | None, *, sent: Collection[str] = ()
+) -> ModelFault:
+    """The fault that an HTTP status and its decoded body stand for.
+
+    An exhausted quota comes as a 429 and does not pass by waiting.
+
+    Args:
+        status: Of the answer.
+        body: Of the answer, decoded.
+        wait_s: What the headers ask for.
+        sent: The names of what the request had, of which the endpoint may refuse one.
+    """
+    message, code, param = _message_code_and_param(body)
+    passing = (status in _PASSING or status >= 500) and code not in _SPENT
+    shown = shorten(message, LONGEST_MESSAGE)
+    text = f"the endpoint answered {status}" + (
+        f" ({shorten(code, LONGEST_CODE)})" if code else ""
+    )
+    text = f"{text}: {shown}" if shown else text
+    refused = _refused(message, code, param, sent) if status in _ABOUT_THE_REQUEST else None
+    if refused:
+        return ParameterRefused(refused, text, status=status)
+    return ModelFault(
+        text, retryable=passing, status=status, retry_after_s=wait_s if passing else None
+    )
+
+
+def retry_after_s(headers: Mapping[str, str]) -> float | None:
+    """The wait that the headers (names in lower case) ask for, None where they ask for none."""
+    for name, unit_s in (("retry-after-ms", 0.001), ("retry-after", 1.0)):
+        value = headers.get(name)
+        if value is None:
+            continue
+        seconds = _number(value)
+        if seconds is not None:
+            return max(0.0, seconds * unit_s)
+        at_s = _date_s(value)
+        if at_s is not None:
+            return max(0.0, at_s - time.time())
+    return None
+
+
+def _date_s(value: str) -> float | None:
+    """The time that an HTTP date stands for; one that names no zone is in UTC, as all are."""
+    try:
+        at = parsedate_to_datetime(value)
+        return (at if at.tzinfo is not None else at.replace(tzinfo=UTC)).timestamp()
+    except (ValueError, OverflowError, TypeError, IndexError):
+        return None
+
+
+def _number(value: str) -> float | None:
+    try:
+        number = float(value)
+    except ValueError:
+        return None
+    return number if math.isfinite(number) else None
+
+
+def _refused(message: str, code: str, param: str, sent: Collection[str]) -> str | None:
+    """The parameter of the request that an error is about, None where it is about another thing.
+
+    Servers that do not name it (`param`) name it in their message. An answer's limit that is too
+    large is no parameter that is not taken.
+    """
+    named = [param.partition(".")[0]] if param else re.findall(r"\w+", message)
+    refused = next((name for name in named if name in _DROPPABLE and name in sent), None)
+    if refused in _LENGTHS and code not in _NOT_TAKEN and not _SAYS_UNKNOWN.search(message):
+        return None
+    return refused
+
+
+def _message_code_and_param(body: object) -> tuple[str, str, str]:
+    """What an error body says; Gemini's compatible endpoint wraps it in a list."""
+    if isinstance(body, list) and body:
+        body = body[0]
+    if isinstance(body, dict) and isinstance(body.get("error"), dict):
+        body = body["error"]
+    if not isinstance(body, dict):
+        return "", "", ""
+    message, code, param = (body.get(name) for name in ("message", "code", "param"))
+    return (
+        str(message or ""),
+        code if isinstance(code, str) else "",
+        param if isinstance(param, str) else "",
+    )
+
+
+LONGEST_REFUSAL = 4_000
+LONGEST_NAME = 200
+LONGEST_ARGUMENTS = 10_000
+"""Of one call, in characters."""
+
+LONGEST_EXTRA = 100_000
+"""What hangs on a call goes back as it came, so it can't be cut: longer ones are left out."""
+
+MOST_CALLS = 64
+"""Of one answer."""
+
+MOST_TOKENS = 100_000_000
+"""A count beyond is none: no model reads or writes so much at once."""
+
+
+def reply_of(answer: object, *, latency_s: float, secret: Secret) -> Reply:
+    """The reply in an answer of the package.
+
+    Args:
+        answer: A `ChatCompletion`, or what came instead of one.
+        latency_s: How long it took.
+        secret: Is taken out of every text, should a server echo it.
+
+    Raises:
+        ModelFault: It is no completion.
+    """
+    if isinstance(answer, str):
+        raise ModelFault(
+            "the endpoint answered with a page of text instead of JSON: is its base URL right?",
+            retryable=False,
+            status=200,
+        )
+    choices = getattr(answer, "choices", None)
+    if not isinstance(choices, list) or not choices:
+        raise ModelFault("the endpoint answered without a choice", retryable=True, status=200)
+    message = getattr(choices[0], "message", None)
+    if message is None:
+        raise ModelFault("the endpoint answered without a message", retryable=True, status=200)
+    usage = getattr(answer, "usage", None)
+    refusal = getattr(message, "refusal", None)
+    calls = _tool_calls(getattr(message, "tool_calls", None), secret)
+    return Reply(
+        text=secret.out_of(_text(getattr(message, "content", None))),
+        model=shorten(secret.out_of(_text(getattr(answer, "model", None))), 120),
+        finish_reason=shorten(
+            secret.out_of(_text(getattr(choices[0], "finish_reason", None))), 40
+        ),
+        refusal=shorten(secret.out_of(_text(refusal)), LONGEST_REFUSAL) or None,
+        prompt_tokens=_count(getattr(usage, "prompt_tokens", None)),
+        completion_tokens=_count(getattr(usage, "completion_tokens", None)),
+        latency_s=latency_s,
+        tool_calls=calls[:MOST_CALLS],
+        calls_left_out=len(calls[MOST_CALLS:]),
+    )
+
+
+def _tool_calls(calls: object, secret: Secret) -> tuple[ToolCall, ...]:
+    """Those calls that name a function; their arguments stay as they came."""
+    made = []
+    for number, call in enumerate(calls if isinstance(calls, list) else [], start=1):
+        function = getattr(call, "function", None)
+        name = _text(getattr(function, "name", None))
+        if name:
+            made.append(
+                ToolCall(
+                    # Some servers number no calls; the answer to one must name it.
+                    id=shorten(secret.out_of(_text(getattr(call, "id", None))), LONGEST_NAME)
+                    or f"call_{number}",
+                    name=shorten(secret.out_of(name), LONGEST_NAME),
+                    arguments=shorten(
+                        secret.out_of(_text(getattr(function, "arguments", None))),
+                        LONGEST_ARGUMENTS,
+                    ),
+                    extra=_extra(getattr(call, "model_extra", None), secret),
+                )
+            )
+    return tuple(made)
+
+
+def _extra(extra: object, secret: Secret) -> str:
+    """What else hangs on a call, as JSON; empty where there is nothing, or too much."""
+    text = secret.out_of(json.dumps(extra, sort_keys=True)) if extra else ""
+    return text if len(text) <= LONGEST_EXTRA else ""
+
+
+def _text(value: object) -> str:
+    return value if isinstance(value, str) else ""
+
+
+def _count(value: object) -> int | None:
+    """A count of tokens, None where it can't be one; some servers write whole numbers as 12.0."""
+    if isinstance(value, float) and value.is_integer():
+        value = int(value)
+    if isinstance(value, bool) or not isinstance(value, int):
+        return None
+    return value if 0 <= value <= MOST_TOKENS else None
+
 
 DEFAULT_TIMEOUT_S = 180.0
 MEGABYTE = 1_000_000

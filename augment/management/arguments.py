@@ -10,7 +10,7 @@ from typing import Any
 
 from django.conf import settings
 
-from augment.scene.catalogue import CatalogueSet
+from augment.scene.entities import CatalogueSet
 from augment.services.running.budget import Caps
 from augment.services.scenarios.catalogue import folder_of
 from augment.variants.options import EFFORTS, ContestantOptions, options_from_document

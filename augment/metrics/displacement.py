@@ -8,14 +8,15 @@ Notation: R objects of the reference, G generated ones.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import math
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
 import numpy as np
 
-from augment.scene.entities import AgentType, TrafficAgent
-from augment.scene.modification import Modification
+from augment.geometry.frames import difference
+from augment.scene.entities import AgentType, Modification, TrafficAgent
 
 
 class ObjectClass(StrEnum):
@@ -137,3 +138,134 @@ def _matched(
         )
         for row, column in zip(rows, columns, strict=True)
     ]
+
+
+WHISKER = 1.5
+"""Whiskers end at the last value within so many interquartile ranges of the box (Tukey)."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BoxSummary:
+    """Quartiles by linear interpolation, whiskers by Tukey, all in metres."""
+
+    mean_m: float
+    low_m: float
+    q1_m: float
+    median_m: float
+    q3_m: float
+    high_m: float
+    outliers_m: tuple[float, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Summary:
+    """The displacements of some augmentations taken together.
+
+    Attributes:
+        augmentations: How many there are.
+        n: Matched objects, each with its own distance.
+        missing: Objects of the references that nothing stands for.
+        surplus: Generated objects that stand for nothing.
+        box: None where nothing is matched.
+    """
+
+    augmentations: int
+    n: int
+    missing: int
+    surplus: int
+    box: BoxSummary | None
+
+
+def summarise(displacements: Sequence[Displacement]) -> Summary:
+    """All matched objects of all augmentations; each object counts once."""
+    distances_m = [value for displacement in displacements for value in displacement.distances_m]
+    return Summary(
+        augmentations=len(displacements),
+        n=len(distances_m),
+        missing=sum(len(displacement.missing) for displacement in displacements),
+        surplus=sum(len(displacement.surplus) for displacement in displacements),
+        box=box_of(distances_m) if distances_m else None,
+    )
+
+
+def box_of(values_m: Sequence[float]) -> BoxSummary:
+    """The box of at least one value.
+
+    Raises:
+        ValueError: There is no value.
+    """
+    if not values_m:
+        raise ValueError("a box needs at least one value")
+    values = np.sort(np.asarray(values_m, dtype=float))
+    q1, median, q3 = (float(one) for one in np.percentile(values, (25.0, 50.0, 75.0)))
+    reach = WHISKER * (q3 - q1)
+    inside = (values >= q1 - reach) & (values <= q3 + reach)
+    # Interpolated quartiles may leave no value between a box's edge and its whisker's reach.
+    low, high = min(float(values[inside][0]), q1), max(float(values[inside][-1]), q3)
+    return BoxSummary(
+        mean_m=float(values.mean()),
+        low_m=low,
+        q1_m=q1,
+        median_m=median,
+        q3_m=q3,
+        high_m=high,
+        outliers_m=tuple(float(value) for value in values[~inside]),
+    )
+
+
+_UPRIGHT = frozenset({AgentType.TRAFFIC_CONE, AgentType.CONSTRUCTION_SIGN})
+"""Drawn upright whatever their heading."""
+_SHOWN_S = 1.0
+"""A picture shows the motion of so much time as an arrow."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Likeness:
+    """Up to which difference two objects look the same, the limits included."""
+
+    distance_m: float = 0.15
+    heading_rad: float = math.radians(2.0)
+
+
+def are_alike(one: Modification, other: Modification, within: Likeness | None = None) -> bool:
+    """Whether every object of either change has a counterpart in the other within a tolerance.
+
+    Place, size, end of a walk and motion in a second are held against the distance. What is
+    moved and what is removed must be the same.
+    """
+    limits = within or Likeness()
+    moved = [{agent.id: agent for agent in change.moved} for change in (one, other)]
+    return (
+        set(one.removed) == set(other.removed)
+        and moved[0].keys() == moved[1].keys()
+        and all(_look_alike(agent, moved[1][name], limits) for name, agent in moved[0].items())
+        and _all_matched(list(one.added), list(other.added), limits)
+    )
+
+
+def _all_matched(one: list[TrafficAgent], other: list[TrafficAgent], limits: Likeness) -> bool:
+    """Whether a one-to-one matching within the tolerance exists."""
+    from scipy.optimize import linear_sum_assignment
+
+    if len(one) != len(other):
+        return False
+    apart = np.array([[not _look_alike(a, b, limits) for b in other] for a in one]).reshape(
+        len(one), len(other)
+    )
+    rows, columns = linear_sum_assignment(apart)
+    return not apart[rows, columns].any()
+
+
+def _look_alike(one: TrafficAgent, other: TrafficAgent, limits: Likeness) -> bool:
+    if one.type is not other.type or (one.walk_to_m is None) != (other.walk_to_m is None):
+        return False
+    gaps_m = [
+        math.dist((one.x_m, one.y_m), (other.x_m, other.y_m)),
+        abs(one.length_m - other.length_m),
+        abs(one.width_m - other.width_m),
+        abs(one.speed_mps - other.speed_mps) * _SHOWN_S,
+    ]
+    if one.walk_to_m is not None and other.walk_to_m is not None:
+        gaps_m.append(math.dist(one.walk_to_m, other.walk_to_m))
+    turn = 0.0 if one.type in _UPRIGHT else abs(difference(one.heading_rad, other.heading_rad))
+    return max(gaps_m) <= limits.distance_m + 1e-9 and turn <= limits.heading_rad + 1e-9

@@ -11,90 +11,193 @@ import augment.models.contestants
 
 
 class Migration(migrations.Migration):
-
     initial = True
 
-    dependencies = [
-        migrations.swappable_dependency(settings.AUTH_USER_MODEL),
-    ]
+    dependencies = [migrations.swappable_dependency(settings.AUTH_USER_MODEL)]
 
     operations = [
         migrations.CreateModel(
-            name='Augmentation',
+            name="Augmentation",
             fields=[
-                ('id', models.BigAutoField(auto_created=True, primary_key=True, serialize=False, verbose_name='ID')),
-                ('code', models.UUIDField(default=uuid.uuid4, editable=False, unique=True)),
-                ('state', models.CharField(choices=[('queued', 'Waiting'), ('running', 'Running'), ('done', 'Done'), ('unreadable', 'Unreadable answer'), ('refused', 'Refused'), ('failed', 'Failed'), ('cancelled', 'Cancelled')], default='queued', max_length=20)),
-                ('modification', models.JSONField(blank=True, null=True)),
-                ('notes', models.TextField(blank=True, help_text='what the contestant said about its own work')),
-                ('reason', models.TextField(blank=True, help_text='why there is no modification')),
-                ('image', models.CharField(blank=True, help_text='name in the media storage', max_length=120)),
-                ('claim', models.UUIDField(blank=True, help_text='who works on it right now', null=True)),
-                ('heartbeat_at', models.DateTimeField(blank=True, null=True)),
-                ('sent_at', models.DateTimeField(blank=True, help_text='last put on the queue', null=True)),
-                ('created_at', models.DateTimeField(auto_now_add=True)),
-                ('finished_at', models.DateTimeField(blank=True, null=True)),
+                (
+                    "id",
+                    models.BigAutoField(
+                        auto_created=True, primary_key=True, serialize=False, verbose_name="ID"
+                    ),
+                ),
+                ("code", models.UUIDField(default=uuid.uuid4, editable=False, unique=True)),
+                (
+                    "state",
+                    models.CharField(
+                        choices=[
+                            ("queued", "Waiting"),
+                            ("running", "Running"),
+                            ("done", "Done"),
+                            ("unreadable", "Unreadable answer"),
+                            ("refused", "Refused"),
+                            ("failed", "Failed"),
+                            ("cancelled", "Cancelled"),
+                        ],
+                        default="queued",
+                        max_length=20,
+                    ),
+                ),
+                ("modification", models.JSONField(blank=True, null=True)),
+                (
+                    "notes",
+                    models.TextField(
+                        blank=True, help_text="what the contestant said about its own work"
+                    ),
+                ),
+                ("reason", models.TextField(blank=True, help_text="why there is no modification")),
+                (
+                    "image",
+                    models.CharField(
+                        blank=True, help_text="name in the media storage", max_length=120
+                    ),
+                ),
+                (
+                    "claim",
+                    models.UUIDField(blank=True, help_text="who works on it right now", null=True),
+                ),
+                ("heartbeat_at", models.DateTimeField(blank=True, null=True)),
+                (
+                    "sent_at",
+                    models.DateTimeField(blank=True, help_text="last put on the queue", null=True),
+                ),
+                ("created_at", models.DateTimeField(auto_now_add=True)),
+                ("finished_at", models.DateTimeField(blank=True, null=True)),
             ],
-            options={
-                'ordering': ('scenario__slug', 'contestant__slug'),
-            },
+            options={"ordering": ("scenario__slug", "contestant__slug")},
         ),
         migrations.CreateModel(
-            name='BaseScene',
+            name="BaseScene",
             fields=[
-                ('id', models.BigAutoField(auto_created=True, primary_key=True, serialize=False, verbose_name='ID')),
-                ('code', models.UUIDField(default=uuid.uuid4, editable=False, unique=True)),
-                ('slug', models.SlugField(help_text='lower-case letters, digits and hyphens', max_length=80, unique=True)),
-                ('document', models.JSONField(help_text="the scene in augment.scene.codec's format")),
-                ('recording', models.JSONField(blank=True, help_text='tracks and ego motion after t0', null=True)),
-                ('source', models.CharField(help_text='authored, av2, ...', max_length=40)),
-                ('provenance', models.TextField()),
-                ('created_at', models.DateTimeField(auto_now_add=True)),
+                (
+                    "id",
+                    models.BigAutoField(
+                        auto_created=True, primary_key=True, serialize=False, verbose_name="ID"
+                    ),
+                ),
+                ("code", models.UUIDField(default=uuid.uuid4, editable=False, unique=True)),
+                (
+                    "slug",
+                    models.SlugField(
+                        help_text="lower-case letters, digits and hyphens",
+                        max_length=80,
+                        unique=True,
+                    ),
+                ),
+                (
+                    "document",
+                    models.JSONField(help_text="the scene in augment.scene.codec's format"),
+                ),
+                (
+                    "recording",
+                    models.JSONField(
+                        blank=True, help_text="tracks and ego motion after t0", null=True
+                    ),
+                ),
+                ("source", models.CharField(help_text="authored, av2, ...", max_length=40)),
+                ("provenance", models.TextField()),
+                ("created_at", models.DateTimeField(auto_now_add=True)),
             ],
-            options={
-                'ordering': ('slug',),
-            },
+            options={"ordering": ("slug",)},
         ),
         migrations.CreateModel(
-            name='Contestant',
+            name="Contestant",
             fields=[
-                ('id', models.BigAutoField(auto_created=True, primary_key=True, serialize=False, verbose_name='ID')),
-                ('code', models.UUIDField(default=uuid.uuid4, editable=False, unique=True)),
-                ('slug', models.SlugField(help_text='lower-case letters, digits and hyphens', max_length=80, unique=True)),
-                ('name', models.CharField(max_length=120)),
-                ('kind', models.CharField(choices=[('reference', 'Reference'), ('human', 'Human'), ('llm', 'Language model'), ('rule', 'Rules'), ('baseline', 'Baseline'), ('simulated', 'Simulated')], max_length=20)),
-                ('variant', models.CharField(blank=True, help_text='otm, fc, ...; empty without', max_length=20)),
-                ('model', models.CharField(blank=True, help_text='the model id on the endpoint', max_length=120)),
-                ('roles', models.JSONField(blank=True, default=dict, help_text='who else plays a role: {"viewer": {"endpoint": label, "model": id}}')),
-                ('created_at', models.DateTimeField(auto_now_add=True)),
+                (
+                    "id",
+                    models.BigAutoField(
+                        auto_created=True, primary_key=True, serialize=False, verbose_name="ID"
+                    ),
+                ),
+                ("code", models.UUIDField(default=uuid.uuid4, editable=False, unique=True)),
+                (
+                    "slug",
+                    models.SlugField(
+                        help_text="lower-case letters, digits and hyphens",
+                        max_length=80,
+                        unique=True,
+                    ),
+                ),
+                ("name", models.CharField(max_length=120)),
+                (
+                    "kind",
+                    models.CharField(
+                        choices=[
+                            ("reference", "Reference"),
+                            ("human", "Human"),
+                            ("llm", "Language model"),
+                            ("rule", "Rules"),
+                            ("baseline", "Baseline"),
+                            ("simulated", "Simulated"),
+                        ],
+                        max_length=20,
+                    ),
+                ),
+                (
+                    "variant",
+                    models.CharField(
+                        blank=True, help_text="otm, fc, ...; empty without", max_length=20
+                    ),
+                ),
+                (
+                    "model",
+                    models.CharField(
+                        blank=True, help_text="the model id on the endpoint", max_length=120
+                    ),
+                ),
+                (
+                    "roles",
+                    models.JSONField(
+                        blank=True,
+                        default=dict,
+                        help_text='who else plays a role: {"viewer": {"endpoint": label, "model": id}}',
+                    ),
+                ),
+                ("created_at", models.DateTimeField(auto_now_add=True)),
             ],
-            options={
-                'ordering': ('slug',),
-            },
+            options={"ordering": ("slug",)},
         ),
         migrations.CreateModel(
-            name='Attempt',
+            name="Attempt",
             fields=[
-                ('id', models.BigAutoField(auto_created=True, primary_key=True, serialize=False, verbose_name='ID')),
-                ('number', models.PositiveIntegerField()),
-                ('worker', models.CharField(blank=True, max_length=120)),
-                ('started_at', models.DateTimeField()),
-                ('finished_at', models.DateTimeField(blank=True, null=True)),
-                ('outcome', models.CharField(blank=True, max_length=20)),
-                ('reason', models.TextField(blank=True)),
-                ('augmentation', models.ForeignKey(on_delete=django.db.models.deletion.CASCADE, related_name='attempts', to='augment.augmentation')),
+                (
+                    "id",
+                    models.BigAutoField(
+                        auto_created=True, primary_key=True, serialize=False, verbose_name="ID"
+                    ),
+                ),
+                ("number", models.PositiveIntegerField()),
+                ("worker", models.CharField(blank=True, max_length=120)),
+                ("started_at", models.DateTimeField()),
+                ("finished_at", models.DateTimeField(blank=True, null=True)),
+                ("outcome", models.CharField(blank=True, max_length=20)),
+                ("reason", models.TextField(blank=True)),
+                (
+                    "augmentation",
+                    models.ForeignKey(
+                        on_delete=django.db.models.deletion.CASCADE,
+                        related_name="attempts",
+                        to="augment.augmentation",
+                    ),
+                ),
             ],
-            options={
-                'ordering': ('number',),
-            },
+            options={"ordering": ("number",)},
         ),
         migrations.AddField(
-            model_name='augmentation',
-            name='contestant',
-            field=models.ForeignKey(on_delete=django.db.models.deletion.PROTECT, related_name='augmentations', to='augment.contestant'),
+            model_name="augmentation",
+            name="contestant",
+            field=models.ForeignKey(
+                on_delete=django.db.models.deletion.PROTECT,
+                related_name="augmentations",
+                to="augment.contestant",
+            ),
         ),
         migrations.CreateModel(
-            name='Endpoint',
+            name="Endpoint",
             fields=[
                 ('id', models.BigAutoField(auto_created=True, primary_key=True, serialize=False, verbose_name='ID')),
                 ('code', models.UUIDField(default=uuid.uuid4, editable=False, unique=True)),
@@ -106,257 +209,621 @@ class Migration(migrations.Migration):
                 ('requests_per_minute', models.PositiveIntegerField(blank=True, help_text='so many calls may start within a minute, over all workers; empty: no limit', null=True, validators=[django.core.validators.MinValueValidator(1)])),
             ],
             options={
-                'ordering': ('label',),
-                'constraints': [models.CheckConstraint(condition=models.Q(('max_concurrency__gte', 1), models.Q(('requests_per_minute', None), ('requests_per_minute__gte', 1), _connector='OR')), name='endpoint_lets_somebody_in')],
+                "ordering": ("label",),
+                "constraints": [
+                    models.CheckConstraint(
+                        condition=models.Q(
+                            ("max_concurrency__gte", 1),
+                            models.Q(
+                                ("requests_per_minute", None),
+                                ("requests_per_minute__gte", 1),
+                                _connector="OR",
+                            ),
+                        ),
+                        name="endpoint_lets_somebody_in",
+                    )
+                ],
             },
         ),
         migrations.AddField(
-            model_name='contestant',
-            name='endpoint',
-            field=models.ForeignKey(blank=True, null=True, on_delete=django.db.models.deletion.PROTECT, related_name='contestants', to='augment.endpoint'),
+            model_name="contestant",
+            name="endpoint",
+            field=models.ForeignKey(
+                blank=True,
+                null=True,
+                on_delete=django.db.models.deletion.PROTECT,
+                related_name="contestants",
+                to="augment.endpoint",
+            ),
         ),
         migrations.CreateModel(
-            name='CallLease',
+            name="CallLease",
             fields=[
-                ('id', models.BigAutoField(auto_created=True, primary_key=True, serialize=False, verbose_name='ID')),
-                ('token', models.UUIDField(default=uuid.uuid4, editable=False, unique=True)),
-                ('started_at', models.DateTimeField()),
-                ('expires_at', models.DateTimeField(help_text='a worker that died renews nothing')),
-                ('finished_at', models.DateTimeField(blank=True, null=True)),
-                ('endpoint', models.ForeignKey(on_delete=django.db.models.deletion.CASCADE, related_name='leases', to='augment.endpoint')),
+                (
+                    "id",
+                    models.BigAutoField(
+                        auto_created=True, primary_key=True, serialize=False, verbose_name="ID"
+                    ),
+                ),
+                ("token", models.UUIDField(default=uuid.uuid4, editable=False, unique=True)),
+                ("started_at", models.DateTimeField()),
+                (
+                    "expires_at",
+                    models.DateTimeField(help_text="a worker that died renews nothing"),
+                ),
+                ("finished_at", models.DateTimeField(blank=True, null=True)),
+                (
+                    "endpoint",
+                    models.ForeignKey(
+                        on_delete=django.db.models.deletion.CASCADE,
+                        related_name="leases",
+                        to="augment.endpoint",
+                    ),
+                ),
             ],
-            options={
-                'ordering': ('started_at',),
-            },
+            options={"ordering": ("started_at",)},
         ),
         migrations.CreateModel(
-            name='EndpointModel',
+            name="EndpointModel",
             fields=[
-                ('id', models.BigAutoField(auto_created=True, primary_key=True, serialize=False, verbose_name='ID')),
-                ('code', models.UUIDField(default=uuid.uuid4, editable=False, unique=True)),
-                ('model', models.CharField(help_text='the model id on the endpoint', max_length=120)),
-                ('model_class', models.CharField(blank=True, choices=[('frontier', 'Frontier'), ('utility', 'Utility'), ('open_weight', 'Open weight')], max_length=20)),
-                ('native_tools', models.BooleanField(blank=True, null=True)),
-                ('vision', models.BooleanField(blank=True, null=True)),
-                ('json_schema', models.BooleanField(blank=True, null=True)),
-                ('temperature', models.BooleanField(blank=True, help_text='may be chosen', null=True)),
-                ('refused_parameters', models.JSONField(blank=True, default=list, help_text='what it answered 400 to and is not sent again')),
-                ('reasoning_effort', models.CharField(blank=True, help_text='sent as it stands; empty: not sent', max_length=20)),
-                ('context_tokens', models.PositiveIntegerField(blank=True, null=True)),
-                ('max_output_tokens', models.PositiveIntegerField(blank=True, null=True)),
-                ('price_in_usd', models.DecimalField(blank=True, decimal_places=6, help_text='per million tokens', max_digits=12, null=True)),
-                ('price_out_usd', models.DecimalField(blank=True, decimal_places=6, help_text='per million tokens', max_digits=12, null=True)),
-                ('price_as_of', models.DateField(blank=True, null=True)),
-                ('price_source', models.CharField(blank=True, max_length=200)),
-                ('probed_at', models.DateTimeField(blank=True, null=True)),
-                ('probe_report', models.JSONField(blank=True, null=True)),
-                ('endpoint', models.ForeignKey(on_delete=django.db.models.deletion.CASCADE, related_name='models', to='augment.endpoint')),
+                (
+                    "id",
+                    models.BigAutoField(
+                        auto_created=True, primary_key=True, serialize=False, verbose_name="ID"
+                    ),
+                ),
+                ("code", models.UUIDField(default=uuid.uuid4, editable=False, unique=True)),
+                (
+                    "model",
+                    models.CharField(help_text="the model id on the endpoint", max_length=120),
+                ),
+                (
+                    "model_class",
+                    models.CharField(
+                        blank=True,
+                        choices=[
+                            ("frontier", "Frontier"),
+                            ("utility", "Utility"),
+                            ("open_weight", "Open weight"),
+                        ],
+                        max_length=20,
+                    ),
+                ),
+                ("native_tools", models.BooleanField(blank=True, null=True)),
+                ("vision", models.BooleanField(blank=True, null=True)),
+                ("json_schema", models.BooleanField(blank=True, null=True)),
+                (
+                    "temperature",
+                    models.BooleanField(blank=True, help_text="may be chosen", null=True),
+                ),
+                (
+                    "refused_parameters",
+                    models.JSONField(
+                        blank=True,
+                        default=list,
+                        help_text="what it answered 400 to and is not sent again",
+                    ),
+                ),
+                (
+                    "reasoning_effort",
+                    models.CharField(
+                        blank=True, help_text="sent as it stands; empty: not sent", max_length=20
+                    ),
+                ),
+                ("context_tokens", models.PositiveIntegerField(blank=True, null=True)),
+                ("max_output_tokens", models.PositiveIntegerField(blank=True, null=True)),
+                (
+                    "price_in_usd",
+                    models.DecimalField(
+                        blank=True,
+                        decimal_places=6,
+                        help_text="per million tokens",
+                        max_digits=12,
+                        null=True,
+                    ),
+                ),
+                (
+                    "price_out_usd",
+                    models.DecimalField(
+                        blank=True,
+                        decimal_places=6,
+                        help_text="per million tokens",
+                        max_digits=12,
+                        null=True,
+                    ),
+                ),
+                ("price_as_of", models.DateField(blank=True, null=True)),
+                ("price_source", models.CharField(blank=True, max_length=200)),
+                ("probed_at", models.DateTimeField(blank=True, null=True)),
+                ("probe_report", models.JSONField(blank=True, null=True)),
+                (
+                    "endpoint",
+                    models.ForeignKey(
+                        on_delete=django.db.models.deletion.CASCADE,
+                        related_name="models",
+                        to="augment.endpoint",
+                    ),
+                ),
             ],
-            options={
-                'ordering': ('endpoint__label', 'model'),
-            },
+            options={"ordering": ("endpoint__label", "model")},
         ),
         migrations.CreateModel(
-            name='Event',
+            name="Event",
             fields=[
-                ('id', models.BigAutoField(auto_created=True, primary_key=True, serialize=False, verbose_name='ID')),
-                ('verb', models.CharField(max_length=60)),
-                ('object_kind', models.CharField(max_length=40)),
-                ('object_code', models.CharField(max_length=64)),
-                ('before', models.JSONField(blank=True, null=True)),
-                ('after', models.JSONField(blank=True, null=True)),
-                ('at', models.DateTimeField(auto_now_add=True)),
-                ('actor', models.ForeignKey(blank=True, help_text='null for the machine itself', null=True, on_delete=django.db.models.deletion.PROTECT, related_name='events', to=settings.AUTH_USER_MODEL)),
+                (
+                    "id",
+                    models.BigAutoField(
+                        auto_created=True, primary_key=True, serialize=False, verbose_name="ID"
+                    ),
+                ),
+                ("verb", models.CharField(max_length=60)),
+                ("object_kind", models.CharField(max_length=40)),
+                ("object_code", models.CharField(max_length=64)),
+                ("before", models.JSONField(blank=True, null=True)),
+                ("after", models.JSONField(blank=True, null=True)),
+                ("at", models.DateTimeField(auto_now_add=True)),
+                (
+                    "actor",
+                    models.ForeignKey(
+                        blank=True,
+                        help_text="null for the machine itself",
+                        null=True,
+                        on_delete=django.db.models.deletion.PROTECT,
+                        related_name="events",
+                        to=settings.AUTH_USER_MODEL,
+                    ),
+                ),
             ],
-            options={
-                'ordering': ('-at', '-pk'),
-            },
+            options={"ordering": ("-at", "-pk")},
         ),
         migrations.CreateModel(
-            name='GenerationJob',
+            name="GenerationJob",
             fields=[
-                ('id', models.BigAutoField(auto_created=True, primary_key=True, serialize=False, verbose_name='ID')),
-                ('code', models.UUIDField(default=uuid.uuid4, editable=False, unique=True)),
-                ('name', models.CharField(max_length=120)),
-                ('state', models.CharField(choices=[('running', 'Running'), ('cancelled', 'Cancelled'), ('finished', 'Finished'), ('stopped_at_cap', 'Stopped at cap')], default='running', max_length=20)),
-                ('is_fresh', models.BooleanField(default=False, help_text='ask anew what was answered in other jobs before')),
-                ('cap_nano_usd', models.PositiveBigIntegerField(blank=True, null=True)),
-                ('cap_calls', models.PositiveIntegerField(blank=True, null=True)),
-                ('cap_tokens', models.PositiveBigIntegerField(blank=True, null=True)),
-                ('reserved_nano_usd', models.PositiveBigIntegerField(default=0)),
-                ('reserved_calls', models.PositiveIntegerField(default=0)),
-                ('reserved_tokens', models.PositiveBigIntegerField(default=0)),
-                ('spent_nano_usd', models.PositiveBigIntegerField(default=0)),
-                ('spent_calls', models.PositiveIntegerField(default=0)),
-                ('spent_tokens', models.PositiveBigIntegerField(default=0)),
-                ('created_at', models.DateTimeField(auto_now_add=True)),
-                ('finished_at', models.DateTimeField(blank=True, null=True)),
-                ('contestants', models.ManyToManyField(related_name='jobs', to='augment.contestant')),
-                ('launched_by', models.ForeignKey(blank=True, null=True, on_delete=django.db.models.deletion.PROTECT, related_name='generation_jobs', to=settings.AUTH_USER_MODEL)),
+                (
+                    "id",
+                    models.BigAutoField(
+                        auto_created=True, primary_key=True, serialize=False, verbose_name="ID"
+                    ),
+                ),
+                ("code", models.UUIDField(default=uuid.uuid4, editable=False, unique=True)),
+                ("name", models.CharField(max_length=120)),
+                (
+                    "state",
+                    models.CharField(
+                        choices=[
+                            ("running", "Running"),
+                            ("cancelled", "Cancelled"),
+                            ("finished", "Finished"),
+                            ("stopped_at_cap", "Stopped at cap"),
+                        ],
+                        default="running",
+                        max_length=20,
+                    ),
+                ),
+                (
+                    "is_fresh",
+                    models.BooleanField(
+                        default=False, help_text="ask anew what was answered in other jobs before"
+                    ),
+                ),
+                ("cap_nano_usd", models.PositiveBigIntegerField(blank=True, null=True)),
+                ("cap_calls", models.PositiveIntegerField(blank=True, null=True)),
+                ("cap_tokens", models.PositiveBigIntegerField(blank=True, null=True)),
+                ("reserved_nano_usd", models.PositiveBigIntegerField(default=0)),
+                ("reserved_calls", models.PositiveIntegerField(default=0)),
+                ("reserved_tokens", models.PositiveBigIntegerField(default=0)),
+                ("spent_nano_usd", models.PositiveBigIntegerField(default=0)),
+                ("spent_calls", models.PositiveIntegerField(default=0)),
+                ("spent_tokens", models.PositiveBigIntegerField(default=0)),
+                ("created_at", models.DateTimeField(auto_now_add=True)),
+                ("finished_at", models.DateTimeField(blank=True, null=True)),
+                (
+                    "contestants",
+                    models.ManyToManyField(related_name="jobs", to="augment.contestant"),
+                ),
+                (
+                    "launched_by",
+                    models.ForeignKey(
+                        blank=True,
+                        null=True,
+                        on_delete=django.db.models.deletion.PROTECT,
+                        related_name="generation_jobs",
+                        to=settings.AUTH_USER_MODEL,
+                    ),
+                ),
             ],
-            options={
-                'ordering': ('-created_at', '-pk'),
-            },
+            options={"ordering": ("-created_at", "-pk")},
         ),
         migrations.AddField(
-            model_name='augmentation',
-            name='job',
-            field=models.ForeignKey(on_delete=django.db.models.deletion.CASCADE, related_name='augmentations', to='augment.generationjob'),
+            model_name="augmentation",
+            name="job",
+            field=models.ForeignKey(
+                on_delete=django.db.models.deletion.CASCADE,
+                related_name="augmentations",
+                to="augment.generationjob",
+            ),
         ),
         migrations.CreateModel(
-            name='ModelCall',
+            name="ModelCall",
             fields=[
-                ('id', models.BigAutoField(auto_created=True, primary_key=True, serialize=False, verbose_name='ID')),
-                ('code', models.UUIDField(default=uuid.uuid4, editable=False, unique=True)),
-                ('number', models.PositiveIntegerField()),
-                ('role', models.CharField(help_text='modifier, reviewer, engineer, viewer', max_length=20)),
-                ('request', models.JSONField(help_text='model, messages and parameters, without the key; images by their hash')),
-                ('request_hash', models.CharField(blank=True, db_index=True, max_length=64)),
-                ('answer', models.TextField(blank=True, help_text='the raw text, null without one', null=True)),
-                ('refusal', models.TextField(blank=True, help_text='null where it did not decline', null=True)),
-                ('extras', models.JSONField(blank=True, help_text='what else the reply carried', null=True)),
-                ('fault', models.TextField(blank=True, help_text='what broke, if there was no answer')),
-                ('model_returned', models.CharField(blank=True, max_length=120)),
-                ('finish_reason', models.CharField(blank=True, max_length=40)),
-                ('prompt_version', models.CharField(blank=True, max_length=64)),
-                ('prompt_tokens', models.PositiveIntegerField(blank=True, null=True)),
-                ('completion_tokens', models.PositiveIntegerField(blank=True, null=True)),
-                ('started_at', models.DateTimeField()),
-                ('latency_s', models.FloatField(blank=True, null=True)),
-                ('reserved_tokens', models.PositiveBigIntegerField(default=0)),
-                ('reserved_nano_usd', models.PositiveBigIntegerField(blank=True, null=True)),
-                ('spent_tokens', models.PositiveBigIntegerField(blank=True, null=True)),
-                ('cost_nano_usd', models.PositiveBigIntegerField(blank=True, help_text='null while in flight or where the price is unknown', null=True)),
-                ('is_cost_estimated', models.BooleanField(default=False, help_text='usage is unknown: the worst case counts')),
-                ('settled_at', models.DateTimeField(blank=True, null=True)),
-                ('attempt', models.ForeignKey(on_delete=django.db.models.deletion.CASCADE, related_name='calls', to='augment.attempt')),
-                ('served_from', models.ForeignKey(blank=True, null=True, on_delete=django.db.models.deletion.PROTECT, related_name='copies', to='augment.modelcall')),
+                (
+                    "id",
+                    models.BigAutoField(
+                        auto_created=True, primary_key=True, serialize=False, verbose_name="ID"
+                    ),
+                ),
+                ("code", models.UUIDField(default=uuid.uuid4, editable=False, unique=True)),
+                ("number", models.PositiveIntegerField()),
+                (
+                    "role",
+                    models.CharField(
+                        help_text="modifier, reviewer, engineer, viewer", max_length=20
+                    ),
+                ),
+                (
+                    "request",
+                    models.JSONField(
+                        help_text="model, messages and parameters, without the key; images by their hash"
+                    ),
+                ),
+                ("request_hash", models.CharField(blank=True, db_index=True, max_length=64)),
+                (
+                    "answer",
+                    models.TextField(
+                        blank=True, help_text="the raw text, null without one", null=True
+                    ),
+                ),
+                (
+                    "refusal",
+                    models.TextField(
+                        blank=True, help_text="null where it did not decline", null=True
+                    ),
+                ),
+                (
+                    "extras",
+                    models.JSONField(
+                        blank=True, help_text="what else the reply carried", null=True
+                    ),
+                ),
+                (
+                    "fault",
+                    models.TextField(blank=True, help_text="what broke, if there was no answer"),
+                ),
+                ("model_returned", models.CharField(blank=True, max_length=120)),
+                ("finish_reason", models.CharField(blank=True, max_length=40)),
+                ("prompt_version", models.CharField(blank=True, max_length=64)),
+                ("prompt_tokens", models.PositiveIntegerField(blank=True, null=True)),
+                ("completion_tokens", models.PositiveIntegerField(blank=True, null=True)),
+                ("started_at", models.DateTimeField()),
+                ("latency_s", models.FloatField(blank=True, null=True)),
+                ("reserved_tokens", models.PositiveBigIntegerField(default=0)),
+                ("reserved_nano_usd", models.PositiveBigIntegerField(blank=True, null=True)),
+                ("spent_tokens", models.PositiveBigIntegerField(blank=True, null=True)),
+                (
+                    "cost_nano_usd",
+                    models.PositiveBigIntegerField(
+                        blank=True,
+                        help_text="null while in flight or where the price is unknown",
+                        null=True,
+                    ),
+                ),
+                (
+                    "is_cost_estimated",
+                    models.BooleanField(
+                        default=False, help_text="usage is unknown: the worst case counts"
+                    ),
+                ),
+                ("settled_at", models.DateTimeField(blank=True, null=True)),
+                (
+                    "attempt",
+                    models.ForeignKey(
+                        on_delete=django.db.models.deletion.CASCADE,
+                        related_name="calls",
+                        to="augment.attempt",
+                    ),
+                ),
+                (
+                    "served_from",
+                    models.ForeignKey(
+                        blank=True,
+                        null=True,
+                        on_delete=django.db.models.deletion.PROTECT,
+                        related_name="copies",
+                        to="augment.modelcall",
+                    ),
+                ),
             ],
-            options={
-                'ordering': ('number',),
-            },
+            options={"ordering": ("number",)},
         ),
         migrations.CreateModel(
-            name='Scenario',
+            name="Scenario",
             fields=[
-                ('id', models.BigAutoField(auto_created=True, primary_key=True, serialize=False, verbose_name='ID')),
-                ('code', models.UUIDField(default=uuid.uuid4, editable=False, unique=True)),
-                ('slug', models.SlugField(help_text='lower-case letters, digits and hyphens', max_length=80, unique=True)),
-                ('type', models.CharField(choices=[('approaching_construction_zone', 'Construction zone'), ('avoid_crashed_cars', 'Accident site'), ('jaywalking_pedestrian', 'Jaywalker'), ('nudge_around_parked_vehicle', 'Nudge around parked vehicle'), ('overtake_parked_vehicle', 'Overtake parked vehicle')], max_length=40)),
-                ('instruction', models.TextField()),
-                ('reference', models.JSONField(blank=True, help_text="the human modification, in augment.scene.codec's format", null=True)),
-                ('keep_traffic', models.BooleanField(default=False, help_text='keep the recorded traffic; interPlan clears it')),
-                ('in_catalogue', models.BooleanField(default=False)),
-                ('original_image', models.CharField(blank=True, help_text='name of the picture before any change', max_length=120)),
-                ('created_at', models.DateTimeField(auto_now_add=True)),
-                ('base_scene', models.ForeignKey(on_delete=django.db.models.deletion.PROTECT, related_name='scenarios', to='augment.basescene')),
+                (
+                    "id",
+                    models.BigAutoField(
+                        auto_created=True, primary_key=True, serialize=False, verbose_name="ID"
+                    ),
+                ),
+                ("code", models.UUIDField(default=uuid.uuid4, editable=False, unique=True)),
+                (
+                    "slug",
+                    models.SlugField(
+                        help_text="lower-case letters, digits and hyphens",
+                        max_length=80,
+                        unique=True,
+                    ),
+                ),
+                (
+                    "type",
+                    models.CharField(
+                        choices=[
+                            ("approaching_construction_zone", "Construction zone"),
+                            ("avoid_crashed_cars", "Accident site"),
+                            ("jaywalking_pedestrian", "Jaywalker"),
+                            ("nudge_around_parked_vehicle", "Nudge around parked vehicle"),
+                            ("overtake_parked_vehicle", "Overtake parked vehicle"),
+                        ],
+                        max_length=40,
+                    ),
+                ),
+                ("instruction", models.TextField()),
+                (
+                    "reference",
+                    models.JSONField(
+                        blank=True,
+                        help_text="the human modification, in augment.scene.codec's format",
+                        null=True,
+                    ),
+                ),
+                (
+                    "keep_traffic",
+                    models.BooleanField(
+                        default=False, help_text="keep the recorded traffic; interPlan clears it"
+                    ),
+                ),
+                ("in_catalogue", models.BooleanField(default=False)),
+                (
+                    "original_image",
+                    models.CharField(
+                        blank=True,
+                        help_text="name of the picture before any change",
+                        max_length=120,
+                    ),
+                ),
+                ("created_at", models.DateTimeField(auto_now_add=True)),
+                (
+                    "base_scene",
+                    models.ForeignKey(
+                        on_delete=django.db.models.deletion.PROTECT,
+                        related_name="scenarios",
+                        to="augment.basescene",
+                    ),
+                ),
             ],
-            options={
-                'ordering': ('slug',),
-            },
+            options={"ordering": ("slug",)},
         ),
         migrations.AddField(
-            model_name='generationjob',
-            name='scenarios',
-            field=models.ManyToManyField(related_name='jobs', to='augment.scenario'),
+            model_name="generationjob",
+            name="scenarios",
+            field=models.ManyToManyField(related_name="jobs", to="augment.scenario"),
         ),
         migrations.AddField(
-            model_name='augmentation',
-            name='scenario',
-            field=models.ForeignKey(on_delete=django.db.models.deletion.PROTECT, related_name='augmentations', to='augment.scenario'),
+            model_name="augmentation",
+            name="scenario",
+            field=models.ForeignKey(
+                on_delete=django.db.models.deletion.PROTECT,
+                related_name="augmentations",
+                to="augment.scenario",
+            ),
         ),
         migrations.CreateModel(
-            name='TranscriptNote',
+            name="TranscriptNote",
             fields=[
-                ('id', models.BigAutoField(auto_created=True, primary_key=True, serialize=False, verbose_name='ID')),
-                ('number', models.PositiveIntegerField()),
-                ('after_call', models.PositiveIntegerField(help_text='0 before the first call')),
-                ('kind', models.CharField(help_text='round, tool_call, review, kept', max_length=20)),
-                ('document', models.JSONField()),
-                ('attempt', models.ForeignKey(on_delete=django.db.models.deletion.CASCADE, related_name='notes', to='augment.attempt')),
+                (
+                    "id",
+                    models.BigAutoField(
+                        auto_created=True, primary_key=True, serialize=False, verbose_name="ID"
+                    ),
+                ),
+                ("number", models.PositiveIntegerField()),
+                ("after_call", models.PositiveIntegerField(help_text="0 before the first call")),
+                (
+                    "kind",
+                    models.CharField(help_text="round, tool_call, review, kept", max_length=20),
+                ),
+                ("document", models.JSONField()),
+                (
+                    "attempt",
+                    models.ForeignKey(
+                        on_delete=django.db.models.deletion.CASCADE,
+                        related_name="notes",
+                        to="augment.attempt",
+                    ),
+                ),
             ],
-            options={
-                'ordering': ('number',),
-            },
+            options={"ordering": ("number",)},
         ),
         migrations.AddConstraint(
-            model_name='attempt',
-            constraint=models.UniqueConstraint(fields=('augmentation', 'number'), name='attempt_number_is_unique'),
+            model_name="attempt",
+            constraint=models.UniqueConstraint(
+                fields=("augmentation", "number"), name="attempt_number_is_unique"
+            ),
         ),
         migrations.AddConstraint(
-            model_name='attempt',
-            constraint=models.CheckConstraint(condition=models.Q(('number__gte', 1)), name='attempt_counts_from_one'),
+            model_name="attempt",
+            constraint=models.CheckConstraint(
+                condition=models.Q(("number__gte", 1)), name="attempt_counts_from_one"
+            ),
         ),
         migrations.AddConstraint(
-            model_name='attempt',
-            constraint=models.CheckConstraint(condition=models.Q(('finished_at', None), ('finished_at__gte', models.F('started_at')), _connector='OR'), name='attempt_ends_after_start'),
+            model_name="attempt",
+            constraint=models.CheckConstraint(
+                condition=models.Q(
+                    ("finished_at", None),
+                    ("finished_at__gte", models.F("started_at")),
+                    _connector="OR",
+                ),
+                name="attempt_ends_after_start",
+            ),
         ),
         migrations.AddConstraint(
-            model_name='contestant',
-            constraint=models.CheckConstraint(condition=models.Q(('kind__in', ['reference', 'human', 'llm', 'rule', 'baseline', 'simulated'])), name='contestant_kind_is_known'),
+            model_name="contestant",
+            constraint=models.CheckConstraint(
+                condition=models.Q(
+                    ("kind__in", ["reference", "human", "llm", "rule", "baseline", "simulated"])
+                ),
+                name="contestant_kind_is_known",
+            ),
         ),
         migrations.AddConstraint(
-            model_name='contestant',
-            constraint=models.CheckConstraint(condition=models.Q(models.Q(('endpoint', None), ('model', ''), ('variant', '')), models.Q(models.Q(('variant', ''), _negated=True), ('endpoint__isnull', False), models.Q(('model', ''), _negated=True)), _connector='OR'), name='contestant_variant_has_endpoint_and_model'),
+            model_name="contestant",
+            constraint=models.CheckConstraint(
+                condition=models.Q(
+                    models.Q(("endpoint", None), ("model", ""), ("variant", "")),
+                    models.Q(
+                        models.Q(("variant", ""), _negated=True),
+                        ("endpoint__isnull", False),
+                        models.Q(("model", ""), _negated=True),
+                    ),
+                    _connector="OR",
+                ),
+                name="contestant_variant_has_endpoint_and_model",
+            ),
         ),
         migrations.AddIndex(
-            model_name='calllease',
-            index=models.Index(fields=['endpoint', 'started_at'], name='augment_cal_endpoin_2931af_idx'),
+            model_name="calllease",
+            index=models.Index(
+                fields=["endpoint", "started_at"], name="augment_cal_endpoin_2931af_idx"
+            ),
         ),
         migrations.AddIndex(
-            model_name='calllease',
-            index=models.Index(fields=['endpoint', 'finished_at', 'expires_at'], name='augment_cal_endpoin_edde73_idx'),
+            model_name="calllease",
+            index=models.Index(
+                fields=["endpoint", "finished_at", "expires_at"],
+                name="augment_cal_endpoin_edde73_idx",
+            ),
         ),
         migrations.AddConstraint(
-            model_name='endpointmodel',
-            constraint=models.UniqueConstraint(fields=('endpoint', 'model'), name='one_row_per_endpoint_and_model'),
+            model_name="endpointmodel",
+            constraint=models.UniqueConstraint(
+                fields=("endpoint", "model"), name="one_row_per_endpoint_and_model"
+            ),
         ),
         migrations.AddConstraint(
-            model_name='endpointmodel',
-            constraint=models.CheckConstraint(condition=models.Q(('model_class__in', ['', 'frontier', 'utility', 'open_weight'])), name='model_class_is_known'),
+            model_name="endpointmodel",
+            constraint=models.CheckConstraint(
+                condition=models.Q(
+                    ("model_class__in", ["", "frontier", "utility", "open_weight"])
+                ),
+                name="model_class_is_known",
+            ),
         ),
         migrations.AddConstraint(
-            model_name='endpointmodel',
-            constraint=models.CheckConstraint(condition=models.Q(models.Q(('price_in_usd', None), ('price_out_usd', None)), models.Q(('price_in_usd__gte', 0), ('price_in_usd__isnull', False), ('price_out_usd__gte', 0), ('price_out_usd__isnull', False)), _connector='OR'), name='price_is_whole_and_not_negative'),
+            model_name="endpointmodel",
+            constraint=models.CheckConstraint(
+                condition=models.Q(
+                    models.Q(("price_in_usd", None), ("price_out_usd", None)),
+                    models.Q(
+                        ("price_in_usd__gte", 0),
+                        ("price_in_usd__isnull", False),
+                        ("price_out_usd__gte", 0),
+                        ("price_out_usd__isnull", False),
+                    ),
+                    _connector="OR",
+                ),
+                name="price_is_whole_and_not_negative",
+            ),
         ),
         migrations.AddConstraint(
-            model_name='endpointmodel',
-            constraint=models.CheckConstraint(condition=models.Q(models.Q(('context_tokens', None), ('context_tokens__gte', 1), _connector='OR'), models.Q(('max_output_tokens', None), ('max_output_tokens__gte', 1), _connector='OR')), name='model_takes_and_gives_tokens'),
+            model_name="endpointmodel",
+            constraint=models.CheckConstraint(
+                condition=models.Q(
+                    models.Q(
+                        ("context_tokens", None), ("context_tokens__gte", 1), _connector="OR"
+                    ),
+                    models.Q(
+                        ("max_output_tokens", None), ("max_output_tokens__gte", 1), _connector="OR"
+                    ),
+                ),
+                name="model_takes_and_gives_tokens",
+            ),
         ),
         migrations.AddIndex(
-            model_name='event',
-            index=models.Index(fields=['object_kind', 'object_code'], name='augment_eve_object__e198e6_idx'),
+            model_name="event",
+            index=models.Index(
+                fields=["object_kind", "object_code"], name="augment_eve_object__e198e6_idx"
+            ),
         ),
         migrations.AddConstraint(
-            model_name='modelcall',
-            constraint=models.UniqueConstraint(fields=('attempt', 'number'), name='call_number_is_unique'),
+            model_name="modelcall",
+            constraint=models.UniqueConstraint(
+                fields=("attempt", "number"), name="call_number_is_unique"
+            ),
         ),
         migrations.AddConstraint(
-            model_name='scenario',
-            constraint=models.CheckConstraint(condition=models.Q(('type__in', ['approaching_construction_zone', 'avoid_crashed_cars', 'jaywalking_pedestrian', 'nudge_around_parked_vehicle', 'overtake_parked_vehicle'])), name='scenario_type_is_known'),
+            model_name="scenario",
+            constraint=models.CheckConstraint(
+                condition=models.Q(
+                    (
+                        "type__in",
+                        [
+                            "approaching_construction_zone",
+                            "avoid_crashed_cars",
+                            "jaywalking_pedestrian",
+                            "nudge_around_parked_vehicle",
+                            "overtake_parked_vehicle",
+                        ],
+                    )
+                ),
+                name="scenario_type_is_known",
+            ),
         ),
         migrations.AddIndex(
-            model_name='augmentation',
-            index=models.Index(fields=['job', 'state'], name='augment_aug_job_id_76102f_idx'),
+            model_name="augmentation",
+            index=models.Index(fields=["job", "state"], name="augment_aug_job_id_76102f_idx"),
         ),
         migrations.AddIndex(
-            model_name='augmentation',
-            index=models.Index(fields=['state', 'sent_at'], name='augment_aug_state_48bea3_idx'),
+            model_name="augmentation",
+            index=models.Index(fields=["state", "sent_at"], name="augment_aug_state_48bea3_idx"),
         ),
         migrations.AddConstraint(
-            model_name='augmentation',
-            constraint=models.UniqueConstraint(fields=('job', 'scenario', 'contestant'), name='one_augmentation_per_cell'),
+            model_name="augmentation",
+            constraint=models.UniqueConstraint(
+                fields=("job", "scenario", "contestant"), name="one_augmentation_per_cell"
+            ),
         ),
         migrations.AddConstraint(
-            model_name='augmentation',
-            constraint=models.CheckConstraint(condition=models.Q(models.Q(('state', 'running'), ('claim__isnull', False), ('heartbeat_at__isnull', False)), models.Q(models.Q(('state', 'running'), _negated=True), ('claim', None)), _connector='OR'), name='running_augmentation_is_claimed'),
+            model_name="augmentation",
+            constraint=models.CheckConstraint(
+                condition=models.Q(
+                    models.Q(
+                        ("state", "running"),
+                        ("claim__isnull", False),
+                        ("heartbeat_at__isnull", False),
+                    ),
+                    models.Q(models.Q(("state", "running"), _negated=True), ("claim", None)),
+                    _connector="OR",
+                ),
+                name="running_augmentation_is_claimed",
+            ),
         ),
         migrations.AddConstraint(
-            model_name='augmentation',
-            constraint=models.CheckConstraint(condition=models.Q(models.Q(('state', 'done'), _negated=True), models.Q(('modification__isnull', False), models.Q(('image', ''), _negated=True)), _connector='OR'), name='done_augmentation_has_modification_and_image'),
+            model_name="augmentation",
+            constraint=models.CheckConstraint(
+                condition=models.Q(
+                    models.Q(("state", "done"), _negated=True),
+                    models.Q(
+                        ("modification__isnull", False), models.Q(("image", ""), _negated=True)
+                    ),
+                    _connector="OR",
+                ),
+                name="done_augmentation_has_modification_and_image",
+            ),
         ),
         migrations.AddConstraint(
-            model_name='transcriptnote',
-            constraint=models.UniqueConstraint(fields=('attempt', 'number'), name='note_number_is_unique'),
+            model_name="transcriptnote",
+            constraint=models.UniqueConstraint(
+                fields=("attempt", "number"), name="note_number_is_unique"
+            ),
         ),
     ]

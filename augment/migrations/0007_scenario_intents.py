@@ -4,9 +4,7 @@ from django.db import migrations, models
 
 
 class Migration(migrations.Migration):
-    dependencies = [
-        ("augment", "0006_what_a_contestant_sends"),
-    ]
+    dependencies = [("augment", "0006_what_a_contestant_sends")]
 
     operations = [
         migrations.AddField(
@@ -14,7 +12,7 @@ class Migration(migrations.Migration):
             name="intent",
             field=models.JSONField(
                 blank=True,
-                help_text="what the instruction asks for, in augment.scene.intent_codec's format",
+                help_text="what the instruction asks for, in augment.scene.codec's format",
                 null=True,
             ),
         ),

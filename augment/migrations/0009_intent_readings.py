@@ -60,7 +60,7 @@ class Migration(migrations.Migration):
                     "document",
                     models.JSONField(
                         blank=True,
-                        help_text="what was read, in augment.scene.intent_codec's format",
+                        help_text="what was read, in augment.scene.codec's format",
                         null=True,
                     ),
                 ),
@@ -96,9 +96,7 @@ class Migration(migrations.Migration):
                     ),
                 ),
             ],
-            options={
-                "ordering": ("-pk",),
-            },
+            options={"ordering": ("-pk",)},
         ),
         migrations.AddField(
             model_name="modelcall",

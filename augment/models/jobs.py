@@ -239,7 +239,7 @@ class IntentReading(Work):
     model = models.CharField(max_length=120)
     state = models.CharField(max_length=10, choices=State.choices, default=State.RUNNING)
     document = models.JSONField(
-        null=True, blank=True, help_text="what was read, in augment.scene.intent_codec's format"
+        null=True, blank=True, help_text="what was read, in augment.scene.codec's format"
     )
     cap_nano_usd = models.PositiveBigIntegerField(null=True, blank=True)
     cap_calls = models.PositiveIntegerField(null=True, blank=True)

@@ -9,9 +9,8 @@ from django.db import models
 from django.db.models import Q
 
 from augment.models.work import Work
-from augment.scene.catalogue import CatalogueSet, ScenarioType
-from augment.scene.entities import TrafficDensity, TurnType
-from augment.scene.intent_words import IntentOrigin
+from augment.scene.entities import CatalogueSet, ScenarioType, TrafficDensity, TurnType
+from augment.scene.intent import IntentOrigin
 
 DENSITIES = tuple(TrafficDensity)
 GOALS = (TurnType.LEFT, TurnType.RIGHT, TurnType.STRAIGHT)
@@ -34,7 +33,7 @@ class BaseScene(models.Model):
     notes = models.JSONField(
         default=list,
         blank=True,
-        help_text="losses and assumptions, as augment.scene.notes has them",
+        help_text="losses and assumptions, as augment.scene.recording has them",
     )
     content_hash = models.CharField(
         max_length=64,
@@ -74,7 +73,7 @@ class Scenario(models.Model):
     intent = models.JSONField(
         null=True,
         blank=True,
-        help_text="what the instruction asks for, in augment.scene.intent_codec's format",
+        help_text="what the instruction asks for, in augment.scene.codec's format",
     )
     intent_origin = models.CharField(
         max_length=10, choices=[(one.value, one.value) for one in IntentOrigin], blank=True

@@ -10,21 +10,55 @@ import re
 from collections.abc import Callable
 from typing import TypeVar
 
-from augment.errors import ReplyUnreadable
-from augment.prompts.loose import LONGEST_VALUE
+from pydantic import BaseModel, ConfigDict, ValidationError
 
-_Loaded = TypeVar("_Loaded")
+from augment.errors import ReplyUnreadable
 
 LONGEST_ANSWER = 200_000
 """Characters; a longer answer is not looked at."""
+LONGEST_VALUE = 4_000
+"""Characters that one value within a text may run over."""
 
 _CHANGES = re.compile(r"""["'](?:add|move|remove)["']\s*:""")
+_FENCE = re.compile(r"^[ \t]*```[^\n`]*\n(.*?)(?:^[ \t]*```|\Z)", re.DOTALL | re.MULTILINE)
+# Each of the pieces matches wherever it begins, closed or not: the time that a hostile answer
+# takes grows no faster than its length.
+_STRING = r'"[^"\\\n]*(?:\\.[^"\\\n]*)*"?'
+_STRING_OR_COMMENT = re.compile(rf"({_STRING})|//[^\n]*|/\*.*?(?:\*/|\Z)", re.DOTALL)
+_STRING_OR_COMMA = re.compile(rf"({_STRING})|,(?=\s*[}}\]])", re.DOTALL)
+_Loaded = TypeVar("_Loaded")
 
-FENCE = re.compile(r"^[ \t]*```[^\n`]*\n(.*?)(?:^[ \t]*```|\Z)", re.DOTALL | re.MULTILINE)
+
+class Strict(BaseModel):
+    """The root of what is read from answers: nothing is converted, nothing unknown let through."""
+
+    model_config = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False, frozen=True)
+
+
+_Kind = TypeVar("_Kind", bound=Strict)
+
+
+def validate(kind: type[_Kind], value: object) -> _Kind:
+    """Return what was found as a value of that kind.
+
+    Raises:
+        ReplyUnreadable: It is none; each sentence has a path and echoes nothing.
+    """
+    try:
+        return kind.model_validate(value)
+    except ValidationError as error:
+        faults = error.errors(include_url=False, include_input=False, include_context=False)[:8]
+    paths = (".".join(ascii(part).strip("'")[:40] for part in fault["loc"]) for fault in faults)
+    raise ReplyUnreadable(
+        [
+            f"{path or 'the block'}: {fault['msg']}"
+            for path, fault in zip(paths, faults, strict=True)
+        ]
+    )
 
 
 def last_object(answer: str, keys: frozenset[str]) -> tuple[dict[str, object], bool]:
-    """The last JSON object of the answer that has one of the keys, and whether it was mended.
+    """Return the last JSON object with one of the keys, and whether it was mended.
 
     A block that names a key but can't be read is not passed over in favour of an earlier draft:
     the draft may differ from what the model settled on.
@@ -35,61 +69,62 @@ def last_object(answer: str, keys: frozenset[str]) -> tuple[dict[str, object], b
     if len(answer) > LONGEST_ANSWER:
         raise ReplyUnreadable([f"the answer is longer than {LONGEST_ANSWER} characters"])
     named = re.compile("|".join(rf'"{re.escape(key)}"\s*:' for key in sorted(keys)))
-    for block in _candidates(without_thoughts(answer)):
+    text = without_thoughts(answer)
+    # The last fence may lack its end; without any fences bare objects count.
+    blocks = [match.group(1) for match in _FENCE.finditer(text)] or _bare_objects(text)
+    for block in reversed(blocks):
         if not named.search(block):
             continue
-        found, mended = _loaded(block)
-        if isinstance(found, dict) and keys & found.keys():
-            return found, mended
+        clean = block
+        try:
+            value = strict_json(block)
+        except ReplyUnreadable:
+            clean = _mended(block)
+            if clean == block:
+                raise
+            value = strict_json(clean)
+        if isinstance(value, dict) and keys & value.keys():
+            return value, clean != block
     wanted = ", ".join(f'"{key}"' for key in sorted(keys))
     raise ReplyUnreadable([f"there is no fenced JSON block with the keys {wanted}"])
 
 
 def strict_json(written: str) -> object:
-    """The one JSON value in that text, as strictly read as a block.
+    """Return the one JSON value in that text.
 
     Raises:
-        ReplyUnreadable: It is none.
+        ReplyUnreadable: It is none, or has a key twice or a number that JSON does not know.
     """
-    try:
-        return _strict(written)
-    except _Broken as broken:
-        raise ReplyUnreadable([str(broken)]) from None
+    return _loading(lambda: _DECODER.decode(written))
 
 
 def strict_json_at(text: str, start: int) -> tuple[object, int]:
-    """The JSON value that begins there, strictly read, and where it ends.
+    """Return the JSON value that begins there, and where it ends.
 
     Raises:
         ReplyUnreadable: There is none; lines and columns are counted from there.
     """
     piece = text[start : start + LONGEST_VALUE]
-    try:
-        found, length = _loading(lambda: _DECODER.raw_decode(piece))
-    except _Broken as broken:
-        raise ReplyUnreadable([str(broken)]) from None
-    return found, start + length
+    value, length = _loading(lambda: _DECODER.raw_decode(piece))
+    return value, start + length
 
 
 def names_changes(answer: str) -> bool:
-    """Whether the answer holds a key of a block of changes, however broken the block is."""
+    """Return whether the answer holds a key of a block of changes, however broken the block is."""
     return _CHANGES.search(answer) is not None
 
 
 def without_thoughts(answer: str) -> str:
-    """What follows the last reasoning tag of models that think aloud."""
+    """Return what follows the last reasoning tag of models that think aloud."""
     return answer.rpartition("</think>")[2]
 
 
-def _candidates(answer: str) -> list[str]:
-    """Fenced blocks (the last may lack its end), last first; without any, bare objects."""
-    fenced = [match.group(1) for match in FENCE.finditer(answer)]
-    return (fenced or _bare_objects(answer))[::-1]
+# Private
 
 
 def _bare_objects(answer: str) -> list[str]:
-    """Outermost {...}, braces in strings not counted; one that never closes runs to the end."""
-    found, depth, start, in_string, escaped = [], 0, 0, False, False
+    """Return outermost {...}, braces in strings not counted; an open one runs to the end."""
+    objects, depth, start, in_string, escaped = [], 0, 0, False, False
     for index, character in enumerate(answer):
         if in_string:
             in_string = escaped or character != '"'
@@ -102,29 +137,15 @@ def _bare_objects(answer: str) -> list[str]:
         elif character == "}" and depth:
             depth -= 1
             if not depth:
-                found.append(answer[start : index + 1])
-    return [*found, answer[start:]] if depth else found
+                objects.append(answer[start : index + 1])
+    return [*objects, answer[start:]] if depth else objects
 
 
-def _loaded(block: str) -> tuple[object, bool]:
-    try:
-        return _strict(block), False
-    except _Broken as broken:
-        mended = _mended(block)
-        if mended == block:
-            raise ReplyUnreadable([str(broken)]) from None
-    try:
-        return _strict(mended), True
-    except _Broken as broken:
-        raise ReplyUnreadable([str(broken)]) from None
-
-
-class _Broken(Exception):
-    """The block is not strict JSON; the text says where."""
-
-
-def _strict(block: str) -> object:
-    return _loading(lambda: _DECODER.decode(block))
+def _mended(block: str) -> str:
+    """Return it without comments and trailing commas, which cannot shift a number."""
+    for noise in (_STRING_OR_COMMENT, _STRING_OR_COMMA):
+        block = noise.sub(lambda match: match.group(1) or "", block)
+    return block
 
 
 def _loading(load: Callable[[], _Loaded]) -> _Loaded:
@@ -132,37 +153,25 @@ def _loading(load: Callable[[], _Loaded]) -> _Loaded:
         return load()
     except json.JSONDecodeError as error:
         place = f"line {error.lineno}, column {error.colno}"
-        raise _Broken(f"the JSON block breaks at {place}: {error.msg}") from None
+        problem = f"the JSON block breaks at {place}: {error.msg}"
     except RecursionError:
-        raise _Broken("the JSON block is nested too deeply") from None
+        problem = "the JSON block is nested too deeply"
     except ValueError:
-        raise _Broken("the JSON block has a number with too many digits") from None
+        problem = "the JSON block has a number with too many digits"
+    raise ReplyUnreadable([problem])
 
 
 def _refuse(constant: str) -> object:
-    raise _Broken(f"{constant} is not a number that a block may hold")
+    raise ReplyUnreadable([f"{constant} is not a number that a block may hold"])
 
 
 def _once(pairs: list[tuple[str, object]]) -> dict[str, object]:
     fields: dict[str, object] = {}
     for key, value in pairs:
         if key in fields:
-            raise _Broken(f"the key {key[:40]!a} stands twice in one object")
+            raise ReplyUnreadable([f"the key {key[:40]!a} stands twice in one object"])
         fields[key] = value
     return fields
 
 
 _DECODER = json.JSONDecoder(parse_constant=_refuse, object_pairs_hook=_once)
-
-# Each of the pieces matches wherever it begins, closed or not: the time that a hostile answer
-# takes grows no faster than its length.
-_STRING = r'"[^"\\\n]*(?:\\.[^"\\\n]*)*"?'
-_STRING_OR_COMMENT = re.compile(rf"({_STRING})|//[^\n]*|/\*.*?(?:\*/|\Z)", re.DOTALL)
-_STRING_OR_COMMA = re.compile(rf"({_STRING})|,(?=\s*[}}\]])", re.DOTALL)
-
-
-def _mended(block: str) -> str:
-    """Without comments and trailing commas: what models add and what cannot shift a number."""
-    for noise in (_STRING_OR_COMMENT, _STRING_OR_COMMA):
-        block = noise.sub(lambda match: match.group(1) or "", block)
-    return block

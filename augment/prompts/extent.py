@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from augment.geometry.polyline import Polyline
 from augment.scene.ego_route import EgoRoute
-from augment.scene.entities import Lane, LaneConnector, Scene
+from augment.scene.entities import Area, Lane, LaneConnector, Scene
 from augment.scene.lane_graph import AnyLane
 
 FloatArray = NDArray[np.float64]
@@ -108,9 +108,7 @@ def behind_m(radius_m: float) -> float:
 @lru_cache(maxsize=32)
 def extent_of(scene: Scene, radius_m: float) -> Extent:
     """The region of a scene that prompts and the tool show."""
-    if math.isinf(radius_m):
-        return Extent(radius_m=radius_m, routes_m=None)
-    route = EgoRoute.of(scene)
+    route = None if math.isinf(radius_m) else EgoRoute.of(scene)
     if route is None:
         return Extent(radius_m=radius_m, routes_m=None)
     driven_m = max(DRIVEN_M, radius_m)
@@ -141,13 +139,50 @@ def shown_spans(scene: Scene, radius_m: float) -> dict[str, tuple[float, float]]
         if span is None:
             continue
         if isinstance(lane, LaneConnector):
-            if not extent.comes_near(lane.centerline):
-                continue
-            if any(_is_the_same(lane, other) for other in connectors):
+            is_known = any(_is_the_same(lane, other) for other in connectors)
+            if is_known or not extent.comes_near(lane.centerline):
                 continue
             connectors.append(lane)
         shown[lane.id] = span
     return shown
+
+
+def boundary_near(area: Area, extent: Extent, tolerance_m: float) -> FloatArray:
+    """Return an area's boundary (P, 2) as it is shown; empty for one that is not shown."""
+    import shapely
+
+    boundary = boundary_within(np.array(area.boundary_m, dtype=np.float64), extent.box_m)
+    if len(boundary) and extent.routes_m is not None:
+        polygon = shapely.make_valid(shapely.Polygon(boundary))
+        if shapely.distance(polygon, shapely.MultiPoint(extent.routes_m)) > BESIDE_M:
+            return np.empty((0, 2))
+    return simplify_boundary(boundary, tolerance_m) if len(boundary) else boundary
+
+
+def boundary_within(
+    boundary_m: FloatArray, box_m: tuple[float, float, float, float]
+) -> FloatArray:
+    """Cut a boundary (P, 2) to a box: least x, least y, most x, most y; empty where they part."""
+    points = np.asarray(boundary_m, dtype=np.float64)
+    for side, limit_m in enumerate(box_m):
+        axis, sign = side % 2, -1.0 if side < 2 else 1.0
+        points = _cut(points, sign * (points[:, axis] - limit_m))
+        if len(points) < 3:
+            return np.empty((0, 2))
+    return points
+
+
+def simplify_boundary(boundary_m: FloatArray, tolerance_m: float) -> FloatArray:
+    """Return the boundary (P, 2) with fewer points, nowhere further off than the tolerance.
+
+    A boundary that would be less than a triangle stays as it is.
+    """
+    import shapely
+
+    closed = shapely.LineString([*boundary_m, boundary_m[0]])
+    simple = shapely.simplify(closed, tolerance_m, preserve_topology=False)
+    kept = shapely.get_coordinates(simple)[:-1]
+    return kept if len(kept) >= 3 else boundary_m
 
 
 # Private
@@ -183,17 +218,24 @@ def _reached(route: EgoRoute, within_m: float) -> dict[str, tuple[float, float]]
 
 def _is_the_same(one: LaneConnector, other: LaneConnector) -> bool:
     """Whether two connectors lead the same way; their lights, limits and turns agree too."""
-    said = (one.from_lane, one.to_lane, one.turn_type, one.traffic_light, one.speed_limit_mps)
-    if said != (
-        other.from_lane,
-        other.to_lane,
-        other.turn_type,
-        other.traffic_light,
-        other.speed_limit_mps,
-    ):
+    facts = ("from_lane", "to_lane", "turn_type", "traffic_light", "speed_limit_mps")
+    if any(getattr(one, name) != getattr(other, name) for name in facts):
         return False
     shares = np.linspace(0.0, 1.0, 9)
     places = (
         line.points_at(shares * line.length_m) for line in (one.centerline, other.centerline)
     )
     return bool(np.hypot(*np.subtract(*places).T).max() <= SAME_WITHIN_M)
+
+
+def _cut(points: FloatArray, outside_m: FloatArray) -> FloatArray:
+    """Return the part of a closed boundary where `outside_m`, given at each point, is <= 0."""
+    kept: list[FloatArray] = []
+    for index in range(len(points)):
+        before, here = outside_m[index - 1], outside_m[index]
+        if (before > 0.0) != (here > 0.0):
+            share = before / (before - here)
+            kept.append(points[index - 1] + share * (points[index] - points[index - 1]))
+        if here <= 0.0:
+            kept.append(points[index])
+    return np.array(kept).reshape(-1, 2)

@@ -1,37 +1,42 @@
-"""What the modifier is told: prompt texts filled with a scene, an instruction and what came back.
+"""What models are told: prompt texts filled with a scene, an instruction and what came back.
 
 In: a `Scene`, an instruction, and the form of a variant (polylines or Bezier curves, with or
 without calls); later on what was answered, called and found. Out: `Message`s, ready to be sent.
 
 What is the same for every scenario comes first, then the scene, then the instruction, so that an
-endpoint can reuse the unchanged beginning.
+endpoint can reuse the unchanged beginning. Reviewers get the scene as polylines whatever the
+modifier got: they have no tool to walk along curves. The texts are package data under `text/`.
 """
 
 from __future__ import annotations
 
+import hashlib
 import json
-from collections.abc import Sequence
+import re
+import unicodedata
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import cache
+from importlib.resources import files
 
+from augment.checks.parties import USUAL
 from augment.llm.messages import Message, Speaker, Tool
 from augment.prompts.blocks import names_changes
 from augment.prompts.calls import calls_in
 from augment.prompts.extent import BESIDE_M, CROSSED_M, behind_m
-from augment.prompts.texts import (
-    QUOTE,
-    fill_text,
-    model_message,
-    prompt_version,
-    quote,
-    read_text,
-    said_by_user,
-)
-from augment.prompts.vectors import DEFAULT_RADIUS_M, LaneFormat, scene_text
-from augment.scene.entities import Scene
+from augment.prompts.vectors import DEFAULT_RADIUS_M, LaneFormat, changes_text, scene_text
+from augment.scene.codec import parts_schema
+from augment.scene.entities import Modification, Scene
 
-__all__ = ["QUOTE", "Calling", "Form", "modifier_messages", "prompt_version", "quote"]
+QUOTE = "> "
+"""Stands before every line of somebody else's words: no line of them can end the quotation."""
+LONGEST_ECHO = 20_000
+CANNOT_SEE = "cannot see"
+VECTORS_VERSION = 4
+"""Raised with every change to what of a scene is written down, or how: no text shows that."""
+
+Messages = tuple[Message, ...]
 
 
 class Calling(StrEnum):
@@ -59,23 +64,59 @@ class Form:
     identical: int = 3
 
 
-def modifier_messages(
-    scene: Scene, instruction: str, form: Form | None = None
-) -> tuple[Message, ...]:
-    """What the modifier is asked first."""
-    form = form or Form()
-    task = fill_text(
-        "task.md",
-        scene=scene_text(scene, radius_m=form.radius_m, lanes=form.lanes),
-        quoted=quote(instruction),
+@cache
+def prompt_version() -> str:
+    """Return twelve hexadecimal digits that change with every change to any prompt text."""
+    digest = hashlib.sha256(b"vectors %d\0" % VECTORS_VERSION)
+    for entry in sorted(files(__package__).joinpath("text").iterdir(), key=lambda e: e.name):
+        digest.update(entry.name.encode() + b"\0" + entry.read_bytes() + b"\0")
+    return digest.hexdigest()[:12]
+
+
+@cache
+def read_text(name: str) -> str:
+    """Return the text of that name as it stands in its file."""
+    return files(__package__).joinpath("text", name).read_text(encoding="utf-8").strip()
+
+
+def fill_text(name: str, **values: str) -> str:
+    """Return the text with each {{name}} replaced once; what is filled in is not looked at again.
+
+    Raises:
+        KeyError: A name has no value.
+    """
+    filled = re.sub(r"\{\{(.*?)\}\}", lambda match: values[match[1]], read_text(name))
+    return re.sub(r"\n{3,}", "\n\n", filled).strip()
+
+
+def quote(words: str) -> str:
+    """Quote somebody's words line by line, without control characters."""
+    clean = (
+        "".join(" " if unicodedata.category(c).startswith("C") else c for c in line).strip()
+        for line in words.splitlines()
     )
-    return Message(speaker=Speaker.SYSTEM, text=_modifier(form)), said_by_user(task)
+    return "\n".join(QUOTE + line for line in clean if line)
 
 
-def re_ask_messages(
-    messages: tuple[Message, ...], answer: str, problems: Sequence[str]
-) -> tuple[Message, ...]:
-    """The conversation so far, the answer that can't be read, and what is wrong with it.
+def model_message(answer: str) -> Message:
+    """Return a turn of the model; an empty one is refused by several servers."""
+    return Message(speaker=Speaker.ASSISTANT, text=answer[:LONGEST_ECHO] or "(empty answer)")
+
+
+def said_by_user(words: str, *, images: tuple[bytes, ...] = ()) -> Message:
+    """Return a turn of whoever talks to the model."""
+    return Message(speaker=Speaker.USER, text=words, images=images)
+
+
+def modifier_messages(scene: Scene, instruction: str, form: Form | None = None) -> Messages:
+    """Ask the modifier for a change."""
+    form = form or Form()
+    shown = scene_text(scene, radius_m=form.radius_m, lanes=form.lanes)
+    return _opening(_modifier(form), fill_text("task.md", scene=shown, quoted=quote(instruction)))
+
+
+def re_ask_messages(messages: Messages, answer: str, problems: Sequence[str]) -> Messages:
+    """Return the conversation so far, the modifier's unreadable answer, and its faults.
 
     Only an answer that holds a block is told to keep its placement.
     """
@@ -86,9 +127,9 @@ def re_ask_messages(
 
 
 def regenerate_messages(
-    messages: tuple[Message, ...], feedback: Sequence[str], *, is_measured: bool
-) -> tuple[Message, ...]:
-    """The conversation so far, and what a review found about its last answer.
+    messages: Messages, feedback: Sequence[str], *, is_measured: bool
+) -> Messages:
+    """Return the conversation so far, and what a review found about its last answer.
 
     Args:
         messages: Up to and including that answer.
@@ -100,29 +141,120 @@ def regenerate_messages(
 
 
 def result_text(results: Sequence[str], *, is_over: bool) -> str:
-    """What the program says about calls made in the prompt: each result as one line of JSON."""
-    lines = "\n".join(f"{number}. {result}" for number, result in enumerate(results, start=1))
-    return fill_text("function_result.md", results=lines, rest=go_on_text(is_over=is_over))
-
-
-def go_on_text(*, is_over: bool) -> str:
-    """Whether more calls are answered."""
-    return read_text("calls_are_over.md" if is_over else "calls_go_on.md")
+    """Tell the results of calls made in the prompt, each as one line of JSON."""
+    rest = read_text("calls_are_over.md" if is_over else "calls_go_on.md")
+    return fill_text("function_result.md", results=_numbered(results), rest=rest)
 
 
 @cache
 def pose_tool() -> Tool:
-    """The pose tool as endpoints with native calls are told of it."""
-    function = json.loads(read_text("pose_on_lane.json"))["function"]
-    return Tool(
-        name=function["name"],
-        description=function["description"],
-        parameters=function["parameters"],
+    """Return the pose tool as endpoints with native calls are told of it."""
+    return Tool(**json.loads(read_text("pose_on_lane.json"))["function"])
+
+
+def reviewer_messages(
+    scene: Scene,
+    instruction: str,
+    modification: Modification,
+    *,
+    radius_m: float,
+    earlier: Sequence[str] = (),
+) -> Messages:
+    """Ask the text reviewer: scene, wish and changed vectors, no reasoning.
+
+    Args:
+        scene: The scene before the change.
+        instruction: The user's wish.
+        modification: What is reviewed.
+        radius_m: How far around the ego the scene is written down.
+        earlier: The feedback that the editor was given in earlier rounds.
+    """
+    problems = read_text("common_problems.md")
+    told = fill_text("reviewer.md", **_rules(radius_m), problems=problems)
+    return _opening(told, _review_task(scene, instruction, modification, radius_m, earlier))
+
+
+def engineer_messages(
+    scene: Scene,
+    instruction: str,
+    modification: Modification,
+    *,
+    radius_m: float,
+    earlier: Sequence[str] = (),
+) -> Messages:
+    """Ask the engineer for questions to the viewer; arguments as above."""
+    told = fill_text("engineer.md", **_rules(radius_m), drawn=read_text("drawn.md"))
+    return _opening(told, _review_task(scene, instruction, modification, radius_m, earlier))
+
+
+def viewer_messages(questions: Sequence[str], pictures: Sequence[bytes]) -> Messages:
+    """Ask the viewer the questions about the pictures (PNG)."""
+    lines = _numbered([" ".join(question.split()) for question in questions])
+    system = fill_text("viewer.md", drawn=read_text("drawn.md"))
+    return _opening(system, fill_text("viewer_task.md", questions=lines), tuple(pictures))
+
+
+def verdict_messages(
+    messages: Messages, questions: Sequence[str], answers: Mapping[int, str]
+) -> Messages:
+    """Return the engineer's conversation up to his questions, and what the viewer saw."""
+    lines = [
+        f"{' '.join(question.split())} -> {answers.get(number, CANNOT_SEE)}"
+        for number, question in enumerate(questions, start=1)
+    ]
+    told = fill_text("engineer_answers.md", answers=quote(_numbered(lines)))
+    return (*messages, said_by_user(told))
+
+
+def review_re_ask_messages(messages: Messages, answer: str, problems: Sequence[str]) -> Messages:
+    """Return the conversation so far, a reviewer's unreadable answer, and its faults."""
+    asked = fill_text("review_re_ask.md", problems=_listed(problems))
+    return (*messages, model_message(answer), said_by_user(asked))
+
+
+def viewer_re_ask_messages(messages: Messages, answer: str, problems: Sequence[str]) -> Messages:
+    """Return the viewer's conversation with an answer that answers none of the questions."""
+    return (*messages, model_message(answer), said_by_user(read_text("viewer_re_ask.md")))
+
+
+def reader_messages(instruction: str) -> Messages:
+    """Ask the intent reader: the rules with the JSON schema, and the sentence."""
+    task = fill_text("reader_task.md", quoted=quote(instruction))
+    return _opening(fill_text("reader.md", schema=_intent_schema()), task)
+
+
+# Private
+
+
+def _opening(system: str, task: str, images: tuple[bytes, ...] = ()) -> Messages:
+    return Message(speaker=Speaker.SYSTEM, text=system), said_by_user(task, images=images)
+
+
+@cache
+def _modifier(form: Form) -> str:
+    tools, manner, work = "", "walked", "walked"
+    if form.calling is not Calling.NONE:
+        manner, work = "called", "native" if form.calling is Calling.NATIVE else "called"
+        tools = fill_text(
+            f"calls_{form.calling}.md",
+            function=read_text("pose_on_lane.md"),
+            calls=str(form.calls),
+            identical=str(form.identical),
+        )
+    return fill_text(
+        "modifier.md",
+        input_format=_input_format(form.radius_m, form.lanes),
+        distances=read_text(f"distances_{manner}.md"),
+        rules=read_text("rules.md"),
+        tools=tools,
+        calculations=read_text(f"calculations_{manner}.md"),
+        example=read_text(f"example_{form.lanes}.md"),
+        work=read_text(f"work_{work}.md"),
     )
 
 
-def input_format(radius_m: float, lanes: LaneFormat = LaneFormat.POLYLINE) -> str:
-    """How a scene is written down, and which part of it."""
+def _input_format(radius_m: float, lanes: LaneFormat = LaneFormat.POLYLINE) -> str:
+    """Tell how a scene is written down, and which part of it."""
     return fill_text(
         "input_format.md",
         coordinates=read_text(f"lanes_{lanes}.md"),
@@ -133,31 +265,51 @@ def input_format(radius_m: float, lanes: LaneFormat = LaneFormat.POLYLINE) -> st
     )
 
 
-_WORK = {Calling.NONE: "walked", Calling.IN_PROMPT: "called", Calling.NATIVE: "native"}
+def _rules(radius_m: float) -> dict[str, str]:
+    """Return what the editor was told and what is a deviation from it, for every reviewer."""
+    tolerances = fill_text(
+        "tolerances.md",
+        distance_m=f"{USUAL.distance_m:g}",
+        distance_percent=f"{100.0 * USUAL.distance_share:g}",
+        across_m=f"{USUAL.across_m:g}",
+        middle_m=f"{USUAL.middle_m:g}",
+        heading_deg=f"{USUAL.heading_deg:g}",
+        spacing_m=f"{USUAL.spacing_m:g}",
+        spacing_percent=f"{100.0 * USUAL.spacing_share:g}",
+    )
+    return {
+        "input_format": _input_format(radius_m),
+        "distances": read_text("distances_walked.md"),
+        "rules": read_text("rules.md"),
+        "tolerances": tolerances,
+    }
+
+
+def _review_task(
+    scene: Scene,
+    instruction: str,
+    modification: Modification,
+    radius_m: float,
+    earlier: Sequence[str],
+) -> str:
+    told = quote("\n".join(earlier))
+    return fill_text(
+        "review_task.md",
+        scene=scene_text(scene, radius_m=radius_m),
+        quoted=quote(instruction),
+        changes=changes_text(scene, modification),
+        earlier=fill_text("earlier_feedback.md", quoted=told) if earlier else "",
+    )
 
 
 @cache
-def _modifier(form: Form) -> str:
-    tools = ""
-    if form.calling is not Calling.NONE:
-        tools = fill_text(
-            f"calls_{form.calling}.md",
-            function=read_text("pose_on_lane.md"),
-            calls=str(form.calls),
-            identical=str(form.identical),
-        )
-    manner = "walked" if form.calling is Calling.NONE else "called"
-    return fill_text(
-        "modifier.md",
-        input_format=input_format(form.radius_m, form.lanes),
-        distances=read_text(f"distances_{manner}.md"),
-        rules=read_text("rules.md"),
-        tools=tools,
-        calculations=read_text(f"calculations_{manner}.md"),
-        example=read_text(f"example_{form.lanes}.md"),
-        work=read_text(f"work_{_WORK[form.calling]}.md"),
-    )
+def _intent_schema() -> str:
+    return json.dumps(parts_schema(), separators=(",", ":"))
 
 
 def _listed(entries: Sequence[str]) -> str:
     return "\n".join(f"- {entry}" for entry in entries)
+
+
+def _numbered(entries: Sequence[str]) -> str:
+    return "\n".join(f"{number}. {entry}" for number, entry in enumerate(entries, start=1))

@@ -1,7 +1,7 @@
-"""From a model's answer to a Modification, or an error whose sentences can go back to it.
+"""From what models answer to a Modification, ratings, questions, verdicts or an intent.
 
-In: the text of an answer, and the `Scene` that it is about. Out: a `ReadReply` with the
-`Modification`, the model's notes and what had to be mended; or `ReplyUnreadable`.
+In: the text of an answer, and the `Scene` that it is about. Out: typed values, or
+`ReplyUnreadable`, whose sentences can go back to the model; nothing else is ever raised.
 
 Frame: ego frame of the scene.
 """
@@ -15,38 +15,41 @@ from typing import Annotated, Literal, TypeVar
 
 from pydantic import Field
 
-from augment.errors import InvalidModification, ReplyUnreadable
-from augment.geometry.angles import wrap
-from augment.prompts.blocks import last_object
-from augment.prompts.names import ShortNames, short_names
-from augment.prompts.strict import Strict, validate
-from augment.prompts.vectors import DEFAULT_RADIUS_M
-from augment.scene.entities import AgentType, Scene, TrafficAgent
-from augment.scene.modification import Modification, check_fits
+from augment.errors import InvalidDocument, InvalidModification, ReplyUnreadable
+from augment.geometry.frames import wrap
+from augment.prompts.blocks import LONGEST_ANSWER, Strict, last_object, validate, without_thoughts
+from augment.prompts.vectors import DEFAULT_RADIUS_M, ShortNames, short_names
+from augment.scene.codec import intent_from_parts
+from augment.scene.entities import AgentType, Modification, Scene, TrafficAgent, check_fits
+from augment.scene.intent import Intent
 
 MOST_AGENTS = 64
 LONGEST_NOTES = 4000
+FEWEST_QUESTIONS, MOST_QUESTIONS = 3, 8
+LONGEST_ENTRY = 1000
+MOST_FEEDBACK = 20
+_MOST_PROBLEMS = 8
 
-_KEYS = frozenset({"add", "move", "remove"})
-_PLACEABLE = Literal[
-    "VEHICLE",
-    "BUS",
-    "BICYCLE",
-    "PEDESTRIAN",
-    "TRAFFIC_CONE",
-    "BARRIER",
-    "CONSTRUCTION_SIGN",
-    "GENERIC_OBJECT",
-]
 _Item = TypeVar("_Item")
 _Id = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_-]{0,31}$")]
 _Size = Annotated[float, Field(ge=0.2, le=20.0)]
 _Several = Annotated[list[_Item], Field(max_length=MOST_AGENTS)]
+_Words = Annotated[str, Field(min_length=1, max_length=LONGEST_ENTRY)]
+_Rating = Annotated[int, Field(ge=1, le=5)]
 
 
 class _Agent(Strict):
     id: _Id
-    type: _PLACEABLE
+    type: Literal[
+        "VEHICLE",
+        "BUS",
+        "BICYCLE",
+        "PEDESTRIAN",
+        "TRAFFIC_CONE",
+        "BARRIER",
+        "CONSTRUCTION_SIGN",
+        "GENERIC_OBJECT",
+    ]
     x_m: float
     y_m: float
     heading_rad: float = Field(ge=-2.0 * math.pi, le=2.0 * math.pi)
@@ -65,7 +68,7 @@ class _Block(Strict):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReadReply:
-    """An answer that was understood.
+    """A modifier's answer that was understood.
 
     Attributes:
         notes: The answer's own Insights and Summary.
@@ -77,8 +80,71 @@ class ReadReply:
     mended: bool
 
 
+class Correction(Strict):
+    """One problem, the reason behind it, and what to do about it."""
+
+    problem: _Words
+    reason: _Words
+    corrective_action: _Words
+
+    @property
+    def sentence(self) -> str:
+        """The three on one line."""
+        words = f"{self.problem} Reason: {self.reason} Corrective action: {self.corrective_action}"
+        return " ".join(words.split())
+
+
+class Ratings(Strict):
+    """From 1, wrong throughout, to 5, nothing to improve."""
+
+    compliance: _Rating
+    realism: _Rating
+    logical_consistency: _Rating
+
+    @property
+    def mean(self) -> float:
+        """Computed here, never by the model."""
+        return (self.compliance + self.realism + self.logical_consistency) / 3.0
+
+
+_Feedback = Annotated[list[Correction], Field(max_length=MOST_FEEDBACK)]
+_Remarks = Annotated[list[_Words], Field(max_length=MOST_FEEDBACK)]
+
+
+class _RatedBlock(Strict):
+    ratings: Ratings
+    feedback: _Feedback
+    remarks: _Remarks = []
+
+
+class RatedReview(_RatedBlock):
+    """What the text reviewer found.
+
+    Remarks are too small to be corrected: for the record, nobody is told. So are the reviewer's
+    own words, empty where he left them out.
+    """
+
+    summary: str = ""
+    questions: str = ""
+    answers: str = ""
+
+
+class _QuestionBlock(Strict):
+    questions: Annotated[
+        list[_Words], Field(min_length=FEWEST_QUESTIONS, max_length=MOST_QUESTIONS)
+    ]
+
+
+class EngineerVerdict(Strict):
+    """What the engineer decided: with feedback it is not accepted; remarks change nothing."""
+
+    verdict: Literal["accept", "feedback"]
+    feedback: _Feedback
+    remarks: _Remarks = []
+
+
 def read_reply(answer: str, scene: Scene, *, radius_m: float = DEFAULT_RADIUS_M) -> ReadReply:
-    """The modification that the answer asks for.
+    """Return the modification that the answer asks for.
 
     Args:
         answer: The raw text of the model.
@@ -86,29 +152,10 @@ def read_reply(answer: str, scene: Scene, *, radius_m: float = DEFAULT_RADIUS_M)
         radius_m: No object may lie further than this ahead, behind or to a side.
 
     Raises:
-        ReplyUnreadable: Whatever is wrong with the answer; nothing else is ever raised.
+        ReplyUnreadable: Whatever is wrong with the answer.
     """
-    found, mended = last_object(answer, _KEYS)
-    block = validate(_Block, found)
-    problems = _misplaced(block, scene, radius_m)
-    if problems:
-        raise ReplyUnreadable(problems)
-    modification = _modification(block, scene)
-    return ReadReply(modification=modification, notes=notes_of(answer), mended=mended)
-
-
-def notes_of(answer: str) -> str:
-    """The sections Insights and Summary of an answer, shortened; empty without them."""
-    heads = r"Insights|Summary|Modification Dict|Modification Calculations|Modified Vectors"
-    parts = re.split(rf"^[ \t#*_]*({heads})[ \t#*_]*:[ \t*_]*", answer, flags=re.MULTILINE)
-    bodies = dict(zip(parts[1::2], parts[2::2], strict=True))
-    notes = [bodies.get("Insights", "").strip(), bodies.get("Summary", "").strip()]
-    return "\n\n".join(part for part in notes if part)[:LONGEST_NOTES]
-
-
-def _misplaced(block: _Block, scene: Scene, radius_m: float) -> list[str]:
-    """What is typed rightly and still can't be: places off the map, lanes nobody knows."""
-    names = short_names(scene)
+    document, mended = last_object(answer, frozenset({"add", "move", "remove"}))
+    block, names = validate(_Block, document), short_names(scene)
     problems = []
     for agent in [*block.add, *block.move]:
         points = [(agent.x_m, agent.y_m), tuple(agent.walk_to or (0.0, 0.0))]
@@ -118,12 +165,111 @@ def _misplaced(block: _Block, scene: Scene, radius_m: float) -> list[str]:
             problems.append(f"{agent.id}: its lane is none of the scene's; null means none")
         if agent.walk_to is not None and agent.type != AgentType.PEDESTRIAN:
             problems.append(f"{agent.id}: only a PEDESTRIAN has walk_to")
-    return problems[:8]
+    if problems:
+        raise ReplyUnreadable(problems[:_MOST_PROBLEMS])
+    modification = _modification(block, scene, names)
+    return ReadReply(modification=modification, notes=notes_of(answer), mended=mended)
 
 
-def _modification(block: _Block, scene: Scene) -> Modification:
-    """The change in the scene's own ids; what is wrong with it is told in the short ones."""
-    names = short_names(scene)
+def notes_of(answer: str) -> str:
+    """Return the sections Insights and Summary of an answer, shortened; empty without them."""
+    heads = "Insights|Summary|Modification Dict|Modification Calculations|Modified Vectors"
+    bodies = _sections(answer, heads)
+    notes = [bodies.get("Insights", ""), bodies.get("Summary", "")]
+    return "\n\n".join(part for part in notes if part)[:LONGEST_NOTES]
+
+
+def read_ratings(answer: str, *, accepted_from: float) -> RatedReview:
+    """Return the text reviewer's ratings and feedback.
+
+    Args:
+        answer: The raw text.
+        accepted_from: The mean below which there must be feedback.
+
+    Raises:
+        ReplyUnreadable: A rating is missing or no whole number from 1 to 5, or there is nothing
+            that the modifier could be told.
+    """
+    document, _ = last_object(answer, frozenset({"ratings", "feedback"}))
+    block = validate(_RatedBlock, document)
+    if block.ratings.mean < accepted_from and not block.feedback:
+        rule = f"feedback: must not be empty where the mean rating is below {accepted_from:g}"
+        raise ReplyUnreadable([rule])
+    parts = _sections(answer, "Summary|Questions|Answers|Ratings|Review")
+    return RatedReview(
+        **dict(block),
+        summary=parts.get("Summary", ""),
+        questions=parts.get("Questions", ""),
+        answers=parts.get("Answers", ""),
+    )
+
+
+def read_questions(answer: str) -> tuple[str, ...]:
+    """Return the engineer's questions to the viewer.
+
+    Raises:
+        ReplyUnreadable: They are missing, too few or too many.
+    """
+    document, _ = last_object(answer, frozenset({"questions"}))
+    return tuple(validate(_QuestionBlock, document).questions)
+
+
+def read_verdict(answer: str) -> EngineerVerdict:
+    """Return the engineer's verdict.
+
+    Raises:
+        ReplyUnreadable: It is missing, or it and the feedback contradict each other.
+    """
+    document, _ = last_object(answer, frozenset({"verdict", "feedback"}))
+    verdict = validate(EngineerVerdict, document)
+    if (verdict.verdict == "accept") == bool(verdict.feedback):
+        rule = 'feedback: must be empty with "accept" and must not be empty with "feedback"'
+        raise ReplyUnreadable([rule])
+    return verdict
+
+
+def read_sight(answer: str, count: int) -> dict[int, str]:
+    """Return what the viewer said to each question, by its number; unanswered ones are left out.
+
+    Raises:
+        ReplyUnreadable: No line begins with the number of a question.
+    """
+    if len(answer) > LONGEST_ANSWER:
+        raise ReplyUnreadable([f"the answer is longer than {LONGEST_ANSWER} characters"])
+    seen: dict[int, str] = {}
+    for line in without_thoughts(answer).splitlines():
+        numbered = re.match(r"[ \t*#_]*([0-9]{1,2})[ \t]*[.):][ \t*]*(\S.*)", line)
+        if numbered is None:
+            continue
+        number, words = int(numbered.group(1)), numbered.group(2).strip(" *")
+        if 1 <= number <= count and number not in seen and words:
+            seen[number] = words[:LONGEST_ENTRY]
+    if not seen:
+        raise ReplyUnreadable(["no line begins with the number of a question"])
+    return seen
+
+
+def read_intent(answer: str) -> Intent:
+    """Return the intent of a reader's answer.
+
+    Raises:
+        ReplyUnreadable: There is no block, or it breaks the schema or contradicts itself.
+    """
+    document, _ = last_object(answer, frozenset({"requests"}))
+    try:
+        return intent_from_parts(document)
+    except InvalidDocument as fault:
+        problems = fault.problems[:_MOST_PROBLEMS]
+    raise ReplyUnreadable(
+        [f"{ascii(path).strip(chr(39))[:80]}: {text}" for path, text in problems]
+    )
+
+
+# Private
+
+
+def _modification(block: _Block, scene: Scene, names: ShortNames) -> Modification:
+    """Return the change in the scene's own ids; its faults are told in the short ones."""
     shown = replace(scene, agents=tuple(replace(a, id=names.agents[a.id]) for a in scene.agents))
     asked = Modification(
         added=tuple(_agent(agent, names) for agent in block.add),
@@ -134,16 +280,15 @@ def _modification(block: _Block, scene: Scene) -> Modification:
         check_fits(shown, asked)
     except InvalidModification as error:
         raise ReplyUnreadable([str(error)]) from None
-    modification = replace(
-        asked,
-        moved=tuple(replace(a, id=names.agent_ids[a.id]) for a in asked.moved),
-        removed=tuple(names.agent_ids[name] for name in asked.removed),
-    )
     if {agent.id for agent in asked.added} & names.agents.keys():
         raise ReplyUnreadable(
             [f"an added agent's id is taken: number them from {names.next_agent}"]
         )
-    return modification
+    return replace(
+        asked,
+        moved=tuple(replace(a, id=names.agent_ids[a.id]) for a in asked.moved),
+        removed=tuple(names.agent_ids[name] for name in asked.removed),
+    )
 
 
 def _agent(agent: _Agent, names: ShortNames) -> TrafficAgent:
@@ -159,3 +304,10 @@ def _agent(agent: _Agent, names: ShortNames) -> TrafficAgent:
         lane_id=None if agent.lane is None else names.lane_ids[agent.lane],
         walk_to_m=None if agent.walk_to is None else (agent.walk_to[0], agent.walk_to[1]),
     )
+
+
+def _sections(answer: str, heads: str) -> dict[str, str]:
+    """Return what stands under each of some headings of an answer."""
+    parts = re.split(rf"^[ \t#*_]*({heads})[ \t#*_]*:[ \t*_]*", answer, flags=re.MULTILINE)
+    bodies = zip(parts[1::2], parts[2::2], strict=True)
+    return {head: body.strip()[:LONGEST_NOTES] for head, body in bodies}

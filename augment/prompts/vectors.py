@@ -3,6 +3,11 @@
 Frame: ego frame, metres to two decimals, radians to three. Lanes are centrelines sampled every
 5 m, or the control points of cubic Bezier pieces. Only what a wish can concern is written down
 (`extent.py` has the rule).
+
+Scenes come from files of other people: a name out of such a file could carry a sentence, so
+nothing but our own words, numbers and short ids such as Lane3 reaches a prompt. What is written
+into a prompt and what the pose tool answers about both come from `lane_curves`, so that "the
+beginning of Lane3" and its control points are the same place in either.
 """
 
 from __future__ import annotations
@@ -10,49 +15,39 @@ from __future__ import annotations
 import json
 import math
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from enum import StrEnum
+from functools import cached_property
+from itertools import count
+from string import ascii_letters
 
 import numpy as np
 
-from augment.geometry.polyline import Polyline
-from augment.prompts.clip import boundary_within, distance_to_area_m, simplify_boundary
-from augment.prompts.extent import BESIDE_M, Extent, extent_of, shown_spans
-from augment.prompts.lane_curves import control_points
-from augment.prompts.names import ShortNames, number_of, short_names
-from augment.scene.bezier_lanes import bezier_lane
+from augment.geometry.bezier import CubicBezier, travel_pose
+from augment.geometry.frames import Pose
+from augment.geometry.polyline import Projection
+from augment.prompts.extent import boundary_near, extent_of, shown_spans
+from augment.scene.bezier_lanes import BezierLane, bezier_lane, piece_ids, straight_curve
 from augment.scene.entities import (
-    Area,
     Lane,
-    LaneConnector,
+    Modification,
     Scene,
     TrafficAgent,
     TrafficDensity,
     TurnType,
 )
-from augment.scene.modification import Modification
+from augment.scene.lane_graph import AnyLane, LaneGraph
 
 SPACING_M = 5.0
 DEFAULT_RADIUS_M = 80.0
 
 Vector = list[object]
-Coordinates = Callable[[Polyline], list[object]]
-"""How the shown part of a centreline is written down."""
 
 _COMPASS = ("East", "Northeast", "North", "Northwest", "West", "Southwest", "South", "Southeast")
 _BOUNDARY_TOLERANCE_M = 0.1
+# The end of a whole number; ids and words of ours have no dot.
 _WHOLE = re.compile(r"(?<=[0-9])\.0(?=[],])")
-"""The end of a whole number; ids and words of ours have no dot."""
-
-
-def polyline_coordinates(line: Polyline) -> list[object]:
-    """Points every 5 m."""
-    return [[_metres(x), _metres(y)] for x, y in line.resampled(SPACING_M).points_m]
-
-
-def bezier_coordinates(line: Polyline) -> list[object]:
-    """Pieces in order of travel, each four control points, or the two ends of a straight one."""
-    return list(control_points(bezier_lane(line)))
 
 
 class LaneFormat(StrEnum):
@@ -62,74 +57,248 @@ class LaneFormat(StrEnum):
     BEZIER = "bezier"
 
 
-COORDINATES: dict[LaneFormat, Coordinates] = {
-    LaneFormat.POLYLINE: polyline_coordinates,
-    LaneFormat.BEZIER: bezier_coordinates,
-}
+@dataclass(frozen=True)
+class ShortNames:
+    """Ids of a scene and their short forms, such as Agent2, Lane3, Connector1, Area4.
+
+    Attributes:
+        agents, lanes, areas: Short form by the scene's own id; lanes are lanes and connectors.
+    """
+
+    agents: dict[str, str]
+    lanes: dict[str, str]
+    areas: dict[str, str]
+
+    @cached_property
+    def agent_ids(self) -> dict[str, str]:
+        """The scene's agent id by short form."""
+        return {short: name for name, short in self.agents.items()}
+
+    @cached_property
+    def lane_ids(self) -> dict[str, str]:
+        """The scene's lane or connector id by short form."""
+        return {short: name for name, short in self.lanes.items()}
+
+    @property
+    def next_agent(self) -> str:
+        """The id that the first new agent should get."""
+        return f"Agent{1 + max(_number_of(short) for short in self.agents.values())}"
+
+
+def short_names(scene: Scene) -> ShortNames:
+    """Return the short forms for everything in the scene; ids that are short already stay."""
+    return ShortNames(
+        agents=_shorten((agent.id for agent in scene.everyone), "Agent"),
+        lanes=_shorten((lane.id for lane in scene.lanes), "Lane")
+        | _shorten((connector.id for connector in scene.connectors), "Connector"),
+        areas=_shorten((area.id for area in scene.areas), "Area"),
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LaneCurve:
+    """One lane or connector as far as it is shown.
+
+    The prompt shows the Bezier pieces; the tool reads the recorded centreline itself.
+
+    Attributes:
+        id: Its short id.
+        lane: Its pieces; s = 0 is where the shown part begins.
+        whole: The whole of it, as recorded.
+        begins_m: Where on its centreline the shown part begins.
+        before, after: Short ids of what joins it within the shown map, straightest first.
+    """
+
+    id: str
+    lane: BezierLane
+    whole: AnyLane
+    begins_m: float
+    before: tuple[str, ...] = ()
+    after: tuple[str, ...] = ()
+
+    @property
+    def width_m(self) -> float:
+        """How wide it is."""
+        return self.whole.width_m
+
+    @property
+    def length_m(self) -> float:
+        """How long the shown part is."""
+        return self.lane.length_m
+
+    def pose_at(self, s_m: float, d_m: float = 0.0) -> Pose:
+        """Return the place on the recorded centreline at s of the shown part, d to the left."""
+        return travel_pose(self.whole.centerline, self.begins_m + s_m, d_m)
+
+    def project(self, x_m: float, y_m: float) -> Projection:
+        """Return the nearest place on the recorded centreline of the shown part."""
+        shown = self.whole.centerline.between(self.begins_m, self.begins_m + self.length_m)
+        return shown.project(x_m, y_m)
+
+    @property
+    def pieces(self) -> tuple[str, ...]:
+        """How its pieces are called, in order of travel."""
+        return piece_ids(self.id, len(self.lane.pieces))
+
+
+def lane_curves(scene: Scene, names: ShortNames, radius_m: float) -> dict[str, LaneCurve]:
+    """Return all lanes and connectors that a prompt shows, by short id, in the scene's order."""
+    graph = LaneGraph(scene)
+    spans = shown_spans(scene, radius_m)
+    begins = {key for key, (start_m, _) in spans.items() if start_m < 1e-6}
+    ends = {
+        key
+        for key, (_, end_m) in spans.items()
+        if end_m > graph.lanes[key].centerline.length_m - 1e-6
+    }
+
+    def shown(ids: Iterable[str], among: set[str]) -> tuple[str, ...]:
+        return tuple(names.lanes[lane_id] for lane_id in ids if lane_id in among)
+
+    return {
+        names.lanes[key]: LaneCurve(
+            id=names.lanes[key],
+            lane=bezier_lane(graph.lanes[key].centerline.between(*span)),
+            whole=graph.lanes[key],
+            begins_m=span[0],
+            before=shown(graph.predecessors(key) if key in begins else (), ends),
+            after=shown(graph.successors(key) if key in ends else (), begins),
+        )
+        for key, span in spans.items()
+    }
+
+
+def control_points(lane: BezierLane) -> list[list[list[float]]]:
+    """Return the control points [x, y] of each piece, to the centimetre, ready for JSON.
+
+    Four, or of a straight piece its two ends.
+    """
+    return [
+        np.add(np.round(piece.curve.control_m[:: 3 if piece.is_straight else 1], 2), 0.0).tolist()
+        for piece in lane.pieces
+    ]
+
+
+def curve_from(points: Sequence[Sequence[float]]) -> CubicBezier:
+    """Return the curve of four control points, or of the two ends of a straight piece.
+
+    Raises:
+        ValueError: They are neither, or no curve.
+    """
+    return straight_curve(*points) if len(points) == 2 else CubicBezier(points)
 
 
 def scene_text(
     scene: Scene, *, radius_m: float = DEFAULT_RADIUS_M, lanes: LaneFormat = LaneFormat.POLYLINE
 ) -> str:
-    """The four lists under their headings, one entity a line, and what the lists can't say."""
-    names, coordinates = short_names(scene), COORDINATES[lanes]
-    lists = {
-        "Agents": agent_vectors(scene, names, radius_m),
-        "Lanes": lane_vectors(scene, names, radius_m, coordinates),
-        "Lane connectors": connector_vectors(scene, names, radius_m, coordinates),
-        "Areas": area_vectors(scene, names, radius_m),
-    }
-    parts = [f"{title}:\n{_listed(vectors)}" for title, vectors in lists.items()]
+    """Write the four lists under their headings, and what the lists can't say."""
+    names, density, goal = short_names(scene), scene.options.density, scene.options.goal
+    parts = [_list_text(*entry) for entry in scene_vectors(scene, radius_m, lanes).items()]
     parts.append(f"Traffic drives on the {scene.traffic_side.value}-hand side of the road.")
-    parts += _options_lines(scene)
+    if density is not TrafficDensity.NONE:
+        parts.append(f"The traffic around the ego has a {density} density.")
+    if goal is not None:
+        way = "goes straight on" if goal is TurnType.STRAIGHT else f"turns {goal}"
+        parts.append(f"The ego's goal: its way {way} where the lanes first part.")
     parts.append(f"The first new agent is {names.next_agent}.")
     return "\n\n".join(parts)
 
 
-def _options_lines(scene: Scene) -> list[str]:
-    """What the scenario sets besides its change: the density of its traffic and its goal."""
-    density, goal = scene.options.density, scene.options.goal
-    lines = []
-    if density is not TrafficDensity.NONE:
-        lines.append(f"The traffic around the ego has a {density} density.")
-    if goal is not None:
-        way = "goes straight on" if goal is TurnType.STRAIGHT else f"turns {goal}"
-        lines.append(f"The ego's goal: its way {way} where the lanes first part.")
-    return lines
-
-
 def changes_text(scene: Scene, modification: Modification) -> str:
-    """What was added, moved and removed, as three lists under their headings."""
+    """Write what was added, moved and removed, as three lists under their headings."""
     names = short_names(scene)
-    lists = {
-        "Added agents": {agent.id: _walker_vector(agent, names) for agent in modification.added},
-        "Moved agents": {
-            names.agents[agent.id]: _walker_vector(agent, names) for agent in modification.moved
-        },
-    }
-    parts = [f"{title}:\n{_listed(vectors)}" for title, vectors in lists.items()]
+    added = {agent.id: _agent_vector(agent, names) for agent in modification.added}
+    moved = {names.agents[one.id]: _agent_vector(one, names) for one in modification.moved}
     removed = [names.agents[name] for name in modification.removed]
-    return "\n\n".join([*parts, f"Removed agents:\n{json.dumps(removed)}"])
+    return "\n\n".join(
+        [
+            _list_text("Added agents", added),
+            _list_text("Moved agents", moved),
+            f"Removed agents:\n{json.dumps(removed)}",
+        ]
+    )
 
 
-def agent_vectors(scene: Scene, names: ShortNames, radius_m: float) -> dict[str, Vector]:
-    """Type, centre x and y, heading, width, length, velocity, lane id, by agent id."""
-    return {
-        names.agents[agent.id]: agent_vector(agent, names)
-        for agent in shown_agents(scene, radius_m)
-    }
+def scene_vectors(
+    scene: Scene, radius_m: float, lanes: LaneFormat = LaneFormat.POLYLINE
+) -> dict[str, dict[str, Vector]]:
+    """Return the four lists by heading: each entity's attributes by its short id.
+
+    Agents: type, centre x and y, heading, width, length, velocity, lane. Lanes: number, travel
+    direction, direction relative to the ego, width, limit, coordinates. Lane connectors: from,
+    to, light, turn, width, limit, coordinates. Areas: kind and boundary.
+    """
+    names, spans = short_names(scene), shown_spans(scene, radius_m)
+    road: dict[str, dict[str, Vector]] = {"Lanes": {}, "Lane connectors": {}}
+    every: list[AnyLane] = [*scene.lanes, *scene.connectors]
+    for lane in every:
+        if lane.id not in spans:
+            continue
+        line = lane.centerline.between(*spans[lane.id])
+        short = names.lanes[lane.id]
+        facts: Vector
+        if isinstance(lane, Lane):
+            heading_rad = line.heading_at(line.project(0.0, 0.0).s_m)
+            facts = [_number_of(short), compass(heading_rad), _relative(heading_rad)]
+        else:
+            ends = (names.lanes.get(end or "") for end in (lane.from_lane, lane.to_lane))
+            facts = [*ends, lane.traffic_light.value, lane.turn_type.value]
+        limit_mps = None if lane.speed_limit_mps is None else _metres(lane.speed_limit_mps)
+        if lanes is LaneFormat.BEZIER:
+            coordinates: object = control_points(bezier_lane(line))
+        else:
+            coordinates = _points(line.resampled(SPACING_M).points_m)
+        kind = "Lanes" if isinstance(lane, Lane) else "Lane connectors"
+        road[kind][short] = [*facts, _metres(lane.width_m), limit_mps, coordinates]
+    extent = extent_of(scene, radius_m)
+    areas: dict[str, Vector] = {}
+    for area in scene.areas:
+        boundary = boundary_near(area, extent, _BOUNDARY_TOLERANCE_M)
+        if len(boundary):
+            areas[names.areas[area.id]] = [area.kind.value, _points(boundary)]
+    shown = shown_agents(scene, radius_m)
+    agents = {names.agents[one.id]: _agent_vector(one, names)[:8] for one in shown}
+    return {"Agents": agents, **road, "Areas": areas}
 
 
 def shown_agents(scene: Scene, radius_m: float) -> tuple[TrafficAgent, ...]:
-    """The ego, and the agents with their centres in the region that is shown."""
-    extent = extent_of(scene, radius_m)
+    """Return the ego, and the agents with their centres in the region that is shown."""
     places = np.array([(agent.x_m, agent.y_m) for agent in scene.agents]).reshape(-1, 2)
-    inside = extent.holds(places)
+    inside = extent_of(scene, radius_m).holds(places)
     return scene.ego, *(agent for agent, is_in in zip(scene.agents, inside, strict=True) if is_in)
 
 
-def agent_vector(agent: TrafficAgent, names: ShortNames) -> Vector:
-    """One agent as its list of attributes."""
+def compass(heading_rad: float) -> str:
+    """Return the travel direction in words; +x is East, +y is North."""
+    return _COMPASS[round(heading_rad / (math.pi / 4.0)) % 8] + "wards"
+
+
+# Private
+
+
+def _shorten(ids: Iterable[str], prefix: str) -> dict[str, str]:
+    names = list(ids)
+    kept = {name for name in names if re.fullmatch(prefix + "[1-9][0-9]{0,4}", name, re.ASCII)}
+    free = (f"{prefix}{number}" for number in count(1))
+    fresh = (name for name in free if name not in kept)
+    return {name: name if name in kept else next(fresh) for name in names}
+
+
+def _number_of(short: str) -> int:
+    return int(short.lstrip(ascii_letters))
+
+
+def _relative(heading_rad: float) -> str:
+    """Return the direction relative to the ego, which faces 0; up to 45 degrees is the same."""
+    turn = abs(math.remainder(heading_rad, 2.0 * math.pi))
+    if turn <= math.pi / 4.0:
+        return "same"
+    return "opposite" if turn >= 3.0 * math.pi / 4.0 else "crossing"
+
+
+def _agent_vector(agent: TrafficAgent, names: ShortNames) -> Vector:
+    """Return an agent's attributes, at the end that of its walk if it walks."""
+    walk = [] if agent.walk_to_m is None else [[_metres(value) for value in agent.walk_to_m]]
     return [
         agent.type.value,
         _metres(agent.x_m),
@@ -138,121 +307,23 @@ def agent_vector(agent: TrafficAgent, names: ShortNames) -> Vector:
         _metres(agent.width_m),
         _metres(agent.length_m),
         _metres(agent.speed_mps),
-        None if agent.lane_id is None else names.lanes.get(agent.lane_id),
+        names.lanes.get(agent.lane_id or ""),
+        *walk,
     ]
 
 
-def lane_vectors(
-    scene: Scene,
-    names: ShortNames,
-    radius_m: float,
-    coordinates: Coordinates = polyline_coordinates,
-) -> dict[str, Vector]:
-    """Lane number, travel direction, direction relative to the ego, width, limit, coordinates."""
-    spans = shown_spans(scene, radius_m)
-    return {
-        names.lanes[lane.id]: _lane_vector(
-            lane, lane.centerline.between(*spans[lane.id]), names, coordinates
-        )
-        for lane in scene.lanes
-        if lane.id in spans
-    }
-
-
-def connector_vectors(
-    scene: Scene,
-    names: ShortNames,
-    radius_m: float,
-    coordinates: Coordinates = polyline_coordinates,
-) -> dict[str, Vector]:
-    """From lane, to lane, light, turn, width, speed limit, coordinates, by connector id."""
-    spans = shown_spans(scene, radius_m)
-    return {
-        names.lanes[lane.id]: _connector_vector(
-            lane, lane.centerline.between(*spans[lane.id]), names, coordinates
-        )
-        for lane in scene.connectors
-        if lane.id in spans
-    }
-
-
-def area_vectors(scene: Scene, names: ShortNames, radius_m: float) -> dict[str, Vector]:
-    """Kind and boundary points, by area id."""
-    extent = extent_of(scene, radius_m)
-    cut = ((area, _boundary(area, extent)) for area in scene.areas)
-    return {names.areas[area.id]: [area.kind.value, points] for area, points in cut if points}
-
-
-def compass(heading_rad: float) -> str:
-    """The travel direction in words; +x is East, +y is North."""
-    return _COMPASS[round(heading_rad / (math.pi / 4.0)) % 8] + "wards"
-
-
-def relative_direction(heading_rad: float) -> str:
-    """The direction relative to the ego, which faces 0: within 45 degrees it is the same."""
-    turn = abs(math.remainder(heading_rad, 2.0 * math.pi))
-    if turn <= math.pi / 4.0:
-        return "same"
-    return "opposite" if turn >= 3.0 * math.pi / 4.0 else "crossing"
-
-
-def _walker_vector(agent: TrafficAgent, names: ShortNames) -> Vector:
-    """An agent's vector, with the end of its walk if it walks."""
-    walk: Vector = [] if agent.walk_to_m is None else [[_metres(v) for v in agent.walk_to_m]]
-    return agent_vector(agent, names) + walk
-
-
-def _lane_vector(
-    lane: Lane, line: Polyline, names: ShortNames, coordinates: Coordinates
-) -> Vector:
-    heading_rad = line.heading_at(line.project(0.0, 0.0).s_m)
-    return [
-        number_of(names.lanes[lane.id]),
-        compass(heading_rad),
-        relative_direction(heading_rad),
-        _metres(lane.width_m),
-        _speed_limit(lane.speed_limit_mps),
-        coordinates(line),
-    ]
-
-
-def _connector_vector(
-    lane: LaneConnector, line: Polyline, names: ShortNames, coordinates: Coordinates
-) -> Vector:
-    return [
-        None if lane.from_lane is None else names.lanes.get(lane.from_lane),
-        None if lane.to_lane is None else names.lanes.get(lane.to_lane),
-        lane.traffic_light.value,
-        lane.turn_type.value,
-        _metres(lane.width_m),
-        _speed_limit(lane.speed_limit_mps),
-        coordinates(line),
-    ]
-
-
-def _boundary(area: Area, extent: Extent) -> list[list[float]]:
-    points = boundary_within(np.array(area.boundary_m, dtype=np.float64), extent.box_m)
-    if len(points) < 3:
-        return []
-    routes = extent.routes_m
-    if routes is not None and distance_to_area_m(points, routes) > BESIDE_M:
-        return []
-    return [[_metres(x), _metres(y)] for x, y in simplify_boundary(points, _BOUNDARY_TOLERANCE_M)]
-
-
-def _speed_limit(limit_mps: float | None) -> float | None:
-    return None if limit_mps is None else _metres(limit_mps)
+def _points(points_m: Iterable[Sequence[float]]) -> list[list[float]]:
+    return [[_metres(x), _metres(y)] for x, y in points_m]
 
 
 def _metres(value: float) -> float:
     return round(float(value), 2) + 0.0
 
 
-def _listed(vectors: Mapping[str, Vector]) -> str:
+def _list_text(title: str, vectors: Mapping[str, Vector]) -> str:
     # A blank before a number is a token of its own to most models, so coordinates have none.
-    lines = [f"{json.dumps(name)}: {_vector_text(vector)}" for name, vector in vectors.items()]
-    return "{" + ",\n ".join(lines) + "}"
-
-
-def _vector_text(vector: Vector) -> str:
-    return _WHOLE.sub("", json.dumps(vector, separators=(",", ":")))
+    lines = [
+        f"{json.dumps(name)}: {_WHOLE.sub('', json.dumps(vector, separators=(',', ':')))}"
+        for name, vector in vectors.items()
+    ]
+    return f"{title}:\n" + "{" + ",\n ".join(lines) + "}"

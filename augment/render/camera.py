@@ -20,9 +20,8 @@ from PIL import Image, ImageDraw
 
 from augment.geometry.polyline import FloatArray
 from augment.render.shapes import ribbon
-from augment.scene.entities import Scene, TrafficAgent
+from augment.scene.entities import Modification, Scene, TrafficAgent
 from augment.scene.lane_graph import AnyLane
-from augment.scene.modification import Modification
 
 WIDTH_PX = 1200
 MARGIN_M = 5.0

@@ -14,8 +14,7 @@ from typing import Any
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
-from augment.geometry.boxes import corners
-from augment.geometry.frames import Pose
+from augment.geometry.frames import Pose, corners
 from augment.geometry.polyline import FloatArray
 from augment.render import palette
 

@@ -2,20 +2,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
+from augment.geometry.frames import wrap
 from augment.geometry.polyline import FloatArray
 from augment.render import palette
 from augment.render.camera import Camera
 from augment.render.canvas import Canvas, MetricCanvas, text_width_px
-from augment.render.marks import draw_mark, draw_motion, draw_walks
+from augment.render.marks import draw_mark, draw_motion, draw_walks, is_walking, stands
 from augment.render.palette import Colour, MarkStyle
-from augment.scene.entities import AgentType, AreaKind, Scene, TrafficAgent, TrafficLight
-from augment.scene.modification import Modification
-from augment.scene.sizes import LENGTH_WIDTH_M
+from augment.render.road import own_lanes
+from augment.render.shapes import resample_line
+from augment.scene.entities import (
+    LENGTH_WIDTH_M,
+    AgentType,
+    AreaKind,
+    Modification,
+    Point,
+    Scene,
+    TrafficAgent,
+    TrafficLight,
+)
 
 _TEXT_PX = 14
 _ROW_PX, _SAMPLE_PX, _GAP_PX, _MARGIN_PX = 36.0, 56.0, 18.0, 10.0
@@ -193,3 +205,188 @@ def _patch(colour: Colour) -> _Sample:
 def _line_px(ground: MetricCanvas, x_m: float, y_m: float) -> FloatArray:
     x, y = ground.at(x_m, y_m)
     return np.array([[x - 24.0, y], [x + 24.0, y]])
+
+
+_KINDS = {
+    AgentType.BUS: "bus",
+    AgentType.BICYCLE: "bicycle",
+    AgentType.PEDESTRIAN: "person",
+    AgentType.TRAFFIC_CONE: "cone",
+    AgentType.BARRIER: "barrier",
+    AgentType.CONSTRUCTION_SIGN: "sign",
+    AgentType.GENERIC_OBJECT: "object",
+}
+_AREAS_legend_keys = {AreaKind.CROSSWALK: "crosswalk", AreaKind.WALKWAY: "walkway"}
+_STEP_M = 4.0
+_DARK = (TrafficLight.NONE, TrafficLight.UNKNOWN)
+
+
+def scene_keys(scene: Scene, view: Mapping[str, Any]) -> set[str]:
+    """Return the entries for what a picture shows before any change.
+
+    Args:
+        scene: With the traffic that contestants see.
+        view: Where metres lie in the picture: px_per_m, ego_px, width, height.
+    """
+    keys = {"ego", "grid"}
+    shown = [agent for agent in scene.agents if _is_inside([(agent.x_m, agent.y_m)], view)]
+    if shown:
+        keys.add("recorded")
+    for agent in (scene.ego, *shown):
+        keys |= set(_agent_keys(agent))
+    if scene.options.goal is not None:
+        keys.add("goal")
+    return keys | _map_keys(scene, view)
+
+
+def change_keys(change: Modification, view: Mapping[str, Any]) -> set[str]:
+    """Return the entries for what a change adds to a picture."""
+    keys: set[str] = set()
+    for agent in change.changed:
+        if _is_inside([(agent.x_m, agent.y_m)], view):
+            keys |= {"changed", *_agent_keys(agent)}
+        else:
+            keys.add("outside")
+    return keys
+
+
+# Private
+
+
+def _map_keys(scene: Scene, view: Mapping[str, Any]) -> set[str]:
+    keys: set[str] = set()
+    own = own_lanes(scene)
+    for lane in scene.lanes:
+        if _is_inside(lane.centerline.points_m, view):
+            keys.add("own" if lane.id in own else "other")
+    for connector in scene.connectors:
+        if _is_inside(connector.centerline.points_m, view):
+            keys.add("junction")
+            if connector.traffic_light not in _DARK:
+                keys.add("lights")
+    for area in scene.areas:
+        if area.kind in _AREAS_legend_keys and _is_inside(area.boundary_m, view):
+            keys.add(_AREAS_legend_keys[area.kind])
+    return keys
+
+
+def _agent_keys(agent: TrafficAgent) -> Iterator[str]:
+    if agent.type in _KINDS:
+        yield _KINDS[agent.type]
+    if is_walking(agent):
+        yield "walk"
+    elif not stands(agent):
+        yield "motion"
+
+
+def _is_inside(
+    points_m: FloatArray | Iterable[tuple[float, float]], view: Mapping[str, Any]
+) -> bool:
+    """Whether any of some points lies in the picture."""
+    points = np.asarray(points_m, dtype=np.float64)
+    if len(points) > 1:
+        points = resample_line(points, _STEP_M)
+    (ego_x, ego_y), scale = view["ego_px"], view["px_per_m"]
+    x, y = ego_x + points[:, 0] * scale, ego_y - points[:, 1] * scale
+    inside = (x >= 0.0) & (x <= view["width"]) & (y >= 0.0) & (y <= view["height"])
+    return bool(inside.any())
+
+
+CHANGED, GONE = "changed", "gone"
+
+STEP_DEG = 5
+"""Headings are told in these steps: finer ones can't be seen, and would be a handwriting."""
+
+_UPRIGHT = {AgentType.TRAFFIC_CONE, AgentType.CONSTRUCTION_SIGN}
+"""Drawn upright whatever their heading."""
+
+_SYMMETRIC = {AgentType.BARRIER, AgentType.GENERIC_OBJECT}
+"""Drawn alike from either end."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DescribedAgent:
+    """One agent of the list.
+
+    Frame: ego frame, metres ahead of the ego's centre and to its left.
+
+    Attributes:
+        change: `CHANGED` or `GONE`.
+        kind: The value of an `AgentType`.
+        heading_deg: To the left of the ego's, in (-180, 180]; None where its mark shows none.
+        along_deg: How a thing without a front lies, in (-90, 90]; None for all others.
+        speed_mps: 0 for a road user that stands; None for things that do, and for who walks.
+        walk_to_m: Where a walk ends, ahead and left; None without a walk.
+    """
+
+    change: str
+    kind: str
+    ahead_m: float
+    left_m: float
+    heading_deg: int | None = None
+    along_deg: int | None = None
+    speed_mps: float | None = None
+    walk_to_m: Point | None = None
+
+
+def describe(scene: Scene, modification: Modification) -> list[DescribedAgent]:
+    """What was changed, then what is gone, each the nearest first, then by kind.
+
+    Args:
+        scene: The scene before the change; ids that it does not have are passed over.
+        modification: The change; the list of an empty one is empty.
+    """
+    left = {agent.id for agent in modification.moved} | set(modification.removed)
+    lines = [_line(CHANGED, agent) for agent in modification.changed]
+    lines += [_line(GONE, agent) for agent in scene.agents if agent.id in left]
+    return sorted(lines, key=_place)
+
+
+# Private
+
+
+def _line(change: str, agent: TrafficAgent) -> DescribedAgent:
+    walks, moves = is_walking(agent), not stands(agent)
+    is_thing = agent.type in _UPRIGHT | _SYMMETRIC
+    heading, along = None, None
+    if moves or not is_thing:
+        heading = _turn(agent.heading_rad)
+    elif agent.type in _SYMMETRIC:
+        along = _turn(math.remainder(agent.heading_rad, math.pi))
+        along = 90 if along == -90 else along
+    return DescribedAgent(
+        change=change,
+        kind=agent.type.value,
+        ahead_m=_metres(agent.x_m),
+        left_m=_metres(agent.y_m),
+        heading_deg=heading,
+        along_deg=along,
+        speed_mps=None if walks or (is_thing and not moves) else _speed(agent),
+        walk_to_m=_end(agent.walk_to_m) if walks else None,
+    )
+
+
+def _place(line: DescribedAgent) -> tuple[object, ...]:
+    """Everything that a line says, so that two which differ never stand as they came."""
+    distance_m = round(math.hypot(line.ahead_m, line.left_m), 3)
+    walk = line.walk_to_m or ()
+    rest = (line.heading_deg, line.along_deg, line.speed_mps)
+    known = tuple((value is not None, value or 0) for value in rest)
+    return (line.change, distance_m, line.kind, line.ahead_m, line.left_m, *known, walk)
+
+
+def _end(point: Point | None) -> Point | None:
+    return None if point is None else (_metres(point[0]), _metres(point[1]))
+
+
+def _metres(value: float) -> float:
+    return round(value, 1) + 0.0  # no minus before a zero
+
+
+def _speed(agent: TrafficAgent) -> float:
+    return 0.0 if stands(agent) else _metres(agent.speed_mps)
+
+
+def _turn(angle_rad: float) -> int:
+    degrees = STEP_DEG * round(math.degrees(wrap(angle_rad)) / STEP_DEG)
+    return 180 if degrees == -180 else degrees

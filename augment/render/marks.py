@@ -11,7 +11,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from augment.geometry.boxes import corners
+from augment.geometry.frames import corners
 from augment.geometry.polyline import FloatArray
 from augment.render import palette
 from augment.render.canvas import MetricCanvas

@@ -7,14 +7,24 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from augment.geometry.angles import difference
-from augment.geometry.frames import Pose
+from augment.geometry.frames import Pose, difference
 from augment.geometry.polyline import FloatArray
 from augment.render import palette
-from augment.render.canvas import MetricCanvas
+from augment.render.camera import Camera
+from augment.render.canvas import Box, MetricCanvas
 from augment.render.palette import Colour
 from augment.render.shapes import long_axis, offset, resample_line, ring_of, runs, sides, stripes
-from augment.scene.entities import Area, AreaKind, Lane, LaneConnector, Scene, TrafficAgent
+from augment.scene.ego_route import EgoRoute
+from augment.scene.entities import (
+    Area,
+    AreaKind,
+    Lane,
+    LaneConnector,
+    Scene,
+    TrafficAgent,
+    TrafficLight,
+    TurnType,
+)
 from augment.scene.lane_graph import AnyLane, LaneGraph
 
 _ROAD_AREAS = (AreaKind.DRIVABLE, AreaKind.CARPARK, AreaKind.INTERSECTION)
@@ -246,3 +256,152 @@ def _alike(one: Pose, other: Pose) -> bool:
     """Whether two chevrons say the same: connectors that part late run side by side."""
     near = math.hypot(one.x_m - other.x_m, one.y_m - other.y_m) < 2.0
     return near and abs(difference(one.heading_rad, other.heading_rad)) < math.radians(40.0)
+
+
+_COLOURS = {
+    TrafficLight.RED: palette.LIGHT_RED,
+    TrafficLight.YELLOW: palette.LIGHT_YELLOW,
+    TrafficLight.GREEN: palette.LIGHT_GREEN,
+}
+_LEFT_TO_RIGHT = (TurnType.U_TURN, TurnType.LEFT, TurnType.STRAIGHT, TurnType.RIGHT)
+_LAMP_PX = 5.5
+_GOAL_FROM_M, _GOAL_TO_M = 4.0, 80.0
+
+
+def draw_signals(ground: MetricCanvas, scene: Scene) -> None:
+    """One bar for each place where ruled connectors begin, cut where their states differ."""
+    starts: dict[str, list[LaneConnector]] = {}
+    for connector in scene.connectors:
+        if connector.traffic_light in _COLOURS:
+            starts.setdefault(connector.from_lane or connector.id, []).append(connector)
+    for connectors in starts.values():
+        if ground.camera.shows(connectors[0].centerline.points_m[:1]):
+            _bar(ground, connectors)
+
+
+def draw_goal(ground: MetricCanvas, scene: Scene) -> None:
+    """The ego's way to the scenario's goal, dashed; nothing for a scenario without one."""
+    route = EgoRoute.of(scene) if scene.options.goal is not None else None
+    if route is None or route.line.length_m - route.ego_s_m < _GOAL_FROM_M:
+        return
+    end_m = min(route.line.length_m, route.ego_s_m + _GOAL_TO_M)
+    way = route.line.between(route.ego_s_m + _GOAL_FROM_M, end_m)
+    ground.dashed(way.points_m, palette.EGO_MARK.fill, 2.0, 1.5, 1.5)
+
+
+def _bar(ground: MetricCanvas, connectors: list[LaneConnector]) -> None:
+    ordered = sorted(connectors, key=lambda one: _LEFT_TO_RIGHT.index(one.turn_type))
+    # The straightest way leaves its lane most squarely, so the bar is laid across that one.
+    first = min(ordered, key=lambda one: one.turn_type is not TurnType.STRAIGHT)
+    start, width_m = first.centerline.pose_at(0.0), 0.84 * first.width_m
+    states = list(dict.fromkeys(connector.traffic_light for connector in ordered))
+    part_m = width_m / len(states)
+    for index, state in enumerate(states):
+        left_m = width_m / 2.0 - index * part_m
+        ends = start.to_parent(np.array([[0.0, left_m], [0.0, left_m - part_m]]))
+        ground.stroke(ends, _COLOURS[state], max(2.0, 0.2 * ground.camera.px_per_m))
+        _lamp(ground, start, left_m - part_m / 2.0, state)
+
+
+def _lamp(ground: MetricCanvas, start: Pose, left_m: float, state: TrafficLight) -> None:
+    x_m, y_m = start.to_parent(np.array([[0.0, left_m]]))[0]
+    centre = ground.at(float(x_m), float(y_m))
+    if state is TrafficLight.GREEN:
+        ground.canvas.disc(centre, _LAMP_PX + 1.5, palette.PAPER)
+        ground.canvas.disc(centre, _LAMP_PX, _COLOURS[state])
+        return
+    # A diamond is a square on its corner; the red square stands upright in the picture.
+    first_rad = math.pi / 4.0 if state is TrafficLight.RED else 0.0
+    corners_rad = first_rad + np.arange(4) * math.pi / 2.0
+    square = np.column_stack([np.cos(corners_rad), np.sin(corners_rad)])
+    ground.canvas.fill(np.array(centre) + square * (1.25 * _LAMP_PX + 2.0), palette.PAPER)
+    ground.canvas.fill(np.array(centre) + square * 1.25 * _LAMP_PX, _COLOURS[state])
+
+
+GRID_M = 5.0
+Corner = tuple[bool, bool]
+"""Of a picture: whether it is right, whether it is at the top."""
+TEXT_PX = 21
+_INSET_PX = 12.0
+_PADDING_PX = 28.0
+_HEIGHT_PX = 52.0
+# About half a car at the usual scale.
+_NEAR_PX = 50.0
+
+
+def draw_grid(ground: MetricCanvas) -> None:
+    """Lines every 5 m; those through the ego's centre are stronger."""
+    camera = ground.camera
+    for x_m in raster(camera.x_min_m, camera.x_max_m):
+        line = np.array([[x_m, camera.y_min_m], [x_m, camera.y_max_m]])
+        _line(ground, line, axis=x_m == 0.0)
+    for y_m in raster(camera.y_min_m, camera.y_max_m):
+        line = np.array([[camera.x_min_m, y_m], [camera.x_max_m, y_m]])
+        _line(ground, line, axis=y_m == 0.0)
+
+
+def raster(low_m: float, high_m: float) -> list[float]:
+    """The multiples of 5 m strictly between two values."""
+    first, last = math.floor(low_m / GRID_M) + 1, math.ceil(high_m / GRID_M) - 1
+    return [index * GRID_M for index in range(first, last + 1)]
+
+
+def scale_corner(scene: Scene, camera: Camera) -> Corner:
+    """The quiet corner that the scale bar lies in: (whether right, whether at the top).
+
+    It depends on the scene before the change alone, so that all pictures of a scenario have their
+    scale in the same place: bottom left, unless another one hides fewer agents.
+    """
+    corners: list[Corner] = [(right, top) for top in (False, True) for right in (False, True)]
+    places = np.array([[agent.x_m, agent.y_m] for agent in scene.everyone])
+    agents_px = camera.to_pixels(places).tolist()
+    boxes = {corner: scale_box(camera, corner) for corner in corners}
+    return min(corners, key=lambda one: sum(_close(boxes[one], x, y) for x, y in agents_px))
+
+
+def scale_box(camera: Camera, corner: Corner) -> Box:
+    """The plate of the scale bar in a corner: left, top, right, bottom in pixels."""
+    is_right, is_top = corner
+    width = 2.0 * _unit_m(camera) * camera.px_per_m + 2.0 * _PADDING_PX
+    left = camera.width_px - _INSET_PX - width if is_right else _INSET_PX
+    top = _INSET_PX if is_top else camera.height_px - _INSET_PX - _HEIGHT_PX
+    return left, top, left + width, top + _HEIGHT_PX
+
+
+def draw_scale(ground: MetricCanvas, box_px: Box) -> None:
+    """A bar of two units, one filled, one empty, with their lengths beneath."""
+    left, top, _, _ = box_px
+    ground.canvas.plate(box_px, palette.PAPER, None, 6.0)
+    unit_m = _unit_m(ground.camera)
+    unit_px = unit_m * ground.camera.px_per_m
+    start, bar_top, bar_bottom = left + _PADDING_PX, top + 9.0, top + 16.0
+    middle, end = start + unit_px, start + 2.0 * unit_px
+    ground.canvas.fill(_rectangle(start, bar_top, end, bar_bottom), palette.INK)
+    ground.canvas.fill(
+        _rectangle(middle, bar_top + 1.5, end - 1.5, bar_bottom - 1.5), palette.PAPER
+    )
+    for index in range(3):
+        text = f"{index * unit_m:.0f}" + (" m" if index == 2 else "")
+        at = (start + index * unit_px, bar_bottom + 15.0)
+        ground.canvas.text(at, text, palette.INK, TEXT_PX)
+
+
+def _close(box: Box, x_px: float, y_px: float) -> bool:
+    """Whether a mark in the picture may touch the box."""
+    left, top, right, bottom = box
+    return (
+        max(0.0, left - _NEAR_PX) < x_px < right + _NEAR_PX
+        and max(0.0, top - _NEAR_PX) < y_px < bottom + _NEAR_PX
+    )
+
+
+def _unit_m(camera: Camera) -> float:
+    return 5.0 if camera.px_per_m >= 9.0 else 10.0
+
+
+def _rectangle(left: float, top: float, right: float, bottom: float) -> FloatArray:
+    return np.array([[left, top], [right, top], [right, bottom], [left, bottom]])
+
+
+def _line(ground: MetricCanvas, line_m: FloatArray, *, axis: bool) -> None:
+    ground.stroke(line_m, palette.GRID_AXIS if axis else palette.GRID, 1.0)

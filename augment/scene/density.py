@@ -12,11 +12,11 @@ import random
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
-from augment.geometry.boxes import Box, overlap
-from augment.geometry.frames import Pose
+from augment.geometry.frames import Box, Pose, overlap
 from augment.geometry.polyline import Polyline
 from augment.scene.ego_route import find_ego_lane
 from augment.scene.entities import (
+    LENGTH_WIDTH_M,
     AgentType,
     Lane,
     LaneConnector,
@@ -27,7 +27,6 @@ from augment.scene.entities import (
     TrafficLight,
 )
 from augment.scene.lane_graph import LaneGraph
-from augment.scene.sizes import LENGTH_WIDTH_M
 
 FIRST_ID = 101
 """Spawned agents are numbered from here, so that the ids of a change stay clear of them."""

@@ -5,14 +5,15 @@ Frame: ego frame. Angles counter-clockwise from +x. Values are frozen; change by
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
 from enum import StrEnum
-from typing import Annotated
+from typing import Annotated, Self
 
 from pydantic import Field
 
-from augment.geometry.boxes import Box
-from augment.geometry.frames import Pose
+from augment.errors import InvalidModification
+from augment.geometry.frames import Box, Pose
 from augment.scene.schema import (
     CLOSED,
     Heading,
@@ -257,3 +258,125 @@ class Scene:
     def everyone(self) -> tuple[TrafficAgent, ...]:
         """The ego first, then the others."""
         return (self.ego, *self.agents)
+
+
+EGO_LENGTH_M = 5.176
+EGO_WIDTH_M = 2.297
+
+LENGTH_WIDTH_M: dict[AgentType, tuple[float, float]] = {
+    AgentType.EGO_VEHICLE: (EGO_LENGTH_M, EGO_WIDTH_M),
+    AgentType.VEHICLE: (4.8, 2.0),
+    AgentType.BUS: (7.456, 2.079),
+    AgentType.BICYCLE: (1.8, 0.6),
+    AgentType.PEDESTRIAN: (0.900, 0.791),
+    AgentType.TRAFFIC_CONE: (0.5, 0.5),
+    AgentType.BARRIER: (2.0, 0.6),
+    AgentType.CONSTRUCTION_SIGN: (0.8, 0.8),
+    AgentType.GENERIC_OBJECT: (1.0, 1.0),
+}
+"""Length, width for each type; a plain vehicle is a mid-size car, not the ego's large one."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Modification:
+    """A change to a scene; empty means that nothing changes.
+
+    Attributes:
+        added: New agents, their ids not in the scene.
+        moved: Agents of the scene in their new state, by id.
+        removed: Ids of the scene's agents that go.
+    """
+
+    __pydantic_config__ = CLOSED
+
+    added: Annotated[Agents, Field(alias="add")] = ()
+    moved: Annotated[Agents, Field(alias="move")] = ()
+    removed: Annotated[
+        tuple[Id, ...], Field(alias="remove", fail_fast=True, max_length=MOST_AGENTS)
+    ] = ()
+
+    @property
+    def is_empty(self) -> bool:
+        """Whether the scene stays as it is."""
+        return not (self.added or self.moved or self.removed)
+
+    @property
+    def changed(self) -> tuple[TrafficAgent, ...]:
+        """Every agent that a picture marks as changed: the added, then the moved."""
+        return self.added + self.moved
+
+
+def apply(scene: Scene, modification: Modification) -> Scene:
+    """The scene after the change; the given one stays as it is.
+
+    Raises:
+        InvalidModification: An id is unknown, taken, named twice, or the ego's.
+    """
+    check_fits(scene, modification)
+    moved = {agent.id: agent for agent in modification.moved}
+    gone = set(modification.removed)
+    kept = tuple(moved.get(agent.id, agent) for agent in scene.agents if agent.id not in gone)
+    return replace(scene, agents=kept + modification.added)
+
+
+def check_fits(scene: Scene, modification: Modification) -> None:
+    """Raise InvalidModification unless every id of the modification fits the scene."""
+    known = {agent.id for agent in scene.agents}
+    touched = [agent.id for agent in modification.changed] + list(modification.removed)
+    doubled = sorted({name for name in touched if touched.count(name) > 1})
+    if doubled:
+        raise InvalidModification(f"named more than once: {', '.join(doubled)}")
+    for agent in modification.changed:
+        if agent.type is AgentType.EGO_VEHICLE:
+            raise InvalidModification(f"{agent.id}: an added or moved agent can't be the ego")
+    for agent in modification.added:
+        if agent.id in known or agent.id == scene.ego.id:
+            raise InvalidModification(f"{agent.id} is in the scene already; an added agent is new")
+    for name in [agent.id for agent in modification.moved] + list(modification.removed):
+        if name == scene.ego.id:
+            raise InvalidModification(f"{name} is the ego, which stays where it is")
+        if name not in known:
+            allowed = ", ".join(sorted(known)) or "none"
+            raise InvalidModification(f"{name} is not in the scene; its agents: {allowed}")
+
+
+def without_traffic(scene: Scene) -> Scene:
+    """The scene with the ego alone, as interPlan clears it before its own objects are added."""
+    return replace(scene, agents=())
+
+
+class ScenarioType(StrEnum):
+    """A type by interPlan's own name (`type` of a special scenario).
+
+    Attributes:
+        label: The words that the paper uses for it.
+    """
+
+    label: str
+
+    CONSTRUCTION_ZONE = "approaching_construction_zone", "Construction zone"
+    ACCIDENT_SITE = "avoid_crashed_cars", "Accident site"
+    JAYWALKER = "jaywalking_pedestrian", "Jaywalker"
+    NUDGE = "nudge_around_parked_vehicle", "Nudge around parked vehicle"
+    OVERTAKE = "overtake_parked_vehicle", "Overtake parked vehicle"
+
+    def __new__(cls, value: str, label: str = "") -> Self:
+        """A member with its label; a lookup has the value alone."""
+        member = str.__new__(cls, value)
+        member._value_ = value
+        member.label = label
+        return member
+
+
+def in_type_order(names: Iterable[str]) -> list[str]:
+    """Names of types, each once: interPlan's five in their order, then others by their slugs."""
+    given = set(names)
+    five = [one.value for one in ScenarioType if one.value in given]
+    return [*five, *sorted(given.difference(five))]
+
+
+class CatalogueSet(StrEnum):
+    """Which part of the authored catalogue a scenario belongs to."""
+
+    PAPER = "paper"
+    HARD = "hard"

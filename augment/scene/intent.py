@@ -10,26 +10,177 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from enum import StrEnum
 from typing import Annotated, Literal, Self, TypeVar
 
 from pydantic import Field, model_validator
 
 from augment.scene.entities import TurnType
-from augment.scene.intent_words import (
-    Bearing,
-    Body,
-    Facing,
-    LateralTarget,
-    Nearness,
-    Post,
-    Setting,
-    Shape,
-)
-from augment.scene.landmarks import LaneChoice as LaneChoice
-from augment.scene.landmarks import MapPlace, Pick
-from augment.scene.landmarks import Relation as Relation
-from augment.scene.landmarks import Side as Side
 from augment.scene.schema import CLOSED, MOST_OBJECTS, Count, Id, Real, Text, Yes
+
+
+class IntentOrigin(StrEnum):
+    """Where an intent comes from."""
+
+    AUTHORED = "authored"
+    ENTERED = "entered"
+    READ = "read"
+    DERIVED = "derived"
+
+
+class LateralTarget(StrEnum):
+    """Towards what something is offset within its lane."""
+
+    LANE_CENTRE = "lane centre"
+    LEFT_BOUNDARY = "left lane boundary"
+    RIGHT_BOUNDARY = "right lane boundary"
+    KERB = "kerb"
+    CENTRE_LINE = "centre line of the road"
+
+
+class Nearness(StrEnum):
+    """How far towards the target, where the sentence gives no number."""
+
+    SLIGHTLY = "slightly"
+    AT_EDGE = "at the edge"
+    HALF_OUT = "half outside"
+    OUTSIDE = "outside"
+
+
+class Body(StrEnum):
+    """What is meant to stand or drive; `vehicle` and `car` share one size."""
+
+    VEHICLE = "vehicle"
+    CAR = "car"
+    BICYCLE = "bicycle"
+    VAN = "van"
+    TRUCK = "truck"
+    BUS = "bus"
+    BARRIER = "barrier"
+    CONSTRUCTION_SIGN = "construction sign"
+
+
+class Facing(StrEnum):
+    """Where something looks, against the direction of its lane."""
+
+    WITH_LANE = "with the lane"
+    AGAINST_LANE = "against the lane"
+    ACROSS = "across the lane"
+
+
+class Shape(StrEnum):
+    """How cones stand together."""
+
+    TAPER = "taper"
+    LINE = "line"
+    RING = "ring"
+    ROW = "row across the lane"
+
+
+class Bearing(StrEnum):
+    """A direction from a neighbour, as seen in the ego's direction of travel."""
+
+    AHEAD = "in front of"
+    BEHIND = "behind"
+    LEFT = "left of"
+    RIGHT = "right of"
+
+
+class Post(StrEnum):
+    """Where a worker stands by the cones."""
+
+    BEHIND = "behind the cones"
+    BESIDE = "beside the cones"
+    AT_LAST = "beside the last cones"
+
+
+class Setting(StrEnum):
+    """A named place: what the surroundings must be."""
+
+    BEFORE_INTERSECTION = "before the intersection"
+    IN_INTERSECTION = "in the intersection"
+    AT_INTERSECTION = "at the intersection"
+    AFTER_INTERSECTION = "past the intersection"
+    IN_BEND = "in the bend"
+    ON_CROSSWALK = "on the crosswalk"
+    OFF_CROSSWALK = "away from the crosswalk"
+    BY_PARKED = "beside parked vehicles"
+    BY_PARKED_LEFT = "between parked vehicles on the left"
+    BY_PARKED_RIGHT = "between parked vehicles on the right"
+
+
+class Side(StrEnum):
+    """A side of the ego's direction of travel."""
+
+    LEFT = "left"
+    RIGHT = "right"
+
+    @property
+    def other(self) -> Side:
+        """The opposite side."""
+        return Side.RIGHT if self is Side.LEFT else Side.LEFT
+
+
+class Relation(StrEnum):
+    """On which end of its anchor a distance is measured."""
+
+    AHEAD = "ahead"
+    BEHIND = "behind"
+
+
+class LaneChoice(StrEnum):
+    """A lane by its place beside the ego's."""
+
+    OWN = "own"
+    LEFT = "left"
+    RIGHT = "right"
+    ONCOMING = "oncoming"
+
+
+class Sight(StrEnum):
+    """What a road user of the scene is called."""
+
+    VEHICLE = "vehicle"
+    PARKED = "parked vehicle"
+    MOVING = "moving vehicle"
+    BUS = "bus"
+    BICYCLE = "bicycle"
+    PEDESTRIAN = "pedestrian"
+
+
+class MapPlace(StrEnum):
+    """A place of the map on the ego's route; a merge is a junction too."""
+
+    JUNCTION_START = "start of the junction"
+    JUNCTION_END = "end of the junction"
+    CROSSWALK = "crosswalk"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Pick:
+    """A road user of the scene, by what a sentence says of it.
+
+    Attributes:
+        side: On which side of the ego's lane.
+        lane: In which lane.
+        relation: Whether it is counted ahead of the ego or behind it, the nearest first.
+        ordinal: Which of those that fit; 1 is the nearest.
+        every: All that fit.
+    """
+
+    kind: Sight
+    side: Side | None = None
+    lane: LaneChoice | None = None
+    relation: Relation = Relation.AHEAD
+    ordinal: Count = 1
+    every: Yes = False
+
+    @model_validator(mode="after")
+    def _is_one_or_all(self) -> Self:
+        if self.every and self.ordinal != 1:
+            raise ValueError("every one and one of a number contradict each other")
+        return self
+
 
 MOST_REQUESTS = 20
 

@@ -9,31 +9,70 @@ from collections.abc import Iterator
 
 from augment.scene.entities import TurnType
 from augment.scene.intent import (
+    Bearing,
+    Body,
     ConesRequest,
     CrashedCar,
     CrashRequest,
+    Facing,
     Intent,
+    LaneChoice,
     Lateral,
+    LateralTarget,
     Length,
+    MapPlace,
     Move,
+    Nearness,
+    Pick,
+    Post,
     Relation,
     Request,
+    Setting,
+    Shape,
     Side,
+    Sight,
     Spot,
     VehicleRequest,
     WalkRequest,
 )
-from augment.scene.intent_words import (
-    Bearing,
-    Body,
-    Facing,
-    LateralTarget,
-    Nearness,
-    Post,
-    Setting,
-    Shape,
-)
-from augment.scene.landmark_statements import LANES, MARKS, state_pick
+
+MARKS = {
+    MapPlace.JUNCTION_START: "the start of the junction",
+    MapPlace.JUNCTION_END: "the end of the junction",
+    MapPlace.CROSSWALK: "the crosswalk",
+}
+
+
+def state_pick(pick: Pick) -> str:
+    """Who is meant: "parked vehicle 2 ahead of the ego, on its left"."""
+    kind, where = _KINDS[pick.kind], _RELATIONS[pick.relation]
+    if pick.every:
+        words = f"every {kind} {where} the ego"
+    else:
+        words = f"{kind} {pick.ordinal} {where} the ego"  # fmt: skip
+    if pick.side is not None:
+        words = f"{words}, {_SIDES[pick.side]}"
+    if pick.lane is not None:
+        words = f"{words}, {LANES[pick.lane]}"
+    return words
+
+
+LANES = {
+    LaneChoice.OWN: "in the ego's lane",
+    LaneChoice.LEFT: "in the lane on the left",
+    LaneChoice.RIGHT: "in the lane on the right",
+    LaneChoice.ONCOMING: "in the oncoming lane",
+}
+_KINDS = {
+    Sight.VEHICLE: "vehicle",
+    Sight.PARKED: "parked vehicle",
+    Sight.MOVING: "moving vehicle",
+    Sight.BUS: "bus",
+    Sight.BICYCLE: "bicycle",
+    Sight.PEDESTRIAN: "pedestrian",
+}
+_RELATIONS = {Relation.AHEAD: "ahead of", Relation.BEHIND: "behind"}
+_SIDES = {Side.LEFT: "on its left", Side.RIGHT: "on its right"}
 
 
 def list_statements(intent: Intent) -> tuple[str, ...]:
@@ -171,7 +210,7 @@ def _cone_facts(request: ConesRequest) -> Iterator[str]:
     if request.reach_m is not None:
         yield f"over {request.reach_m:g} m along the lane"
     if request.start is not None:
-        yield f"begins at the {_SIDES[request.start]} lane boundary"
+        yield f"begins at the {_SIDES_intent_statements[request.start]} lane boundary"
     if request.ends_in_middle:
         yield "ends in the middle of the lane"
     if request.both_sides:
@@ -181,7 +220,7 @@ def _cone_facts(request: ConesRequest) -> Iterator[str]:
     if request.post is not None:
         yield f"the worker stands {_POSTS[request.post]}"
     if request.post_side is not None:
-        yield f"the worker is on the {_SIDES[request.post_side]} of them"
+        yield f"the worker is on the {_SIDES_intent_statements[request.post_side]} of them"
 
 
 def _crashed_facts(number: int, car: CrashedCar) -> Iterator[str]:
@@ -202,7 +241,7 @@ def _facing_facts(facing: Facing | None, turn_deg: float) -> Iterator[str]:
 
 
 def _turn(turn_deg: float) -> str:
-    side = _SIDES[Side.LEFT if turn_deg > 0.0 else Side.RIGHT]
+    side = _SIDES_intent_statements[Side.LEFT if turn_deg > 0.0 else Side.RIGHT]
     return f"turned {_number(turn_deg)} degrees to the {side}"
 
 
@@ -244,7 +283,7 @@ _ROUTES = {
     TurnType.RIGHT: "distances run along the way that turns right",
     TurnType.U_TURN: "distances run along the way that turns back",
 }
-_SIDES = {Side.LEFT: "left", Side.RIGHT: "right"}
+_SIDES_intent_statements = {Side.LEFT: "left", Side.RIGHT: "right"}
 _TARGETS = {
     LateralTarget.LANE_CENTRE: "lane centre",
     LateralTarget.LEFT_BOUNDARY: "left lane boundary",

@@ -14,7 +14,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from augment.geometry.angles import wrap
+from augment.geometry.frames import wrap
 from augment.scene.entities import AgentType, Scene, TrafficAgent
 from augment.scene.lane_graph import LaneGraph
 from augment.scene.recording import Recording, agent_of

@@ -25,10 +25,13 @@ from augment.models import (
     Simulation,
     UploadMoment,
 )
-from augment.scene.codec import modification_from_document, scene_from_document
-from augment.scene.intent_codec import intent_from_document
-from augment.scene.notes import notes_from_document
-from augment.scene.recording_codec import recording_from_document
+from augment.scene.codec import (
+    intent_from_document,
+    modification_from_document,
+    recording_from_document,
+    scene_from_document,
+)
+from augment.scene.recording import notes_from_document
 from augment.services.endpoints.known_endpoints import EndpointFacts, check_facts
 from augment.services.running.jobs import check_samples
 from augment.services.scenarios.scenes import (
@@ -41,7 +44,7 @@ from augment.services.scenarios.scenes import (
 from augment.services.texts import check_picture_name, check_prose, check_stored_name, one_line
 from augment.simulation.planners import OFFSETS_M
 from augment.variants.options import options_from_document
-from augment.variants.transcript import ModelRole
+from augment.variants.respondents import ModelRole
 
 LONGEST_TRACE = 1 << 26
 """Of a drive to look at, unpacked: some hundred times what 15 s take."""

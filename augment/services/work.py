@@ -24,7 +24,7 @@ from django.db import Error, connection, transaction
 from django.db.models import Q, QuerySet
 
 from augment.errors import AugmentError, BudgetSpent, LeaseLost, WorkerStopping
-from augment.llm.cutting import shorten
+from augment.llm.messages import shorten
 from augment.models import FAILED, Work
 from augment.services.clock import DATABASE_TIME, Moment, repeating
 from augment.services.texts import LONGEST_REASON, make_storable

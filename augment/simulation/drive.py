@@ -1,4 +1,4 @@
-"""The drive itself: plan, track, let traffic answer, 150 times."""
+"""The drive itself: plan, track, let traffic answer, 150 times; and who it is measured by."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ from enum import StrEnum
 import numpy as np
 
 from augment.errors import CannotDrive
-from augment.scene.modification import Modification
+from augment.scene.entities import Modification
 from augment.scene.recording import Recording
-from augment.simulation.idm_planner import IdmPlanner
+from augment.simulation.planners import IdmPlanner
 from augment.simulation.planning import Plan, Planner, Situation
 from augment.simulation.road import Road
-from augment.simulation.setting import DriveSetting
-from augment.simulation.states import STEP_S, EgoBody, FloatArray, Objects, X, Y, start_state
+from augment.simulation.states import STEP_S, EgoBody, FloatArray, Objects, start_state
 from augment.simulation.tracker import drive_steps
-from augment.simulation.traffic import Traffic
+from augment.simulation.traffic import DriveSetting, Traffic
 
 DURATION_STEPS = 150
+_PACE_S = 1.0
 
 
 @dataclass(slots=True, kw_only=True, eq=False)
@@ -28,6 +28,7 @@ class Drive:
 
     Attributes:
         states: (T, 6) of the ego's rear axle.
+        boxes: (T, 5) of the ego.
         objects: T rows of who was there.
         plans: T - 1 plans, one a step.
         at_map_end: Whether the drive ended early because the road did.
@@ -41,6 +42,10 @@ class Drive:
     plans: list[Plan] = field(default_factory=list)
     at_map_end: bool = False
     recorded_s: float | None = None
+    boxes: FloatArray = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.boxes = self.body.boxes(self.states)
 
     @property
     def duration_s(self) -> float:
@@ -51,11 +56,6 @@ class Drive:
     def outlasts_recording(self) -> bool:
         """Whether part of it was driven after the end of the recording."""
         return self.recorded_s is not None and self.duration_s > self.recorded_s + STEP_S / 2.0
-
-    @property
-    def boxes(self) -> FloatArray:
-        """The ego's boxes (T, 5)."""
-        return self.body.boxes(self.states)
 
 
 def run(
@@ -80,41 +80,31 @@ def run(
     """
     road = road or Road(setting.scene, setting.recording)
     body = EgoBody.of(setting.scene.ego)
-    state = start_state(setting.scene.ego, body)
-    traffic = Traffic(setting, road, body, state)
+    states = [start_state(setting.scene.ego, body)]
+    traffic = Traffic(setting, road, body, states[0])
     planner.start(road, body)
-    drive = Drive(
-        road=road,
-        body=body,
-        states=np.empty(0),
-        objects=[traffic.objects()],
-        recorded_s=None if setting.recording is None else float(setting.recording.times_s[-1]),
-    )
-    states = [state]
+    objects, plans, at_end = [traffic.objects()], list[Plan](), False
     for step in range(steps):
-        if _at_end(road, body, state):
-            drive.at_map_end = True
+        if road.end_m < road.centreline.length_m:
+            at_end = road.centreline.station_of(states[-1]) + body.front_m >= road.end_m
+        if at_end:
             break
-        objects = drive.objects[-1]
-        plan = planner.plan(Situation(step=step, ego=state, objects=objects))
-        following = drive_steps(_poses(plan)[None], state, body, 1)[0, 1]
-        traffic.step(state, objects)
-        state = following
-        states.append(state)
-        drive.objects.append(traffic.objects())
-        drive.plans.append(plan)
+        plans.append(planner.plan(Situation(step=step, ego=states[-1], objects=objects[-1])))
+        following = drive_steps(_poses(plans[-1])[None], states[-1], body, 1)[0, 1]
+        traffic.step(states[-1], objects[-1])
+        states.append(following)
+        objects.append(traffic.objects())
         if after_step is not None:
             after_step(step + 1)
-    drive.states = np.array(states)
-    return drive
-
-
-def _at_end(road: Road, body: EgoBody, state: FloatArray) -> bool:
-    """Whether the front bumper has come to the end of the map."""
-    if road.end_m >= road.centreline.length_m:
-        return False
-    rear_axle_m = float(road.centreline.beside(state[None, [X, Y]])[0][0])
-    return rear_axle_m + body.front_m >= road.end_m
+    return Drive(
+        road=road,
+        body=body,
+        states=np.array(states),
+        objects=objects,
+        plans=plans,
+        at_map_end=at_end,
+        recorded_s=None if setting.recording is None else float(setting.recording.times_s[-1]),
+    )
 
 
 def _poses(plan: Plan) -> FloatArray:
@@ -125,9 +115,6 @@ def _poses(plan: Plan) -> FloatArray:
             "at least 2, and finite."
         )
     return poses
-
-
-_PACE_S = 1.0
 
 
 class ExpertKind(StrEnum):
@@ -147,12 +134,12 @@ class Expert:
 
     @property
     def progress_m(self) -> float:
-        """How far."""
+        """How far it came."""
         return self.end_m - self.start_m
 
 
 def expert_of(setting: DriveSetting, road: Road, *, steps: int = DURATION_STEPS) -> Expert:
-    """The recorded ego, or an IDM drive at the speed limit without the change.
+    """Return the recorded ego, or an IDM drive at the speed limit without the change.
 
     Either goes as long as the drive lasts and as far as the map goes. Where the recording ends
     before, the recorded one holds the pace of its last second.
@@ -160,14 +147,15 @@ def expert_of(setting: DriveSetting, road: Road, *, steps: int = DURATION_STEPS)
     # A recorded ego is no expert on the way to a goal, which may be another.
     has_goal = setting.scene.options.goal is not None
     if setting.recording is not None and setting.recording.shows_ego and not has_goal:
-        return _recorded(setting.recording, road, EgoBody.of(setting.scene.ego), steps * STEP_S)
+        end_m = road.end_m - setting.scene.ego.length_m / 2.0
+        return _recorded(setting.recording, road, end_m, steps * STEP_S)
     plain = replace(setting, modification=Modification())
     drive = run(plain, IdmPlanner(target_mps=None), road=road, steps=steps)
     ends, _ = road.centreline.beside(drive.boxes[[0, -1], :2])
     return Expert(kind=ExpertKind.IDM, start_m=float(ends[0]), end_m=float(ends[1]))
 
 
-def _recorded(recording: Recording, road: Road, body: EgoBody, duration_s: float) -> Expert:
+def _recorded(recording: Recording, road: Road, furthest_m: float, duration_s: float) -> Expert:
     seen = recording.ego_is_seen & (recording.times_s <= duration_s + STEP_S / 2.0)
     times_s = recording.times_s[seen]
     stations_m, _ = road.centreline.beside(recording.ego[seen, :2])
@@ -177,12 +165,5 @@ def _recorded(recording: Recording, road: Road, body: EgoBody, duration_s: float
         before_m = float(np.interp(before_s, times_s, stations_m))
         end_m += max(0.0, end_m - before_m) / (float(times_s[-1]) - before_s) * missing_s
     return Expert(
-        kind=ExpertKind.RECORDED,
-        start_m=float(stations_m[0]),
-        end_m=min(end_m, furthest_m(road, body)),
+        kind=ExpertKind.RECORDED, start_m=float(stations_m[0]), end_m=min(end_m, furthest_m)
     )
-
-
-def furthest_m(road: Road, body: EgoBody) -> float:
-    """Where the ego's centre is when its front is at the end of the map."""
-    return road.end_m - body.length_m / 2.0

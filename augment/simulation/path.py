@@ -1,18 +1,19 @@
-"""A line to drive along: dense, read by arc length, and points read beside it, many at a time."""
+"""A line to drive along, and ground to drive on; thousands of points are asked about at once."""
 
 from __future__ import annotations
 
+from functools import cached_property
+from typing import TYPE_CHECKING
+
 import numpy as np
 
-from augment.simulation.states import FloatArray, IntArray
+from augment.simulation.states import BoolArray, FloatArray
+
+if TYPE_CHECKING:
+    from scipy.spatial import KDTree
+    from shapely.geometry.base import BaseGeometry
 
 SPACING_M = 0.5
-_CELL_M = 2.0
-_REACH_M = 30.0
-_WINDOW = 10
-"""Samples either way that may be nearest to a point of a cell, given the cell middle's nearest."""
-
-_COARSE = 8
 
 
 class Path:
@@ -21,32 +22,26 @@ class Path:
     Attributes:
         points_m: (P, 2).
         stations_m: (P,) arc length at each point.
-        headings_rad: (P,) unwrapped, of the segment that follows (the last repeats).
+        length_m: The arc length.
     """
 
     def __init__(self, points_m: FloatArray) -> None:
         steps = np.diff(points_m, axis=0)
-        lengths = np.hypot(steps[:, 0], steps[:, 1])
+        self._lengths = np.hypot(steps[:, 0], steps[:, 1])
         self.points_m = points_m
-        self.stations_m = np.concatenate([[0.0], np.cumsum(lengths)])
-        heading = np.unwrap(np.arctan2(steps[:, 1], steps[:, 0]))
-        self.headings_rad = np.concatenate([heading, heading[-1:]])
-        self._directions = steps / lengths[:, None]
+        self.stations_m = np.concatenate([[0.0], np.cumsum(self._lengths)])
+        self.length_m = float(self.stations_m[-1])
+        self._headings = np.unwrap(np.arctan2(steps[:, 1], steps[:, 0]))
+        self._directions = steps / self._lengths[:, None]
         # The heading is read between the middles of segments, so that it turns without jumps.
-        self._middles = self.stations_m[:-1] + lengths / 2.0
-        self._grid: tuple[FloatArray, IntArray] | None = None
-
-    @property
-    def length_m(self) -> float:
-        """The arc length."""
-        return float(self.stations_m[-1])
+        self._middles = self.stations_m[:-1] + self._lengths / 2.0
 
     def poses(self, stations_m: FloatArray) -> FloatArray:
-        """Poses (..., 3) at arc lengths (...,); beyond the ends straight on."""
+        """Return poses (..., 3) at arc lengths (...,); beyond the ends straight on."""
         poses = np.empty((*stations_m.shape, 3))
         poses[..., 0] = np.interp(stations_m, self.stations_m, self.points_m[:, 0])
         poses[..., 1] = np.interp(stations_m, self.stations_m, self.points_m[:, 1])
-        poses[..., 2] = np.interp(stations_m, self._middles, self.headings_rad[:-1])
+        poses[..., 2] = np.interp(stations_m, self._middles, self._headings)
         beyond = stations_m - np.clip(stations_m, 0.0, self.length_m)
         if beyond.any():
             poses[..., 0] += beyond * np.cos(poses[..., 2])
@@ -54,76 +49,46 @@ class Path:
         return poses
 
     def beside(self, points_m: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Where points (N, 2) lie: arc length (N,) and distance to the left (N,).
+        """Return arc length (N,) and distance to the left (N,) of points (N, 2).
 
-        Beyond the ends the line goes on straight. Exact near the line; of points that are more
-        than `_REACH_M` off it is known that they are far.
+        Beyond the ends the line goes on straight.
         """
-        nearest = self._nearest(points_m)
         last = len(self._directions) - 1
+        nearest = np.asarray(self._tree.query(points_m)[1], dtype=np.int64)
         candidates = np.stack([np.maximum(nearest - 1, 0), np.minimum(nearest, last)])
         offset = points_m - self.points_m[candidates]
         direction = self._directions[candidates]
-        along = (offset * direction).sum(axis=-1)
-        lengths = np.diff(self.stations_m)[candidates]
         low = np.where(candidates == 0, -np.inf, 0.0)
-        high = np.where(candidates == last, np.inf, lengths)
-        along = np.clip(along, low, high)
-        gap = offset - along[..., None] * direction
-        distance = (gap**2).sum(axis=-1)
-        pick = (distance[1] < distance[0]).astype(np.int64)
-        row = np.arange(len(points_m))
+        high = np.where(candidates == last, np.inf, self._lengths[candidates])
+        along = np.clip((offset * direction).sum(axis=-1), low, high)
+        distance = ((offset - along[..., None] * direction) ** 2).sum(axis=-1)
+        pick = (distance[1] < distance[0]).astype(np.int64), np.arange(len(points_m))
         left = direction[..., 0] * offset[..., 1] - direction[..., 1] * offset[..., 0]
-        side = np.where(left[pick, row] >= 0.0, 1.0, -1.0)
-        s_m = self.stations_m[candidates[pick, row]] + along[pick, row]
-        return s_m, side * np.sqrt(distance[pick, row])
+        side = np.where(left[pick] >= 0.0, 1.0, -1.0)
+        return self.stations_m[candidates[pick]] + along[pick], side * np.sqrt(distance[pick])
+
+    def station_of(self, place: FloatArray) -> float:
+        """Return the arc length of one place (2 or more,)."""
+        return float(self.beside(place[None, :2])[0][0])
 
     def offset(self, left_m: float) -> Path:
-        """The parallel path so far to the left; where it would turn back, points are dropped."""
+        """Return the parallel so far to the left; where it would turn back, points are dropped."""
         if left_m == 0.0:
             return self
-        poses = self.poses(self.stations_m)
-        normal = np.stack([-np.sin(poses[:, 2]), np.cos(poses[:, 2])], axis=1)
-        moved = self.points_m + left_m * normal
-        steps = np.diff(moved, axis=0)
-        forward = (steps * self._directions).sum(axis=1)
-        keep = np.concatenate([[True], forward > 0.05 * SPACING_M])
-        return Path(moved[keep])
+        heading = self.poses(self.stations_m)[:, 2]
+        moved = self.points_m + left_m * np.stack([-np.sin(heading), np.cos(heading)], axis=1)
+        forward = (np.diff(moved, axis=0) * self._directions).sum(axis=1)
+        return Path(moved[np.concatenate([[True], forward > 0.05 * SPACING_M])])
 
-    def _nearest(self, points_m: FloatArray) -> IntArray:
-        """The index (N,) of the nearest sample."""
-        origin, cells = self._cells()
-        at = ((points_m - origin) * (1.0 / _CELL_M)).astype(np.int64)
-        np.clip(at, 0, np.array(cells.shape) - 1, out=at)
-        return self._around(points_m, cells[at[:, 0], at[:, 1]], _WINDOW)
+    @cached_property
+    def _tree(self) -> KDTree:
+        from scipy.spatial import KDTree
 
-    def _cells(self) -> tuple[FloatArray, IntArray]:
-        """The nearest sample of the middle of each cell around the path; made once."""
-        if self._grid is None:
-            low = self.points_m.min(axis=0) - _REACH_M
-            shape = np.ceil((self.points_m.max(axis=0) + _REACH_M - low) / _CELL_M).astype(int)
-            columns = low[1] + (np.arange(shape[1]) + 0.5) * _CELL_M
-            rows = low[0] + (np.arange(shape[0]) + 0.5) * _CELL_M
-            # Among few samples first, then among those around the nearest of them.
-            some = self.points_m[::_COARSE]
-            across = (columns[:, None] - some[:, 1]) ** 2
-            guess = np.stack([(across + (x_m - some[:, 0]) ** 2).argmin(axis=1) for x_m in rows])
-            middles = np.stack(np.meshgrid(rows, columns, indexing="ij"), axis=-1)
-            fine = self._around(middles.reshape(-1, 2), guess.ravel() * _COARSE, _COARSE)
-            self._grid = (low, fine.reshape(guess.shape))
-        return self._grid
-
-    def _around(self, points_m: FloatArray, guess: IntArray, window: int) -> IntArray:
-        """The nearest (N,) of the samples around a guess (N,)."""
-        near = guess[:, None] + np.arange(-window, window + 1)
-        np.clip(near, 0, len(self.points_m) - 1, out=near)
-        gap = self.points_m[near] - points_m[:, None, :]
-        best = (gap[..., 0] ** 2 + gap[..., 1] ** 2).argmin(axis=1)
-        return np.asarray(near[np.arange(len(near)), best], dtype=np.int64)
+        return KDTree(self.points_m)
 
 
 def dense(points_m: FloatArray, spacing_m: float = SPACING_M) -> FloatArray:
-    """A line (P, 2) cut into equal pieces of about the spacing, (K, 2); repeats are dropped."""
+    """Return a line (P, 2) cut into equal pieces of about the spacing; repeats are dropped."""
     steps = np.hypot(*np.diff(points_m, axis=0).T)
     points_m = points_m[np.concatenate([[True], steps > 1e-6])]
     stations = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points_m, axis=0).T))])
@@ -132,3 +97,27 @@ def dense(points_m: FloatArray, spacing_m: float = SPACING_M) -> FloatArray:
     return np.stack(
         [np.interp(at, stations, points_m[:, 0]), np.interp(at, stations, points_m[:, 1])], axis=1
     )
+
+
+class Region:
+    """A polygon or several, as ground; the edge itself counts as outside."""
+
+    def __init__(self, ground: BaseGeometry) -> None:
+        import shapely
+
+        shapely.prepare(ground)
+        self.ground = ground
+
+    def contains(self, points_m: FloatArray) -> BoolArray:
+        """Return which points (..., 2) lie inside, (...,)."""
+        import shapely
+
+        return np.asarray(shapely.contains_xy(self.ground, points_m[..., 0], points_m[..., 1]))
+
+    def distance_m(self, points_m: FloatArray) -> FloatArray:
+        """Return how far points (..., 2) are from the ground; infinite where there is none."""
+        import shapely
+
+        if shapely.is_empty(self.ground):
+            return np.full(points_m.shape[:-1], np.inf)
+        return np.asarray(shapely.distance(shapely.points(points_m), self.ground))

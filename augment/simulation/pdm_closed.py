@@ -1,38 +1,51 @@
-"""PDM-Closed: the best of several rolled-out proposals, or an emergency brake."""
+"""PDM-Closed: the best of several rolled-out proposals, or an emergency brake.
+
+Proposals are IDM policies of several speeds on parallel paths. P paths, V policies; proposal
+number p * V + v. Source: the facts on PDM-Closed in docs/simulation.md.
+"""
 
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
-from augment.simulation.contact import meet
-from augment.simulation.leaders import Corridor, ParallelPaths, foresee, nearest
-from augment.simulation.planning import Plan, Proposals, Situation
-from augment.simulation.proposal_scores import ProposalScores, score_proposals
-from augment.simulation.proposals import (
+from augment.simulation.planning import (
     FALLBACK_LIMIT_MPS,
-    HORIZON_STEPS,
-    PAPER_OFFSETS_M,
-    SPEED_SHARES,
-    WHOLE_STEPS,
-    Rollout,
-    roll_out,
+    STEPS_A_SLICE,
+    Corridor,
+    Idm,
+    ParallelPaths,
+    Plan,
+    Proposals,
+    Situation,
+    foresee,
+    nearest,
 )
+from augment.simulation.proposal_scores import score_proposals
 from augment.simulation.road import Road
 from augment.simulation.states import (
     ACCELERATION,
-    HEADING,
     SPEED,
     STEP_S,
     EgoBody,
     FloatArray,
     Objects,
-    X,
-    Y,
+    meet,
+    moved_ahead,
 )
 from augment.simulation.tracker import track
 
+PROPOSAL_IDM = Idm(1.5, 3.0, 10.0)
+"""PDM-Closed's policies."""
+ORIGINAL_OFFSETS_M = (0.0, -1.0, 1.0)
+"""The centreline first: of equal scores, all zero among them, the lowest number wins."""
+PAPER_OFFSETS_M = (0.0, -1.0, 1.0, -2.0, 2.0, -3.0, 3.0, -4.0, 4.0)
+"""The paper says up to 4 m; steps of 1 m and their order are our reading."""
+SPEED_SHARES = np.array([0.2, 0.4, 0.6, 0.8, 1.0])
+HORIZON_STEPS = 40
+WHOLE_STEPS = 80
 FAULT_WITHIN_S = 2.0
 AT_MOST_MPS = 5.0
 _LOW_MPS = 0.2
@@ -40,30 +53,22 @@ _HARDEST, _SOFTEST = -4.05, 2.40
 
 
 def must_brake(fault_s: float, speed_mps: float) -> bool:
-    """Whether even the best proposal hits somebody soon, at a speed that braking can end."""
+    """Return whether even the best proposal soon hits somebody, at a speed to brake from."""
     return fault_s <= FAULT_WITHIN_S and speed_mps <= AT_MOST_MPS
 
 
 def brake(ego: FloatArray, body: EgoBody) -> FloatArray:
-    """Poses (T, 3) straight ahead from the ego's centre, at one commanded speed.
+    """Return poses (T, 3) straight ahead from the ego's centre, at one commanded speed.
 
     The commanded speed may be negative; the tracker turns that into hard braking.
     """
     speed = float(ego[SPEED])
+    wished = -10.0 * speed if speed > _LOW_MPS else -4.0 * speed - float(ego[ACCELERATION])
+    commanded = speed + min(max(wished, _HARDEST), _SOFTEST)
     if speed > _LOW_MPS:
-        pull = min(max(-10.0 * speed, _HARDEST), _SOFTEST)
-        commanded = 1.1 * (speed + pull)
-    else:
-        pull = min(max(-4.0 * speed - float(ego[ACCELERATION]), _HARDEST), _SOFTEST)
-        commanded = speed + pull
-    way = commanded * STEP_S * np.arange(WHOLE_STEPS + 1)
-    heading = float(ego[HEADING])
-    x_m, y_m = body.centre(ego)
-    poses = np.empty((len(way), 3))
-    poses[:, 0] = x_m + way * np.cos(heading)
-    poses[:, 1] = y_m + way * np.sin(heading)
-    poses[:, 2] = heading
-    return poses
+        commanded *= 1.1
+    way_m = commanded * STEP_S * np.arange(WHOLE_STEPS + 1)
+    return moved_ahead(np.tile(body.boxes(ego), (len(way_m), 1)), way_m)
 
 
 class PdmClosed:
@@ -75,46 +80,41 @@ class PdmClosed:
 
     def __init__(self, offsets_m: tuple[float, ...] = PAPER_OFFSETS_M) -> None:
         self._offsets = np.array(offsets_m, dtype=np.float64)
-        self._shares = np.array(SPEED_SHARES, dtype=np.float64)
-        self._touched: set[str] = set()
 
     def start(self, road: Road, body: EgoBody) -> None:
         """Lay the paths beside the centreline."""
         self._road, self._body = road, body
         self._paths = ParallelPaths(road.centreline, self._offsets)
-        self._ends = np.array([path.length_m for path in self._paths.paths])
-        self._touched = set()
+        self._touched: set[str] = set()
 
     def plan(self, situation: Situation) -> Plan:
-        """One step: roll out, simulate, judge, and continue the best, or brake."""
-        ego, body = situation.ego, self._body
+        """Roll out, simulate and judge proposals, and continue the best, or brake."""
+        ego, body, paths = situation.ego, self._body, self._paths
         forecast = foresee(self._seen(situation), WHOLE_STEPS * STEP_S)
-        ego_m = float(self._road.centreline.beside(ego[None, [X, Y]])[0][0])
+        ego_m = self._road.centreline.station_of(ego)
         limit = self._road.limit_at(ego_m)
-        targets = self._shares * (FALLBACK_LIMIT_MPS if math.isnan(limit) else limit)
-        reach_m = float(targets.max()) * WHOLE_STEPS * STEP_S
-        corridor = self._with_red(
-            self._paths.corridor(forecast, ego_m, reach_m, body), ego_m + body.front_m
-        )
-        starts = self._paths.stations(np.array([ego_m]))[:, 0]
-        speed = float(ego[SPEED])
-        rolled = roll_out(starts, speed, targets, corridor, self._ends, body)
-        poses = self._poses(rolled)
-        states = track(poses, ego, body)
+        targets = SPEED_SHARES * (FALLBACK_LIMIT_MPS if math.isnan(limit) else limit)
+        reaches_m = targets * WHOLE_STEPS * STEP_S
+        furthest_m = reaches_m.max(keepdims=True)
+        corridor = paths.corridor(forecast, ego_m, float(furthest_m[0]), body)
+        corridor = self._with_red(corridor, ego_m + body.front_m)
+        speeds = np.full((len(paths.paths), len(targets)), max(float(ego[SPEED]), 0.0))
+        starts = np.broadcast_to(paths.stations(np.array([ego_m])), speeds.shape)
+        first, rest = range(HORIZON_STEPS), range(HORIZON_STEPS, WHOLE_STEPS)
+        begun, speeds = self._roll_out(starts, speeds, targets, furthest_m, corridor, first)
+        states = track(paths.poses(begun).reshape(-1, HORIZON_STEPS + 1, 3), ego, body)
         judged = score_proposals(states, forecast, self._road, body)
         # Scores that differ by rounding alone are equal, and the lowest number wins.
         best = int(judged.scores.round(9).argmax())
         shown = Proposals(states=states, scores=judged.scores, chosen=best)
-        if must_brake(float(judged.fault_s[best]), speed):
+        if must_brake(float(judged.fault_s[best]), float(ego[SPEED])):
             return Plan(poses=brake(ego, body), proposals=shown, braking=True)
+        # All go on from 4 s to 8 s; the winner's way is what is driven.
+        ends = begun[..., -1]
+        goes_on, _ = self._roll_out(ends, speeds, targets, reaches_m, corridor, rest)
         path, policy = divmod(best, len(targets))
-        stations = self._continued(path, policy, rolled, targets, corridor)
-        return Plan(poses=self._paths.paths[path].poses(stations), proposals=shown)
-
-    def judge(self, states: FloatArray, objects: Objects) -> ProposalScores:
-        """The judgement of given states (B, T, 6) among objects; for tests and comparisons."""
-        forecast = foresee(objects, WHOLE_STEPS * STEP_S)
-        return score_proposals(states, forecast, self._road, self._body)
+        stations = np.concatenate([begun[path, policy], goes_on[path, policy, 1:]])
+        return Plan(poses=paths.paths[path].poses(stations), proposals=shown)
 
     def _seen(self, situation: Situation) -> Objects:
         """The objects that count: near, and not touching the ego since some step."""
@@ -128,39 +128,67 @@ class PdmClosed:
         """The corridor with something standing at each red light ahead."""
         red = self._road.red_stations_m
         red = red[red >= front_m]
-        if not len(red):
-            return corridor
-        slices = len(corridor.near_m)
-        stops = np.broadcast_to(self._paths.stations(red), (slices, len(self._ends), len(red)))
-        return Corridor(
+        slices, paths = corridor.near_m.shape[:2]
+        stops = np.broadcast_to(self._paths.stations(red), (slices, paths, len(red)))
+        return replace(
+            corridor,
             near_m=np.concatenate([corridor.near_m, stops], axis=-1),
             middle_m=np.concatenate([corridor.middle_m, stops + 1.0], axis=-1),
             speeds_mps=np.hstack([corridor.speeds_mps, np.zeros((slices, len(red)))]),
         )
 
-    def _poses(self, rolled: Rollout) -> FloatArray:
-        """The proposals' poses (P * V, T, 3)."""
-        poses = self._paths.poses(rolled.stations_m)
-        return poses.reshape(-1, HORIZON_STEPS + 1, 3)
+    def _roll_out(
+        self,
+        station: FloatArray,
+        speed: FloatArray,
+        targets_mps: FloatArray,
+        reaches_m: FloatArray,
+        corridor: Corridor,
+        steps: range,
+    ) -> tuple[FloatArray, FloatArray]:
+        """Every policy on every path, over some steps of the horizon.
 
-    def _continued(
-        self, path: int, policy: int, rolled: Rollout, targets: FloatArray, corridor: Corridor
-    ) -> FloatArray:
-        """The winner's own rollout, carried on from 4 s to 8 s: arc lengths (T,) on its path."""
-        own = Corridor(
-            near_m=corridor.near_m[:, path : path + 1],
-            middle_m=corridor.middle_m[:, path : path + 1],
-            speeds_mps=corridor.speeds_mps,
+        Args:
+            station: (P, V) where the rear axle is.
+            speed: (P, V) at the start.
+            targets_mps: (V,) wished speeds.
+            reaches_m: (V,) or (1,) how far ahead somebody counts.
+            corridor: Who is on the paths.
+            steps: Counted from now.
+
+        Returns:
+            Arc lengths (P, V, T) and the speeds (P, V) at the end.
+        """
+        stations = [station]
+        near, leader = np.zeros(station.shape), np.zeros(station.shape)
+        for step in steps:
+            if step % STEPS_A_SLICE == 0:
+                near, leader = self._leaders(station, corridor, step // STEPS_A_SLICE, reaches_m)
+            gap = near - station - self._body.front_m
+            pull = PROPOSAL_IDM.clipped(speed, targets_mps, gap, leader)
+            station = station + speed * STEP_S
+            speed = np.maximum(speed + pull * STEP_S, 0.0)
+            stations.append(station)
+        return np.stack(stations, axis=-1), speed
+
+    def _leaders(
+        self, station: FloatArray, corridor: Corridor, moment: int, reaches_m: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Where the leader's rear is (P, V), and its speed; of equal ones the first.
+
+        As released: ahead is whose centre lies beyond the rear axle, even beside the ego itself.
+        Something stands at the end of each path.
+        """
+        end = np.broadcast_to(
+            (self._paths.ends_m - self._body.length_m / 2.0)[:, None], station.shape
         )
-        begun = rolled.stations_m[path, policy]
-        rest = roll_out(
-            begun[-1:],
-            float(rolled.speeds_mps[path, policy]),
-            targets[policy : policy + 1],
-            own,
-            self._ends[path : path + 1],
-            self._body,
-            first=HORIZON_STEPS,
-            last=WHOLE_STEPS,
-        )
-        return np.concatenate([begun, rest.stations_m[0, 0, 1:]])
+        moment = min(moment, len(corridor.near_m) - 1)
+        near = corridor.near_m[moment][:, None, :]
+        if near.shape[-1] == 0:
+            return end, np.zeros(station.shape)
+        middle, front = corridor.middle_m[moment][:, None, :], station[..., None]
+        ahead = (middle > front) & (near - front < reaches_m[:, None])
+        rear = np.where(ahead, near, np.inf)
+        closest = rear.min(axis=-1)
+        speeds = corridor.speeds_mps[moment][rear.argmin(axis=-1)]
+        return np.minimum(closest, end), np.where(closest >= end, 0.0, speeds)

@@ -1,16 +1,33 @@
-"""What a planner is given and what it gives back; whoever fits `Planner` can be driven.
+"""What a planner is given and gives back, and what the built-in ones share.
 
-A planner of your own is a class without arguments in a module that can be imported, named by its
-dotted path (docs/simulation.md has an example).
+Whoever fits `Planner` can be driven. A planner of your own is a class without arguments in a
+module that can be imported, named by its dotted path (docs/simulation.md has an example).
+
+Shared are the intelligent driver model and who is ahead on each of several parallel paths. Nobody
+is expected to change speed or heading. Every object is laid beside the centreline once; beside a
+path that runs so far to the left of it, it lies as much further to the right. P paths, F slices
+of 0.2 s, A objects.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
+import numpy as np
+
+from augment.simulation.path import Path
 from augment.simulation.road import Road
-from augment.simulation.states import EgoBody, FloatArray, Objects
+from augment.simulation.states import EgoBody, FloatArray, Kind, Objects, corners
+
+FALLBACK_LIMIT_MPS = 15.0
+SLICE_S = 0.2
+STEPS_A_SLICE = 2
+RADIUS_M = 50.0
+MOST: dict[Kind, int] = {Kind.VEHICLE: 50, Kind.PEDESTRIAN: 25, Kind.BICYCLE: 10, Kind.STATIC: 50}
+"""How many of each kind PDM-Closed looks at, nearest first."""
+_BEHIND_M = 10.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -67,4 +84,147 @@ class Planner(Protocol):
         """Get to know the map and the car; forget every drive before."""
 
     def plan(self, situation: Situation) -> Plan:
-        """What to do from this moment on."""
+        """Return what to do from this moment on."""
+
+
+@dataclass(frozen=True, slots=True)
+class Idm:
+    """The intelligent driver model.
+
+    Attributes:
+        max_acceleration_mps2: On a free road from rest; also the upper clip.
+        max_deceleration_mps2: Comfortable braking; also the lower clip (as a negative).
+        exponent: How late a driver near the wished speed eases off.
+        min_gap_m: To a standing leader.
+        headway_s: The time that the gap grows by with the speed.
+    """
+
+    max_acceleration_mps2: float
+    max_deceleration_mps2: float
+    exponent: float
+    min_gap_m: float = 1.0
+    headway_s: float = 1.5
+
+    def acceleration(
+        self, speed: FloatArray, target: FloatArray, gap: FloatArray, leader_speed: FloatArray
+    ) -> FloatArray:
+        """Return the law itself, m/s2, not clipped; all arrays in m and m/s and of one shape.
+
+        `gap` is from bumper to bumper; `inf` is a free road.
+        """
+        root = 2.0 * math.sqrt(self.max_acceleration_mps2 * self.max_deceleration_mps2)
+        moving = self.headway_s * speed + speed * (speed - leader_speed) / root
+        wished = self.min_gap_m + np.maximum(moving, 0.0)
+        free = (speed / np.maximum(target, 1e-9)) ** self.exponent
+        return self.max_acceleration_mps2 * (1.0 - free - (wished / gap) ** 2)
+
+    def clipped(
+        self, speed: FloatArray, target: FloatArray, gap: FloatArray, leader_speed: FloatArray
+    ) -> FloatArray:
+        """Return the law with the gap held at the minimum gap, within the driver's limits."""
+        wished = self.acceleration(speed, target, np.maximum(gap, self.min_gap_m), leader_speed)
+        return wished.clip(-self.max_deceleration_mps2, self.max_acceleration_mps2)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Forecast:
+    """Objects and their boxes (F, A, 5) at 0, 0.2, 0.4 ... s from now."""
+
+    objects: Objects
+    boxes: FloatArray
+
+
+def foresee(objects: Objects, horizon_s: float) -> Forecast:
+    """Return where objects will be at constant velocity along their headings."""
+    times = np.arange(round(horizon_s / SLICE_S) + 1) * SLICE_S
+    return Forecast(objects=objects, boxes=objects.later(times))
+
+
+def nearest(objects: Objects, place_m: FloatArray, radius_m: float = RADIUS_M) -> Objects:
+    """Return those within the radius of a place (2,), of each kind the nearest `MOST`."""
+    away = np.hypot(*(objects.boxes[:, :2] - place_m).T)
+    kept = np.zeros(len(objects), dtype=np.bool_)
+    for kind, most in MOST.items():
+        rows = np.flatnonzero((objects.kinds == kind) & (away <= radius_m))
+        kept[rows[np.argsort(away[rows], kind="stable")[:most]]] = True
+    return objects.chosen(kept)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Corridor:
+    """Which road each object takes up on each path.
+
+    Attributes:
+        near_m: (F, P, A) where it begins on the path; inf where it does not meet the corridor.
+        middle_m: (F, P, A) where its centre is.
+        speeds_mps: (F, A) along the centreline.
+    """
+
+    near_m: FloatArray
+    middle_m: FloatArray
+    speeds_mps: FloatArray
+
+
+class ParallelPaths:
+    """The centreline and its parallels, one an offset (P,) to the left of it.
+
+    Attributes:
+        paths: One an offset.
+        ends_m: (P,) their lengths.
+    """
+
+    def __init__(self, centreline: Path, offsets_m: FloatArray) -> None:
+        self._centreline, self._offsets = centreline, offsets_m
+        self.paths = [centreline.offset(float(left)) for left in offsets_m]
+        self.ends_m = np.array([path.length_m for path in self.paths])
+        # Arc lengths on the centreline that belong to those of each path's points.
+        self._on_centre = [
+            np.maximum.accumulate(centreline.beside(path.points_m)[0])
+            if path is not centreline
+            else centreline.stations_m
+            for path in self.paths
+        ]
+
+    def stations(self, centre_m: FloatArray) -> FloatArray:
+        """Return arc lengths (P, ...) on the paths, of arc lengths (...) on the centreline."""
+        stations = np.empty((len(self.paths), *centre_m.shape))
+        for row, on_centre in enumerate(self._on_centre):
+            inside = np.clip(centre_m, on_centre[0], on_centre[-1])
+            on_path = np.interp(inside, on_centre, self.paths[row].stations_m)
+            stations[row] = on_path + (centre_m - inside)
+        return stations
+
+    def poses(self, stations_m: FloatArray) -> FloatArray:
+        """Return poses (P, ..., 3) of arc lengths (P, ...), each row on its own path."""
+        return np.stack(
+            [path.poses(row) for path, row in zip(self.paths, stations_m, strict=True)]
+        )
+
+    def corridor(
+        self, forecast: Forecast, ego_m: float, reach_m: float, body: EgoBody
+    ) -> Corridor:
+        """Return who meets half the ego's width either side of each path, up to the reach."""
+        boxes = forecast.boxes
+        middle = self._beside(boxes[..., :2])
+        size = np.hypot(boxes[0, :, 3], boxes[0, :, 4]) / 2.0
+        widest = float(np.abs(self._offsets).max()) + body.width_m / 2.0
+        near = np.abs(middle[..., 1]) < widest + size
+        near &= (middle[..., 0] > ego_m - _BEHIND_M) & (middle[..., 0] < ego_m + reach_m + size)
+        kept = np.flatnonzero(near.any(axis=0))
+        boxes, middle = boxes[:, kept], middle[:, kept]
+        edges = self._beside(corners(boxes))
+        low, high = edges[..., 1].min(axis=-1), edges[..., 1].max(axis=-1)
+        meets = low[:, None] <= self._offsets[:, None] + body.width_m / 2.0
+        meets &= high[:, None] >= self._offsets[:, None] - body.width_m / 2.0
+        begin = np.moveaxis(self.stations(edges[..., 0].min(axis=-1)), 0, 1)
+        heading = self._centreline.poses(middle[..., 0])[..., 2]
+        return Corridor(
+            near_m=np.where(meets, begin, np.inf),
+            middle_m=np.moveaxis(self.stations(middle[..., 0]), 0, 1),
+            speeds_mps=forecast.objects.speeds_mps[kept] * np.cos(boxes[..., 2] - heading),
+        )
+
+    def _beside(self, points_m: FloatArray) -> FloatArray:
+        """Arc length and distance to the left (..., 2) of points (..., 2)."""
+        beside = np.stack(self._centreline.beside(points_m.reshape(-1, 2)), axis=1)
+        return beside.reshape(points_m.shape)

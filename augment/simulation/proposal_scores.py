@@ -1,31 +1,29 @@
-"""PDM-Closed's judgement of its simulated proposals.
+"""PDM-Closed's judgement of its simulated proposals, and what passengers feel.
 
 B proposals, T moments every 0.1 s, A objects, F slices every 0.2 s. A moment takes the slice at or
 before it. Source: the facts on PDM-Closed in docs/simulation.md.
+
+The final score and this one smooth accelerations in different ways (`SCORE`, `PROPOSAL`); both
+hold every moment against the same limits. Savitzky-Golay filters are kept as matrices, so that
+smoothing is one product for all proposals.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
-from augment.simulation.comfort import PROPOSAL, comfort_signals, is_comfortable
-from augment.simulation.contact import (
-    AHEAD_RAD,
-    BEHIND_RAD,
-    at_fault,
-    bearings,
-    classify,
-    corners,
-    meet,
-    radii,
-)
-from augment.simulation.leaders import STEPS_A_SLICE, Forecast
+from augment.simulation.planning import STEPS_A_SLICE, Forecast
 from augment.simulation.road import Road
 from augment.simulation.states import (
+    ACCELERATION,
+    AHEAD_RAD,
+    BEHIND_RAD,
     HEADING,
     SPEED,
+    STEERING,
     STEP_S,
     BoolArray,
     EgoBody,
@@ -34,14 +32,101 @@ from augment.simulation.states import (
     Kind,
     X,
     Y,
+    are_at_fault,
+    bearings,
+    classify_contacts,
+    corners,
+    meet,
+    moved_ahead,
+    radii,
 )
 
-STILL_MPS = 5e-3
-TTC_STEPS = (0, 3, 6, 9)
-PROGRESS_WEIGHT, TTC_WEIGHT, COMFORT_WEIGHT = 5.0, 5.0, 2.0
-LITTLE_PROGRESS_M = 0.1
-STATIC_HIT = 0.5
-ONCOMING_FREE_M, ONCOMING_HALF_M = 2.0, 6.0
+LIMITS: dict[str, tuple[float, float]] = {
+    "longitudinal_acceleration_mps2": (-4.05, 2.40),
+    "lateral_acceleration_mps2": (-4.89, 4.89),
+    "longitudinal_jerk_mps3": (-4.13, 4.13),
+    "jerk_mps3": (-8.37, 8.37),
+    "yaw_rate_radps": (-0.95, 0.95),
+    "yaw_acceleration_radps2": (-1.93, 1.93),
+}
+"""Lowest and highest value of each signal."""
+_YAW_WINDOW = 5
+_STILL_MPS = 5e-3
+_TTC_STEPS = (0, 3, 6, 9)
+_PROGRESS_WEIGHT, _TTC_WEIGHT, _COMFORT_WEIGHT = 5.0, 5.0, 2.0
+_LITTLE_PROGRESS_M = 0.1
+_STATIC_HIT = 0.5
+_ONCOMING_FREE_M, _ONCOMING_HALF_M = 2.0, 6.0
+
+
+@lru_cache(maxsize=64)
+def filter_matrix(count: int, window: int, order: int, derivative: int = 0) -> FloatArray:
+    """Return the matrix (T, T) that smooths T samples every `STEP_S`, or derives them.
+
+    Short rows take a shorter window, and a lower order where it needs one.
+    """
+    from scipy.signal import savgol_filter
+
+    window = min(window, count)
+    matrix = savgol_filter(
+        np.eye(count), window, min(order, window - 1), deriv=derivative, delta=STEP_S, axis=0
+    )
+    return np.asarray(matrix, dtype=np.float64).T
+
+
+@dataclass(frozen=True, slots=True)
+class Windows:
+    """How accelerations become signals, in samples; yaw takes a window of 5 either way.
+
+    Attributes:
+        acceleration: The window of the acceleration itself.
+        before_jerk: A window that smooths the raw acceleration before its rate is taken.
+        jerk: The window of the rate.
+        at_centre: Whether accelerations are those of the box centre instead of the rear axle.
+    """
+
+    acceleration: int
+    before_jerk: int
+    jerk: int
+    at_centre: bool
+
+
+SCORE = Windows(8, 8, 15, at_centre=True)
+PROPOSAL = Windows(41, 8, 41, at_centre=False)
+
+
+def comfort_signals(
+    states: FloatArray, body: EgoBody, windows: Windows = SCORE
+) -> dict[str, FloatArray]:
+    """Return the signals (..., T) named in `LIMITS`, of states (..., T, 6) every 0.1 s; T >= 2.
+
+    The model's rear axle never accelerates sideways. nuPlan moves an acceleration from the axle
+    to the centre by adding d w^2 and d w' to it, d being (centre_m, 0); both lie along the car, so
+    nothing sideways comes of it. It is kept so.
+    """
+    forward = states[..., ACCELERATION]
+    if windows.at_centre:
+        turning = states[..., SPEED] * np.tan(states[..., STEERING]) / body.wheelbase_m
+        change = np.diff(turning, axis=-1, prepend=turning[..., :1]) / STEP_S
+        forward = forward + body.centre_m * (turning**2 + change)
+    count = states.shape[-2]
+    rate = filter_matrix(count, windows.jerk, 2, 1)
+    jerk = forward @ (filter_matrix(count, windows.before_jerk, 2) @ rate)
+    heading = np.unwrap(states[..., HEADING], axis=-1)
+    return {
+        "longitudinal_acceleration_mps2": forward @ filter_matrix(count, windows.acceleration, 2),
+        "lateral_acceleration_mps2": np.zeros_like(forward),
+        "longitudinal_jerk_mps3": jerk,
+        "jerk_mps3": np.abs(jerk),
+        "yaw_rate_radps": heading @ filter_matrix(count, _YAW_WINDOW, 2, 1),
+        "yaw_acceleration_radps2": heading @ filter_matrix(count, _YAW_WINDOW, 3, 2),
+    }
+
+
+def is_comfortable(signals: dict[str, FloatArray]) -> BoolArray:
+    """Return whether all moments (...,) are within all limits."""
+    fits = [(signals[name] > low) & (signals[name] < high) for name, (low, high) in LIMITS.items()]
+    return np.asarray(np.logical_and.reduce(fits).all(axis=-1), dtype=np.bool_)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -68,27 +153,18 @@ def score_proposals(
     drivable = np.where(look.off_road.any(axis=1), 0.0, 1.0)
     direction = _direction(look)
     valid = collision * drivable * direction
-    progress = _progress(look, valid)
-    ttc = _time_to_collision(look)
-    calm = is_comfortable(comfort_signals(states, body, PROPOSAL))
-    comfort = np.where(np.logical_and.reduce(calm, axis=1), 1.0, 0.0)
-    weighted = PROGRESS_WEIGHT * progress + TTC_WEIGHT * ttc + COMFORT_WEIGHT * comfort
-    total = PROGRESS_WEIGHT + TTC_WEIGHT + COMFORT_WEIGHT
-    return ProposalScores(
-        scores=valid * weighted / total,
-        fault_s=fault_s,
-        parts={
-            "collision": collision,
-            "drivable": drivable,
-            "direction": direction,
-            "progress": progress,
-            "ttc": ttc,
-            "comfort": comfort,
-        },
-    )
-
-
-# Private
+    parts = {
+        "collision": collision,
+        "drivable": drivable,
+        "direction": direction,
+        "progress": _progress(look, valid),
+        "ttc": _time_to_collision(look),
+        "comfort": is_comfortable(comfort_signals(states, body, PROPOSAL)).astype(np.float64),
+    }
+    weighted = _PROGRESS_WEIGHT * parts["progress"] + _TTC_WEIGHT * parts["ttc"]
+    weighted = weighted + _COMFORT_WEIGHT * parts["comfort"]
+    total = _PROGRESS_WEIGHT + _TTC_WEIGHT + _COMFORT_WEIGHT
+    return ProposalScores(scores=valid * weighted / total, fault_s=fault_s, parts=parts)
 
 
 class _Look:
@@ -98,17 +174,15 @@ class _Look:
         self.states, self.road, self.body = states, road, body
         self.boxes = body.boxes(states)
         self.corners = corners(self.boxes)
-        inside = road.drivable.contains(self.corners)
-        self.off_road: BoolArray = ~np.logical_and.reduce(inside, axis=-1)
-        self.objects = forecast.objects
-        self.moving_boxes = forecast.boxes
-        self.sizes = radii(forecast.boxes[0])
+        self.off_road: BoolArray = np.any(~road.drivable.contains(self.corners), axis=-1)
+        self.objects, self.moving_boxes = forecast.objects, forecast.boxes
+        self._sizes = radii(forecast.boxes[0])
 
     def contacts(self, boxes: FloatArray, later: int) -> tuple[IntArray, IntArray, IntArray]:
         """Proposal, moment and object (K,) where boxes (B, T, 5), `later` steps on, meet."""
         moments = (np.arange(boxes.shape[1]) + later) // STEPS_A_SLICE
         others = self.moving_boxes[np.minimum(moments, len(self.moving_boxes) - 1)]
-        reach = (self.sizes + radii(boxes[0, 0])) ** 2
+        reach = (self._sizes + radii(boxes[0, 0])) ** 2
         dx = boxes[..., None, 0] - others[None, ..., 0]
         dy = boxes[..., None, 1] - others[None, ..., 1]
         proposal, moment, thing = np.nonzero(dx * dx + dy * dy <= reach)
@@ -122,35 +196,23 @@ class _Look:
         wrong = self.off_road[rows, times] | ~self.road.on_one_way(self.corners[rows, times])
         return np.asarray(wrong[back], dtype=np.bool_)
 
-    def in_intersection(self, proposal: IntArray, moment: IntArray) -> BoolArray:
-        """Whether the ego's rear axle (K,) is in an intersection."""
-        return self.road.intersections.contains(self.states[proposal, moment][:, [X, Y]])
-
 
 def _collisions(look: _Look) -> tuple[FloatArray, FloatArray]:
     """The multiplier (B,) and the first fault (B,) in s; of each pair the first contact counts."""
-    count = len(look.states)
+    count, never = look.states.shape[:2]
     multiplier, fault_s = np.ones(count), np.full(count, np.inf)
     proposal, moment, thing = look.contacts(look.boxes, 0)
-    if not len(proposal):
-        return multiplier, fault_s
-    never = look.states.shape[1]
     first = np.full((count, len(look.objects)), never)
     np.minimum.at(first, (proposal, thing), moment)
     proposal, thing = np.nonzero(first < never)
     moment = first[proposal, thing]
+    boxes = look.moving_boxes[moment // STEPS_A_SLICE, thing]
+    speeds, kinds = look.objects.speeds_mps[thing], look.objects.kinds[thing]
     states = look.states[proposal, moment]
-    contacts = classify(
-        states,
-        states[:, SPEED],
-        look.moving_boxes[moment // STEPS_A_SLICE, thing],
-        look.objects.speeds_mps[thing],
-        look.objects.kinds[thing],
-        look.body,
-    )
-    guilty = at_fault(contacts, look.astray(proposal, moment))
-    static = look.objects.kinds[thing] == Kind.STATIC
-    np.minimum.at(multiplier, proposal[guilty], np.where(static[guilty], STATIC_HIT, 0.0))
+    contacts = classify_contacts(states, boxes, speeds, kinds, look.body)
+    guilty = are_at_fault(contacts, look.astray(proposal, moment))
+    hits = np.where(kinds == Kind.STATIC, _STATIC_HIT, 0.0)
+    np.minimum.at(multiplier, proposal[guilty], hits[guilty])
     np.minimum.at(fault_s, proposal[guilty], moment[guilty] * STEP_S)
     return multiplier, fault_s
 
@@ -159,25 +221,21 @@ def _direction(look: _Look) -> FloatArray:
     """1, 0.5 or 0 (B,) by the longest way in one go with the centre on no way of the route."""
     centres = look.boxes[..., :2]
     against = ~look.road.on_route.contains(centres)
-    if not against.any():
-        return np.ones(len(centres))
     steps = np.zeros(against.shape)
     steps[:, 1:] = np.hypot(*np.moveaxis(np.diff(centres, axis=1), -1, 0)) * against[:, 1:]
     gone = np.cumsum(steps, axis=1)
     before = np.maximum.accumulate(np.where(against, 0.0, gone), axis=1)
     longest = (gone - before).max(axis=1)
-    return np.where(longest < ONCOMING_FREE_M, 1.0, np.where(longest < ONCOMING_HALF_M, 0.5, 0.0))
+    return np.select([longest < _ONCOMING_FREE_M, longest < _ONCOMING_HALF_M], [1.0, 0.5], 0.0)
 
 
 def _progress(look: _Look, valid: FloatArray) -> FloatArray:
     """The advance along the centreline (B,) as a share of the best valid one."""
-    line = look.road.centreline
-    start, _ = line.beside(look.boxes[:1, 0, :2])
-    end, _ = line.beside(look.boxes[:, -1, :2])
+    start = look.road.centreline.station_of(look.boxes[0, 0])
+    end, _ = look.road.centreline.beside(look.boxes[:, -1, :2])
     advance = np.maximum(end - start, 0.0) * valid
-    best = advance.max()
-    if best > LITTLE_PROGRESS_M:
-        return np.asarray(advance / best, dtype=np.float64)
+    if advance.max() > _LITTLE_PROGRESS_M:
+        return np.asarray(advance / advance.max(), dtype=np.float64)
     return (valid > 0.0).astype(np.float64)
 
 
@@ -188,8 +246,8 @@ def _time_to_collision(look: _Look) -> FloatArray:
     behind or beside, has that object left out of all later ones.
     """
     made = np.ones(len(look.states))
-    meetings = [_meetings(look, later) for later in TTC_STEPS]
-    proposal, moment, thing, later = (np.concatenate(rows) for rows in zip(*meetings, strict=True))
+    meetings = [_meetings(look, later) for later in _TTC_STEPS]
+    proposal, moment, thing, later = np.concatenate(meetings, axis=1)
     order = np.lexsort((later, moment))
     pairs = (proposal * (len(look.objects) + 1) + thing)[order]
     first = order[np.unique(pairs, return_index=True)[1]]
@@ -200,20 +258,16 @@ def _time_to_collision(look: _Look) -> FloatArray:
     made[proposal[bearing < AHEAD_RAD]] = 0.0
     beside = (bearing >= AHEAD_RAD) & (bearing <= BEHIND_RAD) & (made[proposal] > 0.0)
     proposal, moment = proposal[beside], moment[beside]
-    if len(proposal):
-        loose = look.in_intersection(proposal, moment) | look.astray(proposal, moment)
-        made[proposal[loose]] = 0.0
+    axles = look.states[proposal, moment][:, [X, Y]]
+    loose = look.road.intersections.contains(axles) | look.astray(proposal, moment)
+    made[proposal[loose]] = 0.0
     return made
 
 
-def _meetings(look: _Look, later: int) -> tuple[IntArray, IntArray, IntArray, IntArray]:
-    """Proposal, moment and object (K,) that meet if the ego goes straight on so many steps."""
-    heading, speed = look.states[..., HEADING], look.states[..., SPEED]
-    boxes = look.boxes.copy()
-    way = speed * (later * STEP_S)
-    boxes[..., 0] += way * np.cos(heading)
-    boxes[..., 1] += way * np.sin(heading)
+def _meetings(look: _Look, later: int) -> IntArray:
+    """Proposal, moment, object and steps (4, K) of who meets if the ego goes straight on."""
+    boxes, speed = look.boxes.copy(), look.states[..., SPEED]
+    boxes[..., :3] = moved_ahead(boxes, speed * (later * STEP_S))
     proposal, moment, thing = look.contacts(boxes, later)
-    moving = speed[proposal, moment] > STILL_MPS
-    proposal, moment, thing = proposal[moving], moment[moving], thing[moving]
-    return proposal, moment, thing, np.full(len(proposal), later, dtype=np.int64)
+    meetings = np.stack([proposal, moment, thing, np.full(len(proposal), later)])
+    return meetings[:, speed[proposal, moment] > _STILL_MPS]

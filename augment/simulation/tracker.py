@@ -13,7 +13,6 @@ import math
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from augment.simulation.states import (
     ACCELERATION,
@@ -26,15 +25,48 @@ from augment.simulation.states import (
     FloatArray,
     X,
     Y,
-    state_of,
     wrap_angles,
 )
 
 MAX_STEERING_RAD = math.pi / 3.0
-ACCELERATION_LAG_S = 0.2
-STEERING_LAG_S = 0.05
-_PEDAL = STEP_S / (STEP_S + ACCELERATION_LAG_S)
-_WHEEL = STEP_S / (STEP_S + STEERING_LAG_S)
+_PEDAL = STEP_S / (STEP_S + 0.2)
+_WHEEL = STEP_S / (STEP_S + 0.05)
+JERK_PENALTY = 1e-4
+"""On the squared difference of neighbouring accelerations."""
+CURVATURE_RATE_PENALTY = 1e-2
+FIRST_CURVATURE_PENALTY = 1e-10
+
+HORIZON = 10
+SPEED_WEIGHT, SPEED_COST = 10.0, 1.0
+LATERAL_WEIGHT, HEADING_WEIGHT, STEERING_RATE_COST = 1.0, 10.0, 1.0
+STOPPING_SPEED_MPS = 0.2
+STOPPING_GAIN = 0.5
+_B_S = HORIZON * STEP_S
+_SPEED_GAIN = _B_S * SPEED_WEIGHT / (_B_S * SPEED_WEIGHT * _B_S + SPEED_COST)
+
+
+def track(references: FloatArray, start: FloatArray, body: EgoBody) -> FloatArray:
+    """Return the states (B, T, 6) of following references (B, T, 3) from one start (6,)."""
+    states = drive_steps(references, start, body, references.shape[1] - 1)
+    states[..., HEADING] = wrap_angles(states[..., HEADING])
+    return states
+
+
+def drive_steps(
+    references: FloatArray, start: FloatArray, body: EgoBody, steps: int
+) -> FloatArray:
+    """Return the first steps along references (B, T, 3), T >= 2, as (B, steps + 1, 6).
+
+    The headings are not wrapped.
+    """
+    poses = np.ascontiguousarray(references.transpose(1, 0, 2))
+    plan = _Plan(poses, steps)
+    states = np.empty((steps + 1, WIDTH, poses.shape[1]))
+    states[0] = start[:, None]
+    for step in range(steps):
+        pedals, wheel = plan.commands(step, states[step], body.wheelbase_m)
+        states[step + 1] = advance(states[step], pedals, wheel, body.wheelbase_m)
+    return np.ascontiguousarray(states.transpose(2, 0, 1))
 
 
 def advance(
@@ -43,7 +75,7 @@ def advance(
     steering_rate_radps: FloatArray,
     wheelbase_m: float,
 ) -> FloatArray:
-    """The states (6, B) one step later: the place by the old speed and the old steering.
+    """Return states (6, B) one step later: the place by the old speed and the old steering.
 
     Args:
         state: (6, B), the numbers first.
@@ -61,51 +93,38 @@ def advance(
     following[ACCELERATION] = gained
     following[SPEED] = state[SPEED] + gained * STEP_S
     turned = steering + (_WHEEL * STEP_S) * steering_rate_radps
-    following[STEERING] = np.minimum(np.maximum(turned, -MAX_STEERING_RAD), MAX_STEERING_RAD)
+    following[STEERING] = turned.clip(-MAX_STEERING_RAD, MAX_STEERING_RAD)
     return following
 
 
-JERK_PENALTY = 1e-4
-"""On the squared difference of neighbouring accelerations."""
-CURVATURE_RATE_PENALTY = 1e-2
-FIRST_CURVATURE_PENALTY = 1e-10
-
-
 def speeds(poses: FloatArray) -> FloatArray:
-    """The speed profile (T-1, B) of poses (T, B, 3)."""
+    """Return the speed profile (T-1, B) of poses (T, B, 3)."""
     steps = np.diff(poses[..., :2], axis=0)
     heading = poses[:-1, :, HEADING]
-    advance = np.cos(heading) * steps[..., X] + np.sin(heading) * steps[..., Y]
-    return np.asarray(_speed_fit(len(advance)) @ advance, dtype=np.float64)
-
-
-def curvatures(poses: FloatArray, speed: FloatArray) -> FloatArray:
-    """The curvature profile (T-1, B) of poses (T, B, 3), given their speeds (T-1, B)."""
-    way = speed * STEP_S
-    right = way * wrap_angles(np.diff(poses[..., HEADING], axis=0))
-    coupling = CURVATURE_RATE_PENALTY / STEP_S**2
-    diagonal = way**2 + 2.0 * coupling
-    diagonal[0] += FIRST_CURVATURE_PENALTY - coupling
-    diagonal[-1] -= coupling
-    if len(way) == 1:
-        return np.asarray(right / (way**2 + FIRST_CURVATURE_PENALTY), dtype=np.float64)
-    return _solved(diagonal, -coupling, right)
+    advances = np.cos(heading) * steps[..., X] + np.sin(heading) * steps[..., Y]
+    return np.asarray(_speed_fit(len(advances)) @ advances, dtype=np.float64)
 
 
 @lru_cache(maxsize=16)
 def _speed_fit(count: int) -> FloatArray:
     """The matrix (N, N) from advances along the heading to speeds."""
-    second = np.zeros((max(count - 2, 0), count))
-    for row in range(len(second)):
-        second[row, row : row + 3] = np.array([1.0, -2.0, 1.0]) / STEP_S
+    second = np.diff(np.eye(count), n=2, axis=0) / STEP_S
     normal = STEP_S**2 * np.eye(count) + JERK_PENALTY * second.T @ second
     return np.asarray(np.linalg.inv(normal) * STEP_S, dtype=np.float64)
 
 
-def _solved(diagonal: FloatArray, off: float, right: FloatArray) -> FloatArray:
-    """Symmetric systems of three diagonals, all columns at once: (N, B) -> (N, B)."""
-    upper = np.empty_like(diagonal)
-    solved = np.empty_like(right)
+def curvatures(poses: FloatArray, speed: FloatArray) -> FloatArray:
+    """Return the curvature profile (T-1, B) of poses (T, B, 3), given their speeds (T-1, B).
+
+    The symmetric systems of three diagonals are solved for all columns at once.
+    """
+    way = speed * STEP_S
+    right = way * wrap_angles(np.diff(poses[..., HEADING], axis=0))
+    off = -CURVATURE_RATE_PENALTY / STEP_S**2
+    diagonal = way**2 - 2.0 * off
+    diagonal[0] += FIRST_CURVATURE_PENALTY + off
+    diagonal[-1] += off
+    upper, solved = np.empty_like(diagonal), np.empty_like(right)
     upper[0] = off / diagonal[0]
     solved[0] = right[0] / diagonal[0]
     for row in range(1, len(diagonal)):
@@ -117,65 +136,7 @@ def _solved(diagonal: FloatArray, off: float, right: FloatArray) -> FloatArray:
     return solved
 
 
-HORIZON = 10
-SPEED_WEIGHT, SPEED_COST = 10.0, 1.0
-LATERAL_WEIGHT, HEADING_WEIGHT, STEERING_RATE_COST = 1.0, 10.0, 1.0
-STOPPING_SPEED_MPS = 0.2
-STOPPING_GAIN = 0.5
-
-_B_S = HORIZON * STEP_S
-_SPEED_GAIN = _B_S * SPEED_WEIGHT / (_B_S * SPEED_WEIGHT * _B_S + SPEED_COST)
-
-
-def follow(reference: ArrayLike, start: ArrayLike, body: EgoBody | None = None) -> FloatArray:
-    """Tracker and bicycle alone, along one reference.
-
-    Args:
-        reference: Rear-axle poses (T, 3) every 0.1 s: x_m, y_m, heading_rad; T >= 2.
-        start: (x, y, heading, speed) of the rear axle, or a whole state (6,).
-        body: nuPlan's vehicle when None.
-
-    Returns:
-        The states (T, 6), the start first (augment.simulation.states).
-
-    Raises:
-        ValueError: A shape is another one.
-    """
-    given = np.asarray(reference, dtype=np.float64)
-    if given.ndim != 2 or given.shape[1] != 3:
-        raise ValueError(f"a reference has the shape (T, 3), not {given.shape}")
-    states: FloatArray = track(given[None], state_of(start), body or EgoBody())[0]
-    return states
-
-
-def track(references: FloatArray, start: FloatArray, body: EgoBody) -> FloatArray:
-    """The states (B, T, 6) of following references (B, T, 3) from one start (6,)."""
-    states = drive_steps(references, start, body, references.shape[1] - 1)
-    states[..., HEADING] = wrap_angles(states[..., HEADING])
-    return states
-
-
-def drive_steps(
-    references: FloatArray, start: FloatArray, body: EgoBody, steps: int
-) -> FloatArray:
-    """The first `steps` steps along references (B, T, 3), as (B, steps + 1, 6); not wrapped."""
-    if references.shape[1] < 2:
-        raise ValueError("a reference needs two poses or more")
-    poses = np.ascontiguousarray(references.transpose(1, 0, 2))
-    plan = _Plan(poses, steps)
-    states = np.empty((steps + 1, WIDTH, poses.shape[1]))
-    states[0] = start[:, None]
-    for step in range(steps):
-        state = states[step]
-        pedals, wheel = plan.commands(step, state, body.wheelbase_m)
-        states[step + 1] = advance(state, pedals, wheel, body.wheelbase_m)
-    return np.ascontiguousarray(states.transpose(2, 0, 1))
-
-
-# Private
-
-
-def _sums() -> tuple[FloatArray, FloatArray, FloatArray]:
+def _sums() -> tuple[FloatArray, FloatArray]:
     """The constants of the horizon, from w_j = dt * v0 + dt^2 * j * a, in powers of v0 and a.
 
     Returns:
@@ -190,14 +151,13 @@ def _sums() -> tuple[FloatArray, FloatArray, FloatArray]:
     squares = np.array(
         [speed * after_speed, speed * after_gain + gain * after_speed, gain * after_gain]
     )
-    bends = np.vstack([speed, gain, squares])
     once = np.array([speed.sum(), gain.sum(), 0.0])
     once_j = np.array([(speed * steps).sum(), (gain * steps).sum(), 0.0])
     plain = np.array([once, squares.sum(axis=1), once_j, (squares * steps).sum(axis=1)])
-    return plain, bends, steps
+    return plain, np.vstack([speed, gain, squares])
 
 
-_PLAIN, _BENDS, _ = _sums()
+_PLAIN, _BENDS = _sums()
 
 
 class _Plan:
@@ -220,8 +180,7 @@ class _Plan:
         """Acceleration and steering rate (B,) for states (6, B)."""
         speed, wanted = state[SPEED], self._wanted[step]
         stopping = (speed <= STOPPING_SPEED_MPS) & (wanted <= STOPPING_SPEED_MPS)
-        missing = wanted - speed
-        pedals = np.where(stopping, STOPPING_GAIN, _SPEED_GAIN) * missing
+        pedals = np.where(stopping, STOPPING_GAIN, _SPEED_GAIN) * (wanted - speed)
         rate = self._steering_rate(step, state, pedals, wheelbase_m)
         rate[stopping] = 0.0
         return pedals, rate

@@ -1,24 +1,21 @@
 """How a contestant asks, beyond its model and its variant: a frozen value.
 
-In: what an admin chose. Out: a run's complete options (`complete_options`), the recipe with them
-(`recipe_with`), what is sent with every request (`ContestantOptions.sampling`) and what keeps
-stored answers apart (`ContestantOptions.key`). None means: left open, so that the default counts,
-or what is known of the model.
+None means: left open, so that the default counts, or what is known of the model. Names, checks,
+documents, labels and slugs all derive from the fields of `ContestantOptions`.
 """
 
 from __future__ import annotations
 
-import math
 import re
-from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass, fields, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields, replace
 from enum import StrEnum
 from typing import Any
 
 from augment.errors import InvalidDocument
 from augment.variants.recipes import Recipe, Tools
 from augment.variants.respondents import Sampling
-from augment.variants.review import Limits
+from augment.variants.reviews import Limits
 
 EFFORTS = ("none", "minimal", "low", "medium", "high", "xhigh", "max")
 """What endpoints call how long a model thinks; not every one takes each."""
@@ -26,6 +23,7 @@ EFFORTS = ("none", "minimal", "low", "medium", "high", "xhigh", "max")
 HIGHEST_SEED = 2**31 - 1
 MOST_SAMPLES = 100
 MOST_ROUNDS = 10
+_LIMITS = Limits()
 
 
 class ToolProtocol(StrEnum):
@@ -33,6 +31,57 @@ class ToolProtocol(StrEnum):
 
     PROMPT = "prompt"
     NATIVE = "native"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Rule:
+    """What is to know of an option besides its name.
+
+    Attributes:
+        words: A value in a name for people.
+        slug: A value as a part of a slug.
+        kind: What a value is.
+        least, most: The range of a number.
+        choices: The values of a text, where these are few.
+        pattern: What a text looks like, where there are no choices.
+        default: What counts where it is left open; None where nothing does.
+        without: Why a recipe has no use for it; empty where all have one.
+    """
+
+    words: str
+    slug: str
+    kind: type = int
+    least: float = 0
+    most: float = 0
+    choices: tuple[str, ...] = ()
+    pattern: str = ""
+    default: object = None
+    without: str = ""
+
+    def read(self, value: Any) -> Any:
+        """Return the value as what it is.
+
+        Raises:
+            ValueError: It can't be; the text says what may be.
+        """
+        is_number = isinstance(value, int | float) and not isinstance(value, bool)
+        if self.choices:
+            fits, allowed = value in self.choices, f"one of {', '.join(self.choices)}"
+        elif self.pattern:
+            fits = isinstance(value, str) and re.fullmatch(self.pattern, value) is not None
+            allowed = "twelve hexadecimal digits"
+        else:
+            is_kind = self.kind is float or isinstance(value, int)
+            fits = is_number and is_kind and self.least <= value <= self.most
+            noun = "number" if self.kind is float else "whole number"
+            allowed = f"a {noun} from {self.least} to {self.most}"
+        if not fits:
+            raise ValueError(f"{value!r} must be {allowed}")
+        return self.kind(value)
+
+
+def _option(words: str, slug: str, **rule: Any) -> Any:
+    return field(default=None, metadata={"rule": _Rule(words=words, slug=slug, **rule)})
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -54,33 +103,75 @@ class ContestantOptions:
         InvalidDocument: A value is out of its range.
     """
 
-    temperature: float | None = None
-    seed: int | None = None
-    reasoning_effort: str | None = None
-    max_output_tokens: int | None = None
-    protocol: ToolProtocol | None = None
-    rounds: int | None = None
-    accepted_from: float | None = None
-    radius_m: float | None = None
-    prompt_version: str | None = None
-    picture_px: int | None = None
+    temperature: float | None = _option("temperature {:g}", "t{:g}", kind=float, least=0, most=2)
+    seed: int | None = _option("seed {}", "s{}", most=HIGHEST_SEED - MOST_SAMPLES)
+    reasoning_effort: str | None = _option("effort {}", "{}-effort", kind=str, choices=EFFORTS)
+    max_output_tokens: int | None = _option(
+        "answers to {} tokens",
+        "{}-tokens",
+        least=1,
+        most=1_000_000,
+        default=_LIMITS.max_output_tokens,
+    )
+    protocol: ToolProtocol | None = _option(  # noqa: RUF009
+        "{} calls",
+        "{}",
+        kind=ToolProtocol,
+        choices=tuple(ToolProtocol),
+        default=ToolProtocol.PROMPT,
+        without="calls no function, so it has no protocol",
+    )
+    rounds: int | None = _option(
+        "{} rounds",
+        "{}-rounds",
+        least=1,
+        most=MOST_ROUNDS,
+        default=_LIMITS.rounds,
+        without="has no review, so it has one round",
+    )
+    accepted_from: float | None = _option(
+        "content from {:g}",
+        "from-{:g}",
+        kind=float,
+        least=1,
+        most=5,
+        default=_LIMITS.accepted_from,
+        without="has no text review, so nothing is rated",
+    )
+    radius_m: float | None = _option(
+        "{:g} m", "{:g}m", kind=float, least=20, most=300, default=_LIMITS.radius_m
+    )
+    prompt_version: str | None = _option("prompts {}", "p{}", kind=str, pattern="[0-9a-f]{12}")
+    picture_px: int | None = _option(
+        "pictures {} px",
+        "{}px",
+        least=300,
+        most=2400,
+        default=_LIMITS.picture_px,
+        without="shows no picture",
+    )
 
     def __post_init__(self) -> None:
-        problems = [
-            (name, f"{getattr(self, name)!r} must be {rule.says}")
-            for name, rule in _RULES.items()
-            if getattr(self, name) is not None and not rule.allows(getattr(self, name))
-        ]
+        problems = []
+        for name, value in self.to_document().items():
+            try:
+                object.__setattr__(self, name, _RULES[name].read(value))
+            except ValueError as fault:
+                problems.append((name, str(fault)))
         if problems:
             raise InvalidDocument("set of options", problems)
 
     def to_document(self) -> dict[str, Any]:
-        """What was chosen or fixed, ready for JSON; what is open is not in it."""
-        chosen = {name: value for name, value in asdict(self).items() if value is not None}
-        return chosen | ({"protocol": self.protocol.value} if self.protocol else {})
+        """Return what was chosen or fixed, ready for JSON; what is open is not in it."""
+        values = {name: getattr(self, name) for name in NAMES}
+        return {
+            name: str(value) if isinstance(value, StrEnum) else value
+            for name, value in values.items()
+            if value is not None
+        }
 
     def sampling(self, sample: int = 1) -> Sampling:
-        """What the requests of one sample are sent with: sample k has the seed + k - 1."""
+        """Return what the requests of one sample are sent with; sample k has the seed + k - 1."""
         return Sampling(
             temperature=self.temperature,
             seed=None if self.seed is None else self.seed + sample - 1,
@@ -88,7 +179,7 @@ class ContestantOptions:
         )
 
     def key(self, sample: int = 1) -> dict[str, Any]:
-        """What keeps the answers of these options and this sample apart from all others.
+        """Return what keeps the answers of these options and this sample apart from all others.
 
         A default is no option of its own: so variants that ask the very same share the answer.
         """
@@ -100,46 +191,36 @@ class ContestantOptions:
         return chosen | ({"sample": sample} if sample > 1 else {})
 
     def describe(self) -> str:
-        """What was chosen in a few words, for names; empty where nothing was."""
-        return ", ".join(
-            _RULES[name].words.format(value) for name, value in self.to_document().items()
-        )
+        """Return what was chosen in a few words, for names; empty where nothing was."""
+        chosen = self.to_document().items()
+        return ", ".join(_RULES[name].words.format(value) for name, value in chosen)
 
     def slug(self) -> str:
-        """The same as a part of a slug."""
-        parts = [_RULES[name].slug.format(value) for name, value in self.to_document().items()]
+        """Return the same as a part of a slug."""
+        chosen = self.to_document().items()
+        parts = [_RULES[name].slug.format(value) for name, value in chosen]
         return "-".join(parts).lower().replace(".", "p")
 
 
-def options_from_document(document: Mapping[str, object]) -> ContestantOptions:
-    """The options that a JSON document holds.
+_RULES: dict[str, _Rule] = {one.name: one.metadata["rule"] for one in fields(ContestantOptions)}
+NAMES = tuple(_RULES)
+
+
+def options_from_document(document: Mapping[str, Any]) -> ContestantOptions:
+    """Return the options that a JSON document holds.
 
     Raises:
         InvalidDocument: A name is none of an option, or a value can't be.
     """
-    problems = [
-        (str(name), f"is no option; there are {', '.join(NAMES)}")
-        for name in document
-        if name not in NAMES
-    ]
-    if problems:
-        raise InvalidDocument("set of options", problems)
-    values: dict[str, Any] = {}
-    for name, value in document.items():
-        rule = _RULES[name]
-        if value is None:
-            continue
-        if not rule.allows(value):
-            problems.append((name, f"{value!r} must be {rule.says}"))
-        else:
-            values[name] = rule.read(value)
-    if problems:
-        raise InvalidDocument("set of options", problems)
-    return ContestantOptions(**values)
+    unknown = [str(name) for name in document if name not in NAMES]
+    if unknown:
+        problem = f"is no option; there are {', '.join(NAMES)}"
+        raise InvalidDocument("set of options", [(name, problem) for name in unknown])
+    return ContestantOptions(**document)
 
 
 def names_for(recipe: Recipe) -> tuple[str, ...]:
-    """The options that a recipe has a use for."""
+    """Return the options that a recipe has a use for."""
     useful = {"rounds", *recipe.review.options} if recipe.review else set[str]()
     if recipe.tools is not Tools.NONE:
         useful.add("protocol")
@@ -165,7 +246,7 @@ def check_options(recipe: Recipe, options: ContestantOptions) -> None:
 def complete_options(
     options: ContestantOptions, recipe: Recipe, *, native_tools: bool | None, prompt_version: str
 ) -> ContestantOptions:
-    """The options with which a recipe runs, nothing of ours left open.
+    """Return the options with which a recipe runs, nothing of ours left open.
 
     Args:
         options: What was chosen.
@@ -173,132 +254,15 @@ def complete_options(
         native_tools: What is known of the modifier's model.
         prompt_version: Of the texts that there are.
     """
-    native = ToolProtocol.NATIVE if native_tools is True else ToolProtocol.PROMPT
-    limits = recipe.limits
-    usual: dict[str, Any] = {
-        "max_output_tokens": limits.max_tokens,
-        "protocol": native,
-        "rounds": limits.regenerations + 1,
-        "accepted_from": limits.accepted_from,
-        "radius_m": limits.radius_m,
-        "prompt_version": prompt_version,
-        "picture_px": limits.picture_px,
-    }
-    allowed = names_for(recipe)
-    return options_from_document(
-        {name: value for name, value in usual.items() if name in allowed} | options.to_document()
-    )
+    usual = {name: getattr(recipe.limits, name, None) for name in names_for(recipe)}
+    if "protocol" in usual:
+        usual["protocol"] = ToolProtocol.NATIVE if native_tools is True else ToolProtocol.PROMPT
+    usual["prompt_version"] = prompt_version
+    return options_from_document(usual | options.to_document())
 
 
 def recipe_with(recipe: Recipe, options: ContestantOptions) -> Recipe:
-    """The recipe within the limits of these options."""
-    changes: dict[str, Any] = {
-        "radius_m": options.radius_m,
-        "max_tokens": options.max_output_tokens,
-        "regenerations": None if options.rounds is None else options.rounds - 1,
-        "accepted_from": options.accepted_from,
-        "picture_px": options.picture_px,
-    }
-    given = {name: value for name, value in changes.items() if value is not None}
-    return replace(recipe, limits=replace(recipe.limits, **given))
-
-
-# --- Private -----------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Rule:
-    """What is to know of an option.
-
-    Attributes:
-        says: What a value may be, in words.
-        allows: Whether a value may be.
-        read: How it is read once it may be.
-        words: A value in a name for people.
-        slug: A value as a part of a slug.
-        default: What counts where it is left open; None where nothing does.
-        without: Why a recipe has no use for it; empty where all have one.
-    """
-
-    says: str
-    allows: Callable[[Any], bool]
-    words: str
-    slug: str
-    read: Callable[[Any], Any] = lambda value: value
-    default: object = None
-    without: str = ""
-
-
-def _number(low: float, high: float, **more: Any) -> _Rule:
-    def allows(value: object) -> bool:
-        is_number = isinstance(value, int | float) and not isinstance(value, bool)
-        return is_number and math.isfinite(value) and low <= value <= high  # type: ignore[arg-type,operator]
-
-    return _Rule(says=f"a number from {low:g} to {high:g}", allows=allows, read=float, **more)
-
-
-def _whole(low: int, high: int, **more: Any) -> _Rule:
-    def allows(value: object) -> bool:
-        return isinstance(value, int) and not isinstance(value, bool) and low <= value <= high
-
-    return _Rule(says=f"a whole number from {low} to {high}", allows=allows, **more)
-
-
-def _one_of(*words: str, read: Callable[[Any], Any] = str, **more: Any) -> _Rule:
-    return _Rule(
-        says=f"one of {', '.join(words)}", allows=lambda value: value in words, read=read, **more
-    )
-
-
-_LIMITS = Limits()
-_RULES: dict[str, _Rule] = {
-    "temperature": _number(0, 2, words="temperature {:g}", slug="t{:g}"),
-    "seed": _whole(0, HIGHEST_SEED - MOST_SAMPLES, words="seed {}", slug="s{}"),
-    "reasoning_effort": _one_of(*EFFORTS, words="effort {}", slug="{}-effort"),
-    "max_output_tokens": _whole(
-        1, 1_000_000, words="answers to {} tokens", slug="{}-tokens", default=_LIMITS.max_tokens
-    ),
-    "protocol": _one_of(
-        *(protocol.value for protocol in ToolProtocol),
-        read=ToolProtocol,
-        words="{} calls",
-        slug="{}",
-        default=ToolProtocol.PROMPT.value,
-        without="calls no function, so it has no protocol",
-    ),
-    "rounds": _whole(
-        1,
-        MOST_ROUNDS,
-        words="{} rounds",
-        slug="{}-rounds",
-        default=_LIMITS.regenerations + 1,
-        without="has no review, so it has one round",
-    ),
-    "accepted_from": _number(
-        1,
-        5,
-        words="content from {:g}",
-        slug="from-{:g}",
-        default=_LIMITS.accepted_from,
-        without="has no text review, so nothing is rated",
-    ),
-    "radius_m": _number(20, 300, words="{:g} m", slug="{:g}m", default=_LIMITS.radius_m),
-    "prompt_version": _Rule(
-        says="twelve hexadecimal digits",
-        allows=lambda value: (
-            isinstance(value, str) and re.fullmatch("[0-9a-f]{12}", value) is not None
-        ),
-        words="prompts {}",
-        slug="p{}",
-    ),
-    "picture_px": _whole(
-        300,
-        2400,
-        words="pictures {} px",
-        slug="{}px",
-        default=_LIMITS.picture_px,
-        without="shows no picture",
-    ),
-}
-
-NAMES = tuple(field.name for field in fields(ContestantOptions))
+    """Return the recipe within the limits of these options."""
+    known = {one.name for one in fields(Limits)}
+    chosen = {name: value for name, value in options.to_document().items() if name in known}
+    return replace(recipe, limits=replace(recipe.limits, **chosen))

@@ -1,26 +1,50 @@
 """Read first: from a scene and an instruction to an outcome, along a recipe.
 
 Scene -> prompt -> answer -> Modification, and back with a review's findings where the recipe has
-a review (rounds.py). An answer that nobody can read and a refusal are outcomes of the model and
-count as such; whoever changes nothing refuses. A broken wire is nobody's outcome and is raised.
+a review. That loop is the only one of the house: it is bounded by the recipe's rounds, and every
+turn of it is in the transcript. A review never takes a result away: where it is unusable, or a
+later round can't be read, what the modifier made before stands, and the notes say so.
+
+An answer that nobody can read and a refusal are outcomes of the model and count as such; whoever
+changes nothing refuses. A broken wire is nobody's outcome and is raised.
 """
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
+from functools import cached_property, partial
 
-from augment.errors import ModelRefused, ReplyUnreadable, UnknownName
-from augment.llm.patience import Patience
-from augment.scene.entities import Scene
+from augment.checks import Ground
+from augment.errors import ModelRefused, ReplyUnreadable, ReviewUnusable, UnknownName
+from augment.llm.client import ChatClient, Patience
+from augment.llm.messages import Message, Reply, Speaker, ToolChoice
+from augment.prompts import fill
+from augment.prompts.calls import TOOL, WrittenCall, calls_in, read_arguments
+from augment.prompts.fill import Calling, Form, Messages
+from augment.prompts.reply import ReadReply, read_intent, read_reply
+from augment.prompts.vectors import changes_text
+from augment.scene.entities import Modification, Scene
 from augment.scene.intent import Intent
-from augment.scene.modification import Modification
-from augment.variants.modifier import Modifier
-from augment.variants.recipes import RECIPES, Recipe
-from augment.variants.respondents import RespondentClient, Respondents, Sampling
-from augment.variants.rounds import modify_and_review
-from augment.variants.transcript import ModelRole, Transcript
+from augment.variants.pose_tool import PoseTool
+from augment.variants.recipes import RECIPES, Keep, Recipe, Tools
+from augment.variants.respondents import (
+    ModelRole,
+    NoteKind,
+    RespondentClient,
+    Respondents,
+    Sampling,
+    Transcript,
+)
+from augment.variants.reviews import Limits, Submission, Verdict
+
+LEFT_ALONE = "The modifier left the scene as it is and did not say why."
+READER_TOKENS = 4096
+"""The length limit of an intent reader's answer."""
+
+_LONGEST_NOTED = 500
 
 
 class OutcomeStatus(StrEnum):
@@ -29,9 +53,6 @@ class OutcomeStatus(StrEnum):
     DONE = "done"
     UNREADABLE = "unreadable"
     REFUSED = "refused"
-
-
-LEFT_ALONE = "The modifier left the scene as it is and did not say why."
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -45,9 +66,9 @@ class Outcome:
         is_accepted: What the review said of the modification, None without a usable review.
     """
 
-    modification: Modification | None
-    notes: str
     status: OutcomeStatus
+    modification: Modification | None = None
+    notes: str = ""
     reason: str = ""
     is_accepted: bool | None = None
 
@@ -89,24 +110,299 @@ def run(
         transcript=transcript,
         patience=patience or Patience(),
         sampling=sampling or Sampling(),
+        max_tokens=recipe.limits.max_output_tokens,
+        re_asks=recipe.limits.re_asks,
     )
-    modification = Modifier(recipe=recipe, scene=scene, respondents=respondents, intent=intent)
+    work = _Work(
+        recipe=recipe, scene=scene, instruction=instruction, respondents=respondents, intent=intent
+    )
     try:
-        result = modify_and_review(modification, instruction)
+        kept, remark = work.modify_and_review()
     except ReplyUnreadable as unreadable:
-        return _without(OutcomeStatus.UNREADABLE, "; ".join(unreadable.problems))
+        reason = "; ".join(unreadable.problems)
+        return Outcome(status=OutcomeStatus.UNREADABLE, reason=reason)
     except ModelRefused as refused:
-        return _without(OutcomeStatus.REFUSED, str(refused))
-    read = result.kept.read
-    if read.modification.is_empty:
-        return _without(OutcomeStatus.REFUSED, read.notes or LEFT_ALONE)
+        return Outcome(status=OutcomeStatus.REFUSED, reason=str(refused))
+    if kept.read.modification.is_empty:
+        return Outcome(status=OutcomeStatus.REFUSED, reason=kept.read.notes or LEFT_ALONE)
     return Outcome(
-        modification=read.modification,
-        notes="\n\n".join(part for part in (read.notes, result.remark) if part),
         status=OutcomeStatus.DONE,
-        is_accepted=result.is_accepted,
+        modification=kept.read.modification,
+        notes="\n\n".join(part for part in (kept.read.notes, remark) if part),
+        is_accepted=None if kept.verdict is None else kept.verdict.is_accepted,
     )
 
 
-def _without(status: OutcomeStatus, reason: str) -> Outcome:
-    return Outcome(modification=None, notes="", status=status, reason=reason)
+def ask_for_intent(
+    instruction: str,
+    *,
+    client: ChatClient,
+    model: str,
+    transcript: Transcript,
+    patience: Patience | None = None,
+) -> Intent:
+    """Return what a model reads out of a sentence, which is all that it is shown.
+
+    What it read counts for nothing until a person has accepted it.
+
+    Raises:
+        ReplyUnreadable: Neither the first answer nor the re-asked one fits the schema.
+        ModelRefused: The model declined, or its endpoint's filter did.
+        ModelFault: The wire broke for good.
+        BudgetSpent: The transcript's budget has no room for the next call.
+    """
+    respondents = Respondents(
+        clients={ModelRole.MODIFIER: RespondentClient(client=client, model=model)},
+        transcript=transcript,
+        patience=patience or Patience(),
+        max_tokens=READER_TOKENS,
+    )
+    messages = fill.reader_messages(instruction)
+    intent, _, _ = respondents.read(ModelRole.READER, messages, read_intent)
+    return intent
+
+
+def form_of(recipe: Recipe, *, native_tools: bool = False) -> Form:
+    """Return the form in which a recipe's modifier gets its task."""
+    calling = Calling.NONE
+    if recipe.tools is Tools.POSE:
+        calling = Calling.NATIVE if native_tools else Calling.IN_PROMPT
+    return Form(
+        lanes=recipe.lane_format,
+        calling=calling,
+        radius_m=recipe.limits.radius_m,
+        calls=recipe.limits.calls,
+        identical=recipe.limits.identical_calls,
+    )
+
+
+# Private
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Round:
+    """What was made in one turn, and what the review said, None without a usable one."""
+
+    number: int
+    read: ReadReply
+    verdict: Verdict | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Work:
+    """One modifier at work on one scene."""
+
+    recipe: Recipe
+    scene: Scene
+    instruction: str
+    respondents: Respondents
+    intent: Intent | None
+
+    @cached_property
+    def ground(self) -> Ground:
+        """The scene, laid out for the checks once for all rounds."""
+        return Ground.of(self.scene)
+
+    def modify_and_review(self) -> tuple[_Round, str]:
+        """Return the round that counts, and how it came to, for people; empty without a review.
+
+        Raises:
+            ReplyUnreadable: The modifier's first round can't be read.
+            ModelRefused: The modifier declined in its first round.
+            ModelFault: The wire broke for good.
+        """
+        note = self.respondents.transcript.note
+        native = self.respondents.client_of(ModelRole.MODIFIER).native_tools
+        form = form_of(self.recipe, native_tools=native)
+        messages = fill.modifier_messages(self.scene, self.instruction, form)
+        rounds: list[_Round] = []
+        while True:
+            number, fault = len(rounds) + 1, ""
+            try:
+                read, messages = self._draft(messages, form.calling)
+            except (ReplyUnreadable, ModelRefused) as unusable:
+                if not rounds:
+                    raise
+                note(NoteKind.ROUND, {"round": number, "fault": str(unusable)})
+                fault = f"Round {number} brought no modification: {unusable}"
+                break
+            if self.recipe.review is None:
+                return _Round(number=1, read=read, verdict=None), ""
+            changes = changes_text(self.scene, read.modification)
+            note(NoteKind.ROUND, {"round": number, "changes": changes, "mended": read.mended})
+            verdict, fault = self._review(read, rounds)
+            rounds.append(_Round(number=number, read=read, verdict=verdict))
+            if verdict is None or verdict.is_accepted or number >= self.recipe.rounds:
+                break
+            messages = fill.regenerate_messages(
+                messages, verdict.feedback, is_measured=verdict.is_measured
+            )
+        return self._kept(rounds, fault)
+
+    def _draft(self, messages: Messages, calling: Calling) -> tuple[ReadReply, Messages]:
+        """Return one answer, read, and the conversation up to and including it."""
+        reply = None
+        if calling is not Calling.NONE:
+            messages, reply = self._ask_with_tool(messages, native=calling is Calling.NATIVE)
+        read, asked, answer = self.respondents.read(
+            ModelRole.MODIFIER,
+            messages,
+            partial(read_reply, scene=self.scene, radius_m=self.recipe.limits.radius_m),
+            again=fill.re_ask_messages,
+            tools=(fill.pose_tool(),) if calling is Calling.NATIVE else (),
+            reply=reply,
+        )
+        return read, (*asked, fill.model_message(answer.text))
+
+    def _ask_with_tool(self, messages: Messages, *, native: bool) -> tuple[Messages, Reply]:
+        """Return the conversation with all calls and their results, and the reply without calls.
+
+        A model that goes on calling when its calls are used up gets no more results: what it
+        said is its answer then.
+        """
+        desk = _ToolDesk(
+            tool=PoseTool(self.scene, self.recipe.limits.radius_m),
+            limits=self.recipe.limits,
+            transcript=self.respondents.transcript,
+        )
+        while True:
+            is_over = desk.is_over
+            reply = self.respondents.ask(
+                ModelRole.MODIFIER,
+                messages,
+                tools=(fill.pose_tool(),) if native else (),
+                tool_choice=ToolChoice.NONE if is_over else ToolChoice.AUTO,
+            )
+            turns = () if is_over else desk.turns(reply, native=native)
+            if not turns:
+                return messages, reply
+            messages += turns
+
+    def _review(self, read: ReadReply, rounds: list[_Round]) -> tuple[Verdict | None, str]:
+        """Return the verdict, or None and why there is none."""
+        review = self.recipe.review
+        assert review is not None
+        submission = Submission(
+            ground=self.ground,
+            instruction=self.instruction,
+            modification=read.modification,
+            respondents=self.respondents,
+            limits=self.recipe.limits,
+            earlier=rounds[-1].read.modification if rounds else None,
+            told=tuple(entry for one in rounds if one.verdict for entry in one.verdict.feedback),
+            intent=self.intent,
+        )
+        head: dict[str, object] = {"round": len(rounds) + 1, "review": review.name}
+        note = partial(self.respondents.transcript.note, NoteKind.REVIEW)
+        try:
+            verdict = review.judge(submission)
+        except ReviewUnusable as unusable:
+            note(head | {"unusable": unusable.reason})
+            return None, str(unusable)
+        note(head | verdict.document)
+        return verdict, ""
+
+    def _kept(self, rounds: list[_Round], fault: str) -> tuple[_Round, str]:
+        """Return the round that counts, and a remark about it.
+
+        An unreviewed last round came after all the feedback and counts.
+        """
+        kept = rounds[-1]
+        if self.recipe.keep is Keep.BEST and kept.verdict is not None:
+            kept = max(
+                rounds, key=lambda one: (one.verdict.score if one.verdict else (), one.number)
+            )
+        accepted, judgement = None, ""
+        if kept.verdict is not None:
+            accepted, judgement = kept.verdict.is_accepted, f": {kept.verdict.summary}"
+        count = len(rounds)
+        self.respondents.transcript.note(
+            NoteKind.KEPT,
+            {"round": kept.number, "rounds": count, "accepted": accepted, "remark": fault},
+        )
+        remark = f"{self.recipe.title}: round {kept.number} of {count} counts{judgement}."
+        if accepted is False:
+            remark += " No round was accepted."
+        return kept, f"{remark} {fault.rstrip('.')}." if fault else remark
+
+
+@dataclass(slots=True, kw_only=True)
+class _ToolDesk:
+    """Answers the calls of one round and keeps count.
+
+    Calls come in two forms: a line of JSON in the answer (for every model, as the paper
+    describes it) and natively (where a model's abilities say so). Limits, faults and results are
+    the same in both; every fault goes back to the model as text.
+
+    Attributes:
+        is_over: Whether a call was one too many: none is answered after it.
+    """
+
+    tool: PoseTool
+    limits: Limits
+    transcript: Transcript
+    is_over: bool = False
+    earlier: list[object] = field(default_factory=list)
+
+    def turns(self, reply: Reply, *, native: bool) -> Messages:
+        """Return the answer with its calls and their results, empty where it calls nothing."""
+        # Models that are offered native calls write them into their answers as well.
+        if native and reply.tool_calls:
+            return self._native_turns(reply)
+        results: list[str] = []
+        for call in calls_in(reply.text, is_cut_off=reply.is_cut_off):
+            results.append(self._answer(call))
+            if self.is_over:
+                break
+        if not results:
+            return ()
+        told = fill.result_text(results, is_over=self.is_over)
+        return fill.model_message(reply.text), fill.said_by_user(told)
+
+    def _native_turns(self, reply: Reply) -> Messages:
+        """Return the calls as they came and one message for each: all must have a result."""
+        echoes, results = [], []
+        for call in reply.tool_calls:
+            written = replace(read_arguments(call.arguments), name=call.name)
+            # Servers that read the arguments of what comes back break on what is no JSON.
+            is_object = isinstance(written.arguments, dict)
+            echoes.append(call if is_object else replace(call, arguments="{}"))
+            result = self._answer(written)
+            results.append(Message(speaker=Speaker.TOOL, text=result, answers=call.id))
+        said = Message(speaker=Speaker.ASSISTANT, text=reply.text, calls=tuple(echoes))
+        return said, *results
+
+    def _answer(self, call: WrittenCall) -> str:
+        """Return the result of a call as JSON: a pose, or {"error": a sentence}."""
+        result = self._result(call)
+        self.transcript.note(
+            NoteKind.TOOL_CALL,
+            {
+                "tool": call.name[:_LONGEST_NOTED],
+                "arguments": json.dumps(call.arguments)[:_LONGEST_NOTED],
+                "understood": not call.problem,
+                "mended": call.mended,
+                "result": result,
+            },
+        )
+        return json.dumps(result, separators=(",", ":"))
+
+    def _result(self, call: WrittenCall) -> dict[str, object]:
+        asked, most = (call.name, call.arguments, call.problem), self.limits
+        problem = call.problem
+        if self.is_over:
+            problem = "no call is answered any more. Answer with what you have."
+        elif len(self.earlier) >= most.calls:
+            self.is_over = True
+            problem = f"no call is left: {most.calls} are allowed. Answer with what you have."
+        elif self.earlier.count(asked) >= most.identical_calls:
+            self.is_over = True
+            problem = (
+                f"this very call was answered {most.identical_calls} times and its answer does "
+                "not change. Answer with what you have."
+            )
+        elif not problem and call.name != TOOL:
+            problem = f"there is no function {call.name[:40]!r}; there is {TOOL}"
+        if not self.is_over:
+            self.earlier.append(asked)
+        return {"error": problem} if problem else self.tool.answer(call.arguments)

@@ -12,11 +12,8 @@ from enum import StrEnum
 
 from augment.errors import UnknownName
 from augment.prompts.vectors import LaneFormat
-from augment.variants.geometric_review import GEOMETRIC_REVIEW
-from augment.variants.review import Limits, Review
-from augment.variants.text_qa import TEXT_REVIEW
-from augment.variants.transcript import ModelRole
-from augment.variants.visual_qa import VISUAL_REVIEW
+from augment.variants.respondents import ModelRole
+from augment.variants.reviews import GEOMETRIC_REVIEW, TEXT_REVIEW, VISUAL_REVIEW, Limits, Review
 
 SPELLING = {"otm": "OTM", "fc": "FC", "tqa": "tQA", "vqa": "vQA", "geo": "geo"}
 """The variants as the paper spells and orders them, then ours."""
@@ -62,14 +59,13 @@ class Recipe:
     @property
     def roles(self) -> tuple[ModelRole, ...]:
         """The roles that language models play in it."""
-        return tuple(
-            dict.fromkeys((ModelRole.MODIFIER, *(self.review.asks if self.review else ())))
-        )
+        asked = self.review.asks if self.review else ()
+        return tuple(dict.fromkeys((ModelRole.MODIFIER, *asked)))
 
     @property
     def rounds(self) -> int:
         """How often the modifier is put to work at most."""
-        return 1 if self.review is None else 1 + self.limits.regenerations
+        return 1 if self.review is None else self.limits.rounds
 
 
 OTM = Recipe(slug="otm", title="One-time modifier")
@@ -79,27 +75,21 @@ VQA = Recipe(slug="vqa", title="Visual QA", review=VISUAL_REVIEW)
 GEO = Recipe(slug="geo", title="Geometric review (ours)", review=GEOMETRIC_REVIEW, keep=Keep.BEST)
 
 PAPER: tuple[Recipe, ...] = (OTM, FC, TQA, VQA)
-
-
-def _with_calls(reviewed: Recipe) -> Recipe:
-    """Function calling with that review on top."""
-    return replace(
+_WITH_CALLS = tuple(
+    replace(
         FC,
         slug=f"fc+{reviewed.slug}",
         title=f"Function calling + {reviewed.title[0].lower()}{reviewed.title[1:]}",
         review=reviewed.review,
         keep=reviewed.keep,
     )
-
-
-RECIPES: dict[str, Recipe] = {
-    recipe.slug: recipe
-    for recipe in (*PAPER, GEO, _with_calls(TQA), _with_calls(VQA), _with_calls(GEO))
-}
+    for reviewed in (TQA, VQA, GEO)
+)
+RECIPES: dict[str, Recipe] = {recipe.slug: recipe for recipe in (*PAPER, GEO, *_WITH_CALLS)}
 
 
 def find_recipe(name: str) -> Recipe:
-    """The recipe of that name, in any case ("OTM", "otm").
+    """Return the recipe of that name, in any case ("OTM", "otm").
 
     Raises:
         UnknownName: There is none; the sentence lists those there are.
@@ -111,5 +101,5 @@ def find_recipe(name: str) -> Recipe:
 
 
 def spell_variant(slug: str) -> str:
-    """A variant as people read it: "fc+tqa" is FC+tQA; one that is none of ours stays as it is."""
+    """Spell a variant as people read it: "fc+tqa" is FC+tQA; an unknown one stays as it is."""
     return "+".join(SPELLING.get(part, part) for part in slug.lower().split("+"))

@@ -1,21 +1,143 @@
-"""Who plays which role, and how a role is asked until its answer can be read."""
+"""Who plays which role, how a role is asked until its answer can be read, and the record of it.
+
+A service keeps the transcript in rows; tests and one-off runs keep it in memory.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
-from typing import TypeVar
+from dataclasses import asdict, dataclass, field
+from enum import StrEnum
+from functools import partial
+from typing import Protocol, TypeVar
 
-from augment.errors import ModelRefused, ReplyUnreadable
-from augment.llm.client import ChatClient
-from augment.llm.messages import Message, Reply, Request, Tool, ToolChoice
-from augment.llm.patience import Patience
-from augment.prompts.texts import prompt_version
-from augment.variants.recording_client import RecordingClient
-from augment.variants.transcript import ModelRole, Transcript
+from augment.errors import (
+    Abandoned,
+    ModelFault,
+    ModelRefused,
+    NotSent,
+    ParameterRefused,
+    ReplyUnreadable,
+    Unwanted,
+)
+from augment.llm.client import ChatClient, Patience
+from augment.llm.costs import cut_of
+from augment.llm.messages import DEFAULT_MAX_TOKENS, Message, Reply, Request, Tool, ToolChoice
+from augment.prompts.fill import prompt_version, review_re_ask_messages
 
 Messages = tuple[Message, ...]
 _Read = TypeVar("_Read")
+
+
+class ModelRole(StrEnum):
+    """What a language model is asked to be: the paper's agents, and the reader of intents."""
+
+    MODIFIER = "modifier"
+    REVIEWER = "reviewer"
+    ENGINEER = "engineer"
+    VIEWER = "viewer"
+    READER = "reader"
+
+
+class NoteKind(StrEnum):
+    """What a transcript notes between two calls."""
+
+    ROUND = "round"
+    TOOL_CALL = "tool_call"
+    REVIEW = "review"
+    KEPT = "kept"
+
+
+class Transcript(Protocol):
+    """Told of every attempt before it is sent, and of its end before anybody reads it."""
+
+    def known(self, role: ModelRole, request: Request, prompt_version: str) -> Reply | None:
+        """Return an earlier answer to this request, recorded as a call that cost nothing.
+
+        None where the request is to be sent.
+        """
+        ...
+
+    def asked(self, role: ModelRole, request: Request, prompt_version: str) -> int:
+        """Note that this request is about to be sent; returns the number of the call."""
+        ...
+
+    def sending(self, number: int) -> None:
+        """Note that this call leaves the computer now, after every wait.
+
+        Raises:
+            LeaseLost: Nobody needs the answer any more; it is not to be sent.
+        """
+        ...
+
+    def answered(self, number: int, reply: Reply, fault: ModelFault | None = None) -> None:
+        """Keep the raw answer to that call, and what shows that it is none to rely on."""
+        ...
+
+    def broke(self, number: int, fault: ModelFault) -> None:
+        """Note that there was no answer to that call, and why."""
+        ...
+
+    def note(self, kind: NoteKind, document: dict[str, object]) -> None:
+        """Keep what happened since the last call: ready for JSON, shown as it is."""
+        ...
+
+
+@dataclass(slots=True, kw_only=True)
+class RecordedCall:
+    """One attempt: a request, and either its reply or its fault (neither while under way)."""
+
+    number: int
+    role: ModelRole
+    request: Request
+    prompt_version: str
+    reply: Reply | None = None
+    fault: ModelFault | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RecordedNote:
+    """What happened after that call (0 before the first)."""
+
+    after_call: int
+    kind: NoteKind
+    document: dict[str, object]
+
+
+@dataclass(slots=True)
+class MemoryTranscript:
+    """A transcript that lives as long as its run; calls are numbered from 1."""
+
+    calls: list[RecordedCall] = field(default_factory=list)
+    notes: list[RecordedNote] = field(default_factory=list)
+
+    def known(self, role: ModelRole, request: Request, prompt_version: str) -> Reply | None:
+        """Return None: every request is sent."""
+        return None
+
+    def asked(self, role: ModelRole, request: Request, prompt_version: str) -> int:
+        """Record a request; returns its number."""
+        number = len(self.calls) + 1
+        self.calls.append(
+            RecordedCall(number=number, role=role, request=request, prompt_version=prompt_version)
+        )
+        return number
+
+    def sending(self, number: int) -> None:
+        """Do nothing: whoever keeps this record is alive to see the end of the call."""
+
+    def answered(self, number: int, reply: Reply, fault: ModelFault | None = None) -> None:
+        """Record the answer to that call."""
+        self.calls[number - 1].reply = reply
+        self.calls[number - 1].fault = fault
+
+    def broke(self, number: int, fault: ModelFault) -> None:
+        """Record the fault of that call."""
+        self.calls[number - 1].fault = fault
+
+    def note(self, kind: NoteKind, document: dict[str, object]) -> None:
+        """Record a note behind the last call."""
+        self.notes.append(RecordedNote(after_call=len(self.calls), kind=kind, document=document))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -45,123 +167,150 @@ class RespondentClient:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Respondents:
-    """Who is talked to, and what keeps the record.
+    """Everybody who is asked in one run, and what keeps the record.
 
     Attributes:
         clients: By role; a role without one is played by the modifier's.
         sampling: What every request is sent with.
+        max_tokens: The length limit of one answer; a cut-off one is asked again with twice it.
+        re_asks: How often an answer that can't be read is asked for again.
     """
 
     clients: Mapping[ModelRole, RespondentClient]
     transcript: Transcript
-    patience: Patience
+    patience: Patience = field(default_factory=Patience)
     sampling: Sampling = field(default_factory=Sampling)
+    max_tokens: int = DEFAULT_MAX_TOKENS
+    re_asks: int = 1
 
     def client_of(self, role: ModelRole) -> RespondentClient:
-        """Who plays that role."""
+        """Return who plays that role."""
         return self.clients.get(role, self.clients[ModelRole.MODIFIER])
 
-    def ask(
+    def read(
         self,
         role: ModelRole,
         messages: Messages,
+        reader: Callable[[str], _Read],
         *,
-        max_tokens: int,
+        again: Callable[[Messages, str, list[str]], Messages] = review_re_ask_messages,
         tools: tuple[Tool, ...] = (),
-        tool_choice: ToolChoice = ToolChoice.AUTO,
-    ) -> Reply:
-        """The reply of whoever plays the role.
-
-        Raises:
-            ModelRefused: The model declined, or its endpoint's filter did.
-            ModelFault: The last attempt broke, or the fault is one that does not pass.
-            BudgetSpent: The transcript's budget has no room for the next attempt.
-        """
-        respondent = self.client_of(role)
-        request = Request(
-            model=respondent.model,
-            messages=messages,
-            max_tokens=max_tokens,
-            tools=tools,
-            tool_choice=tool_choice,
-            temperature=self.sampling.temperature,
-            seed=self.sampling.seed,
-            reasoning_effort=self.sampling.reasoning_effort,
-        )
-        recording = RecordingClient(
-            client=respondent.client,
-            model=respondent.model,
-            transcript=self.transcript,
-            patience=self.patience,
-            context_tokens=respondent.context_tokens,
-        )
-        reply = recording.ask(role, request, prompt_version())
-        if reply.refusal is not None:
-            raise ModelRefused(reply.refusal or "The model declined without a reason.")
-        if reply.finish_reason == "content_filter":
-            raise ModelRefused("The endpoint's content filter withheld the answer.")
-        return reply
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Inquiry:
-    """How an answer is asked for until it can be read.
-
-    Attributes:
-        again: The conversation that asks once more: from the one so far, the answer's text and
-            what is wrong with it.
-        re_asks: How often that is done.
-    """
-
-    respondents: Respondents
-    role: ModelRole
-    again: Callable[[Messages, str, list[str]], Messages]
-    max_tokens: int
-    re_asks: int
-    tools: tuple[Tool, ...] = ()
-
-    def read(
-        self, messages: Messages, reader: Callable[[str], _Read], reply: Reply | None = None
+        reply: Reply | None = None,
     ) -> tuple[_Read, Messages, Reply]:
-        """What was read, the conversation that led to the answer, and the answer.
+        """Ask until the answer can be read.
 
         Args:
+            role: Who is asked.
             messages: What is asked.
             reader: From a text to what it says, raising ReplyUnreadable.
+            again: The conversation that asks once more: from the one so far, the answer's text
+                and what is wrong with it.
+            tools: Named where the conversation holds calls; none can be called any more.
             reply: The first answer, where it is there already.
+
+        Returns:
+            What was read, the conversation that led to the answer, and the answer.
 
         Raises:
             ReplyUnreadable: No answer can be read.
             ModelRefused: The model declined, or its endpoint's filter did.
             ModelFault: The wire broke for good.
         """
-        max_tokens = self.max_tokens
-        reply = reply or self._ask(messages, max_tokens)
-        for _ in range(self.re_asks):
+        ask = partial(self.ask, role, tools=tools, tool_choice=ToolChoice.NONE)
+        max_tokens, asked = self.max_tokens, 0
+        reply = reply or ask(messages)
+        while True:
             try:
-                return _read(reply, reader), messages, reply
+                return reader(reply.text), messages, reply
             except ReplyUnreadable as unreadable:
-                messages = self.again(messages, reply.text, unreadable.problems)
-                max_tokens *= 2 if reply.is_cut_off else 1
-                reply = self._ask(messages, max_tokens)
-        return _read(reply, reader), messages, reply
+                problems = list(unreadable.problems)
+                if reply.is_cut_off:
+                    problems.insert(0, "the answer was cut off at its length limit: be shorter")
+                if asked == self.re_asks:
+                    raise ReplyUnreadable(problems) from None
+            messages = again(messages, reply.text, problems)
+            max_tokens *= 2 if reply.is_cut_off else 1
+            asked += 1
+            reply = ask(messages, max_tokens=max_tokens)
 
-    def _ask(self, messages: Messages, max_tokens: int) -> Reply:
-        # Tools are named where the conversation holds calls, and can't be called any more.
-        return self.respondents.ask(
-            self.role,
-            messages,
-            max_tokens=max_tokens,
-            tools=self.tools,
-            tool_choice=ToolChoice.NONE,
+    def ask(
+        self,
+        role: ModelRole,
+        messages: Messages,
+        *,
+        max_tokens: int | None = None,
+        tools: tuple[Tool, ...] = (),
+        tool_choice: ToolChoice = ToolChoice.AUTO,
+    ) -> Reply:
+        """Return the reply of whoever plays the role.
+
+        Raises:
+            ModelRefused: The model declined, or its endpoint's filter did.
+            ModelFault: The last attempt broke, or the fault is one that does not pass.
+            BudgetSpent: The transcript's budget has no room for the next attempt.
+        """
+        request = Request(
+            model=self.client_of(role).model,
+            messages=messages,
+            max_tokens=max_tokens or self.max_tokens,
+            tools=tools,
+            tool_choice=tool_choice,
+            **asdict(self.sampling),
         )
+        reply = self.send(role, request, prompt_version())
+        if reply.refusal is not None:
+            raise ModelRefused(reply.refusal or "The model declined without a reason.")
+        if reply.finish_reason == "content_filter":
+            raise ModelRefused("The endpoint's content filter withheld the answer.")
+        return reply
 
+    def send(self, role: ModelRole, request: Request, version: str) -> Reply:
+        """Return the reply to a request; every attempt is recorded before it is judged.
 
-def _read(reply: Reply, reader: Callable[[str], _Read]) -> _Read:
-    try:
-        return reader(reply.text)
-    except ReplyUnreadable as unreadable:
-        if not reply.is_cut_off:
-            raise
-        cut = "the answer was cut off at its length limit: be shorter"
-        raise ReplyUnreadable([cut, *unreadable.problems]) from None
+        The request goes without what the model does not take, and what the transcript knows the
+        answer to is not sent.
+
+        Raises:
+            ContextTruncated: There is an answer, but to a part of the prompt.
+            ModelFault: The last attempt broke, or the fault is one that does not pass.
+            BudgetSpent: The transcript's budget has no room for the next attempt.
+            Unwanted: Nobody needs the reply any more.
+        """
+        client = self.client_of(role).client
+        while True:
+            sent = client.fitted(request)
+            try:
+                return self.transcript.known(role, sent, version) or self._attempt(
+                    role, sent, version
+                )
+            except ParameterRefused:
+                if client.fitted(request) == sent:
+                    raise
+
+    def _attempt(self, role: ModelRole, request: Request, version: str) -> Reply:
+        """Send the request as it is, as often as patience allows."""
+        respondent, attempt = self.client_of(role), 1
+        while True:
+            number = self.transcript.asked(role, request, version)
+            try:
+                sending = partial(self.transcript.sending, number)
+                reply = respondent.client.complete(request, sending=sending)
+            except Unwanted as why:
+                self.transcript.broke(number, NotSent(f"not sent: {why}"))
+                raise
+            except Abandoned as fault:
+                self.transcript.broke(number, fault)
+                raise fault.why from None
+            except ModelFault as fault:
+                self.transcript.broke(number, fault)
+                wait_s = self.patience.wait_s(fault, attempt=attempt)
+                if wait_s is None or isinstance(fault, ParameterRefused):
+                    raise
+                self.patience.sleep(wait_s)
+                attempt += 1
+            else:
+                cut = cut_of(request, reply, context_tokens=respondent.context_tokens)
+                self.transcript.answered(number, reply, cut)
+                if cut is not None:
+                    raise cut
+                return reply

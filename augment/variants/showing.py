@@ -1,26 +1,25 @@
-"""The exact messages that a role of a variant gets for a scene, without asking anybody.
+"""What a role of a variant is asked, and how much that can be, before anybody is asked. Pure.
 
 Reviewers judge what a modifier made; where nothing is given, they are shown an unchanged scene.
+Counted are calls that get an answer. Attempts that break on the wire come on top; a job's cap
+counts them too.
 """
 
 from __future__ import annotations
 
 import json
 import math
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from augment.llm.messages import Message
-from augment.prompts import fill, fill_review
-from augment.prompts.lane_curves import lane_curves
-from augment.prompts.names import short_names
-from augment.prompts.vectors import LaneFormat
-from augment.scene.entities import Scene
-from augment.scene.modification import Modification
-from augment.variants.modifier import form_of
-from augment.variants.recipes import Recipe
-from augment.variants.transcript import ModelRole
-from augment.variants.visual_qa import pictures
+from augment.prompts import fill
+from augment.scene.entities import Modification, Scene
+from augment.variants.pipeline import form_of
+from augment.variants.recipes import Recipe, Tools
+from augment.variants.respondents import ModelRole
+from augment.variants.reviews import pictures
 
 CHARACTERS_PER_TOKEN = 2.6
 """Measured on number-heavy text over common vocabularies: an estimate, no bound."""
@@ -32,21 +31,8 @@ EXAMPLE_QUESTIONS = (
 )
 """Shown to a viewer where no engineer has asked."""
 
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class LaneFit:
-    """How far the Bezier pieces of a prompt are from the lanes that they stand for.
-
-    Attributes:
-        pieces: Over all lanes and connectors.
-        position_m, heading_deg: The worst of all; worst_lane has the worst position.
-    """
-
-    lanes: int
-    pieces: int
-    position_m: float
-    heading_deg: float
-    worst_lane: str
+PROGRAM_TOKENS = 2_000
+"""What the program says between two answers: results of calls, problems, feedback."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -55,19 +41,40 @@ class Shown:
 
     Attributes:
         tools: Descriptions of functions that go beside the messages, as JSON.
-        fit: None where the lanes are polylines.
     """
 
     messages: tuple[Message, ...]
-    tools: tuple[str, ...]
-    fit: LaneFit | None
+    tools: tuple[str, ...] = ()
 
     @property
     def tokens(self) -> int:
-        """About so many tokens, pictures not counted."""
+        """An estimate of its tokens, pictures not counted."""
         characters = sum(len(message.text) for message in self.messages)
         characters += sum(len(tool) for tool in self.tools)
         return math.ceil(characters / CHARACTERS_PER_TOKEN)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CallRange:
+    """Calls of one role in one augmentation.
+
+    Attributes:
+        least: Where nothing goes wrong and no function is called.
+        usual: A guess: one answer with calls where there is a function, and one round.
+        most: Every round, every re-ask, every call of the function in an answer of its own.
+    """
+
+    least: int
+    usual: int
+    most: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TokenUse:
+    """Tokens of one role in one augmentation."""
+
+    prompt: int
+    completion: int
 
 
 def shown_prompt(
@@ -81,7 +88,7 @@ def shown_prompt(
     questions: Sequence[str] = EXAMPLE_QUESTIONS,
     images: tuple[bytes, ...] | None = None,
 ) -> Shown:
-    """What that role is asked first.
+    """Return what that role is asked first.
 
     Args:
         recipe: The variant.
@@ -93,38 +100,57 @@ def shown_prompt(
         questions: What the viewer is asked.
         images: What the viewer is shown, as `pictures` drew it before; None to draw it.
     """
-    radius_m = recipe.limits.radius_m
     if role is ModelRole.MODIFIER:
         form = form_of(recipe, native_tools=native_tools)
         native = form.calling is fill.Calling.NATIVE
         return Shown(
             messages=fill.modifier_messages(scene, instruction, form),
             tools=(json.dumps(fill.pose_tool().to_document()),) if native else (),
-            fit=_fit(scene, radius_m) if recipe.lane_format is LaneFormat.BEZIER else None,
         )
-    match role:
-        case ModelRole.REVIEWER:
-            ask = fill_review.reviewer_messages
-            messages = ask(scene, instruction, modification, radius_m=radius_m)
-        case ModelRole.ENGINEER:
-            ask = fill_review.engineer_messages
-            messages = ask(scene, instruction, modification, radius_m=radius_m)
-        case ModelRole.VIEWER:
-            if images is None:
-                images = pictures(scene, modification, width_px=recipe.limits.picture_px)
-            messages = fill_review.viewer_messages(questions, images)
-    return Shown(messages=messages, tools=(), fit=None)
+    if role is ModelRole.VIEWER:
+        if images is None:
+            images = pictures(scene, modification, width_px=recipe.limits.picture_px)
+        return Shown(messages=fill.viewer_messages(questions, images))
+    is_reviewer = role is ModelRole.REVIEWER
+    messages = fill.reviewer_messages if is_reviewer else fill.engineer_messages
+    radius_m = recipe.limits.radius_m
+    return Shown(messages=messages(scene, instruction, modification, radius_m=radius_m))
 
 
-def _fit(scene: Scene, radius_m: float) -> LaneFit | None:
-    curves = lane_curves(scene, short_names(scene), radius_m).values()
-    if not curves:
-        return None
-    worst = max(curves, key=lambda curve: curve.lane.error.position_m)
-    return LaneFit(
-        lanes=len(curves),
-        pieces=sum(len(curve.lane.pieces) for curve in curves),
-        position_m=worst.lane.error.position_m,
-        heading_deg=math.degrees(max(curve.lane.error.heading_rad for curve in curves)),
-        worst_lane=worst.id,
-    )
+def calls_of(recipe: Recipe) -> dict[ModelRole, CallRange]:
+    """Return the calls of every role that a recipe has."""
+    limits, rounds = recipe.limits, recipe.rounds
+    again = 1 + limits.re_asks
+    has_tool = recipe.tools is not Tools.NONE
+    # The answer with the first call too many, and the one that it is asked for.
+    a_round = again + (limits.calls + 1 if has_tool else 0)
+    calls = {ModelRole.MODIFIER: CallRange(least=1, usual=1 + has_tool, most=rounds * a_round)}
+    for role, asked in Counter(recipe.review.asks if recipe.review else ()).items():
+        calls[role] = CallRange(least=asked, usual=asked, most=asked * rounds * again)
+    return calls
+
+
+def most_tokens(recipe: Recipe, first: Mapping[ModelRole, int]) -> dict[ModelRole, TokenUse]:
+    """Return the tokens of conversations in which every answer reaches its length limit.
+
+    Args:
+        recipe: The variant.
+        first: At most so many tokens has the first prompt of each role.
+    """
+    limits = recipe.limits
+    # A cut-off answer is asked for again with twice the room.
+    longest = limits.max_output_tokens * (2 if limits.re_asks else 1)
+    turn = longest + PROGRAM_TOKENS
+    by_role = {}
+    for role, calls in calls_of(recipe).items():
+        # The modifier's conversation goes on through all rounds; a review is one of its own, and
+        # holds what the others said of the round.
+        talks, start = recipe.rounds, first[role] + turn
+        if role is ModelRole.MODIFIER:
+            talks, start = 1, first[role]
+        turns = calls.most // talks
+        by_role[role] = TokenUse(
+            prompt=talks * (turns * start + turn * turns * (turns - 1) // 2),
+            completion=calls.most * longest,
+        )
+    return by_role

@@ -13,7 +13,7 @@ from django.test import Client
 
 from augment.models import BaseScene, Probe, Scenario, SceneUpload
 from augment.scene.codec import modification_to_document, scene_to_document
-from augment.scene.modification import Modification
+from augment.scene.entities import Modification
 from augment.services.endpoints.known_endpoints import ensure_endpoint
 from augment.services.endpoints.known_models import model_at
 from augment.services.endpoints.probing import ABILITIES

@@ -23,11 +23,11 @@ from schemathesis import GenerationMode
 from schemathesis.checks import not_a_server_error
 from schemathesis.specs.openapi import checks
 
-from arena.api import studies
 from arena.api.reference import make_document
 from arena.models import Snapshot
 from arena.services.early_looks import open_early
 from arena.services.ratings import rate
+from arena.studies import api
 from augment.models import Endpoint, EndpointModel, Probe, SceneUpload, UploadMoment
 from augment.services.endpoints.known_endpoints import ensure_endpoint
 from augment.services.endpoints.known_models import model_at
@@ -176,11 +176,11 @@ def test_an_undocumented_status_would_be_noticed(
 ) -> None:
     """The checks check: an answer that nobody described fails the test above."""
 
-    def answer(self: studies.StudiesView, request: Any) -> Response:
+    def answer(self: api.StudiesView, request: Any) -> Response:
         return Response({}, status=418)
 
     make_document()  # as it is, not as it would be made of the view below
-    monkeypatch.setattr(studies.StudiesView, "get", answer)
+    monkeypatch.setattr(api.StudiesView, "get", answer)
     with pytest.raises(BaseExceptionGroup) as failed:
         ask_all("admin", here, only="listStudies")
     assert "418" in str(failed.value.exceptions)

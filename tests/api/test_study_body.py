@@ -7,9 +7,9 @@ from typing import Any
 
 import pytest
 
-from arena.api.studies import StudyBody
 from arena.models import Study
 from arena.services.study_plan import PLAN_INPUTS, StudyPlan
+from arena.studies.api import StudyBody
 from augment.services.inputs import InputKind
 from tests.api.asking import error_of
 from tests.api.tokens import program_of

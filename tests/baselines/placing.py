@@ -6,9 +6,8 @@ import pytest
 
 from augment.baselines.rule_placer import place
 from augment.errors import CannotPlace
-from augment.scene.entities import Scene, TrafficAgent
+from augment.scene.entities import Scene, TrafficAgent, apply
 from augment.scene.intent import Intent
-from augment.scene.modification import apply
 
 
 def added(shown: Scene, intent: Intent, *, seed: int = 0) -> tuple[TrafficAgent, ...]:

@@ -13,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from augment.baselines import quantised, rule_placer
-from augment.baselines.quantised_code import Code, Direction, code_of
+from augment.baselines.quantised import Code, Direction, code_of
 from augment.baselines.registry import PLACERS
 from augment.scene.entities import AgentType, TrafficAgent
 from bench.displacement import made, measured

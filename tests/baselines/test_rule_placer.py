@@ -11,16 +11,20 @@ import pytest
 from augment.geometry.polyline import Polyline
 from augment.scene.entities import AgentType, Lane, Scene, TrafficSide
 from augment.scene.intent import (
+    Body,
     Intent,
     LaneChoice,
     Lateral,
+    LateralTarget,
+    Nearness,
     Relation,
+    Setting,
+    Shape,
     Side,
     Spot,
     VehicleRequest,
     WalkRequest,
 )
-from augment.scene.intent_words import Body, LateralTarget, Nearness, Setting, Shape
 from tests.baselines.placing import added, refusal
 from tests.intents import (
     LEFT_EDGE,

@@ -8,10 +8,8 @@ import pytest
 
 from augment.baselines.rule_placer import Placement, place
 from augment.checks import Ground, Severity
-from augment.checks.against_intent import check_against_intent
-from augment.scene.catalogue import ScenarioType
-from augment.scene.entities import AgentType, TrafficAgent
-from augment.scene.modification import apply
+from augment.checks.registry import check_against_intent
+from augment.scene.entities import AgentType, ScenarioType, TrafficAgent, apply
 from tests.fixtures.shelf import SLUGS, entry, measure_agent, shown_scene
 
 

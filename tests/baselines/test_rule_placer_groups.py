@@ -8,10 +8,9 @@ import math
 import numpy as np
 import pytest
 
-from augment.geometry.boxes import overlap
+from augment.geometry.frames import overlap
 from augment.scene.entities import AgentType
-from augment.scene.intent import Side
-from augment.scene.intent_words import Shape
+from augment.scene.intent import Shape, Side
 from tests.baselines.placing import added
 from tests.intents import LEFT_EDGE, cones, crash, metres, towards, walk
 from tests.scenes import curve, scene

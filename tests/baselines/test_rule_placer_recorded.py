@@ -5,9 +5,9 @@ from pathlib import Path
 import pytest
 
 from augment.baselines.rule_placer import place
-from augment.geometry.angles import difference
+from augment.geometry.frames import difference
+from augment.scene.entities import apply, without_traffic
 from augment.scene.lane_graph import LaneGraph
-from augment.scene.modification import apply, without_traffic
 from tests.intents import PAPER
 from tests.recorded import recorded
 

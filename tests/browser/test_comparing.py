@@ -9,7 +9,7 @@ from playwright.sync_api import Browser, expect
 from pytest_django.live_server_helper import LiveServer
 
 from augment.models import Augmentation
-from augment.scene.modification import Modification
+from augment.scene.entities import Modification
 from augment.services.scenarios.pictures import camera_of, picture_of
 from augment.services.scenarios.scenes import scene_of
 from tests.browser.booth import Booth, all_sent, press

@@ -9,7 +9,7 @@ from playwright.sync_api import Browser, Page, expect
 from pytest_django.live_server_helper import LiveServer
 
 from augment.models import Scenario
-from augment.scene.intent_codec import intent_to_document
+from augment.scene.codec import intent_to_document
 from tests.browser.booth import BOUNCE_MS, Booth, furnish, ready
 from tests.browser.test_voting_page import faults
 from tests.intents import LEFT_EDGE, parked, towards

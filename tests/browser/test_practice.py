@@ -9,7 +9,7 @@ from playwright.sync_api import Page, expect
 from arena.services.practice import practice_pairs
 from augment.models import Augmentation, Scenario
 from augment.scene.codec import modification_to_document
-from augment.scene.modification import Modification
+from augment.scene.entities import Modification
 from augment.services.scenarios.pictures import draw_checks, store
 from tests.browser.booth import DESK, PHONE, Booth
 from tests.browser.test_voting_page import faults

@@ -10,8 +10,7 @@ from hypothesis import strategies as st
 
 from augment.checks import Finding, FindingKind, findings
 from augment.geometry.frames import Pose
-from augment.scene.entities import AgentType, Area, AreaKind, Scene, TrafficAgent
-from augment.scene.modification import Modification
+from augment.scene.entities import AgentType, Area, AreaKind, Modification, Scene, TrafficAgent
 from tests.checks.worlds import moved_agent, moved_scene
 from tests.scenes import cone, curve, junction, scene, vehicle
 

@@ -8,12 +8,21 @@ from dataclasses import replace
 import pytest
 
 from augment.checks import Finding, FindingKind, Ground, Severity
-from augment.checks.against_intent import check_against_intent
-from augment.checks.tolerances import AUTHORED
-from augment.scene.entities import AgentType, TrafficAgent, TrafficSide
-from augment.scene.intent import CrashedCar, Intent, LaneChoice, Side, Spot, VehicleRequest
-from augment.scene.intent_words import Body, Facing, LateralTarget, Shape
-from augment.scene.modification import Modification
+from augment.checks.parties import AUTHORED
+from augment.checks.registry import check_against_intent
+from augment.scene.entities import AgentType, Modification, TrafficAgent, TrafficSide
+from augment.scene.intent import (
+    Body,
+    CrashedCar,
+    Facing,
+    Intent,
+    LaneChoice,
+    LateralTarget,
+    Shape,
+    Side,
+    Spot,
+    VehicleRequest,
+)
 from tests.intents import (
     CENTRED,
     LEFT_EDGE,

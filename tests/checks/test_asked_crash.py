@@ -8,11 +8,18 @@ from dataclasses import replace
 import pytest
 
 from augment.checks import FindingKind, Ground
-from augment.checks.against_intent import check_against_intent
-from augment.scene.entities import TrafficAgent
-from augment.scene.intent import CrashedCar, CrashRequest, Intent, Length, Relation, Spot
-from augment.scene.intent_words import Bearing, Facing
-from augment.scene.modification import Modification
+from augment.checks.registry import check_against_intent
+from augment.scene.entities import Modification, TrafficAgent
+from augment.scene.intent import (
+    Bearing,
+    CrashedCar,
+    CrashRequest,
+    Facing,
+    Intent,
+    Length,
+    Relation,
+    Spot,
+)
 from tests.scenes import scene, vehicle
 
 SPOT = Spot(distance=Length(low_m=25.0, high_m=25.0), relation=Relation.AHEAD)

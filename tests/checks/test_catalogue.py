@@ -9,8 +9,7 @@ from dataclasses import replace
 import pytest
 
 from augment.checks import FindingKind, Severity, findings
-from augment.scene.entities import AgentType, TrafficAgent, TrafficSide
-from augment.scene.modification import Modification
+from augment.scene.entities import AgentType, Modification, TrafficAgent, TrafficSide
 from tests.checks.worlds import Reference, references, severities
 
 REFERENCES = references()

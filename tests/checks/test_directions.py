@@ -8,7 +8,7 @@ from dataclasses import replace
 import pytest
 
 from augment.checks import FindingKind, Severity
-from augment.geometry.angles import wrap
+from augment.geometry.frames import wrap
 from augment.scene.entities import AgentType, Area, AreaKind, TrafficAgent
 from tests.checks.worlds import found_in, of_kind, severities
 from tests.scenes import curve, pedestrian, scene, vehicle

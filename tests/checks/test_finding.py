@@ -5,8 +5,7 @@ from __future__ import annotations
 import pytest
 
 from augment.checks import Finding, FindingKind, Severity
-from augment.checks.against_intent import ASKED_CHECKS
-from augment.checks.registry import CHECKS
+from augment.checks.registry import ASKED_CHECKS, CHECKS
 
 OFF = Finding(
     kind=FindingKind.LANE,

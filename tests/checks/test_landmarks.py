@@ -7,13 +7,28 @@ from dataclasses import replace
 import pytest
 
 from augment.checks import Ground
-from augment.checks.against_intent import check_against_intent
-from augment.checks.landmarks import find_mark, find_picked, list_absent, resolve_landmarks
-from augment.checks.lanes_across import LanesAcross
-from augment.scene.entities import TurnType
-from augment.scene.intent import Intent, Length, Move, Relation, Spot, VehicleRequest
-from augment.scene.landmarks import LaneChoice, MapPlace, Pick, Side, Sight
-from augment.scene.modification import Modification
+from augment.checks.lanes_across import (
+    LanesAcross,
+    find_mark,
+    find_picked,
+    list_absent,
+    resolve_landmarks,
+)
+from augment.checks.registry import check_against_intent
+from augment.scene.entities import Modification, TurnType
+from augment.scene.intent import (
+    Intent,
+    LaneChoice,
+    Length,
+    MapPlace,
+    Move,
+    Pick,
+    Relation,
+    Side,
+    Sight,
+    Spot,
+    VehicleRequest,
+)
 from tests.fixtures.shelf import whole_scene
 
 STREET = whole_scene("terrace-row")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from hypothesis import given
 from hypothesis import strategies as st
 
-from augment.checks.lane_index import LaneIndex, best_aligned
+from augment.checks.ground import LaneIndex, best_aligned
 from augment.scene.entities import Scene
 from augment.scene.lane_graph import LaneGraph
 from tests.scenes import curve, junction, scene

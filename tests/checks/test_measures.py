@@ -12,8 +12,8 @@ import shapely
 
 from augment.checks import Ground
 from augment.checks.measures import LaneEdges, MeasureLine, find_measures, lane_edges_at
+from augment.scene.codec import intent_from_document
 from augment.scene.intent import Intent, LaneChoice, Relation, Side, Spot, VehicleRequest
-from augment.scene.intent_codec import intent_from_document
 from tests.checks.worlds import FIXTURES, references
 from tests.intents import CENTRED, LEFT_EDGE, RIGHT_EDGE, metres, parked, spot, towards, walk
 from tests.scenes import curve, scene

@@ -8,8 +8,7 @@ from pathlib import Path
 import pytest
 
 from augment.checks import FindingKind, Severity, findings
-from augment.scene.entities import AgentType, Scene
-from augment.scene.modification import Modification
+from augment.scene.entities import AgentType, Modification, Scene
 from tests.recorded import recorded
 
 pytestmark = pytest.mark.realdata

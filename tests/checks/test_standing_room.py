@@ -8,9 +8,8 @@ from dataclasses import replace
 import pytest
 
 from augment.checks import FindingKind, Severity
-from augment.checks.surfaces import Surface
-from augment.geometry.boxes import corners
-from augment.geometry.frames import Pose
+from augment.checks.ground import Surface
+from augment.geometry.frames import Pose, corners
 from augment.scene.entities import AgentType, Area, AreaKind, TrafficAgent
 from tests.checks.worlds import found_in, of_kind, severities
 from tests.scenes import EGO, cone, junction, pedestrian, scene, vehicle

@@ -8,7 +8,8 @@ from dataclasses import replace
 import pytest
 
 from augment.checks import FindingKind, Severity
-from augment.metrics.fault_guess import FaultClass, first_guess
+from augment.checks.finding import FaultClass
+from augment.metrics.fault_guess import first_guess
 from augment.scene.entities import AgentType, TrafficAgent
 from tests.checks.worlds import found_in, of_kind
 from tests.scenes import cone, pedestrian, scene, vehicle

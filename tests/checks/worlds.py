@@ -14,8 +14,16 @@ from augment.checks import Finding, FindingKind, Severity, findings
 from augment.geometry.frames import Pose
 from augment.geometry.polyline import Polyline
 from augment.scene.codec import modification_from_document, scene_from_document
-from augment.scene.entities import Area, Lane, LaneConnector, Point, Scene, TrafficAgent
-from augment.scene.modification import Modification, without_traffic
+from augment.scene.entities import (
+    Area,
+    Lane,
+    LaneConnector,
+    Modification,
+    Point,
+    Scene,
+    TrafficAgent,
+    without_traffic,
+)
 
 W = TypeVar("W", Lane, LaneConnector)
 

@@ -12,12 +12,11 @@ from django.db import connection
 from django.test.utils import CaptureQueriesContext
 from django.urls import reverse
 
-from arena.queries.analyses import analysis_of
+from arena.jobs.queries import analysis_of
 from augment.models import Augmentation, Contestant, GenerationJob, Scenario
-from augment.scene.codec import modification_to_document
+from augment.scene.codec import intent_to_document, modification_to_document
+from augment.scene.entities import Modification
 from augment.scene.intent import Intent
-from augment.scene.intent_codec import intent_to_document
-from augment.scene.modification import Modification
 from augment.services.judging.analyses import analyse_job
 from augment.services.scenarios.pictures import store
 from augment.services.scenarios.scenes import reference_of

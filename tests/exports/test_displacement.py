@@ -7,12 +7,11 @@ from pathlib import Path
 import pytest
 from django.core.management import call_command
 
-from arena.exports.jobs.displacement_table import DisplacementTable, displacement_table
-from arena.exports.jobs.displacement_writers import COLUMNS, FORMATS, csv_bytes
+from arena.jobs.exports.displacement import DisplacementTable, displacement_table
+from arena.jobs.exports.displacement_files import COLUMNS, FORMATS, csv_bytes
 from augment.models import Augmentation, Contestant, GenerationJob
-from augment.scene.catalogue import ScenarioType
 from augment.scene.codec import modification_to_document
-from augment.scene.modification import Modification
+from augment.scene.entities import Modification, ScenarioType
 from augment.services.judging.displacement import By
 from augment.services.scenarios.pictures import store
 from tests.jobs import rows

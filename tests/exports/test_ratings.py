@@ -15,7 +15,7 @@ from arena.services.studies import close_study
 from augment.errors import Conflict
 from augment.models import Augmentation, Event, Scenario
 from augment.scene.codec import modification_to_document
-from augment.scene.modification import Modification
+from augment.scene.entities import Modification
 from tests.opening import open_study
 from tests.scenes import vehicle
 from tests.study_rows import a_study, cast_of, expert, matchups_of, vote

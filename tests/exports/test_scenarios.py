@@ -17,14 +17,13 @@ from django.core.management.base import CommandError
 from django.test import Client
 from django.urls import reverse
 
-from arena.exports.jobs.scenario_files import SCENARIO_FILES
+from arena.jobs.exports.files import SCENARIO_FILES
 from arena.models import ScenarioFile
 from arena.services.written_files import keep_file
 from augment.formats.writers import WRITERS
 from augment.models import Augmentation, BaseScene, Contestant, GenerationJob
-from augment.scene.catalogue import ScenarioType
 from augment.scene.codec import modification_to_document, scene_from_document, scene_to_document
-from augment.scene.modification import Modification
+from augment.scene.entities import Modification, ScenarioType
 from augment.services.scenarios.pictures import store
 from augment.services.scenarios.scenes import add_scenario
 from tests.jobs import rows

@@ -19,7 +19,7 @@ from arena.services.studies import close_study
 from arena.services.vote_rows import COLUMNS, digest_of, vote_rows, votes_csv
 from augment.errors import Conflict
 from augment.models import Contestant, Scenario
-from augment.scene.catalogue import ScenarioType
+from augment.scene.entities import ScenarioType
 from tests.append_only import rewriting
 from tests.study_rows import a_study, matchups_of, vote
 

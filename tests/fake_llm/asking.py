@@ -5,13 +5,12 @@ from __future__ import annotations
 import random
 
 from augment.fake_llm.server import FakeServer
+from augment.llm.client import Patience
 from augment.llm.openai_wire import OpenAIWire
-from augment.llm.patience import Patience
 from augment.scene.entities import Scene
 from augment.variants.pipeline import Outcome, run
 from augment.variants.recipes import find_recipe
-from augment.variants.respondents import RespondentClient
-from augment.variants.transcript import MemoryTranscript
+from augment.variants.respondents import MemoryTranscript, RespondentClient
 
 
 def outcome(

@@ -9,8 +9,7 @@ import pytest
 
 from augment.fake_llm.careless import MISTAKES, bend, dice, is_unreadable
 from augment.fake_llm.server import FakeServer
-from augment.scene.entities import Scene, TrafficAgent
-from augment.scene.modification import Modification
+from augment.scene.entities import Modification, Scene, TrafficAgent
 from tests.fake_llm.asking import outcome
 from tests.scenes import curve, pedestrian, scene, vehicle
 

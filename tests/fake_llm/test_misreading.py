@@ -4,8 +4,7 @@ import random
 
 import pytest
 
-from augment.fake_llm.careless import lay_straight
-from augment.fake_llm.misreading import misread
+from augment.fake_llm.careless import lay_straight, misread
 from augment.scene.entities import TurnType
 from augment.scene.intent import Intent
 from tests.fixtures.shelf import SLUGS, entry, shown_scene

@@ -5,9 +5,8 @@ from __future__ import annotations
 import pytest
 
 from augment.errors import ContextTruncated, ModelFault
-from augment.fake_llm.models import MODELS
-from augment.fake_llm.server import running
-from augment.variants.transcript import MemoryTranscript
+from augment.fake_llm.server import MODELS, running
+from augment.variants.respondents import MemoryTranscript
 from tests.fake_llm.asking import outcome
 from tests.intents import intents
 from tests.scenes import scene

@@ -2,8 +2,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from augment.fake_llm.requests import SpokenMessage
 from augment.fake_llm.sight import task_of
+from augment.fake_llm.wire import SpokenMessage
 from augment.prompts.fill import modifier_messages
 from augment.scene.entities import Scene, TrafficSide
 from tests.scenes import cone, junction, scene, vehicle

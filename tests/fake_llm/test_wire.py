@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from augment.fake_llm.requests import BadRequest, chat_request
+from augment.fake_llm.wire import BadRequest, chat_request
 from augment.llm.messages import Message, Request, Speaker, data_url
 from augment.render.camera import camera_for
 from tests.render.pictures import draw_original

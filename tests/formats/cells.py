@@ -8,9 +8,16 @@ from typing import Any
 import numpy as np
 
 from augment.formats.writing import Cell
-from augment.scene.catalogue import ScenarioType
-from augment.scene.entities import AgentType, Area, AreaKind, Origin, Scene, TrafficSide
-from augment.scene.modification import Modification
+from augment.scene.entities import (
+    AgentType,
+    Area,
+    AreaKind,
+    Modification,
+    Origin,
+    ScenarioType,
+    Scene,
+    TrafficSide,
+)
 from augment.scene.recording import Recording, Track
 from tests.scenes import cone, junction, pedestrian, scene, vehicle
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from augment.formats.reading import Reading
 from augment.formats.writing import Cell
-from augment.geometry.angles import difference
+from augment.geometry.frames import difference
 from augment.geometry.polyline import Polyline
 from augment.scene.entities import Area, Lane, LaneConnector, Scene, TrafficAgent
 from augment.scene.lane_graph import AnyLane

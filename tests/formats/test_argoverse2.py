@@ -9,11 +9,10 @@ import pytest
 
 from augment.errors import InvalidDocument
 from augment.formats.argoverse2 import TYPE_OF, ArgoverseSensor
-from augment.scene.codec import scene_from_document, scene_to_document
+from augment.scene.codec import recording_to_document, scene_from_document, scene_to_document
 from augment.scene.entities import AgentType, AreaKind, Scene, TrafficLight, TrafficSide, TurnType
 from augment.scene.lane_graph import LaneGraph
 from augment.scene.recording import Recording
-from augment.scene.recording_codec import recording_to_document
 from tests.formats.av2_logs import boxes, city_map, poses, segment, write_log
 
 

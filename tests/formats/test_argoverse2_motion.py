@@ -12,7 +12,7 @@ from augment.formats.readers import recognise
 from augment.formats.reading import Reading
 from augment.scene.codec import scene_to_document
 from augment.scene.entities import AgentType
-from augment.scene.notes import SceneNoteKind
+from augment.scene.recording import SceneNoteKind
 from tests.formats.av2_motion import row, rows, write_scenario
 
 READER = ArgoverseMotion()

@@ -13,7 +13,7 @@ from augment.formats.commonroad.scenario import CommonRoad
 from augment.formats.reading import Reading
 from augment.scene.codec import scene_to_document
 from augment.scene.entities import AgentType, AreaKind, TrafficLight, TurnType
-from augment.scene.notes import SceneNoteKind
+from augment.scene.recording import SceneNoteKind
 from tests.properties import examples
 
 

@@ -17,9 +17,9 @@ from hypothesis import strategies as st
 from augment.formats.readers import READERS
 from augment.formats.writers import WRITERS, writer_named
 from augment.formats.writing import Cell, Written
+from augment.scene.codec import recording_from_document
 from augment.scene.motion import MotionSource
 from augment.scene.recording import Recording
-from augment.scene.recording_codec import recording_from_document
 from tests.formats.cells import cell, crossing, recorded_street
 from tests.formats.receivers import told_by
 from tests.formats.sanity import check_sanity, loaded

@@ -12,10 +12,14 @@ from augment.formats.interplan.file import ReadEntry, token_of
 from augment.formats.interplan.reader import read
 from augment.formats.interplan.writer import interplan_text as write
 from augment.formats.writing import Cell
-from augment.geometry.angles import difference
-from augment.scene.catalogue import ScenarioType
-from augment.scene.entities import AgentType, TrafficAgent
-from augment.scene.modification import Modification, without_traffic
+from augment.geometry.frames import difference
+from augment.scene.entities import (
+    AgentType,
+    Modification,
+    ScenarioType,
+    TrafficAgent,
+    without_traffic,
+)
 from tests.fixtures.shelf import SLUGS, entry, shown_scene, whole_scene
 
 UNTOLD = (AgentType.BARRIER, AgentType.CONSTRUCTION_SIGN)

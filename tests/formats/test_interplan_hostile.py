@@ -20,8 +20,7 @@ from augment.formats.documents import (
 )
 from augment.formats.documents import MOST_YAML_VALUES as MOST_VALUES
 from augment.formats.interplan.reader import FURTHEST_FROM_EGO_M, read
-from augment.scene.entities import Scene
-from augment.scene.modification import without_traffic
+from augment.scene.entities import Scene, without_traffic
 from tests.fixtures.shelf import whole_scene
 
 TOKEN = "00000000000000ab"

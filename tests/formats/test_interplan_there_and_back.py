@@ -12,9 +12,7 @@ import pytest
 from augment.formats.interplan.file import token_of
 from augment.formats.interplan.reader import read as read_interplan
 from augment.formats.interplan.writer import interplan_text as write_interplan
-from augment.scene.catalogue import ScenarioType
-from augment.scene.entities import AgentType
-from augment.scene.modification import without_traffic
+from augment.scene.entities import AgentType, ScenarioType, without_traffic
 from tests.formats.cells import cell
 from tests.formats.round_trips import agent_changes
 from tests.scenes import cone, pedestrian, vehicle

@@ -14,7 +14,7 @@ from augment.formats.nuplan_map import to_utm
 from augment.formats.reading import Reading
 from augment.scene.codec import scene_to_document
 from augment.scene.entities import AgentType, AreaKind, TrafficLight, TrafficSide, TurnType
-from augment.scene.notes import SceneNoteKind
+from augment.scene.recording import SceneNoteKind
 from tests.formats.nuplan_files import CITIES, token, write_log, write_map
 
 START = token(100).hex()

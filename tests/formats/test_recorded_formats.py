@@ -11,11 +11,10 @@ import pytest
 
 from augment.formats.readers import recognise
 from augment.formats.reading import Reading
-from augment.geometry.angles import difference
-from augment.scene.codec import scene_from_document, scene_to_document
+from augment.geometry.frames import difference
+from augment.scene.codec import recording_to_document, scene_from_document, scene_to_document
 from augment.scene.entities import TrafficLight, TrafficSide
 from augment.scene.lane_graph import LaneGraph
-from augment.scene.recording_codec import recording_to_document
 from tests.recorded import recorded
 
 pytestmark = pytest.mark.realdata

@@ -19,6 +19,7 @@ from augment.scene.entities import (
     AgentType,
     Lane,
     LaneConnector,
+    Modification,
     Scene,
     SceneOptions,
     TrafficAgent,
@@ -28,8 +29,7 @@ from augment.scene.entities import (
     TurnType,
 )
 from augment.scene.lane_graph import AnyLane
-from augment.scene.modification import Modification
-from augment.scene.notes import SceneNoteKind
+from augment.scene.recording import SceneNoteKind
 from tests.fixtures.shelf import entry, whole_scene
 from tests.formats.cells import OF_EACH_TYPE, cell, crossing, recorded_street
 from tests.formats.round_trips import Change, changes

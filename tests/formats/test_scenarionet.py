@@ -17,7 +17,7 @@ from augment.formats.scenarionet.scenario import ScenarioNet
 from augment.formats.scenarionet.unpickling import read_pickle
 from augment.scene.codec import scene_to_document
 from augment.scene.entities import AreaKind, TrafficLight, TrafficSide, TurnType
-from augment.scene.notes import SceneNoteKind
+from augment.scene.recording import SceneNoteKind
 from tests.properties import examples
 
 

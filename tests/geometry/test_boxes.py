@@ -7,8 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from shapely import Polygon
 
-from augment.geometry.boxes import APART, Box, overlap
-from augment.geometry.frames import Pose
+from augment.geometry.frames import APART, Box, Pose, overlap
 
 
 def box(x: float, y: float, heading: float = 0.0, length: float = 4.0, width: float = 2.0) -> Box:

@@ -22,16 +22,15 @@ from django.core.files.storage import default_storage
 from django.utils import timezone
 from pytest_django import Settings
 
-from arena.exports.jobs.displacement_table import displacement_table
-from arena.exports.jobs.displacement_writers import FORMATS as DISPLACEMENT
 from arena.exports.study_folder.writing import MANIFEST, write_study
+from arena.jobs.exports.displacement import displacement_table
+from arena.jobs.exports.displacement_files import FORMATS as DISPLACEMENT
 from arena.management.demo import JOB, RATED, SIMULATED_EXPERTS, SIMULATED_STUDY, vote_and_rate
 from arena.models import Person, Study
 from arena.models.tokens import fresh_token
 from augment.models import Augmentation, GenerationJob
-from augment.scene.catalogue import ScenarioType
 from augment.scene.codec import modification_to_document
-from augment.scene.modification import Modification
+from augment.scene.entities import Modification, ScenarioType
 from augment.services.judging.displacement import By
 from tests.golden.conftest import Check
 from tests.render.pictures import opened

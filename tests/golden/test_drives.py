@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from augment.scene.catalogue import ScenarioType
-from augment.scene.entities import Scene
-from augment.scene.modification import Modification
+from augment.scene.entities import Modification, ScenarioType, Scene
 from augment.simulation.drive import expert_of, run
 from augment.simulation.pdm_closed import PdmClosed
 from augment.simulation.road import Road
 from augment.simulation.score import ScoreKind, score_drive
-from augment.simulation.setting import DriveSetting
 from augment.simulation.states import SPEED, X, Y
+from augment.simulation.traffic import DriveSetting
 from tests.golden.conftest import Check
 from tests.scenes import junction, pedestrian, vehicle
 from tests.simulation.worlds import street

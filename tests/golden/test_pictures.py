@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import hashlib
 
-from augment.render.bev import draw
+from augment.render.bev import draw, draw_for_review
 from augment.render.camera import camera_for
-from augment.render.reviewed import draw_for_review
-from augment.scene.entities import Scene
-from augment.scene.modification import Modification
+from augment.scene.entities import Modification, Scene
 from tests.golden.conftest import Check
 from tests.render.pictures import opened
 from tests.scenes import cone, curve, junction, pedestrian, scene, vehicle

@@ -14,11 +14,11 @@ from tests.house.source import ROOT, dotted, functions, imported, modules, walke
 HEAVY = {
     "openai": ("augment.llm.openai_wire",),
     "httpx2": (*("augment.llm.openai_wire", "augment.llm.wire_transport"),),
-    "httpcore2": ("augment.llm.wire_transport", "augment.llm.wire_network"),
+    "httpcore2": ("augment.llm.wire_transport",),
     "genai_prices": ("augment.services.endpoints.known_models",),
     "shapely": (
         *("augment.checks", "augment.scene", "augment.simulation", "augment.formats"),
-        "augment.prompts.clip",
+        "augment.prompts.extent",
     ),
     "pandas": ("augment.formats", "arena.exports"),
     "pyarrow": ("augment.formats", "arena.exports", "arena.rating.votes_file"),

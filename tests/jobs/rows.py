@@ -6,12 +6,9 @@ from datetime import UTC, datetime, timedelta
 from typing import Any
 
 from augment.models import Augmentation, BaseScene, Contestant, Endpoint, GenerationJob, Scenario
-from augment.scene.catalogue import ScenarioType
-from augment.scene.codec import modification_to_document, scene_to_document
-from augment.scene.entities import Scene
-from augment.scene.intent_codec import intent_to_document
-from augment.scene.intent_words import Shape
-from augment.scene.modification import Modification
+from augment.scene.codec import intent_to_document, modification_to_document, scene_to_document
+from augment.scene.entities import Modification, ScenarioType, Scene
+from augment.scene.intent import Shape
 from augment.services.running import jobs
 from augment.services.running.runner import AUGMENTATIONS, Held
 from augment.services.work import Settlement

@@ -8,9 +8,9 @@ from decimal import Decimal
 import pytest
 
 from augment.errors import ModelFault
+from augment.llm.client import Patience
 from augment.llm.costs import Price, WorstCase
-from augment.llm.patience import Patience
-from augment.llm.wire_faults import fault_of_status
+from augment.llm.openai_wire import fault_of_status
 from augment.models import Augmentation, CallLease, Endpoint, GenerationJob
 from augment.services.endpoints import client
 from augment.services.running import budget

@@ -16,9 +16,8 @@ from augment.formats.readers import READERS
 from augment.llm.client import ChatClient
 from augment.llm.openai_wire import OpenAIWire
 from augment.models import Augmentation, Endpoint
-from augment.scene.codec import modification_from_document, scene_to_document
+from augment.scene.codec import intent_from_document, modification_from_document, scene_to_document
 from augment.scene.intent import Intent
-from augment.scene.intent_codec import intent_from_document
 from augment.scene.lane_graph import LaneGraph
 from augment.services.endpoints import contestants
 from augment.services.endpoints.known_endpoints import ensure_endpoint

@@ -9,14 +9,13 @@ from typing import Any
 import pytest
 
 from augment.errors import KeyMissing
+from augment.llm.client import Patience
 from augment.llm.messages import Message, Request, Speaker
 from augment.llm.openai_wire import OpenAIWire
-from augment.llm.patience import Patience
 from augment.models import Augmentation, CallLease, Endpoint, EndpointModel, Event, ModelCall
 from augment.services.endpoints.client import EndpointClient, Queue
 from augment.services.running import jobs, runner
-from augment.variants.recording_client import RecordingClient
-from augment.variants.transcript import MemoryTranscript, ModelRole
+from augment.variants.respondents import MemoryTranscript, ModelRole, RespondentClient, Respondents
 from tests.jobs.rows import add_model, add_scenario, only_row
 from tests.llm.json_server import JsonServer, serving
 
@@ -68,13 +67,13 @@ class Asking:
     def ask(self, request: Request = ASKED) -> str:
         wire = OpenAIWire(base_url=self.endpoint.base_url, api_key=None, timeout_s=60.0)
         with EndpointClient(wire, self.endpoint, Queue(longest_s=0.0)) as client:
-            conversation = RecordingClient(
-                client=client,
-                model=request.model,
+            respondent = RespondentClient(client=client, model=request.model)
+            conversation = Respondents(
+                clients={ModelRole.MODIFIER: respondent},
                 transcript=self.transcript,
                 patience=Patience(attempts=1),
             )
-            return conversation.ask(ModelRole.MODIFIER, request, "v1").text
+            return conversation.send(ModelRole.MODIFIER, request, "v1").text
 
 
 def test_a_refused_parameter_is_dropped_logged_and_remembered(

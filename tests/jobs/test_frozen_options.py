@@ -6,7 +6,7 @@ import pytest
 
 from augment.errors import Conflict
 from augment.models import Augmentation, Contestant, EndpointModel, GenerationJob
-from augment.prompts.texts import prompt_version
+from augment.prompts.fill import prompt_version
 from augment.services.endpoints import contestants
 from augment.services.endpoints.treatments import options_of
 from augment.services.running import runner

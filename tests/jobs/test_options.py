@@ -12,7 +12,7 @@ from django.core.management import CommandError, call_command
 
 from augment.errors import InvalidDocument
 from augment.models import Contestant, ModelCall
-from augment.prompts.texts import prompt_version
+from augment.prompts.fill import prompt_version
 from augment.services.endpoints import contestants
 from augment.services.endpoints.known_endpoints import ensure_endpoint
 from augment.services.endpoints.treatments import options_of

@@ -10,7 +10,7 @@ from django.core.files.base import ContentFile
 from django.core.files.storage import default_storage
 from pytest_django import Settings
 
-from augment.scene.modification import Modification
+from augment.scene.entities import Modification
 from augment.services.scenarios.pictures import camera_of, original_picture, picture_of, store
 from augment.services.scenarios.scenes import scene_of
 from tests.jobs.rows import add_scenario

@@ -8,10 +8,9 @@ import pytest
 
 from augment.errors import Conflict
 from augment.models import Augmentation, Contestant
-from augment.scene.codec import modification_to_document
+from augment.scene.codec import intent_to_document, modification_to_document
+from augment.scene.entities import Modification
 from augment.scene.intent import Intent
-from augment.scene.intent_codec import intent_to_document
-from augment.scene.modification import Modification
 from augment.services.endpoints import contestants
 from augment.services.running import jobs
 from tests.intents import parked

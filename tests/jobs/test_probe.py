@@ -9,10 +9,10 @@ from typing import Any
 import pytest
 
 from augment.fake_llm.server import running
+from augment.llm.client import Patience
+from augment.llm.costs import least_tokens
 from augment.llm.messages import LengthName
-from augment.llm.patience import Patience
 from augment.llm.questions import MARKER, Ability
-from augment.llm.window import least_tokens
 from augment.models import CallLease, Endpoint, EndpointModel, Event
 from augment.services.endpoints.probing import ProbeReport, probe
 from tests.llm.json_server import JsonServer, serving

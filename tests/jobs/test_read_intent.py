@@ -17,8 +17,8 @@ from augment.fake_llm.server import running
 from augment.llm.client import ChatClient
 from augment.llm.messages import Reply
 from augment.models import Event, IntentReading, ModelCall, Scenario
-from augment.scene.intent_codec import intent_to_document, intent_to_parts
-from augment.scene.intent_words import Shape
+from augment.scene.codec import intent_to_document, intent_to_parts
+from augment.scene.intent import Shape
 from augment.services.endpoints.known_endpoints import ensure_endpoint
 from augment.services.running import intent_readings
 from augment.services.running.budget import Caps

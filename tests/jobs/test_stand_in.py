@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from augment.models import Scenario
-from augment.scene.intent_words import Shape
+from augment.scene.intent import Shape
 from augment.services.scenarios.prompts import StoredIntents
 from tests.intents import cones
 from tests.jobs.rows import INSTRUCTION, add_scenario

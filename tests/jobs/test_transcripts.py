@@ -8,12 +8,12 @@ from typing import Any
 import pytest
 from django.urls import reverse
 
-from augment.llm.fingerprint import request_hash
+from augment.llm.messages import request_hash
 from augment.models import Augmentation, Endpoint, ModelCall, TranscriptNote
 from augment.services.running import budget, jobs, runner
 from augment.services.running.budget import Caps
 from augment.services.running.transcript_records import totals_of, transcript_of, tries_of
-from augment.variants.transcript import NoteKind
+from augment.variants.respondents import NoteKind
 from tests.jobs.models import Model, after_a_second_look, llama_job, reply
 from tests.jobs.rows import INSTRUCTION, only_row
 from tests.llm.raw_server import speaking, whole

@@ -18,8 +18,8 @@ from django.test import Client
 from django.urls import URLPattern, URLResolver, get_resolver
 from scipy import stats
 
+from arena.jobs.services import open_labelling
 from arena.models import LabellingRound, Matchup, Study
-from arena.services.faults import open_labelling
 from arena.services.studies import close_study
 from augment.models import Augmentation, Contestant, Endpoint, GenerationJob
 from augment.services.scenarios.pictures import store

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from augment.llm.cutting import shorten
+from augment.llm.messages import shorten
 
 
 @pytest.mark.parametrize("length", [0, 39, 40])

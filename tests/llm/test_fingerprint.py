@@ -3,8 +3,7 @@ from __future__ import annotations
 import hashlib
 from dataclasses import replace
 
-from augment.llm.fingerprint import image_reference, request_hash
-from augment.llm.messages import Message, Request, Speaker
+from augment.llm.messages import Message, Request, Speaker, image_reference, request_hash
 
 ASKED = Request(
     model="m",

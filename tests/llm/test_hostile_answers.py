@@ -8,7 +8,7 @@ import socket
 import pytest
 
 from augment.errors import NotSent
-from augment.llm.wire_reply import LONGEST_ARGUMENTS, LONGEST_EXTRA, MOST_CALLS, MOST_TOKENS
+from augment.llm.openai_wire import LONGEST_ARGUMENTS, LONGEST_EXTRA, MOST_CALLS, MOST_TOKENS
 from tests.llm.hostile import BODY, answered, ask, fault, message
 from tests.llm.raw_server import head, speaking, whole
 from tests.llm.recorder import GOOD

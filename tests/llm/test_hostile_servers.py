@@ -10,7 +10,7 @@ import zlib
 import pytest
 
 from augment.errors import Abandoned, JobCancelled, Unwanted
-from augment.llm.wire_watch import OutOfTime, Watch
+from augment.llm.wire_transport import OutOfTime, Watch
 from tests.llm.hostile import BODY, EMPTY_BLOCK, LIMIT_S, PACKED, ask, fault
 from tests.llm.raw_server import Say, drip, head, whole
 

@@ -5,7 +5,7 @@ import random
 import pytest
 
 from augment.errors import ModelFault
-from augment.llm.patience import Patience
+from augment.llm.client import Patience
 
 
 def fault(*, retryable: bool = True, retry_after_s: float | None = None) -> ModelFault:

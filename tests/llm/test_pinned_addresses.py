@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from augment.errors import NotSent
-from augment.llm import wire_network
+from augment.llm import wire_transport
 from augment.llm.openai_wire import OpenAIWire
 from tests.llm.hostile import ASKED, BODY
 from tests.llm.raw_server import speaking, whole
@@ -89,7 +89,7 @@ def test_the_certificate_is_held_against_the_name_and_not_the_address() -> None:
 def test_a_name_that_is_never_found_takes_no_longer_than_a_call(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(wire_network, "CONNECT_TIMEOUT_S", 0.1)
+    monkeypatch.setattr(wire_transport, "CONNECT_TIMEOUT_S", 0.1)
     over = threading.Event()
     is_first = iter([True, False])
 

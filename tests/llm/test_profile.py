@@ -5,8 +5,8 @@ from dataclasses import replace
 import pytest
 
 from augment.errors import ModelFault
+from augment.llm.client import ModelProfile
 from augment.llm.messages import AnswerSchema, Message, Request, Speaker, Tool
-from augment.llm.profile import ModelProfile
 
 HELLO = Message(speaker=Speaker.USER, text="Hello")
 SCHEMA = AnswerSchema(name="sum", schema={"type": "object"})

@@ -2,8 +2,8 @@ from __future__ import annotations
 
 import pytest
 
+from augment.llm.costs import cut_of, least_tokens
 from augment.llm.messages import Message, Reply, Request, Speaker
-from augment.llm.window import cut_of, least_tokens
 
 LONG = 'Lane7: [7, "Eastwards", 3.50, [[-12.25, 1.75], [-7.25, 1.75]]]\n' * 300
 

@@ -9,10 +9,9 @@ from django.core.management import call_command
 from django.core.management.base import CommandError
 
 from augment.models import BaseScene, Event, Scenario
-from augment.scene.codec import modification_to_document, scene_to_document
-from augment.scene.intent_codec import intent_to_document
-from augment.scene.intent_words import Shape
-from augment.scene.modification import Modification
+from augment.scene.codec import intent_to_document, modification_to_document, scene_to_document
+from augment.scene.entities import Modification
+from augment.scene.intent import Shape
 from augment.services.scenarios.scene_imports import import_scene
 from tests.intents import cones
 from tests.scenes import cone, scene, vehicle

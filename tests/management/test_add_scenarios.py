@@ -10,7 +10,7 @@ from django.core.management import CommandError, call_command
 
 from augment.models import Scenario
 from augment.scene.codec import modification_to_document
-from augment.scene.modification import Modification
+from augment.scene.entities import Modification
 from tests.jobs.rows import add_scenario
 from tests.scenes import cone
 

@@ -9,8 +9,8 @@ from django.core.management import call_command
 from django.core.management.base import CommandError
 
 from augment.baselines.rule_placer import place
-from augment.checks.against_intent import check_against_intent
 from augment.checks.ground import Ground
+from augment.checks.registry import check_against_intent
 from augment.errors import CannotPlace
 from augment.models import Augmentation, BaseScene, GenerationJob, Scenario
 from augment.scene.entities import AgentType

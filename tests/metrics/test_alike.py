@@ -7,9 +7,8 @@ from dataclasses import replace
 
 import pytest
 
-from augment.metrics.alike import are_alike
-from augment.scene.entities import AgentType
-from augment.scene.modification import Modification
+from augment.metrics.displacement import are_alike
+from augment.scene.entities import AgentType, Modification
 from tests.scenes import cone, pedestrian, vehicle
 
 CAR = vehicle("New1", 20.0, 0.0)

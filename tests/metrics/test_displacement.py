@@ -9,8 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from augment.metrics.displacement import CLASS_OF, Displacement, displacement
-from augment.scene.entities import AgentType, TrafficAgent
-from augment.scene.modification import Modification
+from augment.scene.entities import AgentType, Modification, TrafficAgent
 from tests.scenes import cone, pedestrian, vehicle
 
 

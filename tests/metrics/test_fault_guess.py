@@ -5,10 +5,9 @@ import math
 import pytest
 
 from augment.checks import FindingKind, findings
-from augment.checks.finding import FAULT_OF
-from augment.metrics.fault_guess import FaultClass, first_guess
-from augment.scene.entities import TrafficAgent
-from augment.scene.modification import Modification
+from augment.checks.finding import FAULT_OF, FaultClass
+from augment.metrics.fault_guess import first_guess
+from augment.scene.entities import Modification, TrafficAgent
 from tests.scenes import scene, vehicle
 
 

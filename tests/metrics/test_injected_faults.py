@@ -6,8 +6,8 @@ import inspect
 
 import pytest
 
-from augment.checks.against_intent import check_against_intent
 from augment.checks.finding import FaultClass
+from augment.checks.registry import check_against_intent
 from bench.faults import FaultKind
 from bench.injected_faults import Tally, measure, shifted_share
 

@@ -7,9 +7,14 @@ import pytest
 from scipy.stats import bootstrap
 from statsmodels.stats.multitest import multipletests
 
-from augment.metrics.paired import LEVEL, adjust_holm, compare_all, find_p_by_signed_ranks
-from augment.metrics.refusals import score_refusals
-from augment.metrics.repeats import measure_robustness
+from augment.metrics.paired import (
+    LEVEL,
+    adjust_holm,
+    compare_all,
+    find_p_by_signed_ranks,
+    measure_robustness,
+    score_refusals,
+)
 
 DIFFERENCES = (0.9, -0.2, 1.4, 2.2, -0.5, 3.1, 0.7, 1.1)
 

@@ -5,8 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from augment.metrics.displacement import Displacement, Match, ObjectClass
-from augment.metrics.summary import box_of, summarise
+from augment.metrics.displacement import Displacement, Match, ObjectClass, box_of, summarise
 
 
 def of(*distances_m: float, missing: int = 0, surplus: int = 0) -> Displacement:

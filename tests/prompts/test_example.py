@@ -15,8 +15,8 @@ import pytest
 
 from augment.geometry.polyline import Polyline
 from augment.prompts.calls import calls_in
+from augment.prompts.fill import read_text
 from augment.prompts.reply import notes_of, read_reply
-from augment.prompts.texts import read_text
 from augment.prompts.vectors import SPACING_M, LaneFormat, scene_text
 from augment.scene.entities import Lane, LaneConnector, Scene, TurnType
 from augment.variants.pose_tool import PoseTool

@@ -9,8 +9,7 @@ import pytest
 
 from augment.geometry.polyline import Polyline
 from augment.prompts.extent import BESIDE_M, extent_of, shown_spans
-from augment.prompts.names import short_names
-from augment.prompts.vectors import DEFAULT_RADIUS_M, agent_vectors
+from augment.prompts.vectors import DEFAULT_RADIUS_M, scene_vectors
 from augment.scene.entities import Lane, LaneConnector, TurnType
 from augment.variants.pose_tool import PoseTool
 from tests.fixtures.shelf import HARD_SLUGS, SLUGS, entry, whole_scene
@@ -31,7 +30,7 @@ def test_what_runs_too_far_beside_the_ego_is_left_out(y_m: float, is_shown: bool
         agents=(vehicle("Agent2", 20.0, y_m),),
     )
     assert ("Lane3" in shown_spans(street, 80.0)) is is_shown
-    assert ("Agent2" in agent_vectors(street, short_names(street), 80.0)) is is_shown
+    assert ("Agent2" in scene_vectors(street, 80.0)["Agents"]) is is_shown
     assert ("Lane3" in PoseTool(street).curves) is is_shown
 
 

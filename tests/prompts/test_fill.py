@@ -7,9 +7,9 @@ import pytest
 
 from augment.llm.messages import Speaker
 from augment.prompts import fill
-from augment.prompts.texts import VECTORS_VERSION
+from augment.prompts.fill import VECTORS_VERSION
 from augment.prompts.vectors import LaneFormat, scene_text
-from augment.scene.modification import without_traffic
+from augment.scene.entities import without_traffic
 from tests.fixtures.shelf import SLUGS, shown_scene
 from tests.scenes import junction, scene
 

@@ -9,14 +9,12 @@ from pathlib import Path
 
 import pytest
 
-from augment.prompts.fill import regenerate_messages, result_text
-from augment.prompts.fill_review import viewer_messages
-from augment.prompts.texts import said_by_user
-from augment.scene.modification import Modification
-from augment.variants.modifier import form_of
+from augment.prompts.fill import regenerate_messages, result_text, said_by_user, viewer_messages
+from augment.scene.entities import Modification
+from augment.variants.pipeline import form_of
 from augment.variants.recipes import RECIPES, VQA
+from augment.variants.respondents import ModelRole
 from augment.variants.showing import Shown, shown_prompt
-from augment.variants.transcript import ModelRole
 from tests.scenes import junction, pedestrian, vehicle
 
 GOLDEN = Path(__file__).parent / "golden"

@@ -1,7 +1,6 @@
 from __future__ import annotations
 
-from augment.prompts.lane_curves import control_points, lane_curves
-from augment.prompts.names import short_names
+from augment.prompts.vectors import control_points, lane_curves, short_names
 from tests.scenes import curve, junction
 
 

@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from augment.errors import ReplyUnreadable
-from augment.prompts.review import read_questions, read_ratings, read_sight, read_verdict
+from augment.prompts.reply import read_questions, read_ratings, read_sight, read_verdict
 from tests.variants.playing import questions, rating, verdict
 
 READERS: list[Callable[[str], object]] = [

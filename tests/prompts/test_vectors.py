@@ -10,16 +10,8 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from augment.geometry.polyline import Polyline
-from augment.prompts.clip import boundary_within, simplify_boundary
-from augment.prompts.extent import Extent, extent_of
-from augment.prompts.names import short_names
-from augment.prompts.vectors import (
-    agent_vectors,
-    area_vectors,
-    connector_vectors,
-    lane_vectors,
-    scene_text,
-)
+from augment.prompts.extent import Extent, boundary_within, extent_of, simplify_boundary
+from augment.prompts.vectors import scene_text, scene_vectors, short_names
 from augment.scene.entities import Lane
 from tests.fixtures.shelf import SLUGS, entry, whole_scene
 from tests.scenes import junction, scene, vehicle
@@ -29,7 +21,7 @@ FloatArray = NDArray[np.float64]
 
 def test_an_agent_is_type_centre_heading_width_length_velocity_lane() -> None:
     street = scene(agents=(replace(vehicle("Agent2", 12.346, 3.5, math.pi), lane_id="Lane2"),))
-    assert agent_vectors(street, short_names(street), 80.0) == {
+    assert scene_vectors(street, 80.0)["Agents"] == {
         "Agent1": ["EGO_VEHICLE", 0.0, 0.0, 0.0, 2.3, 5.18, 8.0, "Lane1"],
         "Agent2": ["VEHICLE", 12.35, 3.5, 3.142, 2.0, 4.8, 0.0, "Lane2"],
     }
@@ -37,7 +29,7 @@ def test_an_agent_is_type_centre_heading_width_length_velocity_lane() -> None:
 
 def test_a_lane_is_number_directions_width_limit_and_points_five_metres_apart() -> None:
     street = scene()
-    lanes = lane_vectors(street, short_names(street), 12.0)
+    lanes = scene_vectors(street, 12.0)["Lanes"]
     assert lanes["Lane1"] == [
         1,
         "Eastwards",
@@ -51,7 +43,7 @@ def test_a_lane_is_number_directions_width_limit_and_points_five_metres_apart() 
 
 def test_a_connector_is_from_to_light_turn_limit_and_points() -> None:
     crossing = junction()
-    found = connector_vectors(crossing, short_names(crossing), 80.0)
+    found = scene_vectors(crossing, 80.0)["Lane connectors"]
     assert found["Connector1"] == [
         "Lane1",
         "Lane2",
@@ -65,7 +57,7 @@ def test_a_connector_is_from_to_light_turn_limit_and_points() -> None:
 
 def test_an_area_is_its_kind_and_a_boundary_cut_to_the_square() -> None:
     street = scene()
-    areas = area_vectors(street, short_names(street), 20.0)
+    areas = scene_vectors(street, 20.0)["Areas"]
     kind, points = areas["Area2"]
     assert kind == "walkway"
     assert sorted(map(tuple, points)) == [  # type: ignore[call-overload]
@@ -170,7 +162,7 @@ def test_a_simplified_boundary_strays_nowhere_beyond_the_tolerance(
 def test_the_areas_of_every_prompt_keep_ten_centimetres(slug: str) -> None:
     shown = whole_scene(slug)
     names = short_names(shown)
-    written = area_vectors(shown, names, 80.0)
+    written = scene_vectors(shown, 80.0)["Areas"]
     assert written
     for area in shown.areas:
         cut = boundary_within(np.array(area.boundary_m), extent_of(shown, 80.0).box_m)

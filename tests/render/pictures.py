@@ -12,8 +12,7 @@ from PIL import Image
 from augment.render import palette
 from augment.render.bev import draw
 from augment.render.camera import Camera
-from augment.scene.entities import Scene
-from augment.scene.modification import Modification
+from augment.scene.entities import Modification, Scene
 
 Pixel = tuple[int, int, int]
 

@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from augment.render import palette
-from augment.render.annotated import FaultMark, draw_annotated
-from augment.render.bev import draw
-from augment.scene.modification import Modification
+from augment.render.bev import FaultMark, draw, draw_annotated
+from augment.scene.entities import Modification
 from tests.render.pictures import WIDE, opened
 from tests.scenes import scene, vehicle
 

@@ -12,9 +12,8 @@ from augment.errors import InvalidModification
 from augment.render import palette
 from augment.render.bev import draw
 from augment.render.camera import camera_for
-from augment.render.scale import scale_corner
-from augment.scene.entities import AgentType, TrafficAgent
-from augment.scene.modification import Modification
+from augment.render.road import scale_corner
+from augment.scene.entities import AgentType, Modification, TrafficAgent
 from tests import scenes
 from tests.render.pictures import (
     WIDE,

@@ -9,10 +9,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from augment.geometry.boxes import corners
+from augment.geometry.frames import corners
 from augment.render.bev import draw
 from augment.render.camera import MARGIN_M, Camera, camera_for
-from augment.scene.modification import Modification, without_traffic
+from augment.scene.entities import Modification, without_traffic
 from augment.services.scenarios.catalogue import read_catalogue
 from tests import scenes
 from tests.properties import examples

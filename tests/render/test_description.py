@@ -11,9 +11,8 @@ from hypothesis import strategies as st
 
 from augment.render.bev import draw
 from augment.render.camera import camera_for
-from augment.render.description import CHANGED, GONE, DescribedAgent, describe
-from augment.scene.entities import AgentType, TrafficAgent
-from augment.scene.modification import Modification
+from augment.render.legend import CHANGED, GONE, DescribedAgent, describe
+from augment.scene.entities import AgentType, Modification, TrafficAgent
 from tests.properties import examples
 from tests.scenes import cone, pedestrian, scene, vehicle
 

@@ -8,8 +8,8 @@ from itertools import combinations
 import pytest
 
 from augment.render.canvas import Box, Canvas, MetricCanvas
-from augment.render.edges import Badge, place_badges
-from augment.render.scale import scale_box
+from augment.render.labels import Badge, place_badges
+from augment.render.road import scale_box
 from augment.scene.entities import TrafficAgent
 from tests import scenes
 from tests.render.pictures import WIDE

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from augment.render.legend_keys import change_keys, scene_keys
-from augment.scene.entities import AgentType, SceneOptions, TurnType
-from augment.scene.modification import Modification
+from augment.render.legend import change_keys, scene_keys
+from augment.scene.entities import AgentType, Modification, SceneOptions, TurnType
 from tests.scenes import cone, junction, pedestrian, scene, vehicle
 
 VIEW = {"px_per_m": 20.0, "ego_px": [300.0, 400.0], "width": 1200, "height": 800}

@@ -10,11 +10,10 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from augment.render import legend, palette
+from augment.render.bev import draw_for_review, lanes_near
 from augment.render.camera import Camera, camera_for
 from augment.render.canvas import Canvas
-from augment.render.reviewed import draw_for_review, lanes_near
-from augment.scene.entities import AgentType, Scene, TrafficAgent
-from augment.scene.modification import Modification
+from augment.scene.entities import AgentType, Modification, Scene, TrafficAgent
 from tests.scenes import cone, junction, pedestrian, scene, vehicle
 
 

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from augment.geometry.angles import difference
+from augment.geometry.frames import difference
 from augment.geometry.polyline import Polyline
 from augment.scene.bezier_lanes import Tolerance, bezier_lane, piece_ids
 from tests.scenes import curve, scene

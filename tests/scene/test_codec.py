@@ -24,6 +24,7 @@ from augment.scene.entities import (
     AreaKind,
     Lane,
     LaneConnector,
+    Modification,
     Origin,
     Scene,
     SceneOptions,
@@ -33,7 +34,6 @@ from augment.scene.entities import (
     TrafficSide,
     TurnType,
 )
-from augment.scene.modification import Modification
 from tests.scenes import EGO, cone, curve, junction, pedestrian, scene, vehicle
 
 metres = st.floats(-1000.0, 1000.0)

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from augment.geometry.polyline import Polyline
-from augment.scene.directions import traffic_side_of, turn_type_of
 from augment.scene.entities import TrafficSide, TurnType
+from augment.scene.lane_graph import traffic_side_of, turn_type_of
 from tests.scenes import curve, scene
 
 

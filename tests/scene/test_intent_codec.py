@@ -8,33 +8,31 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from augment.errors import InvalidDocument
+from augment.scene.codec import INTENT_FORMAT, intent_from_document, intent_to_document
 from augment.scene.intent import (
+    Bearing,
+    Body,
     ConesRequest,
     CrashedCar,
     CrashRequest,
+    Facing,
     Intent,
     LaneChoice,
     Lateral,
+    LateralTarget,
     Length,
+    Nearness,
+    Post,
     Relation,
+    Setting,
+    Shape,
     Side,
     Spot,
     VehicleRequest,
     WalkRequest,
     resolve_anchors,
 )
-from augment.scene.intent_codec import INTENT_FORMAT, intent_from_document, intent_to_document
 from augment.scene.intent_statements import list_statements
-from augment.scene.intent_words import (
-    Bearing,
-    Body,
-    Facing,
-    LateralTarget,
-    Nearness,
-    Post,
-    Setting,
-    Shape,
-)
 from tests.fixtures.shelf import SLUGS, entry
 from tests.intents import metres, parked
 

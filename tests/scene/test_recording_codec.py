@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from augment.errors import InvalidDocument
+from augment.scene.codec import recording_from_document, recording_to_document
 from augment.scene.entities import AgentType
 from augment.scene.recording import Recording, Track
-from augment.scene.recording_codec import recording_from_document, recording_to_document
 
 
 def recording() -> Recording:

@@ -14,10 +14,8 @@ from django.core.management import call_command
 
 from augment.errors import Conflict, InvalidDocument, UnknownName
 from augment.models import Augmentation, BaseScene, Contestant, Event, GenerationJob, Scenario
-from augment.scene.catalogue import ScenarioType
-from augment.scene.catalogue_codec import CatalogueEntry, entry_to_document
-from augment.scene.codec import scene_to_document
-from augment.scene.modification import Modification
+from augment.scene.codec import CatalogueEntry, entry_to_document, scene_to_document
+from augment.scene.entities import Modification, ScenarioType
 from augment.services.running.choosing import resolve_scenarios
 from augment.services.scenarios.catalogue import CatalogueReport, load_catalogue
 from augment.services.scenarios.scene_imports import import_scene

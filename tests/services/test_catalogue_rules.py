@@ -11,12 +11,9 @@ from dataclasses import replace
 
 import pytest
 
-from augment.scene.catalogue import ScenarioType
-from augment.scene.catalogue_codec import CatalogueEntry
-from augment.scene.entities import AgentType, Scene, TrafficAgent
-from augment.scene.intent import Intent, Side
-from augment.scene.intent_words import Setting
-from augment.scene.modification import Modification
+from augment.scene.codec import CatalogueEntry
+from augment.scene.entities import AgentType, Modification, ScenarioType, Scene, TrafficAgent
+from augment.scene.intent import Intent, Setting, Side
 from augment.services.scenarios.catalogue_check import (
     StagedScenario,
     find_apart,

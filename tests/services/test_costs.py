@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from arena.queries.costs import spent_on
+from arena.jobs.queries import spent_on
 from augment.errors import ModelFault
 from augment.llm.messages import Reply, Request
 from augment.models import Augmentation, Contestant, GenerationJob

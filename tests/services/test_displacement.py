@@ -6,7 +6,7 @@ import pytest
 
 from augment.models import Augmentation, Contestant, GenerationJob, Scenario
 from augment.scene.codec import modification_to_document
-from augment.scene.modification import Modification
+from augment.scene.entities import Modification
 from augment.services.judging.displacement import By, Group, Unmeasured, groups, of_job
 from tests.jobs import rows
 from tests.scenes import cone

@@ -13,16 +13,14 @@ from django.core.files.storage import default_storage
 from django.db import connection
 from django.test.utils import CaptureQueriesContext
 
-from arena.services import references as guarded
+from arena.scenarios import services as guarded
 from augment.errors import Conflict, InvalidDocument, InvalidModification
 from augment.models import Augmentation, Contestant, Event, Scenario
 from augment.render.bev import draw
 from augment.render.camera import AROUND_THE_EGO
-from augment.scene.codec import modification_to_document
-from augment.scene.entities import TrafficAgent
+from augment.scene.codec import intent_to_document, modification_to_document
+from augment.scene.entities import Modification, TrafficAgent
 from augment.scene.intent import Intent
-from augment.scene.intent_codec import intent_to_document
-from augment.scene.modification import Modification
 from augment.services.judging.displacement import of_augmentation
 from augment.services.judging.findings import check_augmentation, check_edit
 from augment.services.running import by_hand, runner

@@ -14,8 +14,8 @@ from django.db.models import Model
 from django.db.models.signals import pre_save
 
 from arena.errors import NothingToPlan
+from arena.jobs.services import open_labelling
 from arena.models import Invitation, LabellingRound
-from arena.services.faults import open_labelling
 from arena.services.invitations import FreshLink, invite
 from augment.errors import Conflict
 from augment.models import GenerationJob

@@ -7,11 +7,11 @@ from dataclasses import replace
 
 import pytest
 
-from arena.queries.jobs import grid
+from arena.jobs.queries import grid
 from augment.errors import UnknownName
 from augment.models import Augmentation, GenerationJob
 from augment.scene.codec import modification_to_document
-from augment.scene.modification import Modification
+from augment.scene.entities import Modification
 from augment.services.judging.analyses import repeatability
 from augment.services.running import jobs
 from tests.jobs.rows import TWO_CONES, add_kind, add_scenario

@@ -7,11 +7,14 @@ import pytest
 
 from augment.errors import InvalidDocument, InvalidModification
 from augment.models import BaseScene, IntentReading, Scenario
-from augment.scene.codec import modification_to_document, scene_to_document
-from augment.scene.intent_codec import intent_to_document
-from augment.scene.intent_words import Shape
-from augment.scene.modification import Modification
-from augment.scene.recording_codec import recording_from_document
+from augment.scene.codec import (
+    intent_to_document,
+    modification_to_document,
+    recording_from_document,
+    scene_to_document,
+)
+from augment.scene.entities import Modification
+from augment.scene.intent import Shape
 from augment.services.endpoints.known_endpoints import ensure_endpoint
 from augment.services.scenarios.editing import accept_reading, enter_intent
 from augment.services.scenarios.scene_imports import import_scene

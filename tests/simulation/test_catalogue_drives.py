@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from augment.scene.modification import without_traffic
+from augment.scene.entities import without_traffic
 from augment.simulation.drive import Drive, run
-from augment.simulation.pdm_closed import PdmClosed
-from augment.simulation.proposals import ORIGINAL_OFFSETS_M, PAPER_OFFSETS_M
+from augment.simulation.pdm_closed import ORIGINAL_OFFSETS_M, PAPER_OFFSETS_M, PdmClosed
 from augment.simulation.road import Road
-from augment.simulation.setting import DriveSetting
+from augment.simulation.traffic import DriveSetting
 from tests.fixtures.shelf import entry, shown_scene
 
 SLUG = "nudge-mill-junction"

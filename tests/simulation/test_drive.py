@@ -16,16 +16,15 @@ from hypothesis import strategies as st
 from augment.errors import CannotDrive
 from augment.geometry.frames import Pose
 from augment.geometry.polyline import Polyline
-from augment.scene.entities import Lane, Scene, TrafficAgent
-from augment.scene.modification import Modification
+from augment.scene.entities import Lane, Modification, Scene, TrafficAgent
 from augment.simulation.drive import ExpertKind, expert_of, run
-from augment.simulation.idm_planner import IdmPlanner
 from augment.simulation.pdm_closed import PdmClosed
+from augment.simulation.planners import IdmPlanner
 from augment.simulation.planning import Plan, Situation
 from augment.simulation.road import Road
 from augment.simulation.score import score_drive
-from augment.simulation.setting import DriveSetting
 from augment.simulation.states import EgoBody, X, Y
+from augment.simulation.traffic import DriveSetting
 from tests.properties import examples
 from tests.scenes import pedestrian, vehicle
 from tests.simulation.worlds import street
@@ -88,7 +87,7 @@ def test_a_moved_or_mirrored_world_gives_the_moved_or_mirrored_drive(
 
 DRIVE = """
 import hashlib
-from augment.scene.modification import Modification
+from augment.scene.entities import Modification
 from augment.simulation.drive import run
 from augment.simulation.pdm_closed import PdmClosed
 from tests.simulation.test_drive import busy

@@ -10,9 +10,8 @@ import shapely
 from hypothesis import given
 from hypothesis import strategies as st
 
-from augment.simulation.contact import corners, meet
-from augment.simulation.path import Path, dense
-from augment.simulation.region import Region
+from augment.simulation.path import Path, Region, dense
+from augment.simulation.states import corners, meet
 from tests.properties import examples
 
 metres = st.floats(-8.0, 8.0)

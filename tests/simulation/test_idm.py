@@ -8,10 +8,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from augment.simulation.idm import PLANNER_IDM, PROPOSAL_IDM, TRAFFIC_IDM, Idm
+from augment.simulation.pdm_closed import PROPOSAL_IDM
+from augment.simulation.planners import PLANNER_IDM
+from augment.simulation.planning import Idm
 from augment.simulation.road import Road
-from augment.simulation.road_users import LaneDrivers
 from augment.simulation.states import Kind, Objects, join_objects
+from augment.simulation.traffic import TRAFFIC_IDM, LaneDrivers
 from tests.scenes import vehicle
 from tests.simulation.worlds import street
 

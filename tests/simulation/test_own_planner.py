@@ -9,7 +9,7 @@ import pytest
 
 from augment.simulation.drive import run
 from augment.simulation.planners import planner_named
-from augment.simulation.setting import DriveSetting
+from augment.simulation.traffic import DriveSetting
 from tests.house.source import ROOT
 from tests.simulation.worlds import street
 

@@ -8,16 +8,20 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from augment.scene.entities import Area, AreaKind, TrafficAgent
-from augment.scene.modification import Modification
+from augment.scene.entities import Area, AreaKind, Modification, TrafficAgent
 from augment.simulation.drive import run
-from augment.simulation.pdm_closed import PdmClosed, brake, must_brake
-from augment.simulation.planning import Plan, Situation
-from augment.simulation.proposals import ORIGINAL_OFFSETS_M, PAPER_OFFSETS_M
+from augment.simulation.pdm_closed import (
+    ORIGINAL_OFFSETS_M,
+    PAPER_OFFSETS_M,
+    PdmClosed,
+    brake,
+    must_brake,
+)
+from augment.simulation.planning import Plan, Situation, foresee
+from augment.simulation.proposal_scores import ProposalScores, score_proposals
 from augment.simulation.road import Road
-from augment.simulation.road_users import objects_of
-from augment.simulation.setting import DriveSetting
-from augment.simulation.states import FloatArray, start_state
+from augment.simulation.states import FloatArray, Objects, start_state
+from augment.simulation.traffic import DriveSetting, objects_of
 from tests.scenes import cone, pedestrian, vehicle
 from tests.simulation.worlds import BODY, states_along, street
 
@@ -30,8 +34,12 @@ def planner(**options: object) -> PdmClosed:
 
 def planned(agents: list[TrafficAgent], *, speed_mps: float = 8.0, **options: object) -> Plan:
     ego = start_state(street(speed_mps=speed_mps).ego, BODY)
-    situation = Situation(step=0, ego=ego, objects=objects_of(agents, speeds=True))
+    situation = Situation(step=0, ego=ego, objects=objects_of(agents))
     return planner(**options).plan(situation)
+
+
+def judged_among(states: FloatArray, objects: Objects, road: Road | None = None) -> ProposalScores:
+    return score_proposals(states, foresee(objects, 8.0), road or Road(street()), BODY)
 
 
 def test_fifteen_proposals_by_default_of_the_release_and_45_of_the_paper() -> None:
@@ -71,7 +79,7 @@ def test_it_starts_where_the_rear_axle_is_and_accelerates_by_the_idm() -> None:
     ],
 )
 def test_collisions_multiply(what: str, agents: list[TrafficAgent], collision: float) -> None:
-    judged = planner().judge(states_along(np.full(41, 8.0))[None], objects_of(agents, speeds=True))
+    judged = judged_among(states_along(np.full(41, 8.0))[None], objects_of(agents))
     assert judged.parts["collision"].tolist() == [collision], what
 
 
@@ -82,9 +90,7 @@ def test_collisions_multiply(what: str, agents: list[TrafficAgent], collision: f
 def test_no_corner_leaves_the_road_and_the_centre_stays_on_the_route(
     y_m: float, drivable: float, direction: float
 ) -> None:
-    judged = planner().judge(
-        states_along(np.full(41, 8.0), y_m=y_m)[None], objects_of([], speeds=True)
-    )
+    judged = judged_among(states_along(np.full(41, 8.0), y_m=y_m)[None], objects_of([]))
     assert judged.parts["drivable"].tolist() == [drivable]
     assert judged.parts["direction"].tolist() == [direction]
 
@@ -93,23 +99,21 @@ def test_no_corner_leaves_the_road_and_the_centre_stays_on_the_route(
     ("speed", "direction"), [(0.49, 1.0), (0.51, 0.5), (1.49, 0.5), (1.51, 0.0)]
 )
 def test_the_wrong_way_counts_by_2_and_6_m_in_4_s(speed: float, direction: float) -> None:
-    judged = planner().judge(
-        states_along(np.full(41, speed), y_m=3.5)[None], objects_of([], speeds=True)
-    )
+    judged = judged_among(states_along(np.full(41, speed), y_m=3.5)[None], objects_of([]))
     assert judged.parts["direction"].tolist() == [direction]
 
 
 def test_waiting_scores_more_than_overtaking_on_the_oncoming_lane() -> None:
     # At best half of everything against no progress, but time to collision and comfort in full.
     states = np.stack([states_along(np.zeros(41)), states_along(np.full(41, 1.2), y_m=3.5)])
-    judged = planner().judge(states, objects_of([vehicle("A", 12.0, 0.0)], speeds=True))
+    judged = judged_among(states, objects_of([vehicle("A", 12.0, 0.0)]))
     assert judged.scores == pytest.approx([7.0 / 12.0, 0.5])
 
 
 def test_progress_is_a_share_of_the_best_valid_one() -> None:
     states = np.stack([states_along(np.full(41, speed)) for speed in (2.0, 4.0, 8.0)])
-    parked = objects_of([vehicle("A", 30.0, 0.0)], speeds=True)  # 32 m are too far
-    judged = planner().judge(states, parked)
+    parked = objects_of([vehicle("A", 30.0, 0.0)])  # 32 m are too far
+    judged = judged_among(states, parked)
     assert judged.parts["collision"].tolist() == [1.0, 1.0, 0.0]
     assert judged.parts["progress"].tolist() == pytest.approx([0.5, 1.0, 0.0])
 
@@ -118,8 +122,8 @@ def test_progress_is_a_share_of_the_best_valid_one() -> None:
 def test_time_to_collision_looks_0_9_s_ahead_of_every_state(gap_m: float, ttc: float) -> None:
     states = states_along(np.full(41, 5.0))
     end_m = 20.0 + 2.588
-    parked = objects_of([vehicle("A", end_m + gap_m + 2.4, 0.0)], speeds=True)
-    assert planner().judge(states[None], parked).parts["ttc"].tolist() == [ttc]
+    parked = objects_of([vehicle("A", end_m + gap_m + 2.4, 0.0)])
+    assert judged_among(states[None], parked).parts["ttc"].tolist() == [ttc]
 
 
 @pytest.mark.parametrize(("from_m", "ttc"), [(-1.0, 1.0), (-2.0, 0.0)])
@@ -129,9 +133,8 @@ def test_of_each_object_the_first_meeting_ahead_of_time_counts(from_m: float, tt
     crossing = replace(vehicle("A", 1.0, 6.5, -math.pi / 2.0), speed_mps=8.0)
     rim = ((from_m, -3.0), (60.0, -3.0), (60.0, 6.0), (from_m, 6.0))
     area = Area(id="Area1", kind=AreaKind.INTERSECTION, boundary_m=rim)
-    made = PdmClosed()
-    made.start(Road(replace(street(), areas=(area,))), BODY)
-    judged = made.judge(states_along(np.full(41, 5.0))[None], objects_of([crossing], speeds=True))
+    road = Road(replace(street(), areas=(area,)))
+    judged = judged_among(states_along(np.full(41, 5.0))[None], objects_of([crossing]), road)
     assert judged.parts["ttc"].tolist() == [ttc]
 
 

@@ -8,14 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from augment.scene.entities import AgentType, TrafficAgent
-from augment.scene.modification import Modification
+from augment.scene.entities import AgentType, Modification, TrafficAgent
 from augment.simulation.drive import ExpertKind, expert_of, run
-from augment.simulation.encounters import collisions
-from augment.simulation.pdm_closed import PdmClosed
-from augment.simulation.proposals import ORIGINAL_OFFSETS_M
+from augment.simulation.metrics import collisions
+from augment.simulation.pdm_closed import ORIGINAL_OFFSETS_M, PdmClosed
 from augment.simulation.road import Road
-from augment.simulation.setting import DriveSetting
+from augment.simulation.traffic import DriveSetting
 from tests.recorded import recorded
 
 pytestmark = pytest.mark.realdata

@@ -10,14 +10,17 @@ import numpy as np
 import pytest
 
 from augment.geometry.polyline import Polyline
-from augment.scene.catalogue import ScenarioType
-from augment.scene.entities import LaneConnector, Scene, TrafficAgent, TrafficLight
-from augment.scene.modification import Modification
-from augment.simulation.criticality import criticality
+from augment.scene.entities import (
+    LaneConnector,
+    Modification,
+    ScenarioType,
+    Scene,
+    TrafficAgent,
+    TrafficLight,
+)
 from augment.simulation.drive import Expert, ExpertKind
-from augment.simulation.encounters import collisions
-from augment.simulation.metrics import Metric, combine, red_lights
-from augment.simulation.score import Score, ScoreKind, score_drive
+from augment.simulation.metrics import Metric, collisions, combine, red_lights
+from augment.simulation.score import Score, ScoreKind, criticality, score_drive
 from augment.simulation.states import FloatArray
 from tests.scenes import cone, pedestrian, vehicle
 from tests.simulation.worlds import driven, states_along, street

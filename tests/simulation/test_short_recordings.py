@@ -10,7 +10,7 @@ import pytest
 from augment.simulation.drive import ExpertKind, expert_of, run
 from augment.simulation.metrics import progress_ratio
 from augment.simulation.road import Road
-from augment.simulation.setting import DriveSetting
+from augment.simulation.traffic import DriveSetting
 from bench.recording_lengths import (
     LENGTHS_S,
     ConstantSpeed,

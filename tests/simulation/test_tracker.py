@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from augment.simulation.states import EgoBody, FloatArray
-from augment.simulation.tracker import follow, track
+from augment.simulation.tracker import track
 
 BODY = EgoBody()
 DT = 0.1
@@ -18,6 +18,12 @@ def straight(speed_mps: float, count: int = 41) -> FloatArray:
     made = np.zeros((count, 3))
     made[:, 0] = np.arange(count) * DT * speed_mps
     return made
+
+
+def follow(reference: FloatArray, start: tuple[float, ...]) -> FloatArray:
+    state = np.zeros(6)
+    state[: len(start)] = start
+    return np.asarray(track(reference[None], state, BODY)[0])
 
 
 def bent(speed_mps: float, curvature: float, gain_mps2: float = 0.0) -> FloatArray:

@@ -9,13 +9,17 @@ import numpy as np
 import pytest
 
 from augment.geometry.polyline import Polyline
-from augment.scene.entities import AgentType, LaneConnector, TrafficAgent, TrafficLight
-from augment.scene.modification import Modification
+from augment.scene.entities import (
+    AgentType,
+    LaneConnector,
+    Modification,
+    TrafficAgent,
+    TrafficLight,
+)
 from augment.scene.recording import Recording, Track
 from augment.simulation.road import Road
-from augment.simulation.setting import DriveSetting
 from augment.simulation.states import Objects, start_state
-from augment.simulation.traffic import Traffic
+from augment.simulation.traffic import DriveSetting, Traffic
 from tests.scenes import pedestrian, vehicle
 from tests.simulation.worlds import BODY, street
 

@@ -11,8 +11,8 @@ from augment.geometry.polyline import Polyline
 from augment.scene.entities import Lane, Scene, TrafficAgent
 from augment.simulation.drive import Drive
 from augment.simulation.road import Road
-from augment.simulation.road_users import objects_of
-from augment.simulation.states import HEADING, NOBODY, SPEED, EgoBody, FloatArray, Objects, X, Y
+from augment.simulation.states import HEADING, SPEED, EgoBody, FloatArray, Objects, X, Y
+from augment.simulation.traffic import objects_of
 from tests.scenes import EGO, scene
 
 BODY = EgoBody()
@@ -56,13 +56,5 @@ def driven(
 
 
 def rows(agents: Sequence[TrafficAgent], count: int) -> list[Objects]:
-    if not agents:
-        return [NOBODY] * count
-    start = objects_of(agents, speeds=True)
-    made = []
-    for moment in range(count):
-        boxes = start.boxes.copy()
-        boxes[:, 0] += 0.1 * moment * start.speeds_mps * np.cos(boxes[:, 2])
-        boxes[:, 1] += 0.1 * moment * start.speeds_mps * np.sin(boxes[:, 2])
-        made.append(replace(start, boxes=boxes))
-    return made
+    start = objects_of(agents)
+    return [replace(start, boxes=start.later(np.array(0.1 * step))) for step in range(count)]

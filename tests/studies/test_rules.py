@@ -13,7 +13,7 @@ from arena.services.replanning import plan_batch
 from arena.services.studies import rules_of
 from augment.models import Augmentation, Scenario
 from augment.scene.codec import modification_to_document
-from augment.scene.modification import Modification
+from augment.scene.entities import Modification
 from augment.services.scenarios.pictures import draw_checks
 from tests.opening import open_study
 from tests.scenes import vehicle

@@ -7,12 +7,12 @@ import pytest
 from arena.errors import NothingToPlan
 from arena.models import Matchup, Study
 from arena.queries.voting.showings import VIEW_OF_OLD, view_shown
+from arena.scenarios.services import redraw_pictures
 from arena.services.frames import find_frames
 from arena.services.plans import pictures_of, planned_so_far
-from arena.services.redrawing import redraw_pictures
 from augment.models import Augmentation, Scenario
 from augment.scene.codec import modification_to_document
-from augment.scene.modification import Modification
+from augment.scene.entities import Modification
 from augment.services.running import runner
 from augment.services.running.by_hand import keep_correction
 from augment.services.scenarios.pictures import camera_of, original_picture, view_of, window_of

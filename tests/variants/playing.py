@@ -7,14 +7,13 @@ import random
 from collections.abc import Iterable, Mapping
 
 from augment.errors import ModelFault
+from augment.llm.client import Patience
 from augment.llm.messages import Reply, ToolCall
-from augment.llm.patience import Patience
 from augment.scene.entities import Scene
 from augment.scene.intent import Intent
 from augment.variants.pipeline import Outcome, run
 from augment.variants.recipes import find_recipe
-from augment.variants.respondents import RespondentClient
-from augment.variants.transcript import MemoryTranscript, ModelRole
+from augment.variants.respondents import MemoryTranscript, ModelRole, RespondentClient
 from tests.llm.scripted import ScriptedClient
 from tests.scenes import scene
 from tests.variants.answers import agent, answer, block

@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 
 from augment.formats.readers import recognise
 from augment.geometry.frames import Pose
-from augment.prompts.lane_curves import control_points, curve_from
-from augment.prompts.names import short_names
+from augment.prompts.vectors import control_points, curve_from, short_names
 from augment.scene.codec import scene_from_document
 from augment.scene.entities import Scene
 from augment.scene.lane_graph import LaneGraph

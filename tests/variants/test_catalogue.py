@@ -13,13 +13,12 @@ import pytest
 
 from augment.checks import findings
 from augment.fake_llm.server import FakeServer, running
+from augment.llm.client import Patience
 from augment.llm.openai_wire import OpenAIWire
-from augment.llm.patience import Patience
 from augment.metrics.displacement import displacement
 from augment.variants.pipeline import Outcome, OutcomeStatus, run
 from augment.variants.recipes import RECIPES, Tools, find_recipe
-from augment.variants.respondents import RespondentClient
-from augment.variants.transcript import MemoryTranscript
+from augment.variants.respondents import MemoryTranscript, RespondentClient
 from tests.baselines.test_rule_placer_catalogue import placed
 from tests.fixtures.shelf import SLUGS, entry, shown_scene
 from tests.intents import intents

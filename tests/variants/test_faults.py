@@ -15,14 +15,12 @@ from pathlib import Path
 import pytest
 
 from augment.errors import ModelFault
-from augment.fake_llm.models import MODELS
-from augment.fake_llm.server import FakeServer, running
+from augment.fake_llm.server import MODELS, FakeServer, running
+from augment.llm.client import Patience
 from augment.llm.openai_wire import OpenAIWire
-from augment.llm.patience import Patience
 from augment.variants.pipeline import run
 from augment.variants.recipes import GEO, RECIPES, find_recipe
-from augment.variants.respondents import RespondentClient
-from augment.variants.transcript import MemoryTranscript, ModelRole
+from augment.variants.respondents import MemoryTranscript, ModelRole, RespondentClient
 from tests.intents import intents
 from tests.scenes import scene
 

@@ -8,14 +8,13 @@ import re
 import pytest
 
 from augment.fake_llm.playing import CARELESS, GOOD
-from augment.llm.patience import Patience
+from augment.llm.client import Patience
 from augment.prompts.blocks import names_changes
 from augment.prompts.calls import calls_in
-from augment.prompts.texts import read_text
+from augment.prompts.fill import read_text
 from augment.variants.pipeline import run
 from augment.variants.recipes import find_recipe
-from augment.variants.respondents import RespondentClient
-from augment.variants.transcript import MemoryTranscript
+from augment.variants.respondents import MemoryTranscript, RespondentClient
 from bench.mutated_answers import Answering
 from tests.fixtures.shelf import SLUGS, entry, shown_scene
 from tests.prompts.test_calls import FORMS

@@ -8,15 +8,13 @@ import random
 import pytest
 
 from augment.fake_llm.playing import GOOD, LOOPING, STUBBORN, Character
-from augment.fake_llm.requests import chat_request
-from augment.llm.client import Sending, watch_nothing
+from augment.fake_llm.wire import chat_request
+from augment.llm.client import Patience, Sending, watch_nothing
 from augment.llm.messages import Reply, Request
-from augment.llm.patience import Patience
-from augment.variants.forecast import CallRange, calls_of, most_tokens
 from augment.variants.pipeline import run
 from augment.variants.recipes import FC, OTM, RECIPES, TQA, VQA
-from augment.variants.respondents import RespondentClient
-from augment.variants.transcript import MemoryTranscript, ModelRole
+from augment.variants.respondents import MemoryTranscript, ModelRole, RespondentClient
+from augment.variants.showing import CallRange, calls_of, most_tokens
 from tests.fixtures.shelf import entry, shown_scene
 from tests.intents import intents
 

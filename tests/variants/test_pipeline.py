@@ -7,13 +7,12 @@ from dataclasses import replace
 import pytest
 
 from augment.errors import ModelFault, UnknownName
+from augment.llm.client import Patience
 from augment.llm.messages import Reply, Speaker
-from augment.llm.patience import Patience
 from augment.prompts.fill import prompt_version
 from augment.variants.pipeline import Outcome, OutcomeStatus, run
 from augment.variants.recipes import OTM, TQA
-from augment.variants.respondents import RespondentClient
-from augment.variants.transcript import MemoryTranscript
+from augment.variants.respondents import MemoryTranscript, RespondentClient
 from tests.llm.scripted import ScriptedClient
 from tests.scenes import scene
 from tests.variants.answers import GOOD, agent, answer, block

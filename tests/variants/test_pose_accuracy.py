@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from augment.prompts.names import short_names
+from augment.prompts.vectors import short_names
 from augment.scene.entities import Scene
 from augment.scene.lane_graph import LaneGraph
 from augment.variants.pose_tool import PoseTool

@@ -10,12 +10,10 @@ from hypothesis import strategies as st
 
 from augment.errors import ToolError
 from augment.geometry.polyline import Polyline
-from augment.prompts.lane_curves import control_points
-from augment.prompts.names import short_names
+from augment.prompts.vectors import control_points, short_names
 from augment.scene.ego_route import EgoRoute
 from augment.scene.entities import AreaKind, SceneOptions, TurnType
-from augment.variants.pose_call import OBJECT_TYPES, CallLimits
-from augment.variants.pose_tool import PoseTool
+from augment.variants.pose_tool import OBJECT_TYPES, PoseTool
 from tests.fixtures.shelf import whole_scene
 from tests.scenes import curve, junction, scene, vehicle
 
@@ -282,14 +280,3 @@ def test_any_curve_has_a_finite_answer_or_an_error(
 ) -> None:
     answer = JUNCTION.answer({"lane": control, "start": "Agent1", "distance_m": distance_m})
     json.dumps(answer, allow_nan=False)
-
-
-def test_calls_are_limited_and_identical_ones_more_so() -> None:
-    limits = CallLimits()
-    call = {"lane": "Lane1", "start": "lane", "distance_m": 1}
-    others = [{**call, "distance_m": number} for number in range(2, 9)]
-    limits.check([call, call, *others[:5]], call)
-    with pytest.raises(ToolError, match="answered 3 times"):
-        limits.check([call, call, call], call)
-    with pytest.raises(ToolError, match="no call is left: 8 are allowed"):
-        limits.check([call, *others], {**call, "distance_m": 99})

@@ -79,7 +79,7 @@ def test_a_call_in_another_form_is_answered_and_recorded_as_mended(
     ("answer", "said"),
     [
         ("- {'call': 'pose_on_lane', 'arguments': {'lane': Lane1}}", "one line of the form"),
-        ("pose_on_lane(lane='Lane1', distance_m=20 + 1.4)", "expected a comma"),
+        ("pose_on_lane(lane='Lane1', distance_m=20 + 1.4)", "BinOp is no value"),
         ("I would call pose_on_lane from Agent1.", "is named and not called"),
         ("x = retrieve_suitable_pose('Lane1', 'Agent1', 21.4)", "no function 'retrieve_suit"),
     ],

@@ -11,10 +11,10 @@ from django.core.management import call_command
 from django.db import IntegrityError, transaction
 
 from arena.errors import LabellingClosed, NotYours
-from arena.exports.jobs.faults import csv_bytes, fault_table, latex
+from arena.jobs.exports.faults import csv_bytes, fault_table, latex
+from arena.jobs.queries import labelling_of, next_task
+from arena.jobs.services import close_labelling, open_labelling, save_label
 from arena.models import FaultLabel, LabellingRound, LabelTask
-from arena.queries.faults import labelling_of, next_task
-from arena.services.faults import close_labelling, open_labelling, save_label
 from augment.models import Event, GenerationJob
 from augment.services.judging.findings import FaultClass
 from tests.exports.test_displacement import a_job

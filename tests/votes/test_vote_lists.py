@@ -12,7 +12,7 @@ from arena.queries.votes.lists import each_vote, vote_page, votes_behind
 from arena.queries.votes.search import EVERY, LEFT_OUT, VoteSearch
 from arena.queries.votes.sets import Filters
 from arena.services.ratings import rate
-from augment.scene.catalogue import ScenarioType
+from augment.scene.entities import ScenarioType
 from tests.mixed_study import mixed_study
 
 pytestmark = pytest.mark.django_db

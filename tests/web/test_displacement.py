@@ -9,7 +9,7 @@ from django.urls import reverse
 
 from augment.models import Augmentation, GenerationJob
 from augment.scene.codec import modification_to_document
-from augment.scene.modification import Modification
+from augment.scene.entities import Modification
 from tests.exports.test_displacement import a_job
 from tests.jobs import rows
 from tests.scenes import vehicle

@@ -11,7 +11,7 @@ from django.urls import reverse
 
 from augment.models import Augmentation, Scenario
 from augment.scene.codec import modification_to_document
-from augment.scene.modification import Modification
+from augment.scene.entities import Modification
 from augment.services.running import runner
 from augment.services.scenarios.pictures import draw_scenario, draw_scene
 from tests.jobs.rows import add_scenario, launch
@@ -25,10 +25,10 @@ CAR = json.dumps(modification_to_document(Modification(added=(vehicle("Added1", 
 @pytest.fixture
 def analyst(monkeypatch: pytest.MonkeyPatch) -> Client:
     """Signed in; what is sent to a worker is done at once."""
-    monkeypatch.setattr("arena.web.scenarios.editing.enqueue_scene", draw_scene)
-    monkeypatch.setattr("arena.web.scenarios.editing.enqueue_scenario", draw_scenario)
-    monkeypatch.setattr("arena.web.scenarios.pages.enqueue_scenario", draw_scenario)
-    monkeypatch.setattr("arena.web.scenarios.editing.enqueue_job", run_job)
+    monkeypatch.setattr("arena.scenarios.pages.editing.enqueue_scene", draw_scene)
+    monkeypatch.setattr("arena.scenarios.pages.editing.enqueue_scenario", draw_scenario)
+    monkeypatch.setattr("arena.scenarios.pages.scenarios.enqueue_scenario", draw_scenario)
+    monkeypatch.setattr("arena.scenarios.pages.editing.enqueue_job", run_job)
     monkeypatch.setattr("arena.web.sending.transaction.on_commit", lambda done: done())
     return signed_in(people()["analyst"])
 

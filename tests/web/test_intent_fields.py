@@ -13,7 +13,7 @@ from django.urls import reverse
 
 from augment.errors import InvalidDocument
 from augment.models import BaseScene, Scenario
-from augment.scene.intent_codec import intent_to_document
+from augment.scene.codec import intent_to_document
 from augment.services.scenarios.intent_fields import (
     FIELDS,
     IntentFields,

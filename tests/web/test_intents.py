@@ -9,8 +9,8 @@ from django.core.files.uploadedfile import SimpleUploadedFile
 from django.test import Client
 
 from augment.models import EndpointModel, IntentReading, Scenario
-from augment.scene.intent_codec import intent_to_document
-from augment.scene.intent_words import Shape
+from augment.scene.codec import intent_to_document
+from augment.scene.intent import Shape
 from augment.services.endpoints.known_endpoints import ensure_endpoint
 from tests.intents import cones
 from tests.jobs.rows import add_scenario
@@ -74,7 +74,7 @@ def test_an_admin_has_an_instruction_read_by_a_worker(
     endpoint = ensure_endpoint(label="here", base_url="http://127.0.0.1:1/v1")
     reader = EndpointModel.objects.create(endpoint=endpoint, model="m")
     sent: list[int] = []
-    monkeypatch.setattr("arena.web.scenarios.intents.enqueue_reading", sent.append)
+    monkeypatch.setattr("arena.scenarios.pages.scenarios.enqueue_reading", sent.append)
     assert "m at here" in page(staff, scenario)
     staff.post(f"/scenarios/{scenario.code}/read/", {"reader": str(reader.code)})
     row = IntentReading.objects.get()

@@ -11,7 +11,7 @@ from django.test import Client
 from django.urls import reverse
 from django.utils import timezone
 
-from arena.config.hiding import HideKeys
+from arena.config.logs import HideKeys
 from arena.models import Invitation, Study
 from arena.services.invitations import invite
 from tests.study_rows import a_study

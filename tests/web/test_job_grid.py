@@ -10,7 +10,7 @@ from django.test import Client
 from django.urls import reverse
 
 from augment.models import Augmentation, Contestant, GenerationJob, Scenario
-from augment.scene.catalogue import ScenarioType
+from augment.scene.entities import ScenarioType
 from tests.jobs import rows
 from tests.web.cast import people, signed_in
 

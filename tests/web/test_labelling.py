@@ -6,8 +6,8 @@ import pytest
 from django.contrib.auth.models import User
 from django.urls import reverse
 
+from arena.jobs.services import open_labelling
 from arena.models import FaultLabel, LabellingRound
-from arena.services.faults import open_labelling
 from augment.models import Augmentation, GenerationJob, Scenario
 from augment.services.scenarios.pictures import store
 from tests.exports.test_displacement import a_job

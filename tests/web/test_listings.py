@@ -11,7 +11,7 @@ from django.urls import reverse
 
 from arena.models import Study
 from augment.models import Augmentation, BaseScene, Contestant, GenerationJob, Scenario
-from augment.scene.catalogue import ScenarioType
+from augment.scene.entities import ScenarioType
 from tests.jobs import rows
 from tests.web.cast import people, signed_in
 

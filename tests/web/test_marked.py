@@ -11,7 +11,7 @@ from django.core.files.storage import default_storage
 from django.urls import reverse
 
 from augment.models import Augmentation
-from augment.scene.intent_codec import intent_to_document
+from augment.scene.codec import intent_to_document
 from augment.services.judging.findings import check_augmentation, draw_marked
 from tests.intents import parked
 from tests.jobs import rows

@@ -12,7 +12,7 @@ from arena.errors import InvalidVote
 from arena.models import Matchup, Study
 from arena.queries.voting.showings import view_shown
 from augment.models import Scenario
-from augment.scene.intent_codec import intent_to_document
+from augment.scene.codec import intent_to_document
 from tests.intents import LEFT_EDGE, parked, towards
 from tests.opening import open_study
 from tests.study_rows import a_study, cast_of, matchups_of, vote

@@ -14,7 +14,7 @@ from django.test import Client
 from django.urls import reverse
 from pytest_django import Settings
 
-from arena.config.hiding import HideKeys
+from arena.config.logs import HideKeys
 from arena.models import Study, Vote
 from arena.queries.people import find_admins
 from arena.services.accounts import (

@@ -15,7 +15,7 @@ from arena.queries.voting.ballots import voting_progress
 from arena.services.practice import practice_pairs
 from augment.models import Augmentation, Scenario
 from augment.scene.codec import modification_to_document
-from augment.scene.modification import Modification
+from augment.scene.entities import Modification
 from augment.services.scenarios.pictures import draw_checks, store
 from tests.opening import open_study
 from tests.scenes import vehicle

@@ -11,8 +11,8 @@ from django.contrib.auth.models import User
 from django.test import Client
 from django.urls import reverse
 
+from arena.jobs.services import open_labelling
 from arena.models import Study
-from arena.services.faults import open_labelling
 from augment.models import Event, GenerationJob
 from tests import study_rows
 from tests.web.cast import people, signed_in

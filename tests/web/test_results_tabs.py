@@ -12,7 +12,7 @@ from arena.models import EarlyLook, Matchup, Study
 from arena.services.ratings import rate
 from arena.services.studies import close_study
 from arena.web.results.tabs import TABS
-from augment.scene.catalogue import ScenarioType
+from augment.scene.entities import ScenarioType
 from tests import study_rows
 from tests.full_study import Size, full_study
 from tests.web.cast import people, signed_in

@@ -9,10 +9,10 @@ from django.core.files.uploadedfile import SimpleUploadedFile
 from django.test import Client
 from django.urls import reverse
 
-from arena.queries.scenarios import by_type
+from arena.scenarios.queries import by_type
 from augment.models import BaseScene, GenerationJob, Scenario
 from augment.scene.codec import modification_to_document
-from augment.scene.modification import Modification
+from augment.scene.entities import Modification
 from augment.services.running.choosing import resolve_scenarios
 from augment.services.scenarios.pictures import draw_scenario, draw_scene
 from tests.jobs.rows import add_scenario
@@ -31,8 +31,8 @@ street-scene,jaywalking_pedestrian,,Let somebody cross.,two,change.json
 @pytest.fixture
 def analyst(monkeypatch: pytest.MonkeyPatch) -> Client:
     """Signed in; what is sent to a worker is done at once."""
-    monkeypatch.setattr("arena.web.scenarios.forms.enqueue_scene", draw_scene)
-    monkeypatch.setattr("arena.web.scenarios.forms.enqueue_scenario", draw_scenario)
+    monkeypatch.setattr("arena.scenarios.pages.forms.enqueue_scene", draw_scene)
+    monkeypatch.setattr("arena.scenarios.pages.forms.enqueue_scenario", draw_scenario)
     monkeypatch.setattr("arena.web.sending.transaction.on_commit", lambda done: done())
     return signed_in(people()["analyst"])
 

@@ -6,7 +6,7 @@ import re
 
 import pytest
 
-from augment.scene.notes import Note, SceneNoteKind, notes_to_document
+from augment.scene.recording import Note, SceneNoteKind, notes_to_document
 from tests.jobs.rows import add_scenario
 from tests.web.cast import people, signed_in
 

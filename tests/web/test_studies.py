@@ -12,7 +12,7 @@ from arena import tasks
 from arena.models import Study
 from augment.models import Augmentation
 from augment.scene.codec import modification_to_document
-from augment.scene.modification import Modification
+from augment.scene.entities import Modification
 from tests import study_rows
 from tests.scenes import vehicle
 from tests.web.cast import people, signed_in

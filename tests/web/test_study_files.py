@@ -21,7 +21,7 @@ from arena.services.ratings import rate
 from arena.services.studies import close_study
 from augment.models import Augmentation, Event, GenerationJob
 from augment.scene.codec import modification_to_document
-from augment.scene.modification import Modification
+from augment.scene.entities import Modification
 from tests.exports.test_study_folder import export
 from tests.scenes import vehicle
 from tests.study_rows import a_study, matchups_of, vote

@@ -14,8 +14,8 @@ from pytest_django import Settings
 from arena.config import env
 from augment.render.bev import draw
 from augment.render.camera import camera_for
-from augment.render.shrunken import shrink_png
-from augment.scene.modification import Modification
+from augment.render.canvas import shrink_png
+from augment.scene.entities import Modification
 from augment.services.scenarios.pictures import WIDTHS_PX, store, thumbnail_of
 from tests import scenes
 from tests.buckets import Bucket, bucket

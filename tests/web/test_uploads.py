@@ -30,11 +30,11 @@ def analyst() -> Client:
 @pytest.fixture(autouse=True)
 def working(monkeypatch: pytest.MonkeyPatch, django_capture_on_commit_callbacks: object) -> None:
     """What is sent to a worker is done at once."""
-    monkeypatch.setattr("arena.web.scenarios.uploads.enqueue_upload", uploads.UPLOADS.perform)
+    monkeypatch.setattr("arena.scenarios.pages.uploads.enqueue_upload", uploads.UPLOADS.perform)
     monkeypatch.setattr(
-        "arena.web.scenarios.uploads.enqueue_moment", upload_moments.MOMENTS.perform
+        "arena.scenarios.pages.uploads.enqueue_moment", upload_moments.MOMENTS.perform
     )
-    monkeypatch.setattr("arena.web.scenarios.scenes.enqueue_scene", pictures.draw_scene)
+    monkeypatch.setattr("arena.scenarios.pages.uploads.enqueue_scene", pictures.draw_scene)
     monkeypatch.setattr("arena.web.sending.transaction.on_commit", lambda done: done())
 
 

@@ -16,9 +16,8 @@ from arena.exports.charts.drawing import (
     house_style,
     write_figure,
 )
-from arena.exports.jobs.displacement_table import DisplacementTable
-from arena.exports.jobs.published import SOURCE, PublishedBox
 from arena.exports.tables import shown_name
+from arena.jobs.exports.displacement import SOURCE, DisplacementTable, PublishedBox
 from augment.services.judging.displacement import VARIANTS, By, Group
 
 if TYPE_CHECKING:

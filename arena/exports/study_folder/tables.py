@@ -11,9 +11,9 @@ from django.db.models import QuerySet
 
 from arena.exports.bundle import MANIFEST as RATING_MANIFEST
 from arena.exports.bundle import bundle_files
-from arena.exports.jobs.displacement_objects import csv_bytes as objects_csv
-from arena.exports.jobs.displacement_objects import object_rows
 from arena.exports.study_folder.closure import Closure
+from arena.jobs.exports.displacement_files import object_csv as objects_csv
+from arena.jobs.exports.displacement_files import object_rows
 from arena.models import Matchup, Snapshot, Vote
 from arena.services.cells import csv_text
 from arena.services.preregistration import FILE_NAME, preregistration_bytes

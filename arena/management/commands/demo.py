@@ -16,9 +16,8 @@ from arena.errors import ArenaError
 from arena.management import demo
 from arena.management.arguments import at_least
 from arena.management.commands.serve import INTERRUPTED
-from arena.serving.hold import hold_alone
 from arena.serving.ledger import Ledger
-from arena.serving.stack import Web, background, remembered_address, web_server
+from arena.serving.stack import Web, background, hold_alone, remembered_address, web_server
 from arena.serving.supervisor import Supervisor
 from augment.errors import AugmentError
 from augment.services.terminal import TerminalCommand

@@ -8,7 +8,7 @@ from django.conf import settings
 from django.core.management import call_command
 
 from arena.management.catalogue import compile_catalogue
-from arena.services.redrawing import redraw_pictures
+from arena.scenarios.services import redraw_pictures
 from augment.services.endpoints.contestants import ensure_builtin
 from augment.services.terminal import TerminalCommand
 

@@ -12,9 +12,8 @@ from arena.errors import ArenaError
 from arena.management.arguments import at_least
 from arena.management.demo import login_lines
 from arena.services.first_start import make_first_link_token
-from arena.serving.hold import hold_alone
 from arena.serving.ledger import Ledger
-from arena.serving.stack import Web, background, remembered_address, web_server
+from arena.serving.stack import Web, background, hold_alone, remembered_address, web_server
 from arena.serving.supervisor import Supervisor
 from augment.services.terminal import TerminalCommand
 

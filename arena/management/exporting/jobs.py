@@ -6,18 +6,19 @@ from pathlib import Path
 from typing import Any
 
 from arena.exports.formats import format_named
-from arena.exports.jobs import analyses, displacement_writers, driving_writers, faults, tool_calls
-from arena.exports.jobs.augmentations import (
+from arena.exports.samples import SHEET_FORMATS, sheet_bytes, sheet_of
+from arena.jobs.exports import displacement_files, driving, faults, tables
+from arena.jobs.exports.displacement import displacement_table
+from arena.jobs.exports.displacement_files import BY_OBJECT, OBJECT_FORMATS, object_rows
+from arena.jobs.exports.driving import DrivingTable
+from arena.jobs.exports.files import TRANSCRIPT_FORMATS
+from arena.jobs.exports.tables import (
     AUGMENTATION_FORMATS,
     REPEAT_FORMATS,
     augmentation_rows,
     repeat_rows,
 )
-from arena.exports.jobs.displacement_objects import BY_OBJECT, OBJECT_FORMATS, object_rows
-from arena.exports.jobs.displacement_table import displacement_table
-from arena.exports.jobs.driving_table import DrivingTable
-from arena.exports.jobs.transcripts import TRANSCRIPT_FORMATS
-from arena.exports.samples import SHEET_FORMATS, sheet_bytes, sheet_of
+from arena.jobs.queries import grid
 from arena.management.exporting.kinds import (
     Chosen,
     ExportedFile,
@@ -27,7 +28,6 @@ from arena.management.exporting.kinds import (
     add_table,
     fill,
 )
-from arena.queries.jobs import grid
 from augment.errors import Conflict, UnknownName
 from augment.services.judging.analyses import analyse_job
 from augment.services.judging.displacement import By, types_named
@@ -47,7 +47,7 @@ def add_jobs(kinds: Any) -> None:
     )
     _add_driving(kinds)
     add_table(
-        *(kinds, "tool-calls", tool_calls.FORMATS, tool_calls_by_augmentation),
+        *(kinds, "tool-calls", tables.CALL_FORMATS, tool_calls_by_augmentation),
         help="calls of the function: tried, understood, mended",
     )
     add_table(
@@ -80,7 +80,7 @@ def _add_displacement(kinds: Any) -> None:
         nargs="+",
         help="scenario types, or all; by variant only those with definite places unless given",
     )
-    add_format(kind, displacement_writers.FORMATS)
+    add_format(kind, displacement_files.FORMATS)
 
 
 def write_displacement(options: Chosen, say: Say) -> ExportedFile:
@@ -89,7 +89,7 @@ def write_displacement(options: Chosen, say: Say) -> ExportedFile:
     if options["by"] == BY_OBJECT:
         of_objects = format_named(OBJECT_FORMATS, options["format"])
         return fill(of_objects, object_rows(find_job(options["job"]), types=types))
-    chosen = format_named(displacement_writers.FORMATS, options["format"])
+    chosen = format_named(displacement_files.FORMATS, options["format"])
     if options["by"] not in set(By):
         raise UnknownName("grouping", options["by"], [*By, BY_OBJECT])
     table = displacement_table(find_job(options["job"]), by=By(options["by"]), types=types)
@@ -136,12 +136,12 @@ def _add_driving(kinds: Any) -> None:
     kind.add_argument(
         "--with-paper", action="store_true", help="add the paper's rows below a rule"
     )
-    add_format(kind, driving_writers.FORMATS)
+    add_format(kind, driving.FORMATS)
 
 
 def write_driving(options: Chosen, say: Say) -> ExportedFile:
     """Mean scores of the drives that were made just so."""
-    chosen = format_named(driving_writers.FORMATS, options["format"])
+    chosen = format_named(driving.FORMATS, options["format"])
     job = find_job(options["job"])
     if options["score"] not in SCORES:
         raise UnknownName("score", options["score"], list(SCORES))
@@ -161,14 +161,14 @@ def _add_analyses(kinds: Any) -> None:
         of="job",
         help="pairs of contestants, wordings, refusals",
     )
-    kind.add_argument("--part", required=True, help=f"one of {', '.join(analyses.PARTS)}")
-    add_format(kind, analyses.ANALYSIS_FORMATS)
+    kind.add_argument("--part", required=True, help=f"one of {', '.join(tables.PARTS)}")
+    add_format(kind, tables.ANALYSIS_FORMATS)
 
 
 def write_analyses(options: Chosen, say: Say) -> ExportedFile:
     """One part of what can be said of a job."""
-    chosen = format_named(analyses.ANALYSIS_FORMATS, options["format"])
-    if options["part"] not in analyses.PARTS:
-        raise UnknownName("part", options["part"], list(analyses.PARTS))
+    chosen = format_named(tables.ANALYSIS_FORMATS, options["format"])
+    if options["part"] not in tables.PARTS:
+        raise UnknownName("part", options["part"], list(tables.PARTS))
     found = analyse_job(find_job(options["job"]))
-    return fill(chosen, analyses.analysis_table(found, options["part"]))
+    return fill(chosen, tables.analysis_table(found, options["part"]))

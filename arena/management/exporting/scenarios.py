@@ -6,8 +6,8 @@ from typing import Any
 
 from django.utils.text import slugify
 
-from arena.exports.jobs.scenarios import scenario_zip, zip_name
 from arena.exports.zips import ZIP
+from arena.jobs.exports.files import scenario_zip, zip_name
 from arena.management.exporting.kinds import Chosen, ExportedFile, Say, add_kind
 from augment.errors import UnknownName
 from augment.services.judging.scenario_export import FORMATS, RECORDED, Exported, export_job

@@ -1,4 +1,4 @@
-"""The text description in words: what augment.render.description gives as values."""
+"""The text description in words: what augment.render.legend gives as values."""
 
 from __future__ import annotations
 

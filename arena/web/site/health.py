@@ -14,8 +14,7 @@ from prometheus_client.registry import Collector
 
 from arena.queries.gauges import read_gauges
 from arena.queries.people import role_of
-from arena.serving.metrics_key import opens_metrics
-from arena.serving.readiness import look_at_parts
+from arena.serving.readiness import look_at_parts, opens_metrics
 from arena.web.access import ADMIN
 
 

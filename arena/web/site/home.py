@@ -10,8 +10,9 @@ from django.shortcuts import redirect, render
 from django.utils.http import url_has_allowed_host_and_scheme
 from django.views.decorators.http import require_POST, require_safe
 
+from arena.jobs import queries
 from arena.models import Study
-from arena.queries import faults, inventory
+from arena.queries import inventory
 from arena.queries.people import role_of
 from arena.queries.studies import progress
 from arena.queries.studies.results import ResultsAccess, results_access
@@ -80,7 +81,7 @@ def _expert(request: HttpRequest) -> HttpResponse:
         "finished": [line for line in is_open if not line.left],
         "closed": closed,
         "cancelled": [line for line in found if line.study.state == Study.State.CANCELLED],
-        "labellings": faults.of_expert(expert),
+        "labellings": queries.of_expert(expert),
         "readable": {
             line.study.pk: results_access(user=expert, study=line.study) is ResultsAccess.FULL
             for line in closed

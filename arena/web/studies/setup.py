@@ -14,10 +14,10 @@ from django.views.decorators.http import require_http_methods, require_POST
 from arena import tasks
 from arena.errors import ArenaError
 from arena.models import Study, StudyDraft
-from arena.queries import scenarios
 from arena.queries.inventory import usual_checks
 from arena.queries.people import by_pseudonym, experts
 from arena.queries.studies.drafts import missing_of
+from arena.scenarios import queries
 from arena.services.practice import has_practice
 from arena.services.studies import open_study
 from arena.services.study_drafts import (
@@ -181,7 +181,7 @@ def _form(**given: Any) -> StudyForm:
             .select_related("endpoint")
             .order_by("name")
         ),
-        groups=scenarios.by_type(),
+        groups=queries.by_type(),
         experts=by_pseudonym(experts()),
         jobs=list(GenerationJob.objects.all()),
         **given,
@@ -194,7 +194,7 @@ def _entered(posted: QueryDict) -> dict[str, object]:
     found |= {name: name in posted for name in SWITCHES}
     types = set(posted.getlist("types"))
     whole = [
-        row.slug for group in scenarios.by_type() if group.type in types for row in group.scenarios
+        row.slug for group in queries.by_type() if group.type in types for row in group.scenarios
     ]
     found |= {name: posted.getlist(name) for name in NAMES}
     return found | {"scenarios": [*posted.getlist("scenarios"), *whole]}

@@ -29,9 +29,9 @@ from augment.formats.road_map import (
 )
 from augment.formats.roads import midline
 from augment.geometry.polyline import Polyline
-from augment.scene.directions import turn_type_of
 from augment.scene.entities import AreaKind, TrafficLight, TurnType
-from augment.scene.notes import Note, SceneNoteKind
+from augment.scene.lane_graph import turn_type_of
+from augment.scene.recording import Note, SceneNoteKind
 
 WHAT = "CommonRoad scenario"
 

@@ -35,9 +35,8 @@ from augment.formats.reading import (
     reading_at,
 )
 from augment.formats.road_map import FloatArray, left_out_notes
-from augment.scene.entities import AgentType
-from augment.scene.notes import Note, SceneNoteKind
-from augment.scene.sizes import EGO_LENGTH_M, EGO_WIDTH_M, LENGTH_WIDTH_M
+from augment.scene.entities import EGO_LENGTH_M, EGO_WIDTH_M, LENGTH_WIDTH_M, AgentType
+from augment.scene.recording import Note, SceneNoteKind
 
 MOST_STEPS = 100_000
 TYPE_OF = {

@@ -18,9 +18,13 @@ from pydantic import BaseModel, ConfigDict, Field, Strict, ValidationError
 from augment.checks.ground import Ground
 from augment.errors import InvalidDocument
 from augment.escaping import escape_controls
-from augment.scene.catalogue import ScenarioType
-from augment.scene.entities import SceneOptions, TrafficDensity, TurnType
-from augment.scene.modification import Modification
+from augment.scene.entities import (
+    Modification,
+    ScenarioType,
+    SceneOptions,
+    TrafficDensity,
+    TurnType,
+)
 from augment.scene.schema import path, problems_of
 
 STANDING_WALK_M: Final = 1.5

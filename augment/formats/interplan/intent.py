@@ -12,29 +12,40 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 from statistics import median
 
-from augment.checks.against_intent import check_against_intent
 from augment.checks.ground import Ground
 from augment.checks.lanes_across import Band, LanesAcross
-from augment.geometry.angles import difference
-from augment.scene.catalogue import ScenarioType
-from augment.scene.entities import AgentType, Point, Scene, TrafficAgent, TurnType
+from augment.checks.registry import check_against_intent
+from augment.geometry.frames import difference
+from augment.scene.entities import (
+    AgentType,
+    Modification,
+    Point,
+    ScenarioType,
+    Scene,
+    TrafficAgent,
+    TurnType,
+)
 from augment.scene.intent import (
+    Bearing,
+    Body,
     ConesRequest,
     CrashedCar,
     CrashRequest,
+    Facing,
     Intent,
     LaneChoice,
     Lateral,
+    LateralTarget,
     Length,
+    Nearness,
     Relation,
     Request,
+    Shape,
     Side,
     Spot,
     VehicleRequest,
     WalkRequest,
 )
-from augment.scene.intent_words import Bearing, Body, Facing, LateralTarget, Nearness, Shape
-from augment.scene.modification import Modification
 
 _STRAIGHT_DEG = 5.0
 _BESIDE_M = 0.1

@@ -30,12 +30,16 @@ from augment.formats.interplan.file import (
     options_of,
     place_of,
 )
-from augment.geometry.angles import wrap
-from augment.geometry.frames import Pose
+from augment.geometry.frames import Pose, wrap
 from augment.scene.density import ExtraAgent, spawn_traffic
-from augment.scene.entities import AgentType, Point, Scene, TrafficAgent
-from augment.scene.modification import Modification
-from augment.scene.sizes import LENGTH_WIDTH_M
+from augment.scene.entities import (
+    LENGTH_WIDTH_M,
+    AgentType,
+    Modification,
+    Point,
+    Scene,
+    TrafficAgent,
+)
 
 Place = tuple[str, int]
 """A key of a special scenario and the number of a row under it."""

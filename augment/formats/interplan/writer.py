@@ -31,11 +31,16 @@ from augment.formats.interplan.file import (
 )
 from augment.formats.interplan.reader import read_entry
 from augment.formats.writing import Cell, Loss, Written
-from augment.geometry.angles import difference, wrap
-from augment.scene.catalogue import ScenarioType
-from augment.scene.entities import AgentType, Point, Scene, TrafficAgent
-from augment.scene.modification import without_traffic
-from augment.scene.sizes import LENGTH_WIDTH_M
+from augment.geometry.frames import difference, wrap
+from augment.scene.entities import (
+    LENGTH_WIDTH_M,
+    AgentType,
+    Point,
+    ScenarioType,
+    Scene,
+    TrafficAgent,
+    without_traffic,
+)
 
 BUS_LENGTH_M = 7.0
 """A vehicle from here on is written as a bus: clearly longer than any car."""

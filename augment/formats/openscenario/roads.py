@@ -14,7 +14,7 @@ from xml.etree import ElementTree as ET
 import numpy as np
 
 from augment.formats.writing import CannotExpress, Cell, LossReport, bounds_of
-from augment.geometry.angles import difference
+from augment.geometry.frames import difference
 from augment.geometry.polyline import FloatArray, Polyline
 from augment.scene.entities import Lane, LaneConnector, Scene, TrafficLight, TrafficSide
 from augment.scene.lane_graph import AnyLane, LaneGraph

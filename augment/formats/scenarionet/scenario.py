@@ -41,9 +41,8 @@ from augment.formats.road_map import (
     width_of,
 )
 from augment.formats.scenarionet.unpickling import WHAT, read_pickle
-from augment.scene.entities import AgentType, AreaKind, TrafficLight, TrafficSide
-from augment.scene.notes import Note, SceneNoteKind
-from augment.scene.sizes import LENGTH_WIDTH_M
+from augment.scene.entities import LENGTH_WIDTH_M, AgentType, AreaKind, TrafficLight, TrafficSide
+from augment.scene.recording import Note, SceneNoteKind
 
 SUMMARY, MAPPING = "dataset_summary.pkl", "dataset_mapping.pkl"
 ENDING = ".pkl"

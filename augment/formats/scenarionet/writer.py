@@ -17,7 +17,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from augment.formats.writing import Cell, LossReport, Written, bounds_of, report_motion, write_each
-from augment.scene.directions import turn_type_of
 from augment.scene.entities import (
     AgentType,
     Area,
@@ -28,7 +27,7 @@ from augment.scene.entities import (
     TrafficLight,
     TurnType,
 )
-from augment.scene.lane_graph import AnyLane, LaneGraph
+from augment.scene.lane_graph import AnyLane, LaneGraph, turn_type_of
 from augment.scene.motion import Movement
 
 VERSION = "scenario-arena 1"

@@ -45,7 +45,7 @@ from augment.formats.road_map import (
 )
 from augment.formats.waymo.scenario_pb2 import Scenario
 from augment.scene.entities import AgentType, AreaKind, TrafficLight
-from augment.scene.notes import Note, SceneNoteKind
+from augment.scene.recording import Note, SceneNoteKind
 
 WHAT = "Waymo Open Motion file"
 

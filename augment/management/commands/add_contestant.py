@@ -15,7 +15,7 @@ from augment.services.endpoints.contestants import add_contestant, add_like, ens
 from augment.services.endpoints.known_endpoints import ensure_endpoint
 from augment.services.endpoints.treatments import left_out
 from augment.services.terminal import TerminalCommand
-from augment.variants.transcript import ModelRole
+from augment.variants.respondents import ModelRole
 
 ROLES = (ModelRole.REVIEWER, ModelRole.ENGINEER, ModelRole.VIEWER)
 

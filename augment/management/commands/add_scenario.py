@@ -11,9 +11,8 @@ from django.core.management.base import CommandError
 from augment.errors import AugmentError
 from augment.formats.documents import read_json
 from augment.models.scenes import GOALS
-from augment.scene.catalogue import ScenarioType
 from augment.scene.codec import modification_from_document, modification_to_document
-from augment.scene.entities import TrafficDensity
+from augment.scene.entities import ScenarioType, TrafficDensity
 from augment.services.scenarios.bulk import NEEDED, OPTIONAL, add_scenarios, read_rows
 from augment.services.scenarios.scenes import add_scenario, read_circumstances
 from augment.services.terminal import TerminalCommand

@@ -10,8 +10,7 @@ from typing import Any
 
 from django.core.management.base import CommandError, CommandParser
 
-from augment.fake_llm.models import MODELS
-from augment.fake_llm.server import running
+from augment.fake_llm.server import MODELS, running
 from augment.services.scenarios.prompts import StoredIntents
 from augment.services.terminal import TerminalCommand
 

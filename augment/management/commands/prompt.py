@@ -9,19 +9,19 @@ from typing import Any
 from django.core.management.base import CommandError
 
 from augment.errors import AugmentError
-from augment.prompts.texts import prompt_version
+from augment.prompts.fill import prompt_version
 from augment.services.scenarios.prompts import prompt_of
 from augment.services.terminal import TerminalCommand
+from augment.variants.respondents import ModelRole
 from augment.variants.showing import Shown
-from augment.variants.transcript import ModelRole
 
 
 class Command(TerminalCommand):
     """prompt SCENARIO VARIANT [--role R] [--native-tools] [--picture FILE]."""
 
     help = (
-        "Print the exact messages that a variant sends for a scenario, an estimate of their "
-        "tokens, and how well Bezier lanes fit. Reviewers are shown the scenario's reference."
+        "Print the exact messages that a variant sends for a scenario, and an estimate of their "
+        "tokens. Reviewers are shown the scenario's reference."
     )
 
     def add_arguments(self, parser: ArgumentParser) -> None:
@@ -75,11 +75,4 @@ def _facts(shown: Shown) -> list[str]:
     images = sum(len(message.images) for message in shown.messages)
     facts = [f"About {shown.tokens} tokens of text" + (f" and {images} picture" * bool(images))]
     facts.append(f"Prompt version {prompt_version()}")
-    if shown.fit is not None:
-        fit = shown.fit
-        facts.append(
-            f"{fit.lanes} lanes and connectors in {fit.pieces} Bezier pieces; worst position "
-            f"error {fit.position_m:.2f} m ({fit.worst_lane}), worst heading error "
-            f"{fit.heading_deg:.1f} degrees"
-        )
     return facts

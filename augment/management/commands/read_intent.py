@@ -12,7 +12,7 @@ from augment.errors import AugmentError
 from augment.formats.documents import read_json
 from augment.management.arguments import add_cap_arguments, caps_of
 from augment.models import IntentReading
-from augment.scene.intent_codec import intent_from_document
+from augment.scene.codec import intent_from_document
 from augment.scene.intent_statements import list_statements
 from augment.services.running.intent_readings import USUAL_CAPS, read_intent
 from augment.services.scenarios.editing import accept_reading, enter_intent

@@ -23,7 +23,6 @@ from augment.checks.measures import MeasureLine as MeasureLine
 from augment.checks.measures import Measures, find_measures, lane_edges_at
 from augment.checks.registry import check_against_intent
 from augment.errors import InvalidDocument, InvalidModification
-from augment.metrics.fault_guess import FaultClass as FaultClass
 from augment.metrics.fault_guess import first_guess
 from augment.models import Augmentation, Scenario
 from augment.render.bev import FaultMark, draw_annotated

@@ -13,11 +13,10 @@ from augment.errors import Conflict, UnknownName
 from augment.formats.writers import WRITERS, writer_named
 from augment.formats.writing import Cell, Loss, Written
 from augment.models import Augmentation, BaseScene, GenerationJob, Simulation
-from augment.scene.codec import modification_from_document
+from augment.scene.codec import modification_from_document, recording_from_document
 from augment.scene.entities import AgentType, TrafficAgent
 from augment.scene.motion import Motion, MotionSource, Movement
 from augment.scene.recording import Recording
-from augment.scene.recording_codec import recording_from_document
 from augment.services.judging.simulations import trace_document
 from augment.services.scenarios.interplan import refuse_changes
 from augment.services.scenarios.scenes import scene_of, type_of

@@ -15,20 +15,18 @@ from django.db.models import QuerySet
 from augment.errors import Conflict
 from augment.models import Augmentation, GenerationJob, Scenario, Simulation
 from augment.render.film import animation, strip
-from augment.scene.codec import modification_from_document
-from augment.scene.modification import Modification
-from augment.scene.recording_codec import recording_from_document
+from augment.scene.codec import modification_from_document, recording_from_document
+from augment.scene.entities import Modification
 from augment.services.scenarios.scenes import reference_of, scene_of, type_of
 from augment.services.work import Lease, Settlement, WorkKind
-from augment.simulation.criticality import criticality
 from augment.simulation.drive import Drive, expert_of, run
 from augment.simulation.metrics import red_lights
 from augment.simulation.planners import NAMED, PDM_CLOSED, planner_named
 from augment.simulation.planning import Planner
 from augment.simulation.road import Road
-from augment.simulation.score import Score, ScoreKind, score_drive
-from augment.simulation.setting import DriveSetting
+from augment.simulation.score import Score, ScoreKind, criticality, score_drive
 from augment.simulation.trace import blind_trace, trace_of
+from augment.simulation.traffic import DriveSetting
 
 State, Subject = Simulation.State, Simulation.Subject
 NUPLAN, INTERPLAN = ScoreKind.NUPLAN.value, ScoreKind.INTERPLAN.value

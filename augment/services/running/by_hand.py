@@ -12,7 +12,7 @@ from django.db import transaction
 from augment.errors import Conflict
 from augment.models import Augmentation, Contestant, GenerationJob
 from augment.scene.codec import modification_from_document
-from augment.scene.modification import Modification
+from augment.scene.entities import Modification
 from augment.services.events import log_event
 from augment.services.scenarios.editing import edit_to_document, read_edit
 from augment.services.scenarios.scenes import check_slug

@@ -176,11 +176,11 @@ class ReadingTranscript(CallTranscript):
         numbers = reading.calls.count()
         super().__init__({"reading": reading}, reading.endpoint, numbers=numbers)
 
-    def insist(self) -> None:  # noqa: D102
+    def insist(self) -> None:
         if not self._held.is_held(lock=True):
             raise LeaseLost
 
-    def earlier_answer(self, request_hash: str) -> ModelCall | None:  # noqa: D102
+    def earlier_answer(self, request_hash: str) -> ModelCall | None:
         if self._is_fresh:
             return None
         return find_earlier_answer(
@@ -199,7 +199,7 @@ class ReadingTranscript(CallTranscript):
                 return budget.Room.SPENT
         return budget.Room.TAKEN
 
-    def limit(self) -> str:  # noqa: D102
+    def limit(self) -> str:
         return self._limit
 
     def note(self, kind: NoteKind, document: dict[str, object]) -> None:

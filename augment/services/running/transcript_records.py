@@ -21,12 +21,11 @@ from django.core.files.storage import default_storage
 from django.db import models
 from django.db.models import Prefetch, QuerySet
 
-from augment.llm.cutting import shorten
-from augment.llm.fingerprint import IMAGE_SCHEME
+from augment.llm.messages import IMAGE_SCHEME, shorten
 from augment.models import Attempt, Augmentation, Contestant, ModelCall, TranscriptNote
 from augment.services.endpoints.treatments import left_out_of_each
 from augment.services.running.calls import IMAGES
-from augment.variants.transcript import ModelRole
+from augment.variants.respondents import ModelRole
 
 FORMAT, VERSION = "scenario-arena/transcript", 3
 

@@ -19,13 +19,16 @@ from django.db import transaction
 from augment.errors import Conflict, InvalidDocument, InvalidModification, UnknownName
 from augment.formats.documents import read_json
 from augment.models import Augmentation, BaseScene, Scenario
-from augment.scene.catalogue import CatalogueSet
-from augment.scene.catalogue_codec import CatalogueEntry, entry_from_document
-from augment.scene.codec import modification_to_document, scene_from_document, scene_to_document
-from augment.scene.entities import Scene
-from augment.scene.intent_codec import intent_to_document
-from augment.scene.intent_words import IntentOrigin
-from augment.scene.modification import without_traffic
+from augment.scene.codec import (
+    CatalogueEntry,
+    entry_from_document,
+    intent_to_document,
+    modification_to_document,
+    scene_from_document,
+    scene_to_document,
+)
+from augment.scene.entities import CatalogueSet, Scene, without_traffic
+from augment.scene.intent import IntentOrigin
 from augment.services.events import log_event
 from augment.services.scenarios.scenes import (
     add_scenario,

@@ -20,29 +20,31 @@ from typing import Any
 import numpy as np
 
 from augment.checks import Ground
-from augment.checks.against_intent import check_against_intent
-from augment.checks.landmarks import find_mark
-from augment.checks.lanes_across import LanesAcross
+from augment.checks.ground import gaps_m
+from augment.checks.lanes_across import LanesAcross, find_mark
+from augment.checks.parties import AUTHORED
+from augment.checks.registry import check_against_intent
 from augment.checks.situation import VEHICLES, is_stopped
-from augment.checks.surfaces import gaps_m
-from augment.checks.tolerances import AUTHORED
-from augment.geometry.angles import difference
-from augment.geometry.boxes import Box, overlap
-from augment.geometry.frames import Pose
+from augment.geometry.frames import Box, Pose, difference, overlap
 from augment.geometry.polyline import FloatArray
 from augment.prompts.vectors import DEFAULT_RADIUS_M
 from augment.render.camera import Camera, camera_for
-from augment.scene.catalogue import CatalogueSet, ScenarioType
-from augment.scene.catalogue_codec import ENGLISH, CatalogueEntry
+from augment.scene.codec import ENGLISH, CatalogueEntry, intent_to_parts
 from augment.scene.ego_route import EgoRoute
-from augment.scene.entities import AgentType, Scene, TrafficAgent
-from augment.scene.intent import LaneChoice
-from augment.scene.intent_codec import intent_to_parts
+from augment.scene.entities import (
+    EGO_LENGTH_M,
+    EGO_WIDTH_M,
+    AgentType,
+    CatalogueSet,
+    Modification,
+    ScenarioType,
+    Scene,
+    TrafficAgent,
+    apply,
+    without_traffic,
+)
+from augment.scene.intent import LaneChoice, MapPlace, Setting
 from augment.scene.intent_statements import list_statements
-from augment.scene.intent_words import Setting
-from augment.scene.landmarks import MapPlace
-from augment.scene.modification import Modification, apply, without_traffic
-from augment.scene.sizes import EGO_LENGTH_M, EGO_WIDTH_M
 from augment.services.scenarios.catalogue import folder_of, read_catalogue
 
 TOUCH_M = 0.1

@@ -15,18 +15,25 @@ from django.contrib.auth.models import User
 from django.db import transaction
 
 from augment.errors import Conflict, UnknownName
-from augment.geometry.angles import difference, wrap
-from augment.geometry.frames import Pose
+from augment.geometry.frames import Pose, difference, wrap
 from augment.models import IntentReading, Scenario
 from augment.render.camera import AROUND_THE_EGO
-from augment.scene.codec import modification_from_document, modification_to_document
-from augment.scene.entities import AgentType, Point, Scene, TrafficAgent
-from augment.scene.intent_codec import intent_from_document
+from augment.scene.codec import (
+    intent_from_document,
+    modification_from_document,
+    modification_to_document,
+)
+from augment.scene.entities import (
+    LENGTH_WIDTH_M,
+    AgentType,
+    Modification,
+    Point,
+    Scene,
+    TrafficAgent,
+)
+from augment.scene.intent import IntentOrigin
 from augment.scene.intent_statements import list_statements
-from augment.scene.intent_words import IntentOrigin
 from augment.scene.lane_graph import LaneGraph
-from augment.scene.modification import Modification
-from augment.scene.sizes import LENGTH_WIDTH_M
 from augment.services.events import log_event
 from augment.services.scenarios.scenes import (
     check_reference,

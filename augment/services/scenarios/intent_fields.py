@@ -14,8 +14,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from augment.errors import InvalidDocument
-from augment.scene.intent_codec import intent_from_document, intent_to_document
-from augment.scene.intent_words import Body, Shape
+from augment.scene.codec import intent_from_document, intent_to_document
+from augment.scene.intent import Body, Shape
 
 KINDS = ("vehicles", "walk", "cones", "crash")
 CHOICES: dict[str, tuple[str, ...]] = {

@@ -37,15 +37,14 @@ from augment.formats.reading import Reading
 from augment.formats.writing import Cell, Loss
 from augment.models import Augmentation, BaseScene, GenerationJob, Scenario
 from augment.scene.codec import (
+    intent_to_document,
     modification_from_document,
     modification_to_document,
     scene_from_document,
 )
-from augment.scene.entities import Scene, SceneOptions
-from augment.scene.intent_codec import intent_to_document
-from augment.scene.intent_words import IntentOrigin
-from augment.scene.modification import without_traffic
-from augment.scene.notes import Note, SceneNoteKind
+from augment.scene.entities import Scene, SceneOptions, without_traffic
+from augment.scene.intent import IntentOrigin
+from augment.scene.recording import Note, SceneNoteKind
 from augment.services.scenarios.scene_imports import keep_reading
 from augment.services.scenarios.scenes import Circumstances, add_scenario, scene_of, type_of
 

@@ -19,20 +19,18 @@ from django.db.models import QuerySet
 from django.utils import timezone
 from numpy.typing import NDArray
 
-from augment.baselines.broken import break_reference
+from augment.baselines.registry import break_reference
 from augment.models import Augmentation, BaseScene, Contestant, GenerationJob, Scenario
 from augment.render.bev import draw
 from augment.render.camera import AROUND_THE_EGO, LOOK, Camera, camera_for
-from augment.render.description import describe
-from augment.render.legend_keys import change_keys, scene_keys
-from augment.render.shrunken import shrink, shrink_png
+from augment.render.canvas import shrink, shrink_png
+from augment.render.legend import change_keys, describe, scene_keys
 from augment.scene.codec import (
     modification_from_document,
     modification_to_document,
     scene_from_document,
 )
-from augment.scene.entities import Scene
-from augment.scene.modification import Modification, without_traffic
+from augment.scene.entities import Modification, Scene, without_traffic
 from augment.services.events import log_event
 from augment.services.scenarios.scenes import content_hash, reference_of, scene_key, scene_of
 
@@ -306,7 +304,7 @@ def legends_of_changes(views: Mapping[int, Mapping[str, Any]]) -> dict[int, set[
 
 
 Description = list[dict[str, Any]]
-"""The lines of augment.render.description, ready to be stored."""
+"""The lines of augment.render.legend, ready to be stored."""
 
 
 def descriptions(

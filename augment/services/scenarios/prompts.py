@@ -14,18 +14,18 @@ from django.db import connection
 from augment.errors import Conflict, UnknownName
 from augment.fake_llm.sight import same_text
 from augment.models import Contestant, Scenario
-from augment.prompts.texts import prompt_version
+from augment.prompts.fill import prompt_version
 from augment.render.camera import LOOK
+from augment.scene.codec import intent_from_document
+from augment.scene.entities import Modification
 from augment.scene.intent import Intent
-from augment.scene.intent_codec import intent_from_document
-from augment.scene.modification import Modification
 from augment.services.scenarios.pictures import store
 from augment.services.scenarios.scenes import reference_of, scene_key, scene_of
 from augment.variants.options import ContestantOptions, recipe_with
 from augment.variants.recipes import RECIPES, Tools, find_recipe
+from augment.variants.respondents import ModelRole
+from augment.variants.reviews import pictures
 from augment.variants.showing import Shown, shown_prompt
-from augment.variants.transcript import ModelRole
-from augment.variants.visual_qa import pictures
 
 FOLDER = "prompts"
 """Where pictures lie that a viewer would be shown."""

@@ -14,13 +14,12 @@ from augment.errors import Conflict
 from augment.formats.apart import UntrustedInput
 from augment.formats.reading import Moment, Reading
 from augment.models import BaseScene
-from augment.scene.codec import scene_to_document
-from augment.scene.notes import Note, SceneNoteKind, notes_from_document, notes_to_document
-from augment.scene.recording_codec import recording_to_document
+from augment.scene.codec import recording_to_document, scene_to_document
+from augment.scene.recording import Note, SceneNoteKind, notes_from_document, notes_to_document
 from augment.services.events import log_event
 from augment.services.scenarios.scenes import SLUG_LENGTH, check_slug, content_hash
-from augment.simulation.proposals import FALLBACK_LIMIT_MPS
-from augment.simulation.road_users import FALLBACK_MPS
+from augment.simulation.planning import FALLBACK_LIMIT_MPS
+from augment.simulation.traffic import FALLBACK_MPS
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

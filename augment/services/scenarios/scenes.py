@@ -17,20 +17,28 @@ from augment.errors import Conflict, InvalidDocument, UnknownName
 from augment.formats.interplan.reader import goal_place
 from augment.models import BaseScene, Scenario
 from augment.models.scenes import GOALS
-from augment.scene.catalogue import ScenarioType as ScenarioType
-from augment.scene.catalogue import in_type_order as in_type_order
 from augment.scene.codec import (
+    intent_from_document,
+    intent_to_document,
     modification_from_document,
     modification_to_document,
     scene_from_document,
 )
 from augment.scene.density import spawn_traffic
-from augment.scene.entities import Scene, TrafficAgent, TrafficDensity, TurnType
-from augment.scene.intent import Intent
-from augment.scene.intent_codec import intent_from_document, intent_to_document
-from augment.scene.intent_words import IntentOrigin
+from augment.scene.entities import (
+    Modification,
+    Scene,
+    TrafficAgent,
+    TrafficDensity,
+    TurnType,
+    apply,
+    check_fits,
+    without_traffic,
+)
+from augment.scene.entities import ScenarioType as ScenarioType
+from augment.scene.entities import in_type_order as in_type_order
+from augment.scene.intent import Intent, IntentOrigin
 from augment.scene.lane_graph import LaneGraph
-from augment.scene.modification import Modification, apply, check_fits, without_traffic
 from augment.services.events import log_event
 from augment.services.texts import check_prose, one_line
 

@@ -24,8 +24,8 @@ from augment.formats.reading import Reading
 from augment.models import SceneUpload, UploadMoment
 from augment.render.bev import draw
 from augment.render.camera import camera_for
-from augment.scene.modification import Modification
-from augment.scene.notes import notes_from_document, notes_to_document
+from augment.scene.entities import Modification
+from augment.scene.recording import notes_from_document, notes_to_document
 from augment.services.events import log_event
 from augment.services.scenarios.pictures import store_as
 from augment.services.scenarios.scene_imports import keep_reading, said_of

@@ -1,0 +1,1 @@
+"""Contestants, endpoints and models."""

@@ -1,0 +1,273 @@
+"""Contestants and how they ask."""
+
+from __future__ import annotations
+
+import uuid
+from collections.abc import Sequence
+from functools import partial
+from typing import Any
+
+from django.http import Http404
+from django.shortcuts import get_object_or_404
+from drf_spectacular.utils import extend_schema_field
+from rest_framework import serializers
+from rest_framework.request import Request
+from rest_framework.response import Response
+
+from arena.api.access import ADMINS, STAFF
+from arena.api.fields import FlagField, StrictSerializer, TextField, WholeNumberField
+from arena.api.views import (
+    ApiView,
+    PageQuery,
+    WarnedDocument,
+    answer_page,
+    keep_and_send,
+    operation,
+    page_of,
+)
+from arena.contestants.queries import probe_lines
+from augment.models import Contestant, Endpoint, EndpointModel, Probe
+from augment.services.endpoints import known_endpoints
+from augment.services.endpoints.contestants import VARIANTS, EnteredEndpoint, enter_contestant
+from augment.services.endpoints.known_endpoints import EndpointFacts
+from augment.services.endpoints.probing import plan_probe
+from augment.services.running.transcript_records import contestant_documents
+from augment.tasks import enqueue_probe
+
+KINDS = [kind.value for kind in Contestant.Kind if kind is not Contestant.Kind.CHECK]
+
+
+class ContestantQuery(PageQuery):
+    """Which contestants."""
+
+    kind = serializers.ChoiceField(choices=KINDS, required=False)
+    variant = serializers.ChoiceField(choices=list(VARIANTS), required=False)
+    slug = serializers.CharField(max_length=80, required=False)
+
+
+class ContestantEndpointDocument(serializers.Serializer[Any]):
+    """Where a contestant's model is."""
+
+    label = serializers.CharField()  # type: ignore[assignment]
+    base_url = serializers.CharField()
+    is_simulated = serializers.BooleanField()
+
+
+class WholeContestantDocument(serializers.Serializer[Any]):
+    """A contestant, as in transcripts."""
+
+    code = serializers.UUIDField()
+    slug = serializers.CharField()
+    name = serializers.CharField()
+    kind = serializers.CharField()
+    variant = serializers.CharField(allow_null=True)
+    model = serializers.CharField(allow_null=True)
+    roles = serializers.DictField(help_text="The models of other roles.")
+    options = serializers.DictField(help_text="Those that were chosen.")
+    frozen_options = serializers.DictField(
+        allow_null=True, help_text="All options, from its first run on."
+    )
+    left_out = serializers.DictField(
+        help_text="By role, options that its model does not support and that are not sent."
+    )
+    sends = serializers.DictField(allow_null=True)
+    endpoint = ContestantEndpointDocument(allow_null=True)
+    retired_at = serializers.DateTimeField(allow_null=True)
+
+
+class ContestantBody(StrictSerializer):
+    """A new contestant that asks a language model."""
+
+    slug = TextField(max_length=80)
+    variant = serializers.ChoiceField(choices=list(VARIANTS))
+    endpoint = TextField(max_length=80, help_text="The label of an endpoint.")
+    model = TextField(max_length=120, help_text="The model id on the endpoint.")
+    name = TextField(max_length=120, required=False, default="", allow_blank=True)
+    options = serializers.DictField(required=False, default=dict, help_text="By name.")
+
+
+class ContestantsView(ApiView):
+    """Contestants; attention checks are not among them."""
+
+    readers, writers = STAFF, ADMINS
+
+    @operation(
+        "Contestants by slug",
+        answers=page_of(WholeContestantDocument),
+        query=ContestantQuery,
+        name="listContestants",
+    )
+    def get(self, request: Request, given: dict[str, Any]) -> Response:
+        """Retired ones have a date in `retired_at`."""
+        rows = Contestant.objects.exclude(kind=Contestant.Kind.CHECK).select_related("endpoint")
+        return answer_page(
+            request, rows, given, WholeContestantDocument, order="slug", lines=_documents
+        )
+
+    @operation(
+        "Add a contestant that asks a language model",
+        takes=ContestantBody,
+        answers=WholeContestantDocument,
+        status=201,
+        name="createContestant",
+    )
+    def post(self, request: Request, given: dict[str, Any]) -> dict[str, Any]:
+        """The same one twice is one."""
+        endpoint = EnteredEndpoint(label=given.pop("endpoint"))
+        return _documents([enter_contestant(**given, endpoint=endpoint, actor=self.user)])[0]
+
+
+def _documents(rows: Sequence[Contestant]) -> list[dict[str, Any]]:
+    return [
+        document | {"code": row.code, "retired_at": row.retired_at}
+        for row, document in zip(rows, contestant_documents(rows), strict=True)
+    ]
+
+
+class EndpointDocument(serializers.ModelSerializer[Endpoint]):
+    """An endpoint; `key_variable` names an environment variable of the workers."""
+
+    class Meta:
+        model = Endpoint
+        fields = (
+            *("code", "label", "base_url", "key_variable", "is_simulated"),
+            *("max_concurrency", "requests_per_minute"),
+        )
+        read_only_fields = fields
+
+
+class EndpointBody(StrictSerializer):
+    """A new endpoint."""
+
+    label = TextField(max_length=80)  # type: ignore[assignment]
+    is_simulated = FlagField(required=False, default=False)
+    base_url = TextField(max_length=200)
+    key_variable = TextField(max_length=80, required=False, default="", allow_blank=True)
+    max_concurrency = WholeNumberField(
+        required=False, default=4, min_value=1, max_value=known_endpoints.HIGHEST_CONCURRENCY
+    )
+    requests_per_minute = WholeNumberField(
+        required=False,
+        default=None,
+        allow_null=True,
+        min_value=1,
+        max_value=known_endpoints.HIGHEST_PER_MINUTE,
+    )
+
+
+class EndpointModelDocument(serializers.ModelSerializer[EndpointModel]):
+    """A model of an endpoint; null or empty is unknown. Prices are for a million tokens."""
+
+    endpoint = serializers.CharField(source="endpoint.label")
+    model_class = serializers.CharField(allow_blank=True)
+
+    class Meta:
+        model = EndpointModel
+        fields = (
+            *("code", "endpoint", "model", "model_class", "vision", "native_tools", "json_schema"),
+            *("temperature", "reasoning_effort", "context_tokens", "max_output_tokens"),
+            *("price_in_usd", "price_out_usd", "price_as_of", "price_source"),
+        )
+        read_only_fields = fields
+
+
+class NewModelBody(StrictSerializer):
+    """A model that an endpoint has."""
+
+    model = TextField(max_length=120, help_text="Its id there.")
+
+
+class ProbeLineDocument(serializers.Serializer[Any]):
+    """The result of one question so far."""
+
+    ability = serializers.CharField()
+    progress = serializers.CharField(
+        help_text="asked, asking, waiting, or left where it was not asked."
+    )
+    has_it = serializers.BooleanField(
+        allow_null=True, help_text="Null where the answer does not tell."
+    )
+    note = serializers.CharField()
+    model_returned = serializers.CharField()
+    tokens = serializers.IntegerField(allow_null=True)
+    latency_s = serializers.FloatField(allow_null=True)
+    cost_usd = serializers.DecimalField(None, 9, allow_null=True)
+
+
+class ProbeDocument(serializers.ModelSerializer[Probe], WarnedDocument):
+    """A probe with a line for each ability."""
+
+    lines = serializers.SerializerMethodField()
+
+    class Meta:
+        model = Probe
+        fields = ("code", "state", "reason", "lines", "created_at", "finished_at", "warnings")
+        read_only_fields = fields
+
+    @extend_schema_field(ProbeLineDocument(many=True))
+    def get_lines(self, probe: Probe) -> Any:
+        """Return the lines, those to come included."""
+        return ProbeLineDocument(probe_lines(probe.model, probe), many=True).data
+
+
+class EndpointsView(ApiView):
+    """Endpoints."""
+
+    writers = ADMINS
+
+    @operation(
+        "Add an endpoint",
+        takes=EndpointBody,
+        answers=EndpointDocument,
+        status=201,
+        name="createEndpoint",
+    )
+    def post(self, request: Request, given: dict[str, Any]) -> Endpoint:
+        """409 where the label is taken."""
+        return known_endpoints.add_endpoint(
+            label=given.pop("label"),
+            is_simulated=given.pop("is_simulated"),
+            facts=EndpointFacts(**given),
+            actor=self.user,
+        )
+
+
+class ModelsView(ApiView):
+    """The models of an endpoint."""
+
+    writers = ADMINS
+
+    @operation(
+        "Add a model to an endpoint",
+        takes=NewModelBody,
+        answers=EndpointModelDocument,
+        status=201,
+        name="addModel",
+    )
+    def post(self, request: Request, code: uuid.UUID, given: dict[str, Any]) -> EndpointModel:
+        """Comes with its listed price; all else is unknown before a probe."""
+        row = get_object_or_404(Endpoint, code=code)
+        return known_endpoints.add_model(row, model=given["model"], actor=self.user)
+
+
+class ProbeView(ApiView):
+    """What a model can do, asked by a worker."""
+
+    readers, writers = STAFF, ADMINS
+
+    @operation("The last probe of a model", answers=ProbeDocument, name="getProbe")
+    def get(self, request: Request, code: uuid.UUID) -> Probe:
+        """Line by line while it runs; 404 before the first."""
+        found = _model(code).probes.first()
+        if found is None:
+            raise Http404
+        return found
+
+    @operation("Have a model probed", answers=ProbeDocument, status=202, name="probeModel")
+    def post(self, request: Request, code: uuid.UUID) -> tuple[Probe, list[str]]:
+        """Poll it until its state is done or failed."""
+        return keep_and_send(partial(plan_probe, _model(code), actor=self.user), enqueue_probe)
+
+
+def _model(code: uuid.UUID) -> EndpointModel:
+    return get_object_or_404(EndpointModel.objects.select_related("endpoint"), code=code)

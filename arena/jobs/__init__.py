@@ -1,0 +1,1 @@
+"""Jobs: what contestants made of scenarios, how it was judged, driven and labelled."""

@@ -1,0 +1,296 @@
+"""Generation jobs: estimated, launched and watched."""
+
+from __future__ import annotations
+
+import uuid
+from collections.abc import Callable, Mapping
+from functools import partial
+from typing import Any
+
+from django.http import Http404
+from django.http.response import HttpResponseBase
+from django.shortcuts import get_object_or_404
+from django.utils.text import slugify
+from rest_framework import serializers
+from rest_framework.request import Request
+from rest_framework.response import Response
+
+from arena.api.access import ADMINS, STAFF
+from arena.api.fields import FlagField, StrictSerializer, TextField, WholeNumberField
+from arena.api.views import (
+    ApiView,
+    FileView,
+    PageQuery,
+    WarnedDocument,
+    answer_page,
+    as_file,
+    file_operation,
+    keep_and_send,
+    operation,
+    page_of,
+    written_as,
+)
+from arena.exports.formats import Format
+from arena.jobs.exports import displacement, displacement_files, faults, tables
+from arena.jobs.exports.displacement_files import FORMATS as DISPLACEMENT
+from arena.jobs.exports.driving import FORMATS as DRIVING
+from arena.jobs.exports.driving import DrivingTable
+from arena.jobs.queries import analysis_of
+from augment.models import GenerationJob
+from augment.services.judging.displacement import By
+from augment.services.judging.driving_scores import options_driven, scores_of_job
+from augment.services.judging.simulations import SCORES, Options
+from augment.services.running import budget, jobs
+from augment.services.running.budget import Caps
+from augment.services.running.estimates import estimate
+from augment.services.running.progress import (
+    JobCounts,
+    count_each,
+    count_rows,
+    tool_calls_by_augmentation,
+)
+from augment.services.running.workers import workforce
+from augment.tasks import enqueue_job
+
+MOST_CHOSEN = 5_000
+
+
+class JobQuery(PageQuery):
+    """Which jobs."""
+
+    state = serializers.ChoiceField(choices=GenerationJob.State.values, required=False)
+
+
+class CountsDocument(serializers.Serializer[Any]):
+    """How many augmentations of a job are in each state."""
+
+    state = serializers.CharField(source="job.state")
+    total = serializers.IntegerField()
+    settled = serializers.IntegerField()
+    by_state = serializers.SerializerMethodField()
+    is_over = serializers.SerializerMethodField()
+
+    def get_by_state(self, found: JobCounts) -> dict[str, int]:
+        """Return the number of augmentations by state."""
+        return {state.value: number for state, number in found.by_state.items()}
+
+    def get_is_over(self, found: JobCounts) -> bool:
+        """Return whether nothing will change by itself."""
+        return not found.is_moving
+
+
+class JobDocument(CountsDocument):
+    """A job."""
+
+    code = serializers.UUIDField(source="job.code")
+    name = serializers.CharField(source="job.name")
+    samples = serializers.IntegerField(source="job.samples")
+    is_fresh = serializers.BooleanField(source="job.is_fresh")
+    cap_usd = serializers.DecimalField(None, 9, source="job.cap_usd", allow_null=True)
+    cap_calls = serializers.IntegerField(source="job.cap_calls", allow_null=True)
+    cap_tokens = serializers.IntegerField(source="job.cap_tokens", allow_null=True)
+    spent_usd = serializers.DecimalField(
+        None, 9, source="job.spent_usd", help_text="As far as prices are known."
+    )
+    spent_calls = serializers.IntegerField(source="job.spent_calls")
+    spent_tokens = serializers.IntegerField(source="job.spent_tokens")
+    created_at = serializers.DateTimeField(source="job.created_at")
+    finished_at = serializers.DateTimeField(source="job.finished_at", allow_null=True)
+
+
+class ChangedJobDocument(JobDocument, WarnedDocument):
+    """A job after a change."""
+
+
+class ProgressDocument(CountsDocument):
+    """The progress of a job, small enough to poll."""
+
+    calls = serializers.IntegerField(source="job.spent_calls")
+    is_worked_on = serializers.SerializerMethodField()
+
+    def get_is_worked_on(self, found: JobCounts) -> bool:
+        """Return whether it is under way and workers run."""
+        return found.is_moving and workforce().works
+
+
+class EstimateBody(StrictSerializer):
+    """A job that is not launched."""
+
+    contestants = serializers.ListField(
+        child=TextField(max_length=80), max_length=MOST_CHOSEN, help_text="Slugs."
+    )
+    scenarios = serializers.ListField(
+        child=TextField(max_length=80), max_length=MOST_CHOSEN, help_text="Slugs."
+    )
+    samples = WholeNumberField(
+        required=False, default=1, min_value=1, max_value=jobs.HIGHEST_SAMPLES
+    )
+    is_fresh = FlagField(
+        required=False, default=False, help_text="Ignore answers that are stored already."
+    )
+
+
+class JobBody(EstimateBody):
+    """A new job; a missing cap is none."""
+
+    name = TextField(max_length=120)
+    cap_usd = serializers.DecimalField(16, 9, required=False, default=None)
+    cap_calls = WholeNumberField(
+        required=False, default=None, min_value=1, max_value=budget.HIGHEST_CALLS
+    )
+    cap_tokens = WholeNumberField(
+        required=False, default=None, min_value=1, max_value=budget.HIGHEST_TOKENS
+    )
+
+
+class EstimateLineDocument(serializers.Serializer[Any]):
+    """The expected use of one contestant."""
+
+    slug = serializers.CharField()
+    name = serializers.CharField()
+    rows = serializers.IntegerField()
+    calls = serializers.ListField(
+        child=serializers.IntegerField(), help_text="At least, as expected, at most."
+    )
+    tokens_in = serializers.IntegerField()
+    tokens_out = serializers.IntegerField()
+    usd = serializers.DecimalField(None, 9, allow_null=True)
+    usd_most = serializers.DecimalField(None, 9, allow_null=True)
+    seen = serializers.IntegerField(
+        help_text="Earlier augmentations that it rests on; 0 for a guess."
+    )
+    answered = serializers.IntegerField(help_text="Rows whose answers are in the store already.")
+
+
+class EstimateDocument(serializers.Serializer[Any]):
+    """The expected use of a job."""
+
+    rows = serializers.IntegerField()
+    scenarios = serializers.IntegerField()
+    contestants = serializers.IntegerField()
+    calls = serializers.ListField(child=serializers.IntegerField())
+    tokens_in = serializers.IntegerField()
+    tokens_out = serializers.IntegerField()
+    usd = serializers.DecimalField(None, 9)
+    usd_most = serializers.DecimalField(None, 9)
+    answered = serializers.IntegerField(help_text="Rows whose answers are in the store already.")
+    lines = EstimateLineDocument(many=True)
+
+
+class JobsView(ApiView):
+    """Jobs."""
+
+    readers, writers = STAFF, ADMINS
+
+    @operation(
+        "Jobs, the youngest first", answers=page_of(JobDocument), query=JobQuery, name="listJobs"
+    )
+    def get(self, request: Request, given: dict[str, Any]) -> Response:
+        """With their counts."""
+        return answer_page(
+            request, GenerationJob.objects.all(), given, JobDocument, lines=count_each
+        )
+
+    @operation(
+        "Launch a job", takes=JobBody, answers=ChangedJobDocument, status=201, name="launchJob"
+    )
+    def post(self, request: Request, given: dict[str, Any]) -> tuple[JobCounts, list[str]]:
+        """Workers begin at once."""
+        limits = Caps(**{name: given.pop(f"cap_{name}") for name in ("usd", "calls", "tokens")})
+        launch = partial(jobs.launch, caps=limits, **given, actor=self.user)
+        job, warnings = keep_and_send(launch, enqueue_job)
+        return count_rows(job), warnings
+
+
+class JobView(ApiView):
+    """One job."""
+
+    readers = STAFF
+
+    @operation("A job", answers=JobDocument, name="getJob")
+    def get(self, request: Request, code: uuid.UUID) -> JobCounts:
+        """With its counts."""
+        return count_rows(get_object_or_404(GenerationJob, code=code))
+
+
+class JobProgressView(ApiView):
+    """The progress of a job."""
+
+    readers = STAFF
+
+    @operation("The progress of a job", answers=ProgressDocument, name="getJobProgress")
+    def get(self, request: Request, code: uuid.UUID) -> JobCounts:
+        """Counts by state, and whether workers are busy with it."""
+        return count_rows(get_object_or_404(GenerationJob, code=code))
+
+
+class EstimateView(ApiView):
+    """A job before it is launched."""
+
+    writers = ADMINS
+
+    @operation(
+        "What a job would use", takes=EstimateBody, answers=EstimateDocument, name="estimateJob"
+    )
+    def post(self, request: Request, given: dict[str, Any]) -> Any:
+        """From recorded calls where there are some, else a guess."""
+        return estimate(**given)
+
+
+Export = tuple[Mapping[str, Format[Any]], Callable[[GenerationJob], Any]]
+
+
+def _driving(score: str, job: GenerationJob) -> DrivingTable:
+    known = options_driven(job)
+    scores = scores_of_job(job, options=known[0] if known else Options(), score=score)
+    return DrivingTable(title=job.name, scores=scores)
+
+
+def _displacement(by: By, job: GenerationJob) -> Any:
+    return displacement.displacement_table(job, by=by, types=None)
+
+
+def _analysis(part: str, job: GenerationJob) -> Any:
+    return tables.analysis_table(analysis_of(job), part)
+
+
+OF_JOBS: dict[str, Export] = {
+    "tool-calls": (tables.CALL_FORMATS, tool_calls_by_augmentation),
+    "augmentations": (tables.AUGMENTATION_FORMATS, tables.augmentation_rows),
+    "repeats": (tables.REPEAT_FORMATS, tables.repeat_rows),
+    "faults": (faults.FORMATS, faults.fault_table),
+    "displacement-objects": (displacement_files.OBJECT_FORMATS, displacement_files.object_rows),
+    **{f"displacement-by-{by.value}": (DISPLACEMENT, partial(_displacement, by)) for by in By},
+    **{f"driving-{score}": (DRIVING, partial(_driving, score)) for score in SCORES},
+    **{
+        f"analyses-{part}": (tables.ANALYSIS_FORMATS, partial(_analysis, part))
+        for part in tables.PARTS
+    },
+}
+"""Exports of a job by name: their formats, and what makes their table."""
+
+
+class JobExportView(FileView):
+    """A table of a job."""
+
+    readers = STAFF
+
+    @file_operation(
+        "A table of a job as a file",
+        types=[one.content_type for formats, _ in OF_JOBS.values() for one in formats.values()],
+        name="exportJob",
+        words={
+            "name": OF_JOBS,
+            "form": [form for formats, _ in OF_JOBS.values() for form in formats],
+        },
+    )
+    def get(self, request: Request, code: uuid.UUID, name: str, form: str) -> HttpResponseBase:
+        """The same bytes as on its page."""
+        job = get_object_or_404(GenerationJob, code=code)
+        if name not in OF_JOBS:
+            raise Http404
+        formats, table = OF_JOBS[name]
+        chosen = written_as(formats, form)
+        content = chosen.write(table(job))
+        stem = f"{slugify(job.name) or 'job'}-{name}"
+        return as_file(content, chosen.content_type, f"{stem}.{chosen.suffix}")

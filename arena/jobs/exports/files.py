@@ -1,0 +1,142 @@
+"""Scenarios of a job or a study as one zip: files, and a manifest of what they are and lost."""
+
+from __future__ import annotations
+
+import json
+import platform
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import asdict
+from importlib import metadata
+from typing import Any
+
+from django.core.files.base import ContentFile
+from django.core.files.storage import default_storage
+from django.utils.text import slugify
+
+from arena.exports.formats import Format, formats
+from arena.exports.written_files import FileWork, MadeFile
+from arena.exports.zips import zip_bytes
+from arena.models import ScenarioFile
+from arena.services.vote_rows import digest_of
+from augment.models import Augmentation, GenerationJob
+from augment.services.judging.scenario_export import Exported, export_job
+from augment.services.running.calls import IMAGES
+from augment.services.running.transcript_records import record_of, tries_by_augmentation
+
+MANIFEST = "manifest.json"
+WARNING = "WARNING.txt"
+WRITTEN_WITH = ("numpy", "scenariogeneration", "shapely", "PyYAML")
+"""What the bytes of the files depend on besides our own code."""
+
+
+def scenario_zip(exported: Exported) -> bytes:
+    """The zip; the same rows always give the same bytes."""
+    files = dict(exported.written.files)
+    if exported.warnings:
+        files[WARNING] = ("\n".join(exported.warnings) + "\n").encode()
+    files[MANIFEST] = _manifest(exported, files)
+    return zip_bytes(files)
+
+
+def zip_name(exported: Exported, slug: str) -> str:
+    """What the zip is called; data that must not be used commercially is marked in the name."""
+    marked = any(source.is_non_commercial for source in exported.sources)
+    return f"{slug}-{exported.format}{'-non-commercial' if marked else ''}.zip"
+
+
+# --- Private -----------------------------------------------------------------------------------
+
+
+def _manifest(exported: Exported, files: dict[str, bytes]) -> bytes:
+    written = exported.written
+    document = {
+        "format": "scenario-arena/scenarios",
+        "version": 1,
+        exported.origin.kind: {"name": exported.origin.name, "code": exported.origin.code},
+        "scenarios_in": exported.format,
+        "warnings": list(exported.warnings),
+        "sources": [asdict(source) for source in exported.sources],
+        "lost": [asdict(loss) for loss in written.losses],
+        "refused": [asdict(loss) for loss in written.refused],
+        "missing": [asdict(loss) for loss in exported.missing],
+        "versions": {"python": platform.python_version()}
+        | {name: metadata.version(name) for name in WRITTEN_WITH},
+        "files": {
+            name: {"sha256": digest_of(content), "bytes": len(content)}
+            for name, content in sorted(files.items())
+        },
+    }
+    return (json.dumps(document, indent=2, ensure_ascii=False, sort_keys=True) + "\n").encode()
+
+
+class ScenarioFiles(FileWork[ScenarioFile]):
+    """Zips of jobs."""
+
+    model = ScenarioFile
+    related = ("job",)
+
+    @contextmanager
+    def made(self, row: ScenarioFile) -> Iterator[MadeFile]:
+        """All scenarios of the job in the format."""
+        exported = export_job(row.job, file_format=row.format)
+        yield made_of(exported, slugify(row.job.name) or str(row.job.code))
+
+
+SCENARIO_FILES = ScenarioFiles()
+
+
+def made_of(exported: Exported, slug: str) -> MadeFile:
+    """Scenarios as the file that is offered."""
+    return MadeFile(
+        name=zip_name(exported, slug),
+        content=ContentFile(scenario_zip(exported)),
+        warnings=exported.warnings,
+        marked=any(source.is_non_commercial for source in exported.sources),
+    )
+
+
+AT_ONCE = 50
+"""So many transcripts are read and held in memory together."""
+
+LINES = "transcripts.jsonl"
+
+
+def transcript_records(job: GenerationJob) -> Iterator[dict[str, Any]]:
+    """A record for each augmentation as they were made, images by their SHA-256 alone."""
+    rows = Augmentation.objects.filter(job=job).order_by("pk")
+    keys = list(rows.values_list("pk", flat=True))
+    for start in range(0, len(keys), AT_ONCE):
+        part = keys[start : start + AT_ONCE]
+        chosen = rows.filter(pk__in=part)
+        tries = tries_by_augmentation(part)
+        for row in chosen.select_related("job", "scenario", "contestant__endpoint"):
+            record = record_of(row, tries.get(row.pk, []))
+            yield record | {"images": sorted(record["images"])}
+
+
+def transcript_lines(job: GenerationJob) -> Iterator[bytes]:
+    """Each record as one line."""
+    for record in transcript_records(job):
+        yield (json.dumps(record, ensure_ascii=False) + "\n").encode()
+
+
+def zip_of(job: GenerationJob) -> bytes:
+    """The lines, and every image that one of them names and that is still there."""
+    lines: list[bytes] = []
+    images: set[str] = set()
+    for record in transcript_records(job):
+        images.update(record["images"])
+        lines.append((json.dumps(record, ensure_ascii=False) + "\n").encode())
+    files = {LINES: b"".join(lines)}
+    for digest in sorted(images):
+        name = f"{IMAGES}/{digest}.png"
+        if default_storage.exists(name):
+            with default_storage.open(name) as file:
+                files[f"images/{digest}.png"] = file.read()
+    return zip_bytes(files)
+
+
+TRANSCRIPT_FORMATS: dict[str, Format[GenerationJob]] = formats(
+    jsonl=lambda job: b"".join(transcript_lines(job)), zip=zip_of
+)

@@ -1,0 +1,263 @@
+"""Driving scores on the pages of jobs and studies, and the drives to look at."""
+
+from __future__ import annotations
+
+import uuid
+from functools import partial
+from typing import Any
+
+from django.contrib import messages
+from django.db import transaction
+from django.http import Http404, HttpRequest, HttpResponse, HttpResponseBase
+from django.shortcuts import get_object_or_404, redirect, render
+from django.urls import reverse
+from django.utils.text import slugify
+from django.views.decorators.http import require_POST, require_safe
+
+from arena.exports.formats import format_named
+from arena.exports.tables import LeaderboardTable
+from arena.jobs.exports.driving import FORMATS, DrivingTable
+from arena.jobs.queries import DRIVES, Part, before_of, shown_augmentations
+from arena.jobs.queries import drive_cells as cells_of
+from arena.models import Snapshot
+from arena.web.access import ADMIN, STAFF, allow_only
+from arena.web.listing import choice_asked, page_asked
+from augment.errors import AugmentError, QueueFault, UnknownName
+from augment.models import GenerationJob, Simulation
+from augment.services.judging import simulations
+from augment.services.judging.driving_scores import (
+    least_clearance_m,
+    options_driven,
+    scores_of_augmentations,
+    scores_of_job,
+)
+from augment.services.judging.simulations import FILES, NUPLAN, SCORES, Options, drive_file
+from augment.tasks import enqueue_simulations
+
+LABELS = {"nuplan": "nuPlan", "interplan": "interPlan"}
+PDM_CLOSED = Options().planner
+PLANNERS = {PDM_CLOSED: "PDM-Closed", "idm": "IDM"}
+
+
+@allow_only(ADMIN)
+@require_POST
+def simulate_job(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
+    """Have the job's results driven by the workers."""
+    job = get_object_or_404(GenerationJob, code=code)
+    planner = request.POST.get("planner", PDM_CLOSED)
+    options = Options(
+        planner=planner,
+        offsets=request.POST.get("offsets", "paper") if planner == PDM_CLOSED else "paper",
+        is_reactive=request.POST.get("reactive") == "on",
+    )
+    score = request.POST.get("score", NUPLAN)
+    try:
+        if score not in SCORES:
+            raise UnknownName("score", score, list(SCORES))
+        with transaction.atomic():
+            waiting = simulations.plan_job(job=job, options=options)
+            transaction.on_commit(partial(_send, request, waiting))
+    except AugmentError as error:
+        messages.error(request, str(error))
+    else:
+        number = len(waiting)
+        messages.success(
+            request,
+            ("%(number)s drive is queued." if number == 1 else "%(number)s drives are queued.")
+            % {"number": number},
+        )
+    shown = f"?score={score}#driving" if score in SCORES else "#driving"
+    return redirect(reverse("job", args=[code]) + shown)
+
+
+@allow_only(*STAFF)
+@require_safe
+def drives_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
+    """The drives of a job in a grid, page by page."""
+    job = get_object_or_404(GenerationJob, code=code)
+    score = _score_asked(request)
+    known = options_driven(job)
+    way = _way_asked(request, known)
+    part = Part(
+        view=DRIVES,
+        row=page_asked(request, "row"),
+        column=page_asked(request, "column"),
+        sample=page_asked(request, "sample"),
+    )
+    cells = cells_of(job, known[way] if known else Options(), part)
+    lines = [
+        {
+            "scenario": row.scenario,
+            "scenes": [
+                _cell(found.get(row.scenario.pk), score)
+                for found in (cells.before, cells.reference)
+            ],
+            "cells": [
+                _cell(cells.by_augmentation.get(sample[0].pk) if sample else None, score)
+                for sample in row.cells
+            ],
+        }
+        for row in cells.grid.rows
+    ]
+    context = {"job": job, "lines": lines, "grid": cells.grid, "score": score}
+    driven = {"labels": LABELS, "driven": way}
+    return render(request, "drives/list.html", context | driven)
+
+
+@allow_only(*STAFF)
+@require_safe
+def drive_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
+    """One drive to look at, beside the same scene before the change."""
+    row = _driven(code)
+    before = before_of(row)
+    context = {
+        "drive": row,
+        "before": before,
+        "files": FILES if row.state == Simulation.State.DONE else (),
+        "metrics": _metrics(row, before),
+        "labels": LABELS,
+    }
+    return render(request, "drives/drive.html", context)
+
+
+@allow_only(*STAFF)
+@require_safe
+def drive_trace(request: HttpRequest, code: uuid.UUID, form: str) -> HttpResponseBase:
+    """The drive as JSON for the page, or as a moving picture or a strip of stills."""
+    row = _driven(code)
+    if row.state != Simulation.State.DONE or form not in FILES:
+        raise Http404
+    content = drive_file(row, form, before=None if form == "json" else before_of(row))
+    answer = HttpResponse(content, content_type=FILES[form])
+    answer["Cache-Control"] = "private, max-age=3600"
+    if form != "json":
+        answer["Content-Disposition"] = f'attachment; filename="{row.scenario.slug}.{form}"'
+    return answer
+
+
+@allow_only(*STAFF)
+@require_safe
+def export(request: HttpRequest, code: uuid.UUID, form: str) -> HttpResponse:
+    """The mean driving scores of a job as a file."""
+    job = get_object_or_404(GenerationJob, code=code)
+    try:
+        chosen = format_named(FORMATS, form)
+    except UnknownName as error:
+        raise Http404 from error
+    name = f"{slugify(job.name) or 'job'}-driving-{_score_asked(request)}"
+    return HttpResponse(
+        chosen.write(_table(request, job)),
+        content_type=chosen.content_type,
+        headers={"Content-Disposition": f'attachment; filename="{name}.{chosen.suffix}"'},
+    )
+
+
+def section(request: HttpRequest, job: GenerationJob) -> dict[str, object]:
+    """What the part of the job's page shows."""
+    table = _table(request, job)
+    known = options_driven(job)
+    chosen = _way_asked(request, known)
+    ways = [
+        {
+            "planner": PLANNERS.get(one.planner, one.planner),
+            "offsets": _offsets()[one.offsets] if one.planner == PDM_CLOSED else "",
+            "is_reactive": one.is_reactive,
+            "is_shown": number == chosen,
+        }
+        for number, one in enumerate(known)
+    ]
+    choices = {"planner": PLANNERS.items(), "offsets": _offsets().items()}
+    asked = {"ways": ways, "driven": chosen, "choices": choices, "asked": table.scores.options}
+    return {"table": table, "forms": FORMATS, **asked, **_shown(table)}
+
+
+def driving(snapshot: Snapshot, table: LeaderboardTable) -> dict[str, Any]:
+    """What the tab of a study's results shows: of the augmentations that it shows."""
+    if not Simulation.objects.exists():
+        return {"drivings": []}
+    ids = shown_augmentations(snapshot.study)
+    found = [
+        DrivingTable(
+            title=snapshot.study.name,
+            scores=scores_of_augmentations(ids, options=Options(), score=score),
+        )
+        for score in SCORES
+    ]
+    return {"drivings": [{"table": one, **_shown(one)} for one in found if one.lines]}
+
+
+# Private
+
+
+def _table(request: HttpRequest, job: GenerationJob) -> DrivingTable:
+    scores = scores_of_job(job, options=_options_asked(request, job), score=_score_asked(request))
+    return DrivingTable(title=job.name, scores=scores, with_paper="paper" in request.GET)
+
+
+def _shown(table: DrivingTable) -> dict[str, Any]:
+    return {
+        "lines": [
+            {"line": line, "types": [line.by_type[kind] for kind, _ in table.types]}
+            for line in table.lines
+        ],
+        "labels": LABELS,
+        "score": table.scores.score,
+    }
+
+
+def _score_asked(request: HttpRequest) -> str:
+    wanted = request.GET.get("score", NUPLAN)
+    return wanted if wanted in SCORES else NUPLAN
+
+
+def _options_asked(request: HttpRequest, job: GenerationJob) -> Options:
+    """As the address says, else the way in which the job was driven last."""
+    known = options_driven(job)
+    return known[_way_asked(request, known)] if known else Options()
+
+
+def _way_asked(request: HttpRequest, known: list[Options]) -> int:
+    numbers = [str(number) for number in range(len(known))]
+    return int(choice_asked(request, "driven", numbers) or 0)
+
+
+def _offsets() -> dict[str, str]:
+    """What the names of the lateral offsets mean."""
+    return {"paper": "Up to 4 m (paper)", "original": "Up to 1 m (original)"}
+
+
+def _driven(code: uuid.UUID) -> Simulation:
+    rows = Simulation.objects.select_related("scenario", "augmentation__contestant")
+    return get_object_or_404(rows, code=code)
+
+
+def _cell(row: Simulation | None, score: str) -> dict[str, Any] | None:
+    if row is None:
+        return None
+    return {
+        "row": row,
+        "value": getattr(row, SCORES[score]),
+        "clearance_m": least_clearance_m(row),
+    }
+
+
+def _metrics(row: Simulation, before: Simulation | None) -> list[dict[str, Any]]:
+    """The parts of nuPlan's score, beside those before the change."""
+    if row.document is None:
+        return []
+    old = {} if before is None or before.document is None else _values(before.document)
+    return [
+        metric | {"before": old.get(metric["name"])} for metric in row.document["metrics"][NUPLAN]
+    ]
+
+
+def _values(document: dict[str, Any]) -> dict[str, float | None]:
+    return {metric["name"]: metric["value"] for metric in document["metrics"][NUPLAN]}
+
+
+def _send(request: HttpRequest, waiting: list[int]) -> None:
+    """Put drives on the queue; without a queue they wait, and the person is told."""
+    try:
+        enqueue_simulations(waiting)
+    except QueueFault as error:
+        messages.warning(request, str(error))

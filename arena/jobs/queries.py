@@ -1,0 +1,394 @@
+"""A part of a job's grid: so many scenarios, contestants and samples as one page can hold."""
+
+from __future__ import annotations
+
+import hashlib
+from collections import defaultdict
+from collections.abc import Collection, Hashable
+from dataclasses import dataclass, field
+from uuid import UUID
+
+from django.contrib.auth.models import User
+from django.core.paginator import Page, Paginator
+from django.db.models import Count, Q, QuerySet, TextField
+from django.db.models.functions import Cast
+
+from arena.errors import NotYours
+from arena.models import FaultLabel, LabellingRound, LabelTask, Study
+from arena.queries.remembering import Remembered, plan_of
+from augment.errors import UnknownName
+from augment.models import (
+    Augmentation,
+    Contestant,
+    EndpointModel,
+    GenerationJob,
+    Scenario,
+    Simulation,
+)
+from augment.services.endpoints.known_models import CONTESTANT, Spending, sum_spending
+from augment.services.judging.analyses import JobAnalysis, analyse_job
+from augment.services.judging.simulations import Options
+from augment.services.running.progress import cells_of
+
+State = Augmentation.State
+
+_LEAN = (*("code", "state", "sample", "image", "scenario_id", "contestant_id"), "job_id")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class View:
+    """How cells are shown, and how many at once.
+
+    Attributes:
+        cells: At most so many on a page, but for a single row.
+        columns, samples, rows: At most so many of each.
+    """
+
+    name: str
+    cells: int
+    columns: int
+    samples: int
+    rows: int
+
+
+MARKS = View(name="marks", cells=300, columns=10, samples=10, rows=50)
+PICTURES = View(name="pictures", cells=24, columns=4, samples=2, rows=12)
+VIEWS = {view.name: view for view in (MARKS, PICTURES)}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Part:
+    """Which part of a grid is asked for; pages count from 1."""
+
+    view: View = MARKS
+    row: int = 1
+    column: int = 1
+    sample: int = 1
+    state: str = ""
+    search: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PartRow:
+    """One scenario, and its samples by contestant."""
+
+    scenario: Scenario
+    cells: list[list[Augmentation]]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GridPart:
+    """What a page shows of a grid."""
+
+    part: Part
+    contestants: Page[Contestant]
+    samples: Page[int]
+    scenarios: Page[Scenario]
+    rows: list[PartRow]
+
+
+def grid_part(job: GenerationJob, part: Part) -> GridPart:
+    """Scenarios down, contestants across; five queries, however large the job is.
+
+    Pages beyond the last one are the last one.
+    """
+    view = part.view
+    columns = Paginator(_contestants(job), view.columns).get_page(part.column)
+    samples = Paginator(range(1, job.samples + 1), view.samples).get_page(part.sample)
+    wide = max(1, len(columns.object_list)) * len(samples.object_list)
+    lines = min(view.rows, max(1, view.cells // wide))
+    scenarios = Paginator(_scenarios(job, part), lines).get_page(part.row)
+    return GridPart(
+        part=part,
+        contestants=columns,
+        samples=samples,
+        scenarios=scenarios,
+        rows=_rows(job, columns, samples, scenarios),
+    )
+
+
+# --- Private -----------------------------------------------------------------------------------
+
+
+def _contestants(job: GenerationJob) -> QuerySet[Contestant]:
+    found = Contestant.objects.filter(pk__in=job.augmentations.order_by().values("contestant"))
+    return found.only("slug", "name", "kind", "code").order_by("name", "pk")
+
+
+def _scenarios(job: GenerationJob, part: Part) -> QuerySet[Scenario]:
+    """Those with a cell of the wanted state, and with the wanted text in their slug."""
+    cells = job.augmentations.order_by()
+    if part.state:
+        cells = cells.filter(state=part.state)
+    found = Scenario.objects.filter(pk__in=cells.values("scenario"))
+    if part.search:
+        found = found.filter(slug__icontains=part.search)
+    return found.only("slug", "type", "code").order_by("type", "slug")
+
+
+def _rows(
+    job: GenerationJob, columns: Page[Contestant], samples: Page[int], scenarios: Page[Scenario]
+) -> list[PartRow]:
+    who, where = list(columns.object_list), list(scenarios.object_list)
+    numbers = list(samples.object_list)
+    found: defaultdict[tuple[int, int], list[Augmentation]] = defaultdict(list)
+    cells = Augmentation.objects.filter(
+        job=job, contestant__in=who, scenario__in=where, sample__range=(numbers[0], numbers[-1])
+    )
+    for cell in cells.only(*_LEAN).order_by("sample"):
+        found[cell.scenario_id, cell.contestant_id].append(cell)
+    return [
+        PartRow(scenario=scenario, cells=[found[scenario.pk, contestant.pk] for contestant in who])
+        for scenario in where
+    ]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GridRow:
+    """One scenario of the grid.
+
+    Attributes:
+        cells: One sample of each contestant, None where nothing was planned.
+        samples: All of them.
+    """
+
+    scenario: Scenario
+    cells: list[Augmentation | None]
+    samples: list[list[Augmentation]] = field(default_factory=list)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class JobGrid:
+    """Scenarios down, contestants across."""
+
+    contestants: list[Contestant]
+    rows: list[GridRow]
+
+
+def grid(job: GenerationJob, *, sample: int = 1) -> JobGrid:
+    """What became of every scenario with every contestant.
+
+    Raises:
+        UnknownName: The job has no such sample.
+    """
+    if not 1 <= sample <= job.samples:
+        known = [str(number) for number in range(1, job.samples + 1)]
+        raise UnknownName("sample of this job", str(sample), known)
+    found: defaultdict[tuple[int, int], list[Augmentation]] = defaultdict(list)
+    for cell in cells_of(job):
+        found[cell.scenario_id, cell.contestant_id].append(cell)
+    every = [cell for cells in found.values() for cell in cells]
+    contestants = sorted({cell.contestant for cell in every}, key=lambda one: one.name)
+    scenarios = {cell.scenario_id: cell.scenario for cell in every}
+    ordered = sorted(scenarios.values(), key=lambda scenario: (scenario.type, scenario.slug))
+    return JobGrid(
+        contestants=contestants,
+        rows=[
+            GridRow(
+                scenario=scenario,
+                cells=[
+                    next((one for one in cells if one.sample == sample), None) for cells in line
+                ],
+                samples=line,
+            )
+            for scenario in ordered
+            for line in [[found[scenario.pk, who.pk] for who in contestants]]
+        ],
+    )
+
+
+DRIVES = View(name="drives", cells=300, columns=10, samples=1, rows=50)
+"""How many drives are shown at once: one sample of each contestant."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DriveCells:
+    """A part of a job's grid with its drives by augmentation, and those of its scenes."""
+
+    grid: GridPart
+    by_augmentation: dict[int, Simulation]
+    before: dict[int, Simulation]
+    reference: dict[int, Simulation]
+
+
+def options_of(row: Simulation) -> Options:
+    """How it was driven."""
+    return Options(planner=row.planner, offsets=row.offsets, is_reactive=row.is_reactive)
+
+
+def before_of(row: Simulation) -> Simulation | None:
+    """The same scene before the change, driven the same way; None until that is done."""
+    rows = options_of(row).of(Simulation.objects.filter(scenario_id=row.scenario_id))
+    drives = rows.filter(subject=Simulation.Subject.UNMODIFIED, state=Simulation.State.DONE)
+    return drives.exclude(pk=row.pk).first()
+
+
+def drive_cells(job: GenerationJob, options: Options, part: Part) -> DriveCells:
+    """The drives of a part of a job's grid; seven queries, no traces."""
+    shown = grid_part(job, part)
+    scenarios = [row.scenario.pk for row in shown.rows]
+    augmentations = [cell.pk for row in shown.rows for cells in row.cells for cell in cells]
+    rows = options.of(Simulation.objects.defer("trace"))
+    of_scenes = list(rows.filter(augmentation=None, scenario__in=scenarios))
+    subject = Simulation.Subject
+    return DriveCells(
+        grid=shown,
+        by_augmentation={
+            row.augmentation_id: row
+            for row in rows.filter(augmentation__in=augmentations)
+            if row.augmentation_id is not None
+        },
+        before={row.scenario_id: row for row in of_scenes if row.subject == subject.UNMODIFIED},
+        reference={row.scenario_id: row for row in of_scenes if row.subject == subject.REFERENCE},
+    )
+
+
+def shown_augmentations(study: Study) -> frozenset[int]:
+    """The primary keys of all augmentations in the study's matchups; two queries at most."""
+    return _SHOWN.get(plan_of(study), lambda: _shown(study))
+
+
+def _shown(study: Study) -> frozenset[int]:
+    rows = study.matchups.order_by().values_list("left", "right").distinct()
+    return frozenset(pk for pair in rows for pk in pair)
+
+
+_SHOWN: Remembered[frozenset[int]] = Remembered(8)
+
+
+def spent_on(augmentations: Collection[int]) -> dict[int, Spending]:
+    """By the contestant's primary key, over all augmentations that a study shows; one query."""
+    return sum_spending(Q(attempt__augmentation__in=augmentations), by=CONTESTANT)
+
+
+def model_classes(contestants: Collection[Contestant]) -> dict[int, str]:
+    """The class of the model that modifies, by the contestant's primary key; one query."""
+    asked = [row for row in contestants if row.endpoint_id is not None]
+    wanted = Q(endpoint__in={row.endpoint_id for row in asked})
+    known = {
+        (endpoint, model): EndpointModel.ModelClass(classes).value
+        for endpoint, model, classes in EndpointModel.objects.filter(wanted)
+        .exclude(model_class="")
+        .values_list("endpoint", "model", "model_class")
+    }
+    classes = {row.pk: known.get((row.endpoint_id or 0, row.model)) for row in asked}
+    return {pk: name for pk, name in classes.items() if name is not None}
+
+
+def analysis_of(job: GenerationJob) -> JobAnalysis:
+    """Everything about a job; three queries, and one more where it is not kept."""
+    return _ANALYSED.get(analysed_from(job), lambda: analyse_job(job))
+
+
+def analysed_from(job: GenerationJob) -> Hashable:
+    """Another value whenever a row of the job, a scenario or a contestant of it changes.
+
+    Stored documents are compared as text, which costs a tenth of parsing them.
+    """
+    rows = job.augmentations.order_by("pk").values_list(
+        "pk", "state", "scenario", "contestant", "sample", Cast("modification", TextField())
+    )
+    mine = job.augmentations.order_by()
+    scenarios = Scenario.objects.filter(pk__in=mine.values("scenario")).order_by("pk")
+    contestants = Contestant.objects.filter(pk__in=mine.values("contestant")).order_by("pk")
+    read = (
+        rows,
+        scenarios.values_list(
+            *("pk", "slug", "paraphrase_of"),
+            *(Cast(name, TextField()) for name in ("intent", "reference")),
+        ),
+        contestants.values_list("pk", "slug", "name", "kind"),
+    )
+    found = hashlib.sha256()
+    for lines in read:
+        found.update(repr(list(lines)).encode())
+    return (job.pk, found.digest())
+
+
+# --- Private -----------------------------------------------------------------------------------
+
+_ANALYSED: Remembered[JobAnalysis] = Remembered(10)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LabellingProgress:
+    """A labelling and how many of its planned showings have a label."""
+
+    labelling: LabellingRound
+    planned: int
+    labelled: int
+
+    @property
+    def left(self) -> int:
+        """What still waits for a label: nothing in a closed labelling."""
+        return 0 if self.labelling.closed_at else self.planned - self.labelled
+
+
+def of_expert(expert: User) -> list[LabellingProgress]:
+    """The labellings that an expert was invited to, counted over their own showings."""
+    rows = LabellingRound.objects.filter(tasks__expert=expert)
+    return _counted(rows)
+
+
+def of_job(job: GenerationJob) -> list[LabellingProgress]:
+    """The labellings of a job over all their experts."""
+    return _counted(job.labellings.all())
+
+
+def labelling_of(*, expert: User, code: UUID) -> LabellingProgress:
+    """One of the expert's own labellings.
+
+    Raises:
+        NotYours: There is none with that code, or the expert takes no part in it.
+    """
+    progress = _counted(LabellingRound.objects.filter(code=code, tasks__expert=expert))
+    if not progress:
+        raise NotYours("You do not take part in this labelling.")
+    return progress[0]
+
+
+def next_task(*, labelling: LabellingRound, expert: User) -> LabelTask | None:
+    """What the expert labels next, None when all is done or the labelling is closed."""
+    if labelling.closed_at is not None:
+        return None
+    waiting = labelling.tasks.filter(expert=expert, label=None)
+    return (
+        waiting.select_related("augmentation__scenario")
+        .defer("augmentation__modification", "augmentation__scenario__reference")
+        .order_by("position")
+        .first()
+    )
+
+
+def labels_of(job: GenerationJob) -> QuerySet[FaultLabel]:
+    """Every label on the augmentations of a job, each with its augmentation's contestant."""
+    found = FaultLabel.objects.filter(augmentation__job=job).select_related("augmentation")
+    return found.only(*_LABEL, "augmentation__contestant").order_by("augmentation", "pk")
+
+
+def contestants_of(job: GenerationJob) -> list[tuple[Contestant, int]]:
+    """The contestants of a job by name, each with its answers that are none; two queries."""
+    missed = Q(state__in=(Augmentation.State.UNREADABLE, Augmentation.State.REFUSED))
+    counted = dict(
+        job.augmentations.order_by()
+        .values_list("contestant")
+        .annotate(missed=Count("pk", filter=missed))
+    )
+    found = Contestant.objects.filter(pk__in=counted).order_by("name", "slug")
+    return [(who, counted[who.pk]) for who in found.only("name", "slug", "kind")]
+
+
+_LABEL = (
+    *("augmentation", "position", "heading", "logic"),
+    *("guessed_position", "guessed_heading", "guessed_logic"),
+)
+
+
+def _counted(rows: QuerySet[LabellingRound]) -> list[LabellingProgress]:
+    counted = rows.annotate(
+        planned=Count("tasks", distinct=True), labelled=Count("tasks__label", distinct=True)
+    )
+    return [
+        LabellingProgress(labelling=row, planned=row.planned, labelled=row.labelled)
+        for row in counted
+    ]

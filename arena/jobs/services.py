@@ -1,0 +1,214 @@
+"""Labelling faults: a round is planned before the first label, and a label is never changed."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Sequence
+from functools import partial
+from uuid import UUID
+
+from django.contrib.auth.models import User
+from django.db import IntegrityError, transaction
+from django.utils import timezone
+
+from arena.errors import AlreadyLabelled, LabellingClosed, NothingToPlan, NotYours
+from arena.models import FaultLabel, LabellingRound, LabelTask, ScenarioFile
+from arena.queries.people import experts as expert_accounts
+from arena.services.written_files import waiting_row
+from augment.errors import Conflict, UnknownName
+from augment.models import Augmentation, GenerationJob
+from augment.services.events import log_event
+from augment.services.judging.findings import FaultClass, guess_faults
+from augment.services.judging.scenario_export import FORMATS
+from augment.services.texts import make_storable, one_line
+
+NOTE_LENGTH = 2000
+
+
+@transaction.atomic
+def open_labelling(
+    *, name: str, job: GenerationJob, experts: Sequence[str], seed: int, actor: User | None = None
+) -> LabellingRound:
+    """Plan that each expert looks at every finished augmentation of a job, in an order of its own.
+
+    What an expert was planned to label before is left out.
+
+    Args:
+        name: Experts see it.
+        job: Whose augmentations with a modification are labelled.
+        experts: Usernames of accounts with the role expert.
+        seed: The orders are a pure function of it.
+        actor: Who opens it.
+
+    Raises:
+        UnknownName: There is no such expert.
+        Conflict: The name is taken, or an expert is simulated.
+        NothingToPlan: Nothing of the job is left to label for these experts.
+    """
+    name = one_line("name", name, what="labelling")
+    if LabellingRound.objects.filter(name=name).exists():
+        raise _taken(name)
+    people = _experts(experts)
+    # Held, so that of two that are opened at once the second sees what the first has planned.
+    GenerationJob.objects.select_for_update(no_key=True).get(pk=job.pk)
+    labelling = _insert(name, job, seed)
+    labelling.experts.set(people)
+    tasks = [task for expert in people for task in _planned(labelling, expert)]
+    if not tasks:
+        raise NothingToPlan("These experts have nothing left to label in this job.")
+    LabelTask.objects.bulk_create(tasks)
+    log_event(
+        actor=actor,
+        verb="open",
+        object_kind="labelling",
+        object_code=labelling.code,
+        after={
+            "name": name,
+            "job": str(job.code),
+            "experts": [expert.username for expert in people],
+            "seed": seed,
+            "tasks": len(tasks),
+        },
+    )
+    return labelling
+
+
+@transaction.atomic
+def close_labelling(*, labelling: LabellingRound, actor: User | None = None) -> LabellingRound:
+    """Take no more labels; those that are there stay, and what is left is nobody's duty.
+
+    Raises:
+        LabellingClosed: It is closed already.
+    """
+    now = timezone.now()
+    if not LabellingRound.objects.filter(pk=labelling.pk, closed_at=None).update(closed_at=now):
+        raise LabellingClosed(f"The labelling '{labelling.name}' is closed already.")
+    labelling.closed_at = now
+    log_event(
+        actor=actor,
+        verb="close",
+        object_kind="labelling",
+        object_code=labelling.code,
+        after={"labels": FaultLabel.objects.filter(task__labelling=labelling).count()},
+    )
+    return labelling
+
+
+def save_label(
+    *, expert: User, task_code: UUID, faults: frozenset[FaultClass], note: str = ""
+) -> FaultLabel:
+    """Store what an expert sees in one augmentation; the same again is the same label.
+
+    Raises:
+        NotYours: The task is somebody else's or does not exist.
+        AlreadyLabelled: It has another label.
+        LabellingClosed: It has no label, and its labelling takes none any more.
+    """
+    save = partial(_save, expert=expert, task_code=task_code, faults=faults, note=note)
+    try:
+        return save()
+    except IntegrityError:
+        # Another request was faster; looked at again, this one is its replay or too late.
+        return save()
+
+
+# Private
+
+
+def _insert(name: str, job: GenerationJob, seed: int) -> LabellingRound:
+    try:
+        with transaction.atomic():
+            return LabellingRound.objects.create(name=name, job=job, seed=seed)
+    except IntegrityError:  # somebody else was faster
+        raise _taken(name) from None
+
+
+def _taken(name: str) -> Conflict:
+    return Conflict(f"There is a labelling called '{name}' already; choose another name.")
+
+
+def _experts(usernames: Sequence[str]) -> list[User]:
+    known = {user.username: user for user in expert_accounts()}
+    for username in usernames:
+        if username not in known:
+            raise UnknownName("expert", username, sorted(known))
+    experts = [known[username] for username in sorted(set(usernames))]
+    simulated = [user.username for user in experts if user.person.is_simulated]
+    if simulated:
+        raise Conflict(f"Simulated experts label nothing: {', '.join(simulated)}.")
+    return experts
+
+
+def _planned(labelling: LabellingRound, expert: User) -> list[LabelTask]:
+    rows = Augmentation.objects.filter(job=labelling.job, state=Augmentation.State.DONE)
+    left = rows.exclude(label_tasks__expert=expert).order_by("scenario__slug", "contestant__slug")
+    order = list(left.values_list("pk", flat=True))
+    random.Random(f"{labelling.seed}/{expert.username}").shuffle(order)
+    return [
+        LabelTask(labelling=labelling, expert=expert, position=n, augmentation_id=pk)
+        for n, pk in enumerate(order, start=1)
+    ]
+
+
+@transaction.atomic
+def _save(
+    *, expert: User, task_code: UUID, faults: frozenset[FaultClass], note: str
+) -> FaultLabel:
+    task = (
+        LabelTask.objects.select_related("labelling", "augmentation__scenario__base_scene")
+        .filter(code=task_code, expert=expert)
+        .first()
+    )
+    if task is None:
+        raise NotYours("This picture is not yours to label.")
+    note = make_storable(note.strip())[:NOTE_LENGTH]
+    said = {fault.value: fault in faults for fault in FaultClass}
+    known = FaultLabel.objects.filter(task=task).first()
+    if known is not None:
+        if any(getattr(known, name) != value for name, value in said.items()):
+            raise AlreadyLabelled("You had labelled that picture before; your first label counts.")
+        return known
+    if task.labelling.closed_at is not None:
+        raise LabellingClosed(f"The labelling '{task.labelling.name}' is closed.")
+    guessed = guess_faults(task.augmentation)
+    return FaultLabel.objects.create(
+        augmentation=task.augmentation,
+        expert=expert,
+        task=task,
+        note=note,
+        **said,
+        **{
+            f"guessed_{fault.value}": None if guessed is None else fault in guessed
+            for fault in FaultClass
+        },
+    )
+
+
+@transaction.atomic
+def ask_for_file(
+    *, job: GenerationJob, file_format: str, actor: User | None = None
+) -> ScenarioFile:
+    """A row for a worker to write; one that waits already is asked for once more.
+
+    Raises:
+        UnknownName: No such format.
+    """
+    if file_format not in FORMATS:
+        raise UnknownName("format", file_format, list(FORMATS))
+    row = ScenarioFile(job=job, format=file_format, asked_by=actor)
+    if (waiting := waiting_row(row)) is not None:
+        return waiting
+    row.save()
+    log_event(
+        actor=actor,
+        verb="ask for scenarios",
+        object_kind="job",
+        object_code=job.code,
+        after={"format": file_format, "file": str(row.code)},
+    )
+    return row
+
+
+def files_of(job: GenerationJob) -> dict[str, ScenarioFile]:
+    """The newest row of each format."""
+    return {row.format: row for row in ScenarioFile.objects.filter(job=job).order_by("pk")}

@@ -1,0 +1,149 @@
+"""Accounts, and the links that let their owners in."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from django.contrib.auth.models import User
+from django.db import transaction
+from django.urls import reverse
+from rest_framework import serializers
+from rest_framework.request import Request
+
+from arena.api.access import ADMINS
+from arena.api.fields import StrictSerializer, TextField
+from arena.api.views import ApiView, operation
+from arena.queries.people import ROLES, role_given, role_of
+from arena.services.accounts import accept_welcome, check_password_strength, make_welcome_token
+from arena.services.api_tokens import make_api_token
+from arena.services.first_start import make_first_admin
+from arena.services.people import create_person
+
+DAYS = 30
+"""Lifetime of the token that a link is exchanged for."""
+
+
+class NewPersonDocument(serializers.Serializer[Any]):
+    """A new account."""
+
+    code = serializers.UUIDField(source="person.code")
+    username = serializers.CharField()
+    pseudonym = serializers.CharField(source="person.pseudonym")
+    role = serializers.SerializerMethodField()
+    is_active = serializers.BooleanField()
+    has_password = serializers.BooleanField(source="has_usable_password")
+    link = serializers.CharField(
+        help_text="Lets its owner set a password, or `POST /welcome` make a token; works once."
+    )
+
+    def get_role(self, user: User) -> str | None:
+        """Return the role that the account was given."""
+        return role_given(user)
+
+
+class PersonBody(StrictSerializer):
+    """A new account."""
+
+    username = TextField(max_length=150)
+    role = serializers.ChoiceField(choices=list(ROLES))
+    pseudonym = TextField(
+        max_length=60, required=False, default=None, help_text="What others see."
+    )
+
+
+class FirstBody(StrictSerializer):
+    """The first admin."""
+
+    link = TextField(max_length=2000, help_text="As `serve` printed it, or the end of it.")
+    username = TextField(max_length=150)
+    password = TextField(max_length=500, trim_whitespace=False)
+
+
+class WelcomeBody(StrictSerializer):
+    """The password of an account."""
+
+    link = TextField(max_length=2000, help_text="As it was given, or the end of it.")
+    password = TextField(max_length=500, trim_whitespace=False)
+
+
+class TokenDocument(serializers.Serializer[Any]):
+    """A new token; it can't be read again."""
+
+    token = serializers.CharField()
+    role = serializers.CharField()
+    expires_at = serializers.DateTimeField()
+
+
+class PeopleView(ApiView):
+    """Accounts."""
+
+    writers = ADMINS
+
+    @operation(
+        "Make an account and the link that lets its owner in",
+        takes=PersonBody,
+        answers=NewPersonDocument,
+        status=201,
+        name="createPerson",
+    )
+    def post(self, request: Request, given: dict[str, Any]) -> User:
+        """The link is shown this once."""
+        made = create_person(**given, password=None, actor=self.user)
+        path = reverse("welcome", args=[make_welcome_token(made, actor=self.user)])
+        made.link = request.build_absolute_uri(path)  # type: ignore[attr-defined]
+        return made
+
+
+class FirstView(ApiView):
+    """The first admin of an empty installation."""
+
+    authentication_classes = ()
+    permission_classes = ()
+
+    @operation(
+        "Make the first admin by the link that `serve` prints",
+        takes=FirstBody,
+        answers=TokenDocument,
+        status=201,
+        name="makeFirstAdmin",
+    )
+    def post(self, request: Request, given: dict[str, Any]) -> dict[str, Any]:
+        """Answers with a token of the new admin."""
+        check_password_strength(given["password"])
+        user = make_first_admin(
+            token=_end_of(given["link"]), username=given["username"], password=given["password"]
+        )
+        return _token(user, "first start")
+
+
+class WelcomeView(ApiView):
+    """The owner of a new account, who has a link."""
+
+    authentication_classes = ()
+    permission_classes = ()
+
+    @operation(
+        "Set the password of an account by its link",
+        takes=WelcomeBody,
+        answers=TokenDocument,
+        status=201,
+        name="acceptWelcome",
+    )
+    def post(self, request: Request, given: dict[str, Any]) -> dict[str, Any]:
+        """Answers with a token of the account, in its role."""
+        with transaction.atomic():  # the link stays valid where no token can be made
+            user = accept_welcome(token=_end_of(given["link"]), password=given["password"])
+            return _token(user, "welcome")
+
+
+# --- Private -----------------------------------------------------------------------------------
+
+
+def _end_of(link: str) -> str:
+    return link.strip().rstrip("/").rpartition("/")[2]
+
+
+def _token(user: User, name: str) -> dict[str, Any]:
+    role = role_of(user) or ""
+    fresh = make_api_token(owner=user, name=name, role=role, days=DAYS)
+    return {"token": fresh.secret, "role": role, "expires_at": fresh.token.expires_at}

@@ -1,0 +1,267 @@
+"""Ratings of a study with their tables, for staff who may read its results."""
+
+from __future__ import annotations
+
+import uuid
+from collections.abc import Callable
+from dataclasses import fields
+from functools import partial
+from typing import Any
+
+from django.http import Http404
+from django.http.response import HttpResponseBase
+from django.shortcuts import get_object_or_404
+from django.utils.text import slugify
+from drf_spectacular.utils import extend_schema_field
+from rest_framework import serializers
+from rest_framework.request import Request
+
+from arena import tasks
+from arena.api.access import STAFF
+from arena.api.fields import FlagField, StrictSerializer, TextField, WholeNumberField
+from arena.api.views import (
+    ApiView,
+    FileView,
+    as_file,
+    file_operation,
+    keep_and_send,
+    operation,
+    written_as,
+)
+from arena.errors import NoSnapshot
+from arena.exports.bundle import bundle
+from arena.exports.charts.rating import CONTENT_TYPES, chart_bytes
+from arena.exports.formats import Format
+from arena.exports.tables import LeaderboardTable, leaderboard_table
+from arena.exports.votes import VOTE_FORMATS, vote_table
+from arena.exports.writers import FORMATS as LEADERBOARD
+from arena.exports.zips import CONTENT_TYPE as ZIP_TYPE
+from arena.models import Snapshot, Study
+from arena.models.ratings import STORED
+from arena.pairing.order import MAIN, REPEAT
+from arena.queries.studies.results import must_read_results
+from arena.queries.votes.sets import Filters
+from arena.rating.bootstrap import Unit
+from arena.rating.leaderboard import Intervals, Line, Method
+from arena.services.ratings import DEFAULT_ROUNDS, MOST_ROUNDS, is_big, plan_snapshot, rate
+from arena.services.study_plan import HIGHEST_SEED
+from arena.studies.api import get_study
+from augment.errors import UnknownName
+from augment.services.scenarios.scenes import type_choices
+
+_FIELDS: dict[str, Callable[[], serializers.Field[Any, Any, Any, Any]]] = {
+    "str": serializers.CharField,
+    "int": serializers.IntegerField,
+    "int | None": partial(serializers.IntegerField, allow_null=True),
+    "float | None": partial(serializers.FloatField, allow_null=True),
+}
+"""By the type of a line's field."""
+
+
+class StandingDocument(serializers.Serializer[Any]):
+    """A contestant; null is what the votes do not determine."""
+
+    slug = serializers.CharField()
+    name = serializers.CharField()
+    kind = serializers.CharField()
+    simulated = serializers.BooleanField()
+    part = serializers.IntegerField(
+        help_text="Ratings compare only those with the same number here."
+    )
+
+    def get_fields(self) -> dict[str, serializers.Field[Any, Any, Any, Any]]:
+        """Return these and all stored fields of a line."""
+        kinds = {column.name: _FIELDS[str(column.type)] for column in fields(Line)}
+        stored = {name: kinds[name]() for name in STORED}
+        stored["elo"] = serializers.FloatField(source="rating", allow_null=True)
+        del stored["rating"]
+        return {**super().get_fields(), **stored}
+
+
+class TableDocument(serializers.Serializer[Any]):
+    """The table of a rating, best first, with its warnings."""
+
+    method = serializers.CharField(source="method_text")
+    left_out = serializers.DictField(child=serializers.IntegerField())
+    warnings = serializers.SerializerMethodField()
+    rows = StandingDocument(many=True)
+
+    def get_warnings(self, table: LeaderboardTable) -> list[str]:
+        """Return them as sentences."""
+        return list(table.warnings)
+
+
+class SnapshotDocument(serializers.ModelSerializer[Snapshot]):
+    """A rating with its table, which is null until it is ready."""
+
+    study = serializers.UUIDField(source="study.code")
+    resample = serializers.CharField(source="resampling_unit")
+    votes = serializers.IntegerField(source="votes_counted")
+    status = serializers.CharField(
+        source="reason", help_text="why there is no rating, if there is none"
+    )
+    table = serializers.SerializerMethodField()
+
+    class Meta:
+        model = Snapshot
+        fields = (
+            *("code", "study", "state", "progress", "method", "rounds", "resample", "intervals"),
+            *("seed", "filters", "votes", "votes_sha256", "is_early", "includes_simulated"),
+            *("status", "made_at", "table"),
+        )
+        read_only_fields = fields
+
+    @extend_schema_field(TableDocument(allow_null=True))
+    def get_table(self, row: Snapshot) -> Any:
+        """Return the table."""
+        ready = row.state == Snapshot.State.READY
+        return TableDocument(leaderboard_table(row)).data if ready else None
+
+
+class SnapshotBody(StrictSerializer):
+    """How to rate; what is missing is the default."""
+
+    method = serializers.ChoiceField(
+        choices=[one.value for one in Method], required=False, default=Method.BRADLEY_TERRY.value
+    )
+    resample = serializers.ChoiceField(
+        source="unit", choices=[one.value for one in Unit], required=False
+    )
+    intervals = serializers.ChoiceField(choices=[one.value for one in Intervals], required=False)
+    rounds = WholeNumberField(
+        required=False, default=DEFAULT_ROUNDS, min_value=1, max_value=MOST_ROUNDS
+    )
+    seed = WholeNumberField(required=False, default=0, min_value=0, max_value=HIGHEST_SEED)
+    types = serializers.ListField(
+        child=TextField(max_length=40), required=False, default=list, max_length=200
+    )
+    experts = serializers.ListField(
+        child=TextField(max_length=200),
+        required=False,
+        default=list,
+        max_length=5_000,
+        help_text="Codes as a rating names them; none for all.",
+    )
+    with_repeats = FlagField(required=False, default=False)
+    leave_out_settled = FlagField(required=False, default=False)
+    leave_out_own = FlagField(required=False, default=False)
+
+
+class SnapshotsView(ApiView):
+    """The ratings of a study."""
+
+    writers = STAFF
+
+    @operation(
+        "Rate the votes as they are now",
+        takes=SnapshotBody,
+        answers=SnapshotDocument,
+        status=201,
+        name="rateStudy",
+    )
+    def post(self, request: Request, code: uuid.UUID, given: dict[str, Any]) -> Snapshot:
+        """A worker rates large studies: poll the rating until its state is ready."""
+        study = get_study(code)
+        must_read_results(user=self.user, study=study)
+        wanted = _wanted(given) | {"early": study.state == Study.State.OPEN, "actor": self.user}
+        if not is_big(study):
+            return rate(study=study, **wanted)
+        plan = partial(plan_snapshot, study=study, **wanted)
+        planned, warnings = keep_and_send(plan, tasks.send_snapshot)
+        planned.reason = " ".join([planned.reason, *warnings]).strip()
+        return planned
+
+
+class SnapshotView(ApiView):
+    """One rating."""
+
+    readers = STAFF
+
+    @operation("A rating with its table", answers=SnapshotDocument, name="getSnapshot")
+    def get(self, request: Request, code: uuid.UUID) -> Snapshot:
+        """Of an open study only after an early look, which is taken on its page."""
+        return get_snapshot(self, code)
+
+
+def get_snapshot(view: ApiView, code: uuid.UUID) -> Snapshot:
+    """Return the rating with that code, for whoever may read the results of its study.
+
+    Raises:
+        StudyStillOpen, NotYours: They may not, or not before an early look.
+    """
+    rows = Snapshot.objects.select_related("study__vote_file")
+    snapshot = get_object_or_404(rows, code=code)
+    must_read_results(user=view.user, study=snapshot.study)
+    return snapshot
+
+
+CHARTS = ("pairs", "types")
+
+
+class SnapshotExportView(FileView):
+    """A rating as a file."""
+
+    readers = STAFF
+
+    @file_operation(
+        "A rating as a file",
+        types=[
+            *(one.content_type for one in LEADERBOARD.values()),
+            *(one.content_type for one in VOTE_FORMATS.values()),
+            *CONTENT_TYPES.values(),
+            ZIP_TYPE,
+        ],
+        name="exportSnapshot",
+        words={
+            "name": ["leaderboard", "votes", "all", *CHARTS],
+            "form": [*LEADERBOARD, *VOTE_FORMATS, *CONTENT_TYPES, "zip"],
+        },
+    )
+    def get(self, request: Request, code: uuid.UUID, name: str, form: str) -> HttpResponseBase:
+        """Its table, votes, a chart, or all of them in a zip."""
+        snapshot = get_snapshot(self, code)
+        if snapshot.state != Snapshot.State.READY:
+            raise NoSnapshot("This rating is not ready.")
+        study = slugify(snapshot.study.name) or "study"
+        if name == "all":
+            if form != "zip":
+                raise Http404
+            return as_file(bundle(snapshot), ZIP_TYPE, f"{study}-rating.zip")
+        if name == "leaderboard":
+            chosen: Format[Any] = written_as(LEADERBOARD, form)
+            table: Any = leaderboard_table(snapshot)
+        elif name == "votes":
+            chosen, table = written_as(VOTE_FORMATS, form), vote_table(snapshot)
+        else:
+            return _chart(snapshot, name, form, f"{study}-{name}.{form}")
+        return as_file(chosen.write(table), chosen.content_type, f"{study}-{name}.{chosen.suffix}")
+
+
+# --- Private -----------------------------------------------------------------------------------
+
+
+def _wanted(given: dict[str, Any]) -> dict[str, Any]:
+    """Return the choices of the rating services."""
+    kinds = (MAIN, REPEAT) if given.pop("with_repeats") else (MAIN,)
+    known = [name for name, _ in type_choices()]
+    for name in given["types"]:
+        if name not in known:
+            raise serializers.ValidationError(
+                {"types": [f"There is no type {name!r}; there are {', '.join(known)}."]}
+            )
+    filters = Filters(
+        types=tuple(given.pop("types")),
+        experts=tuple(given.pop("experts")),
+        kinds=kinds,
+        leave_out_settled=given.pop("leave_out_settled"),
+        leave_out_own=given.pop("leave_out_own"),
+    )
+    return given | {"filters": filters}
+
+
+def _chart(snapshot: Snapshot, name: str, form: str, file_name: str) -> HttpResponseBase:
+    try:
+        content = chart_bytes(snapshot, name=name, file_format=form)
+    except UnknownName as error:
+        raise Http404 from error
+    return as_file(content, CONTENT_TYPES[form], file_name)

@@ -1,0 +1,1 @@
+"""Scenes and scenarios: read, written, edited, removed."""

@@ -1,0 +1,283 @@
+"""Which pictures an update of the program draws anew, and which somebody still has to judge."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+
+from django.contrib.auth.models import User
+from django.db import transaction
+
+from arena.models import LabelTask, Study
+from augment.errors import AugmentError, Conflict
+from augment.models import BaseScene, Scenario
+from augment.services.events import log_event
+from augment.services.scenarios import editing
+from augment.services.scenarios.pictures import redraw
+from augment.services.scenarios.scenes import (
+    Circumstances,
+    change_circumstances,
+    check_slug,
+    set_wording,
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Redrawn:
+    """What was done about one scenario.
+
+    Attributes:
+        pictures: How many have been drawn anew.
+        fault: Why they could not be drawn, "" where they could.
+    """
+
+    scenario: str
+    pictures: int = 0
+    fault: str = ""
+
+    @property
+    def says(self) -> str:
+        """One line about it."""
+        if self.fault:
+            return f"{self.scenario}: kept as they are. {self.fault}"
+        return f"{self.scenario}: {self.pictures} drawn anew"
+
+
+def redraw_pictures() -> Iterator[Redrawn]:
+    """Draw every scenario's pictures in today's window, one scenario after the other.
+
+    Open studies go on showing those that they were opened with. What can't be drawn is told, and
+    does not stop the others.
+    """
+    drawn = Scenario.objects.filter(augmentations__image__gt="").distinct().order_by("slug")
+    for pk, slug in list(drawn.values_list("pk", "slug")):
+        scenario = Scenario.objects.select_related("base_scene").get(pk=pk)
+        try:
+            if pictures := redraw(scenario):
+                yield Redrawn(scenario=slug, pictures=pictures)
+        except AugmentError as error:
+            yield Redrawn(scenario=slug, fault=str(error))
+
+
+def find_judged_now(scenario: int) -> str:
+    """The open study or labelling that shows its pictures to somebody, empty for none."""
+    studies = Study.objects.filter(state=Study.State.OPEN, scenarios=scenario).order_by("pk")
+    tasks = LabelTask.objects.filter(
+        augmentation__scenario=scenario, label=None, labelling__closed_at=None
+    ).order_by("labelling")
+    return (
+        studies.values_list("name", flat=True).first()
+        or tasks.values_list("labelling__name", flat=True).first()
+        or ""
+    )
+
+
+@transaction.atomic
+def set_reference(scenario: Scenario, document: object, *, actor: User | None = None) -> Scenario:
+    """Give a scenario this reference; the window of its pictures may become another one.
+
+    Raises:
+        InvalidDocument: The document breaks its format.
+        InvalidModification: It does not fit the scene.
+        Conflict: The scenario is the catalogue's, an open study or labelling shows it, or nothing
+            changes.
+    """
+    _hold_unjudged(scenario)
+    return editing.set_reference(scenario, document, actor=actor)
+
+
+@transaction.atomic
+def drop_reference(scenario: Scenario, *, actor: User | None = None) -> Scenario:
+    """Leave a scenario without a reference.
+
+    Raises:
+        Conflict: As above, or it has none.
+    """
+    _hold_unjudged(scenario)
+    return editing.drop_reference(scenario, actor=actor)
+
+
+def why_not_editable(scenario: Scenario) -> str:
+    """Why the reference of a scenario can't be changed now, empty where it can."""
+    try:
+        editing.refuse_catalogue(scenario)
+        _refuse_judged(scenario)
+    except Conflict as conflict:
+        return conflict.args[0]  # type: ignore[no-any-return]
+    return ""
+
+
+def _hold_unjudged(scenario: Scenario) -> None:
+    """Hold it, as an opening study does: none opens between the look and the change."""
+    Scenario.objects.select_for_update(of=("self",)).get(pk=scenario.pk)
+    _refuse_judged(scenario)
+
+
+def _refuse_judged(scenario: Scenario) -> None:
+    if needed_by := find_judged_now(scenario.pk):
+        raise Conflict(
+            f"“{needed_by}” is open and shows this scenario: its reference stays until that "
+            "is over."
+        )
+
+
+MOST_NAMED = 8
+
+
+@transaction.atomic
+def delete_scenario(scenario: Scenario, *, actor: User | None = None) -> None:
+    """Delete a scenario that no job, study, drive or other wording needs.
+
+    Raises:
+        Conflict: Something does; the text names it.
+    """
+    Scenario.objects.select_for_update(of=("self",)).get(pk=scenario.pk)
+    refuse_needed_scenario(scenario, "deleted")
+    _log_deletion("scenario", scenario, actor)
+    scenario.delete()
+
+
+@transaction.atomic
+def delete_scene(scene: BaseScene, *, actor: User | None = None) -> None:
+    """Delete a scene that no scenario stands on.
+
+    Raises:
+        Conflict: Some do; the text names them.
+    """
+    BaseScene.objects.select_for_update().only("pk").get(pk=scene.pk)
+    refuse_needed_scene(scene, "deleted")
+    _log_deletion("scene", scene, actor)
+    scene.delete()
+
+
+def refuse_needed_scenario(scenario: Scenario, what: str) -> None:
+    """Do nothing where no job, study, drive or other wording needs a scenario.
+
+    Args:
+        scenario: Locked by the caller.
+        what: What it is not to be: deleted, changed.
+
+    Raises:
+        Conflict: Something does; the text names it.
+    """
+    drives = scenario.simulations.count()
+    needed_by = [
+        *(f"the job “{job.name}”" for job in scenario.jobs.order_by("pk")),
+        *(f"the study “{study.name}”" for study in scenario.studies.order_by("pk")),
+        *(f"its other wording “{row.slug}”" for row in scenario.paraphrases.order_by("slug")),
+        *([f"{drives} drives"] if drives else []),
+    ]
+    _refuse_needed(scenario.slug, needed_by, what)
+
+
+def refuse_needed_scene(scene: BaseScene, what: str) -> None:
+    """Do nothing where no scenario stands on a scene.
+
+    Raises:
+        Conflict: Some do; the text names them.
+    """
+    slugs = scene.scenarios.order_by("slug").values_list("slug", flat=True)
+    _refuse_needed(scene.slug, [f"the scenario “{slug}”" for slug in slugs], what)
+
+
+# --- Private -----------------------------------------------------------------------------------
+
+
+def _refuse_needed(slug: str, needed_by: list[str], what: str) -> None:
+    if not needed_by:
+        return
+    more = len(needed_by) - MOST_NAMED
+    named = [*needed_by[:MOST_NAMED], *([f"{more} more"] if more > 0 else [])]
+    raise Conflict(f"“{slug}” can’t be {what}; it is needed by {_listed(named)}.")
+
+
+def _listed(names: Iterable[str]) -> str:
+    *first, last = names
+    return f"{', '.join(first)} and {last}" if first else last
+
+
+def _log_deletion(kind: str, row: Scenario | BaseScene, actor: User | None) -> None:
+    log_event(
+        actor=actor,
+        verb="delete",
+        object_kind=kind,
+        object_code=row.code,
+        before={"slug": row.slug},
+    )
+
+
+@transaction.atomic
+def change_scenario(
+    scenario: Scenario,
+    *,
+    instruction: str,
+    type: str,
+    type_label: str | None,
+    keep_traffic: bool,
+    circumstances: Circumstances,
+    actor: User | None = None,
+) -> Scenario:
+    """Set the instruction, type and circumstances of a scenario that was not worked on yet.
+
+    Raises:
+        InvalidDocument: The type or the instruction breaks its format.
+        InvalidModification: The reference does not fit the changed scene.
+        Conflict: The scenario is the catalogue's, or something needs it; the text names it.
+    """
+    row = Scenario.objects.select_for_update(of=("self",)).get(pk=scenario.pk)
+    if row.in_catalogue:
+        raise Conflict(f"“{row.slug}” is the catalogue’s own; change it in its file.")
+    refuse_needed_scenario(row, "changed")
+    before = _state(row)
+    set_wording(row, instruction, type, type_label)
+    change_circumstances(row, circumstances, keep_traffic=keep_traffic)
+    row.save()
+    log_event(
+        actor=actor,
+        verb="change",
+        object_kind="scenario",
+        object_code=row.code,
+        before=before,
+        after=_state(row),
+    )
+    return row
+
+
+@transaction.atomic
+def rename_scene(scene: BaseScene, slug: str, *, actor: User | None = None) -> BaseScene:
+    """Give a scene that no scenario stands on another slug.
+
+    Raises:
+        InvalidDocument: It is no slug.
+        Conflict: It is taken, or a scenario stands on the scene.
+    """
+    row = BaseScene.objects.select_for_update().get(pk=scene.pk)
+    check_slug(slug, what="scene")
+    refuse_needed_scene(row, "renamed")
+    if BaseScene.objects.filter(slug=slug).exclude(pk=row.pk).exists():
+        raise Conflict(f"There is a scene called “{slug}” already; choose another slug.")
+    before, row.slug = row.slug, slug
+    row.document["name"] = slug
+    row.save(update_fields=["slug", "document"])
+    log_event(
+        actor=actor,
+        verb="rename",
+        object_kind="scene",
+        object_code=row.code,
+        before={"slug": before},
+        after={"slug": slug},
+    )
+    return row
+
+
+# --- Private -----------------------------------------------------------------------------------
+
+
+def _state(row: Scenario) -> dict[str, object]:
+    return {
+        "instruction": row.instruction,
+        "type": row.type,
+        "keep_traffic": row.keep_traffic,
+        "density": row.traffic_density,
+        "goal": row.goal,
+    }

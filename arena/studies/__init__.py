@@ -1,0 +1,1 @@
+"""Studies: planned, opened, closed."""

@@ -1,0 +1,146 @@
+"""Studies: opened, closed, and their progress; never who leads."""
+
+from __future__ import annotations
+
+import uuid
+from typing import Any
+
+from django.shortcuts import get_object_or_404
+from rest_framework import serializers
+from rest_framework.request import Request
+from rest_framework.response import Response
+
+from arena.api.access import ADMINS, EXPERTS, STAFF
+from arena.api.fields import Field, StrictSerializer, body_field
+from arena.api.views import ApiView, PageQuery, answer_page, operation, page_of
+from arena.models import Study
+from arena.queries.people import role_of
+from arena.queries.studies.progress import StudyProgress, of_these, studies_seen_by
+from arena.services.studies import close_study, open_study
+from arena.services.study_plan import PLAN_INPUTS, SWITCH_COLUMNS, StudyPlan
+
+
+class StudyBody(StrictSerializer):
+    """A new study; its rules are fixed from the moment it opens."""
+
+    def get_fields(self) -> dict[str, Field]:
+        """Return a field for all that a plan asks for."""
+        return {one.name: body_field(one) for one in PLAN_INPUTS}
+
+
+class StudyQuery(PageQuery):
+    """Which studies."""
+
+    state = serializers.ChoiceField(choices=Study.State.values, required=False)
+
+
+class StudyDocument(serializers.Serializer[Any]):
+    """A study and the progress of its votes; an expert gets their own."""
+
+    code = serializers.UUIDField(source="study.code")
+    name = serializers.CharField(source="study.name")
+    state = serializers.CharField(source="study.state")
+    planned = serializers.IntegerField(help_text="Pairs to be judged.")
+    voted = serializers.IntegerField()
+    skipped = serializers.IntegerField()
+    left = serializers.IntegerField()
+    opened_at = serializers.DateTimeField(source="study.opened_at", allow_null=True)
+    closed_at = serializers.DateTimeField(source="study.closed_at", allow_null=True)
+
+
+class NamesField(serializers.ListField):
+    """One column of related rows."""
+
+    child = serializers.CharField()
+
+    def __init__(self, column: str, **kwargs: Any) -> None:
+        self.column = column
+        super().__init__(help_text=f"Each by its {column}.", **kwargs)
+
+    def to_representation(self, rows: Any) -> list[str]:
+        """Return the values, sorted."""
+        return list(rows.order_by(self.column).values_list(self.column, flat=True))
+
+
+class WholeStudyDocument(StudyDocument):
+    """A study with its participants, for staff."""
+
+    contestants = NamesField("slug", source="study.contestants")
+    scenarios = NamesField("slug", source="study.scenarios")
+    experts = NamesField("username", source="study.experts")
+    votes_per_expert = serializers.IntegerField(source="study.votes_per_expert")
+    seed = serializers.IntegerField(source="study.seed")
+
+    def get_fields(self) -> dict[str, Field]:
+        """Return the fields above and the switches of the study."""
+        switches = {
+            name: serializers.BooleanField(source=f"study.{name}") for name in SWITCH_COLUMNS
+        }
+        return super().get_fields() | switches
+
+
+class StudiesView(ApiView):
+    """Studies."""
+
+    readers, writers = (*STAFF, *EXPERTS), ADMINS
+
+    @operation(
+        "Studies, the youngest first",
+        answers=page_of(StudyDocument),
+        query=StudyQuery,
+        name="listStudies",
+    )
+    def get(self, request: Request, given: dict[str, Any]) -> Response:
+        """An expert gets their own with their own progress, staff all with everybody's."""
+        is_staff = role_of(self.user) in STAFF
+        expert = None if is_staff else self.user
+        return answer_page(
+            request,
+            studies_seen_by(self.user, is_staff=is_staff),
+            given,
+            StudyDocument,
+            lines=lambda page: of_these(page, expert=expert),
+        )
+
+    @operation(
+        "Plan a study and open it",
+        takes=StudyBody,
+        answers=WholeStudyDocument,
+        status=201,
+        name="openStudy",
+    )
+    def post(self, request: Request, given: dict[str, Any]) -> StudyProgress:
+        """Its experts can vote at once."""
+        return _progress(open_study(StudyPlan.read(given), actor=self.user))
+
+
+class StudyView(ApiView):
+    """One study."""
+
+    readers = STAFF
+
+    @operation("A study", answers=WholeStudyDocument, name="getStudy")
+    def get(self, request: Request, code: uuid.UUID) -> StudyProgress:
+        """With its participants."""
+        return _progress(get_study(code))
+
+
+class CloseStudyView(ApiView):
+    """The end of a study."""
+
+    writers = ADMINS
+
+    @operation("Close a study", answers=WholeStudyDocument, name="closeStudy")
+    def post(self, request: Request, code: uuid.UUID) -> StudyProgress:
+        """Ends voting for good. Twice changes nothing."""
+        return _progress(close_study(study=get_study(code), actor=self.user))
+
+
+def get_study(code: uuid.UUID) -> Study:
+    """Return the study with that code, or raise 404."""
+    return get_object_or_404(Study.objects.select_related("vote_file"), code=code)
+
+
+def _progress(study: Study) -> StudyProgress:
+    (found,) = of_these([study])
+    return found

@@ -1,0 +1,258 @@
+"""What an expert does: pairs, their pictures, votes, reports and preferences."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from django.core.files.storage import default_storage
+from django.http import Http404, HttpResponse
+from django.http.response import HttpResponseBase
+from rest_framework import serializers
+from rest_framework.permissions import IsAuthenticated
+from rest_framework.request import Request
+from rest_framework.response import Response
+
+from arena.api.access import ADMINS, EXPERTS
+from arena.api.fields import (
+    CodeField,
+    FlagField,
+    ShareField,
+    StrictSerializer,
+    TextField,
+    WholeNumberField,
+)
+from arena.api.views import ApiView, FileView, file_operation, operation
+from arena.errors import StudyNotOpen
+from arena.models import AIDS, OUTCOME_LETTERS, Matchup, Report, Study, Vote
+from arena.queries.studies.lists import voting_study
+from arena.queries.voting.showings import as_shown, picture_shown
+from arena.services.decisions import LONGEST_COMMENT, decision_of
+from arena.services.preferences import keep_voting
+from arena.services.replanning import next_pairs
+from arena.services.reports import SIDES, Complaint, report
+from arena.services.votes import receive_vote
+
+PNG = "image/png"
+OUTCOMES = {letter: outcome for outcome, letter in OUTCOME_LETTERS.items()}
+LONGEST_MS = 2**31 - 1
+AHEAD, MOST = 4, 12
+"""How many coming pairs are sent, by default and at most."""
+
+
+class MatchupsQuery(StrictSerializer):
+    """Which study, and how many pairs at most."""
+
+    study = serializers.UUIDField()
+    n = serializers.IntegerField(min_value=1, max_value=MOST, default=AHEAD)
+
+
+class SidesDocument(serializers.Serializer[Any]):
+    """What changed, one sentence for each object."""
+
+    a = serializers.ListField(child=serializers.CharField())
+    b = serializers.ListField(child=serializers.CharField())
+
+
+class MatchupDocument(serializers.Serializer[Any]):
+    """A pair as an expert sees it."""
+
+    matchup = serializers.UUIDField()
+    position = serializers.IntegerField()
+    instruction = serializers.CharField()
+    a = serializers.CharField(help_text="The address of a picture.")
+    b = serializers.CharField(help_text="The address of a picture.")
+    original = serializers.CharField(
+        allow_null=True, help_text="The scene before any change, null where it was never drawn."
+    )
+    px_per_m = serializers.FloatField()
+    ego_px = serializers.ListField(child=serializers.FloatField())
+    width = serializers.IntegerField()
+    height = serializers.IntegerField()
+    legend = serializers.ListField(
+        child=serializers.CharField(),
+        required=False,
+        help_text="Which kinds of marks the two pictures hold; absent of pairs planned before.",
+    )
+    text = SidesDocument(required=False, help_text="In studies that offer it.")
+
+
+class VoteBody(StrictSerializer):
+    """One decision of an expert."""
+
+    key = CodeField()
+    matchup = CodeField()
+    outcome = serializers.ChoiceField(choices=list(OUTCOMES))
+    both_miss = FlagField(required=False, default=False)
+    reason = serializers.ChoiceField(
+        choices=Vote.SkipReason.choices, required=False, allow_blank=True, default=""
+    )
+    comment = TextField(required=False, allow_blank=True, default="", max_length=LONGEST_COMMENT)
+    ms_visible = WholeNumberField(
+        required=False, allow_null=True, default=None, min_value=0, max_value=LONGEST_MS
+    )
+    aids = serializers.ListField(
+        child=serializers.ChoiceField(choices=AIDS), required=False, default=list, max_length=16
+    )
+    supersedes = CodeField(required=False, allow_null=True, default=None)
+    n = WholeNumberField(required=False, default=AHEAD, min_value=1, max_value=MOST)
+
+
+class ReceivedDocument(serializers.Serializer[Any]):
+    """The progress after a vote, and the next pairs."""
+
+    saved = serializers.IntegerField(help_text="Pairs with a vote.")
+    skipped = serializers.IntegerField(help_text="Pairs that were skipped instead.")
+    total = serializers.IntegerField()
+    minutes_left = serializers.IntegerField(allow_null=True)
+    next = MatchupDocument(many=True)
+
+
+class ReportBody(StrictSerializer):
+    """One report of an expert."""
+
+    key = CodeField()
+    matchup = CodeField()
+    reason = serializers.ChoiceField(choices=Report.Reason.choices)
+    side = serializers.ChoiceField(choices=list(SIDES), required=False, default="both")
+    mark = serializers.ListField(
+        child=ShareField(),
+        required=False,
+        allow_null=True,
+        default=None,
+        min_length=2,
+        max_length=2,
+    )
+    comment = TextField(required=False, allow_blank=True, default="", max_length=LONGEST_COMMENT)
+
+
+class SavedDocument(serializers.Serializer[Any]):
+    """The report is stored."""
+
+    saved = serializers.BooleanField()
+
+
+class PreferencesBody(StrictSerializer):
+    """What changes; missing fields stay."""
+
+    single_keys = FlagField(required=False)
+    legend = FlagField(required=False)
+    keep_zoom = FlagField(required=False)
+    keys = serializers.DictField(child=TextField(max_length=8), required=False)
+
+
+class PreferencesDocument(serializers.Serializer[Any]):
+    """All preferences."""
+
+    single_keys = serializers.BooleanField()
+    legend = serializers.BooleanField()
+    keep_zoom = serializers.BooleanField()
+    keys = serializers.DictField(
+        child=serializers.ListField(child=serializers.CharField()),
+        help_text="By action, its keys.",
+    )
+
+
+class MatchupsView(ApiView):
+    """An expert's own next pairs; nothing tells who made the pictures."""
+
+    readers = EXPERTS
+    is_never_cached = True
+
+    @operation(
+        "The next pairs of the expert who asks",
+        answers=MatchupDocument(many=True),
+        query=MatchupsQuery,
+        name="listMatchups",
+    )
+    def get(self, request: Request, given: dict[str, Any]) -> Response:
+        """An empty list when all is done."""
+        study = voting_study(expert=self.user, code=given["study"])
+        if study.state != Study.State.OPEN:
+            raise StudyNotOpen(f"The study {study.name!r} takes no votes: it is {study.state}.")
+        matchups = next_pairs(study=study, expert=self.user, n=given["n"])
+        return Response([as_shown(matchup) for matchup in matchups])
+
+
+class VotesView(ApiView):
+    """An expert's own votes."""
+
+    writers = EXPERTS
+    is_never_cached = True
+
+    @operation("Vote", takes=VoteBody, answers=ReceivedDocument, name="vote")
+    def post(self, request: Request, given: dict[str, Any]) -> Response:
+        """The same key counts once, however often it arrives."""
+        n, outcome = given.pop("n"), OUTCOMES[given.pop("outcome")]
+        decision = decision_of(matchup_code=given.pop("matchup"), outcome=outcome, **given)
+        received = receive_vote(expert=self.user, decision=decision, ahead=n)
+        now = received.state
+        coming: Sequence[Matchup] = received.coming
+        if len(coming) < n:  # this vote may allow more pairs to be planned
+            coming = next_pairs(study=now.study, expert=self.user, n=n)
+        return Response(
+            {
+                "saved": now.progress.voted,
+                "skipped": now.progress.skipped,
+                "total": now.progress.total,
+                "minutes_left": now.progress.minutes_left,
+                "next": [as_shown(matchup) for matchup in coming],
+            }
+        )
+
+
+class ReportsView(ApiView):
+    """Reports of pairs; they change no vote."""
+
+    writers = EXPERTS
+
+    @operation(
+        "Report that something is wrong with a pair",
+        takes=ReportBody,
+        answers=SavedDocument,
+        name="report",
+    )
+    def post(self, request: Request, given: dict[str, Any]) -> dict[str, bool]:
+        """The same key counts once, however often it arrives."""
+        mark = given["mark"]
+        said = Complaint(
+            reason=given["reason"],
+            side=SIDES[given["side"]],
+            mark=None if mark is None else (mark[0], mark[1]),
+            comment=given["comment"],
+        )
+        report(expert=self.user, matchup_code=given["matchup"], key=given["key"], said=said)
+        return {"saved": True}
+
+
+class PreferencesView(ApiView):
+    """The voting preferences of whoever is signed in."""
+
+    permission_classes = (IsAuthenticated,)
+
+    @operation(
+        "Keep voting preferences",
+        takes=PreferencesBody,
+        answers=PreferencesDocument,
+        name="keepPreferences",
+    )
+    def post(self, request: Request, given: dict[str, Any]) -> Any:
+        """Answers with all of them."""
+        keys = given.pop("keys", None)
+        return keep_voting(user=self.user, switches=given, keys=keys).as_json()
+
+
+class ShownPictureView(FileView):
+    """A picture of a pair, by its token: the last part of its address in `a`, `b`, `original`."""
+
+    readers = (*EXPERTS, *ADMINS)
+    is_never_cached = True
+
+    @file_operation("A picture of a pair", types=[PNG], name="getShownPicture")
+    def get(self, request: Request, token: str) -> HttpResponseBase:
+        """Has neither a name nor an ETag, which would show which pictures are the same."""
+        name = picture_shown(user=self.user, token=token)
+        if not name or not default_storage.exists(name):
+            raise Http404
+        with default_storage.open(name) as file:
+            return HttpResponse(file.read(), content_type=PNG)

@@ -1,1 +1,0 @@
-"""Pages of contestants and of the endpoints that they ask."""

@@ -1,1 +1,0 @@
-"""Pages of jobs, of what came out and of how it was judged and driven."""

@@ -1,1 +1,0 @@
-"""Pages of scenes, scenarios and what they ask for."""

@@ -1,1 +1,0 @@
-"""Checks that hold a modification against what an instruction asks for."""

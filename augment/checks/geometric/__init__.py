@@ -1,1 +1,0 @@
-"""Checks of a modification that need no intent."""
