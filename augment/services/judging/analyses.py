@@ -29,6 +29,20 @@ from augment.services.endpoints.known_models import AUGMENTATION, Spending, sum_
 from augment.services.judging.displacement import Measured, of_job
 from augment.services.judging.findings import findings_of
 
+__all__ = [
+    "AugmentationLine",
+    "ContestantAnalysis",
+    "JobAnalysis",
+    "PairedComparison",
+    "RefusalScore",
+    "RepeatLine",
+    "Robustness",
+    "SampleSpread",
+    "analyse_job",
+    "augmentation_lines",
+    "repeatability",
+]
+
 State = Augmentation.State
 
 SEED = 2026

@@ -14,6 +14,7 @@ from django.db.models import QuerySet
 from augment.errors import InvalidDocument, UnknownName
 from augment.metrics.displacement import (
     CLASS_OF,
+    BoxSummary,
     Displacement,
     ObjectClass,
     Summary,
@@ -26,6 +27,28 @@ from augment.scene.codec import modification_from_document
 from augment.scene.entities import Modification, ScenarioType, TrafficAgent
 from augment.services.scenarios.scenes import reference_of, type_choices, type_rank
 from augment.variants.recipes import SPELLING, spell_variant
+
+__all__ = [
+    "NO_VARIANT",
+    "PLACED_EXACTLY",
+    "VARIANTS",
+    "BoxSummary",
+    "By",
+    "DisplacedObject",
+    "Group",
+    "MatchState",
+    "Measured",
+    "ObjectPosition",
+    "Unmeasured",
+    "alike_pairs",
+    "groups",
+    "objects_of",
+    "of_augmentation",
+    "of_job",
+    "of_rows",
+    "summarise",
+    "types_named",
+]
 
 State = Augmentation.State
 

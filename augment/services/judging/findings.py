@@ -15,22 +15,37 @@ from typing import Any
 
 from django.core.files.storage import default_storage
 
-from augment.checks import Finding as Finding
-from augment.checks import FindingKind as FindingKind
-from augment.checks import Ground, Severity
-from augment.checks.measures import LaneEdges as LaneEdges
-from augment.checks.measures import MeasureLine as MeasureLine
-from augment.checks.measures import Measures, find_measures, lane_edges_at
+from augment.checks import Finding, FindingKind, Ground, Severity
+from augment.checks.finding import FaultClass
+from augment.checks.measures import LaneEdges, MeasureLine, Measures, find_measures, lane_edges_at
 from augment.checks.registry import check_against_intent
 from augment.errors import InvalidDocument, InvalidModification
 from augment.metrics.fault_guess import first_guess
 from augment.models import Augmentation, Scenario
 from augment.render.bev import FaultMark, draw_annotated
-from augment.scene.codec import modification_from_document
+from augment.scene.codec import EGO_ID, modification_from_document
 from augment.scene.entities import Scene
 from augment.services.scenarios.editing import edit_to_document, editable_scene, read_edit, snap
 from augment.services.scenarios.pictures import camera_of, store_as
 from augment.services.scenarios.scenes import intent_of, scene_of
+
+__all__ = [
+    "EGO_ID",
+    "Checked",
+    "FaultClass",
+    "Finding",
+    "FindingKind",
+    "FindingLine",
+    "LaneEdges",
+    "MeasureLine",
+    "check_augmentation",
+    "check_edit",
+    "draw_marked",
+    "findings_of",
+    "guess_faults",
+    "lane_edges_of",
+    "measures_of",
+]
 
 _LOOK = 2
 """Raised whenever the marked pictures look different."""

@@ -187,7 +187,7 @@ class ReadingTranscript(CallTranscript):
             request_hash=request_hash, augmentation_pk=0, attempt_pk=0, is_fresh=False
         )
 
-    def reserve(self, worst: WorstCase, price: Price | None) -> budget.Room:  # noqa: D102
+    def reserve(self, worst: WorstCase, price: Price | None) -> budget.Room:
         used = self._reading.calls.exclude(sent_at=None).aggregate(
             calls=Count("pk"), tokens=Sum("spent_tokens"), nano_usd=Sum("cost_nano_usd")
         )
