@@ -6,7 +6,7 @@ import pytest
 from django.core.management import CommandError, call_command
 
 from augment.errors import Conflict, InvalidDocument
-from augment.models import Contestant, Endpoint, Event
+from augment.models import Contestant, Endpoint, EndpointModel, Event
 from augment.services.endpoints import contestants, known_endpoints
 from augment.services.endpoints.known_endpoints import ensure_endpoint
 
@@ -145,3 +145,16 @@ def test_a_contestant_that_is_refused_leaves_no_endpoint_behind() -> None:
     with pytest.raises(CommandError, match="Unknown variant"):
         call_command("add_contestant", "fake", *facts)
     assert not Endpoint.objects.exists()
+
+
+def test_a_contestant_brings_its_model_which_is_unknown() -> None:
+    ensure_endpoint(label="local", base_url=LOCAL)
+    for variant in ("otm", "otm"):
+        contestants.add_contestant(
+            slug="llama", variant=variant, endpoint="local", model="llama3.1"
+        )
+    known = EndpointModel.objects.get()
+    assert (known.endpoint.label, known.model, known.model_class) == ("local", "llama3.1", "")
+    abilities = (known.native_tools, known.vision, known.json_schema, known.temperature)
+    assert abilities == (None, None, None, None)
+    assert (known.price_in_usd, known.price_out_usd) == (None, None)

@@ -5,10 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
-from django.contrib.auth.models import User
 from django.core.management import CommandError, call_command
-from django.test import Client
-from django.urls import reverse
 
 from augment.errors import Conflict, InvalidDocument
 from augment.models import Augmentation, Contestant, Endpoint, Event
@@ -17,7 +14,6 @@ from augment.services.running import jobs, runner
 from augment.services.running.choosing import find_obstacle, keys_missing
 from tests.jobs.models import add_llama, llama_job
 from tests.jobs.rows import add_scenario, only_row
-from tests.jobs.test_endpoint_rows import form, problems
 from tests.llm.recorder import recorder
 
 pytestmark = pytest.mark.django_db
@@ -88,20 +84,6 @@ def test_a_contestant_with_such_a_variable_is_refused_at_launch() -> None:
         jobs.launch(name="J", contestants=["llama"], scenarios=["street"])
 
 
-@pytest.fixture
-def office(client: Client) -> Client:
-    client.force_login(User.objects.create_superuser("admin", password="x"))
-    return client
-
-
-def test_the_admin_takes_no_variable_that_is_not_for_keys(office: Client) -> None:
-    page = office.post(
-        reverse("admin:augment_endpoint_add"), form(key_variable="ARENA_SECRET_KEY")
-    )
-    assert "ARENA_SECRET_KEY may not be sent to an endpoint" in problems(page)
-    assert not Endpoint.objects.exists()
-
-
 # --- Another host ------------------------------------------------------------------------------
 
 OLD, NEW = "https://models.example:443", "https://thief.example:443"
@@ -151,22 +133,3 @@ def test_a_key_goes_to_another_host_only_when_told_twice_and_is_logged() -> None
         {"server": OLD},
         {"server": NEW, "key_variable": "MY_API_KEY"},
     )
-
-
-def test_the_admin_asks_again_before_a_key_goes_to_another_host(office: Client) -> None:
-    endpoint = keyed()
-    page = reverse("admin:augment_endpoint_change", args=[endpoint.pk])
-    sent = form(base_url="https://thief.example/v1", key_variable="MY_API_KEY")
-    assert f"went to {OLD} and would go to {NEW}" in problems(office.post(page, sent))
-    endpoint.refresh_from_db()
-    assert endpoint.base_url == "https://models.example/v1"
-    assert not Event.objects.exists()
-    assert office.post(page, sent | {"move_key": "on"}).status_code == 302
-    endpoint.refresh_from_db()
-    assert endpoint.base_url == "https://thief.example/v1"
-    event = Event.objects.get(verb="move key")
-    assert (event.actor, event.before) == (User.objects.get(), {"server": OLD})
-    # Everything else is changed without a question, and without such a line.
-    sent = form(base_url="https://thief.example/v1", key_variable="MY_API_KEY")
-    assert office.post(page, sent | {"max_concurrency": "2"}).status_code == 302
-    assert Event.objects.filter(verb="move key").count() == 1

@@ -9,12 +9,12 @@ from django.core.management import CommandError, call_command
 from django.utils import timezone
 
 from augment import tasks
-from augment.broker import check_broker
 from augment.errors import QueueUnreachable
 from augment.management.commands.generate import Command
 from augment.models import Augmentation, GenerationJob
 from augment.services.running.progress import count_rows
 from augment.services.running.runner import AUGMENTATIONS
+from augment.tasks import check_broker
 from tests.brokers import Broker
 from tests.jobs.rows import add_scenario, done, launch, leased, only_row
 

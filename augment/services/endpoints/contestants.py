@@ -10,7 +10,7 @@ from django.contrib.auth.models import User
 from django.db import transaction
 
 from augment.baselines.registry import PLACERS
-from augment.errors import Conflict, UnknownName
+from augment.errors import Conflict
 from augment.models import Contestant, Scenario
 from augment.services.endpoints.known_endpoints import EndpointFacts, add_endpoint, find_endpoint
 from augment.services.endpoints.known_models import model_at
@@ -31,7 +31,6 @@ from augment.variants.options import (
     ContestantOptions,
     ToolProtocol,
     check_options,
-    names_for,
     options_from_document,
 )
 from augment.variants.recipes import RECIPES, Tools, find_recipe, spell_variant
@@ -85,7 +84,6 @@ def add_contestant(
     name: str | None = None,
     roles: Roles | None = None,
     options: ContestantOptions | None = None,
-    spoken: ContestantOptions | None = None,
     actor: User | None = None,
 ) -> Contestant:
     """Add a language model that runs one variant; simulated where its endpoint is.
@@ -103,7 +101,6 @@ def add_contestant(
             where another contestant is called so.
         roles: Who else plays a role.
         options: How it asks; what is open is fixed at its first run.
-        spoken: The options that a name made here tells; None for all.
         actor: Who adds it.
 
     Raises:
@@ -113,10 +110,12 @@ def add_contestant(
     """
     check_slug(slug, what="contestant")
     recipe = find_recipe(variant)
+    check_roles(recipe, roles or {})
+    chosen = options or ContestantOptions()
+    check_options(recipe, chosen)
     own = Respondent(
         endpoint=find_endpoint(endpoint, actor), model=one_line("model", model, what="contestant")
     )
-    check_roles(recipe, roles or {})
     others = {
         role: Respondent(
             endpoint=own.endpoint if label is None else find_endpoint(label, actor),
@@ -124,27 +123,10 @@ def add_contestant(
         )
         for role, (label, played_by) in sorted((roles or {}).items())
     }
-    chosen = options or ContestantOptions()
-    check_options(recipe, chosen)
-    respondents = (own, *others.values())
-    for respondent in respondents:
+    for respondent in (own, *others.values()):
         model_at(endpoint=respondent.endpoint, model=respondent.model)
-    title = name
-    if title is None:
-        title = _title(slug, recipe.slug, own, others, spoken or chosen)
-    is_simulated = any(respondent.endpoint.is_simulated for respondent in respondents)
-    columns: dict[str, Any] = {
-        "name": one_line("name", title, what="contestant"),
-        "kind": Kind.SIMULATED if is_simulated else Kind.LLM,
-        "variant": recipe.slug,
-        "endpoint": own.endpoint,
-        "model": own.model,
-        "roles": {
-            role.value: {"endpoint": one.endpoint.label, "model": one.model}
-            for role, one in others.items()
-        },
-        "options": chosen.to_document(),
-    }
+    title = _title(slug, recipe.slug, own, others, chosen) if name is None else name
+    columns = _columns(title, recipe.slug, own, others, chosen)
     contestant, made = Contestant.objects.get_or_create(slug=slug, defaults=columns)
     if made:
         log_event(
@@ -161,62 +143,6 @@ def add_contestant(
             f"{contestant.name} ({contestant.kind}); choose another slug."
         )
     return contestant
-
-
-@transaction.atomic
-def add_like(
-    *,
-    slug: str,
-    like: str,
-    changes: Mapping[str, str] | None = None,
-    name: str | None = None,
-    roles: Roles | None = None,
-    options: ContestantOptions | None = None,
-    actor: User | None = None,
-) -> Contestant:
-    """Add a contestant as another one, but for what is given; it asks with the installed prompts.
-
-    What the other one ran with counts, be it a default of then; options that another variant has
-    no use for stay behind. A name made here tells only what somebody chose.
-
-    Args:
-        slug: Of the new one.
-        like: Of the one that is followed.
-        changes: Its variant, endpoint or model, where these are to be others.
-        name: What people read.
-        roles: Who else plays a role, beside those of the one that is followed.
-        options: What it chooses otherwise.
-        actor: Who adds it.
-
-    Raises:
-        UnknownName: No such contestant, variant or endpoint.
-        InvalidDocument: Something can't be used.
-        Conflict: The one that is followed asks no model, or the slug is another one's.
-    """
-    row = Contestant.objects.select_related("endpoint").filter(slug=like).first()
-    if row is None:
-        slugs = Contestant.objects.values_list("slug", flat=True)
-        raise UnknownName("contestant", like, list(slugs))
-    if row.endpoint is None:
-        raise Conflict(f"{like} asks no language model; there is nothing to be like.")
-    wanted = {"variant": row.variant, "endpoint": row.endpoint.label, "model": row.model}
-    wanted |= changes or {}
-    kept = {ModelRole(role): (one["endpoint"], one["model"]) for role, one in row.roles.items()}
-    usable = set(names_for(find_recipe(wanted["variant"]))) - {"prompt_version"}
-    asked = (options or ContestantOptions()).to_document()
-    chosen, ran = (
-        options_from_document({k: v for k, v in copied.items() if k in usable} | asked)
-        for copied in (row.options, (row.frozen_options or {}) | row.options)
-    )
-    return add_contestant(
-        slug=slug,
-        **wanted,
-        name=name,
-        roles=kept | dict(roles or {}),
-        options=ran,
-        spoken=chosen,
-        actor=actor,
-    )
 
 
 @transaction.atomic
@@ -292,6 +218,28 @@ def preview_contestant(scenario: Scenario, contestant: Contestant, *, role: str)
         native_tools=has_tools and is_native,
         options=options,
     )
+
+
+def _columns(
+    name: str,
+    variant: str,
+    own: Respondent,
+    others: Mapping[ModelRole, Respondent],
+    options: ContestantOptions,
+) -> dict[str, Any]:
+    is_simulated = any(one.endpoint.is_simulated for one in (own, *others.values()))
+    return {
+        "name": one_line("name", name, what="contestant"),
+        "kind": Kind.SIMULATED if is_simulated else Kind.LLM,
+        "variant": variant,
+        "endpoint": own.endpoint,
+        "model": own.model,
+        "roles": {
+            role.value: {"endpoint": one.endpoint.label, "model": one.model}
+            for role, one in others.items()
+        },
+        "options": options.to_document(),
+    }
 
 
 def _title(

@@ -99,15 +99,9 @@ def launch(
         for scenario in where
         for contestant in who
     )
-    launched: dict[str, Any] = {
-        "name": job.name,
-        "contestants": [contestant.slug for contestant in who],
-        "scenarios": [scenario.slug for scenario in where],
-        "samples": samples,
-        "is_fresh": is_fresh,
-        "cap": limit_of(job) if job.is_capped else None,
-    }
-    _log(job, "launch", actor, after=launched)
+    settings = {"samples": samples, "is_fresh": is_fresh, "cap": limit_of(job)}
+    slugs = {"contestants": [row.slug for row in who], "scenarios": [row.slug for row in where]}
+    _log(job, "launch", actor, after={"name": name, **slugs, **settings})
     return job
 
 

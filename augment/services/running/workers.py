@@ -8,8 +8,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 from threading import Event, Lock
-from types import TracebackType
-from typing import Self
 
 from django.conf import settings
 
@@ -61,26 +59,14 @@ def worker_name(pid: int) -> str:
     return f"{socket.gethostname()} {pid}"[:120]
 
 
-class Survived:
-    """A block that may break in any way without ending its caller; `fault` says how it did.
-
-    For loops that must outlive unforeseen errors; the caller reports the fault.
-    """
-
-    def __init__(self) -> None:
-        self.fault: Exception | None = None
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> bool:
-        self.fault = error if isinstance(error, Exception) else None
-        return self.fault is not None
+def survive(action: Callable[[], object], complaint: str) -> bool:
+    """Do what may break in any way without ending the caller's loop; False with a log line."""
+    try:
+        action()
+    except Exception as error:
+        logger.warning("%s: %s", complaint, error)
+        return False
+    return True
 
 
 class Presence:
@@ -142,13 +128,13 @@ class RecoveryRounds:
 
     def go_on(self) -> bool:
         """Do one round; returns whether it worked. Faults are logged and kept for the pages."""
-        with Survived() as round_:
+        try:
             self._recover(self._at_start)
             self._presence.recovered()
             now = database_now()
-        if round_.fault is not None:
+        except Exception as error:
             self._failed += 1
-            self._report(round_.fault)
+            self._report(error)
             return False
         if self._failed:
             logger.info("Lost work is brought back again, after %d failed rounds.", self._failed)
@@ -167,10 +153,7 @@ class RecoveryRounds:
             fault,
             exc_info=error if self._failed == 1 else None,
         )
-        with Survived() as storing:
-            self._presence.failed(fault)
-        if storing.fault is not None:
-            logger.warning("This could not be stored for the pages: %s", storing.fault)
+        survive(lambda: self._presence.failed(fault), "This could not be stored for the pages")
 
 
 def workforce() -> Workforce:
