@@ -7,11 +7,8 @@ from decimal import Decimal
 
 import pytest
 
-from augment.errors import ModelFault
-from augment.llm.client import Patience
 from augment.llm.costs import Price, WorstCase
-from augment.llm.openai_wire import fault_of_status
-from augment.models import Augmentation, CallLease, Endpoint, GenerationJob
+from augment.models import CallLease, Endpoint, GenerationJob
 from augment.services.endpoints import client
 from augment.services.running import budget
 from augment.services.running.budget import Room
@@ -73,50 +70,6 @@ def test_a_cap_has_room_up_to_its_last_unit(
 
 
 @pytest.mark.parametrize(
-    ("status", "is_billed"), [(None, True), (200, True), (399, True), (400, False), (500, False)]
-)
-def test_from_which_status_on_a_fault_is_free(status: int | None, is_billed: bool) -> None:
-    fault = ModelFault("x", retryable=False, status=status)
-    used = budget.used_by_fault(fault, worst=WORST, price=ONE_USD)
-    assert (used.tokens, used.calls) == (1000 if is_billed else 0, 1)
-
-
-@pytest.mark.parametrize(
-    ("status", "may_pass"),
-    [
-        *((status, False) for status in (400, 401, 403, 404, 407, 410, 422, 424, 426, 428, 499)),
-        *((status, True) for status in (408, 409, 425, 429, 500, 501, 502, 503, 504, 599)),
-    ],
-)
-def test_which_statuses_may_pass(status: int, may_pass: bool) -> None:
-    fault = fault_of_status(status, {}, 7.0)
-    assert fault.retryable is may_pass
-    assert fault.retry_after_s == (7.0 if may_pass else None)
-
-
-@pytest.mark.parametrize(
-    ("attempt", "asked_s", "waits"),
-    [
-        (1, None, True),
-        (2, None, True),
-        (3, None, False),
-        (4, None, False),
-        (1, 30.0, True),
-        (1, 30.001, False),
-        (2, 30.0, True),
-        (3, 0.0, False),
-    ],
-)
-def test_how_often_and_how_long_a_request_is_tried_again(
-    attempt: int, asked_s: float | None, waits: bool
-) -> None:
-    fault = ModelFault("x", retryable=True, retry_after_s=asked_s)
-    wait_s = Patience(attempts=3, longest_wait_s=30.0).wait_s(fault, attempt=attempt)
-    assert (wait_s is not None) is waits
-    assert wait_s is None or wait_s >= (asked_s or 0.0)
-
-
-@pytest.mark.parametrize(
     ("after_the_beat", "is_taken_back"),
     [(STALE - INSTANT, False), (STALE, False), (STALE + INSTANT, True)],
 )
@@ -127,32 +80,6 @@ def test_when_a_claim_without_a_beat_is_taken_back(
     leased(row, now=NOON)
     now = NOON + after_the_beat
     assert bool(AUGMENTATIONS.take_back_lost(now=now)) is is_taken_back
-
-
-@pytest.mark.parametrize(
-    ("age", "is_unsent"), [(STALE - INSTANT, False), (STALE, True), (STALE + INSTANT, True)]
-)
-def test_when_a_message_counts_as_lost(age: timedelta, is_unsent: bool) -> None:
-    row = only_row(launch())
-    AUGMENTATIONS.mark_sent([row.pk], now=NOON)
-    assert bool(AUGMENTATIONS.find_unsent(now=NOON + age, older_than=STALE)) is is_unsent
-
-
-@pytest.mark.parametrize(
-    ("lost", "state"),
-    [
-        (AUGMENTATIONS.lost_limit - 1, Augmentation.State.QUEUED),
-        (AUGMENTATIONS.lost_limit, Augmentation.State.FAILED),
-    ],
-)
-def test_how_many_workers_may_die_at_one_row(lost: int, state: str) -> None:
-    row = only_row(launch())
-    for number in range(lost):
-        now = NOON + number * 3 * STALE
-        leased(row, now=now)
-        AUGMENTATIONS.take_back_lost(now=now + 2 * STALE)
-    row.refresh_from_db()
-    assert row.state == state
 
 
 @pytest.mark.parametrize(

@@ -59,7 +59,7 @@ def test_unknown_usage_counts_with_its_worst_case_and_says_so() -> None:
     ("fault", "is_billed"),
     [
         (ModelFault("no such model", retryable=False, status=404), False),
-        (ModelFault("upstream broke", retryable=False, status=500), False),
+        (ModelFault("bad request", retryable=False, status=400), False),
         (ModelFault("too slow", retryable=False), True),
         (ModelFault("no choice", retryable=False, status=200), True),
     ],

@@ -80,17 +80,6 @@ def test_a_dead_claim_is_taken_back_whatever_the_clock_of_who_looks(
     assert row.state == state
 
 
-@pytest.mark.parametrize("seconds", [-700.0, 700.0])
-def test_a_message_on_its_way_is_not_sent_again_by_a_wrong_clock(
-    skew: Skew, seconds: float
-) -> None:
-    job = launch()
-    skew(seconds)
-    tasks.enqueue_job(job.pk)
-    skew(0.0)
-    assert tasks.enqueue_job(job.pk) == 0
-
-
 @pytest.mark.parametrize("seconds", [-70.0, 70.0])
 def test_a_wrong_clock_takes_no_place_that_is_taken(skew: Skew, seconds: float) -> None:
     endpoint = add_llama().endpoint

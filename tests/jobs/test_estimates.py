@@ -40,12 +40,3 @@ def test_after_a_run_it_is_what_was_used() -> None:
     assert (line.seen, line.tokens_in, line.tokens_out) == (1, 2 * 2900, 2 * 120)
     assert line.calls == (2, 2, 4)
     assert line.usd == Decimal("0.00604")
-
-
-def test_a_cap_below_what_is_expected_covers_so_many_rows() -> None:
-    add_llama(price="1")
-    for number in range(10):
-        add_scenario(f"street-{number}")
-    found = estimate(["llama"], [f"street-{number}" for number in range(10)])
-    assert found.rows_within(found.usd) is None
-    assert found.rows_within(found.usd / 2) == 5

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 from datetime import timedelta
+from uuid import uuid4
 
 import pytest
 from django.db import IntegrityError, transaction
@@ -14,26 +15,6 @@ from tests.jobs.rows import NOON, done, failed, launch, leased, only_row
 pytestmark = pytest.mark.django_db
 State = Augmentation.State
 LATER = NOON + timedelta(seconds=30)
-
-
-def test_a_waiting_row_can_be_claimed_once() -> None:
-    row = only_row(launch())
-    first = AUGMENTATIONS.take(row.pk, now=NOON, worker="w1")
-    second = AUGMENTATIONS.take(row.pk, now=NOON, worker="w2")
-    assert first is not None
-    assert second is None
-    row.refresh_from_db()
-    assert (row.state, row.claim, row.heartbeat_at) == (State.RUNNING, first.token, NOON)
-    attempt = row.attempts.get()
-    assert (attempt.number, attempt.worker, attempt.started_at) == (1, "w1", NOON)
-
-
-@pytest.mark.parametrize("state", [State.DONE, State.FAILED, State.CANCELLED, State.REFUSED])
-def test_a_row_with_an_outcome_can_not_be_claimed(state: str) -> None:
-    row = only_row(launch())
-    Augmentation.objects.update(state=state, modification={}, image="bev/x.png")
-    assert AUGMENTATIONS.take(row.pk, now=NOON) is None
-    assert not Attempt.objects.exists()
 
 
 @pytest.mark.parametrize(
@@ -52,28 +33,6 @@ def test_a_row_of_a_job_that_stopped_is_not_started(state: str, is_started: bool
     assert (held is not None) == is_started
     row.refresh_from_db()
     assert row.state == (State.RUNNING if is_started else State.QUEUED)
-
-
-def test_an_outcome_is_written_with_its_attempt() -> None:
-    row = only_row(launch())
-    held = leased(row)
-    assert held.settle(done(), now=LATER)
-    row.refresh_from_db()
-    assert (row.state, row.image, row.finished_at) == (State.DONE, "bev/x.png", LATER)
-    assert (row.claim, row.heartbeat_at) == (None, None)
-    attempt = row.attempts.get()
-    assert (attempt.outcome, attempt.finished_at) == ("done", LATER)
-
-
-def test_a_claim_without_heartbeat_is_taken_back_and_its_attempt_is_lost() -> None:
-    row = only_row(launch())
-    AUGMENTATIONS.mark_sent([row.pk], now=NOON)
-    leased(row)
-    assert AUGMENTATIONS.take_back_lost(now=LATER) == [row.pk]
-    row.refresh_from_db()
-    assert (row.state, row.claim, row.sent_at) == (State.QUEUED, None, None)
-    attempt = row.attempts.get()
-    assert (attempt.outcome, attempt.finished_at) == ("lost", None)
 
 
 def test_a_row_that_was_taken_back_gets_a_second_attempt() -> None:
@@ -119,34 +78,25 @@ def test_workers_lost_before_an_outcome_are_forgiven() -> None:
     assert AUGMENTATIONS.take_back_lost(now=late + timedelta(minutes=1)) == [row.pk]
 
 
-def test_the_database_refuses_a_running_row_without_a_claim() -> None:
+REFUSED: dict[str, dict[str, object]] = {
+    "running without a claim": {"state": State.RUNNING},
+    "done without a picture": {"state": State.DONE, "modification": {}},
+    "a claim on what waits": {"claim": uuid4(), "heartbeat_at": NOON},
+}
+
+
+@pytest.mark.parametrize("columns", REFUSED.values(), ids=REFUSED)
+def test_the_database_refuses_a_row_that_can_not_be(columns: dict[str, object]) -> None:
     row = only_row(launch())
     with pytest.raises(IntegrityError), transaction.atomic():
-        Augmentation.objects.filter(pk=row.pk).update(state=State.RUNNING)
+        Augmentation.objects.filter(pk=row.pk).update(**columns)
 
 
-def test_the_database_refuses_a_claim_on_a_row_that_does_not_run() -> None:
-    row = only_row(launch())
-    held = leased(row)
-    with pytest.raises(IntegrityError), transaction.atomic():
-        Augmentation.objects.filter(claim=held.token).update(state=State.FAILED)
-
-
-def test_the_database_refuses_a_done_row_without_a_picture() -> None:
-    row = only_row(launch())
-    with pytest.raises(IntegrityError), transaction.atomic():
-        Augmentation.objects.filter(pk=row.pk).update(state=State.DONE, modification={})
-
-
-def test_the_database_refuses_two_attempts_of_one_number() -> None:
+def test_the_database_refuses_a_second_attempt_of_one_number_and_a_second_row_of_a_cell() -> None:
     row = only_row(launch())
     leased(row)
     with pytest.raises(IntegrityError), transaction.atomic():
         Attempt.objects.create(augmentation=row, number=1, started_at=NOON)
-
-
-def test_the_database_refuses_a_second_row_for_one_cell() -> None:
-    row = only_row(launch())
     with pytest.raises(IntegrityError), transaction.atomic():
         Augmentation.objects.create(
             job_id=row.job_id, scenario_id=row.scenario_id, contestant_id=row.contestant_id

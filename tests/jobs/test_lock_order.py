@@ -42,17 +42,6 @@ def test_a_worker_holds_its_row_before_the_job() -> None:
     assert held(lambda: runner.work_on(augmentation_pk=pk, connect=Model())) == [ROWS, JOB]
 
 
-def test_who_cancels_a_job_holds_what_waits_before_the_job() -> None:
-    job = launch(scenarios=2)
-    assert held(lambda: jobs.cancel(job)) == [ROWS, JOB]
-
-
-def test_who_resumes_a_job_holds_what_waits_before_the_job() -> None:
-    job = llama_job(caps=Caps(tokens=5))
-    runner.work_on(augmentation_pk=job.augmentations.get().pk, connect=Model())
-    assert held(lambda: pausing.resume(job)) == [ROWS, JOB]
-
-
 def test_who_raises_a_cap_and_resumes_holds_what_waits_before_the_job() -> None:
     job = llama_job(caps=Caps(tokens=5))
     runner.work_on(augmentation_pk=job.augmentations.get().pk, connect=Model())
@@ -140,11 +129,3 @@ def test_a_call_is_settled_before_the_job_is_held() -> None:
     changes = [query["sql"].split('"')[1] for query in captured if query["sql"][:6] == "UPDATE"]
     reserved, settled, *_ = (place for place, table in enumerate(changes) if table == JOB)
     assert changes[reserved + 1 : settled].count("augment_modelcall") == 2, "sent, then answered"
-
-
-def test_a_job_that_is_over_keeps_what_waits() -> None:
-    job = launch()
-    GenerationJob.objects.update(state=GenerationJob.State.FINISHED)
-    with pytest.raises(Conflict):
-        jobs.cancel(job)
-    assert count_rows(job).queued == 1

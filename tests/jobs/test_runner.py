@@ -61,15 +61,6 @@ def test_the_reference_runs_to_its_picture_and_the_job_is_finished() -> None:
     assert row.job.state == GenerationJob.State.FINISHED
 
 
-def test_a_message_that_comes_twice_does_nothing_the_second_time() -> None:
-    row = ran(only_row(launch()))
-    finished_at = row.finished_at
-    assert not runner.work_on(augmentation_pk=row.pk)
-    row.refresh_from_db()
-    assert row.finished_at == finished_at
-    assert row.attempts.count() == 1
-
-
 def test_a_scene_that_can_not_be_read_is_a_failure_with_a_sentence() -> None:
     row = only_row(launch())
     row.scenario.base_scene.document = {"format": "nonsense"}
@@ -138,16 +129,6 @@ def test_a_worker_whose_claim_was_taken_asks_no_model_and_writes_nothing() -> No
     assert not ModelCall.objects.exists()
 
 
-def test_a_claim_that_is_lost_while_drawing_ends_quietly() -> None:
-    row = only_row(launch())
-    held = AUGMENTATIONS.take(row.pk, now=timezone.now() - timedelta(minutes=1))
-    assert held is not None
-    AUGMENTATIONS.take_back_lost(now=timezone.now())
-    AUGMENTATIONS.work(held)
-    row.refresh_from_db()
-    assert (row.state, row.modification) == (State.QUEUED, None)
-
-
 def test_what_nobody_foresaw_fails_the_row_and_is_logged(caplog: pytest.LogCaptureFixture) -> None:
     row = model_job()
     wire = Wire()
@@ -160,8 +141,3 @@ def test_what_nobody_foresaw_fails_the_row_and_is_logged(caplog: pytest.LogCaptu
     assert row.attempts.get().outcome == "failed"
     row.job.refresh_from_db()
     assert row.job.state == GenerationJob.State.FINISHED
-
-
-def test_notes_that_a_database_can_not_take_are_kept_all_the_same() -> None:
-    row = ran(model_job(), Wire(GOOD.replace("One road", "One\0 road")))
-    assert (row.state, row.notes[:9]) == (State.DONE, "One\u2400 road")

@@ -54,12 +54,6 @@ def test_the_task_runs_its_row() -> None:
     assert row.attempts.get().worker.startswith("here ")
 
 
-def test_recover_sends_what_was_never_sent(broker: Broker) -> None:
-    launch(scenarios=2)
-    tasks.recover(now=timezone.now())
-    assert len(broker) == 2
-
-
 def test_recover_takes_back_and_sends_what_a_dead_worker_held(broker: Broker) -> None:
     row = only_row(launch())
     now = timezone.now()
