@@ -18,7 +18,7 @@ from augment.escaping import escape_controls
 
 
 class TerminalOutput(OutputWrapper):
-    """Standard output or error as a person reads it."""
+    """Standard output or error with control characters escaped."""
 
     def write(  # type: ignore[override]
         self,
@@ -26,11 +26,11 @@ class TerminalOutput(OutputWrapper):
         style_func: Callable[[str], str] | None = None,
         ending: str | None = None,
     ) -> None:
-        """Write the text, escaped; what stands behind it is the command's own."""
+        """Write the text with its control characters escaped."""
         super().write(escape_controls(msg), style_func, ending)
 
     def write_data(self, text: str) -> None:
-        """Write a file's content: to the byte into a file or a pipe, escaped to a terminal."""
+        """Write a file's content, escaped only if this is a terminal."""
         if self.isatty():
             self.write(text, ending="")
         else:
