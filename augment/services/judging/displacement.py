@@ -35,6 +35,7 @@ __all__ = [
     "BoxSummary",
     "By",
     "DisplacedObject",
+    "Displacement",
     "Group",
     "MatchState",
     "Measured",
