@@ -116,13 +116,7 @@ def add_contestant(
     own = Respondent(
         endpoint=find_endpoint(endpoint, actor), model=one_line("model", model, what="contestant")
     )
-    others = {
-        role: Respondent(
-            endpoint=own.endpoint if label is None else find_endpoint(label, actor),
-            model=one_line(f"roles.{role}", played_by, what="contestant"),
-        )
-        for role, (label, played_by) in sorted((roles or {}).items())
-    }
+    others = _reviewers(roles or {}, own, actor)
     for respondent in (own, *others.values()):
         model_at(endpoint=respondent.endpoint, model=respondent.model)
     title = _title(slug, recipe.slug, own, others, chosen) if name is None else name
@@ -218,6 +212,16 @@ def preview_contestant(scenario: Scenario, contestant: Contestant, *, role: str)
         native_tools=has_tools and is_native,
         options=options,
     )
+
+
+def _reviewers(roles: Roles, own: Respondent, actor: User | None) -> dict[ModelRole, Respondent]:
+    return {
+        role: Respondent(
+            endpoint=own.endpoint if label is None else find_endpoint(label, actor),
+            model=one_line(f"roles.{role}", model, what="contestant"),
+        )
+        for role, (label, model) in sorted(roles.items())
+    }
 
 
 def _columns(

@@ -63,8 +63,8 @@ def survive(action: Callable[[], object], complaint: str) -> bool:
     """Do what may break in any way without ending the caller's loop; False with a log line."""
     try:
         action()
-    except Exception as error:
-        logger.warning("%s: %s", complaint, error)
+    except Exception:
+        logger.exception(complaint)
         return False
     return True
 
@@ -134,26 +134,20 @@ class RecoveryRounds:
             now = database_now()
         except Exception as error:
             self._failed += 1
-            self._report(error)
+            fault = str(error) or type(error).__name__
+            since = f"{self._worked_at:%Y-%m-%d %H:%M:%S} UTC" if self._worked_at else "the start"
+            text = "Could not bring lost work back since %s (%d rounds), will try again: %s: %s"
+            values = (since, self._failed, type(error).__name__, fault)
+            if self._failed == 1:
+                logger.exception(text, *values)
+            else:  # a fault that stays is told in full once
+                logger.warning(text, *values)
+            survive(lambda: self._presence.failed(fault), "This could not be stored for the pages")
             return False
         if self._failed:
             logger.info("Lost work is brought back again, after %d failed rounds.", self._failed)
         self._at_start, self._failed, self._worked_at = False, 0, now
         return True
-
-    def _report(self, error: Exception) -> None:
-        since = f"{self._worked_at:%Y-%m-%d %H:%M:%S} UTC" if self._worked_at else "the start"
-        fault = str(error) or type(error).__name__
-        # A fault that stays is told in full once.
-        logger.warning(
-            "Could not bring lost work back since %s (%d rounds), will try again: %s: %s",
-            since,
-            self._failed,
-            type(error).__name__,
-            fault,
-            exc_info=error if self._failed == 1 else None,
-        )
-        survive(lambda: self._presence.failed(fault), "This could not be stored for the pages")
 
 
 def workforce() -> Workforce:
