@@ -88,8 +88,7 @@ def add_contestant(
 ) -> Contestant:
     """Add a language model that runs one variant; simulated where its endpoint is.
 
-    The same contestant twice is one. What the model can do and costs has a row of its own, made
-    empty here where there is none; `openai` can be named without having been added where
+    The same contestant twice is one. `openai` can be named without having been added where
     OPENAI_API_KEY is set.
 
     Args:
