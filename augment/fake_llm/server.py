@@ -291,7 +291,7 @@ def _spoilt_block(fields: str) -> Behaviour:
 
 
 _500 = _always(error(500, "The server had an error.", kind="server_error"))
-_QUOTA = "insufficient_quota"
+_QUOTA, _TOO_LONG = "insufficient_quota", "context_length_exceeded"
 _LIST_ERROR = {"error": {"code": 400, "message": "Invalid value.", "status": "INVALID_ARGUMENT"}}
 
 MODELS: dict[str, Behaviour] = {
@@ -314,7 +314,7 @@ MODELS: dict[str, Behaviour] = {
         error(429, "You exceeded your current quota.", kind=_QUOTA, code=_QUOTA)
     ),
     "fake-context": _always(
-        error(400, "This model's maximum context length is 4096 tokens.", param="messages")
+        error(400, "This model's maximum context length is 4096 tokens.", code=_TOO_LONG)
     ),
     "fake-list-error": _always(as_json([_LIST_ERROR], status=400)),
     "fake-html": _always(
