@@ -10,7 +10,7 @@ from urllib.parse import urlencode
 from django.contrib.auth.models import User
 from django.db import transaction
 from django.db.models import Model, QuerySet
-from django.http import Http404, HttpResponse
+from django.http import HttpResponse
 from django.http.response import HttpResponseBase
 from django.views.decorators.cache import never_cache
 from django.views.decorators.http import conditional_page
@@ -29,8 +29,7 @@ from rest_framework.views import APIView
 from arena.api.access import RoleAllowed
 from arena.api.errors import error_response
 from arena.api.fields import SoundJSONParser, StrictSerializer
-from arena.exports.formats import Format, format_named
-from augment.errors import QueueFault, UnknownName
+from augment.errors import QueueFault
 
 Row = TypeVar("Row", bound=Model)
 
@@ -352,11 +351,3 @@ def answer_page(
         kept = request.query_params.dict() | {"after": str(shown[-1].code)}  # type: ignore[attr-defined]
         body["next"] = f"{request.path}?{urlencode(kept)}"
     return Response(body)
-
-
-def written_as(formats: Mapping[str, Format[Any]], form: str) -> Format[Any]:
-    """Return the format of that name, or raise 404."""
-    try:
-        return format_named(formats, form)
-    except UnknownName as error:
-        raise Http404 from error

@@ -1,4 +1,4 @@
-"""Django's admin, in which no address can ask for what its rows do not show."""
+"""Django's admin, whose filters can't reveal what its rows do not show."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ class SiteConfig(AdminConfig):
 
 
 class Site(AdminSite):
-    """Every list takes filters by its own fields alone."""
+    """An admin whose lists are filtered by their own fields alone."""
 
     def register(self, model_or_iterable: Any, admin_class: Any = None, **options: Any) -> None:
         """Register with `OwnLookups` in front, so that no class can go without."""
@@ -26,7 +26,7 @@ class Site(AdminSite):
 
 
 class OwnLookups:
-    """Refuses filters that go backwards along a relation.
+    """Refuse filters that follow a relation backwards.
 
     Django lets an address filter a list by one such step: contestants by the ranks of their
     standings, augmentations by the votes that they won.
@@ -35,7 +35,7 @@ class OwnLookups:
     model: Any
 
     def lookup_allowed(self, lookup: str, value: str, request: HttpRequest) -> bool:
-        """Whether it begins with a field of the row itself, beside what Django asks for."""
+        """Return whether a lookup begins with a field of the row itself and Django allows it."""
         fields = (*self.model._meta.fields, *self.model._meta.many_to_many)
         own = {"pk"} | {name for field in fields for name in (field.name, field.attname)}
         is_own = lookup.split("__")[0] in own

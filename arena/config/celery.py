@@ -30,24 +30,24 @@ _open: dict[str, ExitStack] = {}
 
 @setup_logging.connect
 def leave_the_log_alone(**_: object) -> None:
-    """Being connected is enough: Celery then keeps the settings that Django has made."""
+    """Keep Django's log settings: Celery configures none when this signal has a receiver."""
 
 
 @before_task_publish.connect
 def write_request_id(headers: dict[str, Any] | None = None, **_: object) -> None:
-    """Send the id along."""
+    """Add the request id to an outgoing message."""
     if headers is not None:
         headers[REQUEST_ID] = current_request_id()
 
 
 @task_prerun.connect
 def take_request_id(task_id: str = "", task: Any = None, **_: object) -> None:
-    """Work under the id that came along."""
+    """Run the task under the request id of its message."""
     stack = _open.setdefault(task_id, ExitStack())
     stack.enter_context(working_for(task.request.get(REQUEST_ID) or NOBODY))
 
 
 @task_postrun.connect
 def leave_request_id(task_id: str = "", **_: object) -> None:
-    """And under no id afterwards; both signals are sent in the thread of the task."""
+    """Reset the request id; both signals are sent in the thread of the task."""
     _open.pop(task_id, ExitStack()).close()

@@ -15,20 +15,20 @@ from django.http.response import HttpResponseBase
 HEADER = "X-Request-ID"
 
 NOBODY = "-"
-"""What stands in place of an id where no request began it: a command, or a round of recovery."""
+"""The id of work that no request began: a command, or a round of recovery."""
 
 _GIVEN = re.compile(r"[A-Za-z0-9._-]{8,64}")
 _current: ContextVar[str] = ContextVar("request_id", default=NOBODY)
 
 
 def current_request_id() -> str:
-    """The id of what this thread works on."""
+    """Return the request id of this thread."""
     return _current.get()
 
 
 @contextmanager
 def working_for(request_id: str) -> Iterator[None]:
-    """Everything that is logged or sent in this block belongs to one request."""
+    """Attribute everything logged or sent in this block to one request."""
     token = _current.set(request_id)
     try:
         yield
@@ -37,13 +37,12 @@ def working_for(request_id: str) -> Iterator[None]:
 
 
 class RequestIdMiddleware:
-    """Gives each request an id: the one of the proxy in front where it is one, else a new one."""
+    """Give each request an id: the one that a proxy sent if it is valid, else a new one."""
 
     def __init__(self, get_response: Callable[[HttpRequest], HttpResponseBase]) -> None:
         self.get_response = get_response
 
     def __call__(self, request: HttpRequest) -> HttpResponseBase:
-        """The answer, with the id in a header, so that a report can name it."""
         given = request.headers.get(HEADER, "")
         request_id = given if _GIVEN.fullmatch(given) else secrets.token_hex(8)
         with working_for(request_id):
@@ -53,9 +52,22 @@ class RequestIdMiddleware:
 
 
 class AddRequestId(logging.Filter):
-    """Write the id into every line."""
+    """Write the request id into every line."""
 
     def filter(self, record: logging.LogRecord) -> bool:
-        """Let every line through."""
         record.request_id = current_request_id()
+        return True
+
+
+_KEY_IN_ADDRESS = re.compile(r"(/(?:invitation|i|first|welcome)/)[A-Za-z0-9_-]+")
+
+
+class HideKeys(logging.Filter):
+    """Mask the tokens in addresses of invitations and pictures."""
+
+    def filter(self, record: logging.LogRecord) -> bool:
+        text = record.getMessage()
+        hidden = _KEY_IN_ADDRESS.sub(r"\1...", text)
+        if hidden != text:
+            record.msg, record.args = hidden, None
         return True

@@ -16,7 +16,7 @@ from typing import Any
 
 from csp.constants import NONE, SELF
 
-from arena.config import env, private, wire
+from arena.config import env, private
 from arena.exports.files import write_once
 
 BASE_DIR = Path(__file__).resolve().parents[2]
@@ -53,7 +53,6 @@ SECURE_HSTS_SECONDS = 31_536_000 if HTTPS else 0
 SECURE_PROXY_SSL_HEADER = ("HTTP_X_FORWARDED_PROTO", "https") if HTTPS else None
 PROXIES = env.integer("ARENA_PROXIES", default=0, low=0, high=9)
 SESSION_COOKIE_AGE = 30 * 24 * 3600
-SESSION_ENGINE = "arena.config.sessions"
 X_FRAME_OPTIONS = "DENY"
 SECURE_REFERRER_POLICY = "same-origin"
 CONTENT_SECURITY_POLICY = {
@@ -73,7 +72,7 @@ CONTENT_SECURITY_POLICY = {
 # Wrong passwords lock an account for the address that sent them, not for the whole world: nobody
 # can lock out somebody else. Far more of them, whatever the accounts, lock the address.
 # Kept in the database, so it holds for every web server.
-AXES_HANDLER = "arena.config.login_limit.LoginLimit"
+AXES_HANDLER = "arena.config.login.LoginLimit"
 ADDRESS_FAILURE_LIMIT = env.integer(
     "ARENA_LOGIN_FAILURES_ADDRESS", default=50, low=1, high=100_000
 )
@@ -86,8 +85,8 @@ AXES_RESET_COOL_OFF_ON_FAILURE_DURING_LOCKOUT = False
 AXES_RESET_ON_SUCCESS = True
 AXES_DISABLE_ACCESS_LOG = True
 AXES_VERBOSE = False
-AXES_CLIENT_IP_CALLABLE = "arena.config.client_address.client_address"
-AXES_LOCKOUT_CALLABLE = "arena.web.faults.answer_locked"
+AXES_CLIENT_IP_CALLABLE = "arena.config.login.client_address"
+AXES_LOCKOUT_CALLABLE = "arena.site.faults.answer_locked"
 
 # --- What it is made of ------------------------------------------------------------------------
 
@@ -107,20 +106,20 @@ INSTALLED_APPS = [
 ]
 MIDDLEWARE = [
     "arena.config.logs.RequestIdMiddleware",
-    "arena.config.headers.HeaderMiddleware",
+    "arena.config.middleware.HeaderMiddleware",
     "django.middleware.security.SecurityMiddleware",
     "csp.middleware.CSPMiddleware",
     "whitenoise.middleware.WhiteNoiseMiddleware",
     "django.contrib.sessions.middleware.SessionMiddleware",
-    "arena.web.language.VoterLanguageMiddleware",
+    "arena.site.language.VoterLanguageMiddleware",
     "django.middleware.common.CommonMiddleware",
     "django.middleware.csrf.CsrfViewMiddleware",
     "django.contrib.auth.middleware.AuthenticationMiddleware",
-    "arena.web.kept_forms.SignInMiddleware",
+    "arena.site.access.SignInMiddleware",
     "django.contrib.messages.middleware.MessageMiddleware",
     "django.middleware.clickjacking.XFrameOptionsMiddleware",
     "axes.middleware.AxesMiddleware",
-    "arena.config.busy.BusyMiddleware",
+    "arena.config.middleware.BusyMiddleware",
 ]
 ROOT_URLCONF = "arena.config.urls"
 WSGI_APPLICATION = "arena.config.wsgi.application"
@@ -144,7 +143,7 @@ LOGIN_REDIRECT_URL = "home"
 LOGOUT_REDIRECT_URL = "login"
 AUTHENTICATION_BACKENDS = [
     "axes.backends.AxesStandaloneBackend",  # refuses before a password is looked at
-    "arena.queries.accounts.AccountBackend",
+    "arena.people.queries.AccountBackend",
 ]
 PASSWORD_RESET_TIMEOUT = 14 * 24 * 3600  # how long a link to set a password works
 AUTH_PASSWORD_VALIDATORS = [
@@ -160,8 +159,25 @@ USE_TZ = True
 TIME_ZONE = "UTC"
 DEFAULT_AUTO_FIELD = "django.db.models.BigAutoField"
 
-REST_FRAMEWORK = wire.REST_FRAMEWORK
-SPECTACULAR_SETTINGS = wire.SPECTACULAR_SETTINGS
+REST_FRAMEWORK = {
+    "DEFAULT_AUTHENTICATION_CLASSES": [
+        "arena.api.access.BearerToken",
+        "rest_framework.authentication.SessionAuthentication",
+    ],
+    "DEFAULT_PERMISSION_CLASSES": ["rest_framework.permissions.IsAuthenticated"],
+    "DEFAULT_RENDERER_CLASSES": ["rest_framework.renderers.JSONRenderer"],
+    "DEFAULT_PARSER_CLASSES": ["rest_framework.parsers.JSONParser"],
+    "DEFAULT_SCHEMA_CLASS": "arena.api.views.ArenaSchema",
+}
+SPECTACULAR_SETTINGS = {
+    "TITLE": "Scenario Arena",
+    "VERSION": "1",
+    "OAS_VERSION": "3.1.1",
+    "SCHEMA_PATH_PREFIX": "/api/v1/",
+    "SERVE_INCLUDE_SCHEMA": False,
+    "POSTPROCESSING_HOOKS": [],  # what a field may be is said where the field is
+    "ENUM_GENERATE_CHOICE_DESCRIPTION": False,
+}
 
 # --- Where things are kept ---------------------------------------------------------------------
 
@@ -201,7 +217,7 @@ STATIC_URL = "static/"
 STATICFILES_DIRS = [BASE_DIR / "static"]
 STORAGES: dict[str, dict[str, Any]] = {
     "default": env.media("ARENA_MEDIA_URL"),
-    "staticfiles": {"BACKEND": "arena.config.static_files.ModuleStorage"},
+    "staticfiles": {"BACKEND": "arena.config.storage.ModuleStorage"},
 }
 WHITENOISE_KEEP_ONLY_HASHED_FILES = True
 
@@ -284,7 +300,7 @@ LOGGING = {
         },
     },
     "filters": {
-        "no_keys": {"()": "arena.config.hiding.HideKeys"},
+        "no_keys": {"()": "arena.config.logs.HideKeys"},
         "request_id": {"()": "arena.config.logs.AddRequestId"},
     },
     "handlers": {

@@ -1,4 +1,4 @@
-"""Where pictures are kept: a folder in which every file is whole."""
+"""How pictures and static files are stored on this machine."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from pathlib import Path
 
 from django.core.files.base import File
 from django.core.files.storage import FileSystemStorage
+from whitenoise.storage import CompressedManifestStaticFilesStorage
 
 from arena.config import private
 from arena.exports.files import write_pieces
@@ -16,16 +17,13 @@ logger = logging.getLogger(__name__)
 
 
 class WholeFiles(FileSystemStorage):
-    """Files of this machine that are there whole or not at all; the last writer wins.
+    """Store files atomically, readable by their owner alone; the last writer wins.
 
-    Only their owner reads them: what contestants made is nobody's until a study shows it.
-
-    Django's own storage makes an empty file and fills it: another worker with the same picture
-    would meet half of it, and a worker that is killed would leave that half behind.
+    Django's own storage creates an empty file and fills it: another worker with the same picture
+    would read half of it, and a worker that is killed would leave that half behind.
     """
 
     def __init__(self, location: str | Path | None = None, base_url: str | None = None) -> None:
-        """Take the folder and the address from the settings unless they are given."""
         super().__init__(location=location, base_url=base_url, allow_overwrite=True)
 
     def _save(self, name: str, content: File[bytes]) -> str:
@@ -38,3 +36,9 @@ class WholeFiles(FileSystemStorage):
             logger.error("Could not write %s: %s", path, fault)
             raise MediaFault("write", str(self.location), cause) from fault
         return name
+
+
+class ModuleStorage(CompressedManifestStaticFilesStorage):  # type: ignore[misc] # untyped
+    """Static files with hashed names, also inside `import` statements."""
+
+    support_js_module_import_aggregation = True

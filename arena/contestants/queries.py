@@ -1,8 +1,8 @@
-"""The lines of a probe as a page shows them: those that are known, and those to come."""
+"""Contestants and models as pages show them: how one asks, and what a probe saw of the other."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from decimal import Decimal
 from typing import Any
 
@@ -31,44 +31,37 @@ class ProbeLine:
 
 
 def probe_lines(model: EndpointModel, probe: Probe | None) -> list[ProbeLine]:
-    """The lines of a probe; of the report that the model has where nobody asked on a page."""
-    found: list[dict[str, Any]] = []
+    """Return the lines of a probe; of the model's report where nobody asked on a page."""
     if probe is not None:
-        found = list(probe.findings)
-    elif model.probe_report is not None:
-        found = list(model.probe_report["findings"])
-    if probe is None and not found:
+        findings = list(probe.findings)
+    else:
+        findings = list((model.probe_report or {}).get("findings", ()))
+    if probe is None and not findings:
         return []
-    by_ability = {one["ability"]: one for one in found}
-    lines: list[ProbeLine] = []
-    is_next = probe is not None and probe.state == Probe.State.RUNNING
-    for ability in ABILITIES:
-        if ability in by_ability:
-            lines.append(_line(by_ability[ability]))
-        elif is_next:
-            lines.append(ProbeLine(ability=ability, progress="asking"))
-            is_next = False
-        else:
-            is_coming = probe is not None and probe.state in Probe.UNDER_WAY
-            lines.append(ProbeLine(ability=ability, progress="waiting" if is_coming else "left"))
+    by_ability = {finding["ability"]: finding for finding in findings}
+    to_come = "waiting" if probe is not None and probe.state in Probe.UNDER_WAY else "left"
+    lines = [
+        _probe_line(by_ability[ability])
+        if ability in by_ability
+        else ProbeLine(ability=ability, progress=to_come)
+        for ability in ABILITIES
+    ]
+    if probe is not None and probe.state == Probe.State.RUNNING:
+        place = next((n for n, line in enumerate(lines) if line.progress == to_come), None)
+        if place is not None:
+            lines[place] = replace(lines[place], progress="asking")
     return lines
 
 
-# --- Private -----------------------------------------------------------------------------------
-
-
-def _line(found: dict[str, Any]) -> ProbeLine:
-    counts = (found["prompt_tokens"], found["completion_tokens"])
-    cost = found["cost_usd"]
+def _probe_line(finding: dict[str, Any]) -> ProbeLine:
+    tokens = (finding["prompt_tokens"], finding["completion_tokens"])
+    cost = finding["cost_usd"]
+    same = ("ability", "has_it", "note", "model_returned", "latency_s")
     return ProbeLine(
-        ability=found["ability"],
         progress="asked",
-        has_it=found["has_it"],
-        note=found["note"],
-        model_returned=found["model_returned"],
-        tokens=None if None in counts else sum(counts),
-        latency_s=found["latency_s"],
+        tokens=None if None in tokens else sum(tokens),
         cost_usd=None if cost is None else Decimal(cost),
+        **{name: finding[name] for name in same},
     )
 
 
@@ -86,31 +79,10 @@ LABELS = {
 }
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class OptionLine:
-    """One option.
-
-    Attributes:
-        is_chosen: Whether somebody chose it when the contestant was added.
-        left_out: Roles whose models do not take it.
-    """
-
-    label: str
-    value: str
-    is_chosen: bool
-    left_out: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Asking:
-    """All options that a contestant has."""
-
-    lines: tuple[OptionLine, ...]
-    is_frozen: bool
-
-
-def asking_of(contestant: Contestant, made_with: dict[str, Any] | None = None) -> Asking | None:
-    """How a contestant asks, None where it asks no model.
+def asking_of(
+    contestant: Contestant, made_with: dict[str, Any] | None = None
+) -> dict[str, Any] | None:
+    """Return a contestant's options as a page shows them, None where it asks no model.
 
     Args:
         contestant: Who.
@@ -120,19 +92,17 @@ def asking_of(contestant: Contestant, made_with: dict[str, Any] | None = None) -
         return None
     options = made_with or options_of(contestant).to_document()
     lacking = left_out(contestant)
-    return Asking(
-        lines=tuple(
-            OptionLine(
-                label=str(LABELS[name]),
-                value=_value(name, options[name]),
-                is_chosen=name in contestant.options,
-                left_out=tuple(role for role, names in lacking.items() if name in names),
-            )
-            for name in OPTIONS
-            if name in options
-        ),
-        is_frozen=contestant.frozen_options is not None,
-    )
+    lines = [
+        {
+            "label": LABELS[name],
+            "value": _value(name, options[name]),
+            "is_chosen": name in contestant.options,
+            "left_out": [role for role, names in lacking.items() if name in names],
+        }
+        for name in OPTIONS
+        if name in options
+    ]
+    return {"lines": lines, "is_frozen": contestant.frozen_options is not None}
 
 
 def _value(name: str, value: object) -> str:

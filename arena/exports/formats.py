@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Generic, Protocol, TypeVar
 
+from django.http import Http404, HttpResponse
+
 from augment.errors import UnknownName
 
 Table = TypeVar("Table")
@@ -77,3 +79,23 @@ def drawings(chart: _Drawing[Table]) -> dict[str, Callable[[Table], bytes]]:
 def round_value(value: float | None) -> float | None:
     """Four decimals, which every machine agrees on."""
     return None if value is None else round(value, 4)
+
+
+def download(
+    known: Mapping[str, Format[Table]], name: str, stem: str, make: Callable[[], Table]
+) -> HttpResponse:
+    """Return a table as a file to be saved.
+
+    Args:
+        known: The formats that it has.
+        name: Which of them; 404 for another.
+        stem: The file's name without its suffix.
+        make: Makes the table.
+    """
+    if name not in known:
+        raise Http404
+    return HttpResponse(
+        known[name].write(make()),
+        content_type=known[name].content_type,
+        headers={"Content-Disposition": f'attachment; filename="{stem}.{known[name].suffix}"'},
+    )

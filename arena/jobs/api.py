@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import uuid
-from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any
 
@@ -23,32 +22,18 @@ from arena.api.views import (
     PageQuery,
     WarnedDocument,
     answer_page,
-    as_file,
     file_operation,
     keep_and_send,
     operation,
     page_of,
-    written_as,
 )
-from arena.exports.formats import Format
-from arena.jobs.exports import displacement, displacement_files, faults, tables
-from arena.jobs.exports.displacement_files import FORMATS as DISPLACEMENT
-from arena.jobs.exports.driving import FORMATS as DRIVING
-from arena.jobs.exports.driving import DrivingTable
-from arena.jobs.queries import analysis_of
+from arena.exports.formats import download
+from arena.jobs.exports.registry import JOB_TABLES
 from augment.models import GenerationJob
-from augment.services.judging.displacement import By
-from augment.services.judging.driving_scores import options_driven, scores_of_job
-from augment.services.judging.simulations import SCORES, Options
 from augment.services.running import budget, jobs
 from augment.services.running.budget import Caps
 from augment.services.running.estimates import estimate
-from augment.services.running.progress import (
-    JobCounts,
-    count_each,
-    count_rows,
-    tool_calls_by_augmentation,
-)
+from augment.services.running.progress import JobCounts, count_each, count_rows
 from augment.services.running.workers import workforce
 from augment.tasks import enqueue_job
 
@@ -239,39 +224,6 @@ class EstimateView(ApiView):
         return estimate(**given)
 
 
-Export = tuple[Mapping[str, Format[Any]], Callable[[GenerationJob], Any]]
-
-
-def _driving(score: str, job: GenerationJob) -> DrivingTable:
-    known = options_driven(job)
-    scores = scores_of_job(job, options=known[0] if known else Options(), score=score)
-    return DrivingTable(title=job.name, scores=scores)
-
-
-def _displacement(by: By, job: GenerationJob) -> Any:
-    return displacement.displacement_table(job, by=by, types=None)
-
-
-def _analysis(part: str, job: GenerationJob) -> Any:
-    return tables.analysis_table(analysis_of(job), part)
-
-
-OF_JOBS: dict[str, Export] = {
-    "tool-calls": (tables.CALL_FORMATS, tool_calls_by_augmentation),
-    "augmentations": (tables.AUGMENTATION_FORMATS, tables.augmentation_rows),
-    "repeats": (tables.REPEAT_FORMATS, tables.repeat_rows),
-    "faults": (faults.FORMATS, faults.fault_table),
-    "displacement-objects": (displacement_files.OBJECT_FORMATS, displacement_files.object_rows),
-    **{f"displacement-by-{by.value}": (DISPLACEMENT, partial(_displacement, by)) for by in By},
-    **{f"driving-{score}": (DRIVING, partial(_driving, score)) for score in SCORES},
-    **{
-        f"analyses-{part}": (tables.ANALYSIS_FORMATS, partial(_analysis, part))
-        for part in tables.PARTS
-    },
-}
-"""Exports of a job by name: their formats, and what makes their table."""
-
-
 class JobExportView(FileView):
     """A table of a job."""
 
@@ -279,20 +231,19 @@ class JobExportView(FileView):
 
     @file_operation(
         "A table of a job as a file",
-        types=[one.content_type for formats, _ in OF_JOBS.values() for one in formats.values()],
+        types=[
+            one.content_type for table in JOB_TABLES.values() for one in table.formats.values()
+        ],
         name="exportJob",
         words={
-            "name": OF_JOBS,
-            "form": [form for formats, _ in OF_JOBS.values() for form in formats],
+            "name": JOB_TABLES,
+            "form": [form for table in JOB_TABLES.values() for form in table.formats],
         },
     )
     def get(self, request: Request, code: uuid.UUID, name: str, form: str) -> HttpResponseBase:
         """The same bytes as on its page."""
         job = get_object_or_404(GenerationJob, code=code)
-        if name not in OF_JOBS:
+        if name not in JOB_TABLES:
             raise Http404
-        formats, table = OF_JOBS[name]
-        chosen = written_as(formats, form)
-        content = chosen.write(table(job))
-        stem = f"{slugify(job.name) or 'job'}-{name}"
-        return as_file(content, chosen.content_type, f"{stem}.{chosen.suffix}")
+        table, stem = JOB_TABLES[name], f"{slugify(job.name) or 'job'}-{name}"
+        return download(table.formats, form, stem, lambda: table.make(job))

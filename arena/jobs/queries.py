@@ -330,7 +330,7 @@ def of_expert(expert: User) -> list[LabellingProgress]:
     return _counted(rows)
 
 
-def of_job(job: GenerationJob) -> list[LabellingProgress]:
+def labellings_of(job: GenerationJob) -> list[LabellingProgress]:
     """The labellings of a job over all their experts."""
     return _counted(job.labellings.all())
 

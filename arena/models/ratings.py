@@ -24,20 +24,20 @@ else:
 class ResultsField(_JSONField):
     """Results as their document; for migrations it is a JSON field like any other."""
 
-    def deconstruct(self) -> Any:  # noqa: D102
+    def deconstruct(self) -> Any:
         name, _, args, kwargs = super().deconstruct()
         return name, "django.db.models.JSONField", args, kwargs | {"default": dict}
 
-    def from_db_value(self, *given: Any) -> Any:  # noqa: D102
+    def from_db_value(self, *given: Any) -> Any:
         return self.to_python(super().from_db_value(*given))
 
-    def to_python(self, value: Any) -> Any:  # noqa: D102
+    def to_python(self, value: Any) -> Any:
         return read_results(value) if isinstance(value, dict) else value
 
-    def get_prep_value(self, value: Any) -> Any:  # noqa: D102
+    def get_prep_value(self, value: Any) -> Any:
         return results_document(value) if isinstance(value, Results) else value
 
-    def value_to_string(self, obj: models.Model) -> Any:  # noqa: D102
+    def value_to_string(self, obj: models.Model) -> Any:
         return self.get_prep_value(self.value_from_object(obj))
 
 

@@ -19,19 +19,11 @@ from rest_framework.request import Request
 from arena import tasks
 from arena.api.access import STAFF
 from arena.api.fields import FlagField, StrictSerializer, TextField, WholeNumberField
-from arena.api.views import (
-    ApiView,
-    FileView,
-    as_file,
-    file_operation,
-    keep_and_send,
-    operation,
-    written_as,
-)
+from arena.api.views import ApiView, FileView, as_file, file_operation, keep_and_send, operation
 from arena.errors import NoSnapshot
 from arena.exports.bundle import bundle
 from arena.exports.charts.rating import CONTENT_TYPES, chart_bytes
-from arena.exports.formats import Format
+from arena.exports.formats import download
 from arena.exports.tables import LeaderboardTable, leaderboard_table
 from arena.exports.votes import VOTE_FORMATS, vote_table
 from arena.exports.writers import FORMATS as LEADERBOARD
@@ -41,11 +33,11 @@ from arena.models.ratings import STORED
 from arena.pairing.order import MAIN, REPEAT
 from arena.queries.studies.results import must_read_results
 from arena.queries.votes.sets import Filters
-from arena.rating.bootstrap import Unit
 from arena.rating.leaderboard import Intervals, Line, Method
+from arena.rating.rules import Unit
 from arena.services.ratings import DEFAULT_ROUNDS, MOST_ROUNDS, is_big, plan_snapshot, rate
-from arena.services.study_plan import HIGHEST_SEED
 from arena.studies.api import get_study
+from arena.studies.services.plan import HIGHEST_SEED
 from augment.errors import UnknownName
 from augment.services.scenarios.scenes import type_choices
 
@@ -227,14 +219,16 @@ class SnapshotExportView(FileView):
             if form != "zip":
                 raise Http404
             return as_file(bundle(snapshot), ZIP_TYPE, f"{study}-rating.zip")
+        stem = f"{study}-{name}"
         if name == "leaderboard":
-            chosen: Format[Any] = written_as(LEADERBOARD, form)
-            table: Any = leaderboard_table(snapshot)
-        elif name == "votes":
-            chosen, table = written_as(VOTE_FORMATS, form), vote_table(snapshot)
-        else:
-            return _chart(snapshot, name, form, f"{study}-{name}.{form}")
-        return as_file(chosen.write(table), chosen.content_type, f"{study}-{name}.{chosen.suffix}")
+            return download(LEADERBOARD, form, stem, lambda: leaderboard_table(snapshot))
+        if name == "votes":
+            return download(VOTE_FORMATS, form, stem, lambda: vote_table(snapshot))
+        try:
+            content = chart_bytes(snapshot, name=name, file_format=form)
+        except UnknownName as error:
+            raise Http404 from error
+        return as_file(content, CONTENT_TYPES[form], f"{stem}.{form}")
 
 
 # --- Private -----------------------------------------------------------------------------------
@@ -257,11 +251,3 @@ def _wanted(given: dict[str, Any]) -> dict[str, Any]:
         leave_out_own=given.pop("leave_out_own"),
     )
     return given | {"filters": filters}
-
-
-def _chart(snapshot: Snapshot, name: str, form: str, file_name: str) -> HttpResponseBase:
-    try:
-        content = chart_bytes(snapshot, name=name, file_format=form)
-    except UnknownName as error:
-        raise Http404 from error
-    return as_file(content, CONTENT_TYPES[form], file_name)

@@ -12,32 +12,34 @@ AT_ONCE = 1000
 _FORMULA = ("=", "+", "-", "@", "\t", "\r", "\n")
 
 
-def cell(value: object) -> str:
-    """A cell that no spreadsheet takes for a formula."""
+def cell(value: object, number: str = ".2f") -> str:
+    """Return a cell that no spreadsheet takes for a formula; `number` is the format of floats."""
     if value is None:
         return ""
     if isinstance(value, bool):
         return "yes" if value else "no"
     if isinstance(value, float):
-        return f"{value:.2f}"
+        return format(value, number)
     text = str(value)
     guard = "'" if text.startswith(_FORMULA) else ""
     return guard + text.replace("\r", " ").replace("\n", " ")
 
 
-def csv_text(head: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
+def csv_text(head: Sequence[str], rows: Iterable[Sequence[object]], *, number: str = ".2f") -> str:
     """A CSV file; no cell below its head is a formula."""
-    return b"".join(csv_parts(head, rows)).decode()
+    return b"".join(csv_parts(head, rows, number=number)).decode()
 
 
-def csv_parts(head: Sequence[str], rows: Iterable[Sequence[object]]) -> Iterator[bytes]:
+def csv_parts(
+    head: Sequence[str], rows: Iterable[Sequence[object]], *, number: str = ".2f"
+) -> Iterator[bytes]:
     """The same file, AT_ONCE lines at a time while the rest is read."""
     sheet = io.StringIO()
     writer = csv.writer(sheet, lineterminator="\n")
     writer.writerow(head)
-    for number, row in enumerate(rows, start=1):
-        writer.writerow([cell(value) for value in row])
-        if number % AT_ONCE == 0:
+    for written, row in enumerate(rows, start=1):
+        writer.writerow([cell(value, number) for value in row])
+        if written % AT_ONCE == 0:
             yield _taken(sheet)
     yield _taken(sheet)
 

@@ -1,4 +1,4 @@
-"""What a supervisor has started, written down so that the next one can end what it left behind.
+"""The list of processes that a supervisor has started, so that the next one can end orphans.
 
 After `kill -9` the programs of a supervisor end with it on Linux, but not what they started
 themselves (web workers that hold the port), and elsewhere nothing does. Only that is ended which

@@ -1,12 +1,14 @@
-"""Whether the parts of an installation answer: what load balancers and people on duty ask."""
+"""Health checks of the database, the broker and the workers, for load balancers and operators."""
 
 from __future__ import annotations
 
+import secrets
 import threading
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from django.conf import settings
 from django.db import DatabaseError, connection
 from django.db.migrations.executor import MigrationExecutor
 
@@ -16,7 +18,7 @@ from augment.services.running.workers import workforce
 
 BROKER_WITHIN_S = 1.0
 HELD_FOR_S = 5.0
-"""A probe is asked by everybody and signs in nobody: it must not be dear."""
+"""Probes need no account, so a request must stay cheap."""
 
 _is_prepared = threading.Event()
 """Set once every migration was seen applied: they don't go away under a running process."""
@@ -33,7 +35,7 @@ class PartState:
 
 
 def look_at_database() -> PartState:
-    """Whether it answers and has the tables of this release."""
+    """Return whether the database answers and has the tables of this release."""
     try:
         missing = [] if _is_prepared.is_set() else find_unapplied_migrations()
         with connection.cursor() as cursor:
@@ -54,7 +56,7 @@ def find_unapplied_migrations() -> list[str]:
 
 
 def look_at_broker() -> PartState:
-    """Whether messages to workers can be sent."""
+    """Return whether messages to workers can be sent."""
     try:
         check_broker(within_s=BROKER_WITHIN_S)
     except QueueFault as error:
@@ -63,7 +65,7 @@ def look_at_broker() -> PartState:
 
 
 def look_at_workers() -> PartState:
-    """Whether somebody works, and what is lost is brought back."""
+    """Return whether at least one worker is alive and lost work is recovered."""
     try:
         found = workforce()
     except DatabaseError as error:
@@ -79,12 +81,12 @@ def look_at_workers() -> PartState:
 
 
 class HeldLook:
-    """An answer that is held for a while, so that many who ask cost no more than one.
+    """A check whose result is cached for a while, so that many callers cost no more than one.
 
     Args:
-        look: Who is asked.
-        for_s: For how long an answer is held.
-        clock: Seconds that only ever grow.
+        look: The check.
+        for_s: How long a result is cached, in seconds.
+        clock: A monotonic clock in seconds.
     """
 
     def __init__(
@@ -99,7 +101,7 @@ class HeldLook:
         self._held: tuple[float, PartState] | None = None
 
     def __call__(self) -> PartState:
-        """The answer, at most so old; who asks meanwhile waits for the one look."""
+        """Return the result, at most `for_s` old; concurrent callers share one check."""
         with self._lock:
             if self._held is None or self._clock() - self._held[0] >= self._for_s:
                 state = self._look()
@@ -107,7 +109,7 @@ class HeldLook:
             return self._held[1]
 
     def forget(self) -> None:
-        """Look anew when asked the next time."""
+        """Drop the cached result."""
         with self._lock:
             self._held = None
 
@@ -117,5 +119,13 @@ PARTS: tuple[Callable[[], PartState], ...] = (look_at_database, *HELD)
 
 
 def look_at_parts() -> tuple[PartState, ...]:
-    """All of them, in the order in which they need each other."""
+    """Return the state of every part, in the order of their dependencies."""
     return tuple(look() for look in PARTS)
+
+
+def opens_metrics(authorization: str | None) -> bool:
+    """Return whether a header bears the configured metrics token; False without a token."""
+    expected = settings.METRICS_TOKEN
+    scheme, _, given = (authorization or "").partition(" ")
+    is_bearer = scheme.lower() == "bearer" and bool(expected)
+    return is_bearer and secrets.compare_digest(given.strip().encode(), expected.encode())

@@ -1,33 +1,155 @@
-"""Several programs as one: all up or none, all down together; crashed or hung ones start again.
+"""Supervision of several programs: started and stopped together, restarted when they crash.
 
-One that keeps crashing is started again after longer and longer waits, and the others live on: a
-worker that can't work takes no page away from anybody.
+A program that keeps crashing is restarted after growing delays while the others go on: a broken
+worker does not take the web server down.
 """
 
 from __future__ import annotations
 
+import contextlib
+import os
 import signal
+import subprocess
+import sys
+import threading
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections import deque
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
-from types import FrameType
+from dataclasses import dataclass, field
+from types import FrameType, MappingProxyType
 
 from arena.errors import ArenaError
-from arena.serving.child import Child, Program
 from arena.serving.ledger import Ledger
+
+KEPT_LINES = 20
+STOP_POLL_S = 0.05
+READER_S = 5.0
+"""How long its last lines are waited for; what it started may keep its output open."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Program:
+    """What to run and how to see that it works.
+
+    Attributes:
+        name: The word before each of its lines.
+        arguments: The command line.
+        environment: What it needs beside the environment of the supervisor.
+        is_ready: Asked until it says yes; it must not raise.
+        is_alive: Asked with its process id every ALIVE_EVERY_S while it runs; on no it is killed
+            and started again. It must not raise.
+        ready_within_s: How long it may take to come up.
+        grace_s: How long it may take to end after SIGTERM.
+    """
+
+    name: str
+    arguments: tuple[str, ...]
+    environment: Mapping[str, str] = field(default_factory=dict)
+    is_ready: Callable[[], bool]
+    is_alive: Callable[[int], bool] = lambda pid: True
+    ready_within_s: float = 60.0
+    grace_s: float = 10.0
+
+
+class Child:
+    """A running program.
+
+    Args:
+        program: What to run.
+        say: Gets every line that the program prints.
+        environment: What every child of the supervisor has in its environment.
+    """
+
+    def __init__(
+        self,
+        program: Program,
+        say: Callable[[str, str], None],
+        environment: Mapping[str, str] = MappingProxyType({}),
+    ) -> None:
+        self.program = program
+        self._last_lines: deque[str] = deque(maxlen=KEPT_LINES)
+        self._say = say
+        leash = (sys.executable, "-m", "arena.serving.leash", str(os.getpid()), "--")
+        # A session of its own: Ctrl-C reaches the supervisor alone, which then stops its children
+        # in order; and the whole group can be killed when one of them does not listen.
+        self._process = subprocess.Popen(
+            (*leash, *program.arguments),
+            env={**os.environ, "PYTHONUNBUFFERED": "1", **environment, **program.environment},
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            errors="replace",
+            start_new_session=True,
+        )
+        self._reader = threading.Thread(
+            target=self._read, name=f"{program.name} lines", daemon=True
+        )
+        self._reader.start()
+
+    @property
+    def pid(self) -> int:
+        """The process id."""
+        return self._process.pid
+
+    @property
+    def exit_code(self) -> int | None:
+        """None while it runs."""
+        return self._process.poll()
+
+    def last_words(self) -> list[str]:
+        """Its last lines; of one that has ended everything that it still had to say."""
+        if self.exit_code is not None:
+            self._reader.join(timeout=READER_S)
+        return list(self._last_lines)
+
+    def ask_to_stop(self) -> None:
+        """Send SIGTERM, if it still runs."""
+        if self.exit_code is None:
+            self._process.terminate()
+
+    def stop(self, *, is_hurried: Callable[[], bool] = lambda: False) -> None:
+        """End it and whatever it started: SIGTERM, after the grace SIGKILL to the whole group.
+
+        Args:
+            is_hurried: Asked all the while; once it says yes, the grace is over.
+        """
+        self.ask_to_stop()
+        limit = time.monotonic() + self.program.grace_s
+        while self.exit_code is None and not is_hurried():
+            if time.monotonic() > limit:
+                self._say(self.program.name, f"did not end within {self.program.grace_s:.0f} s")
+                break
+            time.sleep(STOP_POLL_S)
+        self.kill()
+
+    def kill(self) -> None:
+        """End it and whatever it started at once."""
+        with contextlib.suppress(ProcessLookupError):  # nobody of the group is left: as wanted
+            os.killpg(self.pid, signal.SIGKILL)
+        self._process.wait()
+        self._reader.join(timeout=READER_S)
+
+    def _read(self) -> None:
+        assert self._process.stdout is not None
+        with self._process.stdout as lines:
+            for line in lines:
+                self._last_lines.append(line.rstrip())
+                self._say(self.program.name, line.rstrip())
+
 
 POLL_S = 0.1
 LONG_GRACE_S = 30.0
-"""Who may take so long to end is announced."""
+"""A program with a grace period of at least this is announced when it is stopped."""
 
 STEADY_S = 60.0
-"""Who has run for so long starts again at once, as after a first crash."""
+"""A program that ran this long before it crashed is restarted at once."""
 
 LONGEST_WAIT_S = 60.0
 ALIVE_EVERY_S = 5.0
 CRASHES_ALLOWED = 3
-"""Who has crashed more often in a row is not steady."""
+"""More crashes in a row than this count as a crash loop."""
 
 
 class ChildFailed(ArenaError):
@@ -36,14 +158,14 @@ class ChildFailed(ArenaError):
 
 @dataclass(slots=True)
 class Place:
-    """One program among the others: who runs it now, and how it has fared.
+    """The state of one supervised program.
 
     Attributes:
-        child: Who runs it, or ran it until it crashed.
-        started_at: When that one was started, seconds of the supervisor's clock.
-        crashes: How often in a row it ended soon after its start.
-        due_at: When it is started again; None while it runs.
-        asked_at: When it was last asked whether it is alive.
+        child: The process that runs it, or ran it until it crashed.
+        started_at: When that process was started, in seconds of the supervisor's clock.
+        crashes: Crashes in a row, each soon after a start.
+        due_at: When it is restarted; None while it runs.
+        asked_at: When its liveness was last checked.
     """
 
     child: Child
@@ -54,12 +176,12 @@ class Place:
 
 
 def wait_s(crashes: int) -> float:
-    """How long to wait before a start after so many crashes in a row: 0, 1, 2, 4, ... 60 s."""
+    """Return the delay before a restart after this many crashes in a row: 0, 1, 2, 4, ... 60 s."""
     return min(2.0 ** min(crashes - 2, 10), LONGEST_WAIT_S) if crashes > 1 else 0.0
 
 
 class Supervisor:
-    """Runs programs in the given order and stops them in the opposite one.
+    """Start programs in order, restart what crashes or hangs, and stop all in reverse order.
 
     Args:
         programs: What to run; each is ready before the next one starts.
@@ -86,10 +208,10 @@ class Supervisor:
         self._interrupts = 0
 
     def start(self) -> None:
-        """Bring every program up.
+        """Start every program and wait until each is ready.
 
         Raises:
-            ChildFailed: One did not come up; those before it are stopped again.
+            ChildFailed: A program did not start; those before it are stopped.
         """
         for program in self._programs:
             if self._stopping:
@@ -102,21 +224,21 @@ class Supervisor:
                 raise
 
     def watch(self) -> None:
-        """Return when somebody asks to stop."""
+        """Supervise until a stop is requested."""
         while not self._stopping:
             self.check()
             time.sleep(POLL_S)
 
     def check(self) -> None:
-        """Start again what has crashed, each when its time has come."""
+        """Restart crashed programs that are due, and kill those that hang."""
         for place in self._places:
             if self._stopping:
                 return
             if place.due_at is not None:
                 if self._clock() >= place.due_at:
-                    self._start_again(place)
+                    self._restart(place)
             elif place.child.exit_code is not None:
-                self._bury(place)
+                self._handle_crash(place)
             elif self._clock() - place.asked_at >= ALIVE_EVERY_S:
                 place.asked_at = self._clock()
                 if not place.child.program.is_alive(place.child.pid):
@@ -124,10 +246,10 @@ class Supervisor:
                     place.child.kill()
 
     def insist_on_steadiness(self) -> None:
-        """Return unless a program keeps crashing; for who waits for what the programs do.
+        """Raise if a program keeps crashing; for callers that wait for the programs' results.
 
         Raises:
-            ChildFailed: One does; nothing is stopped.
+            ChildFailed: A program keeps crashing; nothing is stopped.
         """
         for place in self._places:
             if place.crashes > CRASHES_ALLOWED:
@@ -135,11 +257,11 @@ class Supervisor:
 
     @property
     def is_stopping(self) -> bool:
-        """Whether somebody asked to stop."""
+        """Whether a stop was requested."""
         return self._stopping
 
     def ask_to_stop(self) -> None:
-        """Let `watch` return; safe to call from a signal handler."""
+        """Make `watch` return; safe to call from a signal handler."""
         self._stopping = True
 
     def stop(self) -> None:
@@ -160,7 +282,7 @@ class Supervisor:
 
     @contextmanager
     def signals(self) -> Iterator[None]:
-        """Turn Ctrl-C, SIGTERM and SIGHUP into a request to stop; a second one means at once."""
+        """Request a stop on Ctrl-C, SIGTERM and SIGHUP; a second one skips the grace."""
         handled = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
         def handle(_number: int, _frame: FrameType | None) -> None:
@@ -186,28 +308,28 @@ class Supervisor:
                 raise self._failure(child, f"is not ready after {waited}")
             time.sleep(POLL_S)
 
-    def _bury(self, place: Place) -> None:
-        """Count a crash and say when the next start is due."""
+    def _handle_crash(self, place: Place) -> None:
+        """Count a crash and schedule the restart."""
         name, code = place.child.program.name, place.child.exit_code
         was_steady = self._clock() - place.started_at >= STEADY_S
         place.crashes = 1 if was_steady else place.crashes + 1
-        self._put_off(place, f"ended with exit code {code}")
+        self._schedule_restart(place, f"ended with exit code {code}")
         place.child.kill()
         if place.crashes == CRASHES_ALLOWED + 1:
             self._say(name, "keeps crashing; everything else goes on without it")
 
-    def _put_off(self, place: Place, what: str) -> None:
+    def _schedule_restart(self, place: Place, what: str) -> None:
         after_s = wait_s(place.crashes)
         place.due_at = self._clock() + after_s
         when = f"in {after_s:.0f} s" if after_s else "now"
         self._say(place.child.program.name, f"{what}; starting it again {when}")
 
-    def _start_again(self, place: Place) -> None:
+    def _restart(self, place: Place) -> None:
         try:
             place.child = self._child(place.child.program)
         except OSError as error:  # no memory, no process left: the next try may have them
             place.crashes += 1
-            self._put_off(place, f"could not be started ({error})")
+            self._schedule_restart(place, f"could not be started ({error})")
             return
         place.started_at, place.due_at = self._clock(), None
 

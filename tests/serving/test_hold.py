@@ -9,7 +9,7 @@ import pytest
 from django.conf import settings
 from django.test import override_settings
 
-from arena.serving.hold import LOCK, AlreadyRunning, hold_alone
+from arena.serving.stack import LOCK, AlreadyRunning, hold_alone
 
 
 @pytest.fixture(autouse=True)

@@ -12,8 +12,7 @@ from pathlib import Path
 import psutil
 import pytest
 
-from arena.serving.child import Program
-from arena.serving.supervisor import ALIVE_EVERY_S, ChildFailed, Supervisor
+from arena.serving.supervisor import ALIVE_EVERY_S, ChildFailed, Program, Supervisor
 from tests.processes import wait_until
 
 SLEEP = "import time; print('up', flush=True); time.sleep(600)"
@@ -208,7 +207,7 @@ def test_nothing_outlives_a_killed_supervisor(tmp_path: Path) -> None:
     pids = tmp_path / "pid"
     code = f"""
 import sys, time
-from arena.serving.child import Child, Program
+from arena.serving.supervisor import Child, Program
 sleep = (sys.executable, "-c", "import time; time.sleep(600)")
 child = Child(Program(name="one", arguments=sleep,
                       is_ready=lambda: True), print)

@@ -134,7 +134,7 @@ def test_the_files_have_the_papers_columns(job: GenerationJob, eva: User) -> Non
         ("ann", "1"),
         ("sim (simulated)", "2"),
     ]
-    text = latex(table)
+    text = latex(table).decode()
     assert r"    ann & 1 & 1 & 0 & 0 & 0 & 1\\" in text
     # Two unreadable answers and nothing to label: two misses, of two.
     assert r"    sim (simulated) & 2 & -- & -- & -- & 2 & 2\\" in text

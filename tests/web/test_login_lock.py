@@ -8,7 +8,7 @@ from django.http import HttpResponse
 from django.test import Client, RequestFactory
 from django.urls import reverse
 
-from arena.config.client_address import client_address
+from arena.config.login import client_address
 from tests.web.cast import people
 
 pytestmark = pytest.mark.django_db

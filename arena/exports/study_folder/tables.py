@@ -12,11 +12,10 @@ from django.db.models import QuerySet
 from arena.exports.bundle import MANIFEST as RATING_MANIFEST
 from arena.exports.bundle import bundle_files
 from arena.exports.study_folder.closure import Closure
-from arena.jobs.exports.displacement_files import object_csv as objects_csv
-from arena.jobs.exports.displacement_files import object_rows
+from arena.jobs.exports.tables import object_sheet, sheet_csv
 from arena.models import Matchup, Snapshot, Vote
 from arena.services.cells import csv_text
-from arena.services.preregistration import FILE_NAME, preregistration_bytes
+from arena.studies.services.opening import FILE_NAME, preregistration_bytes
 from augment.models import Augmentation, Contestant, GenerationJob, Scenario
 from augment.services.running.transcript_records import Try, record_of, tries_by_augmentation
 
@@ -54,7 +53,7 @@ def files_for_people(closure: Closure) -> Iterator[File]:
     for scene in sorted(scenes, key=lambda one: one.slug):
         yield f"scenes/{scene.slug}.json", _json(scene.document)
     for job in GenerationJob.objects.filter(pk__in=closure.jobs).order_by("pk"):
-        yield f"objects/{job.code}.csv", objects_csv(object_rows(job))
+        yield f"objects/{job.code}.csv", sheet_csv(object_sheet(job))
     for start in range(0, len(augmentations), _AT_ONCE):
         yield from _made(augmentations[start : start + _AT_ONCE])
     ready = closure.study.snapshots.filter(state=Snapshot.State.READY).order_by("made_at", "pk")

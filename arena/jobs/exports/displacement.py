@@ -1,15 +1,11 @@
-"""What the paper published of its displacement errors, to stand beside our own. Read-only.
-
-Nothing here was measured by this project: the numbers are read from the paper's box plot by eye,
-to a tenth of a metre. Lower whiskers (0.0 to 0.4 m) can't be told apart there, means and numbers
-of objects are not given, outliers are not drawn.
-"""
+"""The displacement errors of a job as a table: what its files, chart and page show."""
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from augment.models import GenerationJob
 from augment.services.judging.displacement import (
@@ -25,8 +21,7 @@ from augment.services.scenarios.scenes import ScenarioType, in_type_order
 SOURCE = "read from the paper's figure"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class PublishedBox:
+class PublishedBox(NamedTuple):
     """One box of the paper's figure "Displacement error by variant", in metres."""
 
     model: str
@@ -37,23 +32,26 @@ class PublishedBox:
     high_m: float
 
 
-_FIGURE = (
-    ("GPT-4o", "OTM", 1.2, 1.5, 2.1, 2.9),
-    ("Gemini-1.5-Flash", "OTM", 1.0, 1.4, 3.9, 5.2),
-    ("Llama3.1-70B", "OTM", 0.9, 2.7, 7.3, 9.7),
-    ("GPT-4o", "FC", 0.3, 0.5, 1.2, 1.9),
-    ("Gemini-1.5-Flash", "FC", 0.2, 0.4, 0.8, 1.8),
-    ("Llama3.1-70B", "FC", 0.3, 0.7, 1.4, 1.8),
-    ("GPT-4o", "tQA", 1.1, 1.4, 2.4, 3.9),
-    ("Gemini-1.5-Flash", "tQA", 0.6, 1.0, 2.4, 4.8),
-    ("Llama3.1-70B", "tQA", 0.9, 1.4, 3.2, 4.2),
-    ("Gemini-1.5-Flash", "vQA", 0.9, 1.3, 2.9, 4.8),
+BY_VARIANT = (
+    PublishedBox("GPT-4o", "OTM", 1.2, 1.5, 2.1, 2.9),
+    PublishedBox("Gemini-1.5-Flash", "OTM", 1.0, 1.4, 3.9, 5.2),
+    PublishedBox("Llama3.1-70B", "OTM", 0.9, 2.7, 7.3, 9.7),
+    PublishedBox("GPT-4o", "FC", 0.3, 0.5, 1.2, 1.9),
+    PublishedBox("Gemini-1.5-Flash", "FC", 0.2, 0.4, 0.8, 1.8),
+    PublishedBox("Llama3.1-70B", "FC", 0.3, 0.7, 1.4, 1.8),
+    PublishedBox("GPT-4o", "tQA", 1.1, 1.4, 2.4, 3.9),
+    PublishedBox("Gemini-1.5-Flash", "tQA", 0.6, 1.0, 2.4, 4.8),
+    PublishedBox("Llama3.1-70B", "tQA", 0.9, 1.4, 3.2, 4.2),
+    PublishedBox("Gemini-1.5-Flash", "vQA", 0.9, 1.3, 2.9, 4.8),
 )
+"""Read from the paper's box plot by eye, to a tenth of a metre; nothing was measured here. Lower
+whiskers can't be told apart there, means and numbers of objects are not given."""
 
-BY_VARIANT = tuple(
-    PublishedBox(model=model, variant=variant, q1_m=q1, median_m=median, q3_m=q3, high_m=high)
-    for model, variant, q1, median, q3, high in _FIGURE
+PAPERS_CHOICE = (
+    "As in the paper, construction zone and accident site are left out: their objects can lie in "
+    "many places that all follow the instruction."
 )
+SIMULATED_NOTE = "Simulated contestants are marked; they say nothing about a real one."
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -98,37 +96,25 @@ class DisplacementTable:
     @property
     def remarks(self) -> tuple[str, ...]:
         """The same but for the scenario types."""
-        said: list[str] = [
-            (
-                "Distances between centres, in metres, of objects matched within their class so "
-                "that their sum is smallest; each matched object counts once."
-            ),
-            (
-                "Missing and surplus objects are counted and have no distance; an unreadable or "
-                "refused answer misses all."
-            ),
-        ]
-        if self.by is By.VARIANT and self.is_papers_choice:
-            said.append(
-                "As in the paper, construction zone and accident site are left out: their "
-                "objects can lie in many places that all follow the instruction."
-            )
-        for why, number in self.left_out.items():
-            said.append(f"Augmentations not measured: {number} ({', '.join((why,))}).")
-        if self.simulated:
-            said.append("Simulated contestants are marked; they say nothing about a real one.")
-        return tuple(said)
-
-    @property
-    def is_papers_choice(self) -> bool:
-        """Whether the types are those of the paper's figure by variant."""
-        return set(self.types) == set(PLACED_EXACTLY)
+        unmeasured = (
+            f"Augmentations not measured: {number} ({reason})."
+            for reason, number in self.left_out.items()
+        )
+        return (
+            "Distances between centres, in metres, of objects matched within their class so that "
+            "their sum is smallest; each matched object counts once.",
+            "Missing and surplus objects are counted and have no distance; an unreadable or "
+            "refused answer misses all.",
+            *([PAPERS_CHOICE] if self.published else []),
+            *unmeasured,
+            *([SIMULATED_NOTE] if self.simulated else []),
+        )
 
 
 def displacement_table(
     job: GenerationJob, *, by: By, types: Sequence[str] | None = None
 ) -> DisplacementTable:
-    """The table of a job; one query.
+    """Return the table of a job; one query.
 
     Args:
         job: Whose augmentations are measured.

@@ -2,18 +2,27 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
-from typing import Any
 
 from arena.exports.formats import Format, formats, round_value
 from arena.exports.tables import shown_name
-from arena.rating.printed import escape
+from arena.jobs.exports.displacement import SIMULATED_NOTE
+from arena.jobs.exports.tables import json_bytes, read_value
+from arena.rating.lines import escape
 from arena.services.cells import csv_text
-from augment.services.judging.driving_scores import CLOSE_M, DrivingLine, DrivingScores
+from augment.models import GenerationJob
+from augment.services.judging.driving_scores import (
+    CLOSE_M,
+    DrivingLine,
+    DrivingScores,
+    options_driven,
+    scores_of_job,
+)
+from augment.services.judging.simulations import Options
 from augment.services.scenarios.scenes import ScenarioType, in_type_order, type_choices
 
 SOURCE = "reported in the paper"
+SCORE_LABELS = {"nuplan": "nuPlan", "interplan": "interPlan"}
 REPORTED = (
     ("Val14", 0.908),
     ("interPlan", 0.519),
@@ -78,94 +87,112 @@ class DrivingTable:
     @property
     def notes(self) -> tuple[str, ...]:
         """Sentences that belong beneath every form of it."""
-        said = [self._what, *DIFFERENCES]
-        for reason, number in self.scores.failures:
-            said.append(f"Drives that failed: {number} ({reason}).")
-        if self.scores.outlasting:
-            said.append(
-                f"The recording ends before the drive in {self.scores.outlasting} of "
-                f"{self.scores.total} drives: there, who stands stays, who moves goes on along "
-                "its lane or straight, and the expert holds the pace of its last second."
+        scores, how = self.scores, self.scores.options
+        traffic = "reactive" if how.is_reactive else "replayed"
+        notes = [
+            f"Mean of {SCORE_LABELS[scores.score]}'s score over 15 s drives of the planner "
+            f"{how.planner} (offsets: {how.offsets}; recorded traffic {traffic}); contestants by "
+            "how much they lower it.",
+            *DIFFERENCES,
+            *(f"Drives that failed: {number} ({reason})." for reason, number in scores.failures),
+        ]
+        if scores.outlasting:
+            notes.append(
+                f"The recording ends before the drive in {scores.outlasting} of {scores.total} "
+                "drives: there, who stands stays, who moves goes on along its lane or straight, "
+                "and the expert holds the pace of its last second."
             )
         if any(line.close for line in self.lines):
-            said.append(
+            notes.append(
                 f"Drives that pass somebody at less than {CLOSE_M:g} m are counted beside the "
                 "score, which takes nothing off for them."
             )
-        if self.scores.under_way:
-            said.append(f"Not complete: {self.scores.under_way} drives wait or run.")
-        if self.simulated:
-            said.append("Simulated contestants are marked; they say nothing about a real one.")
-        return tuple(said)
-
-    @property
-    def _what(self) -> str:
-        how = self.scores.options
-        score = "nuPlan" if self.scores.score == "nuplan" else "interPlan"
-        traffic = "reactive" if how.is_reactive else "replayed"
-        return (
-            f"Mean of {score}'s score over 15 s drives of the planner {how.planner} (offsets: "
-            f"{how.offsets}; recorded traffic {traffic}); contestants by how much they lower it."
-        )
+        if scores.under_way:
+            notes.append(f"Not complete: {scores.under_way} drives wait or run.")
+        return (*notes, *([SIMULATED_NOTE] if self.simulated else []))
 
 
 MEASURED = "own simulator"
-_BEFORE = (
-    "scenarios", "slug", "model", "variant", "simulated", "score_percent", "before_percent",
-    "lowered_percent", "drives", "failed", "least_clearance_m", "closer_than_0_3_m", "collided",
-    "emergency_braked",
-)  # fmt: skip
+WHO = {"slug": "slug", "model": "model", "variant": "variant", "simulated": "is_simulated"}
+COUNTS = {
+    "drives": "drives",
+    "failed": "failed",
+    "least_clearance_m": "least_clearance_m",
+    "closer_than_0_3_m": "close",
+    "collided": "collided",
+    "emergency_braked": "braked",
+}
+MEANS = {"score_percent": "mean", "before_percent": "before", "lowered_percent": "lowered"}
+
+
+def driving_table(
+    job: GenerationJob, *, options: Options | None = None, score: str, with_paper: bool = False
+) -> DrivingTable:
+    """Return the table of a job's drives.
+
+    Args:
+        job: Whose results were driven.
+        options: How they were driven; None for the way in which they were driven last.
+        score: One of `SCORES`.
+        with_paper: Whether the paper's rows are added.
+    """
+    if options is None:
+        options = next(iter(options_driven(job)), Options())
+    scores = scores_of_job(job, options=options, score=score)
+    return DrivingTable(title=job.name, scores=scores, with_paper=with_paper)
 
 
 def csv_bytes(table: DrivingTable) -> bytes:
-    """One line a contestant, then the paper's if asked for; what is unknown is empty."""
-    rows: list[list[object]] = []
-    kinds = _kinds(table)
-    for line in table.lines:
-        who = [
+    """Return one line a contestant, then the paper's if asked for; what is unknown is empty."""
+    driven = (kind for line in table.lines for kind in line.by_type)
+    kinds = list(in_type_order([*ScenarioType, *driven]))
+    types = [f"{kind}_percent" for kind in kinds]
+    head = ("scenarios", *WHO, *MEANS, *COUNTS, *types, "source")
+    rows = [
+        (
             shown_name(line.name, line.is_simulated),
-            line.slug,
-            line.model,
-            line.variant,
-            line.is_simulated,
-        ]
-        means = [_percent(value) for value in (line.mean, line.before, line.lowered)]
-        clearance = "" if line.least_clearance_m is None else f"{line.least_clearance_m:.2f}"
-        counts = [line.drives, line.failed, clearance, line.close, line.collided, line.braked]
-        types = [_percent(line.by_type[kind]) for kind in kinds]
-        rows.append([*who, *means, *counts, *types, MEASURED])
-    blank = [""] * len(kinds)
+            *(getattr(line, name) for name in WHO.values()),
+            *(_percent(getattr(line, name)) for name in MEANS.values()),
+            *(getattr(line, name) for name in COUNTS.values()),
+            *(_percent(line.by_type[kind]) for kind in kinds),
+            MEASURED,
+        )
+        for line in table.lines
+    ]
     for name, score in table.reported:
-        rows.append([name, "", "", "", "no", _percent(score), *[""] * 8, *blank, SOURCE])
-    head = (*_BEFORE, *(f"{kind}_percent" for kind in kinds), "source")
+        known: dict[str, object] = {"scenarios": name, "simulated": "no", "source": SOURCE}
+        known["score_percent"] = _percent(score)
+        rows.append(tuple(known.get(column, "") for column in head))
     return csv_text(head, rows).encode()
 
 
-def _kinds(table: DrivingTable) -> tuple[str, ...]:
-    """A column each: the five types, and one's own that were driven."""
-    driven = (kind for line in table.lines for kind in line.by_type)
-    return tuple(in_type_order([*ScenarioType, *driven]))
-
-
-def json_bytes(table: DrivingTable) -> bytes:
-    """Everything, shares from 0 to 1."""
+def driving_json(table: DrivingTable) -> bytes:
+    """Return everything, shares from 0 to 1."""
     how = table.scores.options
-    document: dict[str, Any] = {
-        "format": "scenario-arena/driving",
-        "version": 1,
-        "title": table.title,
-        "score": table.scores.score,
-        "planner": how.planner,
-        "offsets": how.offsets,
-        "reactive": how.is_reactive,
-        "simulated": table.simulated,
-        "notes": list(table.notes),
-        "lines": [_line(line) for line in table.lines],
-        "reported": [
-            {"scenarios": name, "mean": score, "source": SOURCE} for name, score in table.reported
-        ],
-    }
-    return (json.dumps(document, indent=2, ensure_ascii=False) + "\n").encode()
+    return json_bytes(
+        {
+            "format": "scenario-arena/driving",
+            "version": 1,
+            "title": table.title,
+            "score": table.scores.score,
+            "planner": how.planner,
+            "offsets": how.offsets,
+            "reactive": how.is_reactive,
+            "simulated": table.simulated,
+            "notes": list(table.notes),
+            "lines": [
+                {"scenarios": line.name, "subject": line.subject}
+                | {name: read_value(line, path) for name, path in (WHO | COUNTS).items()}
+                | {name: round_value(getattr(line, name)) for name in MEANS.values()}
+                | {"by_type": {kind: round_value(mean) for kind, mean in line.by_type.items()}}
+                for line in table.lines
+            ],
+            "reported": [
+                {"scenarios": name, "mean": score, "source": SOURCE}
+                for name, score in table.reported
+            ],
+        }
+    )
 
 
 def latex_bytes(table: DrivingTable) -> bytes:
@@ -202,37 +229,13 @@ def latex_bytes(table: DrivingTable) -> bytes:
 
 
 FORMATS: dict[str, Format[DrivingTable]] = formats(
-    csv=csv_bytes, json=json_bytes, latex=latex_bytes
+    csv=csv_bytes, json=driving_json, latex=latex_bytes
 )
 
 
-# Private
-
-
-def _percent(value: float | None) -> str:
-    return "" if value is None else f"{100.0 * value:.2f}"
+def _percent(value: float | None) -> float | None:
+    return None if value is None else 100.0 * value
 
 
 def _printed(value: float | None) -> str:
     return "--" if value is None else f"{100.0 * value:.1f}"
-
-
-def _line(line: DrivingLine) -> dict[str, Any]:
-    return {
-        "scenarios": line.name,
-        "subject": line.subject,
-        "slug": line.slug,
-        "model": line.model,
-        "variant": line.variant,
-        "simulated": line.is_simulated,
-        "mean": round_value(line.mean),
-        "before": round_value(line.before),
-        "lowered": round_value(line.lowered),
-        "drives": line.drives,
-        "failed": line.failed,
-        "least_clearance_m": round_value(line.least_clearance_m),
-        "closer_than_0_3_m": line.close,
-        "collided": line.collided,
-        "emergency_braked": line.braked,
-        "by_type": {kind: round_value(mean) for kind, mean in line.by_type.items()},
-    }

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from arena.exports.formats import Format, formats
 from arena.exports.latex import escape
@@ -16,7 +15,7 @@ from arena.jobs.queries import contestants_of, labels_of
 from arena.models import FaultLabel
 from arena.rating.reliability import DifferenceMetric, cohens_kappa, krippendorff_alpha
 from arena.services.cells import csv_text
-from augment.models import Contestant, GenerationJob
+from augment.models import GenerationJob
 from augment.services.judging.findings import FaultClass
 
 COLUMNS = (
@@ -63,10 +62,8 @@ class FaultLine:
 
         Answers without a modification count in the sum of all, labelled or not.
         """
-        total = self.all if self.counted else NOT_LABELLED
-        if not self.labelled:
-            return total, *[NOT_LABELLED] * len(FaultClass)
-        return total, *(self.counts[fault] for fault in FaultClass)
+        by_class = self.counts.values() if self.labelled else [NOT_LABELLED] * len(FaultClass)
+        return self.all if self.counted else NOT_LABELLED, *by_class
 
     @property
     def shown_name(self) -> str:
@@ -76,13 +73,12 @@ class FaultLine:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LabelAgreement:
-    """How well the labels of one class of faults agree.
+    """How well the labels of one class of faults agree; None is undefined.
 
     Attributes:
-        kappa: Cohen's, of the checks' first guess and the experts; None where it is not defined.
+        kappa: Cohen's, of the checks' first guess and the experts.
         n: Labels with a guess beside them.
-        alpha: Krippendorff's, nominal, of the experts among themselves; None where it is not
-            defined.
+        alpha: Krippendorff's, nominal, of the experts among themselves.
         pictures: Augmentations that at least two experts have labelled.
     """
 
@@ -113,32 +109,46 @@ class FaultTable:
 
 
 def fault_table(job: GenerationJob) -> FaultTable:
-    """The table of a job; three queries, which read a row a label and a row a contestant.
+    """Return the table of a job; three queries, which read a row a label and a row a contestant.
 
     Of several experts on one augmentation a fault counts where more than half of them see it.
     """
     labels = list(labels_of(job))
-    lines_by_row: defaultdict[int, list[FaultLabel]] = defaultdict(list)
+    by_augmentation: defaultdict[int, list[FaultLabel]] = defaultdict(list)
     for label in labels:
-        lines_by_row[label.augmentation_id].append(label)
+        by_augmentation[label.augmentation_id].append(label)
     by_contestant: defaultdict[int, list[list[FaultLabel]]] = defaultdict(list)
-    for own in lines_by_row.values():
+    for own in by_augmentation.values():
         by_contestant[own[0].augmentation.contestant_id].append(own)
     return FaultTable(
         job=job.name,
         lines=tuple(
-            _line(who, missed, by_contestant[who.pk]) for who, missed in contestants_of(job)
+            FaultLine(
+                name=who.name,
+                slug=who.slug,
+                is_simulated=who.is_simulated,
+                counts={
+                    fault: sum(_is_seen(fault, own) for own in by_contestant[who.pk])
+                    for fault in FaultClass
+                },
+                labelled=len(by_contestant[who.pk]),
+                labels=sum(map(len, by_contestant[who.pk])),
+                without_modification=missed,
+            )
+            for who, missed in contestants_of(job)
         ),
-        agreement=tuple(_agreement(fault, labels, lines_by_row) for fault in FaultClass),
+        agreement=tuple(
+            _agreement(fault, labels, by_augmentation.values()) for fault in FaultClass
+        ),
     )
 
 
 def csv_bytes(table: FaultTable) -> bytes:
-    """One line a contestant; counts are empty where nothing was labelled."""
+    """Return one line a contestant; counts are empty where nothing was labelled."""
     rows = (
         (
             line.shown_name, line.slug, line.is_simulated,
-            *("" if one == NOT_LABELLED else one for one in line.shown_counts),
+            *("" if count == NOT_LABELLED else count for count in line.shown_counts),
             line.labelled, line.labels, line.without_modification,
         )
         for line in table.lines
@@ -146,20 +156,20 @@ def csv_bytes(table: FaultTable) -> bytes:
     return csv_text(COLUMNS, rows).encode()
 
 
-def latex(table: FaultTable) -> str:
-    """The paper's table "Error Count per Category": needs booktabs and xcolor with `table`.
+def latex(table: FaultTable) -> bytes:
+    """Return the paper's table "Error Count per Category"; needs booktabs and xcolor (`table`).
 
     Beside the paper's columns stand unreadable and refused answers, and how many were judged.
     """
-    kappas = ", ".join(f"{one.fault} {_said(one.kappa)} (n={one.n})" for one in table.agreement)
-    alphas = ", ".join(
-        f"{one.fault} {_said(one.alpha)} (pictures={one.pictures})" for one in table.agreement
+    kappas = (f"{one.fault} {_printed(one.kappa)} (n={one.n})" for one in table.agreement)
+    alphas = (
+        f"{one.fault} {_printed(one.alpha)} (pictures={one.pictures})" for one in table.agreement
     )
     lines = [
         r"% \usepackage{booktabs} and \usepackage[table]{xcolor}",
         f"% {' '.join(table.job.split())}: {table.labels} labels",
-        f"% Cohen's kappa of the checks' first guess and the experts: {kappas}",
-        f"% Krippendorff's alpha of the experts among themselves: {alphas}",
+        f"% Cohen's kappa of the checks' first guess and the experts: {', '.join(kappas)}",
+        f"% Krippendorff's alpha of the experts among themselves: {', '.join(alphas)}",
         r"\providecolor{llm_blue}{RGB}{105, 156, 219}",
         r"\begin{table}",
         r"    \centering",
@@ -181,29 +191,10 @@ def latex(table: FaultTable) -> str:
         r"    \label{tab:manual_eval}",
         r"\end{table}",
     ]
-    return "\n".join(lines) + "\n"
+    return ("\n".join(lines) + "\n").encode()
 
 
-FORMATS: dict[str, Format[FaultTable]] = formats(
-    csv=csv_bytes, latex=lambda table: latex(table).encode()
-)
-
-
-# Private
-
-
-def _line(who: Contestant, missed: int, labelled: Sequence[Sequence[FaultLabel]]) -> FaultLine:
-    return FaultLine(
-        name=who.name,
-        slug=who.slug,
-        is_simulated=who.is_simulated,
-        counts={
-            fault: sum(_is_seen(fault, labels) for labels in labelled) for fault in FaultClass
-        },
-        labelled=len(labelled),
-        labels=sum(len(labels) for labels in labelled),
-        without_modification=missed,
-    )
+FORMATS: dict[str, Format[FaultTable]] = formats(csv=csv_bytes, latex=latex)
 
 
 def _is_seen(fault: FaultClass, labels: Sequence[FaultLabel]) -> bool:
@@ -212,32 +203,26 @@ def _is_seen(fault: FaultClass, labels: Sequence[FaultLabel]) -> bool:
 
 
 def _agreement(
-    fault: FaultClass, labels: Sequence[FaultLabel], found: dict[int, list[FaultLabel]]
+    fault: FaultClass, labels: Sequence[FaultLabel], of_rows: Iterable[list[FaultLabel]]
 ) -> LabelAgreement:
-    pairs = [
-        (getattr(label, f"guessed_{fault.value}"), getattr(label, fault.value))
-        for label in labels
-        if label.guessed_position is not None
-    ]
-    kappa = cohens_kappa([one for one, _ in pairs], [other for _, other in pairs])
-    several = [own for own in found.values() if len(own) > 1]
+    guessed = [label for label in labels if label.guessed_position is not None]
+    several = [own for own in of_rows if len(own) > 1]
+    alpha = None
+    if several:  # how often "no", nothing and "yes" was said of each augmentation
+        seen = np.array([sum(getattr(label, fault.value) for label in own) for own in several])
+        said = np.column_stack([[len(own) for own in several] - seen, np.zeros_like(seen), seen])
+        alpha = krippendorff_alpha(said.astype(np.int64), DifferenceMetric.NOMINAL)
     return LabelAgreement(
         fault=fault.value,
-        kappa=kappa,
-        n=len(pairs),
-        alpha=krippendorff_alpha(_table(fault, several), DifferenceMetric.NOMINAL)
-        if several
-        else None,
+        kappa=cohens_kappa(
+            [getattr(label, f"guessed_{fault.value}") for label in guessed],
+            [getattr(label, fault.value) for label in guessed],
+        ),
+        n=len(guessed),
+        alpha=alpha,
         pictures=len(several),
     )
 
 
-def _table(fault: FaultClass, several: Sequence[Sequence[FaultLabel]]) -> NDArray[np.int64]:
-    """(U, 3): how often "no", nothing and "yes" was said of each augmentation."""
-    seen = np.array([sum(getattr(one, fault.value) for one in own) for own in several])
-    labels = np.array([len(own) for own in several])
-    return np.column_stack([labels - seen, np.zeros_like(seen), seen]).astype(np.int64)
-
-
-def _said(value: float | None) -> str:
+def _printed(value: float | None) -> str:
     return "undefined" if value is None else f"{value:.2f}"

@@ -1,286 +1,276 @@
-"""A job's augmentations with one row each, and what varies between its samples."""
+"""Tables of a job with one line a row, declared as columns; each is a CSV, JSON or Parquet file.
+
+The same job always gives the same bytes. What is unknown or does not exist is empty.
+"""
 
 from __future__ import annotations
 
-import csv
-import io
 import json
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Collection, Iterable, Mapping
+from dataclasses import dataclass, field
+from enum import Enum
 from typing import Any
+from uuid import UUID
 
-from arena.exports.formats import Format, formats, round_value
+from arena.exports.formats import Format, formats
 from arena.exports.parquet import NUMBER, TEXT, WHOLE, YES_NO, parquet_bytes
-from arena.services.cells import cell, csv_text
+from arena.services.cells import csv_text
 from augment.models import GenerationJob
-from augment.services.judging.analyses import (
-    AugmentationLine,
-    JobAnalysis,
-    RepeatLine,
-    SampleSpread,
-    augmentation_lines,
-    repeatability,
-)
-from augment.services.running.progress import ToolCallLine
+from augment.services.judging.analyses import JobAnalysis, augmentation_lines, repeatability
+from augment.services.judging.displacement import objects_of
+from augment.services.running.progress import tool_calls_by_augmentation
 
-COLUMNS = {
-    "job": TEXT, "scenario": TEXT, "type": TEXT, "contestant": TEXT, "name": TEXT, "model": TEXT,
-    "variant": TEXT, "simulated": YES_NO, "sample": WHOLE, "options": TEXT,
-    "augmentation": TEXT, "state": TEXT, "matched": WHOLE, "missing": WHOLE, "surplus": WHOLE,
-    "displacement_mean_m": NUMBER, "wrong": WHOLE, "doubtful": WHOLE, "calls": WHOLE,
-    "tokens": WHOLE, "cost_usd": NUMBER, "reason": TEXT,
-}  # fmt: skip
-"""What each column holds. `contestant` is the slug, `options` a JSON object with sorted names,
-`wrong` and `doubtful` count findings of the checks; what is unknown or does not exist is empty."""
-
-MEASURES = ("displacement_m", "missed", "usd", "wrong")
-REPEAT_COLUMNS = (
-    "contestant", "name", "simulated", "samples", *(
-        f"{name}_{part}" for name in MEASURES for part in ("mean", "sd", "values")
-    ), "displacement_within_scenario_sd_m",
-)  # fmt: skip
-"""`sd` is between samples, `values` has one number a sample; see `RepeatLine`."""
-
-Rows = list[tuple[object, ...]]
-
-
-def augmentation_rows(job: GenerationJob) -> Rows:
-    """One row an augmentation, in the order of COLUMNS."""
-    return [_row(job, line) for line in augmentation_lines(job)]
-
-
-def repeat_rows(job: GenerationJob) -> Rows:
-    """One row a contestant, in the order of REPEAT_COLUMNS."""
-    return [_repeat_row(line) for line in repeatability(job)]
-
-
-def csv_bytes(head: Sequence[str], rows: Rows) -> bytes:
-    """One line a row; a text is no formula, and a number is written in full."""
-    sheet = io.StringIO()
-    writer = csv.writer(sheet, lineterminator="\n")
-    writer.writerow(head)
-    writer.writerows(
-        [value if isinstance(value, float) else cell(value) for value in row] for row in rows
-    )
-    return sheet.getvalue().encode()
-
-
-def json_bytes(name: str, head: Sequence[str], rows: Rows) -> bytes:
-    """A list of objects with the same names."""
-    document = {
-        "format": f"scenario-arena/{name}",
-        "version": 1,
-        name: [dict(zip(head, row, strict=True)) for row in rows],
-    }
-    return (json.dumps(document, indent=1, ensure_ascii=False) + "\n").encode()
-
-
-AUGMENTATION_FORMATS: dict[str, Format[Rows]] = formats(
-    csv=lambda rows: csv_bytes(tuple(COLUMNS), rows),
-    json=lambda rows: json_bytes("augmentations", tuple(COLUMNS), rows),
-    parquet=lambda rows: parquet_bytes(COLUMNS, rows),
-)
-REPEAT_FORMATS: dict[str, Format[Rows]] = formats(
-    csv=lambda rows: csv_bytes(REPEAT_COLUMNS, rows),
-    json=lambda rows: json_bytes("repeats", REPEAT_COLUMNS, rows),
-)
-
-
-# Private
-
-
-def _row(job: GenerationJob, line: AugmentationLine) -> tuple[object, ...]:
-    row, who, found, spent = line.row, line.row.contestant, line.displacement, line.spending
-    distances = [] if found is None else found.distances_m
-    mean = round_value(sum(distances) / len(distances)) if distances else None
-    options = None if row.options is None else json.dumps(row.options, sort_keys=True)
-    usd = None if spent is None else spent.usd
-    return (
-        *(job.name, row.scenario.slug, row.scenario.type, who.slug, who.name, who.model),
-        *(who.variant, who.is_simulated, row.sample, options, str(row.code), row.state),
-        None if found is None else len(distances),
-        None if found is None else len(found.missing),
-        None if found is None else len(found.surplus),
-        mean,
-        *(line.wrong, line.doubtful),
-        *((None, None) if spent is None else (spent.calls, spent.tokens)),
-        *(usd, row.reason),
-    )
-
-
-def _repeat_row(line: RepeatLine) -> tuple[object, ...]:
-    spreads: list[SampleSpread | None] = [getattr(line, name) for name in MEASURES]
-    samples = max((len(one.values) for one in spreads if one is not None), default=0)
-    return (
-        *(line.slug, line.name, line.is_simulated, samples),
-        *(part for one in spreads for part in _parts(one)),
-        round_value(line.within_m),
-    )
-
-
-def _parts(spread: SampleSpread | None) -> tuple[Any, Any, Any]:
-    if spread is None:
-        return None, None, None
-    values = " ".join(f"{value:.6g}" for value in spread.values)
-    return round(spread.mean, 6), None if spread.sd is None else round(spread.sd, 6), values
-
-
-AnalysisRows = list[dict[str, object]]
+Value = str | Callable[[Any], object]
+Columns = Mapping[str, tuple[Value, str]]
+"""By name: a dotted path of attributes or a function of a line, and what the column holds."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class AnalysisTable:
-    """One part of a job's analysis as rows of named values."""
+class Sheet:
+    """Rows of named values.
 
-    part: str
-    columns: tuple[str, ...]
-    rows: AnalysisRows
-    seed: int
+    Attributes:
+        name: JSON files say "scenario-arena/<name>".
+        key: What the list of rows is called in JSON.
+        number: The format of floats in CSV.
+        facts: What else a JSON file says.
+    """
 
-
-def analysis_table(analysis: JobAnalysis, part: str) -> AnalysisTable:
-    """The rows of a part: one of `PARTS`."""
-    columns, rows = PARTS[part]
-    return AnalysisTable(part=part, columns=columns, rows=rows(analysis), seed=analysis.seed)
-
-
-def analysis_csv(table: AnalysisTable) -> bytes:
-    """One line a row; what is unknown is empty."""
-    sheet = io.StringIO()
-    writer = csv.writer(sheet, lineterminator="\n")
-    writer.writerow(table.columns)
-    writer.writerows([_cell(row[name]) for name in table.columns] for row in table.rows)
-    return sheet.getvalue().encode()
+    name: str
+    key: str
+    columns: Columns
+    rows: list[tuple[object, ...]]
+    number: str = ""
+    facts: Mapping[str, object] = field(default_factory=dict)
 
 
-def analysis_json(table: AnalysisTable) -> bytes:
-    """The same rows as objects."""
+def sheet_csv(sheet: Sheet) -> bytes:
+    """Return one line a row; no text is a formula."""
+    return csv_text(tuple(sheet.columns), sheet.rows, number=sheet.number).encode()
+
+
+def sheet_json(sheet: Sheet) -> bytes:
+    """Return the rows as objects."""
     document = {
-        "format": "scenario-arena/analysis",
+        "format": f"scenario-arena/{sheet.name}",
         "version": 1,
-        "part": table.part,
-        "seed": table.seed,
-        "rows": table.rows,
+        **sheet.facts,
+        sheet.key: [dict(zip(sheet.columns, row, strict=True)) for row in sheet.rows],
     }
-    return (json.dumps(document, indent=1, ensure_ascii=False) + "\n").encode()
+    return json_bytes(document)
 
 
-ANALYSIS_FORMATS: dict[str, Format[AnalysisTable]] = formats(csv=analysis_csv, json=analysis_json)
+def sheet_parquet(sheet: Sheet) -> bytes:
+    """Return the rows as typed columns."""
+    return parquet_bytes({name: kind for name, (_, kind) in sheet.columns.items()}, sheet.rows)
 
 
-# Private
-
-
-def _pairs(analysis: JobAnalysis) -> AnalysisRows:
-    return [
-        {
-            "first": one.first,
-            "second": one.second,
-            "scenarios": one.scenarios,
-            "median_difference_m": _rounded(one.median_m),
-            "low_m": _rounded(one.low_m),
-            "high_m": _rounded(one.high_m),
-            "p_wilcoxon": _rounded(one.p, 6),
-            "p_holm": _rounded(one.p_holm, 6),
-        }
-        for one in analysis.pairs
-    ]
-
-
-def _wordings(analysis: JobAnalysis) -> AnalysisRows:
-    return [
-        {
-            "contestant": one.slug,
-            "simulated": one.is_simulated,
-            "scenarios": one.robustness.scenarios,
-            "wordings": one.robustness.wordings,
-            "within_m": _rounded(one.robustness.within_m),
-            "median_range_m": _rounded(one.robustness.median_range_m),
-        }
-        for one in analysis.contestants
-        if one.robustness is not None
-    ]
-
-
-def _refusals(analysis: JobAnalysis) -> AnalysisRows:
-    return [
-        {
-            "contestant": one.slug,
-            "simulated": one.is_simulated,
-            "right": one.refusals.right,
-            "wrong": one.refusals.wrong,
-            "overlooked": one.refusals.overlooked,
-            "precision": _rounded(one.refusals.precision),
-            "recall": _rounded(one.refusals.recall),
-        }
-        for one in analysis.contestants
-        if one.refusals is not None
-    ]
-
-
-def _cell(value: object) -> str:
-    """A text is no formula, and a number may be negative."""
-    return f"{value:g}" if isinstance(value, float) else cell(value)
-
-
-def _rounded(value: float | None, digits: int = 4) -> float | None:
-    return None if value is None else round(value, digits) + 0.0
-
-
-PARTS: dict[str, tuple[tuple[str, ...], Callable[[JobAnalysis], AnalysisRows]]] = {
-    "pairs": (
-        (
-            "first", "second", "scenarios", "median_difference_m", "low_m", "high_m",
-            "p_wilcoxon", "p_holm",
-        ),
-        _pairs,
-    ),
-    "wordings": (
-        ("contestant", "simulated", "scenarios", "wordings", "within_m", "median_range_m"),
-        _wordings,
-    ),
-    "refusals": (
-        ("contestant", "simulated", "right", "wrong", "overlooked", "precision", "recall"),
-        _refusals,
-    ),
-}  # fmt: skip
-"""The columns of each part, and how its rows are made."""
-
-
-CALL_COLUMNS = (
-    "contestant", "name", "simulated", "scenario", "augmentation", "attempted", "understood",
-    "mended",
-)  # fmt: skip
-"""One row an augmentation that called; `contestant` is the slug, `augmentation` the code."""
-
-Lines = list[ToolCallLine]
-
-
-def call_csv(lines: Lines) -> bytes:
-    """One row an augmentation."""
-    return csv_text(CALL_COLUMNS, [_row_tool_calls(line) for line in lines]).encode()
-
-
-def call_json(lines: Lines) -> bytes:
-    """The same as a list of objects."""
-    document = {
-        "format": "scenario-arena/tool-calls",
-        "version": 1,
-        "augmentations": [
-            dict(zip(CALL_COLUMNS, _row_tool_calls(line), strict=True)) for line in lines
-        ],
-    }
+def json_bytes(document: object) -> bytes:
+    """Return a document as an indented JSON file."""
     return (json.dumps(document, indent=2, ensure_ascii=False) + "\n").encode()
 
 
-CALL_FORMATS: dict[str, Format[Lines]] = formats(csv=call_csv, json=call_json)
+TABLE_FORMATS: dict[str, Format[Sheet]] = formats(
+    csv=sheet_csv, json=sheet_json, parquet=sheet_parquet
+)
 
 
-# Private
+def read_columns(
+    lines: Iterable[object], columns: Columns, *, digits: int
+) -> list[tuple[object, ...]]:
+    """Return a row of plain values for each line; floats are rounded to `digits` decimals."""
+    return [
+        tuple(read_value(line, value, digits=digits) for value, _ in columns.values())
+        for line in lines
+    ]
 
 
-def _row_tool_calls(line: ToolCallLine) -> tuple[object, ...]:
-    return (
-        line.contestant, line.name, line.is_simulated, line.scenario, line.augmentation,
-        line.attempted, line.understood, line.mended,
-    )  # fmt: skip
+def read_value(line: Any, value: Value, *, digits: int = 4) -> object:
+    """Return a plain value of a line; None where its path meets a None."""
+    if callable(value):
+        read = value(line)
+    else:
+        read = line
+        for name in value.split("."):
+            read = None if read is None else getattr(read, name)
+    if isinstance(read, Enum):
+        return read.value
+    if isinstance(read, float):
+        return round(read, digits) + 0.0
+    if isinstance(read, tuple):
+        return " ".join(f"{number:.6g}" for number in read)
+    return str(read) if isinstance(read, UUID) else read
+
+
+# --- The tables --------------------------------------------------------------------------------
+
+
+def _count(name: str) -> Callable[[Any], int | None]:
+    """Return what counts matched, missing or surplus objects of a line."""
+
+    def count(line: Any) -> int | None:
+        return None if line.displacement is None else len(getattr(line.displacement, name))
+
+    return count
+
+
+def _options(line: Any) -> str | None:
+    options = line.row.options
+    return None if options is None else json.dumps(options, sort_keys=True)
+
+
+def _samples(line: Any) -> int:
+    spreads = [getattr(line, name) for name in MEASURES]
+    return max((len(spread.values) for spread in spreads if spread is not None), default=0)
+
+
+_WHAT: Columns = {
+    "scenario": ("row.scenario.slug", TEXT),
+    "type": ("row.scenario.type", TEXT),
+    "contestant": ("row.contestant.slug", TEXT),
+    "name": ("row.contestant.name", TEXT),
+    "model": ("row.contestant.model", TEXT),
+    "variant": ("row.contestant.variant", TEXT),
+    "simulated": ("row.contestant.is_simulated", YES_NO),
+}
+AUGMENTATIONS: Columns = {
+    **_WHAT,
+    "sample": ("row.sample", WHOLE),
+    "options": (_options, TEXT),
+    "augmentation": ("row.code", TEXT),
+    "state": ("row.state", TEXT),
+    "matched": (_count("matches"), WHOLE),
+    "missing": (_count("missing"), WHOLE),
+    "surplus": (_count("surplus"), WHOLE),
+    "displacement_mean_m": ("displacement.mean_m", NUMBER),
+    "wrong": ("wrong", WHOLE),
+    "doubtful": ("doubtful", WHOLE),
+    "calls": ("spending.calls", WHOLE),
+    "tokens": ("spending.tokens", WHOLE),
+    "cost_usd": ("spending.usd", NUMBER),
+    "reason": ("row.reason", TEXT),
+}
+"""`contestant` is the slug, `options` a JSON object; `wrong` and `doubtful` count findings."""
+
+OBJECTS: Columns = {
+    **_WHAT,
+    "augmentation": ("row.code", TEXT),
+    "state": ("row.state", TEXT),
+    "object": ("standing", TEXT),
+    "class": ("object_class", TEXT),
+    "reference": ("reference.id", TEXT),
+    "reference_x_m": ("reference.x_m", NUMBER),
+    "reference_y_m": ("reference.y_m", NUMBER),
+    "generated": ("generated.id", TEXT),
+    "x_m": ("generated.x_m", NUMBER),
+    "y_m": ("generated.y_m", NUMBER),
+    "distance_m": ("distance_m", NUMBER),
+    "sample": ("row.sample", WHOLE),
+}
+"""`object` is matched, missing or surplus; places are in the ego frame."""
+
+MEASURES = ("displacement_m", "missed", "usd", "wrong")
+REPEATS: Columns = {
+    "contestant": ("slug", TEXT),
+    "name": ("name", TEXT),
+    "simulated": ("is_simulated", YES_NO),
+    "samples": (_samples, WHOLE),
+    **{
+        f"{name}_{part}": (f"{name}.{part}", TEXT if part == "values" else NUMBER)
+        for name in MEASURES
+        for part in ("mean", "sd", "values")
+    },
+    "displacement_within_scenario_sd_m": ("within_m", NUMBER),
+}
+"""`sd` is between samples, `values` has one number a sample; see `RepeatLine`."""
+
+TOOL_CALLS: Columns = {
+    "contestant": ("contestant", TEXT),
+    "name": ("name", TEXT),
+    "simulated": ("is_simulated", YES_NO),
+    "scenario": ("scenario", TEXT),
+    "augmentation": ("augmentation", TEXT),
+    "attempted": ("attempted", WHOLE),
+    "understood": ("understood", WHOLE),
+    "mended": ("mended", WHOLE),
+}
+_WHO: Columns = {"contestant": ("slug", TEXT), "simulated": ("is_simulated", YES_NO)}
+ANALYSES: dict[str, tuple[str, Columns]] = {
+    "pairs": (
+        "pairs",
+        {
+            "first": ("first", TEXT),
+            "second": ("second", TEXT),
+            "scenarios": ("scenarios", WHOLE),
+            "median_difference_m": ("median_m", NUMBER),
+            "low_m": ("low_m", NUMBER),
+            "high_m": ("high_m", NUMBER),
+            "p_wilcoxon": ("p", NUMBER),
+            "p_holm": ("p_holm", NUMBER),
+        },
+    ),
+    "wordings": (
+        "reworded",
+        {
+            **_WHO,
+            "scenarios": ("robustness.scenarios", WHOLE),
+            "wordings": ("robustness.wordings", WHOLE),
+            "within_m": ("robustness.within_m", NUMBER),
+            "median_range_m": ("robustness.median_range_m", NUMBER),
+        },
+    ),
+    "refusals": (
+        "refusing",
+        {
+            **_WHO,
+            "right": ("refusals.right", WHOLE),
+            "wrong": ("refusals.wrong", WHOLE),
+            "overlooked": ("refusals.overlooked", WHOLE),
+            "precision": ("refusals.precision", NUMBER),
+            "recall": ("refusals.recall", NUMBER),
+        },
+    ),
+}
+"""The parts of an analysis: the attribute that holds their lines, and their columns."""
+
+
+def augmentation_sheet(job: GenerationJob) -> Sheet:
+    """Return a job's augmentations with one row each."""
+    columns: Columns = {"job": (lambda line: job.name, TEXT), **AUGMENTATIONS}
+    rows = read_columns(augmentation_lines(job), columns, digits=4)
+    return Sheet(name="augmentations", key="augmentations", columns=columns, rows=rows)
+
+
+def object_sheet(job: GenerationJob, *, types: Collection[str] | None = None) -> Sheet:
+    """Return the displacement of a job with one row an object.
+
+    Args:
+        job: Whose augmentations are measured.
+        types: The scenario types that count; None for all.
+    """
+    found = objects_of(job)
+    lines = (line for line in found if types is None or line.row.scenario.type in types)
+    rows = read_columns(lines, OBJECTS, digits=4)
+    return Sheet(
+        name="displacement-objects", key="objects", columns=OBJECTS, rows=rows, number=".4f"
+    )
+
+
+def repeat_sheet(job: GenerationJob) -> Sheet:
+    """Return what varies between the samples of a job, one row a contestant."""
+    rows = read_columns(repeatability(job), REPEATS, digits=6)
+    return Sheet(name="repeats", key="repeats", columns=REPEATS, rows=rows)
+
+
+def tool_call_sheet(job: GenerationJob) -> Sheet:
+    """Return the calls of a job's contestants to their function, one row an augmentation."""
+    rows = read_columns(tool_calls_by_augmentation(job), TOOL_CALLS, digits=4)
+    return Sheet(name="tool-calls", key="augmentations", columns=TOOL_CALLS, rows=rows)
+
+
+def analysis_sheet(analysis: JobAnalysis, part: str) -> Sheet:
+    """Return one part of a job's analysis; its bootstrap has a seed, which JSON names."""
+    attribute, columns = ANALYSES[part]
+    rows = read_columns(getattr(analysis, attribute), columns, digits=6)
+    facts = {"part": part, "seed": analysis.seed}
+    return Sheet(name="analysis", key="rows", columns=columns, rows=rows, number="g", facts=facts)

@@ -11,17 +11,15 @@ from django.db import transaction
 from django.http import Http404, HttpRequest, HttpResponse, HttpResponseBase
 from django.shortcuts import get_object_or_404, redirect, render
 from django.urls import reverse
-from django.utils.text import slugify
 from django.views.decorators.http import require_POST, require_safe
 
-from arena.exports.formats import format_named
 from arena.exports.tables import LeaderboardTable
-from arena.jobs.exports.driving import FORMATS, DrivingTable
+from arena.jobs.exports.driving import FORMATS, SCORE_LABELS, DrivingTable, driving_table
 from arena.jobs.queries import DRIVES, Part, before_of, shown_augmentations
 from arena.jobs.queries import drive_cells as cells_of
 from arena.models import Snapshot
-from arena.web.access import ADMIN, STAFF, allow_only
-from arena.web.listing import choice_asked, page_asked
+from arena.site.access import ADMIN, STAFF, allow_only
+from arena.site.listing import choice_asked, page_asked
 from augment.errors import AugmentError, QueueFault, UnknownName
 from augment.models import GenerationJob, Simulation
 from augment.services.judging import simulations
@@ -29,12 +27,10 @@ from augment.services.judging.driving_scores import (
     least_clearance_m,
     options_driven,
     scores_of_augmentations,
-    scores_of_job,
 )
 from augment.services.judging.simulations import FILES, NUPLAN, SCORES, Options, drive_file
 from augment.tasks import enqueue_simulations
 
-LABELS = {"nuplan": "nuPlan", "interplan": "interPlan"}
 PDM_CLOSED = Options().planner
 PLANNERS = {PDM_CLOSED: "PDM-Closed", "idm": "IDM"}
 
@@ -75,7 +71,7 @@ def simulate_job(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
 def drives_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """The drives of a job in a grid, page by page."""
     job = get_object_or_404(GenerationJob, code=code)
-    score = _score_asked(request)
+    score = score_asked(request)
     known = options_driven(job)
     way = _way_asked(request, known)
     part = Part(
@@ -100,7 +96,7 @@ def drives_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         for row in cells.grid.rows
     ]
     context = {"job": job, "lines": lines, "grid": cells.grid, "score": score}
-    driven = {"labels": LABELS, "driven": way}
+    driven = {"labels": SCORE_LABELS, "driven": way}
     return render(request, "drives/list.html", context | driven)
 
 
@@ -115,7 +111,7 @@ def drive_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         "before": before,
         "files": FILES if row.state == Simulation.State.DONE else (),
         "metrics": _metrics(row, before),
-        "labels": LABELS,
+        "labels": SCORE_LABELS,
     }
     return render(request, "drives/drive.html", context)
 
@@ -135,26 +131,9 @@ def drive_trace(request: HttpRequest, code: uuid.UUID, form: str) -> HttpRespons
     return answer
 
 
-@allow_only(*STAFF)
-@require_safe
-def export(request: HttpRequest, code: uuid.UUID, form: str) -> HttpResponse:
-    """The mean driving scores of a job as a file."""
-    job = get_object_or_404(GenerationJob, code=code)
-    try:
-        chosen = format_named(FORMATS, form)
-    except UnknownName as error:
-        raise Http404 from error
-    name = f"{slugify(job.name) or 'job'}-driving-{_score_asked(request)}"
-    return HttpResponse(
-        chosen.write(_table(request, job)),
-        content_type=chosen.content_type,
-        headers={"Content-Disposition": f'attachment; filename="{name}.{chosen.suffix}"'},
-    )
-
-
-def section(request: HttpRequest, job: GenerationJob) -> dict[str, object]:
+def driving_section(request: HttpRequest, job: GenerationJob) -> dict[str, object]:
     """What the part of the job's page shows."""
-    table = _table(request, job)
+    table = driving_asked(request, job)
     known = options_driven(job)
     chosen = _way_asked(request, known)
     ways = [
@@ -189,9 +168,13 @@ def driving(snapshot: Snapshot, table: LeaderboardTable) -> dict[str, Any]:
 # Private
 
 
-def _table(request: HttpRequest, job: GenerationJob) -> DrivingTable:
-    scores = scores_of_job(job, options=_options_asked(request, job), score=_score_asked(request))
-    return DrivingTable(title=job.name, scores=scores, with_paper="paper" in request.GET)
+def driving_asked(request: HttpRequest, job: GenerationJob) -> DrivingTable:
+    """Return the table that the address asks for; of the last way of driving unless it says so."""
+    known = options_driven(job)
+    options = known[_way_asked(request, known)] if known else None
+    return driving_table(
+        job, options=options, score=score_asked(request), with_paper="paper" in request.GET
+    )
 
 
 def _shown(table: DrivingTable) -> dict[str, Any]:
@@ -200,20 +183,15 @@ def _shown(table: DrivingTable) -> dict[str, Any]:
             {"line": line, "types": [line.by_type[kind] for kind, _ in table.types]}
             for line in table.lines
         ],
-        "labels": LABELS,
+        "labels": SCORE_LABELS,
         "score": table.scores.score,
     }
 
 
-def _score_asked(request: HttpRequest) -> str:
+def score_asked(request: HttpRequest) -> str:
+    """Return the score that the address names, nuPlan's unless it names one."""
     wanted = request.GET.get("score", NUPLAN)
     return wanted if wanted in SCORES else NUPLAN
-
-
-def _options_asked(request: HttpRequest, job: GenerationJob) -> Options:
-    """As the address says, else the way in which the job was driven last."""
-    known = options_driven(job)
-    return known[_way_asked(request, known)] if known else Options()
 
 
 def _way_asked(request: HttpRequest, known: list[Options]) -> int:

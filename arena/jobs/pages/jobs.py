@@ -1,31 +1,25 @@
-"""Pages of generation jobs."""
+"""Pages of generation jobs, and what an admin does with one: pause, resume, cancel, try again."""
 
 from __future__ import annotations
 
 import uuid
-from functools import partial
-from typing import cast
 
 from django.contrib import messages
-from django.contrib.auth.models import User
 from django.db import transaction
-from django.http import Http404, HttpRequest, HttpResponse
+from django.http import HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, redirect, render
 from django.urls import reverse
-from django.utils.text import slugify
 from django.views.decorators.http import require_http_methods, require_POST, require_safe
 
-from arena.exports.formats import format_named
-from arena.jobs.exports.tables import CALL_FORMATS as TOOL_CALL_FORMATS
-from arena.jobs.pages.displacement import section
-from arena.jobs.pages.driving import section as driving_section
-from arena.jobs.pages.files import rows_of
+from arena.jobs.pages.driving import driving_section
+from arena.jobs.pages.exports import displacement_section
 from arena.jobs.queries import MARKS, VIEWS, Part, grid_part
-from arena.queries.listings import MINE, Narrowing, find_jobs
+from arena.jobs.services import files_of
 from arena.services.retrying import retry_cause as retry_one_cause
-from arena.web.access import ADMIN, STAFF, allow_only
-from arena.web.forms import CapsForm
-from arena.web.listing import (
+from arena.site.access import ADMIN, STAFF, allow_only, user_of
+from arena.site.acts import Confirmation, ask, is_sure, refusals_told, send_later
+from arena.site.forms import CapsForm
+from arena.site.listing import (
     choice_asked,
     page_asked,
     read_listing,
@@ -33,52 +27,17 @@ from arena.web.listing import (
     said_choices,
     search_asked,
 )
-from arena.web.questions import Confirmation, ask, is_sure
-from augment.errors import AugmentError, QueueFault, UnknownName
+from arena.site.queries import MINE, Narrowing, find_jobs
 from augment.models import Augmentation, GenerationJob
 from augment.services.judging.analyses import repeatability
-from augment.services.running import jobs
-from augment.services.running import jobs as service
+from augment.services.judging.scenario_export import FORMATS
+from augment.services.running import jobs, progress
 from augment.services.running.budget import costs_of
-from augment.services.running.progress import (
-    SHOWN,
-    count_each,
-    count_rows,
-    failure_groups,
-    pace_of,
-    rows_of_cause,
-    tool_calls_by_augmentation,
-    tool_calls_by_contestant,
-)
 from augment.services.running.workers import workforce
 from augment.tasks import enqueue_job
 
 State = Augmentation.State
-
-
-@allow_only(*STAFF)
-@require_safe
-def jobs_page(request: HttpRequest) -> HttpResponse:
-    """Jobs with their bars, page by page."""
-    choices = {
-        "state": ("State", said_choices(GenerationJob.State.choices)),
-        "by": ("Started by", [(MINE, "me")]),
-    }
-    listing = read_listing(request, choices)
-    wanted = Narrowing(
-        search=listing.search, kind=listing.chosen("state"), part=listing.chosen("by")
-    )
-    found = find_jobs(wanted, user=cast(User, request.user))
-    page = read_page(request, found, size=JOBS_AT_ONCE)
-    counted = count_each(list(page.object_list))
-    context: dict[str, object] = {"jobs": counted, "page": page, "listing": listing}
-    if any(counts.is_moving for counts in counted):
-        context["workforce"] = workforce()
-    return render(request, "jobs/list.html", context)
-
-
 JOBS_AT_ONCE = 25
-
 MEASURED_AT_ONCE = 1000
 """Of a job with more augmentations the page measures nothing until somebody asks for it."""
 
@@ -87,33 +46,62 @@ _ASK_TO_MEASURE = frozenset({"measures", "by", "types", "checks"})
 
 @allow_only(*STAFF)
 @require_safe
-def job_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
-    """Progress, a part of the grid, and failures by their cause."""
-    job = get_object_or_404(GenerationJob.objects.select_related("launched_by__person"), code=code)
-    found = count_rows(job)
-    context: dict[str, object] = {
-        "counts": found,
-        "costs": costs_of(job),
-        "grid": grid_part(job, _part_asked(request)),
-        "failures": failure_groups(job),
-        "shown_causes": SHOWN,
+def jobs_page(request: HttpRequest) -> HttpResponse:
+    """List jobs with their bars, page by page."""
+    choices = {
+        "state": ("State", said_choices(GenerationJob.State.choices)),
+        "by": ("Started by", [(MINE, "me")]),
     }
-    if found.is_moving:  # a page that shows itself anew every two seconds measures nothing
-        context |= {"workforce": workforce(), "pace": pace_of(found)}
-    elif found.total <= MEASURED_AT_ONCE or _ASK_TO_MEASURE & request.GET.keys():
-        context |= _measured(request, job)
+    listing = read_listing(request, choices)
+    wanted = Narrowing(
+        search=listing.search, kind=listing.chosen("state"), part=listing.chosen("by")
+    )
+    page = read_page(request, find_jobs(wanted, user=user_of(request)), size=JOBS_AT_ONCE)
+    counted = progress.count_each(list(page.object_list))
+    context: dict[str, object] = {"jobs": counted, "page": page, "listing": listing}
+    if any(counts.is_moving for counts in counted):
+        context["workforce"] = workforce()
+    return render(request, "jobs/list.html", context)
+
+
+@allow_only(*STAFF)
+@require_safe
+def job_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
+    """Show progress, a part of the grid, and failures by their cause."""
+    job = get_object_or_404(GenerationJob.objects.select_related("launched_by__person"), code=code)
+    counts = progress.count_rows(job)
+    part = Part(
+        view=VIEWS.get(request.GET.get("view", ""), MARKS),
+        row=page_asked(request, "row"),
+        column=page_asked(request, "column"),
+        sample=page_asked(request, "sample"),
+        state=choice_asked(request, "state", State.values),
+        search=search_asked(request),
+    )
+    context: dict[str, object] = {
+        "counts": counts,
+        "costs": costs_of(job),
+        "grid": grid_part(job, part),
+        "failures": progress.failure_groups(job),
+        "shown_causes": progress.SHOWN,
+    }
+    if counts.is_moving:  # a page that reloads every two seconds measures nothing
+        context |= {"workforce": workforce(), "pace": progress.pace_of(counts)}
+    elif counts.total <= MEASURED_AT_ONCE or _ASK_TO_MEASURE & request.GET.keys():
+        context |= _measure(request, job)
     else:
         context["could_measure"] = True
     return render(request, "jobs/job.html", context)
 
 
-def _measured(request: HttpRequest, job: GenerationJob) -> dict[str, object]:
-    """What a job that does not move is measured by."""
+def _measure(request: HttpRequest, job: GenerationJob) -> dict[str, object]:
+    """Return the context of all that a settled job is measured by."""
+    files = files_of(job)
     measured: dict[str, object] = {
-        "scenario_files": rows_of(job),
-        "displacement": section(request, job),
+        "scenario_files": [(form, files.get(form)) for form in FORMATS],
+        "displacement": displacement_section(request, job),
         "driving": driving_section(request, job),
-        "tool_calls": tool_calls_by_contestant(job),
+        "tool_calls": progress.tool_calls_by_contestant(job),
     }
     if job.samples > 1:
         is_checked = request.GET.get("checks") == "1"
@@ -122,47 +110,14 @@ def _measured(request: HttpRequest, job: GenerationJob) -> dict[str, object]:
     return measured
 
 
-def _part_asked(request: HttpRequest) -> Part:
-    """Which part of the grid the address asks for; what it can't mean counts as not said."""
-    return Part(
-        view=VIEWS.get(request.GET.get("view", ""), MARKS),
-        row=page_asked(request, "row"),
-        column=page_asked(request, "column"),
-        sample=page_asked(request, "sample"),
-        state=choice_asked(request, "state", State.values),
-        search=search_asked(request),
-    )
-
-
-@allow_only(*STAFF)
-@require_safe
-def export_tool_calls(request: HttpRequest, code: uuid.UUID, form: str) -> HttpResponse:
-    """How each augmentation's contestant called its function, as a file."""
-    job = get_object_or_404(GenerationJob, code=code)
-    try:
-        chosen = format_named(TOOL_CALL_FORMATS, form)
-    except UnknownName as error:
-        raise Http404 from error
-    name = f"{slugify(job.name) or 'job'}-tool-calls.{chosen.suffix}"
-    return HttpResponse(
-        chosen.write(tool_calls_by_augmentation(job)),
-        content_type=chosen.content_type,
-        headers={"Content-Disposition": f'attachment; filename="{name}"'},
-    )
-
-
 @allow_only(ADMIN)
 @require_POST
 def retry_job(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Queue again what failed."""
     job = get_object_or_404(GenerationJob, code=code)
-    try:
-        with transaction.atomic():
-            jobs.retry_failed(job=job, actor=cast(User, request.user))
-            transaction.on_commit(partial(send_rows, request, job.pk))
-    except AugmentError as error:
-        messages.error(request, str(error))
-    else:
+    with refusals_told(request), transaction.atomic():
+        jobs.retry_failed(job=job, actor=user_of(request))
+        send_later(request, enqueue_job, job.pk)
         messages.success(request, "What failed is queued again.")
     return redirect("job", code=code)
 
@@ -170,18 +125,30 @@ def retry_job(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
 @allow_only(ADMIN)
 @require_POST
 def retry_cause(request: HttpRequest, code: uuid.UUID, key: str) -> HttpResponse:
-    """Queue again what ended for one cause; a second chance for an answer is asked about first."""
+    """Queue again what ended for one cause; ask first before an answer gets a second chance."""
     job = get_object_or_404(GenerationJob, code=code)
-    try:
-        state, _cause, pks = rows_of_cause(job, key)
+    with refusals_told(request), transaction.atomic():
+        state, _cause, pks = progress.rows_of_cause(job, key)
         if state == State.UNREADABLE and not is_sure(request):
-            return ask(request, _second_chance(job, len(pks)))
-        with transaction.atomic():
-            retry_one_cause(job, key=key, actor=cast(User, request.user))
-            transaction.on_commit(partial(send_rows, request, job.pk))
-    except AugmentError as error:
-        messages.error(request, str(error))
-    else:
+            return ask(
+                request,
+                Confirmation(
+                    title=f"Ask again for {len(pks)} unreadable answers?",
+                    facts=(
+                        "An unreadable answer is the contestant’s own and counts as a miss.",
+                        "Asked again it has a second chance that the others did not have; that "
+                        "is logged.",
+                        "The attempts so far stay in the transcripts; what counts is the last "
+                        "one.",
+                    ),
+                    button="Ask again",
+                    back=reverse("job", args=[job.code]),
+                    is_final=False,
+                    crumbs=crumbs_of(job),
+                ),
+            )
+        retry_one_cause(job, key=key, actor=user_of(request))
+        send_later(request, enqueue_job, job.pk)
         messages.success(request, f"Queued again: {len(pks)} with this cause.")
     return redirect("job", code=code)
 
@@ -191,30 +158,9 @@ def retry_cause(request: HttpRequest, code: uuid.UUID, key: str) -> HttpResponse
 def pause_job(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Start nothing new; what is in flight ends."""
     job = get_object_or_404(GenerationJob, code=code)
-    try:
-        jobs.pause(job, actor=cast(User, request.user))
-    except AugmentError as error:
-        messages.error(request, str(error))
-    else:
+    with refusals_told(request):
+        jobs.pause(job, actor=user_of(request))
         messages.success(request, "Paused: nothing new is started; what is in flight ends.")
-    return redirect("job", code=code)
-
-
-@allow_only(ADMIN)
-@require_http_methods(["GET", "HEAD", "POST"])
-def cancel_job(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
-    """Start nothing new; what is done stays. There is no way back, so it asks first."""
-    job = get_object_or_404(GenerationJob, code=code)
-    if not is_sure(request):
-        if job.state not in service.OPEN:
-            return redirect("job", code=code)
-        return ask(request, _cancelling(job))
-    try:
-        service.cancel(job=job, actor=cast(User, request.user))
-    except AugmentError as error:
-        messages.error(request, str(error))
-    else:
-        messages.success(request, "Cancelled. What is done stays.")
     return redirect("job", code=code)
 
 
@@ -227,63 +173,44 @@ def resume_job(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     if not form.is_valid():
         messages.error(request, "A cap is a number; nothing was changed.")
         return redirect("job", code=code)
-    try:
-        with transaction.atomic():
-            jobs.resume(job, higher=form.caps(), actor=cast(User, request.user))
-            transaction.on_commit(partial(send_rows, request, job.pk))
-    except AugmentError as error:
-        messages.error(request, str(error))
-    else:
+    with refusals_told(request), transaction.atomic():
+        jobs.resume(job, higher=form.caps(), actor=user_of(request))
+        send_later(request, enqueue_job, job.pk)
         messages.success(request, "What is left is queued again.")
     return redirect("job", code=code)
 
 
-def send_rows(request: HttpRequest, job_pk: int) -> None:
-    """Put the job's rows on the queue; without a queue they wait, and the person is told."""
-    try:
-        enqueue_job(job_pk)
-    except QueueFault as error:
-        messages.warning(request, str(error))
-
-
-# --- Private -----------------------------------------------------------------------------------
+@allow_only(ADMIN)
+@require_http_methods(["GET", "HEAD", "POST"])
+def cancel_job(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
+    """Start nothing new; what is done stays. There is no way back, so ask first."""
+    job = get_object_or_404(GenerationJob, code=code)
+    if is_sure(request):
+        with refusals_told(request):
+            jobs.cancel(job=job, actor=user_of(request))
+            messages.success(request, "Cancelled. What is done stays.")
+    elif job.state in jobs.OPEN:
+        return ask(request, _cancelling(job))
+    return redirect("job", code=code)
 
 
 def _cancelling(job: GenerationJob) -> Confirmation:
-    """What is asked before a job is cancelled."""
-    found = count_rows(job).by_state
-    waiting, running = found[State.QUEUED], found[State.RUNNING]
-    settled = sum(found.values()) - waiting - running
-    facts = (
-        f"Augmentations that wait and are never made: {waiting}.",
-        f"Running now, which end and keep their results: {running}.",
-        f"Settled, which stay as they are: {settled}.",
-        "A cancelled job can’t go on; what is missing takes a new one.",
-    )
+    counts = progress.count_rows(job).by_state
+    waiting, running = counts[State.QUEUED], counts[State.RUNNING]
     return Confirmation(
         title=f"Cancel “{job.name}”?",
-        facts=facts,
+        facts=(
+            f"Augmentations that wait and are never made: {waiting}.",
+            f"Running now, which end and keep their results: {running}.",
+            f"Settled, which stay as they are: {sum(counts.values()) - waiting - running}.",
+            "A cancelled job can’t go on; what is missing takes a new one.",
+        ),
         button="Cancel the job",
         back=reverse("job", args=[job.code]),
-        crumbs=_crumbs(job),
+        crumbs=crumbs_of(job),
     )
 
 
-def _second_chance(job: GenerationJob, number: int) -> Confirmation:
-    """What is asked before answers are asked for a second time."""
-    return Confirmation(
-        title=f"Ask again for {number} unreadable answers?",
-        facts=(
-            "An unreadable answer is the contestant’s own and counts as a miss.",
-            "Asked again it has a second chance that the others did not have; that is logged.",
-            "The attempts so far stay in the transcripts; what counts is the last one.",
-        ),
-        button="Ask again",
-        back=reverse("job", args=[job.code]),
-        is_final=False,
-        crumbs=_crumbs(job),
-    )
-
-
-def _crumbs(job: GenerationJob) -> tuple[tuple[str, str], ...]:
+def crumbs_of(job: GenerationJob) -> tuple[tuple[str, str], ...]:
+    """Return the way to a job's page: names and addresses."""
     return (("Jobs", reverse("jobs")), (job.name, reverse("job", args=[job.code])))

@@ -1,98 +1,46 @@
-"""What an admin is asked before a labelling opens or closes."""
+"""Fault labels: the page of an expert, which tells nothing of who made what, and that of a job."""
 
 from __future__ import annotations
 
 import uuid
-from collections.abc import Sequence
-from typing import cast
+from typing import Any
 
 from django.contrib import messages
 from django.contrib.auth.models import User
+from django.core.exceptions import PermissionDenied
 from django.db import transaction
 from django.http import Http404, HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, redirect, render
 from django.urls import reverse
-from django.utils.text import slugify
 from django.views.decorators.cache import never_cache
-from django.views.decorators.http import require_http_methods, require_safe
+from django.views.decorators.http import require_http_methods
 
-from arena.errors import AlreadyLabelled, ArenaError, LabellingClosed, NotYours
-from arena.exports.formats import format_named
+from arena.errors import AlreadyLabelled, LabellingClosed, NotYours
 from arena.jobs import queries
-from arena.jobs.exports.faults import FORMATS, fault_table
-from arena.jobs.queries import of_job
+from arena.jobs.exports.faults import fault_table
+from arena.jobs.pages.jobs import crumbs_of
 from arena.jobs.services import close_labelling, open_labelling, save_label
 from arena.models import FaultLabel, LabellingRound
-from arena.queries.people import by_pseudonym, experts, role_of
+from arena.people.queries import by_pseudonym, experts, role_of
 from arena.queries.voting.showings import original_beside
-from arena.web.access import ADMIN, EXPERT, STAFF, allow_only
-from arena.web.forms import LabelForm, LabellingForm
-from arena.web.questions import Confirmation, ask, is_sure, wants_to_change
-from augment.errors import AugmentError, UnknownName
+from arena.site.access import ADMIN, EXPERT, STAFF, allow_only, user_of
+from arena.site.acts import Confirmation, ask, is_sure, refusals_in, refusals_told, wants_to_change
+from arena.site.forms import LabelForm, LabellingForm
 from augment.models import GenerationJob
 from augment.services.judging.findings import FaultClass
-
-
-def opening(job: GenerationJob, *, name: str, experts: Sequence[str], seed: int) -> Confirmation:
-    """Counted by opening it and taking that back at once.
-
-    Raises:
-        ArenaError, AugmentError: It can't be opened.
-    """
-    with transaction.atomic():
-        labelling = open_labelling(job=job, name=name, experts=experts, seed=seed)
-        tasks = labelling.tasks.count()
-        pictures = labelling.tasks.values("augmentation").distinct().count()
-        transaction.set_rollback(True)
-    facts = (
-        f"Pictures: {pictures}. Experts: {len(experts)}. Labels planned: {tasks}.",
-        "Experts see it at once; who labels, and in which order, can’t be changed afterwards.",
-    )
-    return Confirmation(
-        title=f"Open the labelling “{name}”?",
-        facts=facts,
-        button="Open the labelling",
-        back=reverse("faults", args=[job.code]),
-        is_final=False,
-        crumbs=_crumbs(job),
-    )
-
-
-def closing(labelling: LabellingRound) -> Confirmation:
-    """What is there, and what will never come."""
-    line = next(one for one in of_job(labelling.job) if one.labelling.pk == labelling.pk)
-    facts = (
-        f"Labels saved, which stay: {line.labelled}.",
-        f"Planned labels that will be missing: {line.left}.",
-        "It takes no more labels. This can’t be taken back.",
-    )
-    return Confirmation(
-        title=f"Close the labelling “{labelling.name}”?",
-        facts=facts,
-        button="Close the labelling",
-        back=reverse("faults", args=[labelling.job.code]),
-        crumbs=_crumbs(labelling.job),
-    )
-
-
-def _crumbs(job: GenerationJob) -> tuple[tuple[str, str], ...]:
-    return (
-        ("Jobs", reverse("jobs")),
-        (job.name, reverse("job", args=[job.code])),
-        ("Fault labels", reverse("faults", args=[job.code])),
-    )
 
 
 @allow_only(EXPERT)
 @never_cache
 @require_http_methods(["GET", "HEAD", "POST"])
 def label_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
-    """The next picture; a label is saved and followed by a redirect."""
-    expert = cast(User, request.user)
+    """Show the next picture; a label is saved and followed by a redirect."""
+    expert = user_of(request)
     try:
         progress = queries.labelling_of(expert=expert, code=code)
         if request.method == "POST":
-            return _save(request, expert, code)
+            _save(request, expert)
+            return redirect("label", code=code)
     except NotYours as error:
         raise Http404 from error
     task = queries.next_task(labelling=progress.labelling, expert=expert)
@@ -103,110 +51,106 @@ def label_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     return render(request, "label/label.html" if task else "label/done.html", context)
 
 
-@allow_only(*STAFF)
-@require_http_methods(["GET", "HEAD", "POST"])
-def faults_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
-    """What was labelled in a job, and the form that opens a labelling."""
-    job = get_object_or_404(GenerationJob, code=code)
-    form = LabellingForm(request.POST or None, experts=by_pseudonym(experts()))
-    if request.method == "POST":
-        if role_of(request.user) != ADMIN:
-            return HttpResponse(status=403)
-        if form.is_valid() and not wants_to_change(request):
-            answer = _open(request, job, form)
-            if answer is not None:
-                return answer
-    context = {
-        "job": job,
-        "form": form,
-        "table": fault_table(job),
-        "labellings": queries.of_job(job),
-    }
-    return render(request, "label/job.html", context, status=422 if form.errors else 200)
-
-
-@allow_only(*STAFF)
-@require_safe
-def export(request: HttpRequest, code: uuid.UUID, form: str) -> HttpResponse:
-    """The faults of a job as a file."""
-    job = get_object_or_404(GenerationJob, code=code)
-    try:
-        chosen = format_named(FORMATS, form)
-    except UnknownName as error:
-        raise Http404 from error
-    name = f"{slugify(job.name) or 'job'}-faults.{chosen.suffix}"
-    return HttpResponse(
-        chosen.write(fault_table(job)),
-        content_type=chosen.content_type,
-        headers={"Content-Disposition": f'attachment; filename="{name}"'},
-    )
-
-
-@allow_only(ADMIN)
-@require_http_methods(["GET", "HEAD", "POST"])
-def close(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
-    """Take no more labels; there is no way back, so it asks first."""
-    labelling = get_object_or_404(LabellingRound.objects.select_related("job"), code=code)
-    if not is_sure(request):
-        if labelling.closed_at is not None:
-            return redirect("faults", code=labelling.job.code)
-        return ask(request, closing(labelling))
-    try:
-        close_labelling(labelling=labelling, actor=cast(User, request.user))
-    except ArenaError as error:
-        messages.error(request, str(error))
-    else:
-        messages.success(request, f"“{labelling.name}” is closed; its labels stay.")
-    return redirect("faults", code=labelling.job.code)
-
-
-# Private
-
-
-def _save(request: HttpRequest, expert: User, code: uuid.UUID) -> HttpResponse:
+def _save(request: HttpRequest, expert: User) -> None:
     form = LabelForm(request.POST)
     if not form.is_valid():
         messages.error(request, "That could not be read; nothing was saved.")
-        return redirect("label", code=code)
+        return
+    task, note = form.cleaned_data["task"], form.cleaned_data["note"]
     try:
-        label = save_label(
-            expert=expert,
-            task_code=form.cleaned_data["task"],
-            faults=form.faults(),
-            note=form.cleaned_data["note"],
-        )
+        label = save_label(expert=expert, task_code=task, faults=form.faults(), note=note)
     except AlreadyLabelled as error:
         messages.info(request, str(error))
     except LabellingClosed as error:
         messages.error(request, str(error))
     else:
-        messages.success(request, " ".join(("Saved.", _guess(label))))
-    return redirect("label", code=code)
+        messages.success(request, f"Saved. {_guess(label)}")
 
 
 def _guess(label: FaultLabel) -> str:
-    """What the checks had guessed, told only now."""
+    """Return what the checks had guessed, told only now."""
     if label.guessed_position is None:
         return "The automatic checks could not look at that picture."
-    names = {
-        FaultClass.POSITION: "position",
-        FaultClass.HEADING: "heading",
-        FaultClass.LOGIC: "logic",
+    guessed = [fault.value for fault in FaultClass if getattr(label, f"guessed_{fault.value}")]
+    return f"The automatic checks had guessed: {', '.join(guessed) or 'no fault'}."
+
+
+@allow_only(*STAFF)
+@require_http_methods(["GET", "HEAD", "POST"])
+def faults_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
+    """Show what was labelled in a job, and the form that opens a labelling."""
+    job = get_object_or_404(GenerationJob, code=code)
+    form = LabellingForm(request.POST or None, experts=by_pseudonym(experts()))
+    if request.method == "POST" and role_of(request.user) != ADMIN:
+        raise PermissionDenied
+    if form.is_bound and form.is_valid() and not wants_to_change(request):
+        given = {name: form.cleaned_data[name] for name in ("name", "experts", "seed")}
+        with refusals_in(form):
+            if not is_sure(request):
+                return ask(request, _opening(job, given))
+            labelling = open_labelling(job=job, **given, actor=user_of(request))
+            messages.success(request, f"“{labelling.name}” is open; its experts can label now.")
+            return redirect("faults", code=job.code)
+    context = {
+        "job": job,
+        "form": form,
+        "table": fault_table(job),
+        "labellings": queries.labellings_of(job),
     }
-    seen = [name for fault, name in names.items() if getattr(label, f"guessed_{fault.value}")]
-    queries = ", ".join(seen) or "no fault"
-    return f"The automatic checks had guessed: {queries}."
+    return render(request, "label/job.html", context, status=422 if form.errors else 200)
 
 
-def _open(request: HttpRequest, job: GenerationJob, form: LabellingForm) -> HttpResponse | None:
-    """The page that asks first, or where to go once it is open; None where it is refused."""
-    given = {name: form.cleaned_data[name] for name in ("name", "experts", "seed")}
-    try:
-        if not is_sure(request):
-            return ask(request, opening(job, **given))
-        labelling = open_labelling(job=job, **given, actor=cast(User, request.user))
-    except (ArenaError, AugmentError) as error:
-        form.add_error(None, str(error))
-        return None
-    messages.success(request, f"“{labelling.name}” is open; its experts can label now.")
-    return redirect("faults", code=job.code)
+@allow_only(ADMIN)
+@require_http_methods(["GET", "HEAD", "POST"])
+def close(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
+    """Take no more labels; there is no way back, so ask first."""
+    labelling = get_object_or_404(LabellingRound.objects.select_related("job"), code=code)
+    if is_sure(request):
+        with refusals_told(request):
+            close_labelling(labelling=labelling, actor=user_of(request))
+            messages.success(request, f"“{labelling.name}” is closed; its labels stay.")
+    elif labelling.closed_at is None:
+        return ask(request, _closing(labelling))
+    return redirect("faults", code=labelling.job.code)
+
+
+def _opening(job: GenerationJob, given: dict[str, Any]) -> Confirmation:
+    """Return what is asked before: counted by opening it and taking that back at once."""
+    with transaction.atomic():
+        labelling = open_labelling(job=job, **given)
+        tasks = labelling.tasks.count()
+        pictures = labelling.tasks.values("augmentation").distinct().count()
+        experts_asked = labelling.experts.count()
+        transaction.set_rollback(True)
+    return Confirmation(
+        title=f"Open the labelling “{given['name']}”?",
+        facts=(
+            f"Pictures: {pictures}. Experts: {experts_asked}. Labels planned: {tasks}.",
+            "Experts see it at once; who labels, and in which order, can’t be changed afterwards.",
+        ),
+        button="Open the labelling",
+        back=reverse("faults", args=[job.code]),
+        is_final=False,
+        crumbs=_crumbs(job),
+    )
+
+
+def _closing(labelling: LabellingRound) -> Confirmation:
+    (line,) = (
+        line for line in queries.labellings_of(labelling.job) if line.labelling.pk == labelling.pk
+    )
+    return Confirmation(
+        title=f"Close the labelling “{labelling.name}”?",
+        facts=(
+            f"Labels saved, which stay: {line.labelled}.",
+            f"Planned labels that will be missing: {line.left}.",
+            "It takes no more labels. This can’t be taken back.",
+        ),
+        button="Close the labelling",
+        back=reverse("faults", args=[labelling.job.code]),
+        crumbs=_crumbs(labelling.job),
+    )
+
+
+def _crumbs(job: GenerationJob) -> tuple[tuple[str, str], ...]:
+    return (*crumbs_of(job), ("Fault labels", reverse("faults", args=[job.code])))

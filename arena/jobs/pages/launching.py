@@ -1,197 +1,115 @@
-"""A new job as it comes in by its form: cells of the matrix, contestants, scenarios, caps."""
+"""The page of a new job: choose, see what it would use, try one scenario first, launch."""
 
 from __future__ import annotations
 
 import uuid
-from dataclasses import dataclass
 from decimal import Decimal
-from functools import partial
-from typing import Any, cast
+from typing import Any
 
 from django import forms
 from django.contrib import messages
-from django.contrib.auth.models import User
 from django.db import transaction
 from django.http import HttpRequest, HttpResponse
 from django.shortcuts import redirect, render
 from django.views.decorators.http import require_http_methods
 
-from arena.jobs.pages.jobs import send_rows
-from arena.scenarios import queries
-from arena.web.access import ADMIN, allow_only
-from arena.web.forms import CapsForm, ChoiceForm, Offer
-from augment.errors import AugmentError
+from arena.contestants.pages import OptionsForm
+from arena.scenarios.queries import by_type, set_asked, set_choices
+from arena.site.access import ADMIN, allow_only, user_of
+from arena.site.acts import refusals_in, send_later
+from arena.site.forms import CapsForm, ChoiceForm, Offer
+from augment.errors import AugmentError, Conflict
 from augment.models import Contestant, EndpointModel, GenerationJob
-from augment.services.endpoints.contestants import PROTOCOLS, REASONING_EFFORTS
 from augment.services.endpoints.known_endpoints import is_key_here
-from augment.services.running import jobs as service
+from augment.services.running import jobs
 from augment.services.running.choosing import find_obstacle, keys_missing
 from augment.services.running.estimates import JobEstimate, estimate_rows
-from augment.services.running.jobs import HIGHEST_SAMPLES
 from augment.services.running.matrix import (
     ChosenCells,
-    MatrixCell,
     add_cells,
     matrix_of,
     matrix_text,
     read_cells,
     read_matrix,
 )
+from augment.tasks import enqueue_job
 
-OF_CELLS = (
-    *("temperature", "seed", "reasoning_effort", "max_output_tokens"),
-    *("protocol", "rounds"),
-)
-"""Options that the page asks for; the others are for a contestant's own page and matrix files."""
+LONGEST_FILE = 1_000_000
+LONGEST_NAME = 120
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class OfferedCell:
-    """A box of the matrix, or why it can't be ticked."""
-
-    cell: MatrixCell
-    obstacle: str
-    is_chosen: bool
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class OfferedRow:
-    """A variant with all models."""
-
-    label: str
-    cells: tuple[OfferedCell, ...]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class MatrixColumn:
-    """A model at its endpoint."""
-
-    known: EndpointModel
-    key_missing: str
-
-
-class LaunchForm(ChoiceForm, CapsForm):
-    """A new job."""
+class LaunchForm(ChoiceForm, CapsForm, OptionsForm):
+    """A new job: cells of the matrix, contestants, scenarios and caps."""
 
     contestants = forms.MultipleChoiceField(required=False)
     cells = forms.MultipleChoiceField(required=False)
-    samples = forms.IntegerField(min_value=1, max_value=HIGHEST_SAMPLES, initial=1, required=False)
+    samples = forms.IntegerField(
+        min_value=1, max_value=jobs.HIGHEST_SAMPLES, initial=1, required=False
+    )
     is_fresh = forms.BooleanField(required=False)
-    temperature = forms.FloatField(required=False, label="Temperature")
-    seed = forms.IntegerField(required=False, label="Seed")
-    reasoning_effort = forms.ChoiceField(
-        required=False,
-        choices=[("", "–"), *((word, word) for word in REASONING_EFFORTS)],
-        label="Reasoning effort",
-    )
-    max_output_tokens = forms.IntegerField(required=False, label="Tokens of one answer, at most")
-    protocol = forms.ChoiceField(
-        required=False,
-        choices=[("", "–"), *((word, word) for word in PROTOCOLS)],
-        label="Tool protocol",
-    )
-    rounds = forms.IntegerField(required=False, label="Rounds, at most")
 
     def __init__(self, *args: Any, models: list[EndpointModel], **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)
         self.models = models
-        self._matrix = matrix_of(models)
-        keys = [cell.key for row in self._matrix for cell, why_not in row.cells if not why_not]
+        self.matrix = matrix_of(models)
+        keys = [cell.key for row in self.matrix for cell, obstacle in row.cells if not obstacle]
         self._offer("cells", [(key, key) for key in keys])
+        self.cells_chosen = ChosenCells()
 
     def clean_samples(self) -> int:
-        """An empty field is one sample."""
+        """Return 1 for an empty field."""
         return self.cleaned_data["samples"] or 1
 
     def clean(self) -> dict[str, Any]:
-        """Somebody is chosen, by name or by a cell; options are what they may be."""
+        """Check that somebody is chosen, by name or by a cell, and the options of the cells."""
         cleaned = super().clean()
         if not (cleaned.get("contestants") or cleaned.get("cells")):
             self.add_error("contestants", "Choose at least one contestant.")
-        options = {name: v for name in OF_CELLS if (v := cleaned.get(name)) not in (None, "")}
-        try:
-            cleaned["chosen_cells"] = read_cells(cleaned.get("cells", []), options)
-        except AugmentError as error:
-            self.add_error(None, str(error))
+        with refusals_in(self):
+            self.cells_chosen = read_cells(cleaned.get("cells", []), self.options())
         return cleaned
 
     @property
     def offers(self) -> list[Offer]:
-        """Contestants that no job can run say why."""
-        return [_offer(row) for row in self.offered]
+        """For the template: contestants, with the reason where no job can run them."""
+        offers = []
+        for row in self.offered:
+            obstacle = find_obstacle(row)
+            missing = () if obstacle else tuple(keys_missing(row))
+            offers.append(Offer(row=row, obstacle=obstacle, keys_missing=missing))
+        return offers
 
     @property
-    def columns(self) -> list[MatrixColumn]:
-        """For the template: the models, and whether their keys are here."""
-        return [
-            MatrixColumn(known=known, key_missing="" if is_key_here(name) or not name else name)
-            for known in self.models
-            for name in [known.endpoint.key_variable]
-        ]
+    def missing_keys(self) -> set[str]:
+        """For the template: variables of the models' keys that are not set here."""
+        names = {known.endpoint.key_variable for known in self.models} - {""}
+        return {name for name in names if not is_key_here(name)}
 
     @property
-    def matrix(self) -> list[OfferedRow]:
-        """For the template: variants down, models across."""
-        chosen = set(self.chosen("cells"))
-        return [
-            OfferedRow(
-                label=row.label,
-                cells=tuple(
-                    OfferedCell(cell=cell, obstacle=why_not, is_chosen=cell.key in chosen)
-                    for cell, why_not in row.cells
-                ),
-            )
-            for row in self._matrix
-        ]
-
-    @property
-    def option_fields(self) -> list[forms.BoundField]:
-        """For the template."""
-        return [self[name] for name in OF_CELLS]
-
-    @property
-    def has_options(self) -> bool:
-        """For the template: whether any is filled in, so that one sees which."""
-        return any(self[name].value() not in (None, "") for name in OF_CELLS)
-
-    def chosen_cells_value(self) -> ChosenCells:
-        """The cells with their options, once the form is valid."""
-        found = self.cleaned_data.get("chosen_cells")
-        return found if isinstance(found, ChosenCells) else ChosenCells()
+    def chosen_cells(self) -> list[str]:
+        """For the template: the keys that are ticked."""
+        return self.chosen("cells")
 
     def chosen_rows(self) -> list[Contestant]:
-        """Whoever is chosen, each once; those of cells may not be stored yet."""
+        """Return whoever is chosen, each once; those of cells may not be stored yet."""
         named = Contestant.objects.filter(slug__in=self.cleaned_data.get("contestants", []))
-        found = [*named.select_related("endpoint"), *self.chosen_cells_value().contestants()]
-        return list({row.slug: row for row in found}.values())
+        rows = [*named.select_related("endpoint"), *self.cells_chosen.contestants()]
+        return list({row.slug: row for row in rows}.values())
 
     def estimated(self) -> JobEstimate | None:
-        """What the job would use, as far as it is chosen; nothing has to be named or capped."""
+        """Return what the job would use, as far as it is chosen, without a name or caps."""
         self.is_valid()
         for name in ("name", "contestants", "scenarios"):
             self.errors.pop(name, None)
-        who, scenarios = self.chosen_rows(), self.cleaned_data.get("scenarios", [])
-        if not (who and scenarios):
+        contestants, scenarios = self.chosen_rows(), self.cleaned_data.get("scenarios", [])
+        if not (contestants and scenarios):
             return None
         return estimate_rows(
-            who,
+            contestants,
             scenarios,
             samples=self.cleaned_data.get("samples", 1),
             is_fresh=self.cleaned_data.get("is_fresh", False),
         )
-
-
-# --- Private -----------------------------------------------------------------------------------
-
-
-def _offer(row: Contestant) -> Offer:
-    why_not = find_obstacle(row)
-    missing = () if why_not else tuple(keys_missing(row))
-    return Offer(row=row, obstacle=why_not, keys_missing=missing)
-
-
-LONGEST_FILE = 1_000_000
-LONGEST_NAME = 120
 
 
 @allow_only(ADMIN)
@@ -199,50 +117,43 @@ LONGEST_NAME = 120
 def new_job_page(request: HttpRequest) -> HttpResponse:
     """Choose contestants and scenarios, then launch."""
     if "read" in request.POST:
-        return _read(request)
+        return _read_file(request)
     form = _form(request, request.POST or None, initial=_like(request))
     if "matrix" in request.POST:
-        return _matrix(request, form)
+        return _matrix_file(request, form)
     if "estimate" in request.POST:
         return _estimated(request, form)
-    if request.method == "POST" and form.is_valid():
-        try:
+    if form.is_bound and form.is_valid():
+        with refusals_in(form), transaction.atomic():
             job = _launch(request, form)
-        except AugmentError as error:
-            form.add_error(None, str(error))
-        else:
+            send_later(request, enqueue_job, job.pk)
             messages.success(request, f"“{job.name}” is launched.")
             return redirect("job", code=job.code)
     return _page(request, form, status=422 if form.errors else 200)
 
 
-# --- Private -----------------------------------------------------------------------------------
-
-
 def _form(request: HttpRequest, data: Any, *, initial: dict[str, Any] | None = None) -> LaunchForm:
+    contestants = Contestant.objects.filter(retired_at=None).select_related("endpoint")
+    models = EndpointModel.objects.select_related("endpoint")
     return LaunchForm(
         data,
         initial=initial,
-        contestants=list(
-            Contestant.objects.filter(retired_at=None).select_related("endpoint").order_by("name")
-        ),
-        groups=queries.by_type(queries.set_asked(request.GET.get("set"))),
-        models=list(
-            EndpointModel.objects.select_related("endpoint").order_by("endpoint__label", "model")
-        ),
+        contestants=list(contestants.order_by("name")),
+        groups=by_type(set_asked(request.GET.get("set"))),
+        models=list(models.order_by("endpoint__label", "model")),
     )
 
 
 def _page(
     request: HttpRequest, form: LaunchForm, *, status: int = 200, **more: object
 ) -> HttpResponse:
-    chosen_set = queries.set_asked(request.GET.get("set"))
-    context = {"form": form, "sets": queries.set_choices(chosen_set), **more}
+    chosen_set = set_asked(request.GET.get("set"))
+    context = {"form": form, "sets": set_choices(chosen_set), **more}
     return render(request, "jobs/new.html", context, status=status)
 
 
 def _like(request: HttpRequest) -> dict[str, Any]:
-    """What the form is filled with: another job where the address names one, else nothing."""
+    """Return the values of another job where the address names one."""
     try:
         code = uuid.UUID(request.GET.get("like", ""))
     except ValueError:
@@ -250,38 +161,34 @@ def _like(request: HttpRequest) -> dict[str, Any]:
     job = GenerationJob.objects.filter(code=code).first()
     if job is None:
         return {}
-    caps = {"cap_usd": job.cap_usd, "cap_calls": job.cap_calls, "cap_tokens": job.cap_tokens}
-    found: dict[str, Any] = {
+    caps: dict[str, Any] = {"cap_calls": job.cap_calls, "cap_tokens": job.cap_tokens}
+    if job.cap_usd is not None:
+        caps["cap_usd"] = f"{job.cap_usd.normalize():f}"
+    like = {
         "name": f"{job.name} (2)"[:LONGEST_NAME],
         "contestants": list(job.contestants.values_list("slug", flat=True)),
         "scenarios": list(job.scenarios.values_list("slug", flat=True)),
         "samples": job.samples,
         "is_fresh": job.is_fresh,
-        **{name: value for name, value in caps.items() if value is not None},
+        **caps,
     }
-    if found.get("cap_usd") is not None:
-        found["cap_usd"] = f"{found['cap_usd'].normalize():f}"
-    plan = job.full_plan
-    return found | plan if plan is not None and request.GET.get("all") == "1" else found
+    is_all = request.GET.get("all") == "1"
+    return like | (job.full_plan or {}) if is_all else like
 
 
 def _estimated(request: HttpRequest, form: LaunchForm) -> HttpResponse:
-    """The page as it came in, with what the job would use; nothing is launched."""
+    """Show the form as it came in, with what the job would use; nothing is launched."""
     more: dict[str, Any] = {}
-    try:
-        found = form.estimated()
-    except AugmentError as error:
-        form.add_error(None, str(error))
-    else:
-        cap = form.cleaned_data.get("cap_usd")
-        more |= {"estimate": found, "cap_usd": cap}
-        if found is not None and cap is not None:
-            more["rows_within"] = found.rows_within(cap)
+    with refusals_in(form):
+        estimate, cap = form.estimated(), form.cleaned_data.get("cap_usd")
+        more = {"estimate": estimate, "cap_usd": cap}
+        if estimate is not None and cap is not None:
+            more["rows_within"] = estimate.rows_within(cap)
     return _page(request, form, **more)
 
 
-def _matrix(request: HttpRequest, form: LaunchForm) -> HttpResponse:
-    """What is chosen as a file for `generate --matrix`; a name is not needed for it."""
+def _matrix_file(request: HttpRequest, form: LaunchForm) -> HttpResponse:
+    """Answer with what is chosen as a file for `generate --matrix`, which needs no name."""
     form.is_valid()
     form.errors.pop("name", None)
     if form.errors:
@@ -299,64 +206,52 @@ def _matrix(request: HttpRequest, form: LaunchForm) -> HttpResponse:
     )
 
 
-def _read(request: HttpRequest) -> HttpResponse:
-    """The form filled in from a matrix file; contestants that it has in full are made."""
+def _read_file(request: HttpRequest) -> HttpResponse:
+    """Fill in the form from a matrix file; contestants that it has in full are made."""
     file = request.FILES.get("file")
-    problem = ""
-    if file is None:
-        problem = "Choose a matrix file."
-    elif file.size is None or file.size > LONGEST_FILE:
-        problem = "The file is too long for a matrix: at most 1 MB."
+    try:
+        if file is None:
+            raise Conflict("Choose a matrix file.")
+        if file.size is None or file.size > LONGEST_FILE:
+            raise Conflict("The file is too long for a matrix: at most 1 MB.")
+        matrix = read_matrix(file.read().decode(), actor=user_of(request))
+    except UnicodeDecodeError:
+        problem = "The file is not UTF-8."
+    except AugmentError as error:
+        problem = str(error)
     else:
-        try:
-            found = read_matrix(file.read().decode(), actor=cast(User, request.user))
-        except UnicodeDecodeError:
-            problem = "The file is not UTF-8."
-        except AugmentError as error:
-            problem = str(error)
-    if problem:
-        return _page(request, _form(request, None), status=422, file_problem=problem)
-    for slug in found.made:
-        messages.success(request, f"“{slug}” is added.")
-    initial = {
-        "name": found.name or "",
-        "contestants": list(found.contestants),
-        "scenarios": list(found.scenarios),
-        "samples": found.samples,
-    }
-    return _page(request, _form(request, None, initial=initial))
+        for slug in matrix.made:
+            messages.success(request, f"“{slug}” is added.")
+        initial = {
+            "name": matrix.name or "",
+            "contestants": list(matrix.contestants),
+            "scenarios": list(matrix.scenarios),
+            "samples": matrix.samples,
+        }
+        return _page(request, _form(request, None, initial=initial))
+    return _page(request, _form(request, None), status=422, file_problem=problem)
 
 
 def _launch(request: HttpRequest, form: LaunchForm) -> GenerationJob:
-    """The job; of one that tries first, one scenario with a memory of the rest."""
-    actor, chosen = cast(User, request.user), form.cleaned_data
-    where, samples, name, plan = chosen["scenarios"], chosen["samples"], chosen["name"], None
+    """Launch the job; of one that tries first, one scenario with a memory of the rest."""
+    chosen = form.cleaned_data
+    scenarios, samples, name, plan = chosen["scenarios"], chosen["samples"], chosen["name"], None
     if "try" in request.POST:
-        plan = _plan(form)
-        where, samples = where[:1], 1
-        name = f"{name}, first try"
-    with transaction.atomic():
-        made = add_cells(form.chosen_cells_value(), actor=actor)
-        job = service.launch(
-            name=name[:LONGEST_NAME],
-            contestants=list(dict.fromkeys([*chosen["contestants"], *made])),
-            scenarios=where,
-            caps=form.caps(),
-            samples=samples,
-            is_fresh=chosen["is_fresh"],
-            full_plan=plan,
-            actor=actor,
-        )
-        transaction.on_commit(partial(send_rows, request, job.pk))
-    return job
-
-
-def _plan(form: LaunchForm) -> dict[str, Any]:
-    """What was chosen for the whole job, as the form's fields have it."""
-    names = ("name", "scenarios", "samples", "is_fresh", "cap_usd", "cap_calls", "cap_tokens")
-    chosen = {name: form.cleaned_data.get(name) for name in names}
-    return {
-        name: str(value) if isinstance(value, Decimal) else value
-        for name, value in chosen.items()
-        if value is not None
-    }
+        names = ("name", "scenarios", "samples", "is_fresh", "cap_usd", "cap_calls", "cap_tokens")
+        plan = {
+            field: str(value) if isinstance(value, Decimal) else value
+            for field in names
+            if (value := chosen.get(field)) is not None
+        }
+        scenarios, samples, name = scenarios[:1], 1, f"{name}, first try"
+    made = add_cells(form.cells_chosen, actor=user_of(request))
+    return jobs.launch(
+        name=name[:LONGEST_NAME],
+        contestants=list(dict.fromkeys([*chosen["contestants"], *made])),
+        scenarios=scenarios,
+        caps=form.caps(),
+        samples=samples,
+        is_fresh=chosen["is_fresh"],
+        full_plan=plan,
+        actor=user_of(request),
+    )

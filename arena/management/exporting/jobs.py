@@ -7,17 +7,10 @@ from typing import Any
 
 from arena.exports.formats import format_named
 from arena.exports.samples import SHEET_FORMATS, sheet_bytes, sheet_of
-from arena.jobs.exports import displacement_files, driving, faults, tables
+from arena.jobs.exports import displacement_files, driving
 from arena.jobs.exports.displacement import displacement_table
-from arena.jobs.exports.displacement_files import BY_OBJECT, OBJECT_FORMATS, object_rows
-from arena.jobs.exports.driving import DrivingTable
-from arena.jobs.exports.files import TRANSCRIPT_FORMATS
-from arena.jobs.exports.tables import (
-    AUGMENTATION_FORMATS,
-    REPEAT_FORMATS,
-    augmentation_rows,
-    repeat_rows,
-)
+from arena.jobs.exports.registry import PLAIN_TABLES, TRANSCRIPTS
+from arena.jobs.exports.tables import ANALYSES, TABLE_FORMATS, analysis_sheet, object_sheet
 from arena.jobs.queries import grid
 from arena.management.exporting.kinds import (
     Chosen,
@@ -31,36 +24,22 @@ from arena.management.exporting.kinds import (
 from augment.errors import Conflict, UnknownName
 from augment.services.judging.analyses import analyse_job
 from augment.services.judging.displacement import By, types_named
-from augment.services.judging.driving_scores import options_driven, scores_of_job
+from augment.services.judging.driving_scores import options_driven
 from augment.services.judging.simulations import SCORES, Options
 from augment.services.running.choosing import find_job
-from augment.services.running.progress import tool_calls_by_augmentation
+
+BY_OBJECT = "object"
 
 
 def add_jobs(kinds: Any) -> None:
     """What can be written of a job, but for its scenarios."""
     _add_displacement(kinds)
     _add_samples(kinds)
-    add_table(
-        *(kinds, "faults", faults.FORMATS, faults.fault_table),
-        help="how often experts saw which fault",
-    )
     _add_driving(kinds)
+    for name, table in PLAIN_TABLES.items():
+        add_table(kinds, name, table.formats, table.make, help=table.help)
     add_table(
-        *(kinds, "tool-calls", tables.CALL_FORMATS, tool_calls_by_augmentation),
-        help="calls of the function: tried, understood, mended",
-    )
-    add_table(
-        *(kinds, "augmentations", AUGMENTATION_FORMATS, augmentation_rows),
-        help="one row for each augmentation of a job",
-    )
-    add_table(
-        *(kinds, "repeats", REPEAT_FORMATS, repeat_rows),
-        help="what varies between the samples of a job",
-    )
-    add_table(
-        *(kinds, "transcripts", TRANSCRIPT_FORMATS, lambda job: job),
-        help="every transcript of a job: a line of JSON each, or with their images as a zip",
+        *(kinds, "transcripts", TRANSCRIPTS.formats, TRANSCRIPTS.make), help=TRANSCRIPTS.help
     ).set_defaults(format="jsonl")
     _add_analyses(kinds)
 
@@ -73,7 +52,7 @@ def _add_displacement(kinds: Any) -> None:
         "--by",
         default="type",
         help=f"one of {', '.join(By)}; or {BY_OBJECT}, for one row an object "
-        f"({', '.join(OBJECT_FORMATS)})",
+        f"({', '.join(TABLE_FORMATS)})",
     )
     kind.add_argument(
         "--types",
@@ -87,8 +66,8 @@ def write_displacement(options: Chosen, say: Say) -> ExportedFile:
     """How far from the references: in groups, or one row an object."""
     types = None if options["types"] is None else types_named(options["types"])
     if options["by"] == BY_OBJECT:
-        of_objects = format_named(OBJECT_FORMATS, options["format"])
-        return fill(of_objects, object_rows(find_job(options["job"]), types=types))
+        of_objects = format_named(TABLE_FORMATS, options["format"])
+        return fill(of_objects, object_sheet(find_job(options["job"]), types=types))
     chosen = format_named(displacement_files.FORMATS, options["format"])
     if options["by"] not in set(By):
         raise UnknownName("grouping", options["by"], [*By, BY_OBJECT])
@@ -150,8 +129,9 @@ def write_driving(options: Chosen, say: Say) -> ExportedFile:
     )
     if how not in options_driven(job):
         raise Conflict(f"Job {job.name!r} was not driven so; manage.py simulate does it.")
-    scores = scores_of_job(job, options=how, score=options["score"])
-    table = DrivingTable(title=job.name, scores=scores, with_paper=options["with_paper"])
+    table = driving.driving_table(
+        job, options=how, score=options["score"], with_paper=options["with_paper"]
+    )
     return fill(chosen, table)
 
 
@@ -161,14 +141,14 @@ def _add_analyses(kinds: Any) -> None:
         of="job",
         help="pairs of contestants, wordings, refusals",
     )
-    kind.add_argument("--part", required=True, help=f"one of {', '.join(tables.PARTS)}")
-    add_format(kind, tables.ANALYSIS_FORMATS)
+    kind.add_argument("--part", required=True, help=f"one of {', '.join(ANALYSES)}")
+    add_format(kind, TABLE_FORMATS)
 
 
 def write_analyses(options: Chosen, say: Say) -> ExportedFile:
     """One part of what can be said of a job."""
-    chosen = format_named(tables.ANALYSIS_FORMATS, options["format"])
-    if options["part"] not in tables.PARTS:
-        raise UnknownName("part", options["part"], list(tables.PARTS))
+    chosen = format_named(TABLE_FORMATS, options["format"])
+    if options["part"] not in ANALYSES:
+        raise UnknownName("part", options["part"], list(ANALYSES))
     found = analyse_job(find_job(options["job"]))
-    return fill(chosen, tables.analysis_table(found, options["part"]))
+    return fill(chosen, analysis_sheet(found, options["part"]))

@@ -13,9 +13,9 @@ from django.shortcuts import get_object_or_404, redirect, render
 from django.views.decorators.http import require_http_methods, require_POST
 
 from arena.scenarios.services import drop_reference, set_reference, why_not_editable
-from arena.web.access import STAFF, allow_only
-from arena.web.json_text import read_json
-from arena.web.sending import looks_again, send_later
+from arena.site.access import STAFF, allow_only
+from arena.site.acts import looks_again, send_later
+from arena.site.forms import read_json
 from augment.errors import AugmentError, Conflict
 from augment.models import Augmentation, Scenario
 from augment.services.judging.findings import check_edit

@@ -16,9 +16,9 @@ from django.views.decorators.http import require_http_methods
 
 from arena.scenarios.services import change_scenario
 from arena.services.sent_files import was_too_large
-from arena.web.access import STAFF, allow_only
-from arena.web.json_text import read_json
-from arena.web.sending import looks_again, send_later
+from arena.site.access import STAFF, allow_only
+from arena.site.acts import looks_again, send_later
+from arena.site.forms import read_json
 from augment.errors import AugmentError, Conflict
 from augment.models import BaseScene, Scenario
 from augment.models.scenes import DENSITIES, GOALS

@@ -16,16 +16,15 @@ from django.urls import reverse
 from django.views.decorators.http import require_http_methods, require_POST, require_safe
 
 from arena.contestants.queries import asking_of
-from arena.queries.listings import Narrowing, find_scenarios, group_by_type
 from arena.scenarios import queries
 from arena.scenarios.queries import modification_lines
 from arena.scenarios.services import delete_scenario, delete_scene, rename_scene, why_not_editable
-from arena.web.access import ADMIN, STAFF, allow_only
-from arena.web.json_text import read_json
-from arena.web.listing import read_listing, read_page, said_choices
+from arena.site.access import ADMIN, STAFF, allow_only
+from arena.site.acts import Confirmation, ask, is_sure, looks_again, send_later
+from arena.site.forms import read_json
+from arena.site.listing import read_listing, read_page, said_choices
+from arena.site.queries import Narrowing, find_scenarios, group_by_type
 from arena.web.pictures import picture_response, sized_picture_response
-from arena.web.questions import Confirmation, ask, is_sure
-from arena.web.sending import looks_again, send_later
 from augment.errors import AugmentError, Conflict, QueueFault
 from augment.models import (
     Augmentation,

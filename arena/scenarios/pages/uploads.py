@@ -14,8 +14,8 @@ from django.views.decorators.http import require_POST, require_safe
 
 from arena.scenarios.queries import counts_of, place_of, scene_rows, track_maps, upload_rows
 from arena.services.sent_files import was_too_large
-from arena.web.access import STAFF, allow_only
-from arena.web.sending import looks_again, send_later
+from arena.site.access import STAFF, allow_only
+from arena.site.acts import looks_again, send_later
 from augment.errors import AugmentError
 from augment.models import BaseScene, SceneUpload, UploadMoment
 from augment.services.scenarios import uploads

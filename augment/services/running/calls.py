@@ -421,10 +421,10 @@ class RowTranscript(CallTranscript):
         self._notes = 0
         super().__init__({"attempt": self._attempt}, endpoint, others=others, key=key, sleep=sleep)
 
-    def insist(self) -> None:  # noqa: D102
+    def insist(self) -> None:
         insist_wanted(self._held, lock=True)
 
-    def earlier_answer(self, request_hash: str) -> ModelCall | None:  # noqa: D102
+    def earlier_answer(self, request_hash: str) -> ModelCall | None:
         return find_earlier_answer(
             request_hash=request_hash,
             augmentation_pk=self._row.pk,
@@ -433,13 +433,13 @@ class RowTranscript(CallTranscript):
             since=self._row.asked_anew_at,
         )
 
-    def reserve(self, worst: WorstCase, price: Price | None) -> budget.Room:  # noqa: D102
+    def reserve(self, worst: WorstCase, price: Price | None) -> budget.Room:
         return budget.reserve(job_pk=self._row.job_id, worst=worst, price=price)
 
-    def limit(self) -> str:  # noqa: D102
+    def limit(self) -> str:
         return budget.limit_of(GenerationJob.objects.get(pk=self._row.job_id))
 
-    def note(self, kind: NoteKind, document: dict[str, object]) -> None:  # noqa: D102
+    def note(self, kind: NoteKind, document: dict[str, object]) -> None:
         self._notes += 1
         TranscriptNote.objects.create(
             attempt=self._attempt,

@@ -170,18 +170,18 @@ class ReadingTranscript(CallTranscript):
         numbers = reading.calls.count()
         super().__init__({"reading": reading}, reading.endpoint, numbers=numbers)
 
-    def insist(self) -> None:  # noqa: D102
+    def insist(self) -> None:
         if not self._held.is_held(lock=True):
             raise LeaseLost
 
-    def earlier_answer(self, request_hash: str) -> ModelCall | None:  # noqa: D102
+    def earlier_answer(self, request_hash: str) -> ModelCall | None:
         if self._is_fresh:
             return None
         return calls.find_earlier_answer(
             request_hash=request_hash, augmentation_pk=0, attempt_pk=0, is_fresh=False
         )
 
-    def reserve(self, worst: WorstCase, price: Price | None) -> budget.Room:  # noqa: D102
+    def reserve(self, worst: WorstCase, price: Price | None) -> budget.Room:
         sent = self._reading.calls.exclude(sent_at=None)
         used = {
             "calls": sent.count(),
@@ -196,7 +196,7 @@ class ReadingTranscript(CallTranscript):
                 return budget.Room.SPENT
         return budget.Room.TAKEN
 
-    def limit(self) -> str:  # noqa: D102
+    def limit(self) -> str:
         return self._limit
 
     def note(self, kind: NoteKind, document: dict[str, object]) -> None:

@@ -1,0 +1,76 @@
+"""Middleware: 503 for a busy database, and headers that every answer carries."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable
+from typing import Any
+
+from django.conf import settings
+from django.db.backends.base.base import BaseDatabaseWrapper
+from django.db.backends.signals import connection_created
+from django.http import HttpRequest, HttpResponse
+from django.http.response import HttpResponseBase
+
+from arena.config import faults
+from arena.errors import DatabaseBusy
+from arena.services.turns import is_transient, limit_waiting
+from augment.errors import MediaFault
+
+logger = logging.getLogger(__name__)
+
+
+class BusyMiddleware:
+    """Answer 503 while the database can't be written or the picture storage is unreachable."""
+
+    def __init__(self, get_response: Callable[[HttpRequest], HttpResponseBase]) -> None:
+        self.get_response = get_response
+
+    def __call__(self, request: HttpRequest) -> HttpResponseBase:
+        return self.get_response(request)
+
+    def process_exception(self, request: HttpRequest, exception: Exception) -> HttpResponse | None:
+        """Return the 503 answer, or None for any other exception."""
+        if isinstance(exception, DatabaseBusy) or is_transient(exception):
+            logger.warning("%s", exception.__cause__ or exception)
+            return faults.answer_busy(request)
+        if isinstance(exception, MediaFault):
+            logger.error("%s", exception)
+            return faults.answer_without_media(request)
+        return None
+
+
+def limit_connections() -> None:
+    """Limit how long connections of a web server wait for locks; workers may wait longer."""
+    connection_created.connect(_limit)
+
+
+def _limit(connection: BaseDatabaseWrapper, **_: Any) -> None:
+    limit_waiting(connection, settings.VOTE_WAIT_S)
+
+
+NOT_KEPT = "private, no-store"
+"""Nothing of a page stays behind in a browser after signing out, nor in a proxy."""
+
+NOT_USED = (
+    *("accelerometer", "autoplay", "bluetooth", "browsing-topics", "camera", "display-capture"),
+    *("encrypted-media", "fullscreen", "geolocation", "gyroscope", "hid", "idle-detection"),
+    *("local-fonts", "magnetometer", "microphone", "midi", "payment", "picture-in-picture"),
+    *("publickey-credentials-get", "screen-wake-lock", "serial", "usb", "xr-spatial-tracking"),
+)
+"""Features of browsers that no page needs, so none may ask for them."""
+
+POLICY = ", ".join(f"{feature}=()" for feature in NOT_USED)
+
+
+class HeaderMiddleware:
+    """Add caching and permissions headers; stands first, so that errors get them as well."""
+
+    def __init__(self, get_response: Callable[[HttpRequest], HttpResponseBase]) -> None:
+        self.get_response = get_response
+
+    def __call__(self, request: HttpRequest) -> HttpResponseBase:
+        answer = self.get_response(request)
+        answer.headers.setdefault("Cache-Control", NOT_KEPT)
+        answer.headers.setdefault("Permissions-Policy", POLICY)
+        return answer

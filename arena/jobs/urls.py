@@ -1,0 +1,64 @@
+"""Addresses of the pages of jobs, drives and fault labels."""
+
+from __future__ import annotations
+
+from django.urls import URLPattern, path
+
+from arena.jobs.pages import driving, exports, jobs, labelling, launching
+
+urlpatterns: list[URLPattern] = [
+    path("jobs/", jobs.jobs_page, name="jobs"),
+    path("jobs/new/", launching.new_job_page, name="job-new"),
+    path("jobs/<uuid:code>/", jobs.job_page, name="job"),
+    path("jobs/<uuid:code>/retry/", jobs.retry_job, name="job-retry"),
+    path("jobs/<uuid:code>/retry/<slug:key>/", jobs.retry_cause, name="job-retry-cause"),
+    path("jobs/<uuid:code>/pause/", jobs.pause_job, name="job-pause"),
+    path("jobs/<uuid:code>/cancel/", jobs.cancel_job, name="job-cancel"),
+    path("jobs/<uuid:code>/resume/", jobs.resume_job, name="job-resume"),
+    path(
+        "jobs/<uuid:code>/displacement.<slug:form>",
+        exports.export_table,
+        {"name": "displacement"},
+        name="displacement-export",
+    ),
+    path("jobs/<uuid:code>/analyses/", exports.analyses_page, name="analyses"),
+    path(
+        "jobs/<uuid:code>/analyses-<slug:part>.<slug:form>",
+        exports.export_analysis,
+        name="analyses-export",
+    ),
+    path(
+        "jobs/<uuid:code>/transcripts.jsonl", exports.export_transcripts, name="transcripts-export"
+    ),
+    path(
+        "jobs/<uuid:code>/tool-calls.<slug:form>",
+        exports.export_table,
+        {"name": "tool-calls"},
+        name="tool-calls-export",
+    ),
+    path(
+        "jobs/<uuid:code>/scenarios-<slug:form>/",
+        exports.ask_for_scenarios,
+        name="scenarios-write",
+    ),
+    path("scenarios-<uuid:code>.zip", exports.download_scenarios, name="scenarios-export"),
+    path("jobs/<uuid:code>/simulate/", driving.simulate_job, name="job-simulate"),
+    path("jobs/<uuid:code>/drives/", driving.drives_page, name="drives"),
+    path(
+        "jobs/<uuid:code>/driving.<slug:form>",
+        exports.export_table,
+        {"name": "driving"},
+        name="driving-export",
+    ),
+    path("drives/<uuid:code>/", driving.drive_page, name="drive"),
+    path("drives/<uuid:code>.<slug:form>", driving.drive_trace, name="drive-file"),
+    path("jobs/<uuid:code>/faults/", labelling.faults_page, name="faults"),
+    path(
+        "jobs/<uuid:code>/faults.<slug:form>",
+        exports.export_table,
+        {"name": "faults"},
+        name="faults-export",
+    ),
+    path("label/<uuid:code>/", labelling.label_page, name="label"),
+    path("label/<uuid:code>/close/", labelling.close, name="labelling-close"),
+]
