@@ -41,7 +41,7 @@ from augment.llm.wire_transport import (
     TooLong,
     Transport,
     Watch,
-    watched,
+    watch_over,
 )
 
 if TYPE_CHECKING:
@@ -160,7 +160,7 @@ class OpenAIWire(AbstractContextManager["OpenAIWire"]):
             look_every_s=self._look_every_s,
         )
         try:
-            with watched(watch):
+            with watch_over(watch):
                 # Typed loosely on purpose: our document is what the wire takes, and is tested so.
                 answer: object = self._client.chat.completions.create(**document)  # type: ignore[call-overload]
             return self._reply(answer, time.monotonic() - started)

@@ -126,7 +126,7 @@ _WATCH: ContextVar[Watch] = ContextVar("watch over this thread's call")
 
 
 @contextmanager
-def watched(watch: Watch) -> Iterator[None]:
+def watch_over(watch: Watch) -> Iterator[None]:
     """Let this watch be the thread's while the block runs."""
     token = _WATCH.set(watch)
     try:
