@@ -16,7 +16,7 @@ from django.shortcuts import redirect, render
 from django.views.decorators.http import require_http_methods
 
 from arena.errors import ArenaError
-from arena.services.sent_files import was_too_large
+from arena.scenarios.services import was_too_large
 from arena.services.vote_imports import ImportedVotes, import_votes
 from arena.web.access import ADMIN, allow_only
 from augment.errors import AugmentError
