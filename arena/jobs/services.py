@@ -12,7 +12,7 @@ from django.utils import timezone
 
 from arena.errors import AlreadyLabelled, LabellingClosed, NothingToPlan, NotYours
 from arena.models import FaultLabel, LabellingRound, LabelTask, ScenarioFile
-from arena.queries.people import experts as expert_accounts
+from arena.people.queries import experts as expert_accounts
 from arena.services.written_files import waiting_row
 from augment.errors import Conflict, UnknownName
 from augment.models import Augmentation, GenerationJob

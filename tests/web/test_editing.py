@@ -29,7 +29,7 @@ def analyst(monkeypatch: pytest.MonkeyPatch) -> Client:
     monkeypatch.setattr("arena.scenarios.pages.editing.enqueue_scenario", draw_scenario)
     monkeypatch.setattr("arena.scenarios.pages.scenarios.enqueue_scenario", draw_scenario)
     monkeypatch.setattr("arena.scenarios.pages.editing.enqueue_job", run_job)
-    monkeypatch.setattr("arena.web.sending.transaction.on_commit", lambda done: done())
+    monkeypatch.setattr("arena.site.acts.transaction.on_commit", lambda done: done())
     return signed_in(people()["analyst"])
 
 

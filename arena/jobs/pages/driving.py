@@ -16,10 +16,9 @@ from arena.exports.tables import LeaderboardTable
 from arena.jobs.exports.driving import FORMATS, SCORE_LABELS, DrivingTable, driving_table
 from arena.jobs.queries import DRIVES, Part, before_of, drive_cells, shown_augmentations
 from arena.models import Snapshot
-from arena.web.access import ADMIN, STAFF, allow_only
-from arena.web.listing import choice_asked, page_asked
-from arena.web.questions import refusals_told
-from arena.web.sending import send_later
+from arena.site.access import ADMIN, STAFF, allow_only
+from arena.site.acts import refusals_told, send_later
+from arena.site.listing import choice_asked, page_asked
 from augment.errors import UnknownName
 from augment.models import GenerationJob, Simulation
 from augment.services.judging import simulations

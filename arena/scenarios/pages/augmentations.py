@@ -15,9 +15,9 @@ from django.views.decorators.http import require_safe
 
 from arena.contestants.queries import asking_of
 from arena.scenarios.queries import modification_lines
-from arena.web.access import STAFF, allow_only
+from arena.site.access import STAFF, allow_only
+from arena.site.acts import looks_again, send_later
 from arena.web.pictures import picture_response, sized_picture_response
-from arena.web.sending import looks_again, send_later
 from augment.errors import AugmentError, UnknownName
 from augment.models import Augmentation, BaseScene, Contestant, Scenario, Simulation, UploadMoment
 from augment.services.endpoints.contestants import asking_contestants, preview_contestant

@@ -13,10 +13,9 @@ from django.views.decorators.http import require_http_methods, require_POST
 
 from arena.scenarios.pages.uploads import look_at
 from arena.scenarios.services import drop_reference, set_reference, why_not_editable
-from arena.web.access import STAFF, allow_only, user_of
-from arena.web.json_text import read_json
-from arena.web.questions import refusals_told
-from arena.web.sending import send_later
+from arena.site.access import STAFF, allow_only, user_of
+from arena.site.acts import refusals_told, send_later
+from arena.site.forms import read_json
 from augment.errors import AugmentError, Conflict
 from augment.models import Augmentation, Scenario
 from augment.services.judging.findings import check_edit

@@ -16,10 +16,9 @@ from django.views.decorators.http import require_http_methods
 
 from arena.scenarios.pages.uploads import look_at
 from arena.scenarios.services import change_scenario, was_too_large
-from arena.web.access import STAFF, allow_only, user_of
-from arena.web.json_text import read_json
-from arena.web.questions import refusals_in
-from arena.web.sending import send_later
+from arena.site.access import STAFF, allow_only, user_of
+from arena.site.acts import refusals_in, send_later
+from arena.site.forms import read_json
 from augment.errors import AugmentError, Conflict
 from augment.models import BaseScene, Scenario
 from augment.models.scenes import DENSITIES, GOALS

@@ -12,13 +12,12 @@ from django.shortcuts import get_object_or_404, redirect, render
 from django.urls import reverse
 from django.views.decorators.http import require_http_methods, require_POST, require_safe
 
-from arena.queries.listings import Narrowing, find_scenarios, group_by_type
 from arena.scenarios import queries, services
-from arena.web.access import ADMIN, STAFF, allow_only, user_of
-from arena.web.json_text import read_json
-from arena.web.listing import read_listing, read_page, said_choices
-from arena.web.questions import Confirmation, ask, is_sure, refusals_told
-from arena.web.sending import looks_again, send_later
+from arena.site.access import ADMIN, STAFF, allow_only, user_of
+from arena.site.acts import Confirmation, ask, is_sure, looks_again, refusals_told, send_later
+from arena.site.forms import read_json
+from arena.site.listing import read_listing, read_page, said_choices
+from arena.site.queries import Narrowing, find_scenarios, group_by_type
 from augment.errors import Conflict
 from augment.models import BaseScene, EndpointModel, Scenario
 from augment.services.endpoints.contestants import ensure_builtin

@@ -12,9 +12,8 @@ from django.views.decorators.http import require_POST, require_safe
 
 from arena.scenarios import queries
 from arena.scenarios.services import was_too_large
-from arena.web.access import STAFF, allow_only, user_of
-from arena.web.questions import refusals_told
-from arena.web.sending import looks_again, send_later
+from arena.site.access import STAFF, allow_only, user_of
+from arena.site.acts import looks_again, refusals_told, send_later
 from augment.errors import Conflict
 from augment.models import BaseScene, SceneUpload, UploadMoment
 from augment.services.scenarios import uploads
