@@ -45,9 +45,8 @@ lint: $(VENV)/.test ## Format, style, floors and types
 screenshots: chromium ## Every page, light and dark, into docs/images/pages
 	$(BIN)/python -m tests.screenshots
 
-bench: chromium ## Ours beside other products, each in its own environment; writes docs/benchmarks.md
-	$(BIN)/python -m bench.rivals.voting
-	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m bench.rating_speed
+bench: $(VENV)/.test ## Votes a second and the rating of many; writes docs/benchmarks.md
+	$(BIN)/python -m bench.voting
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m bench.rating_scale --write
 
 figures: $(VENV)/.test ## Write the figures of README, method.md and catalogue.md

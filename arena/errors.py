@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from augment.errors import AugmentError
 
-class ArenaError(Exception):
+
+class ArenaError(AugmentError):
     """The root of arena's own errors: its text is a sentence for the person who caused it."""
 
 

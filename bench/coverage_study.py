@@ -17,14 +17,13 @@ from pathlib import Path
 
 import numpy as np
 
-from arena.rating import bradley_terry, remarks, sandwich
-from arena.rating.bootstrap import Unit
-from arena.rating.bradley_terry import DidNotConverge, Meetings, to_elo
+from arena.rating import models, remarks, sandwich
 from arena.rating.comparisons import BoolArray, Comparisons, FloatArray, count_pairs
 from arena.rating.leaderboard import FEWEST_TO_JUDGE
-from arena.rating.moderated import spread_of
+from arena.rating.models import DidNotConverge, Meetings, to_elo
 from arena.rating.ranking import judge_pairs
-from arena.rating.sandwich import bradley_terry_pulls
+from arena.rating.rules import Unit
+from arena.rating.sandwich import pulls_of_model, spread_of
 from bench.worlds import World, paper_ratings
 
 EFFECTS = ((0.0, 0.0), (100.0, 40.0), (0.0, 80.0))
@@ -108,15 +107,15 @@ def study(world: World, *, studies: int, judge: bool = False) -> Found:
 
 def _add(found: Found, votes: Comparisons, truth: FloatArray, seed: int | None) -> None:
     counts = count_pairs(votes)
-    met = Meetings(contestants=len(truth), low=counts.low, high=counts.high)
-    strengths = bradley_terry.newton(met, counts.games[:, None], counts.scores[:, None])[:, 0]
-    inverse = bradley_terry.inverse_curvature(met, counts.games, strengths)
-    pulls = bradley_terry_pulls(votes, strengths, inverse)
-    rating, spread = to_elo(strengths), spread_of(votes, pulls, Unit.TWO_WAY)
+    met = Meetings(len(truth), counts)
+    strengths = models.fit(met, counts.games[:, None], counts.scores[:, None])[:, 0]
+    pulls = pulls_of_model(votes, met, counts.games, strengths)
+    rating, spread = to_elo(strengths), spread_of(pulls, Unit.TWO_WAY)
     few = sandwich.factor(remarks.few_clusters(votes, Unit.TWO_WAY))
+    plain = sandwich.plain_covariance(pulls, Unit.TWO_WAY, keep_variances=True)
     half_widths = {
         DEFAULT: spread.half_widths(),
-        CHECK: few * np.sqrt(np.maximum(spread.plain.diagonal(), 0.0)),
+        CHECK: few * np.sqrt(np.maximum(plain.diagonal(), 0.0)),
         SINGLE: sandwich.NORMAL * np.sqrt(pulls.by_row().diagonal()),
     }
     for method, half_width in half_widths.items():

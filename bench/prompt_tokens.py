@@ -28,8 +28,8 @@ from augment.prompts.vectors import LaneFormat
 from augment.scene.entities import Modification, Scene
 from augment.variants.recipes import RECIPES
 from augment.variants.showing import shown_prompt
+from bench.environments import BENCH, python_of
 from bench.report import PAGE, table, write_block
-from bench.rivals.environments import RIVALS, python_of
 from tests.fixtures.shelf import HARD_SLUGS, SLUGS, entry, shown_scene, whole_scene
 from tests.intents import intents
 from tests.variants.pose_accuracy import recorded_scenes
@@ -88,7 +88,7 @@ def tokens(slug: str, scenes: list[Scene]) -> list[int]:
 def counted(texts: list[str]) -> list[int]:
     """How many tokens each text has."""
     ended = subprocess.run(
-        [str(python_of("tokens")), str(RIVALS / "tokens" / "counter.py"), VOCABULARY],
+        [str(python_of("tokens")), str(BENCH / "tokens" / "counter.py"), VOCABULARY],
         input=json.dumps(texts),
         stdout=subprocess.PIPE,
         text=True,

@@ -3,7 +3,7 @@
     python -m bench.rating_scale [--rows N ...] [--write]
 
 Each row is a process of its own, which makes the votes, rates them with all defaults and details
-on every core, and says what rating took; memory is the most that the process ever held, votes
+and says what rating took; memory is the most that the process ever held, votes
 included. One row is a file rated by `manage.py rate_csv`, start of the process and reading
 included. All votes are simulated; some experts give many more of them than others. `--write` puts
 the table into docs/benchmarks.md.
@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import os
 import resource
 import subprocess
 import sys
@@ -24,19 +23,19 @@ from pathlib import Path
 
 import numpy as np
 
-from arena.rating.bradley_terry import ELO_PER_LOGIT
 from arena.rating.comparisons import Comparisons, IntArray
 from arena.rating.leaderboard import rate
-from bench.rating_sizes import WINNERS
+from arena.rating.models import ELO_PER_LOGIT
 from bench.report import load, table, write_section
 
 ROOT = Path(__file__).resolve().parents[1]
 HEADING = "Intervals in closed form, with many contestants"
 TIES = 0.3
+WINNERS = ("model_a", "tie", "model_b")
 
 
 WHAT = """`python -m bench.rating_scale [--write]` (in `make bench`): `rate(votes)` with
-its defaults (two-way, rank sets, cross-check) on every core, each row in a process of its own.
+its defaults (two-way, rank sets, cross-check) each row in a process of its own.
 Simulated votes; the experts' numbers of votes differ widely."""
 BELOW = (
     """Targets: 2 s for LLMFAO's size and 5 s for football's (simulated alike; the files are not at
@@ -100,7 +99,7 @@ def measure(crowd: Crowd) -> dict[str, float]:
             command = [sys.executable, "manage.py", "rate_csv", str(sheet)]
             subprocess.run(command, cwd=ROOT, check=True, stdout=subprocess.DEVNULL)
         else:
-            rate(votes, workers=os.cpu_count() or 1)
+            rate(votes)
         took = time.perf_counter() - began
     return {
         "processor_s": _processor(who) - before,

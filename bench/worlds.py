@@ -22,9 +22,8 @@ import numpy as np
 from arena.pairing.adaptive import draw_units, ratings_so_far
 from arena.pairing.plan import Entry, PlanRules, plan
 from arena.pairing.rules import Grid, grid_of
-from arena.rating import bradley_terry
-from arena.rating.bradley_terry import ELO_PER_LOGIT
-from arena.rating.comparisons import LOSS, TIE, WIN, Comparisons, FloatArray, IntArray
+from arena.rating.comparisons import LOSS, TIE, WIN, Comparisons, FloatArray, IntArray, PairCounts
+from arena.rating.models import ELO_PER_LOGIT, Meetings, fit, to_elo
 
 PAPER = Path(__file__).parents[1] / "tests" / "rating" / "paper_table.json"
 SCENARIOS = 50
@@ -75,15 +74,8 @@ class World:
         """
         win, loss, weights = self._chances_of_pairs(thresholds)
         scores = 0.5 * (1.0 + (1.0 - self.spammers) * (win - loss).mean(axis=0) @ weights)
-        low, high = np.triu_indices(len(self.ratings), 1)
-        fitted = bradley_terry.fit(
-            contestants=len(self.ratings),
-            low=low,
-            high=high,
-            games=np.ones((1, len(low))),
-            scores=scores[None],
-        )
-        return bradley_terry.to_elo(fitted[0])
+        met = Meetings(len(self.ratings), _one_game_a_pair(len(self.ratings)))
+        return to_elo(fit(met, np.ones((len(scores), 1)), scores[:, None])[:, 0])
 
     def tie_share(self) -> float:
         """Of all votes, pairs alike frequent."""
@@ -234,6 +226,13 @@ def _handed_over(planned: IntArray, experts: int, rng: np.random.Generator) -> I
                 expert[place] = takers[int(rng.integers(len(takers)))]
                 known[expert[place]].add(int(units[place]))
     return expert
+
+
+def _one_game_a_pair(contestants: int) -> PairCounts:
+    low, high = np.triu_indices(contestants, 1)
+    nobody = np.empty(0, dtype=np.int64)
+    outcomes = np.tile([1, 0, 0], (len(low), 1))
+    return PairCounts(low=low, high=high, outcomes=outcomes, pair_of=nobody, outcome_of=nobody)
 
 
 def _chances(gap: FloatArray, threshold: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from arena.exports.columns import PRINTED
 from arena.exports.tables import LeaderboardTable, Row
-from arena.rating.printed import caption_text, escape, latex_table
+from arena.rating.lines import caption_text, escape, latex_table
 
 __all__ = ["escape", "latex"]
 

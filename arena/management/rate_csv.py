@@ -5,7 +5,6 @@ manage.py comes here directly; `call_command("rate_csv")` takes the same way.
 
 from __future__ import annotations
 
-import os
 import sys
 import time
 from argparse import ArgumentParser, RawDescriptionHelpFormatter
@@ -14,9 +13,8 @@ from pathlib import Path
 
 from arena.management.progress_line import ProgressLine
 from arena.management.rated_csv import FORMATS, RatedCsv
-from arena.rating.bootstrap import Unit
 from arena.rating.leaderboard import Intervals, Leaderboard, Method, Order, rate
-from arena.rating.rules import TooManyContestants, default_intervals, unit_for
+from arena.rating.rules import TooManyContestants, Unit, default_intervals, unit_for
 from arena.rating.votes_file import SIDE, VotesFile, VotesFileUnreadable, columns_of, read_votes
 from augment.escaping import escape_controls
 
@@ -149,7 +147,6 @@ def run(
             order=Order(order),
             rounds=rounds or default,
             seed=seed,
-            workers=os.cpu_count() or 1,
             report=progress.drawn if progress else None,
         )
     except TooManyContestants as error:

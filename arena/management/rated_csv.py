@@ -10,13 +10,12 @@ from typing import Any
 
 import numpy as np
 
-from arena.rating.bootstrap import Unit
 from arena.rating.leaderboard import Intervals, Leaderboard, Line
+from arena.rating.lines import HEADS as PAPERS_HEADS
+from arena.rating.lines import caption_text, escape, latex_table, notes_by_reason
 from arena.rating.logistic import Coefficient
-from arena.rating.printed import HEADS as PAPERS_HEADS
-from arena.rating.printed import caption_text, escape, latex_table, notes_by_reason
 from arena.rating.ranking import Separation
-from arena.rating.rules import METHOD_TEXTS
+from arena.rating.rules import METHOD_TEXTS, Unit
 from arena.services.cells import csv_text
 from augment.escaping import escape_controls
 

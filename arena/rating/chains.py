@@ -12,13 +12,27 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
-from typing import Self
 
 import numpy as np
 
-from arena.rating.comparisons import BoolArray, FloatArray, IntArray, PairCounts
+from arena.rating.comparisons import (
+    LEVEL,
+    BoolArray,
+    Comparisons,
+    FloatArray,
+    IntArray,
+    PairCounts,
+    count_pairs,
+    renumber_codes,
+    select_votes,
+    split_votes,
+)
+from arena.rating.lines import Line
+from arena.rating.models import ELO_PER_LOGIT, Meetings, fit
+from arena.rating.rules import Unit
 
 _BITS_AT_ONCE = 32_000_000
+_TAIL = (1.0 - LEVEL) / 2.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -39,32 +53,10 @@ class Chains:
     scored: BoolArray
     conceded: BoolArray
 
-    @classmethod
-    def of_nobody(cls) -> Self:
-        """Return the chains among no contestants."""
-        numbers, flags = np.empty(0, dtype=np.int64), np.empty(0, dtype=np.bool_)
-        return cls(
-            part_of=numbers,
-            group_of=numbers,
-            between=np.empty((0, 0), dtype=np.bool_),
-            scored=flags,
-            conceded=flags,
-        )
-
-    def by_group(self) -> Self:
-        """Return the same with whole groups for parts, for methods that rate whoever met."""
-        number = len(self.groups())
-        return replace(self, part_of=self.group_of, between=np.eye(number, dtype=np.bool_))
-
     @property
     def sizes(self) -> IntArray:
         """(K,) members of each part."""
         return np.bincount(self.part_of)
-
-    @property
-    def first_of_parts(self) -> IntArray:
-        """(K,) the first member of each part."""
-        return np.unique(self.part_of, return_index=True)[1]
 
     def above(self) -> IntArray:
         """(C,) how many of other parts reach each one."""
@@ -82,63 +74,43 @@ class Chains:
 
 def chains_among(contestants: int, counts: PairCounts) -> Chains:
     """Return who reaches whom in votes on so many contestants."""
-    games, scores = counts.games[:, None], counts.scores[:, None]
-    scored = _scored(contestants, counts.low, counts.high, games, scores)
-    reached, met = closure(scored)[0], closure(scored | scored.transpose(0, 2, 1))[0]
+    met = Meetings(contestants, counts)
+    scored = _scored(met, counts.games[:, None], counts.scores[:, None])
+    reached, connected = closure(scored)[0], closure(scored | scored.transpose(0, 2, 1))[0]
     part_of = _numbered(reached & reached.T)
     first = np.unique(part_of, return_index=True)[1]
     others = scored[0] & ~np.eye(contestants, dtype=np.bool_)
     return Chains(
         part_of=part_of,
-        group_of=_numbered(met),
+        group_of=_numbered(connected),
         between=reached[np.ix_(first, first)],
         scored=others.any(axis=1),
         conceded=others.any(axis=0),
     )
 
 
-def chains_in_sets(
-    *, contestants: int, low: IntArray, high: IntArray, games: FloatArray, scores: FloatArray
-) -> BoolArray:
+def chains_in_sets(met: Meetings, games: FloatArray, scores: FloatArray) -> BoolArray:
     """(n, C, C) who reached whom in each of n sets of votes.
 
     The row's contestant reached the column's by a score against them, or through a chain.
 
     Args:
-        contestants: C.
-        low: (P,) who met.
-        high: (P,) whom.
+        met: The pairs.
         games: (P, n) comparisons of each pair in each set.
         scores: (P, n) what `low` scored in them.
     """
-    return closure(_scored(contestants, low, high, games, scores))
+    return closure(_scored(met, games, scores))
 
 
-def are_determined(
-    *, contestants: int, low: IntArray, high: IntArray, games: FloatArray, scores: FloatArray
-) -> BoolArray:
+def are_determined(met: Meetings, games: FloatArray, scores: FloatArray) -> BoolArray:
     """(n,) which sets have finite Bradley-Terry strengths for everybody; as `chains_in_sets`."""
     found = np.empty(games.shape[1], dtype=np.bool_)
-    at_once = max(1, _BITS_AT_ONCE // max(1, contestants**2))
+    at_once = max(1, _BITS_AT_ONCE // max(1, met.contestants**2))
     for first in range(0, len(found), at_once):
         some = slice(first, first + at_once)
-        scored = _scored(contestants, low, high, games[:, some], scores[:, some])
+        scored = _scored(met, games[:, some], scores[:, some])
         found[some] = _all_from_first(scored) & _all_from_first(scored.transpose(0, 2, 1))
     return found
-
-
-def heaviest_tree(contestants: int, low: IntArray, high: IntArray, weight: FloatArray) -> IntArray:
-    """Return the pairs of the heaviest tree (Kruskal 1956), over pairs of weight above zero."""
-    group = np.arange(contestants)
-    chosen: list[int] = []
-    for pair in np.argsort(-weight, kind="stable"):
-        one, other = group[low[pair]], group[high[pair]]
-        if weight[pair] > 0 and one != other:
-            group[group == other] = one
-            chosen.append(int(pair))
-            if len(chosen) == contestants - 1:
-                break
-    return np.array(chosen, dtype=np.int64)
 
 
 def closure(edges: BoolArray) -> BoolArray:
@@ -154,14 +126,13 @@ def closure(edges: BoolArray) -> BoolArray:
 # --- Private -----------------------------------------------------------------------------------
 
 
-def _scored(
-    contestants: int, low: IntArray, high: IntArray, games: FloatArray, scores: FloatArray
-) -> BoolArray:
+def _scored(met: Meetings, games: FloatArray, scores: FloatArray) -> BoolArray:
     """(n, C, C) whether the row's contestant ever scored against the column's; itself counts."""
-    scored = np.zeros((games.shape[1], contestants, contestants), dtype=np.bool_)
-    scored[:, low, high] = (scores > 0).T
-    scored[:, high, low] = (scores < games).T
-    scored[:, np.arange(contestants), np.arange(contestants)] = True
+    everybody = np.arange(met.contestants)
+    scored = np.zeros((games.shape[1], len(everybody), len(everybody)), dtype=np.bool_)
+    scored[:, met.low, met.high] = (scores > 0).T
+    scored[:, met.high, met.low] = (scores < games).T
+    scored[:, everybody, everybody] = True
     return scored
 
 
@@ -228,7 +199,7 @@ class Diagnosis:
 
     status: Status
     explanation: tuple[str, ...] = ()
-    chains: Chains = field(default_factory=Chains.of_nobody, compare=False)
+    chains: Chains = field(compare=False)
     notes: tuple[str, ...] = ()
 
 
@@ -242,13 +213,14 @@ def diagnose(
         counts: Of the full data.
         bounded_anyway: The method rates also those who won or lost everything.
     """
-    if not len(names) or not counts.outcomes.sum():
-        said = "There are no votes to rate."
-        return Diagnosis(status=Status.NO_VOTES, explanation=(said,))
     chains = chains_among(len(names), counts)
+    if not counts.outcomes.sum():
+        said = "There are no votes to rate."
+        return Diagnosis(status=Status.NO_VOTES, explanation=(said,), chains=chains)
     groups = chains.groups()
-    if bounded_anyway:
-        chains = chains.by_group()
+    if bounded_anyway:  # whoever met is rated together
+        apart = np.eye(len(groups), dtype=np.bool_)
+        chains = replace(chains, part_of=chains.group_of, between=apart)
     parts = chains.parts()
     if len(parts) > 1:
         explanation = [_who_is_apart(names, groups)] if len(groups) > 1 else []
@@ -303,7 +275,8 @@ _LIMITS = {
 
 def _who_is_unbounded(names: tuple[str, ...], chains: Chains) -> list[str]:
     """Sentences about those who won or lost everything against the rest that they met."""
-    members, group_of_part = chains.parts(), chains.group_of[chains.first_of_parts]
+    members = chains.parts()
+    group_of_part = chains.group_of[[part[0] for part in members]]
     has_rest = np.bincount(group_of_part)[group_of_part] > 1
     is_unbeaten = has_rest & (chains.between.sum(axis=0) == 1)
     is_scoreless = has_rest & (chains.between.sum(axis=1) == 1)
@@ -329,3 +302,170 @@ def _joined(groups: Sequence[str]) -> str:
 
 def _listed(names: tuple[str, ...], group: Sequence[int]) -> str:
     return ", ".join(few_of([names[index] for index in group]))
+
+
+# --- Contestants above or below others without any limit -----------------------------------------
+#
+# Who scored against others who never scored back is above them, and no vote says by how much at
+# most. At least by how much is known, though: of m independent comparisons that all went one way
+# the share p that the winner may be expected to score is at least 0.025^(1/m), with 97.5 %
+# confidence (the exact binomial bound, Clopper and Pearson 1934). Ratings with these shares in
+# place of 100 % are finite, and between two parts they lie as near to each other as the votes
+# allow. Votes that hang together count as one: m is the number of the experts or scenarios.
+
+
+def find_levels(votes: Comparisons, chains: Chains, unit: Unit) -> FloatArray:
+    """Return (C,) points: where each one's part lies at least above the next lower one.
+
+    Or at most below the next higher one. Zero is the mean of the group.
+
+    Args:
+        votes: Of contestants who all have votes.
+        chains: Of these votes.
+        unit: What hangs together.
+    """
+    levels = np.zeros(len(votes.names))
+    groups = chains.groups()
+    if len(groups) < len(chains.sizes):
+        for group, inside in zip(groups, split_votes(votes, groups), strict=True):
+            members = list(group)
+            part_of = chains.part_of[members]
+            if (part_of != part_of[0]).any():
+                levels[members] = _levels_of_group(inside, part_of, unit)
+    return levels
+
+
+def standing_order(chains: Chains, lines: Sequence[Line]) -> list[int]:
+    """Return the contestants, best first, group by group.
+
+    Whoever scored stands above those who never scored back, and within a part the rating decides.
+    Who has neither rating nor rank comes last.
+    """
+    above_me = chains.above()
+    keys = [
+        (
+            int(chains.group_of[number]),
+            line.rating is None and line.rank is None,
+            int(above_me[number]),
+            int(chains.part_of[number]),
+            -(line.rating or 0.0),
+            line.name,
+        )
+        for number, line in enumerate(lines)
+    ]
+    return sorted(range(len(lines)), key=keys.__getitem__)
+
+
+def outer_bounds(chains: Chains, levels: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return (C,), (C,) points above the mean of the main part, of those alone in their part.
+
+    Only a lower bound for who is above it with nobody above them, only an upper one for who is
+    below it with nobody below; NaN is no bound. Where there is no main part the mean is that of
+    the group.
+    """
+    lower, upper = np.full((2, len(levels)), np.nan)
+    is_main = _main_parts(chains, levels)
+    level = levels - _middle(chains, levels, is_main)
+    others = chains.between & ~np.eye(len(chains.between), dtype=np.bool_)
+    for alone in np.flatnonzero(chains.sizes[chains.part_of] == 1).tolist():
+        in_group = chains.group_of == chains.group_of[alone]
+        base = in_group & is_main if (in_group & is_main).any() else in_group
+        part = chains.part_of[alone]
+        above, below = others[part], others[:, part]
+        if above[chains.part_of[base]].any() and not below.any():
+            lower[alone] = level[alone]
+        elif below[chains.part_of[base]].any() and not above.any():
+            upper[alone] = level[alone]
+    return lower, upper
+
+
+def ranks_across(
+    chains: Chains, levels: FloatArray, rank: IntArray, lower: FloatArray, upper: FloatArray
+) -> IntArray:
+    """Return (C,) ranks within the parts, moved down by those of higher parts; 0 is withheld.
+
+    Who is on top by the votes is first where these show them above the average; who is below
+    others has a rank only where somebody is shown to be above them. Those of the main part keep
+    their ranks.
+
+    Args:
+        chains: Who reaches whom.
+        levels: (C,) where the parts stand.
+        rank: (C,) within the own part, 0 where withheld.
+        lower: (C,) bounds above the mean of the own part, NaN without one; zero for who is alone.
+        upper: (C,) the same.
+    """
+    is_alone = chains.sizes[chains.part_of] == 1
+    is_main = _main_parts(chains, levels)
+    low = levels + np.where(np.isnan(lower), -np.inf, lower)
+    high = levels + np.where(np.isnan(upper), np.inf, upper)
+    others = chains.between & ~np.eye(len(chains.between), dtype=np.bool_)
+    higher = np.zeros(len(low), dtype=np.int64)
+    for part in np.flatnonzero(others.any(axis=0)).tolist():
+        members = np.flatnonzero(chains.part_of == part)
+        bounds = np.sort(low[others[chains.part_of, part]])
+        higher[members] = len(bounds) - np.searchsorted(bounds, high[members], side="right")
+    has_lower = np.asarray(others.any(axis=1))[chains.part_of]
+    has_higher = np.asarray(others.any(axis=0))[chains.part_of]
+    inner = np.where(is_alone, 1, rank)
+    keeps = is_main | ~(has_lower | has_higher | is_alone)
+    is_above_middle = low > _middle(chains, levels, is_main)
+    is_first = has_lower & ~has_higher & is_above_middle & (inner == 1)
+    decided = np.where(keeps, rank > 0, (inner > 1) | is_first) | (higher > 0)
+    return np.where(decided, np.maximum(inner, 1) + higher, 0)
+
+
+def _main_parts(chains: Chains, levels: FloatArray) -> BoolArray:
+    """Return (C,) who is in the largest part of their group, the highest of these; none of one."""
+    size = chains.sizes[chains.part_of]
+    is_main = np.zeros(len(size), dtype=np.bool_)
+    for members in chains.groups():
+        best = max(members, key=lambda member: (size[member], levels[member]))
+        if size[best] > 1:
+            is_main |= chains.part_of == chains.part_of[best]
+    return is_main
+
+
+def _middle(chains: Chains, levels: FloatArray, is_main: BoolArray) -> FloatArray:
+    """Return (C,) the level of the main part of each one's group, zero without one."""
+    middle = np.zeros(len(levels))
+    for group in np.unique(chains.group_of[is_main]).tolist():
+        inside = chains.group_of == group
+        middle[inside] = levels[inside & is_main].mean()
+    return middle
+
+
+def _levels_of_group(votes: Comparisons, part_of: IntArray, unit: Unit) -> FloatArray:
+    """Return (C,) the mean of each one's part when every separation is as small as it may be."""
+    counts = count_pairs(votes)
+    games, scores = counts.games, counts.scores.copy()
+    ends = np.sort([part_of[counts.low], part_of[counts.high]], axis=0)
+    across = np.flatnonzero(ends[0] != ends[1])
+    parts, meeting_of = np.unique(ends[:, across], axis=1, return_inverse=True)
+    rows = np.flatnonzero(np.isin(counts.pair_of, across))
+    of_row = meeting_of[np.searchsorted(across, counts.pair_of[rows])]
+    number = _independent_votes(select_votes(votes, rows), of_row, parts.shape[1], unit)
+    share = (_TAIL ** (1.0 / number))[meeting_of]
+    scores[across] = games[across] * np.where(scores[across] > 0.0, share, 1.0 - share)
+    met = Meetings(len(votes.names), counts)
+    strengths = fit(met, games[:, None], scores[:, None])[:, 0] * ELO_PER_LOGIT
+    _, place = np.unique(part_of, return_inverse=True)
+    mean = np.bincount(place, weights=strengths) / np.bincount(place)
+    return np.asarray(mean[place])
+
+
+def _independent_votes(
+    votes: Comparisons, of_row: IntArray, meetings: int, unit: Unit
+) -> IntArray:
+    """Return (M,) how many votes of each of M meetings of two parts count as independent.
+
+    What there is only one of is left out; `of_row` (R,) is the meeting of each row.
+    """
+    fewest: FloatArray = np.full(meetings, np.inf)
+    for kind in unit.kinds:
+        occurring, place = renumber_codes(getattr(votes, kind))
+        met = np.unique(of_row * len(occurring) + place)
+        different = np.bincount(met // len(occurring), minlength=meetings)
+        fewest = np.where(different > 1, np.minimum(fewest, different), fewest)
+    of_all = np.bincount(of_row, weights=votes.count, minlength=meetings)
+    return np.where(np.isinf(fewest), of_all, fewest).astype(np.int64)

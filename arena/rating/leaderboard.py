@@ -16,14 +16,20 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, fields, replace
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 
-from arena.rating import elo, remarks
-from arena.rating.bootstrap import Unit
-from arena.rating.bradley_terry import MEAN_ELO
-from arena.rating.chains import Diagnosis, Status, diagnose
+from arena.rating import models, remarks
+from arena.rating.chains import (
+    Diagnosis,
+    Status,
+    diagnose,
+    find_levels,
+    outer_bounds,
+    ranks_across,
+    standing_order,
+)
 from arena.rating.comparisons import (
     Comparisons,
     FloatArray,
@@ -45,17 +51,14 @@ from arena.rating.rules import (
     Report,
     Rules,
     TooManyContestants,
+    Unit,
     default_intervals,
 )
-from arena.rating.tiers import Tiers, outer_bounds, ranks_across, standing_order, tiers
 
-__all__ = ["Intervals", "Leaderboard", "Line", "Method", "Order", "Unit", "anchor_board", "rate"]
-
-T = TypeVar("T", bound=str)
+__all__ = ["Intervals", "Leaderboard", "Line", "Method", "Order", "Unit", "rate"]
 
 ROUNDS = 10_000
 PAPER_ROUNDS = 1000
-_NO_VOTES = "no votes"
 FEWEST_TO_JUDGE = 5
 """With three experts equals were told apart in up to 9 % of simulated studies."""
 
@@ -115,12 +118,11 @@ class Leaderboard:
         Only intervals in closed form that know of experts or scenarios, at least five of each,
         hold it: votes that hang together unseen tell equals apart in every second study.
         """
-        clusters = {Unit.EXPERT: self.experts, Unit.SCENARIO: self.scenarios}
-        there = {unit: number for unit, number in clusters.items() if number > 1}
-        seen = there if self.unit is Unit.TWO_WAY else {self.unit}
-        holds = there.keys() <= set(seen) and min(there.values(), default=0) >= FEWEST_TO_JUDGE
-        is_closed = self.intervals is Intervals.CLOSED_FORM
-        return self.separation if holds and is_closed else None
+        numbers = {"expert": self.experts, "scenario": self.scenarios}
+        several = {kind: number for kind, number in numbers.items() if number > 1}
+        is_known = several.keys() <= set(self.unit.kinds)
+        holds = is_known and min(several.values(), default=0) >= FEWEST_TO_JUDGE
+        return self.separation if holds and self.intervals is Intervals.CLOSED_FORM else None
 
     @property
     def explanation(self) -> str:
@@ -136,10 +138,9 @@ def rate(
     unit: Unit | None = None,
     intervals: Intervals | None = None,
     seed: int = 0,
-    k: float = elo.K,
+    k: float = models.K,
     order: Order = Order.SHUFFLED,
     details: bool = True,
-    workers: int = 1,
     report: Report | None = None,
 ) -> Leaderboard:
     """Rate all contestants that have votes, with 95 % intervals on the Elo scale, mean 1000.
@@ -162,7 +163,6 @@ def rate(
         k: Points at stake in a vote, online Elo only.
         order: Online Elo's point: the median over shuffled rounds, or the recorded order.
         details: Also what costs extra: covariance, cross-check and separation.
-        workers: Threads, where they help; the answer does not depend on how many.
         report: Is told how many rounds are done.
 
     Raises:
@@ -170,42 +170,32 @@ def rate(
         ValueError: Fewer than one round, online Elo with a unit other than votes, or covariates
             with another method than Bradley-Terry or with resampled intervals.
     """
-    if unit is None:
-        unit = Unit.VOTE if method is Method.ELO else Unit.TWO_WAY
-    if votes.covariates.shape[1]:
-        intervals = _intervals_beside_covariates(method, intervals)
-    rules = Rules(
-        method=method,
-        unit=unit,
-        intervals=intervals or default_intervals(method, unit),
-        rounds=rounds,
-        seed=seed,
-        k=k,
-        order=order,
-        details=details,
-        workers=workers,
-        report=report,
-    )
-    return _rate(votes, rules)
-
-
-def _intervals_beside_covariates(method: Method, intervals: Intervals | None) -> Intervals:
-    if method is not Method.BRADLEY_TERRY or intervals not in (None, Intervals.CLOSED_FORM):
-        raise ValueError("covariates need Bradley-Terry with intervals in closed form")
-    return Intervals.CLOSED_FORM
-
-
-def _rate(votes: Comparisons, rules: Rules) -> Leaderboard:
     if len(votes.names) > MOST_CONTESTANTS:
         raise TooManyContestants(
             f"at most {MOST_CONTESTANTS} contestants can be rated together, not {len(votes.names)}"
         )
+    if unit is None:
+        unit = Unit.VOTE if method is Method.ELO else Unit.TWO_WAY
+    if votes.covariates.shape[1]:
+        intervals = intervals or Intervals.CLOSED_FORM
+        if method is not Method.BRADLEY_TERRY or intervals is not Intervals.CLOSED_FORM:
+            raise ValueError("covariates need Bradley-Terry with intervals in closed form")
+    intervals = intervals or default_intervals(method, unit)
+    return _rate(votes, Rules(method, unit, intervals, rounds, seed, k, order, details, report))
+
+
+def _rate(votes: Comparisons, rules: Rules) -> Leaderboard:
     counted = tally(votes)
     present = np.flatnonzero(counted.sum(axis=1)).tolist()
     counting = restrict_to(votes, present)
-    diagnosis = _diagnose(votes, counting, rules.method)
+    # Online Elo's steps of at most K points stay finite whoever wins.
+    diagnosis = diagnose(
+        counting.shown, count_pairs(counting), bounded_anyway=rules.method is Method.ELO
+    )
+    if len(votes.names) == 1:
+        reason = f"There is only one contestant, {votes.shown[0]}: nobody to compare with."
+        diagnosis = replace(diagnosis, status=Status.ONE_CONTESTANT, explanation=(reason,))
     chains = diagnosis.chains
-    across = tiers(counting, chains, rules.unit)
     above = chains.above()
     parts = sorted(
         (part for part in chains.parts() if len(part) > 1),
@@ -216,15 +206,17 @@ def _rate(votes: Comparisons, rules: Rules) -> Leaderboard:
     for number, (part, found) in enumerate(zip(parts, rated, strict=True)):
         _fill(lines, [present[member] for member in part], number, found)
     if len(chains.sizes) > len(chains.groups()):
-        _rank_across(lines, present, across, rules)
-    order = standing_order(across, [lines[index] for index in present])
-    whole = rated[0] if len(rated) == 1 and len(parts[0]) == len(present) else None
+        _rank_across(lines, present, counting, diagnosis, rules)
+    order = standing_order(chains, [lines[index] for index in present])
+    absent = sorted(set(range(len(lines))) - set(present))
+    whole = rated[0] if len(rated) == 1 and len(parts[0]) == len(present) else Rated()
+    separation = whole.separation and whole.separation.among(np.array(present), len(lines))
     return Leaderboard(
         lines=tuple(lines),
-        order=(*(present[one] for one in order), *sorted(set(range(len(lines))) - set(present))),
+        order=(*(present[place] for place in order), *absent),
         status=_status(diagnosis, rated),
-        reasons=_once(diagnosis.explanation, *(found.explanation for found in rated)),
-        warnings=_once(*(found.warnings for found in rated)),
+        reasons=_unique(diagnosis.explanation, *(found.explanation for found in rated)),
+        warnings=_unique(*(found.warnings for found in rated)),
         method=rules.method,
         unit=rules.unit,
         intervals=rules.intervals,
@@ -234,72 +226,30 @@ def _rate(votes: Comparisons, rules: Rules) -> Leaderboard:
         experts=len(renumber_codes(votes.expert)[0]),
         scenarios=len(renumber_codes(votes.scenario)[0]),
         tie_share=float(counted[:, 1].sum() / counted.sum()) if len(votes) else None,
-        tie_strength=whole.tie_strength if whole else None,
+        tie_strength=whole.tie_strength,
         degenerate_rounds=max((found.degenerate for found in rated), default=0),
-        covariance=_joined(len(lines), present, parts, rated),
-        separation=whole.separation.among(np.array(present), len(lines))
-        if whole and whole.separation
-        else None,
-        coefficients=whole.coefficients if whole else (),
+        covariance=_joined_covariance(len(lines), present, parts, rated),
+        separation=separation,
+        coefficients=whole.coefficients,
     )
 
 
-def anchor_board(board: Leaderboard, *, name: str, at: float) -> Leaderboard:
-    """The same board with a contestant's rating shown as `at`, and all of its part moved alike.
-
-    A shift of what is shown only: intervals keep their widths, and the anchor keeps its own.
-
-    Raises:
-        ValueError: Nobody of that name has a rating.
-    """
-    anchor = next((line for line in board.lines if line.name == name), None)
-    if anchor is None or anchor.rating is None:
-        raise ValueError(f"{name!r} has no rating to anchor the others to")
-    shift = at - anchor.rating
-    return replace(
-        board,
-        lines=tuple(
-            _shifted(line, shift) if line.part == anchor.part else line for line in board.lines
-        ),
-    )
-
-
-def _shifted(line: Line, shift: float) -> Line:
-    columns = ("rating", "lower", "upper", "check_lower", "check_upper")
-    values = {column: getattr(line, column) for column in columns}
-    moved: dict[str, Any] = {
-        column: value + shift for column, value in values.items() if value is not None
-    }
-    return replace(line, **moved)
-
-
-def _diagnose(votes: Comparisons, counting: Comparisons, method: Method) -> Diagnosis:
-    if len(votes.names) == 1:
-        return Diagnosis(
-            status=Status.ONE_CONTESTANT,
-            explanation=(
-                f"There is only one contestant, {votes.shown[0]}: nobody to compare with.",
-            ),
-        )
-    # Online Elo's steps of at most K points stay finite whoever wins.
-    return diagnose(counting.shown, count_pairs(counting), bounded_anyway=method is Method.ELO)
-
-
-def _once(*said: tuple[T, ...]) -> tuple[T, ...]:
-    return tuple(dict.fromkeys(one for sentences in said for one in sentences))
+def _unique(*sentences: tuple[str, ...]) -> tuple[str, ...]:
+    return tuple(dict.fromkeys(sentence for some in sentences for sentence in some))
 
 
 def _status(diagnosis: Diagnosis, rated: list[Rated]) -> Status:
-    if diagnosis.status is Status.RATED and any(found.rating is None for found in rated):
-        return Status.UNBOUNDED
-    if diagnosis.status is Status.RATED and any(found.lower is None for found in rated):
-        return Status.NO_INTERVALS
-    if diagnosis.status is Status.RATED and any(found.is_open for found in rated):
-        return Status.OPEN_INTERVALS
+    if diagnosis.status is Status.RATED:
+        if any(found.rating is None for found in rated):
+            return Status.UNBOUNDED
+        if any(found.lower is None for found in rated):
+            return Status.NO_INTERVALS
+        if any(found.is_open for found in rated):
+            return Status.OPEN_INTERVALS
     return diagnosis.status
 
 
-def _joined(
+def _joined_covariance(
     contestants: int, present: list[int], parts: list[tuple[int, ...]], rated: list[Rated]
 ) -> FloatArray | None:
     """(C, C) of the parts' covariances, NaN between parts."""
@@ -324,25 +274,25 @@ def _blank_lines(
     return [
         Line(
             name=name,
-            votes=sum(row),
-            wins=row[0],
-            ties=row[1],
-            losses=row[2],
+            votes=wins + ties + losses,
+            wins=wins,
+            ties=ties,
+            losses=losses,
             part=-1,
-            note=notes.get(index, "") if any(row) else _NO_VOTES,
+            note=notes.get(index, "") if wins + ties + losses else "no votes",
         )
-        for index, (name, row) in enumerate(zip(names, counted, strict=True))
+        for index, (name, (wins, ties, losses)) in enumerate(zip(names, counted, strict=True))
     ]
 
 
 def _fill(lines: list[Line], members: list[int], number: int, found: Rated) -> None:
     """Put the numbers of a part into its lines."""
-    names = [column.name for column in fields(Line)]
-    columns = {name: getattr(found, name, None) for name in names}
-    known = {name: column for name, column in columns.items() if column is not None}
+    columns = {column.name: getattr(found, column.name, None) for column in fields(Line)}
     for place, index in enumerate(members):
         values: dict[str, Any] = {
-            name: _known(name, column[place].item()) for name, column in known.items()
+            name: _known(name, column[place].item())
+            for name, column in columns.items()
+            if column is not None
         }
         note = found.notes[place] if found.notes else ""
         lines[index] = replace(lines[index], part=number, note=note, **values)
@@ -354,30 +304,30 @@ def _known(column: str, value: float) -> float | None:
     return None if missing else value
 
 
-def _rank_across(lines: list[Line], present: list[int], across: Tiers, rules: Rules) -> None:
+def _rank_across(
+    lines: list[Line],
+    present: list[int],
+    counting: Comparisons,
+    diagnosis: Diagnosis,
+    rules: Rules,
+) -> None:
     """Ranks over all parts that met, and what the votes say of those who are alone in theirs."""
-    counting = [lines[index] for index in present]
-    inner = np.array([line.rank or 0 for line in counting])
-    lower, upper = (
-        np.array([_from_mean(line, bound) for line in counting]) for bound in ("lower", "upper")
-    )
-    ranks = ranks_across(across, inner, lower, upper).tolist()
-    least, most = outer_bounds(across)
-    for place, (index, line) in enumerate(zip(present, counting, strict=True)):
+    levels = find_levels(counting, diagnosis.chains, rules.unit)
+    counted = [lines[index] for index in present]
+    bounds = np.array([(line.lower, line.upper) for line in counted], dtype=np.float64)
+    bounds -= models.MEAN_ELO
+    bounds[[line.part < 0 for line in counted]] = 0.0
+    inner = np.array([line.rank or 0 for line in counted])
+    ranks = ranks_across(diagnosis.chains, levels, inner, bounds[:, 0], bounds[:, 1]).tolist()
+    least, most = outer_bounds(diagnosis.chains, levels)
+    for place, (index, line) in enumerate(zip(present, counted, strict=True)):
         rank = ranks[place] or None
         note = remarks.note_with_rank(line.note, rank)
-        moved: dict[str, Any] = {
-            "rank": rank, "rank_best": None, "rank_worst": None, "note": note
-        }  # fmt: skip
+        moved = replace(line, rank=rank, rank_best=None, rank_worst=None, note=note)
         if line.rating is None and rules.method is Method.BRADLEY_TERRY:
-            moved["lower"] = _known("lower", MEAN_ELO + least[place].item())
-            moved["upper"] = _known("upper", MEAN_ELO + most[place].item())
-        lines[index] = replace(line, **moved)
-
-
-def _from_mean(line: Line, bound: str) -> float:
-    """How far a bound is from the mean of its part; zero for who is alone in one."""
-    if line.part < 0:
-        return 0.0
-    value: float | None = getattr(line, bound)
-    return math.nan if value is None else value - MEAN_ELO
+            moved = replace(
+                moved,
+                lower=_known("lower", models.MEAN_ELO + least[place].item()),
+                upper=_known("upper", models.MEAN_ELO + most[place].item()),
+            )
+        lines[index] = moved

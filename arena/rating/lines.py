@@ -6,9 +6,185 @@ show them.
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from arena.rating.printed import interval_text, places_text, rank_text, rating_text, whole_percent
+UNKNOWN = "--"
+MINUS = "\N{MINUS SIGN}"
+
+_ESCAPES = {
+    "\\": r"\textbackslash{}",
+    "{": r"\{",
+    "}": r"\}",
+    "&": r"\&",
+    "%": r"\%",
+    "$": r"\$",
+    "#": r"\#",
+    "_": r"\_",
+    "~": r"\textasciitilde{}",
+    "^": r"\textasciicircum{}",
+    "<": r"\textless{}",
+    ">": r"\textgreater{}",
+}
+
+HEADS = ("Model", "Rank", "Elo", "95% CI", "Votes")
+"""Of the paper's table."""
+
+_BEGIN = r"""\providecolor{llm_blue}{RGB}{105, 156, 219}
+\begin{table}
+    \centering"""
+_UPWARDS = {"Elo": r"~$\uparrow$"}
+"""Where more is better."""
+
+_SYMMETRIC = 1e-6
+"""Points by which sides may differ for the sake of rounding."""
+
+
+def rating_text(rating: float | None) -> str:
+    """The rating as a whole number, two hyphens without one."""
+    return UNKNOWN if rating is None else str(round(rating))
+
+
+def whole_percent(share: float) -> int:
+    """A share in whole percent, the same wherever it stands; two shares of one make a hundred.
+
+    A half goes to the even number, also where 100 times the share falls short of it: 0.575 of the
+    votes are 58 %, and the 0.425 beside them 42 %.
+    """
+    return round(round(100.0 * share, 9))
+
+
+def rank_text(rank: int | None) -> str:
+    """The rank, or two hyphens without one."""
+    return UNKNOWN if rank is None else str(rank)
+
+
+def places_text(best: int | None, worst: int | None) -> str:
+    """The places between two, 1–3, one alone, or two hyphens without any."""
+    return rank_text(best) if best is None or best == worst else f"{best}–{worst}"
+
+
+def interval_text(rating: float | None, lower: float | None, upper: float | None) -> str:
+    """The interval: ±55, or as the paper prints it where its sides differ, -9/+11.
+
+    Where a side would round to nothing, both have a decimal: no interval has the width zero. A
+    side without a bound is infinite, and a bound without a rating stands as it is: ≥ 1118.
+    """
+    if lower is None and upper is None:
+        return UNKNOWN
+    if rating is None:
+        return f"≤ {upper:.0f}" if lower is None else f"≥ {lower:.0f}"
+    if lower is None or upper is None:
+        below = "-∞" if lower is None else f"{min(round(lower) - round(rating), -1):+d}"
+        above = "+∞" if upper is None else f"{max(round(upper) - round(rating), 1):+d}"
+        return f"{below}/{above}"
+    if abs((upper - rating) - (rating - lower)) < _SYMMETRIC:
+        half = (upper - lower) / 2.0
+        return f"±{half:.0f}" if round(half) else f"±{max(half, 0.1):.1f}"
+    down, up = round(lower) - round(rating), round(upper) - round(rating)
+    if down and up:
+        return f"{down:+d}/{up:+d}"
+    return f"-{max(rating - lower, 0.1):.1f}/+{max(upper - rating, 0.1):.1f}"
+
+
+def with_minus(text: str) -> str:
+    """A printed number as a page shows it: a real minus sign, a dash where it is unknown."""
+    return "–" if text == UNKNOWN else text.replace("-", MINUS)
+
+
+def notes_by_reason(notes: Iterable[tuple[str, str]]) -> list[str]:
+    """What is missing in lines, those of one reason together: "a, b: too few votes".
+
+    Args:
+        notes: Names and what is missing in their lines, empty where nothing is.
+    """
+    names_by_note: dict[str, list[str]] = {}
+    for name, note in notes:
+        if note:
+            names_by_note.setdefault(note, []).append(name)
+    return [f"{', '.join(names)}: {note}" for note, names in names_by_note.items()]
+
+
+def caption_text(method: str, *, votes: int, experts: int, scenarios: int) -> str:
+    """The caption as TeX: what is shown, by which method, on how many votes.
+
+    Args:
+        method: As plain text.
+        votes: How many were counted.
+        experts: How many gave them; up to 1 is not known, or not worth a word.
+        scenarios: On how many, likewise.
+    """
+    numbers = ((votes, "votes"), (experts, "experts"), (scenarios, "scenarios"))
+    said = ", ".join(f"{number} {what}" for number, what in numbers if number > 1)
+    return rf"Elo with 95\% confidence intervals: {escape(method)}; {said}."
+
+
+def latex_table(
+    rows: Iterable[Sequence[str]],
+    *,
+    comments: Iterable[str],
+    heads: Sequence[str] = HEADS,
+    notes: Iterable[str] = (),
+    caption: str,
+) -> str:
+    """The paper's table; it needs booktabs and xcolor with the option `table`.
+
+    Args:
+        rows: Model as TeX, then rank, rating and the rest as they are printed.
+        comments: Lines to put before it, as plain text.
+        heads: Of the columns, as plain text.
+        notes: Lines to put beneath it, as plain text.
+        caption: As TeX.
+    """
+    right = " r" * (len(heads) - 2)
+    across = rf"\multicolumn{{{len(heads)}}}{{p{{0.8\linewidth}}}}"
+    lines = [
+        r"% \usepackage{booktabs} and \usepackage[table]{xcolor}",
+        *(f"% {one_line(comment)}" for comment in comments),
+        _BEGIN,
+        rf"    \begin{{tabular}}{{l>{{\columncolor{{llm_blue!20}}}}c{right}}}",
+        r"    \toprule",
+        "    " + " & ".join(_head(head) for head in heads) + r"\\",
+        r"    \midrule",
+        *("    " + " & ".join([model, *map(_in_tex, rest)]) + r"\\" for model, *rest in rows),
+        r"    \bottomrule",
+        *(rf"    {across}{{\footnotesize {escape(note)}}}\\" for note in notes),
+        r"    \end{tabular}",
+        rf"    \caption{{{caption}}}",
+        r"    \label{tab:elo}",
+        r"\end{table}",
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def _head(head: str) -> str:
+    return rf"\textbf{{{escape(head)}}}{_UPWARDS.get(head, '')}"
+
+
+_IN_TEX = {"∞": r"$\infty$", "≤": r"$\leq$", "≥": r"$\geq$", "–": "--", "±": r"$\pm$"}
+
+
+def _in_tex(number: str) -> str:
+    """A printed number; the signs of open intervals are mathematics."""
+    for sign, command in (
+        ("∞", r"$\infty$"),
+        ("≤", r"$\leq$"),
+        ("≥", r"$\geq$"),
+        ("–", "--"),
+        ("±", r"$\pm$"),
+    ):
+        number = number.replace(sign, command)
+    return number
+
+
+def escape(text: str) -> str:
+    """Text that TeX prints as it is."""
+    return "".join(_ESCAPES.get(letter, letter) for letter in one_line(text))
+
+
+def one_line(text: str) -> str:
+    """Line breaks would end a comment or start a paragraph."""
+    return " ".join(text.split()) if "\n" in text or "\r" in text else text
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

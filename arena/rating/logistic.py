@@ -9,19 +9,23 @@ logarithms of odds.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.special import ndtri, stdtrit
+from scipy.special import expit
 
-from arena.rating import sandwich
-from arena.rating.bootstrap import Unit
-from arena.rating.bradley_terry import ELO_PER_LOGIT
-from arena.rating.comparisons import Comparisons, FloatArray
-from arena.rating.estimate import LEVEL, Estimate, share, t_above, t_quantile
-from arena.rating.moderated import clusters_of
-from arena.rating.sandwich import Pulls
+from arena.rating.comparisons import (
+    TIE,
+    Comparisons,
+    Estimate,
+    FloatArray,
+    share,
+    t_above,
+    t_quantile,
+)
+from arena.rating.models import ELO_PER_LOGIT
+from arena.rating.rules import Unit
+from arena.rating.sandwich import Pulls, clusters_of, plain_covariance
 
 _MOST_STEPS = 60
 _TOLERANCE = 1e-10
@@ -38,13 +42,11 @@ class LogisticFit:
     Attributes:
         strengths: (C,) of mean zero.
         coefficients: (Q,) in the columns' own units.
-        inverse: (K, K) of the likelihood's curvature, on the space of mean strengths zero.
         pulls: What each row pulls at the parameters.
     """
 
     strengths: FloatArray
     coefficients: FloatArray
-    inverse: FloatArray
     pulls: Pulls
 
 
@@ -66,8 +68,8 @@ def fit_with_columns(votes: Comparisons, columns: FloatArray) -> LogisticFit | N
     scaled = columns / scale
     parameters = np.zeros(contestants + extra)
     for _ in range(_MOST_STEPS):
-        slope, curvature, _ = _derivatives(votes, scaled, parameters)
-        inverse = _inverse(curvature, contestants)
+        slope, curvature = _derivatives(votes, scaled, parameters)
+        inverse = _inverse(curvature)
         if inverse is None:
             return None
         step = inverse @ slope
@@ -79,35 +81,26 @@ def fit_with_columns(votes: Comparisons, columns: FloatArray) -> LogisticFit | N
             break
     else:
         return None
-    _, curvature, surprise = _derivatives(votes, scaled, parameters)
-    inverse = _inverse(curvature, contestants)
+    inverse = _inverse(_derivatives(votes, scaled, parameters)[1])
     if inverse is None:
         return None
     units = np.concatenate([np.ones(contestants), 1.0 / scale])
     inverse = units[:, None] * inverse * units
-    expected = votes.score - surprise
+    expected = _expected(votes, scaled, parameters)
+    surprise = votes.score - expected
     strengths = parameters[:contestants]
     return LogisticFit(
         strengths=strengths - strengths.mean(),
         coefficients=parameters[contestants:] / scale,
-        inverse=inverse,
         pulls=Pulls(
-            contestants=contestants,
-            first=votes.first,
-            second=votes.second,
-            count=votes.count,
+            votes=votes,
             surprise=surprise,
             information=expected * (1.0 - expected),
-            inverse=inverse,
             besides=surprise[:, None] * columns,
+            inverse=inverse,
+            back=inverse[:contestants],
         ),
     )
-
-
-def parameter_covariance(votes: Comparisons, fitted: LogisticFit, unit: Unit) -> FloatArray:
-    """(K, K) in squared Elo points, by the plain sandwich; coefficients times a point's worth."""
-    everything = replace(fitted.pulls, contestants=len(fitted.inverse))
-    return sandwich.covariance(votes, everything, unit)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -116,86 +109,35 @@ class Coefficient:
 
     Attributes:
         points: Elo points, with its interval clustered as the ratings' are.
+        error: Its standard error.
         p_value: Of none; None where it can't be told.
     """
 
     points: Estimate
+    error: float
     p_value: float | None
 
 
-def coefficients_of(
-    votes: Comparisons, fitted: LogisticFit, unit: Unit
-) -> tuple[Coefficient, ...]:
+def coefficients_of(fitted: LogisticFit, unit: Unit) -> tuple[Coefficient, ...]:
     """The columns' coefficients in Elo points, by the plain sandwich and Student's t."""
-    covariance = parameter_covariance(votes, fitted, unit)
+    pulls = replace(fitted.pulls, back=fitted.pulls.inverse)
+    variances = plain_covariance(pulls, unit).diagonal()[len(fitted.strengths) :]
+    votes = fitted.pulls.votes
     clusters = min((number for number, _ in clusters_of(votes, unit)), default=votes.votes)
     degrees = float(max(clusters - 1, 1))
     found = []
-    for place, value in enumerate(fitted.coefficients.tolist(), start=len(fitted.strengths)):
-        points, error = value * ELO_PER_LOGIT, math.sqrt(max(covariance[place, place], 0.0))
+    for value, variance in zip(fitted.coefficients.tolist(), variances.tolist(), strict=True):
+        points, error = value * ELO_PER_LOGIT, max(variance, 0.0) ** 0.5
         half = float(t_quantile(degrees)) * error
-        known = error > 0.0
+        lower, upper = (points - half, points + half) if error > 0.0 else (None, None)
         found.append(
             Coefficient(
-                points=Estimate(value=points, lower=points - half, upper=points + half)
-                if known
-                else Estimate(value=points),
-                p_value=2.0 * float(t_above(abs(points) / error, degrees)) if known else None,
+                points=Estimate(value=points, lower=lower, upper=upper),
+                error=error,
+                p_value=2.0 * float(t_above(abs(points) / error, degrees)) if error else None,
             )
         )
     return tuple(found)
-
-
-# --- Steps ---------------------------------------------------------------------------------------
-
-
-def _derivatives(
-    votes: Comparisons, columns: FloatArray, parameters: FloatArray
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """(K,) slope, (K, K) curvature, (R,) what each vote of a row scored above expectation."""
-    contestants, size = len(votes.names), len(parameters)
-    first, second = votes.first, votes.second
-    lead = parameters[first] - parameters[second] + columns @ parameters[contestants:]
-    expected = 1.0 / (1.0 + np.exp(-lead))
-    surprise = votes.score - expected
-    pull = votes.count * surprise
-    weight = votes.count * expected * (1.0 - expected)
-    slope = np.empty(size)
-    slope[:contestants] = _of_ends(votes, pull)
-    slope[contestants:] = columns.T @ pull
-    between = np.bincount(first * contestants + second, weight, contestants**2)
-    between = between.reshape(contestants, contestants)
-    curvature = np.zeros((size, size))
-    inner = -(between + between.T)
-    inner[np.diag_indices(contestants)] = -inner.sum(axis=1)
-    curvature[:contestants, :contestants] = inner
-    for number, column in enumerate(columns.T, start=contestants):
-        curvature[:contestants, number] = _of_ends(votes, weight * column)
-    curvature[contestants:, :contestants] = curvature[:contestants, contestants:].T
-    curvature[contestants:, contestants:] = (columns * weight[:, None]).T @ columns
-    return slope, curvature, surprise
-
-
-def _of_ends(votes: Comparisons, values: FloatArray) -> FloatArray:
-    """(C,): a row's value counts for its first contestant, and against its second."""
-    contestants = len(votes.names)
-    return np.asarray(
-        np.bincount(votes.first, values, contestants)
-        - np.bincount(votes.second, values, contestants)
-    )
-
-
-def _inverse(curvature: FloatArray, contestants: int) -> FloatArray | None:
-    """(K, K) on the space of mean strengths zero; None where another direction is flat, too."""
-    values, directions = np.linalg.eigh(curvature)
-    if len(values) > 1 and values[1] < _SINGULAR * max(values[-1], 1e-300):
-        return None
-    inverse = np.zeros_like(values)
-    inverse[1:] = 1.0 / values[1:]
-    return np.asarray((directions * inverse) @ directions.T)
-
-
-# --- The left side -------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -222,23 +164,66 @@ def side_bias(votes: Comparisons) -> SideBias:
         votes: `first` was shown on the left. They must determine ratings; else the advantage is
             unknown and only the share is given.
     """
-    decided = votes.score != 0.5
-    left = share(votes.score[decided] == 1.0, votes.expert[decided])
+    decided = votes.score != TIE
     clusters = len(np.unique(votes.expert))
     fitted = fit_with_columns(votes, np.ones((len(votes), 1)))
-    if fitted is None:
-        return SideBias(
-            advantage=Estimate(value=None), standard_error=None, left=left, clusters=clusters
-        )
-    value = float(fitted.coefficients[0]) * ELO_PER_LOGIT
-    unit = Unit.EXPERT if clusters > 1 else Unit.VOTE
-    error = math.sqrt(float(parameter_covariance(votes, fitted, unit)[-1, -1]))
-    half = error * float(
-        stdtrit(clusters - 1, 0.5 + LEVEL / 2) if clusters > 1 else ndtri(0.5 + LEVEL / 2)
-    )
+    advantage, error = Estimate(value=None), None
+    if fitted is not None:
+        unit = Unit.EXPERT if clusters > 1 else Unit.VOTE
+        (coefficient,) = coefficients_of(fitted, unit)
+        advantage, error = coefficient.points, coefficient.error
     return SideBias(
-        advantage=Estimate(value=value, lower=value - half, upper=value + half),
+        advantage=advantage,
         standard_error=error,
-        left=left,
+        left=share(votes.score[decided] == 1.0, votes.expert[decided]),
         clusters=clusters,
     )
+
+
+# --- Steps ---------------------------------------------------------------------------------------
+
+
+def _expected(votes: Comparisons, columns: FloatArray, parameters: FloatArray) -> FloatArray:
+    """(R,) what the first of each row is expected to score in one vote."""
+    lead = parameters[votes.first] - parameters[votes.second]
+    return np.asarray(expit(lead + columns @ parameters[len(votes.names) :]))
+
+
+def _derivatives(
+    votes: Comparisons, columns: FloatArray, parameters: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """(K,) slope and (K, K) curvature of the likelihood."""
+    contestants, size = len(votes.names), len(parameters)
+    expected = _expected(votes, columns, parameters)
+    pull = votes.count * (votes.score - expected)
+    weight = votes.count * expected * (1.0 - expected)
+    between = np.bincount(votes.first * contestants + votes.second, weight, contestants**2)
+    between = between.reshape(contestants, contestants)
+    curvature = np.zeros((size, size))
+    inner = -(between + between.T)
+    inner[np.diag_indices(contestants)] = -inner.sum(axis=1)
+    curvature[:contestants, :contestants] = inner
+    weighted = columns * weight[:, None]
+    curvature[:contestants, contestants:] = _of_ends(votes, weighted)
+    curvature[contestants:, :contestants] = curvature[:contestants, contestants:].T
+    curvature[contestants:, contestants:] = weighted.T @ columns
+    slope = np.concatenate([_of_ends(votes, pull[:, None])[:, 0], columns.T @ pull])
+    return slope, curvature
+
+
+def _of_ends(votes: Comparisons, values: FloatArray) -> FloatArray:
+    """(C, Q): a row's values count for its first contestant, and against its second."""
+    sums = np.zeros((len(votes.names), values.shape[1]))
+    np.add.at(sums, votes.first, values)
+    np.subtract.at(sums, votes.second, values)
+    return sums
+
+
+def _inverse(curvature: FloatArray) -> FloatArray | None:
+    """(K, K) on the space of mean strengths zero; None where another direction is flat, too."""
+    values, directions = np.linalg.eigh(curvature)
+    if len(values) > 1 and values[1] < _SINGULAR * max(values[-1], 1e-300):
+        return None
+    inverse = np.zeros_like(values)
+    inverse[1:] = 1.0 / values[1:]
+    return np.asarray((directions * inverse) @ directions.T)

@@ -5,26 +5,41 @@ Notation: C contestants, B rounds.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from arena.rating import remarks, sandwich
-from arena.rating.bootstrap import Placed, Unit, interval, open_interval, place_on_one_scale
+from arena.rating import remarks
+from arena.rating.bootstrap import (
+    RatedRounds,
+    Rounds,
+    percentile_interval,
+    place_on_one_scale,
+    rate_rounds,
+    resample,
+    rounds_to_draw,
+)
 from arena.rating.chains import Status
-from arena.rating.comparisons import Comparisons, FloatArray, count_pairs
-from arena.rating.fits import Fitted, fit_votes
-from arena.rating.logistic import Coefficient
-from arena.rating.moderated import Spread, spread_of
+from arena.rating.comparisons import BoolArray, Comparisons, FloatArray, IntArray, count_pairs
+from arena.rating.logistic import Coefficient, coefficients_of, fit_with_columns
+from arena.rating.models import Meetings, fit, replay_elo, resample_elo, to_elo
 from arena.rating.ranking import (
     Separation,
     above_by_bounds,
+    above_in_rounds,
     judge_pairs,
     rank_sets,
-    separation,
     shown_ranks,
 )
-from arena.rating.rules import Intervals, Method, Rules
+from arena.rating.rules import Intervals, Method, Order, Rules, Unit
+from arena.rating.sandwich import (
+    NORMAL,
+    Pulls,
+    factor,
+    plain_covariance,
+    pulls_of_model,
+    spread_of,
+)
 
 _SAME = 1e-6
 """Points. Rounds that all lie within this say nothing about the spread."""
@@ -46,9 +61,9 @@ class Rated:
     rating: FloatArray | None = None
     lower: FloatArray | None = None
     upper: FloatArray | None = None
-    rank: np.ndarray | None = None
-    rank_best: np.ndarray | None = None
-    rank_worst: np.ndarray | None = None
+    rank: IntArray | None = None
+    rank_best: IntArray | None = None
+    rank_worst: IntArray | None = None
     check_lower: FloatArray | None = None
     check_upper: FloatArray | None = None
     covariance: FloatArray | None = None
@@ -74,36 +89,57 @@ def rate_part(votes: Comparisons, rules: Rules, status: Status) -> Rated:
         rules: How.
         status: Of the data; where every vote is a tie there are no intervals.
     """
-    counts = count_pairs(votes)
-    found = fit_votes(votes, counts, rules)
-    if found is None:
+    fitted = _fit_votes(votes, rules)
+    if fitted is None:
         notes = (remarks.NOT_RATED,) * len(votes.names)
         return Rated(explanation=(remarks.NO_DAVIDSON,), notes=notes)
+    plain = Rated(
+        rating=fitted.rating,
+        tie_strength=fitted.tie_strength,
+        coefficients=fitted.coefficients or (),
+        degenerate=fitted.rounds.degenerate,
+        warnings=(remarks.ELO_NOTE,) if rules.method is Method.ELO else (),
+    )
+
+    def without_intervals(note: str, *explanation: str) -> Rated:
+        return replace(plain, notes=(note,) * len(votes.names), explanation=explanation)
+
     if status is Status.ALL_TIES:
-        return _without_intervals(found, rules, remarks.ONLY_TIES, ())
-    everywhere = place_on_one_scale(found.rating, found.samples, found.loose)
-    spread: Spread | None = None
-    if rules.intervals is Intervals.CLOSED_FORM and found.pulls is not None:
-        spread = spread_of(votes, found.pulls, rules.unit, everywhere.reference)
-    if _are_all_the_same(everywhere.values if spread is None else _ends(spread)):
-        return _without_intervals(found, rules, remarks.NO_SPREAD, (remarks.why_no_spread(rules),))
-    if everywhere.are_finite:
-        bounds = interval(everywhere.values)
-    else:
-        bounds = open_interval(everywhere.values)
+        return without_intervals(remarks.ONLY_TIES)
+    values, reference = place_on_one_scale(fitted.rating, fitted.rounds)
+    bounds = percentile_interval(values)
+    closed = None
+    if rules.intervals is Intervals.CLOSED_FORM and fitted.pulls is not None:
+        closed = _closed_form(fitted.rating, fitted.pulls, rules, reference)
+    if _are_all_the_same(values if closed is None else closed.half_width[:, None] * [-1.0, 1.0]):
+        return without_intervals(remarks.NO_SPREAD, remarks.why_no_spread(rules))
     if np.isnan(bounds).all():
-        lost = found.loose.values.shape[1]
-        said = remarks.why_no_interval(votes.shown, rules, lost=lost)
-        return _without_intervals(found, rules, remarks.TOO_FEW, (said,))
-    if spread is not None:
-        return _in_closed_form(votes, rules, found, everywhere, bounds, spread)
-    return _by_rounds(votes, rules, found, everywhere, bounds)
-
-
-def _ends(spread: Spread) -> FloatArray:
-    """(C, 2) both ends of the intervals, around zero."""
-    half = spread.half_widths()
-    return np.stack([-half, half], axis=1)
+        reason = remarks.why_no_interval(votes.shown, rules, lost=fitted.rounds.degenerate)
+        return without_intervals(remarks.TOO_FEW, reason)
+    if closed is None:
+        found = _by_rounds(votes, rules, fitted, values, reference, bounds)
+    else:  # a bound is missing where the rounds leave it open
+        below, above = (np.where(np.isnan(bound), np.nan, closed.half_width) for bound in bounds)
+        found = replace(closed, lower=fitted.rating - below, upper=fitted.rating + above)
+    ranks = shown_ranks(found.lower, found.upper, average=float(fitted.rating[reference].mean()))
+    notes = remarks.notes_on_bounds(votes, rules.unit, found.lower, found.upper, ranks)
+    is_adjusted = fitted.coefficients is not None or not votes.covariates.size
+    said = remarks.warnings(
+        votes, rules=rules, rounds=values.shape[1], degenerate=plain.degenerate
+    )
+    check = _cross_check(fitted, found, rules, reference)
+    return replace(
+        _with_intervals(plain, found, rules.details),
+        rank=ranks,
+        check_lower=fitted.rating - check,
+        check_upper=fitted.rating + check,
+        notes=notes,
+        explanation=(
+            *(() if is_adjusted else (remarks.NOT_ADJUSTED,)),
+            *remarks.who_is_open(votes.shown, notes),
+        ),
+        warnings=plain.warnings + said,
+    )
 
 
 def _are_all_the_same(values: FloatArray) -> bool:
@@ -114,138 +150,176 @@ def _are_all_the_same(values: FloatArray) -> bool:
     return bool(known.any()) and bool((highest - lowest)[known].max() < _SAME)
 
 
-def _without_intervals(
-    fit: Fitted, rules: Rules, note: str, explanation: tuple[str, ...]
-) -> Rated:
-    return Rated(
-        rating=fit.rating,
-        tie_strength=fit.tie_strength,
-        coefficients=fit.coefficients or (),
-        degenerate=fit.loose.values.shape[1],
-        notes=(note,) * len(fit.rating),
-        explanation=explanation,
-        warnings=_notes_on_method(rules),
+# --- Fits ----------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Fitted:
+    """Ratings (C,) of the data and those of the rounds.
+
+    For intervals in closed form the rounds only say who is determined; their ratings are those of
+    the data. Without covariates, or where the votes do not determine what these are worth, there
+    are no coefficients.
+    """
+
+    rating: FloatArray
+    rounds: RatedRounds
+    pulls: Pulls | None = None
+    tie_strength: float | None = None
+    coefficients: tuple[Coefficient, ...] | None = None
+
+
+def _fit_votes(votes: Comparisons, rules: Rules) -> _Fitted | None:
+    """None where the votes determine no ratings in Davidson's model."""
+    if rules.method is Method.ELO:
+        samples = resample_elo(votes, rounds=rules.rounds, seed=rules.seed, k=rules.k)
+        is_recorded = rules.order is Order.RECORDED
+        rating = replay_elo(votes, k=rules.k) if is_recorded else np.median(samples, axis=1)
+        return _Fitted(rating=rating, rounds=RatedRounds.of_values(samples))
+    counts = count_pairs(votes)
+    met = Meetings(len(votes.names), counts)
+    ties = counts.outcomes[:, 1].sum(keepdims=True).astype(np.float64)
+    has_ties = rules.method is Method.DAVIDSON and 0 < ties[0] < votes.votes
+    coefficients = tie_strength = None
+    adjusted = fit_with_columns(votes, votes.covariates) if votes.covariates.size else None
+    if adjusted is not None:
+        rating, pulls = to_elo(adjusted.strengths), adjusted.pulls
+        coefficients = coefficients_of(adjusted, rules.unit)
+    else:
+        games, scores = counts.games[:, None], counts.scores[:, None]
+        answer = fit(met, games, scores, ties if has_ties else None)[:, 0]
+        if np.isnan(answer).any():
+            return None
+        rating, pulls = (
+            to_elo(answer[: met.contestants]),
+            pulls_of_model(votes, met, counts.games, answer),
+        )
+        tie_strength = float(np.exp(answer[-1])) if has_ties else None
+
+    def refit(rounds: Rounds, together: BoolArray | None) -> FloatArray:
+        if rules.intervals is Intervals.CLOSED_FORM:
+            return np.repeat(rating[:, None], rounds.games.shape[1], axis=1)
+        if not has_ties:
+            return to_elo(fit(met, rounds.games, rounds.scores, start=answer, together=together))
+        is_fine = (rounds.ties > 0) & (rounds.ties < rounds.games.sum(axis=0))
+        fine = rounds.chosen(np.flatnonzero(is_fine))
+        inside = None if together is None else together[is_fine]
+        found = np.full((met.contestants, len(is_fine)), np.nan)
+        found[:, is_fine] = fit(
+            met, fine.games, fine.scores, fine.ties, start=answer, together=inside
+        )[:-1]
+        return to_elo(found)
+
+    number = rules.rounds
+    if rules.intervals is Intervals.CLOSED_FORM:
+        number = rounds_to_draw(votes, counts, number)
+    blocks = resample(votes, counts, unit=rules.unit, rounds=number, seed=rules.seed)
+
+    def report(done: int) -> None:
+        if rules.report is not None:
+            rules.report(done, number)
+
+    return _Fitted(
+        rating=rating,
+        rounds=rate_rounds(votes, counts, blocks, refit, report=report),
+        pulls=pulls,
+        tie_strength=tie_strength,
+        coefficients=coefficients,
+    )
+
+
+# --- Intervals -----------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Intervals:
+    """Bounds (C,), NaN where open, and what is told apart."""
+
+    lower: FloatArray
+    upper: FloatArray
+    above: BoolArray
+    half_width: FloatArray
+    covariance: FloatArray | None
+    separation: Separation | None = None
+
+
+def _closed_form(
+    rating: FloatArray, pulls: Pulls, rules: Rules, reference: BoolArray
+) -> _Intervals:
+    """Student's t around the ratings; pairs of the reference are judged all at once."""
+    spread = spread_of(pulls, rules.unit, reference)
+    members = np.flatnonzero(reference)
+    judged = judge_pairs(
+        rating[members], spread.among(members), rounds=rules.rounds, seed=rules.seed
+    ).among(members, len(rating))
+    half = spread.half_widths()
+    return _Intervals(
+        lower=rating - half,
+        upper=rating + half,
+        above=judged.above,
+        half_width=half,
+        covariance=spread.covariance,
+        separation=judged,
     )
 
 
 def _by_rounds(
     votes: Comparisons,
     rules: Rules,
-    fit: Fitted,
-    everywhere: Placed,
+    fitted: _Fitted,
+    values: FloatArray,
+    reference: BoolArray,
     bounds: tuple[FloatArray, FloatArray],
-) -> Rated:
-    """Intervals are percentiles of the resampled rounds."""
+) -> _Intervals:
+    """Percentiles of the resampled rounds, widened by Student's t where clusters are few."""
     few = remarks.few_clusters(votes, rules.unit)
-    lower, upper = bounds
+    wider = 1.0
     if few and rules.unit is not Unit.TWO_WAY:
-        wider = sandwich.factor(few) / sandwich.NORMAL
-        lower = fit.rating + wider * (lower - fit.rating)
-        upper = fit.rating + wider * (upper - fit.rating)
+        wider = factor(few) / NORMAL
+    lower, upper = (fitted.rating + wider * (bound - fitted.rating) for bound in bounds)
     covariance = None
-    if rules.details:
-        if rules.method is Method.BRADLEY_TERRY and fit.pulls is not None:
-            covariance = sandwich.covariance(votes, fit.pulls, rules.unit)
-        elif fit.samples.shape[1] > 1:
-            covariance = np.cov(fit.samples)
-    judged = _separation(fit.rating, everywhere)
-    plain = None
-    if rules.details and rules.method is Method.BRADLEY_TERRY and fit.pulls is not None:
-        found = sandwich.covariance(votes, fit.pulls, rules.unit)
-        plain = sandwich.relative_to(found, everywhere.reference)
-    ends = (lower, upper)
-    error = None if plain is None else _errors(plain)
-    return _with_intervals(votes, rules, fit, everywhere, ends, judged, covariance, error)
-
-
-def _errors(covariance: FloatArray) -> FloatArray:
-    """(C,) standard errors."""
-    return np.asarray(np.sqrt(np.maximum(covariance.diagonal(), 0.0)))
-
-
-def _in_closed_form(
-    votes: Comparisons,
-    rules: Rules,
-    fit: Fitted,
-    everywhere: Placed,
-    open_bounds: tuple[FloatArray, FloatArray],
-    spread: Spread,
-) -> Rated:
-    """Student's t around the ratings; a bound is missing where the rounds leave it open."""
-    half = spread.half_widths()
-    below, above = (np.where(np.isnan(bound), np.nan, half) for bound in open_bounds)
-    members = np.flatnonzero(everywhere.reference)
-    judged = judge_pairs(
-        fit.rating[members], spread.among(members), rounds=rules.rounds, seed=rules.seed
-    ).among(members, len(fit.rating))
-    bounds = (fit.rating - below, fit.rating + above)
-    plain = _errors(spread.plain)
-    return _with_intervals(votes, rules, fit, everywhere, bounds, judged, spread.covariance, plain)
-
-
-def _with_intervals(
-    votes: Comparisons,
-    rules: Rules,
-    fit: Fitted,
-    everywhere: Placed,
-    bounds: tuple[FloatArray, FloatArray],
-    judged: Separation | None,
-    covariance: FloatArray | None,
-    plain_error: FloatArray | None,
-) -> Rated:
-    lower, upper = bounds
-    rank = shown_ranks(lower, upper, average=float(fit.rating[everywhere.reference].mean()))
-    nobody = np.zeros((len(lower), len(lower)), dtype=bool)
-    apart = nobody if judged is None else judged.above
-    best, worst = rank_sets(above_by_bounds(apart, lower, upper))
-    unbounded = np.isnan(lower) & np.isnan(upper)
-    best[unbounded] = worst[unbounded] = 0
-    check = None
-    if rules.details and plain_error is not None and rules.method is Method.BRADLEY_TERRY:
-        few = remarks.few_clusters(votes, rules.unit)
-        check = np.asarray(sandwich.factor(few) * plain_error)
-        check[np.isnan(lower) | np.isnan(upper)] = np.nan
-    degenerate, drawn = fit.loose.values.shape[1], everywhere.values.shape[1]
-    notes = remarks.notes_on_bounds(lower, upper, rank)
-    notes = remarks.why_too_few(votes, rules.unit, notes)
-    return Rated(
-        rating=fit.rating,
-        lower=lower,
-        upper=upper,
-        rank=rank,
-        rank_best=best,
-        rank_worst=worst,
-        check_lower=None if check is None else fit.rating - check,
-        check_upper=None if check is None else fit.rating + check,
-        covariance=covariance if rules.details else None,
-        separation=judged if rules.details else None,
-        tie_strength=fit.tie_strength,
-        coefficients=fit.coefficients or (),
-        degenerate=degenerate,
-        notes=notes,
-        explanation=_on_covariates(votes, fit) + remarks.who_is_open(votes.shown, notes),
-        warnings=_notes_on_method(rules)
-        + remarks.warnings(votes, rules=rules, rounds=drawn, degenerate=degenerate),
+    if rules.details and rules.method is Method.BRADLEY_TERRY and fitted.pulls is not None:
+        covariance = plain_covariance(fitted.pulls, rules.unit)
+    elif rules.details:
+        whole = fitted.rounds.values[:, fitted.rounds.in_main.all(axis=0)]
+        covariance = np.cov(whole) if whole.shape[1] > 1 else None
+    above = np.zeros((len(lower), len(lower)), dtype=bool)
+    members = np.flatnonzero(reference)
+    samples = values[members]
+    is_fine = np.asarray(np.isfinite(samples).all(axis=0))
+    if 2 * is_fine.sum() >= len(is_fine):
+        apart = above_in_rounds(fitted.rating[members], samples[:, is_fine])
+        above[np.ix_(members, members)] = apart
+    return _Intervals(
+        lower=lower, upper=upper, above=above, half_width=upper - lower, covariance=covariance
     )
 
 
-def _separation(rating: FloatArray, everywhere: Placed) -> Separation | None:
-    """All pairs of the reference, judged by the rounds that determine all of it."""
-    members = np.flatnonzero(everywhere.reference)
-    samples = everywhere.values[members]
-    if not everywhere.are_finite:
-        fine = np.asarray(np.isfinite(samples).all(axis=0))
-        if 2 * fine.sum() < len(fine):
-            return None
-        samples = samples[:, fine]
-    found = separation(rating[members], samples)
-    return found.among(members, len(rating))
+def _cross_check(
+    fitted: _Fitted, found: _Intervals, rules: Rules, reference: BoolArray
+) -> FloatArray:
+    """(C,) half-widths by the plain sandwich, Bradley-Terry only; NaN for who lacks a bound."""
+    if not rules.details or rules.method is not Method.BRADLEY_TERRY or fitted.pulls is None:
+        return np.full(len(fitted.rating), np.nan)
+    pulls = fitted.pulls.relative_to(reference)
+    is_closed = rules.intervals is Intervals.CLOSED_FORM
+    covariance = plain_covariance(pulls, rules.unit, keep_variances=is_closed)
+    variances = np.maximum(covariance.diagonal(), 0.0)
+    check = factor(remarks.few_clusters(pulls.votes, rules.unit)) * np.sqrt(variances)
+    return np.where(np.isnan(found.lower) | np.isnan(found.upper), np.nan, check)
 
 
-def _on_covariates(votes: Comparisons, fit: Fitted) -> tuple[str, ...]:
-    missing = votes.covariates.shape[1] > 0 and fit.coefficients is None
-    return (remarks.NOT_ADJUSTED,) if missing else ()
-
-
-def _notes_on_method(rules: Rules) -> tuple[str, ...]:
-    return (remarks.ELO_NOTE,) if rules.method is Method.ELO else ()
+def _with_intervals(plain: Rated, found: _Intervals, details: bool) -> Rated:
+    lower, upper = found.lower, found.upper
+    best, worst = rank_sets(above_by_bounds(found.above, lower, upper))
+    unbounded = np.isnan(lower) & np.isnan(upper)
+    best[unbounded] = worst[unbounded] = 0
+    return replace(
+        plain,
+        lower=lower,
+        upper=upper,
+        rank_best=best,
+        rank_worst=worst,
+        covariance=found.covariance if details else None,
+        separation=found.separation if details else None,
+    )

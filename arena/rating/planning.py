@@ -1,102 +1,97 @@
-"""What it takes to be told something: votes, minutes, pairs judged by two.
+"""How many votes a study needs, and what it will tell, before its first vote.
 
-In: a `Question`. Out: an `Outlook` with a `Prospect` for each wish; the numbers come from
-`sample_size.py`. By how much experts and scenarios differ is read off past votes.
+In: a `Question`. Out: an `Outlook` with a `Prospect` for each wish. All of it is closed form: the
+sandwich of single votes of a balanced plan, plus what experts and scenarios add, which only more
+experts and more scenarios reduce, and Student's t with Satterthwaite's degrees of freedom.
+docs/rating.md describes it; everything is on the scale of the rated table, ties half a win.
 
-Notation: C contestants, half-widths in Elo points.
+Notation: C contestants, P pairs. Widths and gaps are Elo points.
 """
 
 from __future__ import annotations
 
 import math
+from bisect import bisect_left
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
-from scipy.special import ndtri
+import numpy as np
+from scipy.special import ndtr, ndtri
 
-from arena.rating.bootstrap import Unit
-from arena.rating.bradley_terry import ELO_PER_LOGIT
-from arena.rating.comparisons import Comparisons
-from arena.rating.estimate import LEVEL
+from arena.rating.comparisons import LEVEL, Comparisons, FloatArray, t_quantile
 from arena.rating.leaderboard import Intervals, Leaderboard, rate
-from arena.rating.sample_size import (
-    Expected,
-    StudyDesign,
-    agreement_error,
-    expect,
-    votes_per_expert_for,
-)
-
-QUANTILE = float(ndtri(0.5 + LEVEL / 2))
-
-
-def votes_for(
-    *, contestants: int, half_width: float, tie_share: float, design_effect: float = 1.0
-) -> int:
-    """Votes per contestant until its 95 % interval is +-`half_width` points.
-
-    For a balanced plan and contestants close to each other: with n votes each the variance of a
-    strength is 4 (1 - t) (C - 1)^2 / (C^2 n), because a tie leaves less to chance. Every vote
-    serves two contestants, so the whole study needs C / 2 times as many.
-
-    Args:
-        contestants: C, 2 or more.
-        half_width: More than 0.
-        tie_share: t, from 0 to below 1.
-        design_effect: How much larger the variance is than that of independent votes.
-
-    Raises:
-        ValueError: An argument is out of range.
-    """
-    if contestants < 2 or half_width <= 0 or not 0 <= tie_share < 1 or design_effect <= 0:
-        raise ValueError(
-            "2 contestants or more, a half-width above 0, a tie share from 0 to below 1 and a "
-            f"design effect above 0 are needed, not {contestants}, {half_width}, {tie_share} and "
-            f"{design_effect}"
-        )
-    strength = half_width / (QUANTILE * ELO_PER_LOGIT)
-    variance = 4.0 * (1.0 - tie_share) * ((contestants - 1) / contestants) ** 2
-    return math.ceil(design_effect * variance / strength**2)
-
-
-def votes_until(*, votes: int, half_width: float, wanted: float) -> int:
-    """Votes in all until an interval of +-`half_width` by `votes` votes has become +-`wanted`.
-
-    Widths fall with the square root of the number of votes as long as experts and scenarios grow
-    along with it: more votes of the same experts on the same scenarios narrow it less.
-
-    Raises:
-        ValueError: A number is not positive.
-    """
-    if votes <= 0 or half_width <= 0 or wanted <= 0:
-        raise ValueError(f"positive numbers are needed, not {votes}, {half_width} and {wanted}")
-    return math.ceil(votes * (half_width / wanted) ** 2)
-
-
-def design_effects(board: Leaderboard, independent: Leaderboard) -> list[float]:
-    """How many votes weigh as much as one independent vote, by contestant with an interval.
-
-    The ratio of the variances. Half-widths would also count what Student's t adds for few experts.
-
-    Args:
-        board: Its covariance knows of experts and scenarios.
-        independent: The same votes rated as if each stood for itself.
-    """
-    if board.covariance is None or independent.covariance is None:
-        return []
-    both = zip(board.covariance.diagonal(), independent.covariance.diagonal(), strict=True)
-    return [
-        float(clustered / alone)
-        for line, (clustered, alone) in zip(board.lines, both, strict=True)
-        if line.lower is not None and line.upper is not None and alone > 0.0
-    ]
-
-
-# --- A question and its answer -------------------------------------------------------------------
-
+from arena.rating.models import ELO_PER_LOGIT
+from arena.rating.ranking import CAUTION
+from arena.rating.rules import Unit
+from arena.rating.sandwich import MOST_PRIOR
 
 MOST_SEARCHED = 500
 """No more experts, or scenarios, are thought of."""
+
+_ROUNDS = 100
+"""Of past votes; the rounds only say who is determined at all."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StudyDesign:
+    """A study that somebody thinks of.
+
+    Attributes:
+        contestants, experts, scenarios: How many, 2 or more of each.
+        spread: Points from the worst to the best; the others lie evenly between.
+        tie_share: Of the votes, from 0 to below 1.
+        expert_sd, scenario_sd: By how many points experts, and scenarios, differ in what they
+            make of a contestant.
+        overlap_share: Of the judged units, those that two experts judge.
+
+    Raises:
+        ValueError: Something is out of range; the text says what is allowed.
+    """
+
+    contestants: int
+    experts: int
+    scenarios: int
+    spread: float = 0.0
+    tie_share: float = 0.4
+    expert_sd: float = 0.0
+    scenario_sd: float = 0.0
+    overlap_share: float = 0.0
+
+    def __post_init__(self) -> None:
+        if min(self.contestants, self.experts, self.scenarios) < 2:
+            raise ValueError("contestants, experts and scenarios must be 2 or more")
+        if min(self.spread, self.expert_sd, self.scenario_sd) < 0.0:
+            raise ValueError("spread and standard deviations must be 0 or more")
+        if not 0.0 <= self.overlap_share <= 1.0:
+            raise ValueError(f"overlap_share goes from 0 to 1, not {self.overlap_share}")
+        if not 0.0 <= self.tie_share < min(1.0, self.most_ties):
+            raise ValueError(
+                f"tie_share goes from 0 to below {min(1.0, self.most_ties):.2f} with a spread of "
+                f"{self.spread:g} points, not {self.tie_share}"
+            )
+
+    @property
+    def pairs(self) -> int:
+        """P."""
+        return self.contestants * (self.contestants - 1) // 2
+
+    @property
+    def units(self) -> int:
+        """The most votes that an expert can give: nobody sees a pair on a scenario twice."""
+        return self.pairs * self.scenarios
+
+    @property
+    def gaps(self) -> FloatArray:
+        """(P,) points between the pairs, in the order of np.triu_indices."""
+        ratings = np.linspace(0.0, self.spread, self.contestants)
+        low, high = np.triu_indices(self.contestants, 1)
+        return np.asarray(ratings[high] - ratings[low])
+
+    @property
+    def most_ties(self) -> float:
+        """The tie share at which the weaker one of a pair would never win."""
+        return float((2.0 / (1.0 + np.exp(self.gaps / ELO_PER_LOGIT))).mean())
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -104,10 +99,8 @@ class Question:
     """A design, and what it is to tell.
 
     Attributes:
-        half_width: Points that the widest 95 % interval is expected to have: some studies miss
-            it (docs/rating.md).
-        gap: Points between two contestants that are to be told apart.
-        power: With this chance.
+        half_width: Of the widest 95 % interval that is expected; some studies miss it.
+        gap: Points between two contestants that are to be told apart with this power.
         votes_per_expert: What somebody has in mind, None without.
         seconds: Of one vote.
         extra_share: Hidden repeats and attention checks, as a share of the votes.
@@ -129,8 +122,8 @@ class Prospect:
     Attributes:
         votes_per_expert, votes: Without repeats and checks.
         minutes: Of each expert, with them.
-        half_width, widest: Points expected of a typical interval, and of the widest.
-        gap: Points at which two are told apart with the wanted power.
+        half_width, widest: Expected of a typical interval, and of the widest.
+        gap: At which two are told apart with the wanted power.
         judged_twice: Units that two experts judge.
         agreement: The half-width of their share of agreement, from 0 to 1; None without any.
     """
@@ -153,7 +146,7 @@ class Wish:
         prospect: None where no number of votes reaches it.
         most: What all units judged by everybody would give.
         experts: The fewest experts with whom it can be reached on as many scenarios, None where
-            that is no question or nobody's number does.
+            it is reached anyway or nobody's number does.
         scenarios: The fewest scenarios on which as many experts reach it, likewise.
     """
 
@@ -173,75 +166,152 @@ class Outlook:
 
 
 def foretell(question: Question) -> Outlook:
-    """What it takes to be told what the question asks."""
-
-    def is_narrow(found: Expected) -> bool:
-        return found.widest <= question.half_width
-
-    def tells_apart(found: Expected) -> bool:
-        return found.tells_apart(question.gap, power=question.power)
-
+    """Return what it takes to be told what the question asks."""
     votes = question.votes_per_expert
     return Outlook(
-        narrow=_wish(question, is_narrow),
-        apart=_wish(question, tells_apart),
+        narrow=_wish(question, lambda found: found.widest <= question.half_width),
+        apart=_wish(question, lambda found: found.gap <= question.gap),
         in_mind=None if votes is None else prospect(question, votes),
     )
 
 
 def prospect(question: Question, votes_per_expert: int) -> Prospect:
-    """What so many votes of each expert give."""
+    """Return what so many votes of each expert give."""
     design = question.design
     votes = votes_per_expert * design.experts
-    found = expect(design, votes)
-    distinct = votes / (1.0 + design.overlap_share)
+    judged_twice = votes * design.overlap_share / (1.0 + design.overlap_share)
+    covariance, degrees, chance = _expected_spread(design, float(votes))
+    variance = covariance.diagonal()
+    factor = float(t_quantile(degrees))
+    # By chance some intervals of a table are wider than expected.
+    by_chance = 1.0 + 0.5 * _largest_of(design.contestants) * math.sqrt(chance)
     return Prospect(
         votes_per_expert=votes_per_expert,
         votes=votes,
         minutes=votes_per_expert * (1.0 + question.extra_share) * question.seconds / 60.0,
-        half_width=found.half_width,
-        widest=found.widest,
-        gap=found.gap_found(power=question.power),
-        judged_twice=round(distinct * design.overlap_share),
-        agreement=agreement_error(design, votes),
+        half_width=factor * math.sqrt(float(variance.mean())),
+        widest=factor * math.sqrt(float(variance.max())) * by_chance,
+        gap=_gap_found(design, covariance, degrees, question.power),
+        judged_twice=round(judged_twice),
+        # Of a share of a half, where it is widest.
+        agreement=_NORMAL * 0.5 / math.sqrt(judged_twice) if judged_twice >= 1.0 else None,
     )
 
 
-def _wish(question: Question, reached: Callable[[Expected], bool]) -> Wish:
+_NORMAL = float(ndtri(0.5 + LEVEL / 2))
+
+
+def _wish(question: Question, reached: Callable[[Prospect], bool]) -> Wish:
     design = question.design
+
+    def is_enough(votes_per_expert: int) -> bool:
+        return reached(prospect(question, votes_per_expert))
+
+    def reaches_with(**more: int) -> bool:
+        larger = replace(design, **more)
+        return reached(prospect(replace(question, design=larger), larger.units))
+
     most = prospect(question, design.units)
-    votes = votes_per_expert_for(design, reached)
+    votes = _fewest(is_enough, 1, design.units)
     if votes is not None:
         return Wish(prospect=prospect(question, votes), most=most)
     return Wish(
         prospect=None,
         most=most,
-        experts=_fewest(design, "experts", reached),
-        scenarios=_fewest(design, "scenarios", reached),
+        experts=_fewest(lambda number: reaches_with(experts=number), design.experts),
+        scenarios=_fewest(lambda number: reaches_with(scenarios=number), design.scenarios),
     )
 
 
-def _fewest(design: StudyDesign, what: str, reached: Callable[[Expected], bool]) -> int | None:
-    """The fewest of something with which all units judged by everybody reach it."""
+def _fewest(is_enough: Callable[[int], bool], least: int, most: int = MOST_SEARCHED) -> int | None:
+    """Return the first number that is enough, where every larger one is, too."""
+    numbers = range(least, most + 1)
+    place = bisect_left(numbers, True, key=is_enough)
+    return numbers[place] if place < len(numbers) else None
 
-    def is_enough(number: int) -> bool:
-        larger = replace(design, **{what: number})
-        return reached(expect(larger, larger.units * larger.experts))
 
-    low, high = getattr(design, what), MOST_SEARCHED
-    if low >= high or not is_enough(high):
-        return None
-    while high - low > 1:
-        middle = (low + high) // 2
-        low, high = (low, middle) if is_enough(middle) else (middle, high)
-    return high
+def _expected_spread(design: StudyDesign, votes: float) -> tuple[FloatArray, float, float]:
+    """Return (C, C) squared points, Student's degrees of freedom, and the chance in variances.
+
+    The last is the relative variance of what is found for one contestant's variance.
+    """
+    size = design.contestants
+    single = _covariance_of_a_vote(size, design.spread, design.tie_share) / votes
+    distinct = votes / (1.0 + design.overlap_share)
+    centre = np.eye(size) - 1.0 / size
+    added = [
+        effect**2 * (1.0 + _uneven(design, per_cluster)) / clusters * centre
+        for clusters, effect, per_cluster in (
+            (design.experts, design.expert_sd, votes / design.experts),
+            (design.scenarios, design.scenario_sd, distinct / design.scenarios),
+        )
+    ]
+    covariance = single + added[0] + added[1]
+    largest = float(covariance.diagonal().max())
+    of_parts = chance = 0.0
+    for clusters, part in zip((design.experts, design.scenarios), added, strict=True):
+        variance = float(single.diagonal().max() + part[0, 0])
+        own = clusters - 1.0
+        of_parts += variance**2 / max(min(MOST_PRIOR + own, own * (size - 1.0)), 1.0)
+        chance += 2.0 * (own / (own + MOST_PRIOR) * variance / largest) ** 2 / own
+    return covariance, max(largest**2 / of_parts, 1.0), chance
+
+
+@lru_cache(maxsize=4)
+def _covariance_of_a_vote(size: int, spread: float, tie_share: float) -> FloatArray:
+    """Return (C, C) squared points: H^-1 B H^-1 of a balanced plan with one vote in all."""
+    ratings = np.linspace(0.0, spread, size) / ELO_PER_LOGIT
+    expected = 1.0 / (1.0 + np.exp(ratings[:, None] - ratings[None, :]))
+    off_diagonal = ~np.eye(size, dtype=np.bool_)
+    chance_of_tie = np.minimum(expected, 1.0 - expected)
+    chance_of_tie *= tie_share / chance_of_tie[off_diagonal].mean()
+    pairs = size * (size - 1) / 2
+    information = np.where(off_diagonal, expected * (1.0 - expected), 0.0) / pairs
+    surprise = np.where(off_diagonal, information - chance_of_tie / 4.0 / pairs, 0.0)
+    curvature, squares = (np.diag(w.sum(axis=1)) - w for w in (information, surprise))
+    inverse = np.linalg.pinv(curvature, rcond=1e-9, hermitian=True)
+    return np.asarray(inverse @ squares @ inverse * ELO_PER_LOGIT**2)
+
+
+def _uneven(design: StudyDesign, per_cluster: float) -> float:
+    """Return what a cluster's tastes weigh more because it has not every pair equally often.
+
+    The pairs of a cluster are drawn without putting back: with m of P pairs the variance of its
+    mean taste is (C - 2) (P - m) / ((P - 1) m) times larger than with all of them.
+    """
+    pairs = design.pairs
+    if per_cluster >= pairs or pairs < 2:
+        return 0.0
+    missing = (pairs - per_cluster) / (pairs - 1)
+    return (design.contestants - 2) * missing / max(per_cluster, 1e-9)
+
+
+def _largest_of(number: int) -> float:
+    """Return the mean of the largest of so many standard normal values."""
+    values, step = np.linspace(-9.0, 9.0, 1801, retstep=True)
+    return float((1.0 - ndtr(values) ** number - ndtr(-values)).sum() * step)
+
+
+def _gap_found(design: StudyDesign, covariance: FloatArray, degrees: float, power: float) -> float:
+    """Return how far apart two must be to be told apart with such a chance.
+
+    All pairs are judged at once, at 5 % for all of them, from the largest difference on: a pair
+    shares the 5 % with those that are closer.
+    """
+    variance = covariance.diagonal()
+    neighbours = variance[1:] + variance[:-1] - 2.0 * covariance.diagonal(1)
+    error = math.sqrt(float(neighbours.mean()))
+    gap = 0.0
+    for _ in range(20):  # the gap says which pairs are closer, and these say the gap
+        closer = max(int((design.gaps <= gap + 1e-6).sum()), design.contestants - 1)
+        limit = float(t_quantile(degrees, 1.0 - (1.0 - LEVEL) / CAUTION / closer / 2.0))
+        before, gap = gap, (limit + float(ndtri(power))) * error
+        if abs(gap - before) < 0.01:
+            break
+    return gap
 
 
 # --- What past votes say -------------------------------------------------------------------------
-
-
-_ROUNDS = 100
-"""They only say who is determined at all."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -253,24 +323,38 @@ class Effects:
 
 
 def estimate_effects(votes: Comparisons) -> Effects | None:
-    """What past votes say; None where they do not determine ratings with intervals."""
-    alone = _mean_variance(votes, Unit.VOTE)
-    by_expert, by_scenario = (_mean_variance(votes, unit) for unit in (Unit.EXPERT, Unit.SCENARIO))
-    if alone is None or by_expert is None or by_scenario is None:
-        return None
-    contestants = len(votes.names)
-    share = (contestants - 1) / contestants
-    experts, scenarios = len(set(votes.expert.tolist())), len(set(votes.scenario.tolist()))
+    """Return what past votes say; None where they do not determine ratings with intervals."""
+    means = {}
+    for unit in (Unit.VOTE, Unit.EXPERT, Unit.SCENARIO):
+        board = rate(votes, unit=unit, intervals=Intervals.CLOSED_FORM, rounds=_ROUNDS)
+        if board.covariance is None or np.isnan(board.covariance.diagonal()).any():
+            return None
+        means[unit] = float(board.covariance.diagonal().mean())
+    share = 1.0 - 1.0 / len(votes.names)
+
+    def standard_deviation(unit: Unit, clusters: int) -> float:
+        return math.sqrt(max(means[unit] - means[Unit.VOTE], 0.0) * clusters / share)
+
     return Effects(
-        expert_sd=math.sqrt(max(by_expert - alone, 0.0) * experts / share),
-        scenario_sd=math.sqrt(max(by_scenario - alone, 0.0) * scenarios / share),
+        expert_sd=standard_deviation(Unit.EXPERT, len(np.unique(votes.expert))),
+        scenario_sd=standard_deviation(Unit.SCENARIO, len(np.unique(votes.scenario))),
     )
 
 
-def _mean_variance(votes: Comparisons, unit: Unit) -> float | None:
-    """Squared points, over the contestants."""
-    board = rate(votes, unit=unit, intervals=Intervals.CLOSED_FORM, rounds=_ROUNDS)
-    if board.covariance is None:
-        return None
-    found = float(board.covariance.diagonal().mean())
-    return None if math.isnan(found) else found
+def design_effects(board: Leaderboard, independent: Leaderboard) -> list[float]:
+    """Return how many votes weigh as much as one independent vote, by contestant with an interval.
+
+    The ratio of the variances. Half-widths would also count what Student's t adds for few experts.
+
+    Args:
+        board: Its covariance knows of experts and scenarios.
+        independent: The same votes rated as if each stood for itself.
+    """
+    if board.covariance is None or independent.covariance is None:
+        return []
+    both = zip(board.covariance.diagonal(), independent.covariance.diagonal(), strict=True)
+    return [
+        float(clustered / alone)
+        for line, (clustered, alone) in zip(board.lines, both, strict=True)
+        if line.lower is not None and line.upper is not None and alone > 0.0
+    ]

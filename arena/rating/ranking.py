@@ -7,23 +7,32 @@ a rough guess, and the largest of 36 ratios of guesses is far beyond what a norm
 has. From the largest difference on, each is held against the largest of those that are left (the
 step-down of Westfall and Young 1993, Romano and Wolf 2005).
 
-Notation: C contestants, P pairs, B rounds, N draws.
+Notation: C contestants, P pairs in the order of np.triu_indices, B rounds, N draws.
 """
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass, replace
-from typing import Self
+from dataclasses import dataclass
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.special import ndtri
 
-from arena.rating.comparisons import BoolArray, FloatArray, IntArray
-from arena.rating.estimate import LEVEL, t_above, t_quantile
-from arena.rating.moderated import LEAST, Component, Spread
+from arena.rating.comparisons import LEVEL, BoolArray, FloatArray, IntArray, t_above, t_quantile
+from arena.rating.sandwich import LEAST, Component, Spread
 
+SingleArray = NDArray[np.float32]
+
+CAUTION = 1.8
+"""What p-values are multiplied by: effects of scenarios are no sums of many, and simulated studies
+of equals were told apart up to so much more often than the draws foresee (docs/rating.md)."""
+MOST_DRAWN = 300
+"""Contestants above whom pairs go by Holm's step-down alone, without draws."""
+MOST_ROUNDS = 2000
+"""By so many a p-value of 5 % is known to one percent."""
+_MANY_CLUSTERS = 200.0
+"""So many degrees of freedom make a square as good as known."""
+_MOST_KEPT = 20_000_000
 _NUMBERS_AT_ONCE = 2_000_000
 
 
@@ -55,9 +64,9 @@ def shown_ranks(lower: FloatArray, upper: FloatArray, *, average: float) -> IntA
         average: The rating of an average contestant.
     """
     no_lower, no_upper = np.isnan(lower), np.isnan(upper)
-    found = ranks(np.where(no_lower, -np.inf, lower), np.where(no_upper, np.inf, upper))
-    is_above = ~no_lower & (np.where(no_lower, -np.inf, lower) > average)
-    decided = (found > 1) | ~(no_lower | no_upper) | (no_upper & is_above)
+    low = np.where(no_lower, -np.inf, lower)
+    found = ranks(low, np.where(no_upper, np.inf, upper))
+    decided = (found > 1) | ~(no_lower | no_upper) | (no_upper & (low > average))
     return np.where(decided, found, 0)
 
 
@@ -89,27 +98,45 @@ def above_by_bounds(above: BoolArray, lower: FloatArray, upper: FloatArray) -> B
     return np.asarray(above | (apart & (missing[:, None] | missing[None, :])))
 
 
+def above_in_rounds(rating: FloatArray, samples: FloatArray) -> BoolArray:
+    """(C, C) who is above whom by the largest standardised difference of rounds (max-t).
+
+    Args:
+        rating: (C,) of the data.
+        samples: (C, B) of the rounds.
+    """
+    low, high = np.triu_indices(len(rating), 1)
+    variance = variances_of_pairs(np.atleast_2d(np.cov(samples)), low, high)
+    error = np.sqrt(np.maximum(variance, 1e-300))
+    centred = samples - samples.mean(axis=1, keepdims=True)
+    largest = np.zeros(samples.shape[1])
+    at_once = max(1, _NUMBERS_AT_ONCE // max(1, samples.shape[1]))
+    for first in range(0, len(low), at_once):
+        some = slice(first, first + at_once)
+        gaps = np.abs(centred[low[some]] - centred[high[some]]) / error[some, None]
+        np.maximum(largest, gaps.max(axis=0, initial=0.0), out=largest)
+    critical = float(np.quantile(largest, LEVEL)) if len(largest) else np.inf
+    apart = _square_of(len(rating), np.abs(rating[low] - rating[high]) / error > critical, False)
+    return apart & (rating[:, None] > rating[None, :])
+
+
+# --- All pairs at once, by intervals in closed form ----------------------------------------------
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Separation:
     """Which pairs differ, all pairs judged at once: the error is 5 % for the whole table.
 
     Attributes:
-        above: (C, C) whether the row's contestant is above the column's, by the largest of all
-            standardised differences over the rounds (max-t).
-        p_value: (C, C) adjusted by max-t, symmetric; 1 on the diagonal.
-        holm: (C, C) adjusted by Holm's step-down of the pairs' normal p-values, symmetric.
-        critical: How many standard errors a difference must have under max-t.
+        above: (C, C) whether the row's contestant is above the column's.
+        p_value: (C, C) adjusted for all pairs, symmetric; 1 on the diagonal.
         difference: (C, C) the row's rating minus the column's.
-        error: (C, C) standard error of the difference over the rounds.
         half: (C, C) half the width of the difference's own 95 % interval.
     """
 
     above: BoolArray
     p_value: FloatArray
-    holm: FloatArray
-    critical: float
     difference: FloatArray
-    error: FloatArray
     half: FloatArray
 
     def among(self, members: IntArray, contestants: int) -> Self:
@@ -117,129 +144,12 @@ class Separation:
         if len(members) == contestants:
             return self
         places = np.ix_(members, members)
-
-        def wide(matrix: FloatArray) -> FloatArray:
-            square = np.full((contestants, contestants), np.nan)
-            square[places] = matrix
-            return square
-
         above = np.zeros((contestants, contestants), dtype=bool)
         above[places] = self.above
-        return replace(
-            self,
-            above=above,
-            p_value=wide(self.p_value),
-            holm=wide(self.holm),
-            difference=wide(self.difference),
-            error=wide(self.error),
-            half=wide(self.half),
-        )
-
-
-def separation(rating: FloatArray, samples: FloatArray) -> Separation:
-    """Judge all pairs at once, from ratings (C,) and those of the rounds (C, B)."""
-    contestants = len(rating)
-    low, high = np.triu_indices(contestants, 1)
-    covariance: FloatArray = np.atleast_2d(np.cov(samples)).astype(np.float64)
-    variance = covariance.diagonal()
-    spread = variance[low] + variance[high] - 2.0 * covariance[low, high]
-    error = np.asarray(np.sqrt(np.maximum(spread, 1e-300)), dtype=np.float64)
-    gap = rating[low] - rating[high]
-    largest = _largest_deviations(samples, low, high, error)
-    critical = float(np.quantile(largest, LEVEL)) if len(largest) else math.inf
-    size = np.abs(gap) / error
-    beyond = len(largest) - np.searchsorted(np.sort(largest), size, side="left")
-    adjusted = ((1.0 + beyond) / (1.0 + len(largest))).astype(np.float64)
-    normal = np.array([math.erfc(value / math.sqrt(2.0)) for value in size])
-    return gather_pairs(
-        rating,
-        differs=size > critical,
-        p_value=adjusted,
-        holm=holm(normal),
-        critical=critical,
-        error=error,
-        half=float(ndtri(0.5 + LEVEL / 2)) * error,
-    )
-
-
-def gather_pairs(
-    rating: FloatArray,
-    *,
-    differs: BoolArray,
-    p_value: FloatArray,
-    holm: FloatArray,
-    critical: float,
-    error: FloatArray,
-    half: FloatArray,
-) -> Separation:
-    """What was found for pairs (P,), in the order of `np.triu_indices`, as squares (C, C)."""
-    contestants = len(rating)
-    low, high = np.triu_indices(contestants, 1)
-    difference = rating[:, None] - rating[None, :]
-    apart = np.zeros((contestants, contestants), dtype=bool)
-    apart[low, high] = apart[high, low] = differs
-    return Separation(
-        above=apart & (difference > 0.0),
-        p_value=_square_of(contestants, low, high, p_value, 1.0),
-        holm=_square_of(contestants, low, high, holm, 1.0),
-        critical=critical,
-        difference=difference,
-        error=_square_of(contestants, low, high, error, 0.0),
-        half=_square_of(contestants, low, high, half, 0.0),
-    )
-
-
-def holm(p_values: FloatArray) -> FloatArray:
-    """Holm's adjusted p-values (1979) of (n,) p-values, in their order."""
-    order = np.argsort(p_values, kind="stable")
-    factors = len(p_values) - np.arange(len(p_values))
-    stepped = np.minimum(np.maximum.accumulate(p_values[order] * factors), 1.0)
-    adjusted = np.empty(len(p_values))
-    adjusted[order] = stepped
-    return adjusted
-
-
-def _largest_deviations(
-    samples: FloatArray, low: IntArray, high: IntArray, error: FloatArray
-) -> FloatArray:
-    """(B,) the largest standardised deviation of a difference from its mean, in each round."""
-    centred = samples - samples.mean(axis=1, keepdims=True)
-    largest = np.zeros(samples.shape[1])
-    at_once = max(1, _NUMBERS_AT_ONCE // max(1, samples.shape[1]))
-    for first in range(0, len(low), at_once):
-        some = slice(first, first + at_once)
-        gaps = centred.take(low[some], axis=0)
-        gaps -= centred.take(high[some], axis=0)
-        gaps /= error[some, None]
-        np.maximum(largest, np.abs(gaps, out=gaps).max(axis=0, initial=0.0), out=largest)
-    return largest
-
-
-def _square_of(
-    contestants: int, low: IntArray, high: IntArray, values: FloatArray, diagonal: float
-) -> FloatArray:
-    """(C, C), symmetric, of what pairs have (P,)."""
-    square = np.full((contestants, contestants), diagonal)
-    square[low, high] = values
-    square[high, low] = values
-    return square
-
-
-# --- All pairs at once, by intervals in closed form ----------------------------------------------
-
-
-SingleArray = NDArray[np.float32]
-
-CAUTION = 1.8
-"""What p-values are multiplied by: effects of scenarios are no sums of many, and simulated studies
-of equals were told apart up to so much more often than the draws foresee (docs/rating.md)."""
-MOST_DRAWN = 300
-"""Contestants above whom pairs go by Holm's step-down alone, without draws."""
-MOST_ROUNDS = 2000
-"""By so many a p-value of 5 % is known to one percent."""
-_MANY_CLUSTERS = 200.0
-"""So many degrees of freedom make a square as good as known."""
-_MOST_KEPT = 20_000_000
+        wide = np.full((3, contestants, contestants), np.nan)
+        for square, own in zip(wide, (self.p_value, self.difference, self.half), strict=True):
+            square[places] = own
+        return type(self)(above=above, p_value=wide[0], difference=wide[1], half=wide[2])
 
 
 def judge_pairs(rating: FloatArray, spread: Spread, *, rounds: int, seed: int) -> Separation:
@@ -253,76 +163,68 @@ def judge_pairs(rating: FloatArray, spread: Spread, *, rounds: int, seed: int) -
     """
     contestants = len(rating)
     low, high = np.triu_indices(contestants, 1)
-    gap = rating[low] - rating[high]
     # Of 36 pairs some have a small square by chance, and those would be told apart first.
     variance = np.maximum(
         variances_of_pairs(spread.covariance, low, high),
         variances_of_pairs(spread.common, low, high),
     )
     error = np.sqrt(np.maximum(variance, 1e-300))
-    size = np.abs(gap) / error
+    size = np.abs(rating[low] - rating[high]) / error
     degrees = np.minimum(spread.degrees[low], spread.degrees[high])
-    single = 2.0 * t_above(size, degrees)
-    by_holm = holm(single)
     if contestants <= MOST_DRAWN:
         number = min(rounds, MOST_ROUNDS, max(500, _MOST_KEPT // (10 * max(len(low), 1))))
-        drawn = _drawn(spread, low, high, number, seed)
-        adjusted, critical = _step_down(size, drawn)
+        adjusted = _step_down(size, draw_equals(spread, rounds=number, seed=seed))
     else:
-        adjusted, critical = by_holm, float("nan")
+        adjusted = holm(2.0 * t_above(size, degrees))
     adjusted = np.minimum(CAUTION * adjusted, 1.0)
-    differs = adjusted <= 1.0 - LEVEL
-    return gather_pairs(
-        rating,
-        differs=differs,
-        p_value=adjusted,
-        holm=by_holm,
-        critical=critical,
-        error=error,
-        half=t_quantile(degrees) * error,
+    difference = rating[:, None] - rating[None, :]
+    apart = _square_of(contestants, adjusted <= 1.0 - LEVEL, False)
+    return Separation(
+        above=apart & (difference > 0.0),
+        p_value=_square_of(contestants, adjusted, 1.0),
+        difference=difference,
+        half=_square_of(contestants, t_quantile(degrees) * error, 0.0),
     )
 
 
-def draw_equals(
-    spread: Spread, low: IntArray, high: IntArray, *, rounds: int, seed: int
-) -> tuple[SingleArray, SingleArray, SingleArray]:
-    """(N, P) each: differences of equals, and two variances that would be found for them.
+def holm(p_values: FloatArray) -> FloatArray:
+    """Holm's adjusted p-values (1979) of (n,) p-values, in their order."""
+    order = np.argsort(p_values, kind="stable")
+    factors = len(p_values) - np.arange(len(p_values))
+    stepped = np.minimum(np.maximum.accumulate(p_values[order] * factors), 1.0)
+    adjusted = np.empty(len(p_values))
+    adjusted[order] = stepped
+    return adjusted
 
-    The first is moderated, the second what it would be if all contestants were taken for alike.
+
+def draw_equals(spread: Spread, *, rounds: int, seed: int) -> SingleArray:
+    """(P, N) standardised differences of equals, by the variances that would be found for them.
+
     In single precision: they are compared, once.
-
-    Args:
-        spread: Of the ratings.
-        low: (P,) one of each pair.
-        high: (P,) the other one.
-        rounds: N.
-        seed: Of the draws.
     """
     rng = np.random.default_rng(seed)
     contestants = len(spread.covariance)
-    root = _root(spread.common)
+    low, high = np.triu_indices(contestants, 1)
     base = variances_of_pairs(spread.base, low, high)
     taken_off = max(len(spread.components) - 1, 0) * base
+    least = np.maximum(LEAST * base, 1e-30).astype(np.float32)
     clusters = sum(component.own_degrees.max(initial=1.0) for component in spread.components)
     at_once = int(max(1, _NUMBERS_AT_ONCE // (contestants * (contestants + clusters))))
+    root = _root(spread.common)
     roots = [_root(component.common) for component in spread.components]
-    gaps: SingleArray = np.empty((rounds, len(low)), dtype=np.float32)
-    variances, commons = np.empty_like(gaps), np.empty_like(gaps)
+    drawn: SingleArray = np.empty((rounds, len(low)), dtype=np.float32)
     for first in range(0, rounds, at_once):
-        block = slice(first, min(first + at_once, rounds))
-        number = block.stop - first
+        number = min(at_once, rounds - first)
         ratings = rng.standard_normal((number, contestants), dtype=np.float32) @ root
-        gaps[block] = ratings.take(low, axis=1) - ratings.take(high, axis=1)
-        variances[block] = commons[block] = -taken_off
+        variances: SingleArray = np.empty((number, len(low)), dtype=np.float32)
+        variances[:] = -taken_off
         if not spread.components:
-            variances[block] += variances_of_pairs(spread.covariance, low, high)
+            variances += variances_of_pairs(spread.covariance, low, high).astype(np.float32)
         for component, of_component in zip(spread.components, roots, strict=True):
-            own, common = _variances(component, of_component, low, high, number, rng)
-            variances[block] += own
-            commons[block] += common
-    for found, least in ((variances, LEAST * base), (commons, base)):
-        np.maximum(found, np.maximum(least, 1e-30).astype(np.float32), out=found)
-    return gaps, variances, commons
+            variances += _draw_variances(component, of_component, low, high, number, rng)
+        gaps = np.abs(ratings.take(low, axis=1) - ratings.take(high, axis=1))
+        drawn[first : first + number] = gaps / np.sqrt(np.maximum(variances, least))
+    return drawn.T
 
 
 def variances_of_pairs(covariance: FloatArray, low: IntArray, high: IntArray) -> FloatArray:
@@ -331,48 +233,34 @@ def variances_of_pairs(covariance: FloatArray, low: IntArray, high: IntArray) ->
     return np.asarray(variance[low] + variance[high] - 2.0 * covariance[low, high])
 
 
-def _drawn(spread: Spread, low: IntArray, high: IntArray, rounds: int, seed: int) -> SingleArray:
-    """(P, N) standardised differences of equals."""
-    gaps, variances, _ = draw_equals(spread, low, high, rounds=rounds, seed=seed)
-    np.sqrt(variances, out=variances)
-    return np.abs(np.divide(gaps, variances, out=gaps), out=gaps).T
-
-
-def _variances(
-    one: Component,
+def _draw_variances(
+    component: Component,
     root: SingleArray,
     low: IntArray,
     high: IntArray,
     number: int,
     rng: np.random.Generator,
-) -> tuple[SingleArray, SingleArray]:
-    """(N, P), (N, P): what a component would add to the two variances of `draw_equals`."""
-    degrees = float(np.median(one.own_degrees))
-    common = variances_of_pairs(one.common, low, high).astype(np.float32)
+) -> SingleArray:
+    """(N, P) what a component would add to the variances of differences."""
+    degrees = float(np.median(component.own_degrees))
     if degrees >= _MANY_CLUSTERS:
-        known = np.broadcast_to(common, (number, len(low)))
-        return known, known
-    clusters = max(1, round(degrees))
-    contestants = len(one.common)
+        known = variances_of_pairs(component.common, low, high).astype(np.float32)
+        return np.broadcast_to(known, (number, len(low)))
+    clusters, contestants = max(1, round(degrees)), len(component.common)
     pulls = rng.standard_normal((number, clusters, contestants), dtype=np.float32) @ root
-    seen = np.einsum("ngc,ngc,c->n", pulls, pulls, _over(one.common.diagonal()))
+    weights = 1.0 / np.maximum(component.common.diagonal(), 1e-30)
+    seen = np.einsum("ngc,ngc,c->n", pulls, pulls, weights.astype(np.float32))
     seen /= np.float32(clusters * contestants)
-    others = np.sqrt(1.0 - one.own_share)
-    shared = variances_of_pairs(others[:, None] * one.common * others, low, high).astype(
-        np.float32
-    )
-    pulls *= np.sqrt(one.own_share / clusters).astype(np.float32)
+    others = np.sqrt(1.0 - component.own_share)
+    moderated = others[:, None] * component.common * others
+    shared = variances_of_pairs(moderated, low, high).astype(np.float32)
+    pulls *= np.sqrt(component.own_share / clusters).astype(np.float32)
     squares = np.matmul(pulls.transpose(0, 2, 1), pulls)
     variance = np.diagonal(squares, axis1=1, axis2=2)
     own = variance.take(low, axis=1) + variance.take(high, axis=1)
     own -= np.float32(2.0) * squares.reshape(number, -1).take(low * contestants + high, axis=1)
     own += seen[:, None] * shared
-    return np.asarray(own), np.asarray(seen[:, None] * common)
-
-
-def _over(values: FloatArray) -> SingleArray:
-    """One over each."""
-    return np.asarray(1.0 / np.maximum(values, 1e-30), dtype=np.float32)
+    return np.asarray(own)
 
 
 def _root(covariance: FloatArray) -> SingleArray:
@@ -382,14 +270,20 @@ def _root(covariance: FloatArray) -> SingleArray:
     return np.asarray(root, dtype=np.float32)
 
 
-def _step_down(size: FloatArray, drawn: SingleArray) -> tuple[FloatArray, float]:
-    """(P,) adjusted p-values of sizes (P,), and what the largest must exceed."""
+def _step_down(size: FloatArray, drawn: SingleArray) -> FloatArray:
+    """(P,) adjusted p-values of sizes (P,), by those of equals (P, N)."""
     order = np.argsort(size, kind="stable")
     largest = np.maximum.accumulate(drawn[order], axis=0)
-    rounds = drawn.shape[1]
     reached = (largest >= size[order, None]).sum(axis=1)
-    stepped = (1.0 + reached) / (1.0 + rounds)
+    stepped = (1.0 + reached) / (1.0 + drawn.shape[1])
     adjusted = np.empty(len(size))
     adjusted[order] = np.maximum.accumulate(stepped[::-1])[::-1]
-    critical = float(np.quantile(largest[-1], LEVEL)) if len(size) else float("inf")
-    return adjusted, critical
+    return adjusted
+
+
+def _square_of(contestants: int, values: NDArray[Any], diagonal: float) -> NDArray[Any]:
+    """(C, C), symmetric, of what pairs have (P,)."""
+    low, high = np.triu_indices(contestants, 1)
+    square = np.full((contestants, contestants), diagonal, dtype=values.dtype)
+    square[low, high] = square[high, low] = values
+    return square

@@ -19,8 +19,17 @@ from enum import StrEnum
 
 import numpy as np
 
-from arena.rating.comparisons import BoolArray, Comparisons, FloatArray, IntArray, count_pairs
-from arena.rating.estimate import LEVEL, Estimate, share, wilson
+from arena.rating.comparisons import (
+    LEVEL,
+    BoolArray,
+    Comparisons,
+    Estimate,
+    FloatArray,
+    IntArray,
+    count_pairs,
+    share,
+    wilson,
+)
 
 VALUES = 3
 _TAILS = (50.0 * (1.0 - LEVEL), 50.0 * (1.0 + LEVEL))
@@ -88,17 +97,6 @@ def agreement(votes: Comparisons, *, rounds: int, seed: int) -> Agreement:
         judgements=int(table[is_shared].sum()),
         ac1=_estimate(_ac1, DifferenceMetric.NOMINAL, whole, drawn, several),
     )
-
-
-def gwet_ac1(table: IntArray) -> float | None:
-    """AC1 of a table (U, K) of values by unit; None if no unit was judged twice.
-
-    What is expected by chance comes from all units, also those that were judged once.
-
-    Source: K. L. Gwet, Computing inter-rater reliability in the presence of high agreement (2008).
-    """
-    is_shared = table.sum(axis=1) >= 2
-    return float(_ac1_of(_shares(table).sum(axis=0)[None])[0]) if is_shared.any() else None
 
 
 def unit_table(votes: Comparisons) -> tuple[IntArray, IntArray]:

@@ -4,101 +4,59 @@ from __future__ import annotations
 
 import numpy as np
 
-from arena.rating import elo, sandwich
-from arena.rating.bootstrap import Unit
 from arena.rating.chains import few_of
 from arena.rating.comparisons import Comparisons, FloatArray, IntArray, renumber_codes
-from arena.rating.rules import Intervals, Rules
+from arena.rating.rules import Intervals, Rules, Unit
+from arena.rating.sandwich import FEW_CLUSTERS
 
 FEWEST = {"expert": 5, "scenario": 10}
 """A table that rests on fewer says so: docs/rating.md."""
 
-
-def _clusters(votes: Comparisons, unit: Unit) -> dict[str, int]:
-    """How many of what is drawn there are."""
-    numbers = {}
-    if unit in (Unit.EXPERT, Unit.TWO_WAY):
-        numbers["expert"] = len(renumber_codes(votes.expert)[0])
-    if unit in (Unit.SCENARIO, Unit.TWO_WAY):
-        numbers["scenario"] = len(renumber_codes(votes.scenario)[0])
-    return numbers
+ELO_NOTE = (
+    "Online Elo follows the latest votes: its interval does not shrink with more votes, and the "
+    "order of the votes matters."
+)
+NO_DAVIDSON = (
+    "Davidson's model has no finite ratings for these votes: some score one way by ties only. "
+    "Bradley-Terry rates them."
+)
+NOT_ADJUSTED = (
+    "The votes do not determine what was to be adjusted for: it is the same in all votes, or "
+    "says no more than who was shown. The ratings stand without it."
+)
 
 
 def few_clusters(votes: Comparisons, unit: Unit) -> int | None:
     """The smaller number of clusters where that is few; one alone can't vary and is left out."""
     numbers = [number for number in _clusters(votes, unit).values() if number > 1]
-    smallest = min(numbers, default=sandwich.FEW_CLUSTERS)
-    return smallest if smallest < sandwich.FEW_CLUSTERS else None
+    smallest = min(numbers, default=FEW_CLUSTERS)
+    return smallest if smallest < FEW_CLUSTERS else None
 
 
 def why_no_interval(names: tuple[str, ...], rules: Rules, *, lost: int) -> str:
-    """Why nobody of a part has a bound.
-
-    Args:
-        names: Of the part.
-        rules: How it was rated.
-        lost: Rounds that did not determine everybody.
-    """
+    """Why nobody of a part has a bound; `lost` rounds did not determine everybody."""
     named = ", ".join(few_of(names))
-    if rules.intervals is not Intervals.RESAMPLES:
+    if rules.intervals is Intervals.CLOSED_FORM:
         return (
-            f"Among {named} no intervals can be given: there are too few votes, or "
-            "hardly any against some contestant."
+            f"Among {named} no intervals can be given: there are too few votes, or hardly any "
+            "against some contestant."
         )
     return (
-        f"Among {named} the votes determined no ratings in {lost} of {rules.rounds} "
-        "resamples, so intervals can't be given: there are too few votes, or hardly any against "
-        "some contestant."
+        f"Among {named} the votes determined no ratings in {lost} of {rules.rounds} resamples, so "
+        "intervals can't be given: there are too few votes, or hardly any against some contestant."
     )
 
 
 def why_no_spread(rules: Rules) -> str:
     """Why the votes leave no width for an interval."""
+    start = "The votes do not vary between what they are clustered by"
     if rules.intervals is Intervals.RESAMPLES:
-        return _ALL_THE_SAME[rules.unit]
+        drawn = " and ".join(rules.unit.kinds) or "vote"
+        start = f"Every resample by {drawn} gave the same ratings"
     return (
-        "The votes do not vary between what they are clustered by, so intervals can't be given: "
-        "there is too little that could have come out otherwise."
+        f"{start}, so intervals can't be given: there is too little that could have come out "
+        "otherwise."
     )
-
-
-def notes_on_bounds(lower: FloatArray, upper: FloatArray, rank: IntArray) -> tuple[str, ...]:
-    """(C,) which bounds or ranks are missing and why; bounds NaN and ranks 0 are missing."""
-    return tuple(
-        _MISSING[no_lower, no_upper, no_rank]
-        for no_lower, no_upper, no_rank in zip(
-            np.isnan(lower).tolist(), np.isnan(upper).tolist(), (rank == 0).tolist(), strict=True
-        )
-    )
-
-
-def why_too_few(votes: Comparisons, unit: Unit, notes: tuple[str, ...]) -> tuple[str, ...]:
-    """Say what is too few where neither bound is known: votes, experts or scenarios.
-
-    Args:
-        votes: Of the contestants (C,).
-        unit: What hangs together.
-        notes: (C,) as `notes_on_bounds` gives them.
-    """
-    codes = {"expert": votes.expert, "scenario": votes.scenario}
-    wanted = {Unit.EXPERT: ("expert",), Unit.SCENARIO: ("scenario",), Unit.VOTE: ()}
-    kinds = wanted.get(unit, ("expert", "scenario"))
-    found = list(notes)
-    for place, note in enumerate(notes):
-        if note != TOO_FEW:
-            continue
-        own = (votes.first == place) | (votes.second == place)
-        numbers = {kind: len(np.unique(codes[kind][own])) for kind in kinds}
-        kind = min(numbers, key=numbers.__getitem__, default="")
-        if kind and numbers[kind] < _FEWEST_CLUSTERS:
-            many = f"only {numbers[kind]} {kind}s" if numbers[kind] > 1 else f"one {kind}"
-            prefix = "of" if kind == "expert" else "on"
-            found[place] = f"no interval and no rank: all votes are {prefix} {many}"
-    return tuple(found)
-
-
-_FEWEST_CLUSTERS = 6
-"""Six independent comparisons are the fewest that tell two apart."""
 
 
 def who_is_open(names: tuple[str, ...], notes: tuple[str, ...]) -> tuple[str, ...]:
@@ -115,121 +73,99 @@ def who_is_open(names: tuple[str, ...], notes: tuple[str, ...]) -> tuple[str, ..
 
 def warnings(votes: Comparisons, *, rules: Rules, rounds: int, degenerate: int) -> tuple[str, ...]:
     """What to keep in mind with intervals by these rules."""
-    said: list[str] = []
-    unit = rules.unit
-    clusters = _clusters(votes, unit)
-    few = False
+    found: list[str] = []
+    is_resampled = rules.intervals is Intervals.RESAMPLES
+    is_widened = False
     for kind, number in _clusters(votes, Unit.TWO_WAY).items():
-        is_drawn = kind in clusters and rules.intervals is Intervals.RESAMPLES
-        limit = sandwich.FEW_CLUSTERS if is_drawn else FEWEST[kind]
-        if number == 1 and kind in clusters:
-            said.append(_ONLY_ONE[kind])
+        is_drawn = kind in rules.unit.kinds and is_resampled
+        limit = FEW_CLUSTERS if is_drawn else FEWEST[kind]
+        if number == 1 and kind in rules.unit.kinds:
+            found.append(
+                f"All votes belong to one {kind}: how much {kind}s differ can't be seen, and the "
+                f"intervals hold for this {kind} only."
+            )
         elif 1 < number < limit:
-            said.append(
+            found.append(
                 f"Only {number} {kind}s: intervals that rest on fewer than {limit} of them are "
                 "rough."
             )
-            few = few or is_drawn
-    if few:
-        said.append(_WIDENED[unit])
-    if degenerate and rules.intervals is Intervals.RESAMPLES:
-        said.append(
+            is_widened |= is_drawn
+    if is_widened and rules.unit is Unit.TWO_WAY:
+        found.append(
+            "Drawing both ways is too wide where votes are independent and too narrow where few "
+            "experts differ much; intervals in closed form are neither."
+        )
+    elif is_widened:
+        found.append("Such intervals are widened by Student's t.")
+    if degenerate and is_resampled:
+        found.append(
             f"In {degenerate} of {rounds} resamples the votes did not determine everybody's "
             "rating; there it counts as far above or below the others, as the votes say."
         )
-    return tuple(said)
+    return tuple(found)
 
 
-ELO_NOTE = elo.INTERVAL_NOTE
-
-NO_DAVIDSON = (
-    "Davidson's model has no finite ratings for these votes: some score one way by ties only. "
-    "Bradley-Terry rates them."
-)
-
-NOT_ADJUSTED = (
-    "The votes do not determine what was to be adjusted for: it is the same in all votes, or "
-    "says no more than who was shown. The ratings stand without it."
-)
-
-_ALL_THE_SAME = {
-    Unit.VOTE: (
-        "Every resample by vote gave the same ratings, so intervals can't be given: there is too "
-        "little that could have come out otherwise."
-    ),
-    Unit.EXPERT: (
-        "Every resample by expert gave the same ratings, so intervals can't be given: there is "
-        "too little that could have come out otherwise."
-    ),
-    Unit.SCENARIO: (
-        "Every resample by scenario gave the same ratings, so intervals can't be given: there is "
-        "too little that could have come out otherwise."
-    ),
-    Unit.TWO_WAY: (
-        "Every resample by expert and scenario gave the same ratings, so intervals can't be "
-        "given: there is too little that could have come out otherwise."
-    ),
-}
+def _clusters(votes: Comparisons, unit: Unit) -> dict[str, int]:
+    return {kind: len(renumber_codes(getattr(votes, kind))[0]) for kind in unit.kinds}
 
 
-def note_with_rank(note: str, rank: int | None) -> str:
-    """The note of a line whose rank over all parts is decided, or None, unlike within its part."""
-    if rank is None:
-        return _UNRANKED.get(note, note or _NO_RANK_ACROSS)
-    return _RANKED.get(note, note)
+# --- Notes of single lines -----------------------------------------------------------------------
 
 
 NO_SPREAD = "no interval and no rank: the votes leave no spread"
 ONLY_TIES = "no interval and no rank: every vote is a tie"
 TOO_FEW = "no interval and no rank: too few votes"
 NOT_RATED = "no rating by this model"
-_NO_RANK_ACROSS = "no rank: too few votes against those above"
 
-_UNRANKED: dict[str, str] = {
+_FEWEST_CLUSTERS = 6
+"""Six independent comparisons are the fewest that tell two apart."""
+_NO_LOWER = "no lower bound: hardly any score"
+_NO_UPPER = "no upper bound: hardly anybody scored"
+
+_MISSING: dict[tuple[bool, bool, bool], str] = {
+    (False, False, False): "",
+    (True, False, False): _NO_LOWER,
+    (False, True, False): _NO_UPPER,
+    (True, False, True): f"{_NO_LOWER}; no rank, because the upper bound tells it from nobody",
+    (False, True, True): (
+        f"{_NO_UPPER}; no rank, because the lower bound is not above the average"
+    ),
+    (True, True, True): TOO_FEW,
+}
+"""By whether the lower bound, the upper bound and the rank are missing."""
+
+_UNRANKED = {
     "no upper limit": "no upper limit; no rank: too few votes say that it is above",
     "no lower limit": "no lower limit; no rank: too few votes say that it is below",
     "no limits among equals": "no limits among equals; no rank",
 }
 """Notes of those without a rating, where the votes decide no rank either."""
 
-_MISSING: dict[tuple[bool, bool, bool], str] = {
-    (False, False, False): "",
-    (True, False, False): "no lower bound: hardly any score",
-    (False, True, False): "no upper bound: hardly anybody scored",
-    (True, False, True): (
-        "no lower bound: hardly any score; no rank, because the upper bound tells it from nobody"
-    ),
-    (False, True, True): (
-        "no upper bound: hardly anybody scored; no rank, because the lower bound is not above "
-        "the average"
-    ),
-    (True, True, True): TOO_FEW,
-}
-"""By whether the lower bound, the upper bound and the rank are missing."""
 
-_RANKED = {
-    str(_MISSING[lower, upper, True]): _MISSING[lower, upper, False]
-    for lower, upper in ((True, False), (False, True))
-}
+def notes_on_bounds(
+    votes: Comparisons, unit: Unit, lower: FloatArray, upper: FloatArray, rank: IntArray
+) -> tuple[str, ...]:
+    """(C,) which bounds or ranks are missing and why; bounds NaN and ranks 0 are missing.
 
-_ONLY_ONE = {
-    "expert": (
-        "All votes belong to one expert: how much experts differ can't be seen, and the "
-        "intervals hold for this expert only."
-    ),
-    "scenario": (
-        "All votes belong to one scenario: how much scenarios differ can't be seen, and the "
-        "intervals hold for this scenario only."
-    ),
-}
+    Where neither bound is known it is said what is too few: votes, experts or scenarios.
+    """
+    notes = []
+    for place in range(len(rank)):
+        is_missing = (bool(np.isnan(lower[place])), bool(np.isnan(upper[place])))
+        note = _MISSING[*is_missing, bool(rank[place] == 0)]
+        own = (votes.first == place) | (votes.second == place)
+        numbers = {kind: len(np.unique(getattr(votes, kind)[own])) for kind in unit.kinds}
+        kind = min(numbers, key=numbers.__getitem__, default="")
+        if note == TOO_FEW and kind and numbers[kind] < _FEWEST_CLUSTERS:
+            many = f"only {numbers[kind]} {kind}s" if numbers[kind] > 1 else f"one {kind}"
+            prefix = "of" if kind == "expert" else "on"
+            note = f"no interval and no rank: all votes are {prefix} {many}"
+        notes.append(note)
+    return tuple(notes)
 
-_BY_T = "Such intervals are widened by Student's t."
 
-_WIDENED = {
-    Unit.EXPERT: _BY_T,
-    Unit.SCENARIO: _BY_T,
-    Unit.TWO_WAY: (
-        "Drawing both ways is too wide where votes are independent and too narrow where few "
-        "experts differ much; intervals in closed form are neither."
-    ),
-}
+def note_with_rank(note: str, rank: int | None) -> str:
+    """The note of a line whose rank over all parts is decided, or None, unlike within its part."""
+    if rank is None:
+        return _UNRANKED.get(note, note or "no rank: too few votes against those above")
+    return note.partition("; no rank")[0]

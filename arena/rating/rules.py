@@ -6,8 +6,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
 
-from arena.rating.bootstrap import Unit
-
 
 class Method(StrEnum):
     """How votes become ratings."""
@@ -15,6 +13,20 @@ class Method(StrEnum):
     BRADLEY_TERRY = "bt"
     DAVIDSON = "davidson"
     ELO = "elo"
+
+
+class Unit(StrEnum):
+    """What hangs together, and what the bootstrap draws."""
+
+    VOTE = "vote"
+    SCENARIO = "scenario"
+    EXPERT = "expert"
+    TWO_WAY = "two-way"
+
+    @property
+    def kinds(self) -> tuple[str, ...]:
+        """The arrays of votes by which they hang together."""
+        return {"vote": (), "two-way": ("expert", "scenario")}.get(self.value, (self.value,))
 
 
 class Order(StrEnum):
@@ -30,6 +42,21 @@ class Intervals(StrEnum):
     CLOSED_FORM = "closed"
     RESAMPLES = "resamples"
 
+
+METHOD_TEXTS = {
+    "bt": "Bradley-Terry on the Elo scale",
+    "davidson": "Davidson's tie model on the Elo scale",
+    "elo": "online Elo, median over resamples",
+}
+"""What a method is called in files and on a terminal, by its value."""
+
+UNIT_TEXTS = {
+    "vote": "votes",
+    "scenario": "scenarios",
+    "expert": "experts",
+    "two-way": "experts and scenarios",
+}
+"""What is drawn anew, by the unit's value, in the same places."""
 
 MOST_CONTESTANTS = 2000
 """Covariances of all pairs are kept as matrices; more contestants are refused."""
@@ -59,9 +86,13 @@ Report = Callable[[int, int], None]
 """Is told how many rounds are done, and of how many."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True)
 class Rules:
-    """How to rate."""
+    """How to rate; the fields are the arguments of `leaderboard.rate`.
+
+    Raises:
+        ValueError: Fewer than one round, or online Elo by more than resampled single votes.
+    """
 
     method: Method
     unit: Unit
@@ -71,7 +102,6 @@ class Rules:
     k: float
     order: Order
     details: bool
-    workers: int = 1
     report: Report | None = None
 
     def __post_init__(self) -> None:
@@ -81,19 +111,3 @@ class Rules:
             raise ValueError(f"online Elo resamples single votes only, not by {self.unit}")
         if self.method is Method.ELO and self.intervals is Intervals.CLOSED_FORM:
             raise ValueError("online Elo has no intervals in closed form, only resamples")
-
-
-METHOD_TEXTS = {
-    "bt": "Bradley-Terry on the Elo scale",
-    "davidson": "Davidson's tie model on the Elo scale",
-    "elo": "online Elo, median over resamples",
-}
-"""What a method is called in files and on a terminal, by its value."""
-
-UNIT_TEXTS = {
-    "vote": "votes",
-    "scenario": "scenarios",
-    "expert": "experts",
-    "two-way": "experts and scenarios",
-}
-"""What is drawn anew, by the unit's value, in the same places."""

@@ -1,12 +1,18 @@
-"""The covariance of Bradley-Terry ratings in closed form, with votes that hang together.
+"""How sure ratings are when votes hang together by expert and by scenario, in closed form.
 
-The cross-check of the intervals. Every vote pulls at its two contestants by how much it surprises;
-the pulls of a cluster are added up before they are squared, so that what its votes have in common
-counts (the sandwich, H^-1 S H^-1). Clustered two ways, the pulls by scenario and by expert are
-taken together and those of the cells, which are in both, once off (Cameron, Gelbach, Miller 2011).
+Every vote pulls at its two contestants by how much it surprises. The pulls of a cluster are added
+up before they are squared, so that what its votes have in common counts (the sandwich,
+H^-1 S H^-1); clustered two ways, the squares by expert and by scenario are added and those of the
+cells, which are in both, taken off once (Cameron, Gelbach, Miller 2011).
 
-Notation: R rows, C contestants, K parameters (C strengths, and Q that a model has besides), G
-clusters.
+With few experts such a square is a guess by few numbers, and Student's t makes it twice as wide as
+need be. But contestants are many: by how much experts disagree about one says something about the
+others. So each contestant's own square is drawn towards what all of them have in common, the less
+the more they differ (moderated variances, Smyth 2004), and Student's t gets the degrees of freedom
+of what it then rests on (Satterthwaite 1946). docs/rating.md has how often the truth is inside.
+
+Notation: R rows, C contestants, K parameters (C strengths, and what a model has besides), G
+clusters. Strengths are logarithms of odds, covariances squared Elo points.
 """
 
 from __future__ import annotations
@@ -16,9 +22,6 @@ from typing import Self
 
 import numpy as np
 
-from arena.rating import davidson
-from arena.rating.bootstrap import Unit
-from arena.rating.bradley_terry import ELO_PER_LOGIT, Meetings
 from arena.rating.comparisons import (
     TIE,
     BoolArray,
@@ -26,49 +29,153 @@ from arena.rating.comparisons import (
     FloatArray,
     IntArray,
     renumber_codes,
+    t_quantile,
 )
-from arena.rating.estimate import t_quantile
+from arena.rating.models import ELO_PER_LOGIT, Meetings, chances, inverse_curvature
+from arena.rating.rules import Unit
 
 FEW_CLUSTERS = 20
 NORMAL = 1.959963984540054
 """97.5 % of the normal distribution lie below."""
 
+MOST_PRIOR = 24.0
+"""The others count at most like so many further clusters, however alike all contestants seem: one
+whom experts disagree about more is then still seen."""
 
-def covariance(votes: Comparisons, pulls: Pulls, unit: Unit) -> FloatArray:
-    """(C, C) in squared Elo points; rows add to zero, as ratings have a fixed mean.
+LEAST = 0.6
+"""No variance is smaller than this share of what single cells would give."""
 
-    Args:
+LEAST_LEFT = 0.5
+"""The fit leaves at least this share of the effects of clusters, compared with single votes: one
+expert with nearly all votes would make the estimate as large as chance likes."""
+
+_FAR = 1e9
+"""Degrees of freedom of what is as good as known."""
+_NUMBERS_AT_ONCE = 2_000_000
+
+
+# --- What votes pull -----------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Pulls:
+    """The slope of each vote's likelihood at the fitted parameters, and the way back to ratings.
+
+    Attributes:
         votes: Of contestants who all have votes.
-        pulls: What each row pulls at its contestants.
-        unit: What hangs together.
+        surprise: (R,) what `first` scored above what was expected, in one vote; `second` the
+            opposite.
+        information: (R,) how much a vote of the row says of the difference of the two.
+        besides: (R, K - C) the slopes by a model's further parameters, in one vote.
+        inverse: (K, K) of the likelihood's curvature.
+        back: (C, K) from slopes to strengths; with more rows also to further parameters.
     """
-    if unit is Unit.VOTE:
-        return without_negative_parts(pulls.by_row())
-    experts, expert_of = renumber_codes(votes.expert)
-    scenarios, scenario_of = renumber_codes(votes.scenario)
-    if unit is Unit.EXPERT:
-        return without_negative_parts(_corrected(pulls, expert_of, len(experts)))
-    if unit is Unit.SCENARIO:
-        return without_negative_parts(_corrected(pulls, scenario_of, len(scenarios)))
-    cells, cell_of = renumber_codes(expert_of * len(scenarios) + scenario_of)
-    return without_negative_parts(
-        _corrected(pulls, expert_of, len(experts))
-        + _corrected(pulls, scenario_of, len(scenarios))
-        - _corrected(pulls, cell_of, len(cells))
+
+    votes: Comparisons
+    surprise: FloatArray
+    information: FloatArray
+    besides: FloatArray
+    inverse: FloatArray
+    back: FloatArray
+
+    def relative_to(self, reference: BoolArray) -> Self:
+        """The same for ratings whose mean over a reference (C,) is fixed, not everybody's."""
+        if reference.all():
+            return self
+        return replace(self, back=self.back - self.back[reference].mean(axis=0))
+
+    def by_row(self) -> FloatArray:
+        """(C, C) the sandwich of independent votes."""
+        rows = np.arange(len(self.surprise))
+        return self._squares(rows, len(rows), np.sqrt(self.votes.count))
+
+    def by_cluster(self, cluster_of: IntArray, clusters: int) -> FloatArray:
+        """(C, C) the pulls of each of G clusters added up and squared."""
+        return self._squares(cluster_of, clusters, self.votes.count.astype(np.float64))
+
+    def concentration(self, cluster_of: IntArray, clusters: int) -> tuple[FloatArray, FloatArray]:
+        """(C,), (C,) sums of squared and of cubed shares of each contestant's information.
+
+        The first goes from 1 / G for even clusters to 1 for a single one. Only clusters in which a
+        contestant has votes count.
+        """
+        size = len(self.votes.names)
+        amount = np.tile(self.information * self.votes.count, 2)
+        place = np.concatenate([self.votes.first, self.votes.second]) * clusters
+        met, where = renumber_codes(place + np.tile(cluster_of, 2))
+        given = np.bincount(where, weights=amount)
+        total = np.bincount(met // clusters, weights=given, minlength=size)
+        shares = given / total[met // clusters]
+        squares, cubes = (
+            np.bincount(met // clusters, weights=shares**power, minlength=size) for power in (2, 3)
+        )
+        return np.minimum(squares, 1.0), cubes.astype(np.float64)
+
+    def _squares(self, cluster_of: IntArray, clusters: int, weight: FloatArray) -> FloatArray:
+        """(C, C) the sum over clusters of their weighted and summed slopes times themselves."""
+        size = len(self.inverse)
+        pull = self.surprise * weight
+        further = np.arange(len(self.votes.names), size)
+        ends = [self.votes.first, self.votes.second, *(np.full(len(pull), n) for n in further)]
+        pulls = np.concatenate([pull, -pull, *(self.besides * weight[:, None]).T])
+        place = np.tile(cluster_of, len(ends)) * size + np.concatenate(ends)
+        if clusters * size <= _NUMBERS_AT_ONCE:
+            sums = np.bincount(place, pulls, clusters * size).reshape(-1, size)
+            squares = sums.T @ sums
+        else:
+            from scipy.sparse import coo_array  # slow to load, and for large tables alone
+
+            of_cells = (pulls, (place // size, place % size))
+            table = coo_array(of_cells, shape=(clusters, size)).tocsr()
+            squares = (table.T @ table).toarray()
+        return np.asarray(ELO_PER_LOGIT**2 * self.back @ squares @ self.back.T)
+
+
+def pulls_of_model(
+    votes: Comparisons, met: Meetings, games: FloatArray, answer: FloatArray
+) -> Pulls:
+    """Those of Bradley-Terry or Davidson's model at an answer (K,) of `models.fit`."""
+    size = len(votes.names)
+    expected, tied = chances(size, answer, votes.first, votes.second)
+    inverse = inverse_curvature(met, games, answer)
+    has_ties = len(answer) > size
+    is_tie = votes.score == TIE
+    return Pulls(
+        votes=votes,
+        surprise=votes.score - expected,
+        information=expected - 0.25 * tied - expected**2,
+        besides=(is_tie - tied)[:, None] if has_ties else np.empty((len(votes), 0)),
+        inverse=inverse,
+        back=inverse[:size],
     )
 
 
-def _corrected(pulls: Pulls, cluster_of: IntArray, clusters: int) -> FloatArray:
-    """G / (G - 1) of the squares, for what the fit has taken of them."""
-    return pulls.by_cluster(cluster_of, clusters) * clusters / max(1, clusters - 1)
+# --- The plain sandwich --------------------------------------------------------------------------
 
 
-def relative_to(found: FloatArray, reference: BoolArray) -> FloatArray:
-    """(C, C) of ratings relative to the mean of a reference (C,) instead of everybody's."""
-    if reference.all():
-        return found
-    of_mean = found[:, reference].mean(axis=1)
-    return np.asarray(found - of_mean[:, None] - of_mean[None, :] + of_mean[reference].mean())
+def plain_covariance(pulls: Pulls, unit: Unit, *, keep_variances: bool = False) -> FloatArray:
+    """(C, C) in which each contestant stands for itself; the cross-check of the intervals.
+
+    Args:
+        pulls: What each row pulls.
+        unit: What hangs together.
+        keep_variances: Though negative directions are cut off.
+    """
+    kinds = [renumber_codes(getattr(pulls.votes, kind)) for kind in unit.kinds]
+    if not kinds:
+        return without_negative_parts(pulls.by_row())
+    clusters = [(len(codes), of_row, 1.0) for codes, of_row in kinds]
+    if len(kinds) > 1:
+        (_, expert_of), (scenarios, scenario_of) = kinds
+        cells, cell_of = renumber_codes(expert_of * len(scenarios) + scenario_of)
+        clusters.append((len(cells), cell_of, -1.0))
+    squares = [
+        sign * pulls.by_cluster(of_row, number) * number / max(1, number - 1)
+        for number, of_row, sign in clusters
+    ]
+    found = np.asarray(sum(squares))
+    whole = without_negative_parts(found)
+    return _with_variances(whole, found.diagonal()) if keep_variances else whole
 
 
 def factor(clusters: int | None) -> float:
@@ -77,130 +184,6 @@ def factor(clusters: int | None) -> float:
     Student's t of one less than `clusters` where these are few, else the normal's 1.96.
     """
     return NORMAL if clusters is None else float(t_quantile(clusters - 1))
-
-
-# --- What votes pull -----------------------------------------------------------------------------
-
-
-_NUMBERS_AT_ONCE = 2_000_000
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Pulls:
-    """The slope of each row's likelihood at the fitted strengths, and the way back to ratings.
-
-    Attributes:
-        contestants: C.
-        first, second, count: (R,) of the rows.
-        surprise: (R,) what `first` scored above what was expected, in one vote; `second` the
-            opposite.
-        information: (R,) how much a vote of the row says of the difference of the two.
-        besides: (R, Q) the slopes by a model's further parameters, in one vote; None without.
-        inverse: (K, K) of the likelihood's curvature, from slopes (columns) to strengths.
-    """
-
-    contestants: int
-    first: IntArray
-    second: IntArray
-    count: IntArray
-    surprise: FloatArray
-    information: FloatArray
-    inverse: FloatArray
-    besides: FloatArray | None = None
-
-    def relative_to(self, reference: BoolArray) -> Self:
-        """The same for ratings whose mean over a reference (C,) is fixed, not everybody's."""
-        if reference.all():
-            return self
-        inverse = self.inverse.copy()
-        inverse[: self.contestants] -= inverse[: self.contestants][reference].mean(axis=0)
-        return replace(self, inverse=inverse)
-
-    def by_row(self) -> FloatArray:
-        """(C, C) squared points: the sandwich of independent votes."""
-        size = len(self.inverse)
-        found = np.zeros((size, size))
-        squared = self.surprise**2 * self.count
-        np.add.at(found, (self.first, self.second), -squared)
-        found += found.T
-        found[np.diag_indices(size)] = -found.sum(axis=1)
-        if self.besides is not None:
-            start = size - self.besides.shape[1]
-            for number, slope in enumerate(self.besides.T, start=start):
-                both = self.surprise * slope * self.count
-                ends = np.bincount(self.first, weights=both, minlength=size)
-                ends -= np.bincount(self.second, weights=both, minlength=size)
-                found[number, :start] = found[:start, number] = ends[:start]
-            squares = self.besides.T @ (self.besides * self.count[:, None])
-            found[start:, start:] = squares
-        return self._of_ratings(found)
-
-    def by_cluster(self, cluster_of: IntArray, clusters: int) -> FloatArray:
-        """(C, C) squared points: the pulls of each of G clusters added up and squared."""
-        size = len(self.inverse)
-        ends = [self.first, self.second]
-        pull = self.surprise * self.count
-        pulls = [pull, -pull]
-        if self.besides is not None:
-            start = size - self.besides.shape[1]
-            ends += [np.full(len(pull), number) for number in range(start, size)]
-            pulls += list(self.besides.T * self.count)
-        place = np.tile(cluster_of, len(ends)) * size + np.concatenate(ends)
-        return self._of_ratings(_squares(place, np.concatenate(pulls), clusters, size))
-
-    def concentration(self, cluster_of: IntArray, clusters: int) -> tuple[FloatArray, FloatArray]:
-        """(C,), (C,) how unevenly a contestant's information comes from the clusters.
-
-        The sums of squared and of cubed shares: 1 / G and 1 / G^2 where all give alike, 1 where
-        one gives all.
-        """
-        weight = self.information * self.count
-        place = np.concatenate([self.first, self.second]) * clusters + np.tile(cluster_of, 2)
-        met, of_row = renumber_codes(place)
-        given = np.bincount(of_row, weights=np.tile(weight, 2))
-        total = np.bincount(met // clusters, weights=given, minlength=self.contestants)
-        shares = given / total[met // clusters]
-        squares, cubes = (
-            np.bincount(met // clusters, weights=shares**power, minlength=self.contestants)
-            for power in (2, 3)
-        )
-        return np.minimum(squares, 1.0), cubes.astype(np.float64)
-
-    def _of_ratings(self, squares: FloatArray) -> FloatArray:
-        """(C, C) from squared sums of slopes (K, K)."""
-        back = self.inverse[: self.contestants]
-        return np.asarray(ELO_PER_LOGIT**2 * back @ squares @ back.T)
-
-
-def bradley_terry_pulls(votes: Comparisons, strengths: FloatArray, inverse: FloatArray) -> Pulls:
-    """Those of Bradley-Terry with strengths (C,) and the inverse curvature (C, C)."""
-    expected = 1.0 / (1.0 + np.exp(strengths[votes.second] - strengths[votes.first]))
-    return Pulls(
-        contestants=len(votes.names),
-        first=votes.first,
-        second=votes.second,
-        count=votes.count,
-        surprise=votes.score - expected,
-        information=expected * (1.0 - expected),
-        inverse=inverse,
-    )
-
-
-def davidson_pulls(
-    votes: Comparisons, met: Meetings, games: FloatArray, answer: FloatArray
-) -> Pulls:
-    """Those of Davidson's model with strengths and the logarithm of v (C + 1,)."""
-    expected, tied = davidson.chances(answer, votes.first, votes.second)
-    return Pulls(
-        contestants=len(votes.names),
-        first=votes.first,
-        second=votes.second,
-        count=votes.count,
-        surprise=votes.score - expected,
-        information=expected - 0.25 * tied - expected**2,
-        inverse=davidson.inverse_curvature(met, games, answer),
-        besides=((votes.score == TIE) - tied)[:, None],
-    )
 
 
 def without_negative_parts(matrix: FloatArray) -> FloatArray:
@@ -212,19 +195,222 @@ def without_negative_parts(matrix: FloatArray) -> FloatArray:
     return np.asarray((directions * np.maximum(values, 0.0)) @ directions.T)
 
 
-def _squares(place: IntArray, pulls: FloatArray, clusters: int, size: int) -> FloatArray:
-    """(K, K) the sum over clusters of their summed pulls times themselves.
+# --- Moderated variances -------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Component:
+    """What clusters of one kind add to the covariance of the ratings.
+
+    Attributes:
+        covariance: (C, C) moderated.
+        common: (C, C) what it would be if all contestants were disagreed about alike.
+        own_share: (C,) the weight of a contestant's own square, 0 to 1.
+        own_degrees: (C,) degrees of freedom of that square: effective clusters less one.
+        degrees: (C,) those of the moderated one.
+    """
+
+    covariance: FloatArray
+    common: FloatArray
+    own_share: FloatArray
+    own_degrees: FloatArray
+    degrees: FloatArray
+
+    def among(self, members: IntArray) -> Self:
+        """The same for some of the contestants alone."""
+        places = np.ix_(members, members)
+        return replace(
+            self,
+            covariance=self.covariance[places],
+            common=self.common[places],
+            own_share=self.own_share[members],
+            own_degrees=self.own_degrees[members],
+            degrees=self.degrees[members],
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Spread:
+    """How sure ratings are.
+
+    Attributes:
+        covariance: (C, C) in squared points, around the mean of the reference.
+        degrees: (C,) of Student's t for a rating.
+        common: (C, C) the covariance if contestants were disagreed about alike, at least `base`.
+        base: (C, C) that of independent cells, or votes.
+        components: By kind of cluster; none for votes that count as independent.
+    """
+
+    covariance: FloatArray
+    degrees: FloatArray
+    common: FloatArray
+    base: FloatArray
+    components: tuple[Component, ...]
+
+    def among(self, members: IntArray) -> Self:
+        """The same for some of the contestants alone."""
+        places = np.ix_(members, members)
+        return replace(
+            self,
+            covariance=self.covariance[places],
+            degrees=self.degrees[members],
+            common=self.common[places],
+            base=self.base[places],
+            components=tuple(component.among(members) for component in self.components),
+        )
+
+    def half_widths(self) -> FloatArray:
+        """(C,) of the 95 % intervals, in points."""
+        return np.asarray(t_quantile(self.degrees) * np.sqrt(self.covariance.diagonal()))
+
+
+def spread_of(pulls: Pulls, unit: Unit, reference: BoolArray | None = None) -> Spread:
+    """The spread of ratings by votes that hang together as the unit says.
 
     Args:
-        place: The cluster of each pull, times K, plus whom it pulls at.
-        pulls: How much.
-        clusters: G.
-        size: K.
+        pulls: What each row pulls at its contestants.
+        unit: What hangs together. Where all votes are of one expert, or on one scenario, that
+            side says nothing and is left out.
+        reference: (C,) those whose mean is fixed, by default everybody. Only they say what
+            contestants have in common: who has hardly any votes widens nobody else's interval.
     """
-    if clusters * size <= _NUMBERS_AT_ONCE:
-        sums = np.bincount(place, weights=pulls, minlength=clusters * size).reshape(-1, size)
-        return np.asarray(sums.T @ sums)
-    from scipy.sparse import coo_array  # slow to load, and for large tables alone
+    if reference is None:
+        reference = np.ones(len(pulls.votes.names), dtype=np.bool_)
+    pulls = pulls.relative_to(reference)
+    kinds = clusters_of(pulls.votes, unit)
+    base = pulls.by_row()
+    single = base.diagonal()
+    if len(kinds) > 1:
+        cells, cell_of = renumber_codes(kinds[0][1] * kinds[1][0] + kinds[1][1])
+        base = pulls.by_cluster(cell_of, len(cells))
+    components = tuple(
+        _component(pulls, base, single, clusters, of_row, reference) for clusters, of_row in kinds
+    )
+    if not components:
+        if unit is not Unit.VOTE:
+            base = np.zeros_like(base)  # there is but one of what differs: nothing can be said
+        known = np.full(len(base), _FAR)
+        return Spread(covariance=base, degrees=known, common=base, base=base, components=())
+    covariance = np.asarray(sum(component.covariance for component in components))
+    # What clusters add is never negative: equals drawn with less would be told apart too often.
+    added = (part.common - base for part in components if part.common.trace() > base.trace())
+    if len(components) > 1:
+        covariance = covariance - base
+    least = np.maximum(covariance.diagonal(), LEAST * base.diagonal())
+    covariance = _with_variances(without_negative_parts(covariance), least)
+    return Spread(
+        covariance=covariance,
+        degrees=satterthwaite(covariance.diagonal(), components),
+        common=sum(added, base),
+        base=base,
+        components=components,
+    )
 
-    table = coo_array((pulls, (place // size, place % size)), shape=(clusters, size)).tocsr()
-    return np.asarray((table.T @ table).toarray())
+
+def satterthwaite(variance: FloatArray, components: tuple[Component, ...]) -> FloatArray:
+    """(C,) degrees of freedom of variances (C,) that are sums of the components'."""
+    of_parts = sum(
+        component.covariance.diagonal() ** 2 / component.degrees for component in components
+    )
+    return np.asarray(variance**2 / np.maximum(of_parts, 1e-300))
+
+
+def clusters_of(votes: Comparisons, unit: Unit) -> list[tuple[int, IntArray]]:
+    """The number of clusters of each kind that the unit names, from two on, and (R,) whose."""
+    kinds = [renumber_codes(getattr(votes, kind)) for kind in unit.kinds]
+    return [(len(codes), of_row) for codes, of_row in kinds if len(codes) > 1]
+
+
+def left_of_effect(uneven: FloatArray, cubes: FloatArray) -> FloatArray:
+    """Return the share of the variance of cluster effects that the fit leaves in the pulls.
+
+    Args:
+        uneven: (C,) sums of squared shares of a contestant's information by cluster, at most 1.
+        cubes: (C,) sums of cubed shares.
+    """
+    return np.maximum(1.0 - 2.0 * cubes / uneven + uneven, LEAST_LEFT * (1.0 - uneven))
+
+
+def _component(
+    pulls: Pulls,
+    base: FloatArray,
+    single: FloatArray,
+    clusters: int,
+    of_row: IntArray,
+    reference: BoolArray,
+) -> Component:
+    """What clusters of one kind add; docs/rating.md derives it.
+
+    Args:
+        pulls: What each row pulls at its contestants.
+        base: (C, C) the sandwich of independent cells, or votes.
+        single: (C,) variances by independent votes.
+        clusters: G.
+        of_row: (R,) the cluster of each row.
+        reference: (C,) whose mean is fixed.
+    """
+    raw = pulls.by_cluster(of_row, clusters)
+    uneven, cubes = pulls.concentration(of_row, clusters)
+    left_of_votes, left_of_effects = 1.0 - uneven, left_of_effect(uneven, cubes)
+    effects = _centred(uneven, reference)
+    surplus = raw.diagonal() - base.diagonal() * left_of_votes
+    room = effects.diagonal() * left_of_effects
+    # Single votes, as cells contain the effect: weights by these would prefer where it is small.
+    weight = np.where(reference, 1.0 / np.maximum(single, 1e-9) ** 2, 0.0)
+    # Chance makes this as often too small as too large: cut off at zero it would be too large.
+    effect = float((weight * surplus).sum()) / max(float((weight * room).sum()), 1e-300)
+    common = base + effect * effects
+    if effect < 0.0:
+        common = without_negative_parts(common)
+        least = np.maximum(common.diagonal(), LEAST * base.diagonal())
+        common = _with_variances(common, least)
+    of_votes = np.minimum(base.diagonal() / np.maximum(common.diagonal(), 1e-300), 1.0)
+    left = of_votes * left_of_votes + (1.0 - of_votes) * left_of_effects
+    degrees = left / uneven
+    with np.errstate(invalid="ignore", divide="ignore"):
+        own = np.where(left > 0.0, raw.diagonal() / left, 0.0)
+    prior = _prior_degrees(own[reference], common.diagonal()[reference], degrees[reference])
+    share = degrees / (prior + degrees)
+    mine, others = np.sqrt(1.0 / (prior * uneven + left)), np.sqrt(1.0 - share)
+    everybody = float(degrees[reference].sum()) * (1.0 - 1.0 / reference.sum())
+    return Component(
+        covariance=mine[:, None] * raw * mine + others[:, None] * common * others,
+        common=common,
+        own_share=share,
+        own_degrees=degrees,
+        degrees=np.maximum(np.minimum(prior + degrees, everybody), 1.0),
+    )
+
+
+def _prior_degrees(own: FloatArray, common: FloatArray, degrees: FloatArray) -> float:
+    """How many clusters what all have in common counts for: few where contestants differ.
+
+    The spread of own squares (C,) around the common ones (C,), less what chance alone gives with
+    so many degrees of freedom (C,), as moments of a scaled F distribution.
+    """
+    known = (degrees > 0.5) & (common > 0.0)
+    if known.sum() < 3:
+        return MOST_PRIOR
+    ratio, weight = own[known] / common[known], degrees[known]
+    surplus = float((weight * ((ratio - 1.0) ** 2 - 2.0 / weight)).sum() / weight.sum())
+    surplus /= 1.0 + 2.0 / float(weight.mean())
+    return MOST_PRIOR if surplus <= 0.0 else min(MOST_PRIOR, 4.0 + 2.0 / surplus)
+
+
+def _centred(values: FloatArray, reference: BoolArray) -> FloatArray:
+    """(C, C) covariance of independent numbers with these variances (C,), around a mean."""
+    number = reference.sum()
+    of_mean = np.where(reference, values, 0.0)
+    found = np.diag(values) - (of_mean[:, None] + of_mean) / number
+    return np.asarray(found + of_mean.sum() / number**2)
+
+
+def _with_variances(covariance: FloatArray, variances: FloatArray) -> FloatArray:
+    """The covariance with these variances (C,) where they are positive.
+
+    Many contestants have more directions than there are clusters. What is cut off in negative ones
+    would widen everybody's interval, by a tenth among a thousand.
+    """
+    now = np.maximum(covariance.diagonal(), 1e-300)
+    change = np.sqrt(np.where(variances > 0.0, variances / now, 1.0))
+    return np.asarray(change[:, None] * covariance * change)

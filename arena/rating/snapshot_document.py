@@ -15,8 +15,8 @@ from typing import Annotated, Any
 
 from pydantic import PlainValidator, TypeAdapter, ValidationError
 
-from arena.rating.estimate import Estimate
-from arena.rating.fit_test import FitTest
+from arena.rating.comparisons import Estimate
+from arena.rating.influence import FitTest
 from arena.rating.logistic import SideBias
 from arena.rating.reliability import Agreement, Rater, Repeats
 from augment.errors import InvalidDocument

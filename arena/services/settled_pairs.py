@@ -7,7 +7,7 @@ from arena.pairing.order import MAIN
 from arena.pairing.rules import scenario_of
 from arena.queries.votes.judged import AUTOMATIC
 from arena.queries.votes.sets import VoteSet
-from arena.rating.printed import whole_percent
+from arena.rating.lines import whole_percent
 
 
 def settled_remark(study: Study, votes: VoteSet, *, left_out: bool) -> str:

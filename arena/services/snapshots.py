@@ -15,10 +15,9 @@ from arena.models import Snapshot, Standing
 from arena.models.ratings import stored_values
 from arena.queries.votes.judged import AUTOMATIC, Entrant, Judged, is_imported
 from arena.queries.votes.sets import Filters, VoteSet, vote_set
-from arena.rating.bootstrap import Unit
 from arena.rating.comparisons import Comparisons
 from arena.rating.leaderboard import Intervals, Leaderboard, Method, rate
-from arena.rating.rules import TooManyContestants
+from arena.rating.rules import TooManyContestants, Unit
 from arena.rating.snapshot_document import VERSION as RESULTS_VERSION
 from arena.rating.snapshot_document import Results
 from arena.services import breakdowns

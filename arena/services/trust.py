@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from dataclasses import fields, replace
 from typing import Any
@@ -10,9 +11,6 @@ import numpy as np
 
 from arena.queries.votes.judged import AUTOMATIC
 from arena.queries.votes.sets import VoteSet
-from arena.rating import elo
-from arena.rating.bootstrap import Unit
-from arena.rating.bradley_terry import ELO_PER_LOGIT, MEAN_ELO
 from arena.rating.comparisons import (
     Comparisons,
     FloatArray,
@@ -21,13 +19,19 @@ from arena.rating.comparisons import (
     select_votes,
     tally,
 )
-from arena.rating.fit_test import fit_test
-from arena.rating.influence import fewest_votes_to_change_first, rank_changes, without_each_expert
+from arena.rating.influence import (
+    fewest_votes_to_change_first,
+    fit_test,
+    rank_changes,
+    without_each_expert,
+)
 from arena.rating.leaderboard import Intervals, Leaderboard, Line, Method, rate
 from arena.rating.logistic import side_bias
-from arena.rating.planning import design_effects, votes_until
+from arena.rating.models import ELO_PER_LOGIT, MEAN_ELO, resample_elo
+from arena.rating.planning import design_effects
 from arena.rating.ranking import Separation
 from arena.rating.reliability import Rater, Repeats, agreement, raters, repeat_consistency
+from arena.rating.rules import Unit
 from arena.rating.snapshot_document import (
     BoardRemarks,
     OnlinePlace,
@@ -152,10 +156,7 @@ def precision(arrays: VoteArrays, board: Leaderboard, *, unit: Unit, seed: int) 
         planning=()
         if typical is None
         else tuple(
-            VotesWanted(
-                half_width=wanted,
-                votes=votes_until(votes=votes, half_width=typical, wanted=wanted),
-            )
+            VotesWanted(half_width=wanted, votes=math.ceil(votes * (typical / wanted) ** 2))
             for wanted in WANTED
         ),
     )
@@ -265,7 +266,7 @@ def _aids(votes: VoteSet, judge: str) -> tuple[tuple[str, int], ...]:
 
 def _elo_order(votes: Comparisons, strengths: FloatArray, seed: int) -> tuple[OnlinePlace, ...]:
     """Contestants by Bradley-Terry, with what online Elo makes of them."""
-    online = np.median(elo.resample_elo(votes, rounds=ELO_ROUNDS, seed=seed), axis=1)
+    online = np.median(resample_elo(votes, rounds=ELO_ROUNDS, seed=seed), axis=1)
     places = np.argsort(np.argsort(-online, kind="stable"))
     order = np.argsort(-strengths, kind="stable")
     return tuple(

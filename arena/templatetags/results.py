@@ -10,8 +10,8 @@ from arena.exports.columns import Column
 from arena.exports.tables import Row
 from arena.models import Vote
 from arena.models.votes import AID_LABELS
-from arena.rating.estimate import Estimate
-from arena.rating.printed import interval_text, rating_text, whole_percent, with_minus
+from arena.rating.comparisons import Estimate
+from arena.rating.lines import interval_text, rating_text, whole_percent, with_minus
 from augment.services.judging.driving_scores import clearance_text
 from augment.services.scenarios.scenes import type_label
 

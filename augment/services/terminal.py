@@ -1,4 +1,4 @@
-"""What every command of ours is made of: it prints nothing that steers a terminal.
+"""The base of all commands: nothing that they print steers the terminal.
 
 Names come out of files and rows, and answers out of models; a control character in one of them
 would move the cursor, recolour or rewrite what stands on the screen. So each text is escaped on
@@ -10,13 +10,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from django.core.management.base import BaseCommand, OutputWrapper
+from django.core.management.base import BaseCommand, CommandError, OutputWrapper
 
+from augment.errors import AugmentError
 from augment.escaping import escape_controls
 
 
 class TerminalOutput(OutputWrapper):
-    """Standard output or error as a person reads it."""
+    """Standard output or error with control characters escaped."""
 
     def write(  # type: ignore[override]
         self,
@@ -24,11 +25,11 @@ class TerminalOutput(OutputWrapper):
         style_func: Callable[[str], str] | None = None,
         ending: str | None = None,
     ) -> None:
-        """Write the text, escaped; what stands behind it is the command's own."""
+        """Write the text with its control characters escaped."""
         super().write(escape_controls(msg), style_func, ending)
 
     def write_data(self, text: str) -> None:
-        """Write a file's content: to the byte into a file or a pipe, escaped to a terminal."""
+        """Write a file's content, escaped only if this is a terminal."""
         if self.isatty():
             self.write(text, ending="")
         else:
@@ -36,7 +37,22 @@ class TerminalOutput(OutputWrapper):
 
 
 class TerminalCommand(BaseCommand):
-    """A command whose output and errors are safe to look at."""
+    """A command that escapes what it prints and reports refusals as one sentence.
+
+    Attributes:
+        failure: What that sentence begins with, such as "Nothing was restored."; a command that
+            sets it reports errors of the file system as well.
+    """
+
+    failure = ""
+
+    def execute(self, *args: Any, **options: Any) -> str | None:
+        """Run the command; an AugmentError becomes a CommandError."""
+        reported = (AugmentError, OSError) if self.failure else AugmentError
+        try:
+            return super().execute(*args, **options)
+        except reported as error:
+            raise CommandError(f"{self.failure} {error}".lstrip()) from error
 
     # Django sets both again when it is called with streams of its own.
 

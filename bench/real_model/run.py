@@ -23,8 +23,8 @@ from statistics import median
 from urllib.error import URLError
 from urllib.request import urlopen
 
+from bench.environments import python_of
 from bench.report import load, table, write_section
-from bench.rivals.environments import python_of
 from tests.processes import Machine, machine, wait_until
 from tests.stack import free_port
 

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from arena.rating.bradley_terry import ELO_PER_LOGIT
 from arena.rating.comparisons import LOSS, TIE, WIN, Comparisons, FloatArray, IntArray
+from arena.rating.models import ELO_PER_LOGIT
 
 ROWS = json.loads((Path(__file__).parent / "paper_table.json").read_text())["rows"]
 NAMES = tuple(row[0] for row in ROWS)

@@ -5,8 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from arena.rating.bootstrap import Unit, resample
+from arena.rating.bootstrap import resample, rounds_to_draw
 from arena.rating.comparisons import Comparisons, count_pairs
+from arena.rating.leaderboard import Intervals, rate
+from arena.rating.rules import Unit
 from tests.rating.votes import by_votes, named, simulated, versus
 
 TRUTH = [1060.0, 1020.0, 1000.0, 980.0, 940.0]
@@ -83,3 +85,27 @@ def test_a_vote_counts_as_often_as_its_expert_times_its_scenario_is_drawn() -> N
     assert (of_expert.sum(axis=0) == experts).all()
     assert (of_scenario.sum(axis=0) == scenarios).all()
     assert len(np.unique(games, axis=1).T) > 20
+
+
+SPREAD = [1400.0, 1200.0, 1100.0, 1000.0, 900.0, 600.0]
+
+
+@pytest.mark.parametrize("unit", Unit)
+def test_bounds_are_open_for_those_for_whom_resamples_leave_them_open(unit: Unit) -> None:
+    """The same who by intervals of resamples, where every round is rated."""
+    for seed in range(12):
+        votes = simulated(SPREAD, 90, seed, ties=0.1)
+        boards = [
+            rate(votes, unit=unit, intervals=way, rounds=600, seed=seed) for way in Intervals
+        ]
+        ends = [
+            [(line.lower is None, line.upper is None) for line in board.lines] for board in boards
+        ]
+        assert ends[0] == ends[1], seed
+        assert boards[0].degenerate_rounds == boards[1].degenerate_rounds
+
+
+def test_fewer_rounds_are_drawn_where_one_takes_long() -> None:
+    small, large = simulated(SPREAD, 500, 1), simulated(SPREAD, 200_000, 1, experts=5000)
+    assert rounds_to_draw(small, count_pairs(small), 10_000) == 10_000
+    assert 200 <= rounds_to_draw(large, count_pairs(large), 10_000) < 10_000

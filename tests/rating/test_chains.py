@@ -66,7 +66,6 @@ def test_parts_and_groups_are_numbered_by_their_first_members() -> None:
     chains = chains_among(5, count_pairs(votes))
     assert chains.parts() == ((0,), (1, 3), (2, 4))
     assert chains.groups() == ((0, 1, 3), (2, 4))
-    assert chains.by_group().parts() == chains.groups()
 
 
 def two_crowds(each: int, votes: int, *, unbeaten: int) -> Comparisons:

@@ -9,10 +9,10 @@ import pytest
 import statsmodels.api as sm
 from scipy.stats import t
 
-from arena.rating.bootstrap import Unit
-from arena.rating.bradley_terry import ELO_PER_LOGIT
 from arena.rating.comparisons import Comparisons, FloatArray
 from arena.rating.leaderboard import Intervals, Method, rate
+from arena.rating.models import ELO_PER_LOGIT
+from arena.rating.rules import Unit
 from tests.rating.votes import simulated
 
 RATINGS = [1050.0, 1010, 990, 950]

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from arena.rating.bootstrap import Unit
 from arena.rating.leaderboard import Intervals, rate
+from arena.rating.rules import Unit
 from bench.coverage_study import CHECK, SINGLE, Found, study
 from bench.worlds import THRESHOLDS, World, paper_ratings
 

@@ -7,9 +7,9 @@ import math
 import numpy as np
 import pytest
 
-from arena.rating.bootstrap import Unit
 from arena.rating.chains import Status
-from arena.rating.leaderboard import Method, anchor_board, rate
+from arena.rating.leaderboard import Method, rate
+from arena.rating.rules import Unit
 from tests.rating.votes import by_votes, named, simulated, versus
 
 
@@ -48,21 +48,6 @@ def test_it_has_intervals_by_every_unit() -> None:
             assert line.upper is not None
             assert line.rating is not None
             assert line.lower < line.rating < line.upper
-
-
-def test_an_anchor_moves_what_is_shown_and_no_width() -> None:
-    board = by_votes(simulated([1080.0, 1000.0, 920.0], 900, 3), rounds=300)
-    moved = anchor_board(board, name="c1", at=1500.0)
-    assert moved.lines[1].rating == 1500.0
-    for before, after in zip(board.lines, moved.lines, strict=True):
-        assert after.rating is not None
-        assert before.rating is not None
-        shift = after.rating - before.rating
-        assert shift == pytest.approx(1500.0 - (board.lines[1].rating or 0.0))
-        assert (after.lower or 0) - (before.lower or 0) == pytest.approx(shift)
-        assert after.rank == before.rank
-    with pytest.raises(ValueError, match="'x' has no rating"):
-        anchor_board(board, name="x", at=1000.0)
 
 
 def test_scores_by_ties_only_are_no_limit_in_this_model_and_said_to_be_none() -> None:

@@ -7,11 +7,10 @@ import math
 import numpy as np
 import pytest
 
-from arena.rating.bootstrap import Unit
 from arena.rating.chains import Status
 from arena.rating.comparisons import Comparison, as_arrays
 from arena.rating.leaderboard import Leaderboard, Method, rate
-from arena.rating.rules import Intervals, TooManyContestants
+from arena.rating.rules import Intervals, TooManyContestants, Unit
 from tests.rating.votes import by_votes, named, versus
 
 

@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from arena.rating import elo
+from arena.rating import models
 from arena.rating.comparisons import Comparisons, FloatArray, count_pairs, select_votes
-from bench.rating_sizes import SIZES, drawn
 from tests.rating.votes import simulated
 
 TRUTH = [1150.0, 1040.0, 1000.0, 980.0, 830.0]
@@ -33,12 +32,12 @@ def by_kind(votes: Comparisons) -> Comparisons:
 @pytest.mark.parametrize("k", [0.5, 4.0, 64.0])
 def test_a_replay_is_the_papers_formula(k: float) -> None:
     votes = simulated(TRUTH, 2000, 1)
-    assert elo.replay(votes, k=k) == pytest.approx(as_worded(votes, k), abs=1e-9)
+    assert models.replay_elo(votes, k=k) == pytest.approx(as_worded(votes, k), abs=1e-9)
 
 
 def test_nothing_said_the_stake_is_four_points() -> None:
     votes = simulated(TRUTH, 300, 1)
-    assert elo.replay(votes) == pytest.approx(as_worded(votes, 4.0), abs=1e-9)
+    assert models.replay_elo(votes) == pytest.approx(as_worded(votes, 4.0), abs=1e-9)
 
 
 @pytest.mark.parametrize("k", [0.5, 4.0, 64.0])
@@ -49,13 +48,26 @@ def test_every_round_is_a_replay_of_votes_drawn_with_replacement(
     """Few votes and many, in one go and in several with a remainder."""
     votes = by_kind(simulated(TRUTH, size, 1, ties=0.5))
     order = np.random.default_rng(5).integers(0, len(votes), size=(len(votes), rounds))
-    replays = [elo.replay(select_votes(votes, order[:, number]), k=k) for number in range(rounds)]
-    sampled = elo.resample_elo(votes, rounds=rounds, seed=5, k=k).T
+    replays = [
+        models.replay_elo(select_votes(votes, order[:, number]), k=k) for number in range(rounds)
+    ]
+    sampled = models.resample_elo(votes, rounds=rounds, seed=5, k=k).T
     assert sampled == pytest.approx(np.array(replays), abs=1e-9)
 
 
 def test_counted_votes_are_resampled_like_as_many_rows() -> None:
-    counted = drawn(SIZES[0]).counted(clusters=False)
+    drawn = simulated(TRUTH, 900, 1)
+    columns = (drawn.first, drawn.second, drawn.score)
+    kinds, count = np.unique(np.stack(columns, axis=1), axis=0, return_counts=True)
+    counted = Comparisons(
+        names=drawn.names,
+        first=kinds[:, 0].astype(np.int64),
+        second=kinds[:, 1].astype(np.int64),
+        score=np.asarray(kinds[:, 2], dtype=np.float64),
+        expert=np.zeros(len(kinds), dtype=np.int64),
+        scenario=np.zeros(len(kinds), dtype=np.int64),
+        count=count,
+    )
     single = select_votes(counted, np.repeat(np.arange(len(counted)), counted.count))
     rows = Comparisons(
         names=single.names,
@@ -66,8 +78,8 @@ def test_counted_votes_are_resampled_like_as_many_rows() -> None:
         scenario=single.scenario,
     )
     assert len(counted) < len(rows) == counted.votes
-    of_counted = elo.resample_elo(counted, rounds=7, seed=2)
-    assert of_counted.tolist() == elo.resample_elo(rows, rounds=7, seed=2).tolist()
+    of_counted = models.resample_elo(counted, rounds=7, seed=2)
+    assert of_counted.tolist() == models.resample_elo(rows, rounds=7, seed=2).tolist()
 
 
 def test_one_sided_votes_drive_apart_without_end_and_without_rounding() -> None:
@@ -81,6 +93,6 @@ def test_one_sided_votes_drive_apart_without_end_and_without_rounding() -> None:
         expert=votes.expert,
         scenario=votes.scenario,
     )
-    assert elo.resample_elo(always, rounds=2, seed=0)[:, 1] == pytest.approx(
-        as_worded(always, elo.K), abs=1e-6
+    assert models.resample_elo(always, rounds=2, seed=0)[:, 1] == pytest.approx(
+        as_worded(always, models.K), abs=1e-6
     )

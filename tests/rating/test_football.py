@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 import statsmodels.api as sm
 
-from arena.rating.bootstrap import Unit
-from arena.rating.bradley_terry import ELO_PER_LOGIT
 from arena.rating.comparisons import Comparisons, FloatArray, IntArray
 from arena.rating.leaderboard import Intervals, Leaderboard, Line, rate
+from arena.rating.models import ELO_PER_LOGIT
+from arena.rating.rules import Unit
 
 TEAMS, LEAGUES = 316, 16
 MATCHES = 3400

@@ -9,9 +9,9 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from arena.rating.bootstrap import Unit
 from arena.rating.comparisons import LOSS, TIE, WIN, Comparison, Comparisons, as_arrays, tally
 from arena.rating.leaderboard import Leaderboard, Method
+from arena.rating.rules import Unit
 from tests.properties import examples
 from tests.rating.votes import by_votes
 

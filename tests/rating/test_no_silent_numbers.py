@@ -7,10 +7,10 @@ import math
 import numpy as np
 import pytest
 
-from arena.rating.bootstrap import Unit
 from arena.rating.chains import Status
 from arena.rating.comparisons import Comparisons
 from arena.rating.leaderboard import Method, rate
+from arena.rating.rules import Unit
 
 RULES = [
     (method, unit)

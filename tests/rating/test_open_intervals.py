@@ -9,11 +9,12 @@ import pytest
 from scipy.optimize import brentq
 from scipy.special import expit
 
-from arena.rating.bootstrap import Unit, open_interval
+from arena.rating.bootstrap import percentile_interval
 from arena.rating.chains import Status
 from arena.rating.comparisons import Comparison, Comparisons, as_arrays
 from arena.rating.leaderboard import Intervals, Leaderboard, Line, Method, rate
 from arena.rating.ranking import ranks, shown_ranks
+from arena.rating.rules import Unit
 from tests.rating.votes import by_votes, named, versus
 
 NINE = tuple("abcdefghi")
@@ -252,7 +253,7 @@ def test_a_bound_is_finite_only_if_it_is_whatever_is_unknown(
     known = np.linspace(-1.0, 1.0, 1001 - below - unknown - above)
     ends = [np.full(below, -np.inf), np.full(unknown, np.nan), np.full(above, np.inf)]
     values = np.random.default_rng(1).permutation(np.concatenate([known, *ends]))[None]
-    lower, upper = open_interval(values)
+    lower, upper = percentile_interval(values)
     assert (np.isfinite(lower[0]), np.isfinite(upper[0])) == (has_lower, has_upper)
     if has_lower:
         assert lower[0] == known[25 - below - unknown]

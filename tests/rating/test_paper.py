@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from arena.management.rate_csv import run
-from arena.rating.bootstrap import Unit
 from arena.rating.leaderboard import PAPER_ROUNDS, rate
 from arena.rating.ranking import ranks
+from arena.rating.rules import Unit
 from tests.rating.paper import (
     ELO,
     MINUS,

@@ -7,12 +7,11 @@ import scipy.stats
 from hypothesis import given
 from hypothesis import strategies as st
 
-from arena.rating.comparisons import LOSS, TIE, WIN, Comparison, Comparisons
-from arena.rating.estimate import share, wilson
+from arena.rating.comparisons import LOSS, TIE, WIN, Comparison, Comparisons, share, wilson
 from arena.rating.reliability import (
     DifferenceMetric,
     agreement,
-    gwet_ac1,
+    cohens_kappa,
     krippendorff_alpha,
     raters,
     repeat_consistency,
@@ -175,32 +174,38 @@ def test_repeats_count_what_stayed_and_what_turned() -> None:
         repeat_consistency(first, again[:3], np.zeros(4, dtype=np.int64))
 
 
-def test_ac1_is_gwets_own_example() -> None:
-    """Gwet 2008: 118 of 125 persons are called healthy by both, 7 by one; kappa is -0.02."""
-    table = np.array([[2, 0]] * 118 + [[1, 1]] * 7)
-    by_chance = 2 * (243 / 250) * (7 / 250)
-    assert gwet_ac1(table) == pytest.approx((118 / 125 - by_chance) / (1 - by_chance))
-    assert gwet_ac1(table) == pytest.approx(0.9408, abs=1e-4)
-
-
-@given(table=tables)
-def test_ac1_is_agreement_beyond_guesses_on_hard_units(table: list[tuple[int, int, int]]) -> None:
-    pairs = [
-        [(one, other) for i, one in enumerate(row) for j, other in enumerate(row) if i != j]
-        for row in ([v for v in range(3) for _ in range(n[v])] for n in table)
-    ]
-    seen = np.mean([np.mean([one == other for one, other in unit]) for unit in pairs])
-    share = np.mean([np.array(row) / sum(row) for row in table], axis=0)
-    by_chance = sum(x * (1 - x) for x in share) / 2
-    assert gwet_ac1(np.array(table)) == pytest.approx((seen - by_chance) / (1 - by_chance))
-    assert gwet_ac1(np.array([[1, 0, 0]])) is None
-
-
-def test_agreement_carries_ac1_with_an_interval() -> None:
+def test_ac1_is_agreement_beyond_guesses_on_hard_units() -> None:
+    """Gwet 2008, from the table of values by unit."""
     votes = simulated([1100.0, 1000.0], 400, 1, experts=4, scenarios=20)
-    found = agreement(votes, rounds=200, seed=1)
-    assert found.ac1.value == pytest.approx(gwet_ac1(unit_table(votes)[0]))
-    assert found.ac1.value is not None
-    assert found.ac1.lower is not None
-    assert found.ac1.upper is not None
-    assert found.ac1.lower < found.ac1.value < found.ac1.upper
+    table, _ = unit_table(votes)
+    pairs = table * (table - 1)
+    number = table.sum(axis=1)
+    shared = number > 1
+    seen = (pairs.sum(axis=1)[shared] / (number * (number - 1))[shared]).mean()
+    share_of_value = (table / number[:, None]).mean(axis=0)
+    by_chance = (share_of_value * (1 - share_of_value)).sum() / 2
+    found = agreement(votes, rounds=200, seed=1).ac1
+    assert found.value == pytest.approx((seen - by_chance) / (1 - by_chance))
+    assert found.value is not None
+    assert found.lower is not None
+    assert found.upper is not None
+    assert found.lower < found.value < found.upper
+
+
+# --- Two raters --------------------------------------------------------------------------------
+
+
+def test_kappa_of_a_table_worked_out_by_hand() -> None:
+    # 20 times both yes, 5 only the first, 10 only the second, 15 both no: 35 of 50 agree, and
+    # 0.5 x 0.6 + 0.5 x 0.4 = 0.5 would by chance: (0.7 - 0.5) / 0.5.
+    pairs = [(True, True)] * 20 + [(True, False)] * 5 + [(False, True)] * 10
+    pairs += [(False, False)] * 15
+    first, second = zip(*pairs, strict=True)
+    assert cohens_kappa(first, second) == pytest.approx(0.4)
+    assert cohens_kappa([True, False], [True, False]) == 1.0
+    assert cohens_kappa([True, False], [False, True]) == -1.0
+
+
+@pytest.mark.parametrize("same", [[], [True], [False, False]])
+def test_where_nobody_ever_differs_there_is_nothing_to_tell(same: list[bool]) -> None:
+    assert cohens_kappa(same, same) is None

@@ -7,7 +7,7 @@ import choix
 import numpy as np
 import pytest
 
-from arena.rating import bradley_terry
+from arena.rating import models
 from arena.rating.comparisons import Comparisons, FloatArray
 from arena.rating.leaderboard import Method
 from arena.rating.ranking import ranks
@@ -19,7 +19,7 @@ PAPER = json.loads((HERE / "paper_table.json").read_text())["rows"]
 
 
 def fitted(votes: Comparisons) -> FloatArray:
-    return bradley_terry.to_elo(fit(votes))
+    return models.to_elo(fit(votes))
 
 
 @pytest.mark.parametrize("path", TABLES, ids=[path.stem for path in TABLES])
@@ -38,7 +38,7 @@ def test_a_published_worked_example_comes_out() -> None:
         + versus("b", "c", 5, 0, 3)
         + versus("c", "d", 1, 0, 3)
     )
-    strengths = np.exp((fitted(votes) - 1000.0) / bradley_terry.ELO_PER_LOGIT)
+    strengths = np.exp((fitted(votes) - 1000.0) / models.ELO_PER_LOGIT)
     assert strengths == pytest.approx([0.640, 1.043, 0.660, 2.270], abs=5e-4)
 
 
@@ -50,7 +50,7 @@ def test_bradley_terry_agrees_with_choix(seed: int, ties: float) -> None:
     for first, second, score in zip(votes.first, votes.second, votes.score, strict=True):
         wins += [(first, second)] * int(2 * score) + [(second, first)] * int(2 - 2 * score)
     theirs = choix.opt_pairwise(5, wins, method="Newton-CG", tol=1e-10)
-    assert fitted(votes) == pytest.approx(bradley_terry.to_elo(theirs), abs=1e-3)
+    assert fitted(votes) == pytest.approx(models.to_elo(theirs), abs=1e-3)
 
 
 def test_a_hundred_points_are_64_percent() -> None:

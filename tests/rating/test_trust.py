@@ -6,14 +6,19 @@ import numpy as np
 import pytest
 import statsmodels.api as sm
 
-from arena.rating.bootstrap import Unit
-from arena.rating.bradley_terry import ELO_PER_LOGIT
 from arena.rating.comparisons import Comparison, Comparisons, count_pairs, win_rates
-from arena.rating.fit_test import count_cycles, fit_test
-from arena.rating.influence import fewest_votes_to_change_first, rank_changes, without_each_expert
+from arena.rating.influence import (
+    count_cycles,
+    fewest_votes_to_change_first,
+    fit_test,
+    rank_changes,
+    without_each_expert,
+)
 from arena.rating.leaderboard import Intervals, rate
 from arena.rating.logistic import side_bias
-from arena.rating.planning import design_effects, votes_for, votes_until
+from arena.rating.models import ELO_PER_LOGIT
+from arena.rating.planning import design_effects
+from arena.rating.rules import Unit
 from bench.worlds import World
 from tests.rating.votes import fit, named, simulated, versus
 
@@ -150,27 +155,6 @@ def test_two_contestants_leave_nothing_to_test() -> None:
     assert fit_test(votes, fit(votes), rounds=10, seed=1).p_value is None
 
 
-# --- Size --------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("half_width", "tie_share", "answer"),
-    [(10, 0, 3665), (10, 0.2, 2932), (10, 0.4, 2199), (15, 0, 1629), (15, 0.6, 652)],
-)
-def test_votes_for_an_interval_as_worked_out_for_nine(
-    half_width: float, tie_share: float, answer: int
-) -> None:
-    found = votes_for(contestants=9, half_width=half_width, tie_share=tie_share)
-    assert found == pytest.approx(answer, abs=1.01)
-
-
-def test_a_design_effect_of_two_needs_twice_the_votes() -> None:
-    alone = votes_for(contestants=9, half_width=10, tie_share=0.2)
-    assert votes_for(
-        contestants=9, half_width=10, tie_share=0.2, design_effect=2.0
-    ) == pytest.approx(2 * alone, abs=1)
-
-
 @pytest.mark.parametrize(("expert_sd", "least", "most"), [(0.0, 0.8, 1.4), (80.0, 2.5, 6.0)])
 def test_a_design_effect_is_one_where_votes_are_independent(
     expert_sd: float, least: float, most: float
@@ -186,14 +170,6 @@ def test_a_design_effect_is_one_where_votes_are_independent(
     alone = rate(votes, unit=Unit.VOTE, intervals=Intervals.CLOSED_FORM, rounds=50)
     effects = design_effects(rate(votes, rounds=50), alone)
     assert least < float(np.median(effects)) < most
-
-
-def test_half_the_width_needs_four_times_the_votes() -> None:
-    assert votes_until(votes=1000, half_width=20.0, wanted=10.0) == 4000
-    with pytest.raises(ValueError, match="positive"):
-        votes_until(votes=0, half_width=20.0, wanted=10.0)
-    with pytest.raises(ValueError, match="2 contestants or more"):
-        votes_for(contestants=1, half_width=10, tie_share=0.2)
 
 
 # --- Pairs -------------------------------------------------------------------------------------

@@ -6,9 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from arena.rating import bradley_terry
-from arena.rating.bootstrap import Unit
-from arena.rating.bradley_terry import ELO_PER_LOGIT
+from arena.rating import models
 from arena.rating.comparisons import (
     LOSS,
     TIE,
@@ -20,6 +18,8 @@ from arena.rating.comparisons import (
     count_pairs,
 )
 from arena.rating.leaderboard import Leaderboard, rate
+from arena.rating.models import ELO_PER_LOGIT
+from arena.rating.rules import Unit
 
 
 def versus(first: str, second: str, wins: int, ties: int, losses: int) -> list[Comparison]:
@@ -66,14 +66,8 @@ def by_votes(votes: Comparisons, **rules: Any) -> Leaderboard:
 def fit(votes: Comparisons) -> FloatArray:
     """What Bradley-Terry makes of the votes, in logits."""
     counts = count_pairs(votes)
-    fitted: FloatArray = bradley_terry.fit(
-        contestants=len(votes.names),
-        low=counts.low,
-        high=counts.high,
-        games=counts.games[None],
-        scores=counts.scores[None],
-    )[0]
-    return fitted
+    met = models.Meetings(len(votes.names), counts)
+    return models.fit(met, counts.games[:, None], counts.scores[:, None])[:, 0]
 
 
 def named(votes: list[Comparison], *names: str) -> Comparisons:

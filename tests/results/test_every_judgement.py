@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from scipy.stats import t
 
-from arena.rating.estimate import Estimate
+from arena.rating.comparisons import Estimate
 from tests.results.oracles import POINTS, codes, glm
 from tests.results.raw import CHECKS, Shown
 

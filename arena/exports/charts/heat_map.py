@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from arena.exports.tables import Row
-from arena.rating.printed import whole_percent
+from arena.rating.lines import whole_percent
 from arena.rating.snapshot_document import PairRecord
 
 STRONG = 0.3

@@ -8,7 +8,7 @@ from arena.exports.formats import Format, formats, round_value
 from arena.exports.tables import shown_name
 from arena.jobs.exports.displacement import SIMULATED_NOTE
 from arena.jobs.exports.tables import json_bytes, read_value
-from arena.rating.printed import escape
+from arena.rating.lines import escape
 from arena.services.cells import csv_text
 from augment.models import GenerationJob
 from augment.services.judging.driving_scores import (

@@ -29,8 +29,7 @@ from arena.management.backups.archive import (
     read_manifest,
 )
 from arena.services import stored_rows
-from arena.services.row_rules import check_row, check_votes
-from arena.services.unfinished_work import end_restored_work, is_unfinished
+from arena.site.services import check_row, check_votes, end_restored_work, is_unfinished
 from augment.models import Endpoint, Simulation
 from augment.services.judging.simulations import allowed_planners
 from augment.services.texts import is_stored_name

@@ -9,9 +9,7 @@ from typing import Any
 
 from django.core.management.base import CommandError, CommandParser
 
-from arena.errors import ArenaError
-from arena.services.people import create_person
-from augment.errors import AugmentError
+from arena.people.services import create_person
 from augment.services.terminal import TerminalCommand
 
 
@@ -35,15 +33,12 @@ class Command(TerminalCommand):
         password = getpass.getpass("Password: ") if asked else secrets.token_urlsafe(12)
         if not password:
             raise CommandError("An empty password is no password; nothing was made.")
-        try:
-            user = create_person(
-                username=options["username"],
-                password=password,
-                role=options["role"],
-                pseudonym=options["pseudonym"],
-            )
-        except (ArenaError, AugmentError) as error:
-            raise CommandError(str(error)) from error
+        user = create_person(
+            username=options["username"],
+            password=password,
+            role=options["role"],
+            pseudonym=options["pseudonym"],
+        )
         self.stdout.write(f"Made {options['role']} {user.username} ({user.person.pseudonym}).")
         if not asked:
             self.stdout.write(f"Password (shown once): {password}")

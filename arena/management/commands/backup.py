@@ -5,10 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from django.core.management.base import CommandError, CommandParser
+from django.core.management.base import CommandParser
 from django.utils import timezone
 
-from arena.errors import ArenaError
 from arena.management.backups.taking import take_backup
 from augment.services.terminal import TerminalCommand
 
@@ -16,6 +15,7 @@ from augment.services.terminal import TerminalCommand
 class Command(TerminalCommand):
     """Write rows, pictures and the secret key into one new file."""
 
+    failure = "No backup was made."
     help = "Write everything that this installation knows into one file, while it runs."
 
     def add_arguments(self, parser: CommandParser) -> None:
@@ -25,8 +25,5 @@ class Command(TerminalCommand):
     def handle(self, *args: Any, **options: Any) -> None:
         """Take it."""
         path: Path = options["file"]
-        try:
-            take_backup(path, now=timezone.now(), say=self.stdout.write)
-        except (ArenaError, OSError) as error:
-            raise CommandError(f"No backup was made. {error}") from error
+        take_backup(path, now=timezone.now(), say=self.stdout.write)
         self.stdout.write(f"{path}: {path.stat().st_size / 1e6:.1f} MB, for its owner alone")

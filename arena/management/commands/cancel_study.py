@@ -6,15 +6,13 @@ from typing import Any
 
 from django.core.management.base import CommandError, CommandParser
 
-from arena.errors import ArenaError
-from arena.queries.studies.lists import study_named
-from arena.services.ending import cancel_study
-from augment.errors import AugmentError
+from arena.studies.queries import study_named
+from arena.studies.services.opening import cancel_study
 from augment.services.terminal import TerminalCommand
 
 
 class Command(TerminalCommand):
-    """The door to arena.services.ending.cancel_study."""
+    """The door to arena.studies.services.opening.cancel_study."""
 
     help = "Cancel an open study for good: no more votes, never any results; its votes stay."
 
@@ -26,11 +24,8 @@ class Command(TerminalCommand):
 
     def handle(self, *args: Any, **options: Any) -> None:
         """Cancel the study and say so."""
-        try:
-            study = study_named(options["study"])
-            if options["sure"] != study.name:
-                raise CommandError(f"Nothing was cancelled: --sure must say {study.name!r}.")
-            cancel_study(study=study, why=options["why"])
-        except (ArenaError, AugmentError) as error:
-            raise CommandError(str(error)) from error
+        study = study_named(options["study"])
+        if options["sure"] != study.name:
+            raise CommandError(f"Nothing was cancelled: --sure must say {study.name!r}.")
+        cancel_study(study=study, why=options["why"])
         self.stdout.write(f"Cancelled {study.name!r}. Its votes stay: export votes.")

@@ -4,17 +4,15 @@ from __future__ import annotations
 
 from typing import Any
 
-from django.core.management.base import CommandError, CommandParser
+from django.core.management.base import CommandParser
 
-from arena.errors import ArenaError
-from arena.queries.studies.lists import study_named
-from arena.services.studies import close_study
-from augment.errors import AugmentError
+from arena.studies.queries import study_named
+from arena.studies.services.opening import close_study
 from augment.services.terminal import TerminalCommand
 
 
 class Command(TerminalCommand):
-    """The door to arena.services.studies.close_study."""
+    """The door to arena.studies.services.opening.close_study."""
 
     help = "Close a study: it takes no more votes, and its results may be seen."
 
@@ -24,8 +22,5 @@ class Command(TerminalCommand):
 
     def handle(self, *args: Any, **options: Any) -> None:
         """Close the study and say so."""
-        try:
-            study = close_study(study=study_named(options["study"]))
-        except (ArenaError, AugmentError) as error:
-            raise CommandError(str(error)) from error
+        study = close_study(study=study_named(options["study"]))
         self.stdout.write(f"Closed {study.name!r}.")

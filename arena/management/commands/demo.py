@@ -12,14 +12,12 @@ from django.conf import settings
 from django.core.management import call_command
 from django.core.management.base import CommandError, CommandParser
 
-from arena.errors import ArenaError
 from arena.management import demo
 from arena.management.arguments import at_least
 from arena.management.commands.serve import INTERRUPTED
 from arena.serving.ledger import Ledger
 from arena.serving.stack import Web, background, hold_alone, remembered_address, web_server
 from arena.serving.supervisor import Supervisor
-from augment.errors import AugmentError
 from augment.services.terminal import TerminalCommand
 
 STOPPED = "The demo was stopped before it was done; started again, it goes on from there."
@@ -60,8 +58,6 @@ class Command(TerminalCommand):
                 self._run(
                     web, options["per_type"], options["driven"], serve=not options["no_serve"]
                 )
-        except (ArenaError, AugmentError) as error:
-            raise CommandError(str(error)) from error
         except KeyboardInterrupt:
             raise CommandError(STOPPED, returncode=INTERRUPTED) from None
 

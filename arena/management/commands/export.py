@@ -14,7 +14,7 @@ from arena.management.exporting.jobs import add_jobs
 from arena.management.exporting.kinds import ExportedFile
 from arena.management.exporting.scenarios import add_scenarios
 from arena.management.exporting.studies import add_studies
-from arena.queries.studies.lists import study_named
+from arena.studies.queries import study_named
 from augment.errors import AugmentError
 from augment.services.terminal import TerminalCommand
 
@@ -40,10 +40,7 @@ class Command(TerminalCommand):
         if options["what"] == "study":
             self._study(options)
             return
-        try:
-            written: ExportedFile = options["write"](options, self.stderr.write)
-        except (ArenaError, AugmentError) as error:
-            raise CommandError(str(error)) from error
+        written: ExportedFile = options["write"](options, self.stderr.write)
         self._deliver(written, options["out"])
 
     def _study(self, options: dict[str, Any]) -> None:

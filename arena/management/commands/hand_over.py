@@ -4,17 +4,15 @@ from __future__ import annotations
 
 from typing import Any
 
-from django.core.management.base import CommandError, CommandParser
+from django.core.management.base import CommandParser
 
-from arena.errors import ArenaError
-from arena.queries.studies.lists import study_named
-from arena.services.handing_over import hand_over
-from augment.errors import AugmentError
+from arena.studies.queries import study_named
+from arena.studies.services.taking_part import hand_over
 from augment.services.terminal import TerminalCommand
 
 
 class Command(TerminalCommand):
-    """The door to arena.services.handing_over."""
+    """The door to arena.studies.services.taking_part."""
 
     help = "Hand an expert's remaining pairs over to others, re-planned in one go."
 
@@ -26,11 +24,8 @@ class Command(TerminalCommand):
 
     def handle(self, *args: Any, **options: Any) -> None:
         """Hand over and say who got how many."""
-        try:
-            taken = hand_over(
-                study=study_named(options["study"]), username=options["expert"], to=options["to"]
-            )
-        except (ArenaError, AugmentError) as error:
-            raise CommandError(str(error)) from error
+        taken = hand_over(
+            study=study_named(options["study"]), username=options["expert"], to=options["to"]
+        )
         for name, votes in taken.items():
             self.stdout.write(f"{name} takes {votes} votes.")

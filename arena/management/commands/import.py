@@ -5,9 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from django.core.management.base import CommandError, CommandParser
+from django.core.management.base import CommandParser
 
-from arena.errors import ArenaError
 from arena.management.backups.restoring import import_study
 from augment.services.terminal import TerminalCommand
 
@@ -15,6 +14,7 @@ from augment.services.terminal import TerminalCommand
 class Command(TerminalCommand):
     """Check a folder whole, then take it in."""
 
+    failure = "Nothing was imported."
     help = "Take in a whole study; other imports: import_scene, import_log, import_votes."
 
     def add_arguments(self, parser: CommandParser) -> None:
@@ -25,10 +25,7 @@ class Command(TerminalCommand):
 
     def handle(self, *args: Any, **options: Any) -> None:
         """Take it in."""
-        try:
-            import_study(options["folder"], say=self.stdout.write)
-        except (ArenaError, OSError) as error:
-            raise CommandError(f"Nothing was imported. {error}") from error
+        import_study(options["folder"], say=self.stdout.write)
         self.stdout.write(
             "Imported. Make an account to look at it: manage.py add_person NAME --role admin"
         )

@@ -5,11 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from django.core.management.base import CommandError, CommandParser
+from django.core.management.base import CommandParser
 
-from arena.errors import ArenaError
 from arena.services.vote_imports import import_votes
-from augment.errors import AugmentError
 from augment.services.terminal import TerminalCommand
 
 
@@ -32,12 +30,9 @@ class Command(TerminalCommand):
     def handle(self, *args: Any, **options: Any) -> None:
         """Import the file and say what it held."""
         path: Path = options["file"]
-        try:
-            imported = import_votes(
-                path=path, name=options["name"] or path.stem, is_simulated=options["simulated"]
-            )
-        except (ArenaError, AugmentError) as error:
-            raise CommandError(str(error)) from error
+        imported = import_votes(
+            path=path, name=options["name"] or path.stem, is_simulated=options["simulated"]
+        )
         self.stdout.write(
             f"Imported {imported.votes} votes on {imported.contestants} contestants as "
             f"{imported.study.name!r} ({imported.study.code})."

@@ -4,22 +4,20 @@ from __future__ import annotations
 
 from typing import Any
 
-from django.core.management.base import CommandError, CommandParser
+from django.core.management.base import CommandParser
 from django.urls import reverse
 from django.utils import timezone
 
-from arena.errors import ArenaError
 from arena.models import Study
-from arena.queries.studies.invitations import ExpertLine, expert_lines
-from arena.queries.studies.lists import study_named
-from arena.services.invitations import LINK_LIVES, invite
+from arena.people.links import LINK_LIVES, invite
 from arena.serving.stack import Web, served_address
-from augment.errors import AugmentError, UnknownName
+from arena.studies.queries import ExpertLine, expert_lines, study_named
+from augment.errors import UnknownName
 from augment.services.terminal import TerminalCommand
 
 
 class Command(TerminalCommand):
-    """The door to arena.services.invitations.invite."""
+    """The door to arena.people.services.invite."""
 
     help = (
         "Print a link for every expert of a study who has none that works; each is shown once. "
@@ -38,14 +36,11 @@ class Command(TerminalCommand):
 
     def handle(self, *args: Any, **options: Any) -> None:
         """Make the links and print them."""
-        try:
-            study = study_named(options["study"])
-            made = [
-                (line, invite(study=study, expert=line.tally.expert))
-                for line in _chosen(study, options["experts"])
-            ]
-        except (ArenaError, AugmentError) as error:
-            raise CommandError(str(error)) from error
+        study = study_named(options["study"])
+        made = [
+            (line, invite(study=study, expert=line.tally.expert))
+            for line in _chosen(study, options["experts"])
+        ]
         address = options["address"] or served_address() or Web().address
         for line, fresh in made:
             path = reverse("invitation", args=[fresh.token])

@@ -5,18 +5,17 @@ from __future__ import annotations
 from typing import Any
 
 from django.contrib.auth.models import User
-from django.core.management.base import CommandError, CommandParser
+from django.core.management.base import CommandParser
 
-from arena.errors import ArenaError
 from arena.models import Study
-from arena.queries.studies.lists import study_named
-from arena.services.authorships import mark_author, take_back_author
-from augment.errors import AugmentError, UnknownName
+from arena.people.links import mark_author, take_back_author
+from arena.studies.queries import study_named
+from augment.errors import UnknownName
 from augment.services.terminal import TerminalCommand
 
 
 class Command(TerminalCommand):
-    """The door to arena.services.authorships."""
+    """The door to arena.people.services."""
 
     help = "Mark an expert of a study as author of a contestant; experts see nothing of it."
 
@@ -32,17 +31,14 @@ class Command(TerminalCommand):
     def handle(self, *args: Any, **options: Any) -> None:
         """Mark or take back, and say so."""
         username, slug = options["expert"], options["contestant"]
-        try:
-            study = study_named(options["study"])
-            expert = _expert(study, username)
-            if options["take_back"]:
-                _check_contestant(study, slug)
-                for row in study.authorships.filter(expert=expert, contestant__slug=slug):
-                    take_back_author(authorship=row)
-            else:
-                mark_author(study=study, expert=expert, contestant=slug)
-        except (ArenaError, AugmentError) as error:
-            raise CommandError(str(error)) from error
+        study = study_named(options["study"])
+        expert = _expert(study, username)
+        if options["take_back"]:
+            _check_contestant(study, slug)
+            for row in study.authorships.filter(expert=expert, contestant__slug=slug):
+                take_back_author(authorship=row)
+        else:
+            mark_author(study=study, expert=expert, contestant=slug)
         state = "not marked" if options["take_back"] else "marked"
         self.stdout.write(f"{username} is {state} as author of {slug}.")
 

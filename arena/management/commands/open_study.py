@@ -5,23 +5,20 @@ from __future__ import annotations
 from collections import Counter
 from typing import Any
 
-from django.core.management.base import CommandError, CommandParser
+from django.core.management.base import CommandParser
 
-from arena.errors import ArenaError
 from arena.models import Study
-from arena.queries.inventory import usual_checks
-from arena.queries.studies.coverage import shared_units
-from arena.services.preregistration import preregistration_sha256
-from arena.services.studies import open_study
-from arena.services.study_plan import PLAN_INPUTS, SAMPLES, StudyPlan
-from augment.errors import AugmentError
+from arena.site.queries import usual_checks
+from arena.studies.queries import shared_units
+from arena.studies.services.opening import open_study, preregistration_sha256
+from arena.studies.services.plan import PLAN_INPUTS, SAMPLES, StudyPlan
 from augment.services.inputs import add_options
 from augment.services.running.choosing import resolve_contestants, resolve_scenarios
 from augment.services.terminal import TerminalCommand
 
 
 class Command(TerminalCommand):
-    """The door to arena.services.studies.open_study."""
+    """The door to arena.studies.services.opening.open_study."""
 
     help = "Plan blind, balanced matchups for experts and open the study."
 
@@ -33,15 +30,12 @@ class Command(TerminalCommand):
     def handle(self, *args: Any, **options: Any) -> None:
         """Open the study and say what was planned."""
         given = {one.name: options[one.name] for one in PLAN_INPUTS}
-        try:
-            given |= {
-                "contestants": resolve_contestants(options["contestants"]),
-                "scenarios": resolve_scenarios(options["scenarios"]),
-                "checks": self._checks(options["checks"]),
-            }
-            study = open_study(StudyPlan.read(given))
-        except (ArenaError, AugmentError) as error:
-            raise CommandError(str(error)) from error
+        given |= {
+            "contestants": resolve_contestants(options["contestants"]),
+            "scenarios": resolve_scenarios(options["scenarios"]),
+            "checks": self._checks(options["checks"]),
+        }
+        study = open_study(StudyPlan.read(given))
         self._say(study)
 
     def _checks(self, asked: float | None) -> float:

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
-from django.core.management.base import CommandError, CommandParser
+from django.core.management.base import CommandParser
 from django.utils import timezone
 
-from arena.services.retention import TextLoss, foresee_losses, read_age, remove_old
-from augment.errors import AugmentError
+from arena.site.services import TextLoss, foresee_losses, read_age, remove_old
 from augment.services.terminal import TerminalCommand
 
 LOST = """Afterwards these answers can't be used again: the same request is asked, and paid, anew.
@@ -32,14 +31,11 @@ class Command(TerminalCommand):
     def handle(self, *args: Any, **options: Any) -> None:
         """Foresee, and remove where that is wanted."""
         now = timezone.now()
-        try:
-            before = now - read_age(options["older_than"])
-            losses = foresee_losses(before=before)
-            self._tell(losses)
-            if options["yes"] and losses:
-                self._remove(before, now)
-        except AugmentError as error:
-            raise CommandError(str(error)) from error
+        before = now - read_age(options["older_than"])
+        losses = foresee_losses(before=before)
+        self._tell(losses)
+        if options["yes"] and losses:
+            self._remove(before, now)
 
     def _tell(self, losses: list[TextLoss]) -> None:
         for loss in losses:

@@ -4,19 +4,16 @@ from __future__ import annotations
 
 from typing import Any
 
-from django.core.management.base import CommandError, CommandParser
+from django.core.management.base import CommandParser
 
-from arena.errors import ArenaError
 from arena.exports.tables import leaderboard_table
 from arena.exports.writers import plain_text
-from arena.queries.studies.lists import study_named
 from arena.queries.votes.sets import Filters
-from arena.rating.bootstrap import Unit
-from arena.rating.rules import Intervals
+from arena.rating.rules import Intervals, Unit
 from arena.services.covariates import COVARIATES
 from arena.services.early_looks import log_early_look
 from arena.services.ratings import DEFAULT_ROUNDS, rate
-from augment.errors import AugmentError
+from arena.studies.queries import study_named
 from augment.services.terminal import TerminalCommand
 
 
@@ -61,21 +58,18 @@ class Command(TerminalCommand):
 
     def handle(self, *args: Any, **options: Any) -> None:
         """Rate, then print the table."""
-        try:
-            study = study_named(options["study"])
-            snapshot = rate(
-                study=study,
-                method=options["method"],
-                rounds=options["rounds"],
-                seed=options["seed"],
-                unit=options["resample"],
-                intervals=options["intervals"],
-                covariates=options["adjust"],
-                filters=Filters(leave_out_own=options["leave_out_own"]),
-                early=options["early"],
-            )
-        except (ArenaError, AugmentError) as error:
-            raise CommandError(str(error)) from error
+        study = study_named(options["study"])
+        snapshot = rate(
+            study=study,
+            method=options["method"],
+            rounds=options["rounds"],
+            seed=options["seed"],
+            unit=options["resample"],
+            intervals=options["intervals"],
+            covariates=options["adjust"],
+            filters=Filters(leave_out_own=options["leave_out_own"]),
+            early=options["early"],
+        )
         if snapshot.is_early:
             log_early_look(study=study, actor=None, what="rating, printed")
         self.stdout.write(plain_text(leaderboard_table(snapshot)))

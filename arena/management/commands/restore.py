@@ -5,9 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from django.core.management.base import CommandError, CommandParser
+from django.core.management.base import CommandParser
 
-from arena.errors import ArenaError
 from arena.management.backups.restoring import restore_backup
 from augment.services.terminal import TerminalCommand
 
@@ -15,6 +14,7 @@ from augment.services.terminal import TerminalCommand
 class Command(TerminalCommand):
     """Check a backup whole, then restore it."""
 
+    failure = "Nothing was restored."
     help = (
         "Restore a backup of `manage.py backup` into an empty installation: a new SQLite file or "
         "an empty PostgreSQL database, whichever DATABASE_URL names."
@@ -26,8 +26,5 @@ class Command(TerminalCommand):
 
     def handle(self, *args: Any, **options: Any) -> None:
         """Restore it."""
-        try:
-            restore_backup(options["file"], say=self.stdout.write)
-        except (ArenaError, OSError) as error:
-            raise CommandError(f"Nothing was restored. {error}") from error
+        restore_backup(options["file"], say=self.stdout.write)
         self.stdout.write("Restored. Start it with `manage.py serve`.")

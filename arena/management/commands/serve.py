@@ -8,10 +8,9 @@ from django.conf import settings
 from django.core.management import call_command
 from django.core.management.base import CommandError, CommandParser
 
-from arena.errors import ArenaError
 from arena.management.arguments import at_least
 from arena.management.demo import login_lines
-from arena.services.first_start import make_first_link_token
+from arena.people.services import make_first_link_token
 from arena.serving.ledger import Ledger
 from arena.serving.stack import Web, background, hold_alone, remembered_address, web_server
 from arena.serving.supervisor import Supervisor
@@ -46,8 +45,6 @@ class Command(TerminalCommand):
         try:
             with hold_alone(self.stdout.write):
                 self._serve(web, options["concurrency"])
-        except ArenaError as error:
-            raise CommandError(str(error)) from error
         except KeyboardInterrupt:  # before anything was started
             raise CommandError("Stopped before anything ran.", returncode=INTERRUPTED) from None
         self.stdout.write("Everything is stopped.")

@@ -16,10 +16,10 @@ from arena.exports.writers import FORMATS
 from arena.exports.zips import ZIP
 from arena.management.exporting.kinds import Chosen, ExportedFile, Say, add_format, add_kind, fill
 from arena.models import Snapshot, Study
-from arena.queries.studies.lists import study_named
 from arena.queries.studies.results import snapshot_to_export
 from arena.queries.votes.judged import is_imported
 from arena.services.early_looks import log_early_look
+from arena.studies.queries import study_named
 from augment.errors import Conflict
 
 

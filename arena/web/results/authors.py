@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from arena.exports.tables import LeaderboardTable, Row
 from arena.models import Snapshot
 from arena.queries.votes.sets import Filters
-from arena.rating.printed import rating_text
+from arena.rating.lines import rating_text
 from arena.rating.snapshot_document import BothRanks, PanelRater
 from arena.web.results.ratings import Context
 

@@ -10,8 +10,8 @@ from arena.models import Snapshot
 from arena.pairing.order import MAIN, REPEAT
 from arena.queries.votes.judged import is_imported
 from arena.queries.votes.sets import Filters
-from arena.rating.bootstrap import Unit
 from arena.rating.leaderboard import Intervals, Method
+from arena.rating.rules import Unit
 from arena.services.covariates import COVARIATES, WITHOUT_PICTURES
 from arena.services.ratings import DEFAULT_ROUNDS, MOST_ROUNDS
 from augment.services.scenarios.scenes import type_choices

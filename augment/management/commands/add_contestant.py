@@ -8,7 +8,6 @@ from typing import Any
 from django.core.management.base import CommandError
 from django.db import transaction
 
-from augment.errors import AugmentError
 from augment.management.arguments import add_option_arguments, options_of_arguments
 from augment.models import Contestant
 from augment.services.endpoints.contestants import add_contestant, add_like, ensure_builtin
@@ -78,10 +77,7 @@ class Command(TerminalCommand):
         ]
         if not options["base_url"] and of_endpoints:
             raise CommandError(f"{_flags(of_endpoints)} need --base-url.")
-        try:
-            contestant = self._add(options)
-        except AugmentError as error:
-            raise CommandError(str(error)) from error
+        contestant = self._add(options)
         self.stdout.write(f"{contestant.slug}: {contestant.name} ({contestant.kind})")
         for role, names in left_out(contestant).items():
             self.stderr.write(

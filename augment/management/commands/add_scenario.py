@@ -8,7 +8,6 @@ from typing import Any
 
 from django.core.management.base import CommandError
 
-from augment.errors import AugmentError
 from augment.formats.documents import read_json
 from augment.models.scenes import GOALS
 from augment.scene.codec import modification_from_document, modification_to_document
@@ -70,20 +69,17 @@ class Command(TerminalCommand):
         missing = [f"--{name}" for name in NEEDED if options[name] is None]
         if missing:
             raise CommandError(f"{', '.join(missing)} is needed, or --file FILE instead of all.")
-        try:
-            scenario = add_scenario(
-                scene=options["scene"],
-                type=options["type"],
-                type_label=options["type_label"],
-                instruction=options["instruction"],
-                slug=options["slug"],
-                reference=_reference(options["reference"]),
-                intent=_intent(options["intent"]),
-                keep_traffic=options["keep_traffic"],
-                circumstances=read_circumstances(options["density"] or "", options["goal"] or ""),
-            )
-        except AugmentError as fault:
-            raise CommandError(str(fault)) from fault
+        scenario = add_scenario(
+            scene=options["scene"],
+            type=options["type"],
+            type_label=options["type_label"],
+            instruction=options["instruction"],
+            slug=options["slug"],
+            reference=_reference(options["reference"]),
+            intent=_intent(options["intent"]),
+            keep_traffic=options["keep_traffic"],
+            circumstances=read_circumstances(options["density"] or "", options["goal"] or ""),
+        )
         with_reference = "with" if scenario.reference is not None else "without"
         with_intent = "" if scenario.intent is None else ", with its intent"
         self.stdout.write(
@@ -94,10 +90,7 @@ class Command(TerminalCommand):
         given = [f"--{name.replace('_', '-')}" for name in (*NEEDED, *OPTIONAL) if options[name]]
         if given:
             raise CommandError(f"--file says all of it; it goes without {', '.join(given)}.")
-        try:
-            made = add_scenarios(read_rows(options["file"]), folder=options["file"].parent)
-        except AugmentError as fault:
-            raise CommandError(str(fault)) from fault
+        made = add_scenarios(read_rows(options["file"]), folder=options["file"].parent)
         for scenario in made:
             self.stdout.write(f"Added scenario {scenario.slug}.")
         self.stdout.write(f"{len(made)} scenarios.")

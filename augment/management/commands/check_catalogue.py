@@ -7,7 +7,6 @@ from typing import Any
 
 from django.core.management.base import CommandError
 
-from augment.errors import AugmentError
 from augment.management.arguments import add_folder_argument, add_set_argument, sets_of
 from augment.services.scenarios.catalogue_check import (
     CatalogueCheck,
@@ -32,10 +31,7 @@ class Command(TerminalCommand):
 
     def handle(self, *args: Any, **options: Any) -> None:
         """Print a line for each scenario, then the reasons."""
-        try:
-            checked = check_catalogue(folder=options["folder"], sets=sets_of(options))
-        except AugmentError as error:
-            raise CommandError(str(error)) from error
+        checked = check_catalogue(folder=options["folder"], sets=sets_of(options))
         width = max((len(scenario.slug) for scenario in checked.scenarios), default=8)
         self.stdout.write(f"{'scenario':{width}}  statements  {'way past':14}  result")
         for scenario in checked.scenarios:

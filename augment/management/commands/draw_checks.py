@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from django.core.management.base import CommandError, CommandParser
+from django.core.management.base import CommandParser
 
-from augment.errors import AugmentError
 from augment.services.running.choosing import resolve_scenarios
 from augment.services.scenarios.pictures import draw_checks
 from augment.services.terminal import TerminalCommand
@@ -27,8 +26,5 @@ class Command(TerminalCommand):
 
     def handle(self, *args: Any, **options: Any) -> None:
         """Draw what is missing and say how many there are."""
-        try:
-            drawn = draw_checks(scenarios=resolve_scenarios(options["scenarios"]))
-        except AugmentError as error:
-            raise CommandError(str(error)) from error
+        drawn = draw_checks(scenarios=resolve_scenarios(options["scenarios"]))
         self.stdout.write(f"{len(drawn)} pictures drawn for attention checks.")

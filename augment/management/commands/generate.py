@@ -12,7 +12,6 @@ from django.db import transaction
 from django.utils import timezone
 
 from augment.broker import check_broker
-from augment.errors import AugmentError
 from augment.formats.documents import read_yaml_file
 from augment.management.arguments import add_cap_arguments, caps_of
 from augment.models import Augmentation, GenerationJob
@@ -84,16 +83,13 @@ class Command(TerminalCommand):
     def handle(self, *args: Any, **options: Any) -> None:
         """Launch the job, then wait if asked to."""
         _refuse_both(options)
-        try:
-            if options["estimate"]:
-                with transaction.atomic():
-                    self._estimate(options)
-                    transaction.set_rollback(True)
-                return
-            check_broker()
-            job = self._launch(options)
-        except AugmentError as error:
-            raise CommandError(str(error)) from error
+        if options["estimate"]:
+            with transaction.atomic():
+                self._estimate(options)
+                transaction.set_rollback(True)
+            return
+        check_broker()
+        job = self._launch(options)
         total = count_rows(job).total
         self.stdout.write(f"Job {job.code}, {job.name!r}: {total} to run.")
         if options["wait"]:

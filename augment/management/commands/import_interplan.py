@@ -9,7 +9,6 @@ from typing import Any
 
 from django.core.management.base import CommandError
 
-from augment.errors import AugmentError
 from augment.services.scenarios.interplan import (
     FileLeftOut,
     LogLooked,
@@ -52,18 +51,13 @@ class Command(TerminalCommand):
     def handle(self, *args: Any, **options: Any) -> None:
         """Import one by one, and say each."""
         counts: Counter[str] = Counter()
-        try:
-            for step in import_interplan(
-                folder=options["folder"],
-                data=options["nuplan"],
-                instructions=options["instructions"],
-            ):
-                counts[_kind(step)] += 1
-                counts["same"] += isinstance(step, ScenarioDone) and bool(step.same_as)
-                self.stdout.write(_line(step))
-                self.stdout.flush()
-        except AugmentError as fault:
-            raise CommandError(str(fault)) from fault
+        for step in import_interplan(
+            folder=options["folder"], data=options["nuplan"], instructions=options["instructions"]
+        ):
+            counts[_kind(step)] += 1
+            counts["same"] += isinstance(step, ScenarioDone) and bool(step.same_as)
+            self.stdout.write(_line(step))
+            self.stdout.flush()
         new, old, skipped = counts["new"], counts["old"], counts["skipped"]
         if counts["same"]:
             self.stdout.write(f"{counts['same']} scenarios are the same as an earlier one.")

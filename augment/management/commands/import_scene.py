@@ -6,9 +6,6 @@ from argparse import ArgumentParser
 from pathlib import Path
 from typing import Any
 
-from django.core.management.base import CommandError
-
-from augment.errors import AugmentError
 from augment.formats.readers import READERS
 from augment.services.scenarios.scene_imports import import_scene, notes_of
 from augment.services.terminal import TerminalCommand
@@ -46,16 +43,13 @@ class Command(TerminalCommand):
 
     def handle(self, *args: Any, **options: Any) -> None:
         """Import, and say what came in and what the source left open."""
-        try:
-            row = import_scene(
-                source=options["source"],
-                path=options["path"],
-                frame=options["frame"],
-                item=options["item"],
-                slug=options["slug"],
-            )
-        except AugmentError as fault:
-            raise CommandError(str(fault)) from fault
+        row = import_scene(
+            source=options["source"],
+            path=options["path"],
+            frame=options["frame"],
+            item=options["item"],
+            slug=options["slug"],
+        )
         counts = ", ".join(
             f"{len(row.document[name])} {name}"
             for name in ("agents", "lanes", "connectors", "areas")

@@ -5,9 +5,6 @@ from __future__ import annotations
 from argparse import ArgumentParser
 from typing import Any
 
-from django.core.management.base import CommandError
-
-from augment.errors import AugmentError
 from augment.management.arguments import add_folder_argument, add_set_argument, sets_of
 from augment.services.scenarios.catalogue import load_catalogue
 from augment.services.terminal import TerminalCommand
@@ -33,14 +30,11 @@ class Command(TerminalCommand):
 
     def handle(self, *args: Any, **options: Any) -> None:
         """Load it and say what that changed."""
-        try:
-            report = load_catalogue(
-                folder=options["folder"],
-                sets=sets_of(options),
-                with_paraphrases=options["paraphrases"],
-            )
-        except AugmentError as error:
-            raise CommandError(str(error)) from error
+        report = load_catalogue(
+            folder=options["folder"],
+            sets=sets_of(options),
+            with_paraphrases=options["paraphrases"],
+        )
         for kind in ("scenes", "scenarios"):
             added, changed, unchanged = (
                 getattr(report, f"{kind}_{step}") for step in ("added", "changed", "unchanged")

@@ -7,7 +7,7 @@ from typing import Any
 
 from django.core.management.base import CommandError
 
-from augment.errors import AugmentError, UnknownName
+from augment.errors import UnknownName
 from augment.llm.questions import Ability
 from augment.models import Endpoint
 from augment.services.endpoints.known_models import tell_sight
@@ -40,16 +40,13 @@ class Command(TerminalCommand):
     def handle(self, *args: Any, **options: Any) -> None:
         """Ask, print a table and fail where nobody answers."""
         label = options["label"]
-        try:
-            if not Endpoint.objects.filter(label=label).exists():
-                known = list(Endpoint.objects.values_list("label", flat=True))
-                raise UnknownName("endpoint", label, known)
-            if options["sees"]:
-                self._tell(label, options["model"], sees=options["sees"] == "yes")
-                return
-            report = probe(label=label, model=options["model"])
-        except AugmentError as error:
-            raise CommandError(str(error)) from error
+        if not Endpoint.objects.filter(label=label).exists():
+            known = list(Endpoint.objects.values_list("label", flat=True))
+            raise UnknownName("endpoint", label, known)
+        if options["sees"]:
+            self._tell(label, options["model"], sees=options["sees"] == "yes")
+            return
+        report = probe(label=label, model=options["model"])
         for finding in report.findings:
             self.stdout.write(_line(finding))
         self._sum_up(report)

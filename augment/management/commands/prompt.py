@@ -8,7 +8,6 @@ from typing import Any
 
 from django.core.management.base import CommandError
 
-from augment.errors import AugmentError
 from augment.prompts.fill import prompt_version
 from augment.services.scenarios.prompts import prompt_of
 from augment.services.terminal import TerminalCommand
@@ -40,15 +39,12 @@ class Command(TerminalCommand):
 
     def handle(self, *args: Any, **options: Any) -> None:
         """Print the messages, then what is known about them."""
-        try:
-            shown = prompt_of(
-                scenario=options["scenario"],
-                variant=options["variant"],
-                role=ModelRole(options["role"]),
-                native_tools=options["native_tools"],
-            )
-        except AugmentError as error:
-            raise CommandError(str(error)) from error
+        shown = prompt_of(
+            scenario=options["scenario"],
+            variant=options["variant"],
+            role=ModelRole(options["role"]),
+            native_tools=options["native_tools"],
+        )
         pictures = [png for message in shown.messages for png in message.images]
         if options["picture"] is not None:
             self._keep(options["picture"], pictures)

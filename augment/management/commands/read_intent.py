@@ -8,7 +8,6 @@ from typing import Any
 
 from django.core.management.base import CommandError
 
-from augment.errors import AugmentError
 from augment.formats.documents import read_json
 from augment.management.arguments import add_cap_arguments, caps_of
 from augment.models import IntentReading
@@ -50,18 +49,13 @@ class Command(TerminalCommand):
         if asks and (options["endpoint"] is None or options["model"] is None):
             raise CommandError("--endpoint and --model go together.")
         slug = options["scenario"]
-        try:
-            if asks:
-                self._read(slug, options)
-                return
-            if options["accept"]:
-                row = accept_reading(scenario=slug)
-            else:
-                row = enter_intent(
-                    scenario=slug, document=read_json(options["enter"], what="intent")
-                )
-        except AugmentError as fault:
-            raise CommandError(str(fault)) from fault
+        if asks:
+            self._read(slug, options)
+            return
+        if options["accept"]:
+            row = accept_reading(scenario=slug)
+        else:
+            row = enter_intent(scenario=slug, document=read_json(options["enter"], what="intent"))
         self._print(row.intent)
         self.stdout.write(f"This is the intent of {slug} now ({row.intent_origin}).")
 

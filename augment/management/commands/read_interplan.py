@@ -9,7 +9,6 @@ from typing import Any
 
 from django.core.management.base import CommandError
 
-from augment.errors import AugmentError
 from augment.scene.codec import modification_to_document
 from augment.services.scenarios.interplan import references_from_interplan
 from augment.services.terminal import TerminalCommand
@@ -45,8 +44,6 @@ class Command(TerminalCommand):
                 file.write_text(json.dumps(document, indent=2) + "\n", encoding="utf-8")
                 left_out = f"; left out: {', '.join(entry.left_out)}" if entry.left_out else ""
                 self.stdout.write(f"{file}: {entry.type} on {entry.scene}{left_out}")
-        except AugmentError as error:
-            raise CommandError(str(error)) from error
         except OSError as error:
             raise CommandError(f"{options['out']} can't be written: {error.strerror}.") from error
         for left_out in found.left_out:

@@ -5,11 +5,9 @@ from __future__ import annotations
 from argparse import ArgumentParser
 from typing import Any
 
-from django.core.management.base import CommandError
 from django.db import transaction
 
 from augment.broker import check_broker
-from augment.errors import AugmentError
 from augment.management.arguments import add_cap_arguments, caps_of
 from augment.services.running import jobs
 from augment.services.running.budget import limit_of
@@ -35,14 +33,11 @@ class Command(TerminalCommand):
     def handle(self, *args: Any, **options: Any) -> None:
         """Raise what is given, then resume."""
         wanted = caps_of(options)
-        try:
-            job = find_job(options["job"])
-            check_broker()
-            with transaction.atomic():
-                job = jobs.resume(job, higher=wanted)
-                pk = job.pk
-                transaction.on_commit(lambda: enqueue_job(pk))
-        except AugmentError as error:
-            raise CommandError(str(error)) from error
+        job = find_job(options["job"])
+        check_broker()
+        with transaction.atomic():
+            job = jobs.resume(job, higher=wanted)
+            pk = job.pk
+            transaction.on_commit(lambda: enqueue_job(pk))
         waiting = count_rows(job).queued
         self.stdout.write(f"Job {job.code}, capped at {limit_of(job)}: {waiting} to run.")

@@ -7,12 +7,11 @@ from argparse import ArgumentParser
 from collections.abc import Collection
 from typing import Any, Final
 
-from django.core.management.base import CommandError
 from django.db import transaction
 from django.db.models import Q
 
 from augment.broker import check_broker
-from augment.errors import AugmentError, UnknownName
+from augment.errors import UnknownName
 from augment.models import Scenario, Simulation
 from augment.services.judging import simulations
 from augment.services.judging.driving_scores import (
@@ -64,12 +63,9 @@ class Command(TerminalCommand):
 
     def handle(self, *args: Any, **options: Any) -> None:
         """Plan the rows, drive them here or queue them, then say the scores."""
-        try:
-            if options["score"] not in SCORES:
-                raise UnknownName("score", options["score"], list(SCORES))
-            self._simulate(options)
-        except AugmentError as error:
-            raise CommandError(str(error)) from error
+        if options["score"] not in SCORES:
+            raise UnknownName("score", options["score"], list(SCORES))
+        self._simulate(options)
 
     def _simulate(self, options: dict[str, Any]) -> None:
         how = Options(
