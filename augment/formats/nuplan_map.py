@@ -17,6 +17,7 @@ from typing import Any
 from urllib.parse import quote
 
 import numpy as np
+import shapely
 from numpy.typing import NDArray
 
 from augment.errors import InvalidDocument
@@ -201,8 +202,6 @@ class Layers:
 
     def _lines(self, blocks: list[Any], srs: int, layer: str) -> list[FloatArray]:
         """The points (P, 2) of each geometry; all of a layer are projected in one go."""
-        import shapely
-
         if not blocks:
             return []
         try:
@@ -257,8 +256,6 @@ def _longest_line(geometry: Any) -> Any:
     Raises:
         ValueError: It is neither, or has no points.
     """
-    import shapely
-
     parts = [
         part.exterior if part.geom_type == "Polygon" else part
         for part in shapely.get_parts(geometry).tolist()

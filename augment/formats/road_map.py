@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from statistics import fmean
 
 import numpy as np
+import shapely
 from numpy.typing import NDArray
 
 from augment.scene.entities import (
@@ -248,8 +249,6 @@ def crossing_segments(segments: Mapping[Name, Segment]) -> set[Name]:
     A segment of a fork or a merge does if its line crosses another's, unless both are of the same
     fork or merge; so does one that leads from a fork to a merge beside such a segment.
     """
-    import shapely
-
     names = [name for name, one in segments.items() if _is_line(one.centerline)]
     lines = [shapely.LineString(segments[name].centerline) for name in names]
     following = following_of(segments)
