@@ -10,7 +10,6 @@ from arena.jobs.exports import displacement_files, driving
 from arena.jobs.exports.displacement import displacement_table
 from arena.jobs.exports.registry import PLAIN_TABLES, TRANSCRIPTS
 from arena.jobs.exports.tables import ANALYSES, TABLE_FORMATS, analysis_sheet, object_sheet
-from arena.jobs.queries import grid
 from arena.management.exporting.kinds import (
     Chosen,
     ExportedFile,
@@ -20,7 +19,7 @@ from arena.management.exporting.kinds import (
     add_table,
     fill,
 )
-from arena.results.exports.sheets import SHEET_FORMATS, sample_sheet
+from arena.results.exports.sheets import SHEET_FORMATS
 from augment.errors import Conflict, UnknownName
 from augment.services.judging.analyses import analyse_job
 from augment.services.judging.displacement import By, types_named
@@ -92,11 +91,11 @@ def write_samples(options: Chosen, say: Say) -> ExportedFile:
     form = options["format"] or Path(options["out"]).suffix.removeprefix(".")
     if form not in SHEET_FORMATS:
         raise UnknownName("format", form, list(SHEET_FORMATS))
-    content = sample_sheet(
-        grid(find_job(options["job"]), sample=options["sample"]),
+    sheet = sheet_of(
+        find_job(options["job"]),
         scenarios=options["scenarios"],
         contestants=options["contestants"],
-        file_format=form,
+        sample=options["sample"],
     )
     return ExportedFile(content, form, False)
 
