@@ -6,6 +6,7 @@ from celery import shared_task
 from django.contrib.auth.models import User
 
 from arena.jobs.exports.files import SCENARIO_FILES
+from arena.results.exports.study_files import STUDY_FILES
 from arena.results.services.ratings import RATINGS
 from augment.models import Scenario
 from augment.services.scenarios import pictures

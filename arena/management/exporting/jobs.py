@@ -19,7 +19,7 @@ from arena.management.exporting.kinds import (
     add_table,
     fill,
 )
-from arena.results.exports.sheets import SHEET_FORMATS
+from arena.results.exports.sheets import SHEET_FORMATS, sheet_of
 from augment.errors import Conflict, UnknownName
 from augment.services.judging.analyses import analyse_job
 from augment.services.judging.displacement import By, types_named
