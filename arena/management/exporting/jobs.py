@@ -19,7 +19,7 @@ from arena.management.exporting.kinds import (
     add_table,
     fill,
 )
-from arena.results.exports.sheets import SHEET_FORMATS, sheet_of
+from arena.results.exports.sheets import SHEET_FORMATS, find_cells, sample_sheet
 from augment.errors import Conflict, UnknownName
 from augment.services.judging.analyses import analyse_job
 from augment.services.judging.displacement import By, types_named
@@ -91,12 +91,9 @@ def write_samples(options: Chosen, say: Say) -> ExportedFile:
     form = options["format"] or Path(options["out"]).suffix.removeprefix(".")
     if form not in SHEET_FORMATS:
         raise UnknownName("format", form, list(SHEET_FORMATS))
-    sheet = sheet_of(
-        find_job(options["job"]),
-        scenarios=options["scenarios"],
-        contestants=options["contestants"],
-        sample=options["sample"],
-    )
+    shown = {"scenarios": options["scenarios"], "contestants": options["contestants"]}
+    cells = find_cells(find_job(options["job"]), sample=options["sample"], **shown)
+    content = sample_sheet(cells, file_format=form, **shown)
     return ExportedFile(content, form, False)
 
 

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import io
 import textwrap
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from django.core.files.storage import default_storage
 
-from arena.jobs.queries import JobGrid
 from arena.models import Snapshot
 from arena.results.exports.drawing import (
     INK,
@@ -22,7 +21,8 @@ from arena.results.exports.drawing import (
 from arena.results.exports.tables import Row, leaderboard_table, shown_name
 from arena.results.queries.scores import PictureShown, pictures_by_scenario
 from augment.errors import UnknownName
-from augment.models import Augmentation, Scenario
+from augment.models import Augmentation, GenerationJob, Scenario
+from augment.services.running.progress import cells_of
 from augment.services.scenarios.pictures import shrunken_picture
 
 if TYPE_CHECKING:
@@ -40,21 +40,38 @@ _LEGEND = (
 # --- Samples of a job --------------------------------------------------------------------------
 
 
-def sample_sheet(
-    grid: JobGrid, *, scenarios: Sequence[str], contestants: Sequence[str], file_format: str
-) -> bytes:
-    """Scenarios down and contestants across, in the order in which they are named.
+def find_cells(
+    job: GenerationJob, *, scenarios: Sequence[str], contestants: Sequence[str], sample: int = 1
+) -> dict[tuple[str, str], Augmentation]:
+    """The cells of a job's sample by scenario and contestant.
 
     Raises:
-        UnknownName: The job has no such scenario or contestant.
+        UnknownName: The job has no such scenario, contestant or sample.
     """
+    cells = list(cells_of(job).filter(sample=sample))
+    for kind, names, known in (
+        ("sample of this job", [str(sample)], {str(n + 1) for n in range(job.samples)}),
+        ("contestant of this job", contestants, {cell.contestant.slug for cell in cells}),
+        ("scenario of this job", scenarios, {cell.scenario.slug for cell in cells}),
+    ):
+        for name in names:
+            if name not in known:
+                raise UnknownName(kind, name, sorted(known))
+    return {(cell.scenario.slug, cell.contestant.slug): cell for cell in cells}
+
+
+def sample_sheet(
+    cells: Mapping[tuple[str, str], Augmentation],
+    *,
+    scenarios: Sequence[str],
+    contestants: Sequence[str],
+    file_format: str,
+) -> bytes:
+    """Scenarios down and contestants across, in the order in which they are named."""
     from matplotlib.figure import Figure
 
-    columns = {contestant.slug: n for n, contestant in enumerate(grid.contestants)}
-    lines = {row.scenario.slug: row for row in grid.rows}
-    _check_names("contestant of this job", contestants, list(columns))
-    _check_names("scenario of this job", scenarios, list(lines))
-    chosen = [columns[slug] for slug in contestants]
+    columns = {cell.contestant.slug: cell.contestant for cell in cells.values()}
+    rows = {cell.scenario.slug: cell.scenario for cell in cells.values()}
     across, down = len(contestants), len(scenarios)
     picture_in, head_in, foot_in = 3.2 * 2.0 / 3.0, 0.3, 0.28
     row_in = picture_in + 0.42
@@ -62,7 +79,7 @@ def sample_sheet(
     with house_style():
         figure = Figure(figsize=(wide, high))
         centred: dict[str, Any] = {"ha": "center", "va": "center"}
-        for n, contestant in enumerate(grid.contestants[place] for place in chosen):
+        for n, contestant in enumerate(columns[slug] for slug in contestants):
             figure.text(
                 (n + 0.5) / across, 1.0 - 0.55 * head_in / high,
                 shown_name(contestant.name, contestant.is_simulated), fontsize=9,
@@ -70,21 +87,15 @@ def sample_sheet(
             )  # fmt: skip
         for line, slug in enumerate(scenarios):
             bottom_in = high - head_in - row_in * line - picture_in
-            for n, place in enumerate(chosen):
+            for n, contestant_slug in enumerate(contestants):
                 box = ((n + 0.01) / across, bottom_in / high, 0.98 / across, picture_in / high)
-                _draw_sample(figure.add_axes(box), lines[slug].cells[place])
-            caption = _caption(chr(ord("a") + line % 26), lines[slug].scenario, across)
+                _draw_sample(figure.add_axes(box), cells.get((slug, contestant_slug)))
+            caption = _caption(chr(ord("a") + line % 26), rows[slug], across)
             y = (bottom_in - 0.06) / high
             figure.text(0.5, y, caption, ha="center", va="top", fontsize=8, color=INK)
         legend = textwrap.fill(_LEGEND, width=72 * across)
         figure.text(0.5, 0.09 / high, legend, ha="center", fontsize=6, color=SOFT)
         return write_figure(figure, file_format)
-
-
-def _check_names(what: str, names: Sequence[str], known: list[str]) -> None:
-    for name in names:
-        if name not in known:
-            raise UnknownName(what, name, known)
 
 
 def _draw_sample(axes: Axes, cell: Augmentation | None) -> None:

@@ -35,7 +35,6 @@ from arena.studies.services.planning import (
     store,
     votes_left,
 )
-from arena.voting.services.shown_pictures import Cells
 from augment.errors import Conflict, UnknownName
 from augment.services.events import log_event
 from augment.services.texts import one_line
