@@ -11,7 +11,6 @@ from arena.jobs.exports import displacement_files, driving
 from arena.jobs.exports.displacement import displacement_table
 from arena.jobs.exports.registry import PLAIN_TABLES, TRANSCRIPTS
 from arena.jobs.exports.tables import ANALYSES, TABLE_FORMATS, analysis_sheet, object_sheet
-from arena.jobs.queries import grid
 from arena.management.exporting.kinds import (
     Chosen,
     ExportedFile,
@@ -92,12 +91,11 @@ def write_samples(options: Chosen, say: Say) -> ExportedFile:
     form = options["format"] or Path(options["out"]).suffix.removeprefix(".")
     if form not in SHEET_FORMATS:
         raise UnknownName("format", form, list(SHEET_FORMATS))
-    job = find_job(options["job"])
     sheet = sheet_of(
-        job.name,
-        grid(job, sample=options["sample"]),
+        find_job(options["job"]),
         scenarios=options["scenarios"],
         contestants=options["contestants"],
+        sample=options["sample"],
     )
     return ExportedFile(sheet_bytes(sheet, file_format=form), form, False)
 

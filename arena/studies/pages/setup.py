@@ -21,7 +21,7 @@ from arena import tasks
 from arena.models import Study, StudyDraft
 from arena.people.queries import by_pseudonym, experts
 from arena.scenarios import queries
-from arena.services.sent_files import was_too_large
+from arena.scenarios.services import was_too_large
 from arena.services.vote_imports import ImportedVotes, import_votes
 from arena.site.access import ADMIN, allow_only, user_of
 from arena.site.acts import Confirmation, ask, is_sure, refusals_in, refusals_told, wants_to_change
