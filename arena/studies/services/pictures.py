@@ -11,6 +11,7 @@ from django.db.models import F, QuerySet
 from arena.errors import NothingToPlan
 from arena.pairing.plan import Check, Entry, PlanRules
 from arena.pairing.rules import place_of, scenario_of
+from arena.voting.services.shown_pictures import MOST_NAMED, Cells
 from augment.models import Augmentation, Contestant, Scenario
 from augment.services.scenarios.pictures import window_of
 
