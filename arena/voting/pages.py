@@ -18,7 +18,6 @@ from django.views.decorators.http import require_http_methods, require_POST, req
 from arena.errors import AlreadyDecided, InvalidVote, NotYours, StudyNotOpen, TooFast
 from arena.models import PracticePair, Study
 from arena.site.access import ADMIN, EXPERT, allow_only
-from arena.site.forms import ReportForm, VoteForm
 from arena.studies.queries import voting_study
 from arena.studies.services.experts import (
     answer_practice,
@@ -27,6 +26,7 @@ from arena.studies.services.experts import (
     report,
     skip_practice,
 )
+from arena.voting.forms import ReportForm, VoteForm
 from arena.voting.queries.ballots import skipped_pairs
 from arena.voting.queries.showings import (
     drives_of_pair,

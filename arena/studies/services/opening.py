@@ -28,11 +28,10 @@ from arena.people.queries import experts as expert_accounts
 from arena.rating.snapshot_document import VERSION as RESULTS_VERSION
 from arena.results.services.vote_files import VERSION as VOTES_VERSION
 from arena.studies.services.experts import require_practice_pictures
-from arena.studies.services.pictures import check_pictures, require_checks, windows_of
+from arena.studies.services.pictures import Cells, check_pictures, require_checks, windows_of
 from arena.studies.services.plan import SWITCH_COLUMNS, StudyPlan, log_study, read_hypotheses
 from arena.studies.services.planning import store
 from arena.voting.services.shown_pictures import (
-    Cells,
     SampleRule,
     StudyPictures,
     choose_pictures,

@@ -33,13 +33,7 @@ from arena.studies.services.plan import log_study
 from arena.voting.queries.ballots import upcoming
 from arena.voting.queries.showings import LEGEND
 from arena.voting.services.casting import mark_served
-from arena.voting.services.shown_pictures import (
-    Cells,
-    ScenarioFrame,
-    find_frames,
-    frames_shown,
-    sides_of,
-)
+from arena.voting.services.shown_pictures import ScenarioFrame, find_frames, frames_shown, sides_of
 from augment.models import Augmentation, Scenario
 from augment.services.scenarios.pictures import descriptions, legend_of_scene, legends_of_changes
 
