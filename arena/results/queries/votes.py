@@ -17,8 +17,7 @@ from django.db.models.fields import CharField
 
 from arena.models import ImportedVote, Person, Snapshot, Study, Vote
 from arena.pairing.order import CHECK, MAIN, REPEAT
-from arena.pairing.rules import Entry, grid_of, scenario_of
-from arena.pairing.settled import draw_ties
+from arena.pairing.rules import Entry, draw_ties, grid_of, scenario_of
 from augment.errors import UnknownName
 from augment.models import Contestant
 from augment.services.scenarios.scenes import ScenarioType
@@ -270,7 +269,7 @@ def current_votes(study: Study, filters: Filters, last: int | None) -> list[Judg
 
 
 def settled_ties(study: Study, votes: Iterable[Judged], filters: Filters) -> list[Judged]:
-    """Ties on the pairs that the study settled without showing; see arena.pairing.settled.
+    """Ties on the pairs that the study settled without showing; see arena.pairing.rules.
 
     Args:
         study: A study; one of votes from elsewhere has no such pairs.
