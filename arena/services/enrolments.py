@@ -14,9 +14,9 @@ from django.utils.translation import gettext
 
 from arena.errors import EnrolmentOver, NothingToPlan
 from arena.models import EnrolledVoter, Enrolment, Matchup, Study
-from arena.pairing.arrays import IntArray
-from arena.pairing.following import follow_on
-from arena.pairing.newcomers import choose_units
+from arena.pairing.later import choose_for_newcomer as choose_units
+from arena.pairing.later import follow_on
+from arena.pairing.order import IntArray
 from arena.pairing.rules import Grid, PlanRules, place_of
 from arena.queries.studies.enrolments import (
     enrolment_by_token,

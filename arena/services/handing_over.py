@@ -10,8 +10,7 @@ from django.db import transaction
 
 from arena.errors import NothingToPlan, StudyNotOpen
 from arena.models import Matchup, Study
-from arena.pairing.following import follow_on
-from arena.pairing.later import deal, units_of
+from arena.pairing.later import deal, follow_on, units_of
 from arena.pairing.rules import PlannedMatchup, place_of
 from arena.queries.people import experts as expert_accounts
 from arena.services.attention_checks import without_lost_checks

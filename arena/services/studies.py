@@ -11,10 +11,15 @@ from django.db import IntegrityError, transaction
 from django.utils import timezone
 
 from arena.models import Study
-from arena.pairing.demands import ATTENTION_CHECKS, MOST_CHECKS, check_share
 from arena.pairing.plan import Check, Entry, MatchupPlan, PlanRules, plan
-from arena.pairing.settled import Triple, draw_shown
-from arena.pairing.target_lines import read_targets
+from arena.pairing.rules import (
+    ATTENTION_CHECKS,
+    MOST_CHECKS,
+    Triple,
+    check_share,
+    draw_shown,
+    read_targets,
+)
 from arena.queries.people import experts as expert_accounts
 from arena.services.attention_checks import enough_checks, placed_checks
 from arena.services.ending import cancel_study, close_study

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any, Self
 
 from arena.models import Study
-from arena.pairing.demands import MOST_ADAPTIVE, MOST_CHECKS, MOST_OVERLAP, MOST_REPEATS
+from arena.pairing.rules import MOST_ADAPTIVE, MOST_CHECKS, MOST_OVERLAP, MOST_REPEATS
 from arena.services.hypotheses import hypotheses_of
 from arena.services.shown_pictures import SampleRule
 from augment.services.inputs import InputKind, input_field, inputs_of

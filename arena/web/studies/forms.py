@@ -9,7 +9,7 @@ from django import forms
 from django.contrib.auth.models import User
 
 from arena.errors import NothingToPlan
-from arena.pairing.target_lines import read_targets
+from arena.pairing.rules import read_targets
 from arena.services.study_drafts import SWITCHES
 from arena.services.study_plan import PLAN_INPUTS, StudyPlan
 from arena.web.forms import ChoiceForm
