@@ -28,20 +28,45 @@ def choose_units(
     judges = np.zeros((pairs, scenarios))
     for expert in range(experts):
         mine = chosen[expert]
-        wanted = of_pair[expert].astype(float)
-        for scenario in rng.permutation(scenarios):
-            # The pair that is owed most, then the one that fewest have judged here, then by lot.
-            score = 1e4 * wanted - judges[:, scenario] + rng.random(pairs)
-            score[~showable[:, scenario]] = -np.inf
-            picked = np.argsort(-score)[: of_scenario[expert, scenario]]
-            mine[picked, scenario] = True
-            wanted[picked] -= 1
+        order = rng.permutation(scenarios)
+        _fill(mine, showable, judges, order, of_scenario[expert], of_pair[expert], rng)
         even_out(mine, showable, of_pair[expert])
         judges += mine
     flat = chosen.transpose(1, 0, 2).reshape(pairs, experts * scenarios)
     everywhere = np.tile(showable, (1, experts))
     even_out(flat, everywhere, np.zeros(pairs, dtype=np.int64))
     return flat.reshape(pairs, experts, scenarios).transpose(1, 0, 2)
+
+
+def _fill(
+    mine: BoolArray,
+    showable: BoolArray,
+    judges: FloatArray,
+    order: IntArray,
+    take: IntArray,
+    owed: IntArray,
+    rng: np.random.Generator,
+) -> None:
+    """Choose rows of `mine` (n, K) column by column.
+
+    Those that are owed most, then those that fewest have judged there, then by lot.
+
+    Args:
+        mine: Changed in place.
+        showable: (n, K), where a unit can be.
+        judges: (n, K) how many experts have each unit.
+        order: Of the columns.
+        take: (K,) how many rows of each column.
+        owed: (n,) how many columns each row should have.
+        rng: The lots.
+    """
+    wanted = owed.astype(float)
+    for column in order:
+        score = 1e4 * wanted - judges[:, column] + rng.random(len(wanted))
+        score[~showable[:, column]] = -np.inf
+        picked = np.argsort(-score)[: take[column]]
+        mine[picked, column] = True
+        wanted[picked] -= 1
 
 
 def draw_probability(showable: BoolArray, votes: int) -> FloatArray:
@@ -201,13 +226,8 @@ def choose_wanted(showable: BoolArray, of_pair: IntArray, rng: np.random.Generat
     judges = np.zeros(showable.shape)
     for expert in range(experts):
         mine = chosen[expert]
-        wanted = of_scenario[expert].astype(float)
-        for pair in np.argsort(-of_pair[expert] - rng.random(pairs)):
-            score = 1e4 * wanted - judges[pair] + rng.random(len(wanted))
-            score[~showable[pair]] = -np.inf
-            picked = np.argsort(-score)[: of_pair[expert, pair]]
-            mine[pair, picked] = True
-            wanted[picked] -= 1
+        order = np.argsort(-of_pair[expert] - rng.random(pairs))
+        _fill(mine.T, showable.T, judges.T, order, of_pair[expert], of_scenario[expert], rng)
         even_out(mine.T, showable.T, of_scenario[expert])
         judges += mine
     return chosen
@@ -307,10 +327,7 @@ def bring_together(
     """
     judges = chosen.sum(axis=0)
     idle = 0
-    while True:
-        judged, shared = int((judges > 0).sum()), int((judges > 1).sum())
-        if shared >= math.ceil(share * judged - 1e-9):
-            return
+    while not _is_reached(judges, share):
         moved = sum(
             _exchange(chosen[expert], judges, showable, rng)
             for expert in rng.permutation(len(chosen))
@@ -318,7 +335,12 @@ def bring_together(
         )
         idle = 0 if moved else idle + 1
         if idle == _TRIES:
-            raise NothingToPlan(_out_of_reach(chosen, share))
+            judged, shared = overlap_of(chosen)
+            raise NothingToPlan(
+                f"Of the pairs that are judged, {share:.0%} are to be judged by two experts or "
+                f"more; with these experts, votes and pictures {shared} of {judged} are reached. "
+                "Ask for less, or for more votes per expert."
+            )
 
 
 # --- Private -----------------------------------------------------------------------------------
@@ -353,12 +375,3 @@ def _exchange(
         mine[unit] = change > 0
         judges[unit] += change
     return True
-
-
-def _out_of_reach(chosen: BoolArray, share: float) -> str:
-    judged, shared = overlap_of(chosen)
-    return (
-        f"Of the pairs that are judged, {share:.0%} are to be judged by two experts or more; "
-        f"with these experts, votes and pictures {shared} of {judged} are reached. Ask for less, "
-        "or for more votes per expert."
-    )
