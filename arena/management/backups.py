@@ -40,10 +40,9 @@ from arena.exports.files import write_whole
 from arena.exports.study_folder.closure import TRAVELLING
 from arena.exports.study_folder.writing import FORMAT as STUDY
 from arena.services import stored_rows
-from arena.services.row_rules import check_row, check_votes
-from arena.services.unfinished_work import end_restored_work, is_unfinished
 from arena.services.written_files import FOLDERS
 from arena.serving.readiness import find_unapplied_migrations
+from arena.site.services import check_row, check_votes, end_restored_work, is_unfinished
 from augment.models import Endpoint, Simulation
 from augment.services.judging.simulations import allowed_planners
 from augment.services.scenarios.pictures import THUMBNAILS

@@ -27,10 +27,10 @@ from arena.jobs.exports.registry import PLAIN_TABLES, TRANSCRIPTS, JobTable
 from arena.jobs.exports.tables import ANALYSES, TABLE_FORMATS, analysis_sheet, object_sheet
 from arena.jobs.queries import grid
 from arena.models import Snapshot, Study
-from arena.queries.studies.lists import study_named
 from arena.queries.studies.results import snapshot_to_export
 from arena.queries.votes.judged import is_imported
 from arena.services.early_looks import log_early_look
+from arena.studies.queries import study_named
 from augment.errors import Conflict, UnknownName
 from augment.services.judging import scenario_export
 from augment.services.judging.analyses import analyse_job

@@ -11,7 +11,7 @@ from arena.errors import ArenaError
 from arena.exports.files import write_whole
 from arena.exports.study_folder.writing import write_study
 from arena.management.exporting import KINDS, ExportedFile, add_kinds
-from arena.queries.studies.lists import study_named
+from arena.studies.queries import study_named
 from augment.errors import AugmentError
 from augment.services.terminal import TerminalCommand
 
