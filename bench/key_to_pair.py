@@ -71,7 +71,7 @@ def _prepare(home: Home, votes: int) -> None:
     made = "; ".join(
         f"create_person(username={name!r}, password={PASSWORD!r}, role='expert')" for name in names
     )
-    home.must("shell", "-c", f"from arena.services.people import create_person; {made}")
+    home.must("shell", "-c", f"from arena.people.services import create_person; {made}")
     scenarios = home.rows(
         "SELECT slug FROM augment_scenario WHERE id IN"
         " (SELECT scenario_id FROM augment_augmentation)"

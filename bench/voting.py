@@ -37,8 +37,8 @@ def seed(voters: int, votes_each: int) -> None:
     import django
 
     django.setup()
-    from arena.services.invitations import invite
-    from arena.services.people import create_person
+    from arena.people.links import invite
+    from arena.people.services import create_person
     from augment.models import Augmentation, Contestant, GenerationJob, Scenario
     from augment.services.scenarios.catalogue import load_catalogue
     from augment.services.scenarios.pictures import store

@@ -15,8 +15,8 @@ import numpy as np
 from django.utils import timezone
 
 from arena.models import Matchup, Study, Vote
-from arena.services.people import create_person
-from arena.services.studies import close_study
+from arena.people.services import create_person
+from arena.studies.services.opening import close_study
 from augment.models import Augmentation, BaseScene, Contestant, GenerationJob, Scenario
 from augment.scene.codec import scene_to_document
 from augment.scene.entities import ScenarioType

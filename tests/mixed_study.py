@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from arena.models import Matchup, Study
-from arena.services.authorships import mark_author
-from arena.services.studies import close_study
+from arena.people.links import mark_author
+from arena.studies.services.opening import close_study
 from augment.models import Augmentation, Contestant, Scenario
 from augment.scene.entities import ScenarioType
 from tests.study_rows import a_study, contestant, matchups_of, picture, shown_again, vote

@@ -5,11 +5,11 @@ from __future__ import annotations
 from typing import Any
 
 from arena.models import Study
-from arena.services import studies
-from arena.services.study_plan import StudyPlan
+from arena.studies.services import opening
+from arena.studies.services.plan import StudyPlan
 
 
 def open_study(**fields: Any) -> Study:
     """Open what a plan of these fields asks for; alike pairs are shown and nothing is repeated."""
     plain = {"repeats": 0.0, "show_alike": True}
-    return studies.open_study(StudyPlan.read(plain | fields))
+    return opening.open_study(StudyPlan.read(plain | fields))

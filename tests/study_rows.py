@@ -9,8 +9,8 @@ from django.contrib.auth.models import User
 from django.utils import timezone
 
 from arena.models import Matchup, Study, Vote
+from arena.people.services import create_person
 from arena.services.decisions import decision_of
-from arena.services.people import create_person
 from arena.services.votes import cast_vote
 from augment.models import Augmentation, BaseScene, Contestant, GenerationJob, Scenario
 from augment.scene.codec import modification_to_document, scene_to_document

@@ -14,7 +14,7 @@ from django.contrib.auth.models import Group, User
 from django.http import HttpRequest
 
 from arena.models import Person
-from arena.queries.people import ROLES
+from arena.people.queries import ROLES
 from augment.services.events import log_event
 
 

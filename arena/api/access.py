@@ -11,8 +11,8 @@ from rest_framework.request import Request
 
 from arena.errors import TokenOver
 from arena.models import ApiToken
-from arena.queries.people import role_of
-from arena.services.api_tokens import use_api_token
+from arena.people.links import use_api_token
+from arena.people.queries import role_of
 
 SCHEME = "bearer"
 ADMINS = ("admin",)

@@ -17,7 +17,7 @@ from rest_framework.response import Response
 
 from arena.api.access import STAFF
 from arena.api.views import ApiView
-from arena.queries.people import role_of
+from arena.people.queries import role_of
 
 
 @cache

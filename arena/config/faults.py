@@ -7,7 +7,7 @@ from django.views.defaults import bad_request
 
 from arena.api.errors import busy_message, fault
 from arena.errors import DatabaseBusy
-from arena.web import faults as pages
+from arena.site import faults as pages
 
 
 def answer_unreadable(request: HttpRequest, exception: Exception) -> HttpResponse:

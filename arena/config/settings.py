@@ -86,7 +86,7 @@ AXES_RESET_ON_SUCCESS = True
 AXES_DISABLE_ACCESS_LOG = True
 AXES_VERBOSE = False
 AXES_CLIENT_IP_CALLABLE = "arena.config.login.client_address"
-AXES_LOCKOUT_CALLABLE = "arena.web.faults.answer_locked"
+AXES_LOCKOUT_CALLABLE = "arena.site.faults.answer_locked"
 
 # --- What it is made of ------------------------------------------------------------------------
 
@@ -111,11 +111,11 @@ MIDDLEWARE = [
     "csp.middleware.CSPMiddleware",
     "whitenoise.middleware.WhiteNoiseMiddleware",
     "django.contrib.sessions.middleware.SessionMiddleware",
-    "arena.web.language.VoterLanguageMiddleware",
+    "arena.site.language.VoterLanguageMiddleware",
     "django.middleware.common.CommonMiddleware",
     "django.middleware.csrf.CsrfViewMiddleware",
     "django.contrib.auth.middleware.AuthenticationMiddleware",
-    "arena.web.kept_forms.SignInMiddleware",
+    "arena.site.access.SignInMiddleware",
     "django.contrib.messages.middleware.MessageMiddleware",
     "django.middleware.clickjacking.XFrameOptionsMiddleware",
     "axes.middleware.AxesMiddleware",
@@ -143,7 +143,7 @@ LOGIN_REDIRECT_URL = "home"
 LOGOUT_REDIRECT_URL = "login"
 AUTHENTICATION_BACKENDS = [
     "axes.backends.AxesStandaloneBackend",  # refuses before a password is looked at
-    "arena.queries.accounts.AccountBackend",
+    "arena.people.queries.AccountBackend",
 ]
 PASSWORD_RESET_TIMEOUT = 14 * 24 * 3600  # how long a link to set a password works
 AUTH_PASSWORD_VALIDATORS = [

@@ -8,7 +8,7 @@ from django.urls import include, path
 urlpatterns = [
     path("admin/", admin.site.urls),
     path("api/v1/", include("arena.api.urls")),
-    path("", include("arena.web.urls")),
+    path("", include("arena.site.urls")),
 ]
 
 handler400 = "arena.config.faults.answer_unreadable"

@@ -20,13 +20,12 @@ from django.utils.text import capfirst
 from django.views.decorators.http import require_http_methods, require_POST, require_safe
 
 from arena.contestants.queries import asking_of, probe_lines
-from arena.queries.listings import Narrowing, find_contestants
-from arena.queries.people import role_of
+from arena.people.queries import role_of
 from arena.scenarios.queries import by_type
-from arena.web.access import ADMIN, STAFF, allow_only, user_of
-from arena.web.listing import read_listing, read_page, said_choices
-from arena.web.questions import refusals_in, refusals_told
-from arena.web.sending import send_later
+from arena.site.access import ADMIN, STAFF, allow_only, user_of
+from arena.site.acts import refusals_in, refusals_told, send_later
+from arena.site.listing import read_listing, read_page, said_choices
+from arena.site.queries import Narrowing, find_contestants
 from augment.errors import AugmentError, InvalidDocument
 from augment.models import Augmentation, Contestant, Endpoint, EndpointModel, GenerationJob, Probe
 from augment.services.endpoints import known_endpoints

@@ -17,8 +17,8 @@ from arena.exports.zips import zip_bytes
 from arena.models import Snapshot
 from arena.rating.snapshot_document import Results, results_document
 from arena.services.cells import csv_text
-from arena.services.preregistration import FILE_NAME, preregistration_bytes
 from arena.services.vote_rows import digest_of
+from arena.studies.services.opening import FILE_NAME, preregistration_bytes
 
 MANIFEST = "manifest.json"
 

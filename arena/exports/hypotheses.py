@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from arena.services.hypotheses import Answered
+from arena.studies.services.plan import Answered
 
 COLUMNS = ("hypothesis", "better", "other", "verdict", "difference", "p_adjusted")
 

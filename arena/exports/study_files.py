@@ -19,8 +19,8 @@ from arena.exports.zips import zip_folder
 from arena.jobs.exports.files import made_of
 from arena.models import Study, StudyFile
 from arena.queries.studies.results import snapshot_to_export
-from arena.services.plans import shown_augmentations
 from arena.services.study_files import why_not
+from arena.studies.services.planning import shown_augmentations
 from augment.errors import Conflict
 from augment.services.judging.scenario_export import ExportOrigin, export_rows
 

@@ -12,8 +12,8 @@ from arena.models.ratings import stored_values
 from arena.queries.votes.sets import LeftOut
 from arena.rating.lines import Line, notes_by_reason
 from arena.rating.rules import METHOD_TEXTS, UNIT_TEXTS, Intervals
-from arena.services.hypotheses import Answered, answer_hypotheses
-from arena.services.preregistration import preregistration_sha256
+from arena.studies.services.opening import preregistration_sha256
+from arena.studies.services.plan import Answered, answer_hypotheses
 
 SIMULATED = " (simulated)"
 SIMULATED_TABLE = "Simulated: votes or contestants of this table are made by the machine."

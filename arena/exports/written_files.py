@@ -9,7 +9,7 @@ from typing import TypeVar
 
 from django.core.files import File
 
-from arena.models.written_files import WrittenFile
+from arena.models.files import WrittenFile
 from arena.services.written_files import keep_file
 from augment.services.work import Lease, WorkKind
 

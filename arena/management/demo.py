@@ -20,11 +20,11 @@ from arena.exports.files import write_whole
 from arena.exports.tables import leaderboard_table
 from arena.exports.writers import FORMATS, plain_text
 from arena.models import Study
-from arena.services.people import create_person
+from arena.people.services import create_person
 from arena.services.ratings import rate
 from arena.services.simulation import simulate_votes
-from arena.services.studies import close_study, open_study
-from arena.services.study_plan import StudyPlan
+from arena.studies.services.opening import close_study, open_study
+from arena.studies.services.plan import StudyPlan
 from augment.models import Augmentation, BaseScene, Contestant, Endpoint, GenerationJob, Scenario
 from augment.services.endpoints.contestants import REFERENCE, add_contestant, ensure_builtin
 from augment.services.endpoints.known_endpoints import ensure_endpoint

@@ -22,7 +22,7 @@ from django.core.files.storage import FileSystemStorage, default_storage
 from django.db import DatabaseError, connection
 
 from arena.models import ApiToken
-from arena.queries.people import find_admins
+from arena.people.queries import find_admins
 from arena.serving.readiness import look_at_broker, look_at_database, look_at_workers
 from augment.errors import KeyMissing, KeyNotAllowed, MediaFault
 from augment.models import Contestant, Endpoint, EndpointModel, GenerationJob

@@ -6,8 +6,8 @@ import django.db.models.deletion
 from django.conf import settings
 from django.db import migrations, models
 
-import arena.models.enrolments
-import arena.models.tokens
+import arena.models.people
+import arena.models.taking_part
 
 
 class Migration(migrations.Migration):
@@ -30,7 +30,7 @@ class Migration(migrations.Migration):
                 (
                     "token",
                     models.CharField(
-                        default=arena.models.tokens.fresh_token, max_length=40, unique=True
+                        default=arena.models.people.fresh_token, max_length=40, unique=True
                     ),
                 ),
                 (
@@ -67,9 +67,7 @@ class Migration(migrations.Migration):
                     ),
                 ),
             ],
-            options={
-                "ordering": ("-made_at", "-pk"),
-            },
+            options={"ordering": ("-made_at", "-pk")},
         ),
         migrations.CreateModel(
             name="EnrolledVoter",
@@ -92,7 +90,7 @@ class Migration(migrations.Migration):
                 (
                     "completion_code",
                     models.CharField(
-                        default=arena.models.enrolments.fresh_completion_code,
+                        default=arena.models.taking_part.fresh_completion_code,
                         editable=False,
                         max_length=20,
                         unique=True,
@@ -124,9 +122,7 @@ class Migration(migrations.Migration):
                     ),
                 ),
             ],
-            options={
-                "ordering": ("enrolled_at", "pk"),
-            },
+            options={"ordering": ("enrolled_at", "pk")},
         ),
         migrations.AddConstraint(
             model_name="enrolment",

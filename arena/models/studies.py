@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import uuid
-
 from django.conf import settings
 from django.db import models
 from django.db.models import F, Q
 
-from arena.models.tokens import fresh_token
+from arena.models.people import Coded, fresh_token
 from arena.pairing import order
 from augment.models import Augmentation, Contestant, Scenario
 
 
-class Study(models.Model):
+class Study(Coded):
     """What experts vote on; its rules are fixed when it opens. A StudyDraft comes before it."""
 
     class State(models.TextChoices):
@@ -21,7 +19,6 @@ class Study(models.Model):
         CLOSED = "closed", "Closed"
         CANCELLED = "cancelled", "Cancelled"
 
-    code = models.UUIDField(default=uuid.uuid4, unique=True, editable=False)
     name = models.CharField(max_length=120, unique=True)
     state = models.CharField(max_length=10, choices=State.choices, default=State.OPEN)
     contestants = models.ManyToManyField(Contestant, related_name="studies")
@@ -81,7 +78,7 @@ class Study(models.Model):
         return bool(self.rules.get("samples") == "all")
 
 
-class Matchup(models.Model):
+class Matchup(Coded):
     """One planned showing of two augmentations of one scenario to one expert.
 
     Camera, pictures and descriptions are kept as they were when it was planned: a
@@ -93,7 +90,6 @@ class Matchup(models.Model):
         REPEAT = order.REPEAT, "Hidden repeat"
         CHECK = order.CHECK, "Attention check"
 
-    code = models.UUIDField(default=uuid.uuid4, unique=True, editable=False)
     study = models.ForeignKey(Study, on_delete=models.CASCADE, related_name="matchups")
     expert = models.ForeignKey(
         settings.AUTH_USER_MODEL, on_delete=models.PROTECT, related_name="matchups"
@@ -157,6 +153,3 @@ class Matchup(models.Model):
                 | Q(kind__in=["main", "check"], repeat_of=None),
             ),
         )
-
-    def __str__(self) -> str:
-        return str(self.code)

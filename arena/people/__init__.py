@@ -1,1 +1,1 @@
-"""Accounts, links and tokens."""
+"""Accounts, roles, sign-in, tokens, invitations and authorships."""

@@ -13,11 +13,15 @@ from rest_framework.request import Request
 from arena.api.access import ADMINS
 from arena.api.fields import StrictSerializer, TextField
 from arena.api.views import ApiView, operation
-from arena.queries.people import ROLES, role_given, role_of
-from arena.services.accounts import accept_welcome, check_password_strength, make_welcome_token
-from arena.services.api_tokens import make_api_token
-from arena.services.first_start import make_first_admin
-from arena.services.people import create_person
+from arena.people.links import make_api_token
+from arena.people.queries import ROLES, role_given, role_of
+from arena.people.services import (
+    accept_welcome,
+    check_password_strength,
+    create_person,
+    make_first_admin,
+    make_welcome_token,
+)
 
 DAYS = 30
 """Lifetime of the token that a link is exchanged for."""

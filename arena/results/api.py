@@ -36,8 +36,8 @@ from arena.queries.votes.sets import Filters
 from arena.rating.leaderboard import Intervals, Line, Method
 from arena.rating.rules import Unit
 from arena.services.ratings import DEFAULT_ROUNDS, MOST_ROUNDS, is_big, plan_snapshot, rate
-from arena.services.study_plan import HIGHEST_SEED
 from arena.studies.api import get_study
+from arena.studies.services.plan import HIGHEST_SEED
 from augment.errors import UnknownName
 from augment.services.scenarios.scenes import type_choices
 

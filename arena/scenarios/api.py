@@ -26,7 +26,7 @@ from arena.api.views import (
     page_of,
 )
 from arena.scenarios.queries import OWN
-from arena.services.sent_files import was_too_large
+from arena.scenarios.services import was_too_large
 from augment.models import Scenario, SceneUpload, UploadMoment
 from augment.models.scenes import DENSITIES, GOALS
 from augment.services.scenarios import uploads

@@ -11,7 +11,6 @@ from django.db import transaction
 
 from arena.errors import StudyStillOpen
 from arena.models import ImportedVote, Snapshot, Study, Vote
-from arena.queries.studies.authorships import authors_of
 from arena.queries.votes.judged import is_imported, last_vote_of
 from arena.queries.votes.sets import Filters
 from arena.rating.leaderboard import Method
@@ -19,6 +18,7 @@ from arena.rating.rules import Intervals, Unit, default_intervals, unit_for
 from arena.services.covariates import COVARIATES, WITHOUT_PICTURES
 from arena.services.snapshots import compute, keep
 from arena.services.turns import in_turn
+from arena.studies.queries import authors_of
 from augment.errors import Conflict, LeaseLost, UnknownName
 from augment.services.clock import Moment
 from augment.services.events import log_event

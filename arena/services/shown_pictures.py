@@ -19,7 +19,7 @@ from django.db.models import F
 from arena.errors import NothingToPlan
 from arena.pairing.rules import place_of
 from arena.services.frames import Cells
-from arena.services.showable import find_showable, refuse_missing
+from arena.studies.services.pictures import find_showable, refuse_missing
 from augment.errors import Conflict
 from augment.models import Augmentation, Contestant, GenerationJob, Scenario
 

@@ -17,8 +17,8 @@ from django.db import transaction
 
 from arena.models import Matchup, Study, Vote
 from arena.services.decisions import decision_of
-from arena.services.replanning import plan_batch
 from arena.services.votes import cast_vote
+from arena.studies.services.planning import plan_batch
 from augment.errors import Conflict
 from augment.models import Augmentation
 from augment.services.events import log_event

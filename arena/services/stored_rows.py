@@ -19,7 +19,7 @@ from django.db import connection, models, transaction
 from django.db.migrations.loader import MigrationLoader
 from django.db.models import QuerySet
 
-from arena.services.row_rules import REFUSALS
+from arena.site.services import REFUSALS
 from augment.services.texts import make_storable
 
 LEFT_OUT = frozenset(

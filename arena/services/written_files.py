@@ -13,7 +13,7 @@ from django.core.files.storage import default_storage
 from django.db import transaction
 
 from arena.models import ScenarioFile, StudyFile
-from arena.models.written_files import WrittenFile
+from arena.models.files import WrittenFile
 from augment.services.work import Lease, Settlement
 
 Row = TypeVar("Row", bound=WrittenFile)

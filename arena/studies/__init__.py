@@ -1,1 +1,1 @@
-"""Studies: planned, opened, closed."""
+"""Studies: set up, opened, planned on, handed over and closed."""

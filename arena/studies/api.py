@@ -14,10 +14,10 @@ from arena.api.access import ADMINS, EXPERTS, STAFF
 from arena.api.fields import Field, StrictSerializer, body_field
 from arena.api.views import ApiView, PageQuery, answer_page, operation, page_of
 from arena.models import Study
-from arena.queries.people import role_of
-from arena.queries.studies.progress import StudyProgress, of_these, studies_seen_by
-from arena.services.studies import close_study, open_study
-from arena.services.study_plan import PLAN_INPUTS, SWITCH_COLUMNS, StudyPlan
+from arena.people.queries import role_of
+from arena.studies.queries import StudyProgress, of_these, studies_seen_by
+from arena.studies.services.opening import close_study, open_study
+from arena.studies.services.plan import PLAN_INPUTS, SWITCH_COLUMNS, StudyPlan
 
 
 class StudyBody(StrictSerializer):

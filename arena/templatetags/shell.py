@@ -11,7 +11,7 @@ from django.urls import reverse
 from django.utils.functional import Promise
 from django.utils.translation import gettext_lazy as _
 
-from arena.queries.profiles import Profile, profile_of
+from arena.people.queries import Profile, profile_of
 
 register = template.Library()
 

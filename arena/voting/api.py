@@ -25,13 +25,13 @@ from arena.api.fields import (
 from arena.api.views import ApiView, FileView, file_operation, operation
 from arena.errors import StudyNotOpen
 from arena.models import AIDS, OUTCOME_LETTERS, Matchup, Report, Study, Vote
-from arena.queries.studies.lists import voting_study
+from arena.people.services import keep_voting
 from arena.queries.voting.showings import as_shown, picture_shown
 from arena.services.decisions import LONGEST_COMMENT, decision_of
-from arena.services.preferences import keep_voting
-from arena.services.replanning import next_pairs
-from arena.services.reports import SIDES, Complaint, report
 from arena.services.votes import receive_vote
+from arena.studies.queries import voting_study
+from arena.studies.services.experts import SIDES, Complaint, report
+from arena.studies.services.planning import next_pairs
 
 PNG = "image/png"
 OUTCOMES = {letter: outcome for outcome, letter in OUTCOME_LETTERS.items()}

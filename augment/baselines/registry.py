@@ -17,13 +17,15 @@ from augment.scene.entities import Modification, Scene
 from augment.scene.intent import Intent
 
 RULE_PLACER = "rule-placer"
+SPACING_M = 0.6
+"""Between the centres of the objects, so that a pile of several is seen as a pile."""
 
 
 class PlaceIntent(Protocol):
     """Adds what is asked for to a scene."""
 
     def __call__(self, scene: Scene, intent: Intent | None, /, *, seed: int) -> Placement:
-        """The same for the same seed.
+        """Place what is asked for, the same for the same seed.
 
         Raises:
             CannotPlace: It refuses, with the reason.
@@ -31,7 +33,7 @@ class PlaceIntent(Protocol):
         ...
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True)
 class Placer:
     """One of them.
 
@@ -46,22 +48,17 @@ class Placer:
 
 
 PLACERS: dict[str, Placer] = {
-    RULE_PLACER: Placer(name="Rule placer", place=rule_placer.place, is_rule=True),
-    "quantised-5m": Placer(name="Quantised code, 5 m", place=partial(quantised.place, bin_m=5.0)),
-    "quantised-20m": Placer(
-        name="Quantised code, 20 m", place=partial(quantised.place, bin_m=20.0)
-    ),
+    RULE_PLACER: Placer("Rule placer", rule_placer.place, is_rule=True),
+    "quantised-5m": Placer("Quantised code, 5 m", partial(quantised.place, bin_m=5.0)),
+    "quantised-20m": Placer("Quantised code, 20 m", partial(quantised.place, bin_m=20.0)),
 }
 
 
-SPACING_M = 0.6
-"""Between the centres of the objects, so that a pile of several is seen as a pile."""
-
-
 def break_reference(reference: Modification) -> Modification | None:
-    """The reference with everything that it places heaped across the ego.
+    """Return a change that is obviously wrong, to see whether somebody looks at the pictures.
 
-    No instruction asks for a collision with a standing ego, and no road user looks like that.
+    It is the reference with everything that it places heaped across the ego. No instruction asks
+    for a collision with a standing ego, and no road user looks like that.
 
     Args:
         reference: A right change, in the ego frame.
@@ -71,7 +68,7 @@ def break_reference(reference: Modification) -> Modification | None:
     """
     if not reference.changed:
         return None
-    heaped = [
+    heaped = tuple(
         replace(
             agent,
             x_m=SPACING_M * index,
@@ -81,6 +78,6 @@ def break_reference(reference: Modification) -> Modification | None:
             walk_to_m=None,
         )
         for index, agent in enumerate(reference.changed)
-    ]
+    )
     added = len(reference.added)
-    return replace(reference, added=tuple(heaped[:added]), moved=tuple(heaped[added:]))
+    return replace(reference, added=heaped[:added], moved=heaped[added:])

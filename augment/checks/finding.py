@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 from types import MappingProxyType
+from typing import Self
 
-from augment.scene.entities import Point
+from augment.scene.entities import Point, TrafficAgent
 
 
 class FaultClass(StrEnum):
@@ -19,63 +20,46 @@ class FaultClass(StrEnum):
 
 
 class FindingKind(StrEnum):
-    """What was measured; those that begin with `asked` are held against the instruction."""
+    """What was measured; those that begin with `asked` are held against the instruction.
 
-    EGO_OFFSET = "ego_offset"
-    LANE_DISTANCE = "lane_distance"
-    LANE = "lane"
-    LANE_NAMED = "lane_named"
-    HEADING = "heading"
-    DEGREES = "degrees"
-    WALK_HEADING = "walk_heading"
-    WALK_CROSSING = "walk_crossing"
-    WALK_BLOCKED = "walk_blocked"
-    OFF_ROAD = "off_road"
-    OUTSIDE_MAP = "outside_map"
-    OVERLAP = "overlap"
-    DUPLICATE = "duplicate"
-    SIZE = "size"
-    SPEED = "speed"
-    ASKED_DISTANCE = "asked_distance"
-    ASKED_ACROSS = "asked_across"
-    ASKED_SPACING = "asked_spacing"
-    ASKED_HEADING = "asked_heading"
-    ASKED_SIDE = "asked_side"
-    ASKED_CROSSING = "asked_crossing"
-    ASKED_COUNT = "asked_count"
-    ASKED_TYPE = "asked_type"
-    ASKED_MOTION = "asked_motion"
-    UNASKED = "unasked"
+    Attributes:
+        fault: The class of fault that such a finding speaks for if it is more than a fact.
+    """
 
+    fault: FaultClass
 
-FAULT_OF = {
-    FindingKind.EGO_OFFSET: FaultClass.POSITION,
-    FindingKind.LANE_DISTANCE: FaultClass.POSITION,
-    FindingKind.LANE: FaultClass.POSITION,
-    FindingKind.OFF_ROAD: FaultClass.POSITION,
-    FindingKind.OUTSIDE_MAP: FaultClass.POSITION,
-    FindingKind.ASKED_DISTANCE: FaultClass.POSITION,
-    FindingKind.ASKED_ACROSS: FaultClass.POSITION,
-    FindingKind.ASKED_SPACING: FaultClass.POSITION,
-    FindingKind.HEADING: FaultClass.HEADING,
-    FindingKind.DEGREES: FaultClass.HEADING,
-    FindingKind.WALK_HEADING: FaultClass.HEADING,
-    FindingKind.ASKED_HEADING: FaultClass.HEADING,
-    FindingKind.LANE_NAMED: FaultClass.LOGIC,
-    FindingKind.WALK_CROSSING: FaultClass.LOGIC,
-    FindingKind.WALK_BLOCKED: FaultClass.LOGIC,
-    FindingKind.OVERLAP: FaultClass.LOGIC,
-    FindingKind.DUPLICATE: FaultClass.LOGIC,
-    FindingKind.SIZE: FaultClass.LOGIC,
-    FindingKind.SPEED: FaultClass.LOGIC,
-    FindingKind.ASKED_SIDE: FaultClass.LOGIC,
-    FindingKind.ASKED_CROSSING: FaultClass.LOGIC,
-    FindingKind.ASKED_COUNT: FaultClass.LOGIC,
-    FindingKind.ASKED_TYPE: FaultClass.LOGIC,
-    FindingKind.ASKED_MOTION: FaultClass.LOGIC,
-    FindingKind.UNASKED: FaultClass.LOGIC,
-}
-"""The class of fault that a finding of each kind speaks for, where it speaks for one."""
+    EGO_OFFSET = "ego_offset", FaultClass.POSITION
+    LANE_DISTANCE = "lane_distance", FaultClass.POSITION
+    LANE = "lane", FaultClass.POSITION
+    LANE_NAMED = "lane_named", FaultClass.LOGIC
+    HEADING = "heading", FaultClass.HEADING
+    DEGREES = "degrees", FaultClass.HEADING
+    WALK_HEADING = "walk_heading", FaultClass.HEADING
+    WALK_CROSSING = "walk_crossing", FaultClass.LOGIC
+    WALK_BLOCKED = "walk_blocked", FaultClass.LOGIC
+    OFF_ROAD = "off_road", FaultClass.POSITION
+    OUTSIDE_MAP = "outside_map", FaultClass.POSITION
+    OVERLAP = "overlap", FaultClass.LOGIC
+    DUPLICATE = "duplicate", FaultClass.LOGIC
+    SIZE = "size", FaultClass.LOGIC
+    SPEED = "speed", FaultClass.LOGIC
+    ASKED_DISTANCE = "asked_distance", FaultClass.POSITION
+    ASKED_ACROSS = "asked_across", FaultClass.POSITION
+    ASKED_SPACING = "asked_spacing", FaultClass.POSITION
+    ASKED_HEADING = "asked_heading", FaultClass.HEADING
+    ASKED_SIDE = "asked_side", FaultClass.LOGIC
+    ASKED_CROSSING = "asked_crossing", FaultClass.LOGIC
+    ASKED_COUNT = "asked_count", FaultClass.LOGIC
+    ASKED_TYPE = "asked_type", FaultClass.LOGIC
+    ASKED_MOTION = "asked_motion", FaultClass.LOGIC
+    UNASKED = "unasked", FaultClass.LOGIC
+
+    def __new__(cls, value: str, fault: FaultClass = FaultClass.LOGIC) -> Self:
+        """A member with its class of fault; a lookup has the value alone."""
+        member = str.__new__(cls, value)
+        member._value_ = value
+        member.fault = fault
+        return member
 
 
 class Severity(StrEnum):
@@ -120,10 +104,10 @@ class Finding:
     @property
     def fault(self) -> FaultClass:
         """The class of fault that it speaks for if it is more than a fact."""
-        return FAULT_OF[self.kind]
+        return self.kind.fault
 
     def sentence(self, names: Mapping[str, str] | None = None) -> str:
-        """The finding in words.
+        """Return the finding in words.
 
         Args:
             names: What to call agents and lanes instead of their ids, such as the short names of
@@ -136,3 +120,49 @@ class Finding:
             lanes=[known.get(lane, lane) for lane in self.lanes],
             **sizes,
         )
+
+
+def find(
+    kind: FindingKind,
+    severity: Severity | bool,
+    agents: Iterable[TrafficAgent | str],
+    template: str,
+    *,
+    measured: Mapping[str, float | None] | None = None,
+    lanes: tuple[str, ...] = (),
+    belongs_m: Point | None = None,
+    **numbers: float | None,
+) -> Finding:
+    """Return the finding of a kind about some agents.
+
+    Args:
+        kind: What was measured.
+        severity: How bad it is; of what was asked for in so many words, whether it is there.
+        agents: Whom it is about, or their ids.
+        template: The words.
+        measured: What was measured, by name.
+        lanes: Ids of lanes that the words name.
+        belongs_m: Where what was asked for would be.
+        **numbers: More of what was measured.
+    """
+    if isinstance(severity, bool):
+        severity = Severity.FACT if severity else Severity.WRONG
+    return Finding(
+        kind=kind,
+        severity=severity,
+        agents=tuple(one if isinstance(one, str) else one.id for one in agents),
+        template=template,
+        lanes=lanes,
+        belongs_m=belongs_m,
+        measured={**(measured or {}), **numbers},
+    )
+
+
+def side_of(left: float) -> str:
+    """Return the side of a number whose left is positive."""
+    return "left" if left >= 0.0 else "right"
+
+
+def ahead_of(ahead: float) -> str:
+    """Return on which end of the ego a number is whose ahead is positive."""
+    return "ahead of" if ahead >= 0.0 else "behind"

@@ -1,6 +1,7 @@
 """What the checks know about a scene before anybody changes it; made once, asked often.
 
-Frame: the scene's. Places relative to the ego go by its pose, wherever that is.
+Frame: the scene's. Places relative to the ego go by its pose, wherever that is. W lanes, M
+segments of all their centrelines.
 """
 
 from __future__ import annotations
@@ -10,62 +11,42 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
+import shapely
 from numpy.typing import NDArray
 
 from augment.geometry.frames import difference
+from augment.geometry.polyline import FloatArray
 from augment.scene.ego_route import REACH_M, EgoRoute
 from augment.scene.entities import Area, AreaKind, Scene
 from augment.scene.lane_graph import AnyLane, LaneGraph
 
-if TYPE_CHECKING:
-    from shapely.geometry.base import BaseGeometry
-
-
-FloatArray = NDArray[np.float64]
-
-
 SEAM_M = 0.3
 """A gap between two pieces of ground up to this long is a seam of the map, not an edge."""
+NEAR_M = 20.0
+"""How far beside a lane a point still has anything to do with it."""
+_JOINT_M = 0.5
+"""Where two lanes meet in a bend, a wedge beside the joint belongs to neither; it is as long."""
+_ROAD = (AreaKind.DRIVABLE, AreaKind.CARPARK, AreaKind.INTERSECTION)
+_WALKS = (AreaKind.WALKWAY, AreaKind.CROSSWALK)
 
 
 class Surface:
     """The union of polygons, which are joined only where somebody asks.
 
-    Args:
-        pieces: Valid shapely polygons (P,); empty ones are dropped.
+    Lanes go by their boundaries where the map has both, else by their width. An area that
+    crosses itself is taken as the ground that it encloses.
     """
 
-    def __init__(self, pieces: NDArray[np.object_]) -> None:
-        import shapely
-
+    def __init__(self, lanes: Iterable[AnyLane] = (), areas: Iterable[Area] = ()) -> None:
+        pieces = np.concatenate([strips(list(lanes)), rings(list(areas))])
         self._pieces = pieces[~shapely.is_empty(pieces)]
         self._tree = shapely.STRtree(self._pieces)
-
-    @classmethod
-    def of(cls, lanes: Iterable[AnyLane] = (), areas: Iterable[Area] = ()) -> Surface:
-        """The ground of lanes and connectors and of areas.
-
-        Lanes go by their boundaries where the map has both, else by their width. An area that
-        crosses itself is taken as the ground that it encloses.
-        """
-        return cls(np.concatenate([strips(list(lanes)), rings(list(areas))]))
-
-    def with_areas(self, areas: Iterable[Area]) -> Surface:
-        """This ground and more areas."""
-        return Surface(np.concatenate([self._pieces, rings(list(areas))]))
-
-    @property
-    def is_empty(self) -> bool:
-        """Whether the map has no such ground at all."""
-        return len(self._pieces) == 0
+        self.is_empty = len(self._pieces) == 0
 
     def share_outside(self, corners_m: FloatArray) -> float:
-        """The part, 0 to 1, of a box with the corners (4, 2) that lies off the surface."""
-        import shapely
-
+        """Return the part, 0 to 1, of a box with the corners (4, 2) that lies off the surface."""
         box = shapely.Polygon(corners_m)
         near = self._pieces[self._tree.query(box, predicate="intersects")]
         if any(piece.covers(box) for piece in near):
@@ -74,18 +55,15 @@ class Surface:
         return min(1.0, max(0.0, left))
 
     def distance_m(self, x_m: float, y_m: float) -> float:
-        """From the point to the surface, 0 on it; infinite where there is none."""
-        import shapely
-
+        """Return the way from a point to the surface, 0 on it; infinite where there is none."""
         if self.is_empty:
-            return float("inf")
-        _, distances = self._tree.query_nearest(
-            shapely.Point(x_m, y_m), return_distance=True, all_matches=False
-        )
+            return math.inf
+        point = shapely.Point(x_m, y_m)
+        _, distances = self._tree.query_nearest(point, return_distance=True, all_matches=False)
         return float(distances[0])
 
     def reach_m(self, x_m: float, y_m: float, heading_rad: float, most_m: float) -> float | None:
-        """How far the surface goes on from a point in a direction, up to `most_m`.
+        """Return how far the surface goes on from a point in a direction, up to `most_m`.
 
         Neighbouring pieces seldom meet exactly: gaps up to `SEAM_M` are passed over. None where
         the point is not on the surface, or the surface ends nowhere within `most_m`.
@@ -100,20 +78,17 @@ class Surface:
         return reached_m if is_on and reached_m < most_m - SEAM_M else None
 
     def begins_m(self, x_m: float, y_m: float, heading_rad: float, most_m: float) -> float | None:
-        """How far off a point the surface begins in a direction, 0 on it.
+        """Return how far off a point the surface begins in a direction, 0 on it.
 
         None where it begins nowhere within `most_m`.
         """
-        ahead = (span for span in self._spans_m(x_m, y_m, heading_rad, most_m) if span[1] > 0.0)
-        first = next(ahead, None)
-        return None if first is None else max(0.0, first[0])
+        spans = self._spans_m(x_m, y_m, heading_rad, most_m)
+        return next((max(0.0, low_m) for low_m, high_m in spans if high_m > 0.0), None)
 
     def _spans_m(
         self, x_m: float, y_m: float, heading_rad: float, most_m: float
     ) -> list[tuple[float, float]]:
         """From where to where each piece lies under a ray; it begins a seam behind its point."""
-        import shapely
-
         step = np.array([math.cos(heading_rad), math.sin(heading_rad)])
         start = np.array([x_m, y_m])
         ray = shapely.LineString([start - SEAM_M * step, start + most_m * step])
@@ -124,80 +99,40 @@ class Surface:
         return sorted((min(span), max(span)) for span in spans)
 
     def distance_to_hull_m(self, x_m: float, y_m: float) -> float:
-        """From the point to the smallest convex region around the whole surface, 0 inside."""
-        import shapely
-
-        return (
-            float("inf") if self.is_empty else float(self._hull.distance(shapely.Point(x_m, y_m)))
-        )
-
-    @cached_property
-    def _hull(self) -> BaseGeometry:
-        import shapely
-
-        points: BaseGeometry = shapely.MultiPoint(shapely.get_coordinates(self._pieces))
-        return points.convex_hull
+        """Return the way from a point to the convex region around the surface, 0 inside."""
+        hull = shapely.MultiPoint(shapely.get_coordinates(self._pieces)).convex_hull
+        return math.inf if self.is_empty else float(hull.distance(shapely.Point(x_m, y_m)))
 
 
 def gaps_m(boxes_m: FloatArray) -> FloatArray:
-    """The gap (N, N) between every two boxes with corners (N, 4, 2); 0 where they meet."""
-    import shapely
-
+    """Return the gap (N, N) between every two boxes with corners (N, 4, 2); 0 where they meet."""
     boxes = np.asarray(shapely.polygons(boxes_m), dtype=object)
     return np.asarray(shapely.distance(boxes[:, None], boxes[None, :]), dtype=np.float64)
 
 
-# Private
-
-
 def strips(lanes: Sequence[AnyLane]) -> NDArray[np.object_]:
-    """One polygon a lane."""
-    import shapely
-
-    outlines = [_outline(lane) for lane in lanes]
-    strips = _polygons([outline for outline in outlines if outline is not None])
+    """Return one polygon a lane."""
     made = np.full(len(lanes), None, dtype=object)
-    made[[outline is not None for outline in outlines]] = strips
+    for index, lane in enumerate(lanes):
+        left, right = lane.left_boundary, lane.right_boundary
+        if left is not None and right is not None:
+            made[index] = shapely.Polygon(np.concatenate([left.points_m, right.points_m[::-1]]))
     # Those without an outline, and those whose outline crosses itself.
-    broad = np.flatnonzero(~shapely.is_valid(made)).tolist()
-    lines = [shapely.LineString(lanes[index].centerline.points_m) for index in broad]
-    halves_m = [lanes[index].width_m / 2.0 for index in broad]
-    made[broad] = shapely.buffer(lines, halves_m, cap_style="flat", quad_segs=4)
+    for index in np.flatnonzero(~shapely.is_valid(made)).tolist():
+        line = shapely.LineString(lanes[index].centerline.points_m)
+        half_m = lanes[index].width_m / 2.0
+        made[index] = line.buffer(half_m, cap_style="flat", quad_segs=4)
     return made
 
 
-def _outline(lane: AnyLane) -> FloatArray | None:
-    if lane.left_boundary is None or lane.right_boundary is None:
-        return None
-    return np.concatenate([lane.left_boundary.points_m, lane.right_boundary.points_m[::-1]])
-
-
 def rings(areas: Sequence[Area]) -> NDArray[np.object_]:
-    """One geometry an area."""
-    import shapely
-
-    made = _polygons([np.array(area.boundary_m, dtype=np.float64) for area in areas])
+    """Return one geometry an area."""
+    made = np.empty(len(areas), dtype=object)
+    made[:] = [shapely.Polygon(area.boundary_m) for area in areas]
     crossing = ~shapely.is_valid(made)
     # A buffer of nothing keeps the polygons and drops the lines that mending may leave.
     made[crossing] = shapely.buffer(shapely.make_valid(made[crossing]), 0.0)
     return made
-
-
-def _polygons(outlines: Sequence[FloatArray]) -> NDArray[np.object_]:
-    """Polygons (N,) of outlines (P, 2), closed or not."""
-    import shapely
-
-    if not outlines:
-        return np.empty(0, dtype=object)
-    owners = np.repeat(np.arange(len(outlines)), [len(outline) for outline in outlines])
-    rings = shapely.linearrings(np.concatenate(outlines), indices=owners)
-    return np.asarray(shapely.polygons(rings), dtype=object)
-
-
-NEAR_M = 20.0
-"""How far beside a lane a point still has anything to do with it."""
-_JOINT_M = 0.5
-"""Where two lanes meet in a bend, a wedge beside the joint belongs to neither; it is as long."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -237,18 +172,17 @@ class LaneIndex:
     def __init__(self, lanes: Iterable[AnyLane]) -> None:
         self._lanes = tuple(lanes)
         lines = [lane.centerline for lane in self._lanes]
-        counts = [len(line.points_m) - 1 for line in lines]
-        self._bounds: list[int] = np.cumsum([0, *counts]).tolist()
-        empty = np.zeros((0, 2))
+        self._bounds = np.cumsum([0, *(len(line.points_m) - 1 for line in lines)])
         self._halves_m = np.array([lane.width_m / 2.0 for lane in self._lanes])
-        self._starts = np.concatenate([empty, *(line.points_m[:-1] for line in lines)])
-        steps = np.concatenate([empty, *(np.diff(line.points_m, axis=0) for line in lines)])
-        self._lengths = np.hypot(steps[:, 0], steps[:, 1])
-        self._directions = steps / self._lengths[:, None]
-        self._stations = np.concatenate([empty[:, 0], *(line.stations_m[:-1] for line in lines)])
+        if lines:
+            self._starts = np.concatenate([line.points_m[:-1] for line in lines])
+            steps = np.concatenate([np.diff(line.points_m, axis=0) for line in lines])
+            self._lengths = np.hypot(steps[:, 0], steps[:, 1])
+            self._directions = steps / self._lengths[:, None]
+            self._stations = np.concatenate([line.stations_m[:-1] for line in lines])
 
     def beside(self, x_m: float, y_m: float) -> tuple[Beside, ...]:
-        """The point beside the lanes near it, in the order of the lanes.
+        """Return the point beside the lanes near it, in the order of the lanes.
 
         Those are all whose edge is within `NEAR_M` of the point, else the nearest one.
         """
@@ -260,47 +194,36 @@ class LaneIndex:
         left = self._directions[:, 0] * offset[:, 1] - self._directions[:, 1] * offset[:, 0]
         distances = np.hypot(left, past)
         edges_m = np.minimum.reduceat(distances, self._bounds[:-1]) - self._halves_m
-        near = np.flatnonzero(edges_m <= max(NEAR_M, float(edges_m.min()))).tolist()
-        return tuple(self._read(number, distances, along, past, left) for number in near)
-
-    def _read(
-        self,
-        number: int,
-        distances: FloatArray,
-        along: FloatArray,
-        past: FloatArray,
-        left: FloatArray,
-    ) -> Beside:
-        """One lane; the arrays (M,) tell how the point lies beside every segment."""
-        lane, start, end = self._lanes[number], *self._bounds[number : number + 2]
-        index = start + int(distances[start:end].argmin())
-        distance_m, past_m, left_m = (float(a[index]) for a in (distances, past, left))
-        is_past_end = (past_m < 0.0 and index == start) or (past_m > 0.0 and index == end - 1)
-        dx, dy = self._directions[index].tolist()
-        return Beside(
-            lane_id=lane.id,
-            s_m=float(self._stations[index] + along[index]) - past_m,
-            # On the outside of a bend the nearest place is a corner, which is past no end.
-            d_m=left_m if is_past_end else math.copysign(distance_m, left_m),
-            beyond_m=abs(past_m) if is_past_end else 0.0,
-            distance_m=distance_m,
-            tangent_rad=math.atan2(dy, dx),
-            width_m=lane.width_m,
-        )
+        places = []
+        for number in np.flatnonzero(edges_m <= max(NEAR_M, float(edges_m.min()))).tolist():
+            start, end = self._bounds[number : number + 2].tolist()
+            index = start + int(distances[start:end].argmin())
+            past_m, left_m = float(past[index]), float(left[index])
+            is_past_end = (past_m < 0.0 and index == start) or (past_m > 0.0 and index == end - 1)
+            distance_m = float(distances[index])
+            dx, dy = self._directions[index].tolist()
+            place = Beside(
+                lane_id=self._lanes[number].id,
+                s_m=float(self._stations[index] + along[index]) - past_m,
+                # On the outside of a bend the nearest place is a corner, which is past no end.
+                d_m=left_m if is_past_end else math.copysign(distance_m, left_m),
+                beyond_m=abs(past_m) if is_past_end else 0.0,
+                distance_m=distance_m,
+                tangent_rad=math.atan2(dy, dx),
+                width_m=self._lanes[number].width_m,
+            )
+            places.append(place)
+        return tuple(places)
 
 
 def best_aligned(beside: Iterable[Beside], heading_rad: float) -> Beside | None:
-    """Of the lanes under a point the one that fits the heading, of equal ones the nearest."""
+    """Return of the lanes under a point the one that fits the heading, else the nearest."""
 
-    def misfit(one: Beside) -> tuple[int, float]:
-        turn_deg = math.degrees(abs(difference(one.tangent_rad, heading_rad)))
-        return round(turn_deg / 15.0), round(one.distance_m, 4)
+    def misfit(place: Beside) -> tuple[int, float]:
+        turn_deg = math.degrees(abs(difference(place.tangent_rad, heading_rad)))
+        return round(turn_deg / 15.0), round(place.distance_m, 4)
 
-    return min((one for one in beside if one.covers), key=misfit, default=None)
-
-
-_ROAD = (AreaKind.DRIVABLE, AreaKind.CARPARK, AreaKind.INTERSECTION)
-_WALKS = (AreaKind.WALKWAY, AreaKind.CROSSWALK)
+    return min((place for place in beside if place.covers), key=misfit, default=None)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -319,30 +242,32 @@ class Ground:
 
     @classmethod
     def of(cls, scene: Scene) -> Ground:
-        """The ground of a scene; surfaces are laid out when they are first asked for."""
+        """Return the ground of a scene; surfaces are laid out when they are first asked for."""
         graph = LaneGraph(scene)
         return cls(scene=scene, graph=graph, lanes=LaneIndex(graph.lanes.values()))
+
+    def _areas(self, *kinds: AreaKind) -> list[Area]:
+        return [area for area in self.scene.areas if area.kind in kinds]
 
     @cached_property
     def road(self) -> Surface:
         """What vehicles may stand on."""
-        areas = (area for area in self.scene.areas if area.kind in _ROAD)
-        return Surface.of(self.graph.lanes.values(), areas)
+        return Surface(self.graph.lanes.values(), self._areas(*_ROAD))
 
     @cached_property
     def everything(self) -> Surface:
         """Everything that the map shows: the road, walkways and crosswalks."""
-        return self.road.with_areas(area for area in self.scene.areas if area.kind in _WALKS)
+        return Surface(self.graph.lanes.values(), self._areas(*_ROAD, *_WALKS))
 
     @cached_property
     def carparks(self) -> Surface:
         """Where vehicles stand in any direction."""
-        return Surface.of(areas=(a for a in self.scene.areas if a.kind is AreaKind.CARPARK))
+        return Surface(areas=self._areas(AreaKind.CARPARK))
 
     @cached_property
     def walkways(self) -> Surface:
         """Where people walk beside the road; empty where the map does not say."""
-        return Surface.of(areas=(a for a in self.scene.areas if a.kind is AreaKind.WALKWAY))
+        return Surface(areas=self._areas(AreaKind.WALKWAY))
 
     @cached_property
     def route(self) -> EgoRoute | None:
@@ -358,16 +283,14 @@ class Ground:
         """
         if self.route is None:
             return ()
-        lane_id, begins_m = self.route.lane_id, -self.route.lane_s_m
-        ahead = self._reached(lane_id, begins_m, forwards=True)
-        behind = self._reached(lane_id, begins_m, forwards=False)
+        ahead, behind = (self._reached(self.route, forwards=way) for way in (True, False))
         return (*ahead.items(), *behind.items())
 
-    def _reached(self, lane_id: str, start_m: float, *, forwards: bool) -> dict[str, float]:
+    def _reached(self, route: EgoRoute, *, forwards: bool) -> dict[str, float]:
         """Dijkstra over whole lanes: the signed distance from the ego to each lane's start."""
         lengths = {name: lane.centerline.length_m for name, lane in self.graph.lanes.items()}
         starts_m: dict[str, float] = {}
-        queue = [(abs(start_m), lane_id, start_m)]
+        queue = [(route.lane_s_m, route.lane_id, -route.lane_s_m)]
         while queue:
             _, here, begins_m = heapq.heappop(queue)
             if here in starts_m:

@@ -1,6 +1,7 @@
-"""The lanes across the ego's route: its own, those left and right of it, the oncoming one.
+"""The lanes across the ego's route, and where on it what an intent names is.
 
-Frame: the scene's. Left is left of the route, in its direction of travel.
+Lanes are its own, those left and right of it, and the oncoming one. Frames: the scene's, and that
+of `EgoRoute`: ahead along the route from the ego, left across it in its direction of travel.
 """
 
 from __future__ import annotations
@@ -9,16 +10,24 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
+import shapely
 
 from augment.checks.ground import Beside, Ground, LaneIndex, best_aligned
 from augment.geometry.frames import difference
-from augment.geometry.polyline import FloatArray
 from augment.scene.ego_route import EgoRoute, RoutePosition
-from augment.scene.entities import AgentType, AreaKind, LaneConnector, TrafficAgent, TurnType
+from augment.scene.entities import (
+    AgentType,
+    AreaKind,
+    LaneConnector,
+    TrafficAgent,
+    TrafficSide,
+    TurnType,
+)
 from augment.scene.intent import (
     Intent,
     LaneChoice,
+    Lateral,
+    LateralTarget,
     Length,
     MapPlace,
     Pick,
@@ -29,10 +38,16 @@ from augment.scene.intent import (
     from_ego,
 )
 
-_BESIDE_M = 1.0
+_SAME_LANE_M = 1.0
 """A lane whose centre is nearer than this is the same lane."""
-_ALONG_DEG, _AGAINST_DEG = 45.0, 135.0
+_ALONG_RAD, _AGAINST_RAD = math.radians(45.0), math.radians(135.0)
 _JOINT_M = 1.0
+_STANDS_BELOW_MPS = 0.5
+_BESIDE_M = 15.0
+"""Who is further from the route is on another road; prompts show as much beside it."""
+_ON_A_SIDE_M = 1.0
+_STEP_M = 0.1
+_VEHICLES = (AgentType.VEHICLE, AgentType.BUS)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -53,7 +68,7 @@ class LanesAcross:
 
     @classmethod
     def of(cls, ground: Ground, turn: TurnType = TurnType.STRAIGHT) -> LanesAcross | None:
-        """Those of the ground's ego, None where the map has no lane for it.
+        """Return those of the ground's ego, None where the map has no lane for it.
 
         Args:
             ground: Of the scene.
@@ -64,8 +79,13 @@ class LanesAcross:
             route = EgoRoute.of(ground.scene, ground.graph, turn=turn)
         return None if route is None else cls(route=route, lanes=ground.lanes)
 
+    @property
+    def kerb(self) -> float:
+        """On which side of the ego's lane the kerb is: 1 left, -1 right."""
+        return 1.0 if self.route.scene.traffic_side is TrafficSide.LEFT else -1.0
+
     def band(self, choice: LaneChoice, ahead_m: float) -> Band | None:
-        """The lane of that choice, None where there is none there."""
+        """Return the lane of that choice, None where there is none there."""
         tangent_rad = self.route.heading_at(ahead_m)
         near = self.lanes.beside(*self.route.position(ahead_m))
         if choice is LaneChoice.OWN:
@@ -79,39 +99,34 @@ class LanesAcross:
             default=None,
         )
 
-
-# Private
+    def side_sign(self, lateral: Lateral | None) -> float:
+        """Return 1 for left of the ego's direction, -1 for right, 0 for the lane's centre."""
+        signs = {
+            LateralTarget.LEFT_BOUNDARY: 1.0,
+            LateralTarget.RIGHT_BOUNDARY: -1.0,
+            LateralTarget.KERB: self.kerb,
+            LateralTarget.CENTRE_LINE: -self.kerb,
+        }
+        return 0.0 if lateral is None else signs.get(lateral.target, 0.0)
 
 
 def _band(lane: Beside, tangent_rad: float, choice: LaneChoice) -> Band | None:
     """A lane beside the own one as one of the choice, None where it is not."""
-    turn_deg = math.degrees(abs(difference(lane.tangent_rad, tangent_rad)))
-    is_along, is_against = turn_deg < _ALONG_DEG, turn_deg > _AGAINST_DEG
+    turn_rad = abs(difference(lane.tangent_rad, tangent_rad))
+    is_along, is_against = turn_rad < _ALONG_RAD, turn_rad > _AGAINST_RAD
     left_m = lane.d_m if is_against else -lane.d_m
-    if lane.beyond_m > _JOINT_M or abs(left_m) < _BESIDE_M:
-        return None
     fits = {
         LaneChoice.LEFT: is_along and left_m > 0.0,
         LaneChoice.RIGHT: is_along and left_m < 0.0,
         LaneChoice.ONCOMING: is_against,
-        LaneChoice.OWN: False,
     }
-    if not fits[choice]:
+    if lane.beyond_m > _JOINT_M or abs(left_m) < _SAME_LANE_M or not fits[choice]:
         return None
     return Band(left_m=left_m, width_m=lane.width_m, tangent_rad=lane.tangent_rad)
 
 
-_STANDS_BELOW_MPS = 0.5
-_BESIDE_M_landmarks = 15.0
-"""Who is further from the route is on another road; prompts show as much beside it."""
-_ON_A_SIDE_M = 1.0
-_STEP_M = 0.1
-_ALONG_RAD, _AGAINST_RAD = math.radians(45.0), math.radians(135.0)
-_VEHICLES = (AgentType.VEHICLE, AgentType.BUS)
-
-
 def find_picked(lanes: LanesAcross, pick: Pick) -> tuple[TrafficAgent, ...]:
-    """Who is meant: one, or all of `every`; empty where nobody fits."""
+    """Return who is meant: one, or all of `every`; empty where nobody fits."""
     sign = 1.0 if pick.relation is Relation.AHEAD else -1.0
     agents = []
     for agent in lanes.route.scene.agents:
@@ -123,7 +138,7 @@ def find_picked(lanes: LanesAcross, pick: Pick) -> tuple[TrafficAgent, ...]:
 
 
 def find_mark(lanes: LanesAcross, mark: MapPlace) -> float | None:
-    """How far ahead of the ego a place of the map is, None where there is none ahead."""
+    """Return how far ahead of the ego a place of the map is, None where there is none ahead."""
     if mark is MapPlace.CROSSWALK:
         return _crosswalk_m(lanes)
     route, begins_m = lanes.route, -lanes.route.ego_s_m
@@ -135,7 +150,7 @@ def find_mark(lanes: LanesAcross, mark: MapPlace) -> float | None:
 
 
 def resolve_landmarks(intent: Intent, lanes: LanesAcross) -> Intent:
-    """The intent with the distances from landmarks and marks as distances from the ego.
+    """Return the intent with distances from landmarks and marks as distances from the ego.
 
     Where there is no such road user or place the distance is left open.
     """
@@ -149,7 +164,7 @@ def resolve_landmarks(intent: Intent, lanes: LanesAcross) -> Intent:
 
 
 def list_absent(intent: Intent, lanes: LanesAcross) -> tuple[str, ...]:
-    """In words what the intent names and the scene does not have."""
+    """Return in words what the intent names and the scene does not have."""
     spots = [one.spot for one in (*intent.requests, *intent.moves)]
     picks = [spot.landmark for spot in spots if spot.landmark is not None]
     picks += [*(move.who for move in intent.moves), *intent.removals]
@@ -159,15 +174,12 @@ def list_absent(intent: Intent, lanes: LanesAcross) -> tuple[str, ...]:
 
 
 def name_of_pick(pick: Pick) -> str:
-    """A road user in a few words: "parked vehicle 2 on the left"."""
+    """Return a road user in a few words: "parked vehicle 2 on the left"."""
     parts = [f"every {pick.kind}" if pick.every else f"{pick.kind} {pick.ordinal}"]
     parts += [] if pick.side is None else [f"on the {pick.side}"]
     parts += [] if pick.lane is None else [f"in the {pick.lane} lane"]
     where = "ahead of" if pick.relation is Relation.AHEAD else "behind"
     return " ".join([*parts, f"{where} the ego"])
-
-
-# Private
 
 
 def _fits(lanes: LanesAcross, pick: Pick, agent: TrafficAgent, place: RoutePosition) -> bool:
@@ -181,49 +193,39 @@ def _fits(lanes: LanesAcross, pick: Pick, agent: TrafficAgent, place: RoutePosit
         Sight.BICYCLE: agent.type is AgentType.BICYCLE,
         Sight.PEDESTRIAN: agent.type is AgentType.PEDESTRIAN,
     }
-    if not kinds[pick.kind] or abs(place.left_m) > _BESIDE_M_landmarks:
+    if not kinds[pick.kind] or abs(place.left_m) > _BESIDE_M:
         return False
-    if pick.side is not None:
-        sign = 1.0 if pick.side is Side.LEFT else -1.0
-        if sign * place.left_m <= _ON_A_SIDE_M:
-            return False
-    return pick.lane is None or _is_in(lanes, pick.lane, agent, place)
-
-
-def _is_in(
-    lanes: LanesAcross, lane: LaneChoice, agent: TrafficAgent, place: RoutePosition
-) -> bool:
-    """Whether it is in that lane; what comes towards the ego is in the oncoming one."""
+    sign = 1.0 if pick.side is Side.LEFT else -1.0
+    if pick.side is not None and sign * place.left_m <= _ON_A_SIDE_M:
+        return False
+    if pick.lane is None:
+        return True
+    # What comes towards the ego is in the oncoming lane.
     turned_rad = abs(difference(agent.heading_rad, place.tangent_rad))
-    if lane is LaneChoice.ONCOMING:
+    if pick.lane is LaneChoice.ONCOMING:
         return turned_rad > _AGAINST_RAD
-    band = lanes.band(lane, place.ahead_m)
+    band = lanes.band(pick.lane, place.ahead_m)
     if band is None or turned_rad > _ALONG_RAD:
         return False
     return abs(place.left_m - band.left_m) <= band.width_m / 2.0
 
 
 def _resolved(spot: Spot, lanes: LanesAcross) -> Spot:
+    ahead_m = None
     if spot.landmark is None and spot.mark is None:
         return spot
-    ahead_m = _ahead_m(spot, lanes)
+    if spot.mark is not None:
+        ahead_m = find_mark(lanes, spot.mark)
+    elif spot.landmark is not None and (picked := find_picked(lanes, spot.landmark)):
+        ahead_m = lanes.route.locate_agent(picked[0]).ahead_m
     bare = replace(spot, landmark=None, mark=None)
     if ahead_m is None:
         return replace(bare, distance=None, relation=None)
     where = Relation.AHEAD if ahead_m >= 0.0 else Relation.BEHIND
-    size_m = abs(ahead_m)
-    here = Spot(distance=Length(low_m=size_m, high_m=size_m), relation=where)
+    here = Spot(distance=Length(low_m=abs(ahead_m), high_m=abs(ahead_m)), relation=where)
     if bare.relation is None:  # level with it
         return replace(bare, distance=here.distance, relation=where)
     return from_ego(bare, here)
-
-
-def _ahead_m(spot: Spot, lanes: LanesAcross) -> float | None:
-    if spot.mark is not None:
-        return find_mark(lanes, spot.mark)
-    assert spot.landmark is not None
-    picked = find_picked(lanes, spot.landmark)
-    return lanes.route.locate_agent(picked[0]).ahead_m if picked else None
 
 
 def _crosswalk_m(lanes: LanesAcross) -> float | None:
@@ -233,19 +235,7 @@ def _crosswalk_m(lanes: LanesAcross) -> float | None:
     points = route.line.points_at(route.ego_s_m + ahead_m)
     stations_m = []
     for area in lanes.route.scene.areas:
-        if area.kind is not AreaKind.CROSSWALK:
-            continue
-        inside = np.flatnonzero(_inside(points, np.array(area.boundary_m)))
-        if len(inside):
-            stations_m.append(float(ahead_m[inside].mean()))
+        if area.kind is AreaKind.CROSSWALK:
+            inside = shapely.contains_xy(shapely.Polygon(area.boundary_m), points)
+            stations_m += [float(ahead_m[inside].mean())] if inside.any() else []
     return min(stations_m, default=None)
-
-
-def _inside(points_m: FloatArray, boundary_m: FloatArray) -> NDArray[np.bool_]:
-    """Which points (N, 2) lie in a polygon (P, 2): an odd number of its sides is to the right."""
-    start, end = boundary_m, np.roll(boundary_m, -1, axis=0)
-    x, y = points_m[:, :1], points_m[:, 1:]
-    spans = (start[:, 1] > y) != (end[:, 1] > y)
-    rise = np.where(start[:, 1] == end[:, 1], 1.0, end[:, 1] - start[:, 1])
-    crossing = start[:, 0] + (y - start[:, 1]) * (end[:, 0] - start[:, 0]) / rise
-    return np.asarray((spans & (crossing > x)).sum(axis=1) % 2 == 1)

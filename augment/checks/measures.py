@@ -11,10 +11,8 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from augment.checks.asked_places import side_sign
 from augment.checks.ground import Ground
 from augment.checks.lanes_across import LanesAcross, resolve_landmarks
-from augment.checks.parties import kerb_of
 from augment.geometry.frames import difference
 from augment.scene.entities import Point
 from augment.scene.intent import Intent, LaneChoice, Spot, WalkRequest, resolve_anchors
@@ -71,7 +69,7 @@ class LaneEdges:
 
 
 def find_measures(ground: Ground, intent: Intent | None, *, reach_m: float) -> Measures:
-    """The lines and rings of a scenario.
+    """Return the lines and rings of a scenario.
 
     A line across the road lies so far along the ego's route as is asked for, one at each end of a
     range; a line along the lane lies so far from the lane's centre. What is asked for without a
@@ -92,19 +90,26 @@ def find_measures(ground: Ground, intent: Intent | None, *, reach_m: float) -> M
     if intent is None or lanes is None:
         return Measures(rings=rings)
     counted = resolve_anchors(resolve_landmarks(intent, lanes))
-    return Measures(lines=tuple(dict.fromkeys(_lines(counted, lanes))), rings=rings)
+    lines: list[MeasureLine] = []
+    for part in (*counted.requests, *counted.moves):
+        span_m = part.spot.span_m if part.spot.distance else None
+        ends_m = sorted({end for end in span_m or () if math.isfinite(end)})
+        beyond_m = _WALK_M if isinstance(part, WalkRequest) else _BESIDE_M
+        lines += [_across(part.spot, lanes, ahead_m, beyond_m) for ahead_m in ends_m]
+        lines += _along(part.spot, lanes, ends_m)
+    return Measures(lines=tuple(dict.fromkeys(lines)), rings=rings)
 
 
 def lane_edges_at(ground: Ground, x_m: float, y_m: float) -> LaneEdges | None:
-    """How far a point is from the edges of the lane under it, None off every lane.
+    """Return how far a point is from the edges of the lane under it, None off every lane.
 
     Where several lanes lie over each other, a lane goes before the connectors of a junction, and
     of several the one whose centre is nearest.
     """
-    connectors = {one.id for one in ground.scene.connectors}
+    connectors = {connector.id for connector in ground.scene.connectors}
     under = min(
-        (one for one in ground.lanes.beside(x_m, y_m) if one.covers),
-        key=lambda one: (one.lane_id in connectors, abs(one.d_m)),
+        (place for place in ground.lanes.beside(x_m, y_m) if place.covers),
+        key=lambda place: (place.lane_id in connectors, abs(place.d_m)),
         default=None,
     )
     if under is None:
@@ -118,22 +123,12 @@ def lane_edges_at(ground: Ground, x_m: float, y_m: float) -> LaneEdges | None:
 # Private
 
 
-def _lines(intent: Intent, lanes: LanesAcross) -> Iterator[MeasureLine]:
-    for one in (*intent.requests, *intent.moves):
-        span_m = one.spot.span_m if one.spot.distance else None
-        ends_m = sorted({end for end in span_m or () if math.isfinite(end)})
-        for ahead_m in ends_m:
-            yield _across(one.spot, lanes, ahead_m, is_walk=isinstance(one, WalkRequest))
-        yield from _along(one.spot, lanes, ends_m)
-
-
-def _across(spot: Spot, lanes: LanesAcross, ahead_m: float, *, is_walk: bool) -> MeasureLine:
+def _across(spot: Spot, lanes: LanesAcross, ahead_m: float, beyond_m: float) -> MeasureLine:
     """Over the ego's lane and the one that is asked for."""
     bands = [lanes.band(choice, ahead_m) for choice in (LaneChoice.OWN, spot.lane) if choice]
     edges_m = [
         band.left_m + side * band.width_m / 2.0 for band in bands if band for side in (-1.0, 1.0)
     ] or [-2.0, 2.0]
-    beyond_m = _WALK_M if is_walk else _BESIDE_M
     low_m, high_m = min(edges_m) - beyond_m, max(edges_m) + beyond_m
     ends = tuple(lanes.route.position(ahead_m, left_m) for left_m in (high_m, low_m))
     return MeasureLine(points_m=ends, ahead_m=ahead_m)
@@ -144,7 +139,7 @@ def _along(spot: Spot, lanes: LanesAcross, ends_m: list[float]) -> Iterator[Meas
     lateral = spot.lateral
     if lateral is None or spot.lane is None:
         return
-    sign = side_sign(lateral, kerb=kerb_of(lanes.route.scene))
+    sign = lanes.side_sign(lateral)
     if sign and lateral.offset is None:
         return
     offsets_m = {0.0} if lateral.offset is None else {lateral.offset.low_m, lateral.offset.high_m}
@@ -153,7 +148,7 @@ def _along(spot: Spot, lanes: LanesAcross, ends_m: list[float]) -> Iterator[Meas
     if band is None:
         return
     steps = math.ceil((high_m - low_m + 2.0 * _ALONG_M) / _STEP_M)
-    for offset_m in sorted({sign * one for one in offsets_m}):
+    for offset_m in sorted({sign * offset_m for offset_m in offsets_m}):
         points = tuple(
             lanes.route.position(low_m - _ALONG_M + step * _STEP_M, band.left_m + offset_m)
             for step in range(steps + 1)

@@ -1,7 +1,8 @@
-"""How far off what was asked for something may be before it is a fault.
+"""Who answers which part of an instruction, and how far off it may be.
 
-One set for every scenario and contestant; docs/method.md says where each number comes from. The
-references of the catalogue are held by a narrower one: their authors measured them.
+There is one set of tolerances for every scenario and contestant; docs/method.md says where each
+number comes from. The references of the catalogue are held by a narrower one: their authors
+measured them.
 """
 
 from __future__ import annotations
@@ -11,17 +12,17 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
-from augment.checks.finding import Finding, Severity
+from augment.checks.finding import Finding
 from augment.checks.lanes_across import LanesAcross
 from augment.scene.ego_route import EgoRoute
-from augment.scene.entities import AgentType, Modification, Point, Scene, TrafficAgent, TrafficSide
+from augment.scene.entities import AgentType, Modification, Point, TrafficAgent
 from augment.scene.intent import (
     Body,
     ConesRequest,
     CrashRequest,
-    Facing,
     Intent,
     LaneChoice,
+    Length,
     Request,
     Spot,
     VehicleRequest,
@@ -88,13 +89,10 @@ AUTHORED = Tolerances(
 
 CRASH_M = 6.0
 """From one crashed vehicle to the next at most: the widest of interPlan's."""
-
 WORKER_M = 6.0
 """From a worker to the nearest cone; interPlan's stand 0.8 to 4.0 m off."""
-
 SPEED_MPS, SPEED_SHARE = 1.0, 0.2
 """Of what moves, whichever is more."""
-
 LONG_VEHICLE_M = 7.0
 """A vehicle of this length passes for a bus, as interPlan's file has it."""
 
@@ -111,6 +109,37 @@ class Role(StrEnum):
     WORKER = "worker"
     BARRIER = "barrier"
     SIGN = "construction sign"
+
+    @property
+    def plural(self) -> str:
+        """Several of them."""
+        return "buses" if self is Role.BUS else f"{self}s"
+
+    def suits(self, agent: TrafficAgent) -> bool:
+        """Return whether an agent's type is right."""
+        if self is Role.BUS and agent.length_m < LONG_VEHICLE_M:
+            return agent.type is AgentType.BUS
+        return agent.type in _TYPES[self]
+
+
+_TYPES = {
+    Role.VEHICLE: (AgentType.VEHICLE, AgentType.BUS),
+    Role.CAR: (AgentType.VEHICLE,),
+    Role.BUS: (AgentType.BUS, AgentType.VEHICLE),
+    Role.BICYCLE: (AgentType.BICYCLE,),
+    Role.WALKER: (AgentType.PEDESTRIAN,),
+    Role.CONE: (AgentType.TRAFFIC_CONE,),
+    Role.WORKER: (AgentType.PEDESTRIAN,),
+    Role.BARRIER: (AgentType.BARRIER,),
+    Role.SIGN: (AgentType.CONSTRUCTION_SIGN,),
+}
+_ROLES = {
+    Body.BUS: Role.BUS,
+    Body.VEHICLE: Role.VEHICLE,
+    Body.BICYCLE: Role.BICYCLE,
+    Body.BARRIER: Role.BARRIER,
+    Body.CONSTRUCTION_SIGN: Role.SIGN,
+}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -149,153 +178,77 @@ class Party:
         return not (self.missing or self.spare or self.mistyped)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class RequestMatching:
-    """All parties, and the added agents that no request asks for."""
-
-    parties: tuple[Party, ...]
-    surplus: tuple[TrafficAgent, ...]
-
-
 def match_to_requests(
     intent: Intent, added: Sequence[TrafficAgent], lanes: LanesAcross
-) -> RequestMatching:
+) -> tuple[list[Party], tuple[TrafficAgent, ...]]:
     """Deal the added agents out to the requests, each to the nearest spot that takes its type.
 
     What is left over stands in, whatever its type, for what is still missing.
+
+    Returns:
+        All parties, and the added agents that no request asks for.
     """
-    wanted = [
-        place
-        for number, one in enumerate(intent.requests)
-        for place in _places(number, one, added)
+    places = [
+        (number, role)
+        for number, request in enumerate(intent.requests)
+        for role in _roles(request, added)
     ]
     spots = [middle_of(request.spot, lanes) for request in intent.requests]
     near = sorted(
-        (math.dist(spots[place.party], (agent.x_m, agent.y_m)), number, index)
-        for number, place in enumerate(wanted)
+        (math.dist(spots[number], (agent.x_m, agent.y_m)), place, index)
+        for place, (number, _) in enumerate(places)
         for index, agent in enumerate(added)
     )
     taken: dict[int, int] = {}
-    for suits in (_suits, _is_any):
-        for _, number, index in near:
-            is_free = number not in taken and index not in taken.values()
-            if is_free and suits(wanted[number], added[index]):
-                taken[number] = index
-    return RequestMatching(
-        parties=tuple(
-            _party(number, one, wanted, added, taken, lanes)
-            for number, one in enumerate(intent.requests)
-        ),
-        surplus=tuple(one for n, one in enumerate(added) if n not in taken.values()),
-    )
+    for must_suit in (True, False):
+        for _, place, index in near:
+            is_free = place not in taken and index not in taken.values()
+            if is_free and (not must_suit or places[place][1].suits(added[index])):
+                taken[place] = index
+    surplus = tuple(agent for index, agent in enumerate(added) if index not in taken.values())
+    parties = []
+    for number, request in enumerate(intent.requests):
+        roles = {place: role for place, (owner, role) in enumerate(places) if owner == number}
+        answers = [(added[taken[place]], roles[place]) for place in roles if place in taken]
+        right = [(agent, role) for agent, role in answers if role.suits(agent)]
+        missing = [role for place, role in roles.items() if place not in taken]
+        main = next(iter(roles.values()))
+        agents = [agent for agent, role in right if role is not Role.WORKER]
+        agents.sort(key=lambda agent: abs(lanes.route.locate_agent(agent).ahead_m))
+        party = Party(
+            request=request,
+            agents=tuple(agents),
+            workers=tuple(agent for agent, role in right if role is Role.WORKER),
+            mistyped=tuple((agent, role) for agent, role in answers if not role.suits(agent)),
+            missing=tuple((role, missing.count(role)) for role in dict.fromkeys(missing)),
+            spare=tuple(agent for agent in surplus if main.suits(agent)),
+        )
+        parties.append(party)
+    return parties, surplus
+
+
+def _roles(request: Request, added: Sequence[TrafficAgent]) -> Iterator[Role]:
+    """Whom a request needs; where its count is open, as many as there are, and at least one."""
+    role = Role.WALKER if isinstance(request, WalkRequest) else Role.CONE
+    if isinstance(request, VehicleRequest | CrashRequest):
+        role = _ROLES.get(request.body, Role.CAR)
+    count = request.count or max(sum(role.suits(agent) for agent in added), 1)
+    if isinstance(request, ConesRequest) and request.both_sides and request.count is not None:
+        count *= 2
+    yield from [role] * count
+    if isinstance(request, ConesRequest) and request.has_worker:
+        yield Role.WORKER
 
 
 def middle_of(spot: Spot, lanes: LanesAcross) -> Point:
-    """The point that a spot names: the middle of its range, on the middle of its lane.
+    """Return the point that a spot names: the middle of its range, on the middle of its lane.
 
     What is open is taken as the ego's own place and lane: it only says who is nearest.
     """
-    span_m = [one for one in spot.span_m or (0.0,) if math.isfinite(one)]
+    span_m = [end for end in spot.span_m or (0.0,) if math.isfinite(end)]
     ahead_m = sum(span_m) / len(span_m)
     band = lanes.band(spot.lane or LaneChoice.OWN, ahead_m)
     return lanes.route.position(ahead_m, 0.0 if band is None else band.left_m)
-
-
-@dataclass(frozen=True, slots=True)
-class _Place:
-    """One agent that a request needs."""
-
-    party: int
-    role: Role
-
-
-def _places(party: int, request: Request, added: Sequence[TrafficAgent]) -> Iterator[_Place]:
-    """What a request needs; where its count is open, as many as there are, and at least one."""
-    match request:
-        case VehicleRequest() | CrashRequest():
-            place = _Place(party, _role(request.body))
-        case WalkRequest():
-            place = _Place(party, Role.WALKER)
-        case ConesRequest():
-            place = _Place(party, Role.CONE)
-    suiting = sum(_suits(place, agent) for agent in added)
-    count = request.count or max(suiting, 1)
-    if isinstance(request, ConesRequest):
-        count *= 1 + (request.both_sides and request.count is not None)
-    yield from [place] * count
-    if isinstance(request, ConesRequest) and request.has_worker:
-        yield _Place(party, Role.WORKER)
-
-
-def _role(body: Body) -> Role:
-    return _ROLES.get(body, Role.CAR)
-
-
-_ROLES = {
-    Body.BUS: Role.BUS,
-    Body.VEHICLE: Role.VEHICLE,
-    Body.BICYCLE: Role.BICYCLE,
-    Body.BARRIER: Role.BARRIER,
-    Body.CONSTRUCTION_SIGN: Role.SIGN,
-}
-
-
-def _suits(place: _Place, agent: TrafficAgent) -> bool:
-    match place.role:
-        case Role.BUS:
-            is_long = agent.type is AgentType.VEHICLE and agent.length_m >= LONG_VEHICLE_M
-            return agent.type is AgentType.BUS or is_long
-        case Role.CAR:
-            return agent.type is AgentType.VEHICLE
-        case Role.VEHICLE:
-            return agent.type in (AgentType.VEHICLE, AgentType.BUS)
-        case Role.BICYCLE:
-            return agent.type is AgentType.BICYCLE
-        case Role.CONE:
-            return agent.type is AgentType.TRAFFIC_CONE
-        case Role.BARRIER:
-            return agent.type is AgentType.BARRIER
-        case Role.SIGN:
-            return agent.type is AgentType.CONSTRUCTION_SIGN
-        case Role.WALKER | Role.WORKER:
-            return agent.type is AgentType.PEDESTRIAN
-
-
-def _is_any(place: _Place, agent: TrafficAgent) -> bool:
-    return True
-
-
-def _party(
-    party: int,
-    request: Request,
-    wanted: Sequence[_Place],
-    added: Sequence[TrafficAgent],
-    taken: dict[int, int],
-    lanes: LanesAcross,
-) -> Party:
-    own = [(number, place) for number, place in enumerate(wanted) if place.party == party]
-    answering = [(place, added[taken[number]]) for number, place in own if number in taken]
-    right = [(place.role, agent) for place, agent in answering if _suits(place, agent)]
-    left = [place.role for number, place in own if number not in taken]
-    return Party(
-        request=request,
-        agents=tuple(
-            sorted(
-                (agent for role, agent in right if role is not Role.WORKER),
-                key=lambda agent: abs(lanes.route.locate_agent(agent).ahead_m),
-            )
-        ),
-        workers=tuple(agent for role, agent in right if role is Role.WORKER),
-        mistyped=tuple(
-            (agent, place.role) for place, agent in answering if not _suits(place, agent)
-        ),
-        missing=tuple((role, left.count(role)) for role in dict.fromkeys(left)),
-        spare=tuple(
-            agent
-            for n, agent in enumerate(added)
-            if n not in taken.values() and _suits(own[0][1], agent)
-        ),
-    )
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -303,13 +256,16 @@ class Asked:
     """One modification, held against one intent.
 
     Attributes:
+        parties: The requests with those who answer them.
+        surplus: Added agents that no request asks for.
         to_move, to_remove: Ids of the scene's agents that are to be elsewhere, or to go.
         unmet: Why the wish can't be met; None where it can.
     """
 
     modification: Modification
     lanes: LanesAcross
-    matching: RequestMatching
+    parties: tuple[Party, ...]
+    surplus: tuple[TrafficAgent, ...]
     tolerances: Tolerances
     to_move: frozenset[str] = frozenset()
     to_remove: frozenset[str] = frozenset()
@@ -320,55 +276,29 @@ class Asked:
         """The ego's path over lanes."""
         return self.lanes.route
 
-    @property
-    def kerb(self) -> float:
-        """On which side the kerb is: 1 left, -1 right."""
-        return kerb_of(self.route.scene)
-
-    @property
-    def parties(self) -> tuple[Party, ...]:
-        """The requests with those who answer them."""
-        return self.matching.parties
-
     def ahead_m(self, agent: TrafficAgent) -> float:
-        """How far along the ego's route an agent is."""
+        """Return how far along the ego's route an agent is."""
         return self.route.locate_agent(agent).ahead_m
 
     def left_m(self, agent: TrafficAgent) -> float:
-        """How far left of the ego's route an agent is."""
+        """Return how far left of the ego's route an agent is."""
         return self.route.locate_agent(agent).left_m
+
+    def fits_gap(self, gap_m: float, wanted: Length) -> bool:
+        """Return whether two things are as far apart as is asked for."""
+        share = self.tolerances.spacing_share
+        allowed_m = max(self.tolerances.spacing_m, share * wanted.high_m)
+        return distance_outside(gap_m, wanted.low_m, wanted.high_m) <= allowed_m
 
 
 AskedCheck = Callable[[Asked], Iterator[Finding]]
 
 
-def kerb_of(scene: Scene) -> float:
-    """On which side of the ego's lane the kerb is: 1 left, -1 right."""
-    return 1.0 if scene.traffic_side is TrafficSide.LEFT else -1.0
-
-
 def distance_outside(value: float, low: float, high: float) -> float:
-    """How far a value is outside a range, 0 within it."""
+    """Return how far a value is outside a range, 0 within it."""
     return max(low - value, value - high, 0.0)
 
 
-def severity_of(*, fits: bool) -> Severity:
-    """What was asked for in so many words is there, or it is wrong."""
-    return Severity.FACT if fits else Severity.WRONG
-
-
-def facing_words(facing: Facing | None) -> str:
-    """Which way something is to face, as its lane leads where nothing is said."""
-    return _FACING[facing or Facing.WITH_LANE]
-
-
-def side_of(left: float) -> str:
-    """The side of a number whose left is positive."""
-    return "left" if left >= 0.0 else "right"
-
-
-_FACING = {
-    Facing.WITH_LANE: "facing with the lane",
-    Facing.AGAINST_LANE: "facing against the lane",
-    Facing.ACROSS: "facing across the lane",
-}
+def apart_m(one: TrafficAgent, other: TrafficAgent) -> float:
+    """Return the distance from centre to centre."""
+    return math.hypot(one.x_m - other.x_m, one.y_m - other.y_m)

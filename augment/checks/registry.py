@@ -1,10 +1,11 @@
-"""Every check that needs no intent, and the one function that runs them.
+"""Every check of a modification, and the functions that run them.
 
-In: a `Scene` and a `Modification`. Out: `Finding`s, each a measured fact with its numbers, its
-severity and the class of fault that it speaks for.
+In: a `Scene`, a `Modification`, and what its instruction asks for where that is stored.
+Out: `Finding`s, each a measured fact with its numbers, its severity and the class of fault that
+it speaks for. Nothing else is looked at: never a reference, never anybody's label.
 
-Adding a check is adding one function to `CHECKS`. Checks against an intent get their own tuple:
-these here never ask what was wanted.
+Adding a check is adding one function to `CHECKS`, which never ask what was wanted, or to
+`ASKED_CHECKS`.
 """
 
 from __future__ import annotations
@@ -12,7 +13,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import replace
 
-from augment.checks.asked_places import asked_across, asked_crash, asked_distance, asked_spacing
+from augment.checks.asked_crash import asked_crash
+from augment.checks.asked_places import asked_across, asked_distance, asked_spacing
 from augment.checks.asked_things import (
     asked_changes,
     asked_count,
@@ -41,29 +43,23 @@ from augment.checks.places import (
 )
 from augment.checks.situation import ChangedScene, Check
 from augment.scene.entities import Modification, Scene
-from augment.scene.intent import Intent, Move, VehicleRequest, resolve_anchors
+from augment.scene.intent import Intent, VehicleRequest, resolve_anchors
 
 CHECKS: tuple[Check, ...] = (
-    ego_offset,
-    lane_distance,
-    lane,
-    lane_named,
-    heading,
-    degrees,
-    walk_heading,
-    walk_crossing,
-    walk_blocked,
-    off_road,
-    outside_map,
-    overlap,
-    duplicate,
-    size,
-    speed,
+    *(ego_offset, lane_distance, lane, lane_named, heading, degrees, walk_heading),
+    *(walk_crossing, walk_blocked, off_road, outside_map, overlap, duplicate, size, speed),
+)
+ASKED_CHECKS: tuple[AskedCheck, ...] = (
+    *(asked_count, asked_type, asked_distance, asked_across, asked_heading, asked_crash),
+    *(asked_walk, asked_motion, asked_spacing, asked_changes, find_unasked, find_attempted),
+)
+_OF_PLACE = frozenset(
+    {FindingKind.HEADING, FindingKind.DEGREES, FindingKind.WALK_HEADING, FindingKind.OFF_ROAD}
 )
 
 
 def findings(scene: Scene, modification: Modification) -> tuple[Finding, ...]:
-    """What was measured about every added and moved agent, agent by agent.
+    """Measure every added and moved agent, agent by agent.
 
     Args:
         scene: The scene before the change.
@@ -87,29 +83,13 @@ def findings_on(ground: Ground, modification: Modification) -> tuple[Finding, ..
     return tuple(sorted(found, key=lambda finding: order[finding.agents[0]]))
 
 
-ASKED_CHECKS: tuple[AskedCheck, ...] = (
-    asked_count,
-    asked_type,
-    asked_distance,
-    asked_across,
-    asked_heading,
-    asked_crash,
-    asked_walk,
-    asked_motion,
-    asked_spacing,
-    asked_changes,
-    find_unasked,
-    find_attempted,
-)
-
-
 def check_against_intent(
     ground: Ground,
     modification: Modification,
     intent: Intent | None,
     tolerances: Tolerances = USUAL,
 ) -> tuple[Finding, ...]:
-    """What was measured, what was asked for first, then agent by agent.
+    """Return what was measured, what was asked for first, then agent by agent.
 
     Args:
         ground: Of the scene before the change.
@@ -121,13 +101,13 @@ def check_against_intent(
     Raises:
         InvalidModification: The modification does not fit the scene.
     """
-    findings = findings_on(ground, modification)
+    alone = findings_on(ground, modification)
     lanes = None if intent is None else LanesAcross.of(ground, intent.route)
     if intent is None or lanes is None:
-        return findings
+        return alone
     asked = _asked(modification, intent, lanes, tolerances)
-    held = [one for check in ASKED_CHECKS for one in check(asked)]
-    return (*held, *_settled(findings, held, asked))
+    held = [finding for check in ASKED_CHECKS for finding in check(asked)]
+    return (*held, *_settled(alone, held, asked))
 
 
 def _asked(
@@ -135,38 +115,33 @@ def _asked(
 ) -> Asked:
     """The modification with who answers what; a move is a request for one vehicle elsewhere."""
     counted = resolve_anchors(resolve_landmarks(intent, lanes))
-    matching = match_to_requests(counted, modification.added, lanes)
-    moved = {one.id: one for one in modification.moved}
+    parties, surplus = match_to_requests(counted, modification.added, lanes)
+    moved = {agent.id: agent for agent in modification.moved}
     picked = [(move, agent.id) for move in counted.moves for agent in find_picked(lanes, move.who)]
-    movers = [
-        Party(request=_as_request(move), agents=(moved[name],))
-        for move, name in picked
-        if name in moved
-    ]
+    for move, name in picked:
+        if name in moved:
+            request = VehicleRequest(
+                spot=move.spot,
+                facing=move.facing,
+                turn_deg=move.turn_deg,
+                speed_mps=move.speed_mps,
+                count=1,
+            )
+            parties.append(Party(request=request, agents=(moved[name],)))
+    gone = [agent.id for pick in intent.removals for agent in find_picked(lanes, pick)]
     return Asked(
         modification=modification,
         lanes=lanes,
-        matching=replace(matching, parties=(*matching.parties, *movers)),
+        parties=tuple(parties),
+        surplus=surplus,
         tolerances=tolerances,
         to_move=frozenset(name for _, name in picked),
-        to_remove=frozenset(
-            agent.id for pick in intent.removals for agent in find_picked(lanes, pick)
-        ),
+        to_remove=frozenset(gone),
         unmet=intent.unmet,
     )
 
 
-def _as_request(move: Move) -> VehicleRequest:
-    return VehicleRequest(
-        spot=move.spot,
-        facing=move.facing,
-        turn_deg=move.turn_deg,
-        speed_mps=move.speed_mps,
-        count=1,
-    )
-
-
-def _settled(found: Iterable[Finding], held: Iterable[Finding], asked: Asked) -> Iterable[Finding]:
+def _settled(alone: Iterable[Finding], held: Iterable[Finding], asked: Asked) -> Iterable[Finding]:
     """The findings of the checks that ask for nothing, now that it is known what was asked for.
 
     What is doubtful "unless the instruction asks for it" is a fact where it does: a heading
@@ -174,34 +149,20 @@ def _settled(found: Iterable[Finding], held: Iterable[Finding], asked: Asked) ->
     place across it has been, or of what stands where that belongs which it is taken for. Where
     and how a thing stands that nobody asked for is no fault of its own.
     """
-    mistyped = {agent.id for party in asked.parties for agent, _ in party.mistyped}
-    answering = {
-        agent.id
-        for party in asked.parties
-        for agent in party.everyone
-        if not isinstance(party.request, VehicleRequest) or party.request.spot.lane is not None
-    }
-    surplus = {agent.id for agent in asked.matching.surplus}
-    across = {
-        name
-        for one in held
-        if one.kind in (FindingKind.ASKED_ACROSS, FindingKind.ASKED_SIDE)
-        for name in one.agents
-    }
-    for one in found:
-        name = one.agents[0]
+    answering, placed = set[str](), set[str]()
+    for party in asked.parties:
+        placed.update(agent.id for agent, _ in party.mistyped)
+        if not isinstance(party.request, VehicleRequest) or party.request.spot.lane is not None:
+            answering.update(agent.id for agent in party.everyone)
+    for finding in held:
+        if finding.kind in (FindingKind.ASKED_ACROSS, FindingKind.ASKED_SIDE):
+            placed.update(finding.agents)
+    surplus = {agent.id for agent in asked.surplus}
+    for finding in alone:
+        name, is_doubtful = finding.agents[0], finding.severity is Severity.DOUBTFUL
         is_settled = (
-            (one.kind is FindingKind.HEADING and name in answering)
-            or (
-                one.kind is FindingKind.OFF_ROAD
-                and one.severity is Severity.DOUBTFUL
-                and name in across | mistyped
-            )
-            or (one.kind in _OF_PLACE and name in surplus)
+            (finding.kind is FindingKind.HEADING and name in answering)
+            or (finding.kind is FindingKind.OFF_ROAD and is_doubtful and name in placed)
+            or (finding.kind in _OF_PLACE and name in surplus)
         )
-        yield replace(one, severity=Severity.FACT) if is_settled else one
-
-
-_OF_PLACE = frozenset(
-    {FindingKind.HEADING, FindingKind.DEGREES, FindingKind.WALK_HEADING, FindingKind.OFF_ROAD}
-)
+        yield replace(finding, severity=Severity.FACT) if is_settled else finding

@@ -1,9 +1,9 @@
-"""One modification on one ground: what every check looks at."""
+"""One modification on one ground: what every check that needs no intent looks at."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -38,7 +38,7 @@ class ChangedScene:
 
     @classmethod
     def of(cls, ground: Ground, modification: Modification) -> ChangedScene:
-        """The modification on its ground.
+        """Return the modification on its ground.
 
         Raises:
             InvalidModification: It does not fit the scene.
@@ -49,7 +49,14 @@ class ChangedScene:
     @cached_property
     def boxes(self) -> dict[str, Box]:
         """Everybody's box, by id."""
-        return {agent.id: _box(agent) for agent in self.everyone}
+        return {
+            agent.id: replace(
+                agent.box,
+                length_m=max(agent.length_m, _SMALLEST_M),
+                width_m=max(agent.width_m, _SMALLEST_M),
+            )
+            for agent in self.everyone
+        }
 
     @cached_property
     def beside(self) -> dict[str, tuple[Beside, ...]]:
@@ -58,16 +65,25 @@ class ChangedScene:
         return {agent.id: lanes.beside(agent.x_m, agent.y_m) for agent in self.changed}
 
     def under(self, agent: TrafficAgent) -> Beside | None:
-        """The lane under a changed agent; of several the one that fits its heading."""
+        """Return the lane under a changed agent; of several the one that fits its heading."""
         return best_aligned(self.beside[agent.id], agent.heading_rad)
 
     def nearest(self, agent: TrafficAgent) -> Beside | None:
-        """The lane whose edge is nearest to a changed agent, None on a map without lanes."""
+        """Return the lane whose edge is nearest to a changed agent, None without lanes."""
         return min(
             self.beside[agent.id],
             key=lambda one: (round(one.off_m, 4), round(one.distance_m, 4)),
             default=None,
         )
+
+    def new_pairs(self) -> Iterator[tuple[TrafficAgent, TrafficAgent]]:
+        """Yield every pair with a changed agent in it, that one first, each once."""
+        done: set[str] = set()
+        for agent in self.changed:
+            done.add(agent.id)
+            for other in self.everyone:
+                if other.id not in done:
+                    yield agent, other
 
     @cached_property
     def crashed(self) -> frozenset[str]:
@@ -86,13 +102,5 @@ Check = Callable[[ChangedScene], Iterator[Finding]]
 
 
 def is_stopped(agent: TrafficAgent) -> bool:
-    """Whether an agent stands."""
+    """Return whether an agent stands."""
     return abs(agent.speed_mps) < STOPPED_BELOW_MPS
-
-
-def _box(agent: TrafficAgent) -> Box:
-    return Box(
-        pose=agent.pose,
-        length_m=max(agent.length_m, _SMALLEST_M),
-        width_m=max(agent.width_m, _SMALLEST_M),
-    )

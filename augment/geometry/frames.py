@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,6 +39,15 @@ class Pose:
         cos, sin = math.cos(self.heading_rad), math.sin(self.heading_rad)
         turned = np.asarray(points_m, dtype=np.float64) @ np.array([[cos, sin], [-sin, cos]])
         return np.asarray(turned + np.array([self.x_m, self.y_m]), dtype=np.float64)
+
+    def beside(self, left_m: float) -> tuple[float, float]:
+        """Return the point so far to the left of the pose."""
+        x_m, y_m = self.to_parent(np.array([[0.0, left_m]]))[0].tolist()
+        return x_m, y_m
+
+    def turned(self, turn_rad: float) -> Pose:
+        """Return the pose turned on the spot, to the left."""
+        return replace(self, heading_rad=wrap(self.heading_rad + turn_rad))
 
     def pose_to_local(self, other: Pose) -> Pose:
         """Another pose of the same parent frame, seen from this one."""

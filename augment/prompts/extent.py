@@ -20,6 +20,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
+import shapely
 from numpy.typing import NDArray
 
 from augment.geometry.polyline import Polyline
@@ -149,8 +150,6 @@ def shown_spans(scene: Scene, radius_m: float) -> dict[str, tuple[float, float]]
 
 def boundary_near(area: Area, extent: Extent, tolerance_m: float) -> FloatArray:
     """Return an area's boundary (P, 2) as it is shown; empty for one that is not shown."""
-    import shapely
-
     boundary = boundary_within(np.array(area.boundary_m, dtype=np.float64), extent.box_m)
     if len(boundary) and extent.routes_m is not None:
         polygon = shapely.make_valid(shapely.Polygon(boundary))
@@ -177,8 +176,6 @@ def simplify_boundary(boundary_m: FloatArray, tolerance_m: float) -> FloatArray:
 
     A boundary that would be less than a triangle stays as it is.
     """
-    import shapely
-
     closed = shapely.LineString([*boundary_m, boundary_m[0]])
     simple = shapely.simplify(closed, tolerance_m, preserve_topology=False)
     kept = shapely.get_coordinates(simple)[:-1]

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Annotated, Literal, Self, TypeVar
 
+from numpy.random import Generator
 from pydantic import Field, model_validator
 
 from augment.scene.entities import TurnType
@@ -223,6 +224,10 @@ class Length:
     def is_range(self) -> bool:
         """Whether a value has to be drawn from it."""
         return self.high_m > self.low_m
+
+    def drawn(self, rng: Generator) -> float:
+        """Return a length of the range, evenly drawn."""
+        return float(rng.uniform(self.low_m, self.high_m))
 
     @property
     def middle_m(self) -> float:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
+import shapely
 
 from augment.scene.entities import AgentType, Modification, ScenarioType
 from augment.simulation.drive import Drive, Expert
@@ -65,8 +66,6 @@ def ego_ways(road: Road, centres_m: FloatArray, headings_rad: FloatArray) -> Int
     The way stays the one it was while that contains the centre. Else one of the ways there is
     taken: one that follows the old way, then one of the route, then the best aligned.
     """
-    import shapely
-
     ways = np.full(len(centres_m), NO_WAY, dtype=np.int64)
     before = NO_WAY
     for moment, row in enumerate(road.covering(centres_m)):

@@ -6,13 +6,13 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
+import shapely
+from shapely.geometry.base import BaseGeometry
 
 from augment.simulation.states import BoolArray, FloatArray
 
 if TYPE_CHECKING:
     from scipy.spatial import KDTree
-    from shapely.geometry.base import BaseGeometry
-
 SPACING_M = 0.5
 
 
@@ -103,21 +103,15 @@ class Region:
     """A polygon or several, as ground; the edge itself counts as outside."""
 
     def __init__(self, ground: BaseGeometry) -> None:
-        import shapely
-
         shapely.prepare(ground)
         self.ground = ground
 
     def contains(self, points_m: FloatArray) -> BoolArray:
         """Return which points (..., 2) lie inside, (...,)."""
-        import shapely
-
         return np.asarray(shapely.contains_xy(self.ground, points_m[..., 0], points_m[..., 1]))
 
     def distance_m(self, points_m: FloatArray) -> FloatArray:
         """Return how far points (..., 2) are from the ground; infinite where there is none."""
-        import shapely
-
         if shapely.is_empty(self.ground):
             return np.full(points_m.shape[:-1], np.inf)
         return np.asarray(shapely.distance(shapely.points(points_m), self.ground))

@@ -8,10 +8,11 @@ from __future__ import annotations
 import math
 from collections import Counter
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
+import shapely
 from numpy.typing import NDArray
+from shapely import STRtree
 
 from augment.checks.ground import rings, strips
 from augment.errors import CannotDrive
@@ -22,9 +23,6 @@ from augment.scene.lane_graph import AnyLane, LaneGraph
 from augment.scene.recording import Recording
 from augment.simulation.path import Path, Region, dense
 from augment.simulation.states import BoolArray, FloatArray, IntArray
-
-if TYPE_CHECKING:
-    from shapely import STRtree
 
 ROUTE_M = 600.0
 """Collected ahead of the ego, as far as the map goes: 15 s at 20 m/s, and what a planner sees."""
@@ -221,8 +219,6 @@ class Road:
 
     def covering(self, points_m: FloatArray) -> BoolArray:
         """Return which ways (W,) lie under points (N, 2), (N, W); an edge counts as outside."""
-        import shapely
-
         covers = np.zeros((len(points_m), len(self.names)), dtype=np.bool_)
         points, ways = self._tree.query(shapely.points(points_m), predicate="within")
         covers[points, ways] = True
@@ -244,8 +240,6 @@ class Road:
 
     @cached_property
     def _tree(self) -> STRtree:
-        import shapely
-
         return shapely.STRtree(self.strips)
 
     @cached_property
@@ -268,8 +262,6 @@ class Road:
 
     def _joints(self, names: tuple[str, ...]) -> NDArray[np.object_]:
         """The wedges between ways that follow each other in a bend."""
-        import shapely
-
         wedges = []
         for before in names:
             for after in self.graph.successors(before):
@@ -281,8 +273,6 @@ class Road:
 
     def _aprons(self) -> NDArray[np.object_]:
         """The run-out of the route's last way and of its neighbours."""
-        import shapely
-
         aprons = []
         for name in sorted(self.graph.abreast(self.route[-1])) if self._ends else ():
             way = self.graph.lanes[name]
@@ -313,7 +303,5 @@ def _rim(way: AnyLane, end: int) -> FloatArray:
 
 
 def _region(*pieces: NDArray[np.object_]) -> Region:
-    import shapely
-
     whole = np.concatenate(pieces)
     return Region(shapely.union_all(whole[~shapely.is_empty(whole)]))

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 import numpy as np
+import shapely
 
 from augment.scene.entities import Modification, ScenarioType
 from augment.simulation.drive import Drive, Expert
@@ -168,8 +169,6 @@ def _deceleration(drive: Drive, moment: int) -> float:
 
 def _distance(box: FloatArray, objects: Objects) -> float:
     """From the ego's body to the nearest other."""
-    import shapely
-
     bodies = shapely.polygons(corners(objects.boxes))
     return float(shapely.distance(bodies, shapely.Polygon(corners(box))).min())
 

@@ -10,6 +10,7 @@ from enum import StrEnum
 from typing import Any
 
 import numpy as np
+import shapely
 
 from augment.scene.entities import AreaKind
 from augment.simulation.drive import Drive
@@ -149,8 +150,6 @@ def _plans(drive: Drive) -> list[dict[str, Any]]:
 
 def _road(drive: Drive) -> dict[str, Any]:
     """The ground near the drive, as rings and lines of x, y, x, y, ..."""
-    import shapely
-
     low = drive.boxes[:, :2].min(axis=0) - _AROUND_M
     high = drive.boxes[:, :2].max(axis=0) + _AROUND_M
     window = shapely.box(*low, *high)

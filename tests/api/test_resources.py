@@ -13,10 +13,10 @@ from django.urls import reverse
 
 from arena.api.urls import urlpatterns
 from arena.models import Snapshot
+from arena.people.services import make_first_link_token
 from arena.services.early_looks import open_early
-from arena.services.first_start import make_first_link_token
 from arena.services.ratings import rate
-from arena.services.studies import close_study
+from arena.studies.services.opening import close_study
 from augment.models import Contestant, Event, GenerationJob
 from tests.api.asking import error_of
 from tests.api.tokens import program, program_of

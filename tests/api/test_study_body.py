@@ -8,8 +8,8 @@ from typing import Any
 import pytest
 
 from arena.models import Study
-from arena.services.study_plan import PLAN_INPUTS, StudyPlan
 from arena.studies.api import StudyBody
+from arena.studies.services.plan import PLAN_INPUTS, StudyPlan
 from augment.services.inputs import InputKind
 from tests.api.asking import error_of
 from tests.api.tokens import program_of

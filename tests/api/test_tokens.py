@@ -12,10 +12,10 @@ from django.utils import timezone
 from pytest_django import DjangoAssertNumQueries
 
 from arena.models import ApiToken
-from arena.queries.api_tokens import effective_role
-from arena.services import api_tokens
-from arena.services.accounts import set_active, set_role
-from arena.services.api_tokens import make_api_token
+from arena.people import links
+from arena.people.links import make_api_token
+from arena.people.queries import effective_role
+from arena.people.services import set_active, set_role
 from augment.errors import UnknownName
 from tests.api.asking import error_of
 from tests.api.tokens import program, program_of, secret_of
@@ -42,7 +42,7 @@ def test_the_page_shows_a_new_token_once_and_keeps_only_its_hash() -> None:
     shown = page.post(reverse("api-tokens"), given).content.decode()
     row = ApiToken.objects.get()
     secret = shown.partition('id="secret" value="')[2].partition('"')[0]
-    assert secret.startswith(api_tokens.PREFIX)
+    assert secret.startswith(links.PREFIX)
     assert role_at(program(secret)) == "analyst"
     stored = [str(value) for value in ApiToken.objects.values_list().get()]
     assert not any(secret in value for value in stored)
@@ -152,7 +152,7 @@ def test_an_analysts_token_of_an_admin_changes_nothing() -> None:
 
 
 def test_use_is_remembered_and_limited_by_role(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(api_tokens.REQUESTS, "expert", 3)
+    monkeypatch.setitem(links.REQUESTS, "expert", 3)
     accounts = people()
     asking, other = program_of(accounts["expert"]), program_of(accounts["analyst"])
     assert ApiToken.objects.exclude(last_used_at=None).count() == 0
@@ -174,4 +174,4 @@ def test_a_request_is_counted_by_one_statement_so_that_none_between_is_refused(
     for began in (None, timezone.now() - timedelta(seconds=61), timezone.now()):
         ApiToken.objects.update(window_began_at=began)
         with django_assert_num_queries(3):  # the token with its owner, their roles, the count
-            api_tokens.use_api_token(secret)
+            links.use_api_token(secret)

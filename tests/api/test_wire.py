@@ -11,7 +11,7 @@ from pytest_django import Settings
 
 from arena.models import Study, Vote
 from arena.queries.voting.showings import VIEW_OF_OLD
-from arena.services.studies import close_study
+from arena.studies.services.opening import close_study
 from augment.models import Contestant, Event, GenerationJob
 from tests.api.asking import body_for, error_of, post, signed_in
 from tests.append_only import rewriting

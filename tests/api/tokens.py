@@ -5,8 +5,8 @@ from __future__ import annotations
 from django.contrib.auth.models import User
 from django.test import Client
 
-from arena.queries.api_tokens import roles_offered
-from arena.services.api_tokens import make_api_token
+from arena.people.links import make_api_token
+from arena.people.queries import roles_offered
 
 
 def secret_of(user: User, role: str | None = None) -> str:

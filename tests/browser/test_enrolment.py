@@ -8,8 +8,8 @@ from django.test import Client
 from playwright.sync_api import expect
 
 from arena.models import Study
-from arena.services.enrolments import set_enrolment
-from arena.services.people import create_person
+from arena.people.services import create_person
+from arena.studies.services.taking_part import set_enrolment
 from augment.models import Augmentation
 from tests.browser.booth import PHONE, Booth, ready
 from tests.browser.test_voting_page import faults

@@ -7,7 +7,7 @@ from django.contrib.auth.models import User
 from django.urls import reverse
 from playwright.sync_api import expect
 
-from arena.services.invitations import invite
+from arena.people.links import invite
 from tests.browser.booth import Booth
 from tests.browser.chromium import PATIENCE_MS
 

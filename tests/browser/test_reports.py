@@ -7,7 +7,7 @@ from django.urls import reverse
 from playwright.sync_api import Locator, Position, expect
 
 from arena.models import Report
-from arena.services.people import create_person
+from arena.people.services import create_person
 from tests.browser.booth import DESK, PHONE, Booth, press
 from tests.browser.test_voting_page import faults
 

@@ -8,7 +8,7 @@ import pytest
 from django.urls import reverse
 from playwright.sync_api import Page, expect
 
-from arena.services.people import create_person
+from arena.people.services import create_person
 from augment.models import BaseScene
 from tests.browser.booth import Booth
 

@@ -9,7 +9,7 @@ from axe_playwright_python.sync_playwright import Axe
 from playwright.sync_api import Page, expect
 
 from arena.models import Report
-from arena.services.studies import close_study
+from arena.studies.services.opening import close_study
 from tests import study_rows
 from tests.browser.booth import PHONE, Booth, press, ready
 

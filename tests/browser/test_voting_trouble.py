@@ -8,7 +8,7 @@ from playwright.sync_api import BrowserContext, Dialog, Page, Route, expect
 from pytest_django import Settings
 
 from arena.models import Vote
-from arena.services.studies import close_study
+from arena.studies.services.opening import close_study
 from tests import study_rows
 from tests.browser.booth import Booth, all_sent, let_bounce, press, ready
 from tests.held_lock import kept_busy

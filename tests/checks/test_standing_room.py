@@ -87,8 +87,8 @@ def test_an_area_that_crosses_itself_is_the_ground_that_it_encloses() -> None:
     tie = Area(id="A", kind=AreaKind.DRIVABLE, boundary_m=((0, 0), (4, 4), (4, 0), (0, 4)))
     flat = Area(id="B", kind=AreaKind.DRIVABLE, boundary_m=((0, 0), (4, 0), (9, 0)))
     box = corners(Pose(x_m=2.0, y_m=2.0, heading_rad=0.0), 4.0, 4.0)
-    assert Surface.of(areas=(tie, flat)).share_outside(box) == pytest.approx(0.5)
-    assert Surface.of(areas=(flat,)).is_empty
+    assert Surface(areas=(tie, flat)).share_outside(box) == pytest.approx(0.5)
+    assert Surface(areas=(flat,)).is_empty
 
 
 @pytest.mark.parametrize(

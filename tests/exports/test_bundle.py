@@ -21,7 +21,7 @@ from arena.exports.writers import FORMATS
 from arena.models import Snapshot, Study
 from arena.queries.votes.sets import Filters
 from arena.services.ratings import rate
-from arena.services.studies import close_study
+from arena.studies.services.opening import close_study
 from augment.errors import UnknownName
 from augment.models import Event
 from tests.full_study import Size, full_study

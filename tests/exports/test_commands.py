@@ -10,7 +10,7 @@ from django.core.management import CommandError, call_command
 from django.test import Client
 
 from arena.models import Study
-from arena.services.people import create_person
+from arena.people.services import create_person
 from augment.models import Event
 from tests.exports.test_ratings import voted_study
 from tests.study_rows import a_study, cast_of

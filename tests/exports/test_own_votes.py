@@ -15,11 +15,11 @@ from hypothesis import strategies as st
 from arena.exports.bundle import bundle
 from arena.models import Snapshot, Study
 from arena.pairing.order import MAIN
+from arena.people.links import mark_author
 from arena.queries.votes.judged import Entrant, Judged
 from arena.queries.votes.sets import Filters, VoteSet
 from arena.rating.leaderboard import rate as rate_votes
 from arena.rating.snapshot_document import OwnVotes
-from arena.services.authorships import mark_author
 from arena.services.own_votes import OTHER_ROUNDS, with_and_without
 from arena.services.ratings import rate
 from arena.services.snapshots import votes_of

@@ -10,7 +10,7 @@ from django.utils import timezone
 
 from arena.models import Snapshot
 from arena.services.ratings import RATINGS, is_big, plan_snapshot
-from arena.services.studies import close_study
+from arena.studies.services.opening import close_study
 from augment.models import Event
 from tests.study_rows import a_study, vote
 from tests.web.cast import people, signed_in

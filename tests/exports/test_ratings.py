@@ -6,12 +6,12 @@ import pytest
 
 from arena.errors import NotYours, StudyStillOpen
 from arena.models import Snapshot, Study, Vote
+from arena.people.services import create_person
 from arena.queries.studies.results import ResultsAccess, latest_snapshot, results_access
 from arena.services.early_looks import open_early
-from arena.services.people import create_person
 from arena.services.ratings import rate
 from arena.services.simulation import simulate_votes
-from arena.services.studies import close_study
+from arena.studies.services.opening import close_study
 from augment.errors import Conflict
 from augment.models import Augmentation, Event, Scenario
 from augment.scene.codec import modification_to_document

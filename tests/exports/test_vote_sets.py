@@ -15,8 +15,8 @@ from arena.queries.votes.judged import last_vote_of
 from arena.queries.votes.sets import Filters, vote_set
 from arena.services.ratings import rate
 from arena.services.snapshots import votes_of
-from arena.services.studies import close_study
 from arena.services.vote_rows import COLUMNS, digest_of, vote_rows, votes_csv
+from arena.studies.services.opening import close_study
 from augment.errors import Conflict
 from augment.models import Contestant, Scenario
 from augment.scene.entities import ScenarioType

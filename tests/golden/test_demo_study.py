@@ -27,7 +27,7 @@ from arena.jobs.exports.displacement import displacement_table
 from arena.jobs.exports.displacement_files import FORMATS as DISPLACEMENT
 from arena.management.demo import JOB, RATED, SIMULATED_EXPERTS, SIMULATED_STUDY, vote_and_rate
 from arena.models import Person, Study
-from arena.models.tokens import fresh_token
+from arena.models.people import fresh_token
 from augment.models import Augmentation, GenerationJob
 from augment.scene.codec import modification_to_document
 from augment.scene.entities import Modification, ScenarioType

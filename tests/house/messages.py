@@ -13,11 +13,10 @@ from tests.house.source import ROOT
 VOTER_MODULES = (
     *("arena/api/errors.py", "arena/models/votes.py", "arena/templatetags/shell.py"),
     *("arena/queries/voting/descriptions.py", "arena/queries/voting/measures.py"),
-    *("arena/queries/voting/keys.py", "arena/services/api_tokens.py"),
-    *("arena/services/enrolments.py", "arena/services/preferences.py"),
-    *("arena/web/people/api_tokens.py", "arena/web/people/enrolments.py", "arena/web/forms.py"),
-    *("arena/web/people/accounts.py", "arena/web/voting/practice.py"),
-    *("arena/web/screen.py", "arena/web/voting/pages.py"),
+    *("arena/queries/voting/keys.py", "arena/people/services.py", "arena/people/links.py"),
+    *("arena/people/pages.py", "arena/site/forms.py", "arena/voting/screen.py"),
+    *("arena/studies/pages/experts.py", "arena/studies/services/taking_part.py"),
+    *("arena/web/voting/practice.py", "arena/web/voting/pages.py"),
 )
 """Modules whose messages stand on pages that voters are shown."""
 

@@ -7,8 +7,8 @@ import ast
 from tests.house.messages import VOTER_MODULES
 from tests.house.source import walked
 
-CHOOSING = {"arena.web.language", "arena.web.people.sign_in"}
-"""Modules that choose the language of an answer and mark no text."""
+CHOOSING = {"arena.site.language"}
+"""It chooses the language of an answer and marks no text."""
 
 
 def test_only_modules_of_the_catalogue_translate() -> None:

@@ -20,7 +20,7 @@ from scipy import stats
 
 from arena.jobs.services import open_labelling
 from arena.models import LabellingRound, Matchup, Study
-from arena.services.studies import close_study
+from arena.studies.services.opening import close_study
 from augment.models import Augmentation, Contestant, Endpoint, GenerationJob
 from augment.services.scenarios.pictures import store
 from tests.described import a_described_study

@@ -4,8 +4,8 @@ import math
 
 import pytest
 
-from augment.checks import FindingKind, findings
-from augment.checks.finding import FAULT_OF, FaultClass
+from augment.checks import findings
+from augment.checks.finding import FaultClass
 from augment.metrics.fault_guess import first_guess
 from augment.scene.entities import Modification, TrafficAgent
 from tests.scenes import scene, vehicle
@@ -26,7 +26,3 @@ def test_each_class_is_guessed_from_what_was_measured(
 ) -> None:
     found = findings(scene(), Modification(added=placed))
     assert first_guess(found) == classes
-
-
-def test_every_kind_of_finding_has_a_class() -> None:
-    assert set(FAULT_OF) == set(FindingKind)

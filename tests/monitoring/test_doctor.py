@@ -14,7 +14,7 @@ from pytest_django import Settings
 
 from arena.management.doctor import Level, examine
 from arena.models import ApiToken
-from arena.services.people import create_person
+from arena.people.services import create_person
 from arena.serving import readiness
 from augment.models import Endpoint, GenerationJob, Worker
 from augment.services.clock import DATABASE_TIME

@@ -11,10 +11,10 @@ from django.test import Client
 from django.urls import reverse
 
 from arena.models import Matchup, Snapshot, Standing, Study, Vote
+from arena.people.services import create_person
 from arena.rating.snapshot_document import Results
-from arena.services.people import create_person
 from arena.services.ratings import rate
-from arena.services.studies import close_study
+from arena.studies.services.opening import close_study
 from augment.models import Contestant
 from tests.full_study import Size, contestants, draw_votes, pictures, scenarios
 from tests.opening import open_study

@@ -12,7 +12,7 @@ from django.core.files.storage import default_storage
 from django.core.management import call_command
 
 from arena.services.ratings import rate
-from arena.services.studies import close_study
+from arena.studies.services.opening import close_study
 from augment.services.events import log_event
 from tests.study_rows import a_study, matchups_of, vote, write_changes
 

@@ -6,9 +6,8 @@ import pytest
 from django.contrib.auth.models import Group, User
 from pytest_django import DjangoAssertNumQueries
 
-from arena.queries.accounts import AccountBackend
-from arena.queries.people import has_admin, role_of
-from arena.services.people import create_person
+from arena.people.queries import AccountBackend, has_admin, role_of
+from arena.people.services import create_person
 
 pytestmark = pytest.mark.django_db
 

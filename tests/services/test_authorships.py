@@ -8,8 +8,8 @@ from django.core.management import CommandError, call_command
 
 from arena.errors import NotYours
 from arena.models import Authorship, Study
-from arena.queries.studies.authorships import authors_of
-from arena.services.authorships import mark_author, take_back_author
+from arena.people.links import mark_author, take_back_author
+from arena.studies.queries import authors_of
 from augment.errors import UnknownName
 from augment.models import Event
 from tests.study_rows import contestant, expert

@@ -16,7 +16,7 @@ from django.db.models.signals import pre_save
 from arena.errors import NothingToPlan
 from arena.jobs.services import open_labelling
 from arena.models import Invitation, LabellingRound
-from arena.services.invitations import FreshLink, invite
+from arena.people.links import FreshLink, invite
 from augment.errors import Conflict
 from augment.models import GenerationJob
 from tests.exports.test_displacement import a_job

@@ -11,7 +11,7 @@ from django.utils import timezone
 
 from arena.errors import LinkOver
 from arena.models import Invitation, Study
-from arena.services.invitations import accept, invite, revoke
+from arena.people.links import accept, invite, revoke
 from augment.errors import Conflict
 from augment.models import Event
 

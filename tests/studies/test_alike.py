@@ -8,9 +8,9 @@ from arena.models import Study
 from arena.pairing.plan import plan
 from arena.queries.votes.judged import last_vote_of
 from arena.queries.votes.sets import Filters, vote_set
-from arena.services.plans import rules_of
 from arena.services.ratings import rate
-from arena.services.studies import close_study
+from arena.studies.services.opening import close_study
+from arena.studies.services.planning import rules_of
 from augment.models import Augmentation
 from augment.scene.codec import modification_to_document
 from augment.scene.entities import Modification

@@ -9,11 +9,10 @@ from django.utils import timezone
 
 from arena.errors import EnrolmentOver
 from arena.models import EnrolledVoter, Enrolment, Study
-from arena.queries.studies.enrolments import own_enrolment, state_of
-from arena.services.accounts import forget_identity
-from arena.services.enrolments import drop_silent, enrol, set_enrolment
-from arena.services.people import create_person
-from arena.services.studies import close_study
+from arena.people.services import create_person
+from arena.studies.queries import own_enrolment, state_of
+from arena.studies.services.opening import close_study
+from arena.studies.services.taking_part import drop_silent, enrol, forget_identity, set_enrolment
 from augment.errors import Conflict
 from augment.models import Event
 from tests.study_rows import a_study, matchups_of, vote
@@ -69,7 +68,7 @@ def test_with_every_place_taken_nobody_is_taken_on(study: Study) -> None:
     with pytest.raises(EnrolmentOver, match="Every place"):
         join(enrolment, "w-3")
     assert study.matchups.count() == before
-    assert state_of(enrolment).free == 0
+    assert state_of(enrolment)["free"] == 0
 
 
 def test_one_id_has_one_place(study: Study) -> None:
@@ -105,7 +104,7 @@ def test_the_code_is_told_when_every_pair_has_an_answer(study: Study) -> None:
     told = own_enrolment(study, voter.expert)
     assert told is not None
     assert told.completion_code == voter.completion_code
-    assert state_of(voter.enrolment).done == 1
+    assert state_of(voter.enrolment)["done"] == 1
 
 
 @pytest.mark.parametrize(("hours", "places"), [(23.9, 0), (24.1, 1)])
@@ -114,7 +113,7 @@ def test_who_is_silent_for_too_long_makes_room(study: Study, hours: float, place
     voter = join(enrolment, "w-1")
     age(voter, hours=hours)
     assert drop_silent(enrolment=enrolment) == places
-    assert state_of(enrolment).free == places
+    assert state_of(enrolment)["free"] == places
     assert study.matchups.filter(expert=voter.expert).count() == (0 if places else 6)
 
 
@@ -155,7 +154,7 @@ def test_who_is_forgotten_before_the_end_makes_room_at_once(
     voter = join(enrolment, "w-1")
     answer(study, voter, answered)
     forget_identity(user=voter.expert, actor=admin)
-    assert state_of(enrolment).free == free
+    assert state_of(enrolment)["free"] == free
     assert study.matchups.filter(expert=voter.expert).count() == answered
     assert Event.objects.filter(verb="drop out", actor=admin).count() == free
     if free:

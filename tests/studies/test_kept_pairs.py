@@ -7,8 +7,8 @@ import uuid
 import pytest
 
 from arena.models import Matchup
-from arena.services.handing_over import hand_over
-from arena.services.reports import Complaint, report
+from arena.studies.services.experts import Complaint, report
+from arena.studies.services.taking_part import hand_over
 from tests.opening import open_study
 from tests.study_rows import cast_of, matchups_of, vote
 

@@ -16,10 +16,13 @@ from arena.exports.tables import leaderboard_table
 from arena.exports.writers import FORMATS, plain_text
 from arena.models import Study
 from arena.rating.snapshot_document import PairP
-from arena.services.hypotheses import HypothesisVerdict
-from arena.services.preregistration import preregistration_bytes, preregistration_sha256
 from arena.services.ratings import rate
-from arena.services.studies import close_study
+from arena.studies.services.opening import (
+    close_study,
+    preregistration_bytes,
+    preregistration_sha256,
+)
+from arena.studies.services.plan import HypothesisVerdict
 from augment.models import Contestant
 from tests import study_rows
 from tests.opening import open_study

@@ -11,11 +11,11 @@ from django.contrib.auth.models import User
 from arena.errors import NotYours
 from arena.models import Study, Vote
 from arena.pairing.order import MAIN
-from arena.queries.studies.progress import of_expert, of_study
 from arena.queries.voting.ballots import tallies, voting_progress
-from arena.services.handing_over import hand_over
-from arena.services.replanning import next_pairs, plan_batch
-from arena.services.reports import Complaint, report
+from arena.studies.queries import of_expert, of_study
+from arena.studies.services.experts import Complaint, report
+from arena.studies.services.planning import next_pairs, plan_batch
+from arena.studies.services.taking_part import hand_over
 from augment.errors import Conflict, UnknownName
 from augment.models import Event
 from tests.opening import open_study

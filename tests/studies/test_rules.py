@@ -7,10 +7,9 @@ from collections import Counter
 import pytest
 
 from arena.models import Study
-from arena.services.handing_over import hand_over
-from arena.services.plans import pictures_of
-from arena.services.replanning import plan_batch
-from arena.services.studies import rules_of
+from arena.studies.services.opening import rules_of
+from arena.studies.services.planning import pictures_of, plan_batch
+from arena.studies.services.taking_part import hand_over
 from augment.models import Augmentation, Scenario
 from augment.scene.codec import modification_to_document
 from augment.scene.entities import Modification

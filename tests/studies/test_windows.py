@@ -9,7 +9,7 @@ from arena.models import Matchup, Study
 from arena.queries.voting.showings import VIEW_OF_OLD, view_shown
 from arena.scenarios.services import redraw_pictures
 from arena.services.frames import find_frames
-from arena.services.plans import pictures_of, planned_so_far
+from arena.studies.services.planning import pictures_of, planned_so_far
 from augment.models import Augmentation, Scenario
 from augment.scene.codec import modification_to_document
 from augment.scene.entities import Modification

@@ -11,8 +11,8 @@ from arena.models import EarlyLook, Vote
 from arena.queries.voting.ballots import current_votes, recent_votes
 from arena.queries.voting.path import upcoming
 from arena.services.decisions import decision_of
-from arena.services.studies import close_study
 from arena.services.votes import PACE_WINDOW, cast_vote, receive_vote
+from arena.studies.services.opening import close_study
 from augment.errors import Conflict
 from tests.study_rows import a_study, expert, matchups_of, vote
 

@@ -16,9 +16,9 @@ from django.db import connection
 from arena.errors import NothingToPlan, NotYours
 from arena.models import Matchup, Report, Study, Vote
 from arena.services.decisions import decision_of
-from arena.services.handing_over import hand_over
-from arena.services.reports import Complaint, report
 from arena.services.votes import receive_vote
+from arena.studies.services.experts import Complaint, report
+from arena.studies.services.taking_part import hand_over
 from augment.models import Event
 from tests.study_rows import a_study
 

@@ -16,9 +16,9 @@ from arena.errors import VotesUnreadable
 from arena.models import ImportedVote, Matchup, Snapshot, Study, Vote, VoteFile
 from arena.services import ratings, snapshots, vote_imports
 from arena.services.decisions import decision_of
-from arena.services.studies import close_study
 from arena.services.vote_imports import DEAD_AFTER, import_votes
 from arena.services.votes import receive_vote
+from arena.studies.services.opening import close_study
 from augment.errors import Conflict
 from augment.models import Event
 from tests.opening import open_study

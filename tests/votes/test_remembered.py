@@ -11,13 +11,12 @@ from django.test.utils import CaptureQueriesContext
 from django.utils import timezone
 
 from arena.models import Study, Vote
-from arena.queries.studies.coverage import coverage
-from arena.queries.studies.invitations import expert_lines
 from arena.queries.votes.evidence import read_evidence
 from arena.queries.votes.lists import vote_page
 from arena.queries.votes.search import VoteSearch
 from arena.queries.voting.ballots import tallies
 from arena.services.ratings import rate
+from arena.studies.queries import coverage, expert_lines
 from tests import study_rows
 from tests.mixed_study import mixed_study
 
@@ -61,9 +60,7 @@ def test_a_second_look_asks_for_no_votes() -> None:
     study = mixed_study()
     snapshot = rate(study=study)
     for look in (
-        lambda: coverage(study),
         lambda: tallies(study),
-        lambda: expert_lines(study, timezone.now()),
         lambda: read_evidence(snapshot),
         lambda: list(vote_page(snapshot, VoteSearch(order="disputed"), 1)),
     ):

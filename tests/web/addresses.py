@@ -6,10 +6,9 @@ import uuid
 
 from django.urls import reverse
 
-from arena.services.authorships import mark_author
-from arena.services.invitations import invite
-from arena.services.reports import Complaint, report
-from arena.services.study_drafts import keep_draft
+from arena.people.links import invite, mark_author
+from arena.studies.services.drafts import keep_draft
+from arena.studies.services.experts import Complaint, report
 from augment.models import Endpoint, EndpointModel, SceneUpload, Simulation, UploadMoment
 from tests.web.cast import World
 

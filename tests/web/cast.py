@@ -12,7 +12,7 @@ from django.contrib.auth.models import User
 from django.test import Client
 
 from arena.models import Study
-from arena.services.people import create_person
+from arena.people.services import create_person
 from augment.models import Augmentation, Contestant, GenerationJob
 from augment.services.scenarios.pictures import store
 from tests import study_rows

@@ -13,7 +13,7 @@ from django.urls import reverse
 from arena.models import Matchup, Snapshot, Standing, Study, Vote
 from arena.services.early_looks import open_early
 from arena.services.ratings import rate
-from arena.services.studies import close_study
+from arena.studies.services.opening import close_study
 from augment.models import Augmentation, Contestant
 from tests import study_rows
 from tests.web.cast import people, signed_in, world

@@ -10,7 +10,7 @@ from django.contrib.auth.models import Group, User
 from django.test import Client
 from django.urls import reverse
 
-from arena.services.studies import close_study
+from arena.studies.services.opening import close_study
 from augment.models import Contestant, Scenario
 from tests.web.cast import people, signed_in, world
 

@@ -18,7 +18,7 @@ from django.utils import timezone
 
 from arena.models import EarlyLook, Snapshot, Study
 from arena.services.ratings import rate
-from arena.services.studies import close_study
+from arena.studies.services.opening import close_study
 from augment.models import Event
 from augment.services.events import log_event
 from tests import study_rows
@@ -101,13 +101,13 @@ DOORS = {
     "arena/management/commands/plan_study.py": "reads closed studies alone",
     "arena/management/commands/rate.py": "--early, logged",
     "arena/management/demo.py": "rates a study that it has closed",
-    "arena/management/exporting.py": "--early, logged",
-    "arena/web/studies/planning.py": "reads what the reader may read",
+    "arena/management/exporting/studies.py": "--early, logged",
+    "arena/studies/pages/planning.py": "reads what the reader may read",
     "arena/web/results/rating.py": "gives none: the page that asked leads to the gate",
     "arena/web/results/pages.py": "the gate",
     "arena/web/results/files.py": "behind the gate",
     "arena/web/results/evidence.py": "behind the gate",
-    "arena/web/studies/files.py": "asks results_access; what shows results needs it in full",
+    "arena/studies/pages/studies.py": "asks results_access; what shows results needs it in full",
 }
 """Every module of pages, API, admin and commands that makes something of results, and why nobody
 sees those of an open study through it without an early look."""

@@ -11,7 +11,7 @@ from django.test import Client
 from django.urls import reverse
 
 from arena.models import Authorship, Snapshot, Study
-from arena.services.authorships import mark_author
+from arena.people.links import mark_author
 from arena.services.ratings import rate
 from augment.models import Event
 from tests.full_study import Size, full_study

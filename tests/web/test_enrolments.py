@@ -10,8 +10,8 @@ from django.test import Client
 from django.urls import reverse
 
 from arena.models import Enrolment, Study
-from arena.services.enrolments import set_enrolment
-from arena.web.people.enrolments import VOTER_COOKIE
+from arena.studies.pages.experts import VOTER_COOKIE
+from arena.studies.services.taking_part import set_enrolment
 from tests.study_rows import a_study, matchups_of, vote
 from tests.web.cast import people, signed_in
 

@@ -16,7 +16,7 @@ from arena.queries.votes.evidence import VoteScore, read_evidence
 from arena.queries.votes.lists import neighbours, vote_page
 from arena.queries.votes.search import VoteSearch
 from arena.services.ratings import rate
-from arena.services.studies import close_study
+from arena.studies.services.opening import close_study
 from augment.models import Augmentation
 from augment.services.scenarios.pictures import store
 from tests.study_rows import a_study, hang, vote

@@ -13,7 +13,7 @@ from django.utils import timezone
 
 from arena.config.logs import HideKeys
 from arena.models import Invitation, Study
-from arena.services.invitations import invite
+from arena.people.links import invite
 from tests.study_rows import a_study
 from tests.web.cast import people, signed_in
 

@@ -10,7 +10,7 @@ from django.test import Client
 from django.urls import reverse
 
 from arena.models import Study
-from arena.web.questions import SURE, TYPED
+from arena.site.acts import SURE, TYPED
 from tests.study_rows import a_study
 from tests.web.cast import people
 

@@ -8,7 +8,7 @@ from django.urls import reverse
 
 from arena.models import Person
 from arena.services.ratings import rate
-from arena.services.studies import close_study
+from arena.studies.services.opening import close_study
 from tests.study_rows import a_study, vote
 from tests.web.cast import people, signed_in
 

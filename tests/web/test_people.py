@@ -16,16 +16,17 @@ from pytest_django import Settings
 
 from arena.config.logs import HideKeys
 from arena.models import Study, Vote
-from arena.queries.people import find_admins
-from arena.services.accounts import (
+from arena.people.queries import find_admins
+from arena.people.services import (
+    LINK_LIVES_S,
     accept_welcome,
-    forget_identity,
+    create_person,
+    make_first_link_token,
     make_welcome_token,
     set_active,
     set_role,
 )
-from arena.services.first_start import LINK_LIVES_S, make_first_link_token
-from arena.services.people import create_person
+from arena.studies.services.taking_part import forget_identity
 from augment.errors import Conflict
 from augment.models import Event
 from tests.study_rows import a_study, matchups_of, vote
@@ -67,7 +68,7 @@ def test_a_forged_or_old_first_link_opens_nothing(monkeypatch: pytest.MonkeyPatc
     token = make_first_link_token()
     assert token is not None
     assert first(token[:-1] + ("A" if token[-1] != "A" else "B"))[0] == 410
-    monkeypatch.setattr("arena.services.first_start.LINK_LIVES_S", -LINK_LIVES_S)
+    monkeypatch.setattr("arena.people.services.LINK_LIVES_S", -LINK_LIVES_S)
     assert first(token)[0] == 410
 
 

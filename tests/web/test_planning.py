@@ -10,9 +10,8 @@ from django.urls import reverse
 
 from arena.models import Study
 from arena.rating.planning import prospect
-from arena.services.prospects import known_of
 from arena.services.ratings import rate
-from arena.services.study_estimate import StudyEstimate
+from arena.studies.services.outlook import StudyEstimate, known_of
 from tests import study_rows
 from tests.web.cast import people, signed_in
 

@@ -7,11 +7,11 @@ from django.utils.translation import override
 
 from arena.errors import InvalidPreference
 from arena.models import Snapshot
+from arena.people.links import invite
+from arena.people.services import keep_voting
 from arena.queries.votes.sets import Filters
-from arena.services.handing_over import hand_over
-from arena.services.invitations import invite
-from arena.services.preferences import keep_voting
 from arena.services.ratings import RATINGS, plan_snapshot
+from arena.studies.services.taking_part import hand_over
 from augment.models import Event
 from augment.services.running import budget, jobs
 from augment.services.running.budget import Caps

@@ -9,7 +9,7 @@ import pytest
 from django.urls import reverse
 
 from arena.models import Report, Study
-from arena.services.reports import Complaint, report
+from arena.studies.services.experts import Complaint, report
 from tests import study_rows
 from tests.web.cast import World, people, signed_in, world
 

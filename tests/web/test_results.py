@@ -12,7 +12,7 @@ from django.urls import reverse
 
 from arena.models import Study
 from arena.services.ratings import rate
-from arena.services.studies import close_study
+from arena.studies.services.opening import close_study
 from augment.models import Contestant
 from tests import study_rows
 from tests.opening import open_study

@@ -10,7 +10,7 @@ from pytest_django import DjangoAssertNumQueries
 
 from arena.models import EarlyLook, Matchup, Study
 from arena.services.ratings import rate
-from arena.services.studies import close_study
+from arena.studies.services.opening import close_study
 from arena.web.results.tabs import TABS
 from augment.scene.entities import ScenarioType
 from tests import study_rows

@@ -8,10 +8,10 @@ import pytest
 from django.contrib.auth.models import User
 from django.urls import reverse
 
-from arena.queries.inventory import take_inventory
-from arena.queries.studies import progress
-from arena.queries.studies.coverage import coverage
 from arena.queries.voting.ballots import tallies, voting_progress
+from arena.site.queries import take_inventory
+from arena.studies import queries
+from arena.studies.queries import coverage
 from tests import study_rows
 from tests.web.ballots import ballot, page
 from tests.web.cast import people, signed_in, world
@@ -29,14 +29,14 @@ def test_a_skip_is_counted_apart_everywhere_and_a_vote_instead_of_it_counts() ->
     study_rows.vote(before.matchup, "skip", reason="other", supersedes=before.key)
 
     def counted() -> tuple[object, ...]:
-        line, eva = progress.of_study(study), tallies(study)[0]
-        own = progress.of_expert(first.expert)[0]
+        line, eva = queries.of_study(study), tallies(study)[0]
+        own = queries.of_expert(first.expert)[0]
         (main,) = coverage(study).kinds
         return (
             (line.voted, line.skipped, line.left),
             (eva.voted, eva.skips, eva.left),
             (own.voted, own.skipped, own.left),
-            (main.decided, take_inventory().votes, progress.of_studies()[0].voted),
+            (main.decided, take_inventory()["votes"], queries.of_studies()[0].voted),
         )
 
     assert counted() == ((1, 3, 2), (1, 2, 0), (1, 2, 0), (1, 1, 1))

@@ -13,9 +13,9 @@ from django.urls import reverse
 
 from arena.models import Study, StudyDraft
 from arena.pairing.plan import plan
-from arena.services.accounts import forget_identity
-from arena.services.plans import rules_of
-from arena.services.study_drafts import change_draft, keep_draft
+from arena.studies.services.drafts import change_draft, keep_draft
+from arena.studies.services.planning import rules_of
+from arena.studies.services.taking_part import forget_identity
 from tests import study_rows
 from tests.opening import open_study
 from tests.web.cast import people, signed_in

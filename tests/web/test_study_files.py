@@ -16,9 +16,8 @@ from pytest_django import Settings
 
 from arena.exports.study_files import STUDY_FILES
 from arena.models import EarlyLook, Study, StudyFile
-from arena.services.ending import cancel_study
 from arena.services.ratings import rate
-from arena.services.studies import close_study
+from arena.studies.services.opening import cancel_study, close_study
 from augment.models import Augmentation, Event, GenerationJob
 from augment.scene.codec import modification_to_document
 from augment.scene.entities import Modification

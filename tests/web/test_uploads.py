@@ -35,7 +35,7 @@ def working(monkeypatch: pytest.MonkeyPatch, django_capture_on_commit_callbacks:
         "arena.scenarios.pages.uploads.enqueue_moment", upload_moments.MOMENTS.perform
     )
     monkeypatch.setattr("arena.scenarios.pages.uploads.enqueue_scene", pictures.draw_scene)
-    monkeypatch.setattr("arena.web.sending.transaction.on_commit", lambda done: done())
+    monkeypatch.setattr("arena.site.acts.transaction.on_commit", lambda done: done())
 
 
 def send(client: Client, content: bytes = STREET, name: str = "street.json") -> str:

@@ -8,7 +8,7 @@ from django.http import HttpResponse
 from django.urls import reverse
 
 from arena.models import ImportedVote, Study
-from arena.web.studies import vote_uploads
+from arena.studies.pages import setup
 from augment.models import Event
 from tests.web.cast import people, signed_in
 
@@ -36,7 +36,7 @@ def test_a_file_becomes_a_closed_study_of_whoever_sent_it() -> None:
 
 
 def test_a_file_that_is_too_large_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(vote_uploads, "MOST_MB", 0)
+    monkeypatch.setattr(setup, "MOST_MB", 0)
     answer = _send(FINE)
     assert answer.status_code == 422
     assert "more than 0 MB" in answer.content.decode()

@@ -9,7 +9,7 @@ from django.test import Client
 from django.urls import reverse
 
 from arena.models import Report, Vote
-from arena.services.studies import close_study
+from arena.studies.services.opening import close_study
 from tests import study_rows
 from tests.web.ballots import ballot, following, page
 from tests.web.cast import names_of_contestants, people, signed_in, status, world

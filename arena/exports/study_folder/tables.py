@@ -15,7 +15,7 @@ from arena.exports.study_folder.closure import Closure
 from arena.jobs.exports.tables import object_sheet, sheet_csv
 from arena.models import Matchup, Snapshot, Vote
 from arena.services.cells import csv_text
-from arena.services.preregistration import FILE_NAME, preregistration_bytes
+from arena.studies.services.opening import FILE_NAME, preregistration_bytes
 from augment.models import Augmentation, Contestant, GenerationJob, Scenario
 from augment.services.running.transcript_records import Try, record_of, tries_by_augmentation
 

@@ -19,7 +19,6 @@ from arena.errors import ArenaError
 from arena.exports.study_folder.closure import Closure, close_over, travelling_rows
 from arena.exports.study_folder.tables import files_for_people
 from arena.models import Study
-from arena.services.preregistration import preregistration_sha256
 from arena.services.stored_rows import (
     applied_migrations,
     as_line,
@@ -27,7 +26,8 @@ from arena.services.stored_rows import (
     frozen_rows,
     label_of,
 )
-from arena.services.unfinished_work import UNFINISHED
+from arena.site.services import UNFINISHED
+from arena.studies.services.opening import preregistration_sha256
 
 FORMAT, VERSION = "scenario-arena-study", 1
 MANIFEST, README = "manifest.json", "README.md"

@@ -34,8 +34,8 @@ from arena.jobs.pages.driving import driving_asked, score_asked
 from arena.jobs.queries import analysis_of
 from arena.jobs.services import ask_for_file
 from arena.models import ScenarioFile
-from arena.web.access import STAFF, allow_only
-from arena.web.sending import send_later
+from arena.site.access import STAFF, allow_only
+from arena.site.acts import send_later
 from augment.errors import AugmentError
 from augment.models import GenerationJob
 from augment.services.judging.displacement import By, types_named

@@ -15,11 +15,11 @@ from arena.jobs.pages.driving import driving_section
 from arena.jobs.pages.exports import displacement_section
 from arena.jobs.queries import MARKS, VIEWS, Part, grid_part
 from arena.jobs.services import files_of
-from arena.queries.listings import MINE, Narrowing, find_jobs
 from arena.services.retrying import retry_cause as retry_one_cause
-from arena.web.access import ADMIN, STAFF, allow_only, user_of
-from arena.web.forms import CapsForm
-from arena.web.listing import (
+from arena.site.access import ADMIN, STAFF, allow_only, user_of
+from arena.site.acts import Confirmation, ask, is_sure, refusals_told, send_later
+from arena.site.forms import CapsForm
+from arena.site.listing import (
     choice_asked,
     page_asked,
     read_listing,
@@ -27,8 +27,7 @@ from arena.web.listing import (
     said_choices,
     search_asked,
 )
-from arena.web.questions import Confirmation, ask, is_sure, refusals_told
-from arena.web.sending import send_later
+from arena.site.queries import MINE, Narrowing, find_jobs
 from augment.models import Augmentation, GenerationJob
 from augment.services.judging.analyses import repeatability
 from augment.services.judging.scenario_export import FORMATS

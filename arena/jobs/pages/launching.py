@@ -15,10 +15,9 @@ from django.views.decorators.http import require_http_methods
 
 from arena.contestants.pages import OptionsForm
 from arena.scenarios.queries import by_type, set_asked, set_choices
-from arena.web.access import ADMIN, allow_only, user_of
-from arena.web.forms import CapsForm, ChoiceForm, Offer
-from arena.web.questions import refusals_in
-from arena.web.sending import send_later
+from arena.site.access import ADMIN, allow_only, user_of
+from arena.site.acts import refusals_in, send_later
+from arena.site.forms import CapsForm, ChoiceForm, Offer
 from augment.errors import AugmentError, Conflict
 from augment.models import Contestant, EndpointModel, GenerationJob
 from augment.services.endpoints.known_endpoints import is_key_here

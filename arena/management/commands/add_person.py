@@ -9,7 +9,7 @@ from typing import Any
 
 from django.core.management.base import CommandError, CommandParser
 
-from arena.services.people import create_person
+from arena.people.services import create_person
 from augment.services.terminal import TerminalCommand
 
 

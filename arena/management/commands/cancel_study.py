@@ -6,13 +6,13 @@ from typing import Any
 
 from django.core.management.base import CommandError, CommandParser
 
-from arena.queries.studies.lists import study_named
-from arena.services.ending import cancel_study
+from arena.studies.queries import study_named
+from arena.studies.services.opening import cancel_study
 from augment.services.terminal import TerminalCommand
 
 
 class Command(TerminalCommand):
-    """The door to arena.services.ending.cancel_study."""
+    """The door to arena.studies.services.opening.cancel_study."""
 
     help = "Cancel an open study for good: no more votes, never any results; its votes stay."
 

@@ -6,13 +6,13 @@ from typing import Any
 
 from django.core.management.base import CommandParser
 
-from arena.queries.studies.lists import study_named
-from arena.services.studies import close_study
+from arena.studies.queries import study_named
+from arena.studies.services.opening import close_study
 from augment.services.terminal import TerminalCommand
 
 
 class Command(TerminalCommand):
-    """The door to arena.services.studies.close_study."""
+    """The door to arena.studies.services.opening.close_study."""
 
     help = "Close a study: it takes no more votes, and its results may be seen."
 

@@ -6,13 +6,13 @@ from typing import Any
 
 from django.core.management.base import CommandParser
 
-from arena.queries.studies.lists import study_named
-from arena.services.handing_over import hand_over
+from arena.studies.queries import study_named
+from arena.studies.services.taking_part import hand_over
 from augment.services.terminal import TerminalCommand
 
 
 class Command(TerminalCommand):
-    """The door to arena.services.handing_over."""
+    """The door to arena.studies.services.taking_part."""
 
     help = "Hand an expert's remaining pairs over to others, re-planned in one go."
 

@@ -9,16 +9,15 @@ from django.urls import reverse
 from django.utils import timezone
 
 from arena.models import Study
-from arena.queries.studies.invitations import ExpertLine, expert_lines
-from arena.queries.studies.lists import study_named
-from arena.services.invitations import LINK_LIVES, invite
+from arena.people.links import LINK_LIVES, invite
 from arena.serving.stack import Web, served_address
+from arena.studies.queries import ExpertLine, expert_lines, study_named
 from augment.errors import UnknownName
 from augment.services.terminal import TerminalCommand
 
 
 class Command(TerminalCommand):
-    """The door to arena.services.invitations.invite."""
+    """The door to arena.people.services.invite."""
 
     help = (
         "Print a link for every expert of a study who has none that works; each is shown once. "

@@ -8,14 +8,14 @@ from django.contrib.auth.models import User
 from django.core.management.base import CommandParser
 
 from arena.models import Study
-from arena.queries.studies.lists import study_named
-from arena.services.authorships import mark_author, take_back_author
+from arena.people.links import mark_author, take_back_author
+from arena.studies.queries import study_named
 from augment.errors import UnknownName
 from augment.services.terminal import TerminalCommand
 
 
 class Command(TerminalCommand):
-    """The door to arena.services.authorships."""
+    """The door to arena.people.services."""
 
     help = "Mark an expert of a study as author of a contestant; experts see nothing of it."
 

@@ -8,18 +8,17 @@ from typing import Any
 from django.core.management.base import CommandParser
 
 from arena.models import Study
-from arena.queries.inventory import usual_checks
-from arena.queries.studies.coverage import shared_units
-from arena.services.preregistration import preregistration_sha256
-from arena.services.studies import open_study
-from arena.services.study_plan import PLAN_INPUTS, SAMPLES, StudyPlan
+from arena.site.queries import usual_checks
+from arena.studies.queries import shared_units
+from arena.studies.services.opening import open_study, preregistration_sha256
+from arena.studies.services.plan import PLAN_INPUTS, SAMPLES, StudyPlan
 from augment.services.inputs import add_options
 from augment.services.running.choosing import resolve_contestants, resolve_scenarios
 from augment.services.terminal import TerminalCommand
 
 
 class Command(TerminalCommand):
-    """The door to arena.services.studies.open_study."""
+    """The door to arena.studies.services.opening.open_study."""
 
     help = "Plan blind, balanced matchups for experts and open the study."
 

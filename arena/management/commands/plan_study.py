@@ -9,8 +9,7 @@ from django.core.management.base import CommandError, CommandParser
 
 from arena.models import Study
 from arena.rating.planning import Outlook, Prospect, Question, Wish, foretell
-from arena.services.prospects import known_of, usual_seconds
-from arena.services.study_estimate import ESTIMATE_INPUTS, StudyEstimate
+from arena.studies.services.outlook import ESTIMATE_INPUTS, StudyEstimate, known_of, usual_seconds
 from augment.errors import AugmentError
 from augment.services.inputs import add_options, check_bounds
 from augment.services.terminal import TerminalCommand

@@ -7,7 +7,7 @@ from typing import Any
 from django.core.management.base import CommandParser
 from django.utils import timezone
 
-from arena.services.retention import TextLoss, foresee_losses, read_age, remove_old
+from arena.site.services import TextLoss, foresee_losses, read_age, remove_old
 from augment.services.terminal import TerminalCommand
 
 LOST = """Afterwards these answers can't be used again: the same request is asked, and paid, anew.

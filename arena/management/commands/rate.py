@@ -8,12 +8,12 @@ from django.core.management.base import CommandParser
 
 from arena.exports.tables import leaderboard_table
 from arena.exports.writers import plain_text
-from arena.queries.studies.lists import study_named
 from arena.queries.votes.sets import Filters
 from arena.rating.rules import Intervals, Unit
 from arena.services.covariates import COVARIATES
 from arena.services.early_looks import log_early_look
 from arena.services.ratings import DEFAULT_ROUNDS, rate
+from arena.studies.queries import study_named
 from augment.services.terminal import TerminalCommand
 
 

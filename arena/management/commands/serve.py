@@ -10,7 +10,7 @@ from django.core.management.base import CommandError, CommandParser
 
 from arena.management.arguments import at_least
 from arena.management.demo import login_lines
-from arena.services.first_start import make_first_link_token
+from arena.people.services import make_first_link_token
 from arena.serving.ledger import Ledger
 from arena.serving.stack import Web, background, hold_alone, remembered_address, web_server
 from arena.serving.supervisor import Supervisor

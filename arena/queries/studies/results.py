@@ -10,7 +10,7 @@ from django.db.models import Q, QuerySet
 
 from arena.errors import NoSnapshot, NotYours, StudyStillOpen
 from arena.models import EarlyLook, Snapshot, Study
-from arena.queries.people import role_of
+from arena.people.queries import role_of
 from augment.models import Event
 
 STAFF = ("admin", "analyst")

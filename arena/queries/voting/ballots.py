@@ -12,7 +12,7 @@ from django.utils import timezone
 
 from arena.errors import NotYours
 from arena.models import Matchup, Study, Vote
-from arena.queries.people import by_pseudonym
+from arena.people.queries import by_pseudonym
 from arena.queries.remembering import Remembered, plan_and_votes
 from arena.queries.voting.path import study_now
 

@@ -12,7 +12,7 @@ from django.utils.translation import gettext as _
 
 from arena.errors import NotYours
 from arena.models import Matchup
-from arena.queries.people import role_of
+from arena.people.queries import role_of
 from arena.queries.voting.showings import view_shown
 from augment.services.judging.findings import LaneEdges, MeasureLine, lane_edges_of, measures_of
 

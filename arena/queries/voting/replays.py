@@ -9,7 +9,7 @@ from django.contrib.auth.models import User
 
 from arena.errors import NotYours
 from arena.models import Matchup
-from arena.queries.people import role_of
+from arena.people.queries import role_of
 from augment.models import Simulation
 from augment.services.judging.simulations import blind_drive
 

@@ -10,7 +10,7 @@ from django.urls import reverse
 
 from arena.errors import NotYours
 from arena.models import LabelTask, Matchup, PracticePair
-from arena.queries.people import role_of
+from arena.people.queries import role_of
 from arena.queries.voting.descriptions import describe_in_words
 from augment.models import Augmentation
 from augment.services.scenarios.pictures import window_of

@@ -22,8 +22,8 @@ from arena.queries.votes.search import VoteSearch
 from arena.queries.votes.single import vote_in
 from arena.queries.voting.descriptions import describe_in_words
 from arena.queries.voting.showings import picture_of_side
-from arena.web.access import STAFF, allow_only
-from arena.web.listing import page_asked
+from arena.site.access import STAFF, allow_only
+from arena.site.listing import page_asked
 from arena.web.pictures import sized_picture_response
 from arena.web.results.evidence_form import VoteSearchForm
 from arena.web.results.pages import asked_rating, get_readable_study

@@ -9,7 +9,7 @@ from django import forms
 
 from arena.models import Snapshot
 from arena.models.votes import AID_LABELS
-from arena.queries.people import natural_order
+from arena.people.queries import natural_order
 from arena.queries.votes.judged import AUTOMATIC, is_imported
 from arena.queries.votes.search import (
     AUTOMATIC_TIE,

@@ -20,7 +20,7 @@ from arena.exports.writers import FORMATS
 from arena.exports.zips import CONTENT_TYPE, ZIP
 from arena.models import Snapshot, Study
 from arena.queries.studies.results import snapshot_to_export
-from arena.web.access import ADMIN, ANALYST, EXPERT, STAFF, allow_only
+from arena.site.access import ADMIN, ANALYST, EXPERT, STAFF, allow_only
 from arena.web.results.pages import asked_rating, get_readable_study
 from augment.errors import Conflict, UnknownName
 

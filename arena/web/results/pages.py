@@ -16,19 +16,19 @@ from arena import tasks
 from arena.errors import ArenaError
 from arena.exports.tables import EARLY_LOOK, for_experts, leaderboard_table
 from arena.models import Snapshot, Study
-from arena.queries.people import role_of
+from arena.people.queries import role_of
 from arena.queries.studies.results import STAFF as STAFF_ROLES
 from arena.queries.studies.results import ResultsAccess, results_access, snapshots_of, votes_in
 from arena.queries.votes.judged import is_imported
 from arena.queries.votes.lists import settled_counted
 from arena.services.early_looks import open_early
-from arena.web.access import ADMIN, ANALYST, EXPERT, STAFF, allow_only
+from arena.site.access import ADMIN, ANALYST, EXPERT, STAFF, allow_only
+from arena.studies.pages.studies import export_place
 from arena.web.results.adjustment import show_adjustment
 from arena.web.results.authors import both_versions
 from arena.web.results.rating import rate_or_send
 from arena.web.results.rating_form import RatingForm
 from arena.web.results.tabs import TABS, Tab
-from arena.web.studies.files import export_place
 from augment.errors import AugmentError
 
 SHOWN = 12

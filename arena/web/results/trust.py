@@ -7,7 +7,7 @@ from arena.exports.charts.plots import plots
 from arena.exports.tables import LeaderboardTable
 from arena.models import Snapshot
 from arena.models.votes import AIDS
-from arena.queries.people import natural_order
+from arena.people.queries import natural_order
 from arena.queries.votes.judged import AUTOMATIC
 from arena.rating.snapshot_document import PanelRater
 from arena.web.results.authors import with_authors

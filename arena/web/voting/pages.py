@@ -16,18 +16,17 @@ from django.views.decorators.http import require_http_methods, require_POST, req
 
 from arena.errors import AlreadyDecided, InvalidVote, NotYours, StudyNotOpen, TooFast
 from arena.models import Study
-from arena.queries.studies.lists import voting_study
 from arena.queries.voting.ballots import skipped_pairs
 from arena.queries.voting.measures import lane_edges_of_pair, measures_of_pair
 from arena.queries.voting.replays import drives_of_pair
 from arena.queries.voting.showings import picture_shown
-from arena.services.practice import is_due
-from arena.services.reports import report
 from arena.services.votes import receive_vote
-from arena.web.access import ADMIN, EXPERT, allow_only
-from arena.web.forms import ReportForm, VoteForm
+from arena.site.access import ADMIN, EXPERT, allow_only
+from arena.site.forms import ReportForm, VoteForm
+from arena.studies.queries import voting_study
+from arena.studies.services.experts import is_due, report
+from arena.voting.screen import over_context, vote_context
 from arena.web.pictures import picture_response
-from arena.web.screen import over_context, vote_context
 from augment.errors import Conflict
 from augment.services.judging.findings import LaneEdges
 

@@ -16,10 +16,10 @@ from django.views.decorators.http import require_http_methods
 
 from arena.errors import InvalidVote, NotYours, StudyNotOpen
 from arena.models import PracticePair, Study
-from arena.queries.studies.lists import voting_study
-from arena.services.practice import answer_practice, practice_pairs, skip_practice
-from arena.web.access import EXPERT, allow_only
-from arena.web.screen import over_context
+from arena.site.access import EXPERT, allow_only
+from arena.studies.queries import voting_study
+from arena.studies.services.experts import answer_practice, practice_pairs, skip_practice
+from arena.voting.screen import over_context
 from augment.services.judging.findings import EGO_ID, Finding, FindingKind, check_augmentation
 
 MOST_REASONS = 3

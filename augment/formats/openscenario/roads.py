@@ -12,6 +12,7 @@ from typing import Any, Final
 from xml.etree import ElementTree as ET
 
 import numpy as np
+import shapely
 
 from augment.formats.writing import CannotExpress, Cell, LossReport, bounds_of
 from augment.geometry.frames import difference
@@ -135,8 +136,6 @@ def directions(points_m: FloatArray) -> FloatArray:
 
 def deviation_m(line: ReferenceLine, way: AnyLane) -> float:
     """Return how far the edges of a road lie beside those of its way at most."""
-    import shapely
-
     at = np.linspace(0.0, 1.0, _SAMPLES)[:, None] ** np.arange(4)
     slope = np.column_stack([np.zeros(_SAMPLES), at[:, :3] * (1.0, 2.0, 3.0)])
     written: tuple[list[FloatArray], list[FloatArray]] = ([], [])

@@ -1,0 +1,283 @@
+"""Pages of accounts: sign-in, the list of people, links to set a password, one's own tokens."""
+
+from __future__ import annotations
+
+import uuid
+from typing import Any, cast
+
+from django import forms
+from django.contrib import messages
+from django.contrib.auth import login, update_session_auth_hash
+from django.contrib.auth.decorators import login_not_required
+from django.contrib.auth.forms import AuthenticationForm, PasswordChangeForm, SetPasswordForm
+from django.contrib.auth.models import User
+from django.contrib.auth.views import LoginView
+from django.http import HttpRequest, HttpResponse
+from django.shortcuts import get_object_or_404, redirect, render
+from django.urls import reverse
+from django.utils.translation import gettext as _
+from django.utils.translation import gettext_lazy, ngettext
+from django.views.decorators.cache import never_cache
+from django.views.decorators.http import require_http_methods, require_POST
+
+from arena.errors import LinkOver
+from arena.models import ApiToken
+from arena.people import services
+from arena.people.links import DAYS, REQUESTS, make_api_token, revoke_api_token
+from arena.people.queries import (
+    ROLES,
+    Language,
+    api_tokens_of,
+    has_admin,
+    language_of,
+    list_accounts,
+    roles_offered,
+)
+from arena.site.access import (
+    ADMIN,
+    ANALYST,
+    BACKEND,
+    EXPERT,
+    GONE,
+    KEPT,
+    STAFF,
+    allow_only,
+    keep_secret,
+    read_form,
+    user_of,
+)
+from arena.site.acts import refusals_in, refusals_told
+
+PAGES = ["GET", "HEAD", "POST"]
+ROLE_NAMES = {
+    "admin": gettext_lazy("Admin"),
+    "analyst": gettext_lazy("Analyst"),
+    "expert": gettext_lazy("Expert"),
+}
+LANGUAGE_COOKIE = "django_language"
+"""Django's own name for it, which its locale middleware reads."""
+
+A_YEAR_S = 365 * 24 * 3600
+USUAL_DAYS = 30
+
+
+class AccountForm(forms.Form):
+    """A new account; its owner sets the password by a link."""
+
+    username = forms.CharField(max_length=150, label="Username")
+    pseudonym = forms.CharField(
+        max_length=60, required=False, label="Pseudonym (what others see)", empty_value=None
+    )
+    role = forms.ChoiceField(
+        choices=[(role, ROLE_NAMES[role]) for role in reversed(ROLES)], label="Role"
+    )
+
+
+class FirstForm(SetPasswordForm):  # type: ignore[type-arg] # it takes none at run time
+    """The name and the password of the first admin."""
+
+    username = forms.CharField(max_length=150, label="Username")
+    field_order = ("username", "new_password1", "new_password2")
+
+
+class TokenForm(forms.Form):
+    """A new token."""
+
+    name = forms.CharField(max_length=80, label=gettext_lazy("What it is for"))
+    role = forms.ChoiceField(label=gettext_lazy("Role"))
+    days = forms.TypedChoiceField(
+        coerce=int, initial=str(USUAL_DAYS), label=gettext_lazy("Works for")
+    )
+
+    def __init__(self, data: Any = None, *, roles: tuple[str, ...]) -> None:
+        super().__init__(data)
+        role, days = (cast(forms.ChoiceField, self.fields[name]) for name in ("role", "days"))
+        role.choices = [(name, ROLE_NAMES[name]) for name in roles]
+        days.choices = [(str(n), ngettext("%(n)s day", "%(n)s days", n) % {"n": n}) for n in DAYS]
+
+
+# --- Signing in --------------------------------------------------------------------------------
+
+
+class SignIn(LoginView):
+    """The login; the pages that follow speak the language of the account."""
+
+    template_name = "login.html"
+    redirect_authenticated_user = True
+
+    def get_context_data(self, **more: Any) -> dict[str, Any]:
+        """Add whether the first admin is still to be made, and what was typed elsewhere."""
+        more |= {KEPT: self.request.POST.get(KEPT, ""), "is_empty": not has_admin()}
+        return super().get_context_data(**more)
+
+    def form_valid(self, form: AuthenticationForm) -> HttpResponse:
+        """Sign in; what was typed before the session expired is shown to be sent again."""
+        answer = super().form_valid(form)
+        if fields := read_form(self.request.POST.get(KEPT, "")):
+            context = {"fields": fields, "address": self.get_success_url()}
+            answer = render(self.request, "kept_form.html", context)
+        return with_own_language(answer, form.get_user())
+
+
+def with_own_language(answer: HttpResponse, user: User) -> HttpResponse:
+    """Set this browser's language to what the account chose, if it chose any."""
+    chosen = language_of(user)
+    if chosen is not None:
+        keep_language(answer, chosen)
+    return answer
+
+
+def keep_language(answer: HttpResponse, language: Language) -> None:
+    """Set the cookie that decides before the browser's own wish."""
+    answer.set_cookie(
+        LANGUAGE_COOKIE, language.value, max_age=A_YEAR_S, httponly=True, samesite="Lax"
+    )
+
+
+@login_not_required
+@never_cache
+@require_http_methods(PAGES)
+def first_page(request: HttpRequest, token: str) -> HttpResponse:
+    """The page of the link that `serve` prints where there is no admin yet."""
+    form = FirstForm(User(), request.POST or None)
+    try:
+        services.check_first_link(token)
+        if form.is_valid():
+            name, password = form.cleaned_data["username"], form.cleaned_data["new_password1"]
+            with refusals_in(form, "username"):
+                user = services.make_first_admin(token=token, username=name, password=password)
+                login(request, user, backend=BACKEND)
+                return redirect("home")
+    except LinkOver:
+        return keep_secret(render(request, "people/link_over.html", status=GONE))
+    context = {"form": form, "is_first": True}
+    return keep_secret(render(request, "people/welcome.html", context))
+
+
+@login_not_required
+@never_cache
+@require_http_methods(PAGES)
+def welcome_page(request: HttpRequest, token: str) -> HttpResponse:
+    """Where somebody sets the password of an account that was made for them."""
+    try:
+        user = services.find_welcomed(token)
+        form = SetPasswordForm(user, request.POST or None)
+        if form.is_valid():
+            password = form.cleaned_data["new_password1"]
+            user = services.accept_welcome(token=token, password=password)
+            login(request, user, backend=BACKEND)
+            return redirect("home")
+    except LinkOver:
+        return keep_secret(render(request, "people/link_over.html", status=GONE))
+    context = {"form": form, "welcomed": user}
+    return keep_secret(render(request, "people/welcome.html", context))
+
+
+@never_cache
+@require_http_methods(PAGES)
+def password_page(request: HttpRequest) -> HttpResponse:
+    """One's own password; other devices are signed out by a new one."""
+    user = user_of(request)
+    form = PasswordChangeForm(user, request.POST or None)
+    if not user.has_usable_password():
+        messages.info(request, _("You sign in by a link, not by a password."))
+        return redirect("home")
+    if form.is_valid():
+        update_session_auth_hash(request, form.save())
+        messages.success(request, _("Your password is changed; other devices are signed out."))
+        return redirect("home")
+    return render(request, "people/password.html", {"form": form})
+
+
+# --- People ------------------------------------------------------------------------------------
+
+
+@allow_only(ADMIN)
+@never_cache
+@require_http_methods(PAGES)
+def people_page(request: HttpRequest) -> HttpResponse:
+    """Every account, and a form for a new one, which ends at its link."""
+    form = AccountForm(request.POST or None)
+    if form.is_valid():
+        with refusals_in(form):
+            user = services.create_person(
+                **form.cleaned_data, password=None, actor=user_of(request)
+            )
+            return _link_page(request, user)
+    lines = [(line, ROLE_NAMES.get(line.role or "", "")) for line in list_accounts()]
+    context = {"lines": lines, "form": form, "roles": ROLE_NAMES.items()}
+    return render(request, "people/list.html", context)
+
+
+@allow_only(ADMIN)
+@never_cache
+@require_POST
+def make_link(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
+    """A link to set a password, for who is new or has forgotten it."""
+    with refusals_told(request):
+        return _link_page(request, find_account(code))
+    return redirect("people")
+
+
+@allow_only(ADMIN)
+@require_POST
+def change_person(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
+    """Pause, resume, or give another role: what the pressed button says."""
+    user, actor = find_account(code), user_of(request)
+    act = request.POST.get("act", "")
+    with refusals_told(request):
+        if act in ("pause", "resume"):
+            services.set_active(user=user, is_active=act == "resume", actor=actor)
+        else:
+            services.set_role(user=user, role=request.POST.get("role", ""), actor=actor)
+        messages.success(request, f"{user.person.pseudonym} is changed.")
+    return redirect("people")
+
+
+def find_account(code: uuid.UUID) -> User:
+    """Return the account with that code, or answer 404."""
+    return get_object_or_404(User.objects.select_related("person"), person__code=code)
+
+
+def _link_page(request: HttpRequest, user: User) -> HttpResponse:
+    token = services.make_welcome_token(user, actor=user_of(request))
+    address = request.build_absolute_uri(reverse("welcome", args=[token]))
+    return render(request, "people/link.html", {"made": user, "address": address})
+
+
+# --- One's own tokens --------------------------------------------------------------------------
+
+
+@allow_only(ADMIN, ANALYST, EXPERT)
+@never_cache
+@require_http_methods(PAGES)
+def tokens_page(request: HttpRequest) -> HttpResponse:
+    """One's own tokens, and a form for a new one, which is shown this once."""
+    user = user_of(request)
+    roles = roles_offered(user)
+    form = TokenForm(request.POST or None, roles=roles)
+    fresh = None
+    if form.is_valid():
+        with refusals_in(form):
+            fresh = make_api_token(owner=user, **form.cleaned_data)
+            form = TokenForm(roles=roles)
+    context = {
+        "form": form,
+        "fresh": fresh,
+        "lines": [(*line, ROLE_NAMES[line[0].role]) for line in api_tokens_of(user)],
+        "limits": [(ROLE_NAMES[role], REQUESTS[role]) for role in roles],
+        "is_staff": roles and roles[0] in STAFF,
+        "is_admin": ADMIN in roles,
+    }
+    return render(request, "api/tokens.html", context, status=422 if form.errors else 200)
+
+
+@allow_only(ADMIN, ANALYST, EXPERT)
+@require_POST
+def revoke_token(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
+    """Revoke one of one's own tokens."""
+    user = user_of(request)
+    token = get_object_or_404(ApiToken, owner=user, code=code)
+    revoke_api_token(token=token, actor=user)
+    messages.success(request, _("“%(name)s” opens nothing any more.") % {"name": token.name})
+    return redirect("api-tokens")

@@ -1,0 +1,365 @@
+"""Accounts: made, let in by a link, paused, given another role; and what each chooses."""
+
+from __future__ import annotations
+
+import uuid
+from collections import Counter
+from collections.abc import Mapping
+from typing import Any
+
+from django.contrib.auth.models import Group, User
+from django.contrib.auth.password_validation import validate_password
+from django.contrib.auth.tokens import default_token_generator
+from django.contrib.sessions.models import Session
+from django.core import signing
+from django.core.exceptions import ValidationError
+from django.db import IntegrityError, transaction
+from django.utils import timezone
+from django.utils.translation import gettext as _
+
+from arena.errors import InvalidPreference, LinkOver
+from arena.models import Person
+from arena.people.queries import ROLES, has_admin, is_forgotten, role_of
+from arena.queries.voting.keys import (
+    KEY_LABELS,
+    SOMETIMES,
+    SWITCHES,
+    USUAL_KEYS,
+    VotingPreferences,
+    read_voting,
+)
+from augment.errors import Conflict, InvalidDocument, UnknownName
+from augment.services.events import log_event
+from augment.services.texts import one_line
+
+LINK_LIVES_S = 24 * 3600
+"""How long the first admin's link works."""
+
+OVER = "This link lets nobody in any more."
+_SALT = "arena.first-start"
+
+
+@transaction.atomic
+def create_person(
+    *,
+    username: str,
+    password: str | None,
+    role: str,
+    pseudonym: str | None = None,
+    is_simulated: bool = False,
+    actor: User | None = None,
+) -> User:
+    """Create an account with a role; an admin may use Django's admin too.
+
+    Args:
+        username: For the login.
+        password: None for an account without a password.
+        role: "expert", "analyst" or "admin".
+        pseudonym: What others see instead of the name; "Expert 3" and so on by default.
+        is_simulated: The machine votes for it, and everything that comes of it says so.
+        actor: Who creates the account, for the log.
+
+    Raises:
+        UnknownName: There is no such role.
+        InvalidDocument: The username or the pseudonym is empty, too long or not printable.
+        Conflict: The username or the pseudonym is taken.
+    """
+    _check_role(role)
+    try:
+        User._meta.get_field("username").clean(username, None)
+    except ValidationError as error:
+        raise InvalidDocument("person", [("username", " ".join(error.messages))]) from None
+    if User.objects.filter(username=username).exists():
+        raise Conflict(f"The username {username!r} is taken.")
+    if pseudonym is None:
+        pseudonym = _free_pseudonym(role)
+    else:
+        pseudonym = one_line("pseudonym", pseudonym, what="person", longest=60)
+        if Person.objects.filter(pseudonym=pseudonym).exists():
+            raise Conflict(f"The pseudonym {pseudonym!r} is taken.")
+    is_admin = role == "admin"
+    try:
+        with transaction.atomic():
+            user = User.objects.create_user(
+                username, password=password, is_staff=is_admin, is_superuser=is_admin
+            )
+            user.person.pseudonym, user.person.is_simulated = pseudonym, is_simulated
+            user.person.save(update_fields=["pseudonym", "is_simulated"])
+    except IntegrityError:  # taken since it was looked up
+        raise Conflict(
+            f"The username {username!r} or the pseudonym {pseudonym!r} was taken just now; try "
+            "again."
+        ) from None
+    user.groups.add(Group.objects.get_or_create(name=role)[0])
+    log_person(user, "add", actor, after={"role": role, "is_simulated": is_simulated})
+    return user
+
+
+# --- Links that let an owner in ----------------------------------------------------------------
+
+
+def make_first_link_token() -> str | None:
+    """Return the end of the first admin's link, None where there is an admin.
+
+    It is signed and stored nowhere; it works for a day, until it is used.
+    """
+    return None if has_admin() else signing.dumps("first admin", salt=_SALT)
+
+
+def check_first_link(token: str) -> None:
+    """Raise LinkOver where the link is forged or too old, or an admin exists."""
+    try:
+        signing.loads(token, salt=_SALT, max_age=LINK_LIVES_S)
+    except signing.BadSignature as error:
+        raise LinkOver(OVER) from error
+    if has_admin():
+        raise LinkOver(OVER)
+
+
+@transaction.atomic
+def make_first_admin(*, token: str, username: str, password: str) -> User:
+    """Create the first admin.
+
+    Raises:
+        LinkOver: The link does not work any more.
+        InvalidDocument, Conflict: See `create_person`.
+    """
+    _lock_admins()  # so that of two at once the second finds an admin
+    check_first_link(token)
+    return create_person(username=username, password=password, role="admin")
+
+
+@transaction.atomic
+def make_welcome_token(user: User, *, actor: User) -> str:
+    """Return the end of a link by which somebody sets a password; it works once, for 14 days.
+
+    It is bound to the password and the last login, so that using it ends it. Of an account
+    without a password only the newest link works.
+
+    Raises:
+        Conflict: The account is paused or simulated.
+    """
+    if not user.is_active or user.person.is_simulated:
+        raise Conflict(f"{user.get_username()} can't sign in.")
+    end_links(user)
+    log_person(user, "make link", actor)
+    return f"{user.person.code.hex}-{default_token_generator.make_token(user)}"
+
+
+def find_welcomed(token: str) -> User:
+    """Return the account that a link belongs to.
+
+    Raises:
+        LinkOver: Nobody's, or it does not work any more.
+    """
+    code, _sign, rest = token.partition("-")
+    try:
+        user = User.objects.get(person__code=uuid.UUID(code), is_active=True)
+    except (ValueError, User.DoesNotExist):
+        raise LinkOver(OVER) from None
+    if not default_token_generator.check_token(user, rest):
+        raise LinkOver(OVER)
+    return user
+
+
+@transaction.atomic
+def accept_welcome(*, token: str, password: str) -> User:
+    """Set the password of the account that a link belongs to, which ends the link.
+
+    Raises:
+        LinkOver: The link does not work any more.
+        InvalidDocument: The password is too weak.
+    """
+    # Locked, so that of two who use the link at once the second finds it used.
+    User.objects.select_for_update().get(pk=find_welcomed(token).pk)
+    user = find_welcomed(token)
+    check_password_strength(password, user)
+    user.set_password(password)
+    user.save(update_fields=["password"])
+    return user
+
+
+def check_password_strength(password: str, user: User | None = None) -> None:
+    """Raise InvalidDocument for a password that is too weak."""
+    try:
+        validate_password(password, user)
+    except ValidationError as error:
+        raise InvalidDocument("person", [("password", " ".join(error.messages))]) from None
+
+
+def end_links(user: User) -> None:
+    """End the welcome links of an account without a password."""
+    if not user.has_usable_password():
+        user.set_unusable_password()  # they are bound to what stands for the password
+        user.save(update_fields=["password"])
+
+
+# --- Changing accounts of others ---------------------------------------------------------------
+
+
+@transaction.atomic
+def set_active(*, user: User, is_active: bool, actor: User) -> None:
+    """Pause an account, or resume it; a paused one is signed out everywhere.
+
+    Raises:
+        Conflict: It is one's own or forgotten, or the actor is no admin any more.
+    """
+    check_may_change(user, actor)
+    if user.is_active == is_active:
+        return
+    if is_active and is_forgotten(user):
+        raise Conflict("This account is forgotten; nobody can sign in to it again.")
+    end_links(user)
+    user.is_active = is_active
+    user.save(update_fields=["is_active"])
+    if not is_active:
+        sign_out(user)
+    log_person(user, "resume" if is_active else "pause", actor)
+
+
+@transaction.atomic
+def set_role(*, user: User, role: str, actor: User) -> None:
+    """Give an account another role, its only one.
+
+    Raises:
+        UnknownName: There is no such role.
+        Conflict: It is one's own, or the actor is no admin any more.
+    """
+    _check_role(role)
+    check_may_change(user, actor)
+    end_links(user)
+    before = role_of(User.objects.get(pk=user.pk))
+    user.groups.set([Group.objects.get_or_create(name=role)[0]])
+    user.is_staff = user.is_superuser = role == "admin"
+    user.save(update_fields=["is_staff", "is_superuser"])
+    log_person(user, "change role", actor, before={"role": before}, after={"role": role})
+
+
+def check_may_change(user: User, actor: User) -> None:
+    """Lock the admins, so that one change of accounts ends before the next one begins.
+
+    As the actor stays an admin and changes somebody else, there is always one left.
+
+    Raises:
+        Conflict: It is the actor's own account, or the actor is no admin any more.
+    """
+    if user.pk == actor.pk:
+        raise Conflict("This is your own account; ask another admin.")
+    _lock_admins()
+    if role_of(User.objects.get(pk=actor.pk)) != "admin":
+        raise Conflict("You are not an admin any more.")
+
+
+def sign_out(user: User) -> None:
+    """End the sessions of an account; they are stored sealed and read one by one."""
+    for session in Session.objects.filter(expire_date__gte=timezone.now()).iterator():
+        if session.get_decoded().get("_auth_user_id") == str(user.pk):
+            session.delete()
+
+
+def log_person(
+    user: User,
+    verb: str,
+    actor: User | None,
+    before: dict[str, Any] | None = None,
+    after: dict[str, Any] | None = None,
+) -> None:
+    """Log what was done to an account."""
+    log_event(
+        actor=actor,
+        verb=verb,
+        object_kind="person",
+        object_code=user.person.code,
+        before=before,
+        after=after,
+    )
+
+
+# --- What a person chooses ---------------------------------------------------------------------
+
+
+@transaction.atomic
+def keep_preference(user: User, **chosen: Any) -> Person:
+    """Keep preferences by name; an account without a person gets one."""
+    person, _is_new = Person.objects.select_for_update().get_or_create(
+        user=user, defaults={"pseudonym": user.get_username()}
+    )
+    person.preferences = {**person.preferences, **chosen}
+    person.save(update_fields=["preferences"])
+    return person
+
+
+@transaction.atomic
+def keep_voting(
+    *, user: User, switches: Mapping[str, bool], keys: Mapping[str, str] | None = None
+) -> VotingPreferences:
+    """Keep how this account votes; what is not named stays as it was.
+
+    Args:
+        user: Whose preferences they are.
+        switches: Some of SWITCHES -> on or off.
+        keys: Action -> its only single key; missing actions get their usual ones, so an empty
+            mapping resets all. None leaves the keys alone. One of `SOMETIMES` that is missing
+            among others keeps its key: the page that was filled in had no such action.
+
+    Raises:
+        InvalidPreference: A switch or action is unknown, or two actions share a key.
+    """
+    if unknown := sorted(set(switches) - set(SWITCHES)):
+        raise InvalidPreference("switches", f"Unknown: {', '.join(unknown)}.")
+    person = keep_preference(user)
+    voting = {**person.preferences.get("voting", {}), **switches}
+    if keys is not None:
+        voting["keys"] = _changed_keys(voting.get("keys", {}), keys)
+    return read_voting(keep_preference(user, voting=voting).preferences)
+
+
+def _changed_keys(before: Mapping[str, str], keys: Mapping[str, str]) -> dict[str, str]:
+    """Return the keys that are not the usual first ones, in small letters."""
+    if unknown := sorted(set(keys) - set(USUAL_KEYS)):
+        raise InvalidPreference("keys", f"Unknown action: {', '.join(unknown)}.")
+    lower = {action: key.lower() for action, key in keys.items()}
+    for action, key in lower.items():
+        if len(key) != 1 or not key.isprintable() or key.isspace():
+            problem = _("“%(action)s” needs one character, not '%(key)s'.")
+            raise InvalidPreference(
+                "keys", problem % {"action": _(KEY_LABELS[action]), "key": key}
+            )
+    shown = {
+        action: lower.get(action, usual[0])
+        for action, usual in USUAL_KEYS.items()
+        if action in lower or action not in SOMETIMES
+    }
+    for key, times in Counter(shown.values()).items():
+        if times > 1:
+            both = ", ".join(_(KEY_LABELS[name]) for name, its in shown.items() if its == key)
+            problem = _("'%(key)s' would do two things: %(both)s.")
+            raise InvalidPreference("keys", problem % {"key": key, "both": both})
+    chosen = {action: key for action, key in lower.items() if key != USUAL_KEYS[action][0]}
+    used = {chosen.get(action, usual[0]) for action, usual in USUAL_KEYS.items()}
+    unseen = {
+        action: before[action]
+        for action in SOMETIMES
+        if keys and action in before and action not in keys and before[action] not in used
+    }
+    return chosen | unseen
+
+
+# --- Private -----------------------------------------------------------------------------------
+
+
+def _check_role(role: str) -> None:
+    if role not in ROLES:
+        raise UnknownName("role", role, list(ROLES))
+
+
+def _free_pseudonym(role: str) -> str:
+    number = Person.objects.filter(user__groups__name=role).count() + 1
+    while Person.objects.filter(pseudonym=f"{role.capitalize()} {number}").exists():
+        number += 1
+    return f"{role.capitalize()} {number}"
+
+
+def _lock_admins() -> None:
+    Group.objects.get_or_create(name="admin")
+    Group.objects.select_for_update(no_key=True).get(name="admin")

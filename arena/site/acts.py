@@ -1,0 +1,141 @@
+"""Acts of pages: asking before them, telling what came of them, sending them to a worker."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
+from dataclasses import dataclass
+from functools import partial
+from typing import cast
+
+from django.contrib import messages
+from django.db import transaction
+from django.forms import BaseForm
+from django.http import HttpRequest, HttpResponse
+from django.shortcuts import render
+from django.utils.text import slugify
+
+from arena.errors import ArenaError
+from augment.errors import AugmentError, QueueFault
+
+SURE = "sure"
+"""What the page's own button sends; without it nothing is done."""
+
+CHANGE = "change"
+"""What the other button sends, where there is a form to go back to."""
+
+TYPED, WHY = "typed", "why"
+"""What the question's own fields send: a name as it was typed, and a reason."""
+
+
+LOOKS = 40
+"""How often a page reloads itself while it waits for a worker."""
+
+REFUSALS = (ArenaError, AugmentError)
+"""What a service raises; its text is for whoever asked."""
+
+
+@contextmanager
+def _told_by(tell: Callable[[str], object]) -> Iterator[None]:
+    try:
+        yield
+    except REFUSALS as error:
+        tell(str(error))
+
+
+def refusals_told(request: HttpRequest) -> AbstractContextManager[None, bool]:
+    """Show what a service refuses as a message on the next page."""
+    return cast(AbstractContextManager[None, bool], _told_by(partial(messages.error, request)))
+
+
+def refusals_in(form: BaseForm, field: str | None = None) -> AbstractContextManager[None, bool]:
+    """Show what a service refuses as an error of the form."""
+    return cast(AbstractContextManager[None, bool], _told_by(partial(form.add_error, field)))
+
+
+def tell_errors(request: HttpRequest, form: BaseForm) -> None:
+    """Show the errors of a form that is on another page as messages."""
+    for problems in form.errors.values():
+        messages.error(request, " ".join(map(str, problems)))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Confirmation:
+    """A question before an act.
+
+    Attributes:
+        title: The question itself.
+        facts: What will happen, with its numbers, a sentence each.
+        button: What the act is called.
+        back: Where "no" leads.
+        is_final: Whether something ends by it, rather than begins.
+        phrase: What has to be typed before it is done; empty where a second click will do.
+        asks_why: Whether a reason may be given.
+        crumbs: The way here: names and addresses.
+    """
+
+    title: str
+    facts: tuple[str, ...]
+    button: str
+    back: str
+    is_final: bool = True
+    phrase: str = ""
+    asks_why: bool = False
+    crumbs: tuple[tuple[str, str], ...] = ()
+
+
+def is_sure(request: HttpRequest) -> bool:
+    """Return whether the question was answered with yes."""
+    return request.method == "POST" and SURE in request.POST
+
+
+def is_typed(request: HttpRequest, name: str) -> bool:
+    """Return whether the answer is yes and the name was typed, as it stands or as a slug."""
+    given = " ".join(request.POST.get(TYPED, "").split()).casefold()
+    return is_sure(request) and given in {" ".join(name.split()).casefold(), slugify(name)} - {""}
+
+
+def wants_to_change(request: HttpRequest) -> bool:
+    """Return whether somebody went back to the form, which is shown as it was filled in."""
+    return CHANGE in request.POST
+
+
+def ask(request: HttpRequest, question: Confirmation) -> HttpResponse:
+    """Return the page that asks; it sends along what came in by a form."""
+    ours = {"csrfmiddlewaretoken", SURE, CHANGE, TYPED, WHY}
+    sent = request.POST.lists()
+    is_mistyped = bool(question.phrase) and is_sure(request)
+    context = {
+        "question": question,
+        "given": [(name, value) for name, values in sent if name not in ours for value in values],
+        "sure": SURE,
+        "change": CHANGE,
+        "typed": request.POST.get(TYPED, ""),
+        "why": request.POST.get(WHY, ""),
+        "is_mistyped": is_mistyped,
+    }
+    return render(request, "ask.html", context, status=422 if is_mistyped else 200)
+
+
+def send_later(request: HttpRequest, send: Callable[[int], object], pk: int) -> None:
+    """Send a worker the key of a row on commit; a fault of the queue is only told."""
+
+    def send_now() -> None:
+        try:
+            send(pk)
+        except QueueFault as error:
+            messages.warning(request, str(error))
+
+    transaction.on_commit(send_now)
+
+
+def looks_again(request: HttpRequest, *, waits: bool) -> int:
+    """Return how often a page has reloaded itself, this time included; 0 to stop.
+
+    Args:
+        request: Whose address counts the reloads.
+        waits: Whether there is anything to wait for.
+    """
+    given = request.GET.get("look", "0")
+    looked = int(given) if given.isdecimal() and len(given) < 4 else 0
+    return looked + 1 if waits and looked < LOOKS else 0

@@ -1,0 +1,245 @@
+"""Reads of the whole site: the log of acts, gauges for monitoring, counts, narrowed lists."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from datetime import datetime, time
+from typing import Any
+
+from django.apps import apps
+from django.contrib.auth.models import User
+from django.db.models import Case, Count, IntegerField, Q, QuerySet, Sum, Value, When
+from django.utils import timezone
+from prometheus_client.core import GaugeMetricFamily
+
+from arena.models import Matchup, Study, Vote
+from arena.scenarios.queries import OWN, TypeGroup
+from augment.models import (
+    Augmentation,
+    Contestant,
+    Event,
+    GenerationJob,
+    ModelCall,
+    Scenario,
+    Work,
+)
+from augment.services.running.workers import workforce
+from augment.services.scenarios.scenes import type_choices
+
+MACHINE = "machine"
+"""Asked for as an actor: what nobody did but the machine itself."""
+
+CHECK_PERCENT = 2
+NANO = 1e9
+"""Money is counted in whole nano-dollars."""
+
+# --- The log of acts ---------------------------------------------------------------------------
+
+
+def acts(asked: Mapping[str, Any]) -> QuerySet[Event]:
+    """Return acts, the newest first, with who did them.
+
+    Args:
+        asked: What is empty or missing filters nothing. `actor` is the code of a person, or
+            MACHINE; `object` a whole code or a study's name; `since` and `until` are days of
+            the installation's time zone, both included.
+    """
+    rows = Event.objects.select_related("actor__person").order_by("-at", "-pk")
+    if actor := asked.get("actor"):
+        who = Q(actor=None) if actor == MACHINE else Q(actor__person__code=actor)
+        rows = rows.filter(who)
+    if verb := asked.get("verb"):
+        rows = rows.filter(verb=verb)
+    if kind := asked.get("kind"):
+        rows = rows.filter(object_kind=kind)
+    if name := asked.get("object"):
+        codes = Study.objects.filter(name=name).values_list("code", flat=True)
+        rows = rows.filter(object_code__in=[name, *map(str, codes)])
+    for bound, edge, moment in (("since", "at__gte", time.min), ("until", "at__lte", time.max)):
+        if day := asked.get(bound):
+            rows = rows.filter(**{edge: timezone.make_aware(datetime.combine(day, moment))})
+    return rows
+
+
+def actors() -> list[User]:
+    """Return everybody who ever did something, by pseudonym."""
+    who = User.objects.filter(pk__in=Event.objects.exclude(actor=None).values("actor"))
+    return list(who.select_related("person").order_by("person__pseudonym"))
+
+
+def distinct(column: str) -> list[str]:
+    """Return every value of a column of the log."""
+    return sorted(Event.objects.order_by().values_list(column, flat=True).distinct())
+
+
+# --- Monitoring --------------------------------------------------------------------------------
+
+
+def read_gauges() -> Iterator[GaugeMetricFamily]:
+    """Yield what a monitoring system reads, counted in the rows whichever process is asked.
+
+    Nothing of it is a result: votes are counted by study state, never by contestant or outcome.
+    """
+    state = workforce()
+    yield GaugeMetricFamily("arena_workers", "Workers heard a moment ago", state.living)
+    yield GaugeMetricFamily("arena_recovery", "1 where lost work is brought back", state.works)
+    counted: list[tuple[str, str, QuerySet[Any], str]] = [
+        ("jobs", "Generation jobs", GenerationJob.objects.all(), "state"),
+        ("studies", "Studies", Study.objects.all(), "state"),
+        ("matchups", "Planned pairs", Matchup.objects.all(), "study__state"),
+        (
+            *("votes", "Votes kept", Vote.objects.exclude(outcome=Vote.Outcome.SKIP)),
+            "matchup__study__state",
+        ),
+    ]
+    for model in apps.get_models():
+        if issubclass(model, Work):
+            plural = str(model._meta.verbose_name_plural)
+            rows = model._default_manager.all()
+            counted.append((plural.replace(" ", "_"), plural.capitalize(), rows, "state"))
+    for name, text, rows, field in counted:
+        numbers = rows.order_by().values_list(field).annotate(Count("pk")).order_by(field)
+        yield _by_state(f"arena_{name}", text, dict(numbers))
+    # Copies from the store are no calls.
+    own = ModelCall.objects.filter(served_from__isnull=True).order_by()
+    settled = own.filter(settled_at__isnull=False)
+    faulty = settled.exclude(fault="").count()
+    sums = settled.aggregate(
+        calls=Count("pk"), nano=Sum("cost_nano_usd"), used=Sum("spent_tokens")
+    )
+    calls = {
+        "answered": sums["calls"] - faulty,
+        "failed": faulty,
+        "in_flight": own.filter(settled_at__isnull=True).count(),
+    }
+    yield _by_state("arena_model_calls", "Requests to language models", calls)
+    yield GaugeMetricFamily("arena_model_tokens", "Tokens used", sums["used"] or 0)
+    yield GaugeMetricFamily(
+        "arena_model_usd", "Dollars spent, as far as prices are known", (sums["nano"] or 0) / NANO
+    )
+
+
+def _by_state(name: str, text: str, numbers: Mapping[Any, int]) -> GaugeMetricFamily:
+    family = GaugeMetricFamily(name, text, labels=["state"])
+    for state, number in numbers.items():
+        family.add_metric([str(state)], number)
+    return family
+
+
+# --- Counts ------------------------------------------------------------------------------------
+
+
+def take_inventory() -> dict[str, int]:
+    """Count what there is.
+
+    Failed augmentations of cancelled jobs don't count: nobody waits for them.
+    """
+    augmentations = Augmentation.objects
+    failed = augmentations.filter(state=Augmentation.State.FAILED)
+    return {
+        "scenarios": Scenario.objects.count(),
+        "contestants": Contestant.objects.count(),
+        "done": augmentations.filter(state=Augmentation.State.DONE).count(),
+        "failed": failed.exclude(job__state=GenerationJob.State.CANCELLED).count(),
+        "studies": Study.objects.count(),
+        "studies_open": Study.objects.filter(state=Study.State.OPEN).count(),
+        "studies_closed": Study.objects.filter(state=Study.State.CLOSED).count(),
+        "votes": Vote.objects.filter(superseded_by=None)
+        .exclude(outcome=Vote.Outcome.SKIP)
+        .count(),
+    }
+
+
+def usual_checks() -> int:
+    """Return the usual share of attention checks in percent: none before any are drawn."""
+    is_drawn = Augmentation.objects.filter(contestant__kind=Contestant.Kind.CHECK).exists()
+    return CHECK_PERCENT if is_drawn else 0
+
+
+# --- Lists -------------------------------------------------------------------------------------
+
+MINE = "mine"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Narrowing:
+    """What somebody looks for; empty is everything.
+
+    Attributes:
+        search: A part of a name or of what else is read there.
+        kind: The state, kind or type.
+        part: Another filter that the list has.
+        is_retired: Of scenarios: those that forms offer no more, instead of the others.
+    """
+
+    search: str = ""
+    kind: str = ""
+    part: str = ""
+    is_retired: bool = False
+
+
+def find_jobs(wanted: Narrowing, *, user: User) -> QuerySet[GenerationJob]:
+    """Jobs, the youngest first; `part` "mine" for those that the user launched."""
+    found = GenerationJob.objects.select_related("launched_by__person")
+    if wanted.search:
+        found = found.filter(name__icontains=wanted.search)
+    if wanted.kind:
+        found = found.filter(state=wanted.kind)
+    if wanted.part == MINE:
+        found = found.filter(launched_by=user)
+    return found.order_by("-created_at", "-pk")
+
+
+def find_contestants(wanted: Narrowing) -> QuerySet[Contestant]:
+    """Contestants by name, those that are retired at the end; no attention checks."""
+    found = Contestant.objects.exclude(kind=Contestant.Kind.CHECK).select_related("endpoint")
+    if wanted.search:
+        found = found.filter(
+            _any_has(wanted.search, "name", "slug", "variant", "model", "endpoint__label")
+        )
+    if wanted.kind:
+        found = found.filter(kind=wanted.kind)
+    if wanted.part:
+        found = found.filter(retired_at__isnull=wanted.part == "active")
+    is_retired = Case(When(retired_at=None, then=Value(0)), default=Value(1))
+    return found.annotate(at_end=is_retired).order_by("at_end", "name", "pk")
+
+
+def find_scenarios(wanted: Narrowing) -> QuerySet[Scenario]:
+    """Scenarios in the order of the types, without paraphrases and without their documents.
+
+    `part` is a set of the catalogue, `own` for those in none.
+    """
+    found = Scenario.objects.filter(paraphrase_of=None).select_related("base_scene")
+    found = found.filter(retired_at__isnull=not wanted.is_retired)
+    if wanted.search:
+        found = found.filter(_any_has(wanted.search, "slug", "instruction", "base_scene__slug"))
+    if wanted.kind:
+        found = found.filter(type=wanted.kind)
+    if wanted.part:
+        found = found.filter(catalogue_set="" if wanted.part == OWN else wanted.part)
+    places = [When(type=name, then=Value(n)) for n, (name, _) in enumerate(type_choices())]
+    place = Case(*places, default=Value(len(places)), output_field=IntegerField())
+    lean = found.defer("reference", "base_scene__document", "base_scene__recording")
+    return lean.annotate(place=place).order_by("place", "slug")
+
+
+def group_by_type(rows: list[Scenario]) -> list[TypeGroup]:
+    """Rows that come in the order of the types, in groups."""
+    labels = dict(type_choices())
+    found: dict[str, list[Scenario]] = {}
+    for row in rows:
+        found.setdefault(row.type, []).append(row)
+    return [
+        TypeGroup(type=name, label=labels.get(name, name), scenarios=scenarios)
+        for name, scenarios in found.items()
+    ]
+
+
+def _any_has(text: str, *columns: str) -> Q:
+    """Rows with that text in one of these columns, whatever the case."""
+    matches = Q()
+    for column in columns:
+        matches |= Q(**{f"{column}__icontains": text})
+    return matches

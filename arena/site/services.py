@@ -1,0 +1,307 @@
+"""What language models were asked and answered is removed once it is old; the numbers stay.
+
+A call keeps who was asked in which role, tokens, money and times; its messages and its answer go,
+and the images that no other call names. Modifications, pictures and votes are not touched. What
+goes can't be used again: the same request is asked, and paid, anew, and transcripts are without
+words. Nothing of a job that is not over goes, and nothing that an unfinished study shows.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from datetime import datetime, timedelta
+from typing import Any
+from uuid import uuid4
+
+from django.apps import apps
+from django.contrib.auth.models import User
+from django.core.exceptions import ValidationError
+from django.db import models, transaction
+from django.db.models import Count, F, Q, QuerySet, Sum, TextField
+from django.db.models.functions import Cast, Coalesce, Length
+
+from arena.errors import ArenaError
+from arena.jobs.services import NOTE_LENGTH
+from arena.models import FaultLabel, Matchup, Report, Snapshot, Study, Vote
+from arena.rating.rules import Intervals, Method, Unit
+from arena.services.decisions import decision_of
+from arena.studies.services.experts import Complaint, check_complaint
+from arena.studies.services.opening import check_seed
+from arena.studies.services.planning import rules_of
+from augment.errors import AugmentError, Conflict, InvalidDocument
+from augment.models import FAILED, Augmentation, GenerationJob, ModelCall, Work
+from augment.services import row_rules
+from augment.services.events import log_event
+from augment.services.running.jobs import OPEN
+from augment.services.running.transcript_records import delete_unnamed, images_named_by
+from augment.services.texts import check_picture_name, one_line
+
+BATCH = 200
+"""So many calls are emptied in one transaction, so that nobody waits for long."""
+
+_AGE = re.compile(r"(\d{1,5})([dw])")
+_DAYS = {"d": 1, "w": 7}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TextLoss:
+    """What goes of one job, or of the readings of instructions where `job` is None.
+
+    Attributes:
+        calls: Whose messages go, and of these `answers` have an answer.
+        transcripts: Augmentations whose transcripts are without words afterwards.
+        characters: Of requests and answers.
+    """
+
+    job: GenerationJob | None
+    calls: int
+    answers: int
+    transcripts: int
+    characters: int
+
+
+def read_age(text: str) -> timedelta:
+    """An age as it is entered: 180d or 26w.
+
+    Raises:
+        InvalidDocument: It is none, or below a day.
+    """
+    found = _AGE.fullmatch(text.strip())
+    days = int(found[1]) * _DAYS[found[2]] if found else 0
+    if not days:
+        said = f"expected days or weeks as in 180d or 26w, not {text!r}"
+        raise InvalidDocument("age", [("", said)])
+    return timedelta(days=days)
+
+
+def foresee_losses(*, before: datetime) -> list[TextLoss]:
+    """What would go, job by job, the oldest first; two queries and one for each job.
+
+    Args:
+        before: Calls that began earlier are old.
+    """
+    calls = _removable(before)
+    jobs = GenerationJob.objects.filter(
+        pk__in=calls.order_by().values("attempt__augmentation__job").distinct()
+    )
+    losses = [
+        _loss(job, calls.filter(attempt__augmentation__job=job))
+        for job in jobs.order_by("created_at", "pk")
+    ]
+    readings = calls.filter(reading__isnull=False)
+    return losses + ([_loss(None, readings)] if readings.exists() else [])
+
+
+def remove_old(
+    *, before: datetime, now: datetime, actor: User | None = None
+) -> Iterator[tuple[TextLoss, int]]:
+    """Empty old calls, job by job; each job with how many of its calls are done so far.
+
+    What is to go is logged first. Stopped halfway, it has emptied whole batches, and the next
+    run does the rest.
+
+    Raises:
+        Conflict: A job was resumed or a study opened meanwhile, so that some calls may not go.
+    """
+    for loss in foresee_losses(before=before):
+        whose = Q(reading__isnull=False)
+        if loss.job is not None:
+            whose = Q(attempt__augmentation__job=loss.job)
+        calls = _removable(before).filter(whose)
+        keys = list(calls.order_by("pk").values_list("pk", flat=True))
+        images = images_named_by(keys)
+        _log(loss, before, actor)
+        for start in range(0, len(keys), BATCH):
+            _empty(keys[start : start + BATCH], before=before, now=now)
+            yield loss, min(start + BATCH, len(keys))
+        delete_unnamed(images)
+
+
+# --- Private -----------------------------------------------------------------------------------
+
+
+def _removable(before: datetime) -> QuerySet[ModelCall]:
+    """Old calls with their words, of jobs that are over, which no unfinished study shows."""
+    unfinished = Matchup.objects.exclude(study__state=Study.State.CLOSED).order_by()
+    shown = Augmentation.objects.filter(
+        Q(pk__in=unfinished.values("left")) | Q(pk__in=unfinished.values("right"))
+    ).values("pk")
+    kept = Q(attempt__augmentation__in=shown) | Q(attempt__augmentation__job__state__in=OPEN)
+    # Whoever was answered from a call counts it as the source of what it shows.
+    sources = ModelCall.objects.filter(kept, served_from__isnull=False).values("served_from")
+    old = ModelCall.objects.filter(
+        started_at__lt=before, settled_at__isnull=False, removed_at__isnull=True
+    )
+    of_jobs_over = Q(attempt__isnull=True) | ~Q(attempt__augmentation__job__state__in=OPEN)
+    not_shown = Q(attempt__isnull=True) | ~Q(attempt__augmentation__in=shown)
+    return old.filter(of_jobs_over, not_shown).exclude(pk__in=sources)
+
+
+def _loss(job: GenerationJob | None, calls: QuerySet[ModelCall]) -> TextLoss:
+    long = Length(Cast("request", TextField())) + Coalesce(Length("answer"), 0)
+    found = calls.order_by().aggregate(
+        calls=Count("pk"),
+        answers=Count("pk", filter=Q(answer__isnull=False)),
+        transcripts=Count("attempt__augmentation", distinct=True),
+        characters=Sum(long),
+    )
+    return TextLoss(
+        job=job,
+        calls=found["calls"],
+        answers=found["answers"],
+        transcripts=found["transcripts"],
+        characters=found["characters"] or 0,
+    )
+
+
+@transaction.atomic
+def _empty(keys: list[int], *, before: datetime, now: datetime) -> None:
+    """The messages and the answers of a batch; held, so that no job is resumed in between."""
+    rows = list(ModelCall.objects.select_for_update().filter(pk__in=keys).order_by("pk"))
+    if _removable(before).filter(pk__in=keys).count() != len(keys):
+        raise Conflict(
+            "A job went on or a study was opened meanwhile; the rest is kept. Run it again."
+        )
+    for row in rows:
+        row.request = {name: said for name, said in row.request.items() if name != "messages"}
+        row.answer = None if row.answer is None else ""
+        row.refusal = None if row.refusal is None else ""
+        row.extras, row.request_hash, row.removed_at = None, "", now
+    columns = ("request", "answer", "refusal", "extras", "request_hash", "removed_at")
+    ModelCall.objects.bulk_update(rows, columns)
+
+
+def _log(loss: TextLoss, before: datetime, actor: User | None) -> None:
+    after: dict[str, Any] = {
+        "older_than": before.isoformat(),
+        "calls": loss.calls,
+        "answers": loss.answers,
+        "transcripts": loss.transcripts,
+        "characters": loss.characters,
+    }
+    kind, code = ("reading", "all") if loss.job is None else ("job", str(loss.job.code))
+    log_event(actor=actor, verb="prune", object_kind=kind, object_code=code, after=after)
+
+
+REFUSALS = (AugmentError, ArenaError, ValidationError, ValueError, KeyError, TypeError)
+"""What a rule raises."""
+
+
+def check_row(row: models.Model) -> None:
+    """Refuse a row that no form and no door of the API would have stored.
+
+    Raises:
+        One of REFUSALS: With the column and what is allowed.
+    """
+    if rule := _RULES.get(type(row)):
+        rule(row)
+
+
+def check_votes() -> None:
+    """Hold stored pairs and votes against each other.
+
+    Raises:
+        ArenaError: A vote is not on what its expert was shown, or a pair is not of its scenario.
+    """
+    votes = Vote.objects.order_by("pk")
+    strangers = votes.exclude(
+        expert=F("matchup__expert"), shown_left=F("matchup__left"), shown_right=F("matchup__right")
+    ) | votes.exclude(supersedes=None).exclude(supersedes__matchup=F("matchup"))
+    if vote := strangers.first():
+        raise ArenaError(f"arena.vote, row {vote.pk}: it is not on what its expert was shown.")
+    pairs = Matchup.objects.exclude(left__scenario=F("scenario"), right__scenario=F("scenario"))
+    if pair := pairs.order_by("pk").first():
+        raise ArenaError(
+            f"arena.matchup, row {pair.pk}: both augmentations must be of its scenario."
+        )
+
+
+# --- Private -----------------------------------------------------------------------------------
+
+
+def _check_study(row: Study) -> None:
+    one_line("name", row.name, what="study")
+    check_seed(row.seed)
+    if row.rules:  # those of imported votes have none
+        rules_of(row)
+
+
+def _check_matchup(row: Matchup) -> None:
+    for name in ("original_image", "left_image", "right_image"):
+        check_picture_name(name, getattr(row, name))
+
+
+def _check_vote(row: Vote) -> None:
+    decision_of(
+        matchup_code=uuid4(),
+        key=row.key,
+        outcome=row.outcome,
+        both_miss=row.both_miss,
+        reason=row.reason,
+        comment=row.comment,
+        aids=row.aids.split(),
+    )
+
+
+def _check_report(row: Report) -> None:
+    mark = None if row.mark_x is None or row.mark_y is None else (row.mark_x, row.mark_y)
+    side = row.side or Report.Side.BOTH  # those from before it was asked name none
+    check_complaint(Complaint(reason=row.reason, side=side, mark=mark, comment=row.comment))
+
+
+def _check_label(row: FaultLabel) -> None:
+    if len(row.note) > NOTE_LENGTH:
+        raise ValueError(f"note: at most {NOTE_LENGTH} characters are allowed")
+
+
+def _check_snapshot(row: Snapshot) -> None:
+    check_seed(row.seed)
+    Method(row.method)
+    Unit(row.resampling_unit)
+    Intervals(row.intervals)
+
+
+_RULES: Mapping[type[models.Model], Callable[[Any], None]] = {
+    **row_rules.RULES,
+    FaultLabel: _check_label,
+    Matchup: _check_matchup,
+    Report: _check_report,
+    Snapshot: _check_snapshot,
+    Study: _check_study,
+    Vote: _check_vote,
+}
+
+
+_WHY = "It was under way when the backup was taken. Start it again."
+
+_WORK = [model for model in apps.get_models() if issubclass(model, Work)]
+
+UNFINISHED: Mapping[type[models.Model], tuple[str, ...]] = {
+    **{model: model.UNDER_WAY for model in _WORK},
+    GenerationJob: (GenerationJob.State.RUNNING,),
+    Study: (Study.State.OPEN,),
+}
+"""The states of each table in which something is still done with a row."""
+
+
+def is_unfinished(row: models.Model) -> bool:
+    """Return whether something would still be done with a row."""
+    return getattr(row, "state", None) in UNFINISHED.get(type(row), ())
+
+
+def end_restored_work() -> None:
+    """Leave nothing for workers to pick up: jobs are paused, all else has failed.
+
+    An admin resumes the jobs and asks for the rest again; studies stay open.
+    """
+    waiting = Augmentation.objects.filter(state__in=Augmentation.UNDER_WAY)
+    jobs = GenerationJob.objects.exclude(state=GenerationJob.State.CANCELLED)
+    jobs.filter(pk__in=waiting.values("job")).update(state=GenerationJob.State.PAUSED)
+    for model in _WORK:
+        ended = {"state": FAILED, "reason": _WHY}
+        if model is Augmentation:  # it waits in a job that is paused
+            ended = {"state": Augmentation.State.QUEUED}
+        rows = model._default_manager.filter(state__in=model.UNDER_WAY)
+        rows.update(claim=None, heartbeat_at=None, sent_at=None, **ended)

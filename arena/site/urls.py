@@ -1,0 +1,113 @@
+"""Addresses of the pages."""
+
+from __future__ import annotations
+
+from django.contrib.auth import views as auth
+from django.urls import URLPattern, path
+
+from arena.contestants.urls import urlpatterns as CONTESTANTS
+from arena.jobs.urls import urlpatterns as JOBS
+from arena.people import pages as people
+from arena.scenarios.urls import urlpatterns as SCENARIOS
+from arena.site import pages
+from arena.studies.pages import experts, planning, setup, studies
+from arena.web.results import evidence as results_votes
+from arena.web.results import files as results_files
+from arena.web.results import pages as results
+from arena.web.voting import pages as voting
+from arena.web.voting import practice
+
+urlpatterns: list[URLPattern] = [
+    *SCENARIOS,
+    *CONTESTANTS,
+    *JOBS,
+    path("", pages.home, name="home"),
+    path("healthz", pages.healthz, name="healthz"),
+    path("readyz", pages.readyz, name="readyz"),
+    path("metrics", pages.metrics, name="metrics"),
+    path("theme/", pages.theme, name="theme"),
+    path("language/", pages.language, name="language"),
+    path("login/", people.SignIn.as_view(), name="login"),
+    path("logout/", auth.LogoutView.as_view(), name="logout"),
+    path("invitation/<str:token>/", experts.invitation_page, name="invitation"),
+    path("enrol/<str:token>/", experts.enrol_page, name="enrol"),
+    path("first/<str:token>/", people.first_page, name="first"),
+    path("welcome/<str:token>/", people.welcome_page, name="welcome"),
+    path("password/", people.password_page, name="password"),
+    path("tokens/", people.tokens_page, name="api-tokens"),
+    path("tokens/<uuid:code>/revoke/", people.revoke_token, name="api-token-revoke"),
+    path("people/", people.people_page, name="people"),
+    path("people/<uuid:code>/link/", people.make_link, name="person-link"),
+    path("people/<uuid:code>/change/", people.change_person, name="person-change"),
+    path("people/<uuid:code>/forget/", experts.forget_person, name="person-forget"),
+    path("audit/", pages.audit_page, name="audit"),
+    path("audit.<slug:form>", pages.audit_file, name="audit-export"),
+    path("studies/", studies.studies_page, name="studies"),
+    path("studies/plan/", planning.planning_page, name="study-plan"),
+    path("studies/checks/", setup.draw_checks, name="checks-draw"),
+    path("studies/import/", setup.upload_votes_page, name="import-votes"),
+    path("studies/new/", setup.new_study_page, name="study-new"),
+    path("studies/drafts/<uuid:code>/", setup.draft_page, name="study-draft"),
+    path("studies/drafts/<uuid:code>/discard/", setup.discard, name="study-draft-discard"),
+    path("studies/<uuid:code>/", studies.study_page, name="study"),
+    path("studies/<uuid:code>/again/", setup.use_again, name="study-again"),
+    path("studies/<uuid:code>/cancel/", studies.cancel, name="study-cancel"),
+    path(
+        "studies/<uuid:code>/preregistration.json",
+        studies.preregistration_file,
+        name="preregistration",
+    ),
+    path("studies/<uuid:code>/experts/", experts.experts_page, name="experts"),
+    path("studies/<uuid:code>/enrolment/", experts.enrolment_page, name="enrolment"),
+    path("studies/<uuid:code>/enrolment/drop/", experts.drop_out, name="enrolment-drop"),
+    path("studies/<uuid:code>/enrolment/voters.csv", experts.voters_file, name="enrolment-voters"),
+    path("studies/<uuid:code>/experts/invite/", experts.invite_experts, name="invite"),
+    path("invitations/<uuid:code>/revoke/", experts.revoke_invitation, name="revoke"),
+    path("studies/<uuid:code>/experts/authors/", experts.mark, name="author"),
+    path("authorships/<uuid:code>/take-back/", experts.take_back, name="author-back"),
+    path("studies/<uuid:code>/close/", studies.close, name="study-close"),
+    path("studies/<uuid:code>/hand-over/", studies.hand_over_pairs, name="study-hand-over"),
+    path("studies/<uuid:code>/reports/<uuid:key>/", studies.report_page, name="report"),
+    path("studies/<uuid:code>/vote/", voting.vote_page, name="vote"),
+    path("studies/<uuid:code>/vote/help/", voting.help_page, name="vote-help"),
+    path("studies/<uuid:code>/vote/practice/", practice.practice_page, name="vote-practice"),
+    path("studies/<uuid:code>/vote/skipped/", voting.skipped_page, name="vote-skipped"),
+    path("studies/<uuid:code>/vote/report/", voting.report_pair, name="vote-report"),
+    path("i/<str:token>", voting.matchup_image, name="matchup-image"),
+    path("d/<uuid:code>", voting.replay, name="replay"),
+    path("m/<uuid:code>", voting.measures, name="measures"),
+    path("studies/<uuid:code>/results/", results.results_page, name="results"),
+    path("studies/<uuid:code>/results/open/", results.open_results_early, name="results-open"),
+    path("studies/<uuid:code>/results/votes/", results_votes.votes_page, name="results-votes"),
+    path(
+        "studies/<uuid:code>/results/votes.csv",
+        results_votes.votes_file,
+        name="results-votes-file",
+    ),
+    path(
+        "studies/<uuid:code>/results/votes/<uuid:vote>/",
+        results_votes.single_vote_page,
+        name="results-vote",
+    ),
+    path(
+        "studies/<uuid:code>/results/shown/<uuid:matchup>/<slug:side>.png",
+        results_votes.shown_picture,
+        name="shown-picture",
+    ),
+    path("studies/<uuid:code>/results/<slug:tab>/", results.results_page, name="results-tab"),
+    path("studies/<uuid:code>/files/<slug:kind>/write/", studies.ask_for_file, name="study-write"),
+    path("studies/<uuid:code>/files/<slug:kind>/", studies.download, name="study-file"),
+    path("studies/<uuid:code>/results.<slug:form>", results_files.export, name="results-export"),
+    path(
+        "studies/<uuid:code>/results-votes.<slug:form>",
+        results_files.export_votes,
+        name="results-votes-export",
+    ),
+    path(
+        "studies/<uuid:code>/results-charts/<slug:name>.<slug:form>",
+        results_files.export_chart,
+        name="results-chart",
+    ),
+    path("studies/<uuid:code>/rate/", results.rate_study, name="study-rate"),
+    path("studies/<uuid:code>/rate/<uuid:rating>/", results.compute_again, name="rating-again"),
+]

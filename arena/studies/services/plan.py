@@ -1,0 +1,323 @@
+"""What somebody expects of a study, written down before its first vote, and what came of it."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Any, Self
+
+from arena.errors import NothingToPlan
+from arena.models import Snapshot, Study
+from arena.pairing.rules import MOST_ADAPTIVE, MOST_CHECKS, MOST_OVERLAP, MOST_REPEATS
+from arena.services.shown_pictures import SampleRule
+from augment.services.inputs import InputKind, input_field, inputs_of
+
+MOST = 100
+LONGEST = 500
+_PAIR = re.compile(r"(\S+)\s+above\s+(\S+)")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Hypothesis:
+    """A line.
+
+    Attributes:
+        text: As it was entered.
+        above: The slugs of the one that is expected to be better and of the other; None for a
+            line in words, which no number answers.
+    """
+
+    text: str
+    above: tuple[str, str] | None = None
+
+    def as_document(self) -> dict[str, Any]:
+        """For JSON."""
+        return {"text": self.text, "above": None if self.above is None else list(self.above)}
+
+
+class HypothesisVerdict(StrEnum):
+    """What a rating says of an expected pair, with all pairs of the table judged at once."""
+
+    HELD = "held"
+    CONTRADICTED = "contradicted"
+    UNDECIDED = "undecided"
+    NOT_JUDGED = "not judged"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Answered:
+    """A hypothesis and what came of it.
+
+    Attributes:
+        verdict: None for a line in words.
+        difference: Points from the other to the one expected to be better.
+        p: Adjusted for all pairs of the table.
+    """
+
+    hypothesis: Hypothesis
+    verdict: HypothesisVerdict | None = None
+    difference: float | None = None
+    p: float | None = None
+
+
+def read_hypotheses(lines: Sequence[str], contestants: Sequence[str]) -> tuple[Hypothesis, ...]:
+    """Lines of text; “SLUG above SLUG” alone on a line is an expected pair.
+
+    Args:
+        lines: Empty ones are passed over.
+        contestants: Slugs of the study.
+
+    Raises:
+        NothingToPlan: A pair names somebody else or somebody twice, a line is too long or comes
+            twice, or there are too many.
+    """
+    found = [" ".join(line.split()) for line in lines if line.strip()]
+    if len(found) > MOST or len(set(found)) < len(found):
+        raise NothingToPlan(f"At most {MOST} hypotheses, each once, are allowed.")
+    return tuple(_read(line, contestants) for line in found)
+
+
+def hypotheses_of(study: Study) -> tuple[Hypothesis, ...]:
+    """Those that were frozen at the opening."""
+    return tuple(
+        Hypothesis(
+            text=kept["text"], above=None if kept["above"] is None else tuple(kept["above"])
+        )
+        for kept in study.rules.get("hypotheses", ())
+    )
+
+
+def answer_hypotheses(snapshot: Snapshot) -> tuple[Answered, ...]:
+    """What a rating says of each of the study's hypotheses; one query where there are any."""
+    hypotheses = hypotheses_of(snapshot.study)
+    if not hypotheses:
+        return ()
+    ratings = dict(snapshot.standings.values_list("slug", "rating"))
+    board = snapshot.results.board
+    p_values = {frozenset((one.a, one.b)): one.p for one in board.p_values or ()}
+    return tuple(_answered(one, ratings, board.above, p_values) for one in hypotheses)
+
+
+# --- Private -----------------------------------------------------------------------------------
+
+
+def _read(line: str, contestants: Sequence[str]) -> Hypothesis:
+    if len(line) > LONGEST:
+        raise NothingToPlan(
+            f"A hypothesis has at most {LONGEST} signs: “{line[:40]}…”."
+        )  # fmt: skip
+    found = _PAIR.fullmatch(line)
+    if found is None:
+        return Hypothesis(text=line)
+    better, other = found.groups()
+    for slug in (better, other):
+        if slug not in contestants:
+            raise NothingToPlan(
+                f"“{line}”: {slug} is no contestant of this study; allowed are "
+                f"{', '.join(sorted(contestants))}."
+            )
+    if better == other:
+        raise NothingToPlan(f"“{line}” names one contestant twice.")
+    return Hypothesis(text=line, above=(better, other))
+
+
+def _answered(
+    one: Hypothesis,
+    ratings: dict[str, float | None],
+    above: tuple[tuple[str, str], ...] | None,
+    p_values: dict[frozenset[str], float],
+) -> Answered:
+    if one.above is None:
+        return Answered(hypothesis=one)
+    better, other = one.above
+    high, low = ratings.get(better), ratings.get(other)
+    difference = None if high is None or low is None else high - low
+    if above is None:
+        verdict = HypothesisVerdict.NOT_JUDGED
+    elif (better, other) in above:
+        verdict = HypothesisVerdict.HELD
+    elif (other, better) in above:
+        verdict = HypothesisVerdict.CONTRADICTED
+    else:
+        verdict = HypothesisVerdict.UNDECIDED
+    return Answered(
+        hypothesis=one,
+        verdict=verdict,
+        difference=difference,
+        p=p_values.get(frozenset(one.above)),
+    )
+
+
+LONGEST_NAME = 120
+HIGHEST_SEED = 2**63 - 1
+SAMPLES = {SampleRule.ONE.value: "one of each scenario", SampleRule.ALL.value: "all of them"}
+
+
+def _percent(label: str, help: str, *, most: float, default: float = 0.0) -> Any:
+    return input_field(
+        InputKind.NUMBER, label, help, unit="%", least=0, most=round(100 * most), default=default
+    )
+
+
+def _switch(label: str, help: str, *, default: bool = False) -> Any:
+    return input_field(InputKind.SWITCH, label, help, default=default)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StudyPlan:
+    """A study that is to be opened; see arena.pairing.rules for what its rules mean."""
+
+    name: str = input_field(
+        InputKind.TEXT, "Name", "Experts see it: it should name no contestant.", most=LONGEST_NAME
+    )
+    contestants: tuple[str, ...] = input_field(
+        InputKind.NAMES, "Contestants", "Slugs; the latest picture of each scenario takes part."
+    )
+    scenarios: tuple[str, ...] = input_field(InputKind.NAMES, "Scenarios", "Slugs.")
+    experts: tuple[str, ...] = input_field(InputKind.NAMES, "Experts", "Usernames.")
+    votes_per_expert: int = input_field(InputKind.WHOLE, "Votes per expert", least=1, most=10_000)
+    seed: int = input_field(
+        InputKind.WHOLE, "Seed of the plan", default=1, least=0, most=HIGHEST_SEED
+    )
+    repeats: float = _percent(
+        "Hidden repeats",
+        "On top of the votes, sides swapped, never rated: they tell how steady each expert is.",
+        most=MOST_REPEATS,
+        default=5.0,
+    )
+    checks: float = _percent(
+        "Attention checks",
+        "A broken picture against the reference, never rated. Each needs a scenario with a "
+        "reference; have the missing ones drawn first.",
+        most=MOST_CHECKS,
+    )
+    overlap: float = _percent(
+        "Pairs that two experts judge",
+        "At least so many of the judged pairs go to two experts or more, else nobody can say how "
+        "far they agree.",
+        most=MOST_OVERLAP,
+    )
+    adaptive: float = _percent(
+        "Planned by the votes",
+        "The last share of the votes goes to the pairs that tell most; 0 plans all before the "
+        "first vote.",
+        most=MOST_ADAPTIVE,
+    )
+    targets: tuple[str, ...] = input_field(
+        InputKind.LINES,
+        "Targets",
+        "Empty for a balanced plan. Else one for each contestant, “reference=120”: in how many "
+        "votes of all experts it appears. Or one for each pair, “reference vs rule-placer=40”.",
+        default=(),
+    )
+    hypotheses: tuple[str, ...] = input_field(
+        InputKind.LINES,
+        "Hypotheses",
+        "Lines that are frozen with the study. “reference above rule-placer” alone on a line is "
+        "answered by the results.",
+        default=(),
+    )
+    samples: SampleRule = input_field(
+        InputKind.CHOICE,
+        "Where a job has several samples",
+        "One is drawn by the seed, the same for all contestants; all are shown each on its own.",
+        choices=SAMPLES,
+        default=SampleRule.ONE,
+    )
+    jobs: tuple[str, ...] = input_field(
+        InputKind.NAMES,
+        "Jobs",
+        "Names or codes of the jobs whose augmentations are shown; none for the latest of all.",
+        default=(),
+    )
+    allow_both_miss: bool = _switch(
+        "Ask whether both miss",
+        "Experts may add to Equal that both miss the instruction; it counts as a tie.",
+    )
+    show_alike: bool = _switch(
+        "Also show pairs that nobody can tell apart",
+        "Pairs that differ by at most 0.15 m and 2° in every object are otherwise settled as "
+        "ties, but for a tenth that is shown as a check.",
+    )
+    allow_text: bool = _switch(
+        "Experts may read a text description",
+        "It lists what was added, changed or removed in each image, with metres and headings; "
+        "votes say who read it.",
+    )
+    allow_measures: bool = _switch(
+        "Experts may measure",
+        "They may lay lines and rings of what the instruction asks for over both images, and "
+        "read distances to lane edges under the ruler; votes say who did.",
+        default=True,
+    )
+    allow_replay: bool = _switch(
+        "Experts may play the drives",
+        "Under the images, how a planner drove both scenes; only where every image of a scenario "
+        "was driven. Votes say who played them.",
+    )
+    practice: bool = _switch(
+        "Practice before the first pair",
+        "Five pairs, a reference beside a broken image, each followed by what was right and why; "
+        "nothing of it counts.",
+    )
+    allow_simulated: bool = _switch("Simulated may take part", "Every page and file then says so.")
+
+    @classmethod
+    def read(cls, given: Mapping[str, Any]) -> Self:
+        """Make a plan of what a door has parsed: lists, and words for choices."""
+        found: dict[str, Any] = {
+            name: tuple(value) if isinstance(value, list) else value
+            for name, value in given.items()
+        }
+        return cls(**found | {"samples": SampleRule(given.get("samples", SampleRule.ONE))})
+
+    @property
+    def shares(self) -> dict[str, Any]:
+        """The percentages as the planner takes them, by its names."""
+        return {share: getattr(self, name) / 100 for name, share in SHARES.items()}
+
+
+PLAN_INPUTS = inputs_of(StudyPlan)
+SHARES = {
+    "repeats": "repeat_share",
+    "checks": "check_share",
+    "overlap": "overlap_share",
+    "adaptive": "adaptive_share",
+}
+"""What the frozen rules call a percentage; they keep it as a share."""
+SWITCH_COLUMNS = tuple(
+    one.name
+    for one in PLAN_INPUTS
+    if one.kind is InputKind.SWITCH and one.name in {column.name for column in Study._meta.fields}
+)
+"""Switches that a study keeps in a column of its own."""
+
+
+def plan_of(study: Study) -> StudyPlan:
+    """Return what was asked for when a study was opened, by what it froze.
+
+    Who joined by a link for everybody, and hidden pairs handed over, are no part of it.
+    """
+    rules = study.rules
+    return StudyPlan(
+        name=study.name,
+        contestants=tuple(study.contestants.order_by("slug").values_list("slug", flat=True)),
+        scenarios=tuple(study.scenarios.order_by("slug").values_list("slug", flat=True)),
+        experts=tuple(rules.get("experts", ())),
+        votes_per_expert=study.votes_per_expert,
+        seed=study.seed,
+        targets=_target_lines(rules),
+        hypotheses=tuple(one.text for one in hypotheses_of(study)),
+        samples=SampleRule(rules.get("samples", SampleRule.ONE)),
+        jobs=tuple(job["code"] for job in rules.get("jobs", ())),
+        show_alike=bool(rules.get("show_alike")),
+        **{name: round(100 * rules.get(share, 0), 6) for name, share in SHARES.items()},
+        **{name: getattr(study, name) for name in SWITCH_COLUMNS},
+    )
+
+
+def _target_lines(rules: Mapping[str, Any]) -> tuple[str, ...]:
+    by_pair = [f"{one} vs {other} {votes}" for one, other, votes in rules.get("pair_votes", ())]
+    return (*(f"{slug} {votes}" for slug, votes in rules.get("appearances", ())), *by_pair)

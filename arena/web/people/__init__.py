@@ -1,1 +1,0 @@
-"""Accounts, sign-in and the ways in by a link."""

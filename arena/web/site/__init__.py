@@ -1,1 +1,0 @@
-"""Home, health and the log of acts."""

@@ -1,1 +1,0 @@
-"""Pages of a study from its plan to its files."""

@@ -1,0 +1,216 @@
+"""Pedestrians and construction zones of the rule placer.
+
+Zones are a taper, a line, a row or a ring of cones, and a worker. s runs along the ego's lane from
+the ego's centre, d to the left of it.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from augment.baselines.placing_ground import SIGNS, PlacingGround, build_agent
+from augment.errors import CannotPlace
+from augment.geometry.frames import Pose
+from augment.scene.entities import LENGTH_WIDTH_M, AgentType, TrafficAgent
+from augment.scene.intent import (
+    ConesRequest,
+    LaneChoice,
+    LateralTarget,
+    Post,
+    Shape,
+    Side,
+    WalkRequest,
+)
+from augment.scene.lane_graph import LanePosition
+
+WALK_S = 15.0
+"""How long a walk takes in interPlan, whatever its length: 0.5 to 1.9 m/s."""
+SHORTEST_M, LONGEST_M = 7.0, 29.0
+"""interPlan's walks are 7 to 29 m long."""
+_BEYOND_EDGE_M = 0.5
+APART_M = 1.2
+CONE_SPACING_M = 2.5
+"""Between cones of which nobody says how far: interPlan's median."""
+_EDGE_M = LENGTH_WIDTH_M[AgentType.TRAFFIC_CONE][1] / 2.0
+"""A cone at a lane boundary stands inside of it."""
+_WORKER_GAP_M = 1.6
+"""How far from the cones a worker stands; interPlan's are 0.8 to 4.0 m from the nearest."""
+
+Place = tuple[float, float]
+"""(s, d)."""
+
+
+def place_walkers(
+    request: WalkRequest, ground: PlacingGround, distance_m: float, rng: np.random.Generator
+) -> tuple[TrafficAgent, ...]:
+    """Return the pedestrians: side by side along the road, or in a file behind the first.
+
+    Raises:
+        CannotPlace: The lanes end before.
+    """
+    start = request.start or ground.kerb  # the rule placer refuses an open one
+    added = []
+    for index in range(request.count or 1):
+        behind_m, along_m = 0.0, index * APART_M
+        if request.is_file:
+            behind_m, along_m = along_m, 0.0
+            if 0 < index <= len(request.behind):
+                behind_m = request.behind[index - 1].drawn(rng)
+        added.append(_walker(request, start, ground, distance_m + along_m, behind_m))
+    return tuple(added)
+
+
+def _walker(
+    request: WalkRequest, start: Side, ground: PlacingGround, distance_m: float, behind_m: float
+) -> TrafficAgent:
+    place = ground.along(distance_m)
+    if request.on_road:
+        from_m = ground.lane(place).width_m / 4.0
+    else:
+        from_m = ground.road_edge_m(place.pose, start) + _BEYOND_EDGE_M
+    arrives = ground.along(distance_m + (request.drift_m or 0.0)).pose
+    to_m = ground.road_edge_m(arrives, start.other) + _BEYOND_EDGE_M
+    begin = np.array(place.pose.beside(SIGNS[start] * (from_m + behind_m)))
+    end = np.array(arrives.beside(-SIGNS[start] * to_m))
+    length_m = math.dist(begin, end)
+    walked_m = min(max(length_m, SHORTEST_M), LONGEST_M)
+    end = begin + (end - begin) * (walked_m / length_m)
+    (x_m, y_m), (to_x_m, to_y_m) = begin.tolist(), end.tolist()
+    return build_agent(
+        AgentType.PEDESTRIAN,
+        Pose(x_m=x_m, y_m=y_m, heading_rad=math.atan2(to_y_m - y_m, to_x_m - x_m)),
+        ground.graph.under(x_m, y_m),
+        speed_mps=round(request.speed_mps or walked_m / WALK_S, 2),
+        walk_to_m=(to_x_m, to_y_m),
+    )
+
+
+def place_cones(
+    request: ConesRequest, ground: PlacingGround, distance_m: float, rng: np.random.Generator
+) -> tuple[TrafficAgent, ...]:
+    """Return the cones in order, then the worker; ids are still empty.
+
+    Raises:
+        CannotPlace: The lanes end before the last cone, or there is no such lane.
+    """
+    spacing_m = CONE_SPACING_M if request.spacing is None else request.spacing.drawn(rng)
+    if spacing_m < 2.0 * _EDGE_M:
+        raise CannotPlace(f"Cones {spacing_m:g} m apart would stand in each other.")
+    lane = request.spot.lane
+    edge_m = ground.lane(ground.beside(distance_m, lane)).width_m / 2.0 - _EDGE_M
+    places = _places(request, ground, distance_m, spacing_m, edge_m)
+    standing = [(AgentType.TRAFFIC_CONE, place) for place in places]
+    if request.has_worker:
+        standing.append((AgentType.PEDESTRIAN, _worker(request, ground, places)))
+    added = []
+    for kind, spot in standing:
+        place = _at(ground, lane, spot)
+        on_lane = abs(place.d_m) <= ground.lane(place).width_m / 2.0
+        lane_id = place.lane_id if on_lane else ground.lane_at(place.pose)
+        added.append(build_agent(kind, place.pose, lane_id))
+    return tuple(added)
+
+
+def _at(ground: PlacingGround, lane: LaneChoice | None, place: Place) -> LanePosition:
+    """The place (s, d): s along the ego's lane, d from the centre of the lane asked for."""
+    s_m, d_m = place
+    centre = ground.beside(s_m, lane)
+    sign = -1.0 if lane is LaneChoice.ONCOMING else 1.0
+    return ground.graph.place(centre.lane_id, centre.s_m, sign * d_m)
+
+
+def _places(
+    request: ConesRequest,
+    ground: PlacingGround,
+    distance_m: float,
+    spacing_m: float,
+    edge_m: float,
+) -> list[Place]:
+    count = request.count or 1
+    gaps = max(count - 1, 1)
+    along_m = spacing_m if request.reach_m is None else request.reach_m / gaps
+    if along_m < 2.0 * _EDGE_M:
+        raise CannotPlace(f"{count} cones have no room on {request.reach_m:g} m.")
+    if request.shape is Shape.RING:
+        return _ring(distance_m, count, spacing_m, edge_m)
+    if request.shape is Shape.ROW:
+        first_m = (count - 1) * spacing_m / 2.0
+        return [(distance_m, first_m - index * spacing_m) for index in range(count)]
+    if request.shape is Shape.LINE:
+        sides = (1.0, -1.0) if request.both_sides else (_line_side(request, ground),)
+        return [
+            (distance_m + index * along_m, side * edge_m)
+            for side in sides
+            for index in range(count)
+        ]
+    # A taper: across the lane, as slanted as needed for the spacing, or over the whole reach.
+    from_d_m = SIGNS[request.start or ground.kerb] * edge_m
+    across_m = abs(from_d_m) * (1.0 if request.ends_in_middle else 2.0) / gaps
+    if request.reach_m is None:
+        across_m = min(across_m, spacing_m)
+        along_m = math.sqrt(spacing_m**2 - across_m**2)
+    inwards_m = -math.copysign(across_m, from_d_m)
+    return [(distance_m + i * along_m, from_d_m + i * inwards_m) for i in range(count)]
+
+
+def _ring(centre_m: float, count: int, spacing_m: float, widest_m: float) -> list[Place]:
+    """A circle around the centre, or two rows in the lane where the lane is too narrow for it.
+
+    An odd cone closes the rows towards the ego.
+    """
+    if count < 3:
+        raise CannotPlace("A ring needs at least three cones.")
+    radius_m = spacing_m / (2.0 * math.sin(math.pi / count))
+    if radius_m <= widest_m:
+        angles = (math.pi + 2.0 * math.pi * index / count for index in range(count))
+        return [(centre_m + radius_m * math.cos(a), radius_m * math.sin(a)) for a in angles]
+    side_m, rows = min(spacing_m / 2.0, widest_m), count // 2
+    first_m = centre_m - (rows - 1) * spacing_m / 2.0
+    along = [first_m + index * spacing_m for index in range(rows)]
+    closing = [(first_m - math.sqrt(spacing_m**2 - side_m**2), 0.0)] if count % 2 else []
+    return [*closing, *((s, -side_m) for s in along), *((s, side_m) for s in reversed(along))]
+
+
+def _line_side(request: ConesRequest, ground: PlacingGround) -> float:
+    """1 for the left boundary of the ego's direction, -1 for the right one, 0 for the centre."""
+    lateral = request.spot.lateral
+    kerb = SIGNS[ground.kerb]
+    return {
+        LateralTarget.LANE_CENTRE: 0.0,
+        LateralTarget.LEFT_BOUNDARY: 1.0,
+        LateralTarget.RIGHT_BOUNDARY: -1.0,
+        LateralTarget.KERB: kerb,
+        LateralTarget.CENTRE_LINE: -kerb,
+    }[LateralTarget.LANE_CENTRE if lateral is None else lateral.target]
+
+
+def _worker(request: ConesRequest, ground: PlacingGround, places: list[Place]) -> Place:
+    """Where the worker stands: as said, else where people stand at such a shape."""
+    (first_s, first_d), (last_s, last_d) = places[0], places[-1]
+    if request.shape is Shape.RING:
+        return sum(s for s, _ in places) / len(places), 0.0
+    if request.post is Post.AT_LAST or request.post_side is not None:
+        near = places[-2:] if request.post is Post.AT_LAST else places
+        side = SIGNS[request.post_side or request.start or ground.kerb]
+        middle_m = sum(s for s, _ in near) / len(near)
+        return middle_m, sum(d for _, d in near) / len(near) + side * _WORKER_GAP_M
+    if request.shape is Shape.ROW:
+        return first_s + _WORKER_GAP_M, 0.0
+    if request.shape is Shape.TAPER:
+        # Beside the middle of the taper, on the side that it closes.
+        length_m = math.hypot(last_s - first_s, last_d - first_d)
+        if length_m == 0.0:
+            return first_s + _WORKER_GAP_M, first_d
+        along, across = (last_s - first_s) / length_m, abs(last_d - first_d) / length_m
+        sign = SIGNS[request.start or ground.kerb]
+        middle_s, middle_d = (first_s + last_s) / 2.0, (first_d + last_d) / 2.0
+        return middle_s + across * _WORKER_GAP_M, middle_d + sign * along * _WORKER_GAP_M
+    if request.post is Post.BEHIND:
+        return last_s + _WORKER_GAP_M, last_d
+    # Beside the middle of a line: off the road if the line's outer side is, else in its lane.
+    middle_m = (first_s + last_s) / 2.0
+    gap_m = math.copysign(_WORKER_GAP_M, first_d or SIGNS[ground.kerb])
+    outside = _at(ground, request.spot.lane, (middle_m, first_d + gap_m))
+    return middle_m, first_d + (gap_m if ground.lane_at(outside.pose) is None else -gap_m)

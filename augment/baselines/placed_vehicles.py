@@ -1,0 +1,293 @@
+"""Vehicles of the rule placer: those that stand or drive in a lane, and those that have crashed.
+
+Crashed ones touch or nearly touch, turned against each other. Where an intent says how they stand,
+each is put against the one before it; what it leaves open is chosen so that they share as little
+ground as possible.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Callable, Iterator
+
+import numpy as np
+
+from augment.baselines.placing_ground import PlacingGround, build_agent
+from augment.errors import CannotPlace
+from augment.geometry.frames import Box, Pose, overlap, wrap
+from augment.scene.entities import LENGTH_WIDTH_M, AgentType, TrafficAgent
+from augment.scene.intent import (
+    Bearing,
+    Body,
+    CrashedCar,
+    CrashRequest,
+    Facing,
+    LaneChoice,
+    Lateral,
+    LateralTarget,
+    Nearness,
+    Side,
+    VehicleRequest,
+)
+from augment.scene.lane_graph import LanePosition
+
+_TYPES = {
+    Body.BUS: AgentType.BUS,
+    Body.BICYCLE: AgentType.BICYCLE,
+    Body.BARRIER: AgentType.BARRIER,
+    Body.CONSTRUCTION_SIGN: AgentType.CONSTRUCTION_SIGN,
+}
+"""Of the bodies that are no plain vehicle."""
+_SIZES_M = {Body.VAN: (5.4, 2.0), Body.TRUCK: (8.0, 2.4)}
+_FACING_RAD = {Facing.WITH_LANE: 0.0, Facing.AGAINST_LANE: math.pi, Facing.ACROSS: math.pi / 2.0}
+_EDGE_GAP_M = 0.1
+"""What is left between a box at the edge of a lane and that edge."""
+BUMPER_GAP_M = 1.0
+"""Between neighbours in a row, where no distance is said."""
+SLIGHT_OFFSET_M = 0.75
+"""What "slightly" means without a number: the middle of the paper's range of 0 to 1.5 m."""
+
+_CRASH_GAP_M = 0.05
+_MOST_SHARED = 0.1
+"""Crashed cars that people placed for interPlan share up to 5.6 % of a box."""
+_TURNS_RAD = (math.radians(12.0), math.radians(-35.0), math.radians(30.0), -0.4)
+"""How crashed cars are turned from the lane, the nearest first, where no angle is asked for."""
+_SIDES_M = (-0.4, 0.6, -0.5, 0.5)
+"""How far left of the lane centre each of them stands."""
+_LOOSER = (1.0, 0.5, 0.0)
+"""By how much of these turns and sides; less where the road is too narrow for them."""
+_SHIFTS_M = (0.0, 0.25, -0.25, 0.5, -0.5)
+"""How far left of the lane centre the first one stands where the others are told against it."""
+_BEARINGS_RAD = {
+    Bearing.AHEAD: 0.0,
+    Bearing.BEHIND: math.pi,
+    Bearing.LEFT: math.pi / 2.0,
+    Bearing.RIGHT: -math.pi / 2.0,
+}
+_ASIDE_RAD = tuple(math.radians(sign * 8.0 * step) for step in range(6) for sign in (1.0, -1.0))
+"""How far from the named direction a neighbour may stand."""
+_COST_OF_TURN = 0.5
+
+
+def _size_m(body: Body) -> tuple[float, float]:
+    """Length and width."""
+    return _SIZES_M.get(body) or LENGTH_WIDTH_M[_TYPES.get(body, AgentType.VEHICLE)]
+
+
+def place_vehicles(
+    request: VehicleRequest, ground: PlacingGround, distance_m: float, rng: np.random.Generator
+) -> tuple[TrafficAgent, ...]:
+    """Return the vehicles that were asked for, one or a row, their ids still empty.
+
+    Raises:
+        CannotPlace: There is no such lane or side, or the offset leaves the lane.
+    """
+    lane, body = request.spot.lane, request.body
+    apart_m = _size_m(body)[0] + BUMPER_GAP_M
+    if request.spacing is not None:
+        apart_m = request.spacing.drawn(rng)
+    d_m = _offset_m(request, ground, ground.beside(distance_m, lane), rng)
+    turn_rad = _FACING_RAD[request.facing or Facing.WITH_LANE] + math.radians(request.turn_deg)
+    added = []
+    for index in range(request.count or 1):
+        centre = ground.beside(distance_m + index * apart_m, lane)
+        place = ground.graph.place(centre.lane_id, centre.s_m, d_m)
+        on_lane = abs(d_m) <= ground.lane(place).width_m / 2.0
+        agent = build_agent(
+            _TYPES.get(body, AgentType.VEHICLE),
+            place.pose.turned(turn_rad),
+            place.lane_id if on_lane else None,
+            _size_m(body),
+            speed_mps=request.speed_mps or 0.0,
+        )
+        added.append(agent)
+    return tuple(added)
+
+
+def _offset_m(
+    request: VehicleRequest, ground: PlacingGround, place: LanePosition, rng: np.random.Generator
+) -> float:
+    """How far left of the lane's own direction (right is negative) the box stands."""
+    lateral = request.spot.lateral
+    if lateral is None or lateral.target is LateralTarget.LANE_CENTRE:
+        return 0.0
+    side = _side(lateral, ground)
+    at_kerb = lateral.target is LateralTarget.KERB and lateral.nearness is Nearness.AT_EDGE
+    if (lateral.on_shoulder or at_kerb) and ground.neighbour(place, side) is not None:
+        raise CannotPlace(f"On the {side} is another lane, not the edge of the road.")
+    half_lane_m = ground.lane(place).width_m / 2.0
+    half_box_m = _size_m(request.body)[1] / 2.0
+    if lateral.offset is not None:
+        size_m = lateral.offset.drawn(rng)
+        if size_m > half_lane_m + half_box_m:
+            raise CannotPlace(f"An offset of {size_m:.1f} m leaves the lane.")
+    else:
+        size_m = {
+            None: SLIGHT_OFFSET_M,
+            Nearness.SLIGHTLY: SLIGHT_OFFSET_M,
+            Nearness.AT_EDGE: max(0.0, half_lane_m - half_box_m - _EDGE_GAP_M),
+            Nearness.HALF_OUT: half_lane_m,
+            Nearness.OUTSIDE: half_lane_m + half_box_m + _EDGE_GAP_M,
+        }[lateral.nearness]
+    to_left = (side is Side.LEFT) is not (request.spot.lane is LaneChoice.ONCOMING)
+    return size_m if to_left else -size_m
+
+
+def _side(lateral: Lateral, ground: PlacingGround) -> Side:
+    """The side of the ego's direction that a target is on, on this map."""
+    side = {
+        LateralTarget.LEFT_BOUNDARY: Side.LEFT,
+        LateralTarget.RIGHT_BOUNDARY: Side.RIGHT,
+        LateralTarget.KERB: ground.kerb,
+        LateralTarget.CENTRE_LINE: ground.kerb.other,
+    }[lateral.target]
+    if lateral.on_shoulder and side is not ground.kerb:
+        raise CannotPlace(
+            f"People drive on the {ground.kerb} here, so there is no shoulder on the {side}."
+        )
+    return side
+
+
+def count_arrangements(request: CrashRequest) -> int:
+    """Return how many arrangements `place_crash` has for a request, the preferred one first."""
+    return len(_SHIFTS_M if request.others else _LOOSER)
+
+
+def place_crash(
+    request: CrashRequest,
+    ground: PlacingGround,
+    distance_m: float,
+    rng: np.random.Generator,
+    *,
+    arrangement: int = 0,
+) -> tuple[TrafficAgent, ...]:
+    """Return the crashed vehicles, the first at the spot.
+
+    Args:
+        request: What was asked for.
+        ground: Where.
+        distance_m: Of the first one, along the ego's lane.
+        rng: Draws a gap from a range.
+        arrangement: Which of those that `count_arrangements` counts.
+
+    Raises:
+        CannotPlace: The lanes end before the last of them, there is no such lane, or
+            at the distance asked for they would stand in each other.
+    """
+    if request.others:
+        poses = _chained(request, ground, distance_m, _SHIFTS_M[arrangement], rng)
+    else:
+        poses = _in_a_row(request, ground, distance_m, _LOOSER[arrangement])
+    kind = _TYPES.get(request.body, AgentType.VEHICLE)
+    size_m = _size_m(request.body)
+    return tuple(build_agent(kind, pose, ground.lane_at(pose), size_m) for pose in poses)
+
+
+def _in_a_row(
+    request: CrashRequest, ground: PlacingGround, distance_m: float, looseness: float
+) -> list[Pose]:
+    """Each as near behind the one before as it can stand."""
+
+    def pose_at(along_m: float, index: int) -> Pose:
+        place = ground.beside(along_m, request.spot.lane)
+        pose = ground.graph.place(place.lane_id, place.s_m, looseness * _SIDES_M[index]).pose
+        first_rad = 0.0 if index else _FACING_RAD[request.facing or Facing.WITH_LANE]
+        return pose.turned(looseness * _TURNS_RAD[index] + first_rad)
+
+    poses = [pose_at(distance_m, 0)]
+    along_m = distance_m
+    for index in range(1, request.count or 2):
+
+        def following(gap_m: float, from_m: float = along_m, index: int = index) -> Pose:
+            return pose_at(from_m + gap_m, index)
+
+        along_m += _touching_m(request.body, poses[-1], following)
+        poses.append(pose_at(along_m, index))
+    return poses
+
+
+def _chained(
+    request: CrashRequest,
+    ground: PlacingGround,
+    distance_m: float,
+    left_m: float,
+    rng: np.random.Generator,
+) -> list[Pose]:
+    """Each where the intent puts it against the one before; of the last ones nothing is said."""
+    centre = ground.beside(distance_m, request.spot.lane)
+    spot = ground.graph.place(centre.lane_id, centre.s_m, left_m).pose
+    poses = [spot.turned(_FACING_RAD[request.facing or Facing.WITH_LANE])]
+    unsaid = (request.count or 0) - 1 - len(request.others)
+    for other in [*request.others, *[CrashedCar()] * unsaid]:
+        gap_m = None if other.gap is None else other.gap.drawn(rng)
+        choices = sorted(
+            _choices(request.body, other, poses, spot.heading_rad, gap_m),
+            key=lambda choice: choice[0],
+        )
+        if not choices:
+            apart = "So near" if gap_m is None else f"{gap_m:g} m apart"
+            raise CannotPlace(f"{apart} the cars would stand in each other.")
+        free = (pose for _, pose in choices if _is_free(pose, request.body, ground))
+        poses.append(next(free, choices[0][1]))
+    return poses
+
+
+def _is_free(pose: Pose, body: Body, ground: PlacingGround) -> bool:
+    length_m, width_m = _size_m(body)
+    box = Box(pose=pose, length_m=length_m, width_m=width_m)
+    return all(
+        overlap(box, agent.box).depth_m == 0.0
+        for agent in ground.scene.everyone
+        if math.hypot(agent.x_m - pose.x_m, agent.y_m - pose.y_m) < 2.0 * length_m
+    )
+
+
+def _choices(
+    body: Body, other: CrashedCar, poses: list[Pose], lane_rad: float, gap_m: float | None
+) -> Iterator[tuple[float, Pose]]:
+    """Cost and pose of each way to stand against the one before that shares little ground.
+
+    Without words about it, it is turned a little from the lane.
+    """
+    before = poses[-1]
+    headings = [wrap(lane_rad + turn_rad) for turn_rad in _TURNS_RAD[1:3]]
+    if other.turn_deg is not None:
+        turn_rad = math.radians(other.turn_deg)
+        turns = [turn_rad] if other.is_signed else [turn_rad, -turn_rad]
+        headings = [wrap(before.heading_rad + turn) for turn in turns]
+    for heading_rad, aside_rad in itertools.product(headings, _ASIDE_RAD):
+        toward_rad = lane_rad + _BEARINGS_RAD[other.bearing or Bearing.AHEAD] + aside_rad
+
+        def pose_at(
+            size_m: float, toward_rad: float = toward_rad, heading_rad: float = heading_rad
+        ) -> Pose:
+            return Pose(
+                x_m=before.x_m + size_m * math.cos(toward_rad),
+                y_m=before.y_m + size_m * math.sin(toward_rad),
+                heading_rad=heading_rad,
+            )
+
+        pose = pose_at(_touching_m(body, before, pose_at) if gap_m is None else gap_m)
+        shared = max(_shared(body, pose, one) for one in poses)
+        off_lane = 0.0 if other.turn_deg is None else abs(wrap(heading_rad - lane_rad))
+        cost = abs(aside_rad) + 10.0 * shared + _COST_OF_TURN * min(off_lane, math.pi - off_lane)
+        if shared <= _MOST_SHARED:
+            yield round(cost, 6), pose
+
+
+def _touching_m(body: Body, before: Pose, pose_at: Callable[[float], Pose]) -> float:
+    """The smallest distance at which a pose does not share ground with the one before."""
+    low_m, high_m = 0.0, 2.0 * math.hypot(*_size_m(body))
+    while high_m - low_m > 0.01:
+        middle_m = (low_m + high_m) / 2.0
+        touches = _shared(body, before, pose_at(middle_m)) > 0.0
+        low_m, high_m = (middle_m, high_m) if touches else (low_m, middle_m)
+    return high_m + _CRASH_GAP_M
+
+
+def _shared(body: Body, one: Pose, other: Pose) -> float:
+    """The share of a box that two of that kind have in common."""
+    length_m, width_m = _size_m(body)
+    boxes = (Box(pose=pose, length_m=length_m, width_m=width_m) for pose in (one, other))
+    return overlap(*boxes).share_of_first
