@@ -25,7 +25,6 @@ from arena.jobs.exports.displacement import displacement_table
 from arena.jobs.exports.files import scenario_zip, zip_name
 from arena.jobs.exports.registry import PLAIN_TABLES, TRANSCRIPTS, JobTable
 from arena.jobs.exports.tables import ANALYSES, TABLE_FORMATS, analysis_sheet, object_sheet
-from arena.jobs.queries import grid
 from arena.models import Snapshot, Study
 from arena.queries.studies.results import snapshot_to_export
 from arena.queries.votes.judged import is_imported
@@ -180,12 +179,11 @@ def _write_samples(options: Chosen, say: Say) -> ExportedFile:
     form = options["format"] or Path(options["out"]).suffix.removeprefix(".")
     if form not in SHEET_FORMATS:
         raise UnknownName("format", form, list(SHEET_FORMATS))
-    job = find_job(options["job"])
     sheet = sheet_of(
-        job.name,
-        grid(job, sample=options["sample"]),
+        find_job(options["job"]),
         scenarios=options["scenarios"],
         contestants=options["contestants"],
+        sample=options["sample"],
     )
     return ExportedFile(sheet_bytes(sheet, file_format=form), form, False)
 
