@@ -24,8 +24,9 @@ from arena.pairing.later import (
     ratings_so_far,
     units_of,
 )
+from arena.pairing.order import FloatArray
 from arena.pairing.plan import Check, Entry, PlannedMatchup, PlanRules
-from arena.pairing.rules import FloatArray, Grid, place_of, scenario_of
+from arena.pairing.rules import Grid, place_of, scenario_of
 from arena.queries.voting.path import upcoming
 from arena.queries.voting.showings import LEGEND
 from arena.services.frames import Cells, ScenarioFrame, find_frames, frames_shown, sides_of

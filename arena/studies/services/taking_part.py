@@ -18,7 +18,8 @@ from arena.errors import EnrolmentOver, NothingToPlan, StudyNotOpen
 from arena.models import EnrolledVoter, Enrolment, Invitation, Matchup, Person, Study
 from arena.pairing.later import choose_for_newcomer as choose_units
 from arena.pairing.later import deal, units_of
-from arena.pairing.rules import Grid, IntArray, place_of
+from arena.pairing.order import IntArray
+from arena.pairing.rules import Grid, place_of
 from arena.people.queries import experts as expert_accounts
 from arena.people.queries import forgotten_name
 from arena.people.services import check_may_change, create_person, log_person, sign_out
