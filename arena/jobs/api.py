@@ -159,8 +159,6 @@ class EstimateDocument(serializers.Serializer[Any]):
     usd = serializers.DecimalField(None, 9)
     usd_most = serializers.DecimalField(None, 9)
     answered = serializers.IntegerField(help_text="Rows whose answers are in the store already.")
-    seconds = serializers.FloatField()
-    is_time_guessed = serializers.BooleanField(help_text="A model has no recorded calls.")
     lines = EstimateLineDocument(many=True)
 
 

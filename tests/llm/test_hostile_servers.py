@@ -98,13 +98,13 @@ def test_a_call_that_nobody_wants_before_it_is_sent_is_not_sent() -> None:
 MOST = 20_000
 
 
-@pytest.mark.parametrize("packing", ["gzip", "deflate", "identity"])
+@pytest.mark.parametrize("packing", ["gzip", "identity"])
 @pytest.mark.parametrize(("beyond", "fits"), [(0, True), (1, False)])
 def test_an_answer_may_be_as_long_as_the_limit_and_no_longer(
     packing: str, beyond: int, fits: bool
 ) -> None:
     body = BODY + b" " * (MOST - len(BODY) + beyond)
-    packed = {"gzip": gzip.compress(body), "deflate": zlib.compress(body)}.get(packing, body)
+    packed = gzip.compress(body) if packing == "gzip" else body
     say = whole(packed, f"Content-Encoding: {packing}")
     if fits:
         assert ask(say, most_bytes=MOST).text == "Hi"
@@ -114,14 +114,12 @@ def test_an_answer_may_be_as_long_as_the_limit_and_no_longer(
         assert "longer than 0.02 MB" in str(broken)
 
 
-@pytest.mark.parametrize("packing", ["gzip", "deflate"])
-def test_a_small_answer_that_unpacks_to_a_large_one_is_never_held(packing: str) -> None:
-    wbits = {"gzip": 31, "deflate": 15}[packing]
-    packer = zlib.compressobj(9, zlib.DEFLATED, wbits)
+def test_a_small_answer_that_unpacks_to_a_large_one_is_never_held() -> None:
+    packer = zlib.compressobj(9, zlib.DEFLATED, 31)
     bomb = packer.compress(bytes(40_000_000)) + packer.flush()
     tracemalloc.start()
     try:
-        broken = fault(whole(bomb, f"Content-Encoding: {packing}"), most_bytes=100_000)
+        broken = fault(whole(bomb, "Content-Encoding: gzip"), most_bytes=100_000)
         _, peak = tracemalloc.get_traced_memory()
     finally:
         tracemalloc.stop()
@@ -155,7 +153,7 @@ def test_headers_without_end_are_a_broken_connection(say: Say) -> None:
     assert "the connection failed" in str(fault(say))
 
 
-@pytest.mark.parametrize("packing", ["br", "zstd", "gzip, gzip", "deflate, gzip", "compress"])
+@pytest.mark.parametrize("packing", ["br", "zstd", "gzip, gzip", "deflate"])
 def test_a_packing_that_nobody_asked_for_is_named(packing: str) -> None:
     broken = fault(whole(BODY, f"Content-Encoding: {packing}"))
     assert f"can't be unpacked: {packing}" in str(broken)

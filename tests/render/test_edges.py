@@ -7,7 +7,7 @@ from itertools import combinations
 
 import pytest
 
-from augment.render.canvas import Box, Canvas, MetricCanvas
+from augment.render.canvas import Box, Canvas
 from augment.render.labels import Badge, place_badges
 from augment.render.road import scale_box
 from augment.scene.entities import TrafficAgent
@@ -15,7 +15,7 @@ from tests import scenes
 from tests.render.pictures import WIDE
 
 CAMERA = WIDE
-GROUND = MetricCanvas(Canvas(1200, 800, (255, 255, 255)), CAMERA)
+GROUND = Canvas(CAMERA, (255, 255, 255))
 SCALE = scale_box(CAMERA, (False, False))
 
 
