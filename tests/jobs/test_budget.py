@@ -18,7 +18,7 @@ from augment.services.running.budget import Caps, Room, costs_of
 from augment.services.running.runner import AUGMENTATIONS, Held
 from tests.jobs.models import Model, after_a_second_look, llama_job, reply
 from tests.jobs.rows import NOON, STALE, only_row
-from tests.variants.answers import GOOD
+from tests.variants.playing import GOOD
 
 pytestmark = pytest.mark.django_db
 

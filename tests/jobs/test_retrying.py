@@ -13,7 +13,7 @@ from augment.services.running import jobs as retrying
 from augment.services.running.progress import cause_of, failure_groups
 from tests.jobs.models import Model, llama_job, reply
 from tests.jobs.rows import failed, launch, leased, only_row
-from tests.variants.answers import GOOD
+from tests.variants.playing import GOOD
 
 pytestmark = pytest.mark.django_db
 State = Augmentation.State

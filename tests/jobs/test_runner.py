@@ -16,7 +16,7 @@ from augment.services.running import jobs, runner
 from augment.services.running.runner import AUGMENTATIONS
 from tests.jobs.rows import INSTRUCTION, TWO_CONES, add_model, add_scenario, launch, only_row
 from tests.jobs.running import Wire, ran
-from tests.variants.answers import GOOD
+from tests.variants.playing import GOOD
 
 pytestmark = pytest.mark.django_db
 State = Augmentation.State
