@@ -20,10 +20,15 @@ from django.utils import timezone
 
 from arena.errors import StudyNotOpen
 from arena.models import Study
-from arena.pairing.demands import ATTENTION_CHECKS, MOST_CHECKS, check_share
 from arena.pairing.plan import Check, Entry, MatchupPlan, PlanRules, plan
-from arena.pairing.settled import Triple, draw_shown
-from arena.pairing.target_lines import read_targets
+from arena.pairing.rules import (
+    ATTENTION_CHECKS,
+    MOST_CHECKS,
+    Triple,
+    check_share,
+    draw_shown,
+    read_targets,
+)
 from arena.people.queries import experts as expert_accounts
 from arena.rating.snapshot_document import VERSION as RESULTS_VERSION
 from arena.services.frames import Cells

@@ -15,10 +15,16 @@ from django.db import transaction
 from django.db.models import Count, Max
 
 from arena.models import Matchup, Study, Vote
-from arena.pairing.adaptive import contestants_of, draw_units, ratings_so_far
-from arena.pairing.arrays import FloatArray
-from arena.pairing.following import follow_on
-from arena.pairing.later import Wanted, judges, units_of
+from arena.pairing.later import (
+    Wanted,
+    contestants_of,
+    draw_units,
+    follow_on,
+    judges,
+    ratings_so_far,
+    units_of,
+)
+from arena.pairing.order import FloatArray
 from arena.pairing.plan import Check, Entry, PlannedMatchup, PlanRules
 from arena.pairing.rules import Grid, place_of, scenario_of
 from arena.queries.voting.path import upcoming
