@@ -33,7 +33,7 @@ from tests.jobs.rows import (
     only_row,
 )
 from tests.jobs.running import Wire, ran
-from tests.variants.answers import GOOD
+from tests.variants.playing import GOOD
 
 pytestmark = pytest.mark.django_db
 State = Augmentation.State

@@ -20,7 +20,7 @@ from tests.jobs.models import llama_job
 from tests.jobs.rows import launch, only_row
 from tests.jobs.running import Wire
 from tests.llm.scripted import ScriptedClient
-from tests.variants.answers import GOOD
+from tests.variants.playing import GOOD
 
 pytestmark = pytest.mark.django_db
 State = Augmentation.State
