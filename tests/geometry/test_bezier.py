@@ -12,6 +12,7 @@ from augment.geometry.bezier import CubicBezier, FloatArray, fit, fit_error
 from augment.geometry.frames import Pose
 from augment.geometry.polyline import Polyline
 from tests.scenes import curve as curved_scene
+from tests.scenes import pose_in_parent
 
 KAPPA = 4.0 / 3.0 * (math.sqrt(2.0) - 1.0)
 QUARTER = CubicBezier([(10, 0), (10, 10 * KAPPA), (10 * KAPPA, 10), (0, 10)])
@@ -105,7 +106,7 @@ def test_a_moved_and_turned_curve_has_moved_and_turned_poses(
     moved = CubicBezier(pose.to_parent(curve.control_m))
     assert moved.length_m == pytest.approx(curve.length_m, abs=1e-8)
     there = moved.pose_at(share * moved.length_m, 1.5)
-    wanted = pose.pose_to_parent(curve.pose_at(share * curve.length_m, 1.5))
+    wanted = pose_in_parent(pose, curve.pose_at(share * curve.length_m, 1.5))
     assert (there.x_m, there.y_m) == pytest.approx((wanted.x_m, wanted.y_m), abs=1e-6)
     assert math.remainder(there.heading_rad - wanted.heading_rad, math.tau) == pytest.approx(
         0.0, abs=1e-6
