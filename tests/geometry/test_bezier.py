@@ -62,14 +62,6 @@ def test_a_curve_begins_and_ends_in_its_end_points(curve: CubicBezier) -> None:
     assert (end.x_m, end.y_m) == pytest.approx(tuple(curve.control_m[3]), abs=1e-6)
 
 
-@given(curve=curves(), t=st.floats(0.01, 0.99))
-def test_the_halves_of_a_split_curve_are_the_curve(curve: CubicBezier, t: float) -> None:
-    first, second = curve.split(t)
-    shares = np.linspace(0.0, 1.0, 7)
-    assert first.points(shares) == pytest.approx(curve.points(shares * t), abs=1e-9)
-    assert second.points(shares) == pytest.approx(curve.points(t + shares * (1 - t)), abs=1e-9)
-
-
 @given(curve=lane_like())
 def test_arc_length_is_that_of_a_dense_line(curve: CubicBezier) -> None:
     assert curve.length_m == pytest.approx(dense_length(curve), abs=1e-5)
