@@ -213,7 +213,7 @@ def fit_error(
 
 
 def chord_headings(line: Polyline, stations_m: FloatArray) -> FloatArray:
-    """Return the headings (N,) of the chords from `CHORD_REACH_M` before stations (N,) to past them."""
+    """Return the headings (N,) of the chords from `CHORD_REACH_M` before stations to past them."""
     chords = line.points_at(stations_m + CHORD_REACH_M) - line.points_at(
         stations_m - CHORD_REACH_M
     )
