@@ -1,14 +1,18 @@
-"""Columns out of Arrow and Parquet files that somebody else made.
+"""The readers of Argoverse 2: Sensor logs and Motion Forecasting scenarios, which share maps.
 
-Both formats can be compressed a thousandfold, and pyarrow takes every length in a file at its
-word: what is too large for the memory of the reading process ends there (`sandbox`).
+    <log>/annotations.feather, <log>/city_SE3_egovehicle.feather, <log>/map/log_map_archive_*.json
+    <id>/scenario_<id>.parquet, <id>/log_map_archive_<id>.json
+
+A frame of a log is an annotated sweep, of a scenario a timestep, counted from 0; without one the
+last step that the data set calls observed, so that the future to be forecast is what follows t0.
+City frame, headings of the forward axis seen from above. Bicycle lanes are left out: no car
+drives there. The maps have no speed limits, no lights (their state is unknown) and no sidewalks.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -23,424 +27,58 @@ from augment.formats.reading import (
     LoggedTrack,
     Moment,
     Reading,
-    frames_every,
+    moments_of,
     reading_at,
     speeds,
 )
-from augment.formats.road_map import RoadMap, Segment, count_notes
-from augment.scene.entities import AgentType, AreaKind
+from augment.formats.road_map import FloatArray, RoadMap, Segment
+from augment.scene.entities import LENGTH_WIDTH_M, AgentType, AreaKind
 from augment.scene.recording import Note, SceneNoteKind
 from augment.scene.schema import problems_of
 
-
-@dataclass(frozen=True, slots=True, eq=False)
-class TextColumn:
-    """A column of texts.
-
-    Attributes:
-        values: The different ones, ascending.
-        codes: For each row the place of its text among them.
-    """
-
-    values: tuple[str, ...]
-    codes: NDArray[np.int64]
-
-
-Columns = dict[str, Any]
-"""By name: a `TextColumn`, or numbers as float64 or int64."""
-
-
-def read_arrow(
-    file: Path, *, what: str, numbers: Sequence[str], texts: Sequence[str], whole: Sequence[str]
-) -> Columns:
-    """The named columns of an Arrow file (Feather, version 2), all present and finite.
-
-    Args:
-        file: The file.
-        what: How faults call the source.
-        numbers: Columns of finite numbers.
-        texts: Columns of texts.
-        whole: Columns of whole numbers.
-
-    Raises:
-        InvalidDocument: The file, a column or a value is not so.
-    """
-    import pyarrow as pa
-
-    block, wanted = _bytes(file, what), (*whole, *numbers, *texts)
-    try:
-        with pa.ipc.open_file(pa.py_buffer(block)) as reader:
-            _check_names(file, what, reader.schema.names, wanted)
-            table = reader.read_all().select(list(wanted))
-        table.validate(full=True)
-    except _faults() as fault:
-        text = f"is not a feather file: {str(fault)[:200]}"
-        raise InvalidDocument(what, [(file.name, text)]) from None
-    return _columns(table, file, what, numbers, texts, whole)
-
-
-def read_parquet(
-    file: Path, *, what: str, numbers: Sequence[str], texts: Sequence[str], whole: Sequence[str]
-) -> Columns:
-    """The same of a Parquet file.
-
-    Raises:
-        InvalidDocument: As above.
-    """
-    import pyarrow as pa
-    from pyarrow import parquet
-
-    block, wanted = _bytes(file, what), (*whole, *numbers, *texts)
-    try:
-        with parquet.ParquetFile(pa.BufferReader(block), read_dictionary=list(texts)) as opened:
-            _check_names(file, what, opened.schema_arrow.names, wanted)
-            table = opened.read(columns=list(wanted), use_threads=False)
-        table.validate(full=True)
-    except _faults() as fault:
-        text = f"is not a parquet file: {str(fault)[:200]}"
-        raise InvalidDocument(what, [(file.name, text)]) from None
-    return _columns(table, file, what, numbers, texts, whole)
-
-
-# Private
-
-
-def _faults() -> tuple[type[BaseException], ...]:
-    """All that a broken file makes of pyarrow; want of memory is `sandbox`'s to say."""
-    import pyarrow as pa
-
-    usual = (ValueError, TypeError, KeyError, IndexError, OSError, OverflowError)
-    return (*usual, NotImplementedError, pa.ArrowCapacityError, pa.ArrowSerializationError)
-
-
-def _bytes(file: Path, what: str) -> bytes:
-    if not file.is_file():
-        raise InvalidDocument(what, [(file.name, f"is not in {file.parent}")])
-    return file.read_bytes()
-
-
-def _check_names(file: Path, what: str, there: Sequence[str], wanted: Sequence[str]) -> None:
-    missing = [name for name in wanted if list(there).count(name) != 1]
-    if missing:
-        raise InvalidDocument(what, [(file.name, f"has no column {name!r}") for name in missing])
-
-
-def _columns(
-    table: Any,
-    file: Path,
-    what: str,
-    numbers: Sequence[str],
-    texts: Sequence[str],
-    whole: Sequence[str],
-) -> Columns:
-    try:
-        columns: Columns = {name: _text_column(table[name]) for name in texts}
-        columns |= {name: table[name].to_numpy().astype(np.float64) for name in numbers}
-        columns |= {
-            name: table[name].to_numpy().astype(np.int64, casting="safe") for name in whole
-        }
-    except _faults() as fault:
-        text = f"has a column of a wrong kind: {str(fault)[:200]}"
-        raise InvalidDocument(what, [(file.name, text)]) from None
-    for name in numbers:
-        broken = np.flatnonzero(~np.isfinite(columns[name]))
-        if len(broken):
-            raise InvalidDocument(what, [(f"{file.name}[{broken[0]}].{name}", "is not finite")])
-    return columns
-
-
-def _text_column(column: Any) -> TextColumn:
-    """Each text once: a thousand rows may share one of a megabyte."""
-    import pyarrow as pa
-
-    if not pa.types.is_dictionary(column.type):
-        column = column.dictionary_encode()
-    array = column.unify_dictionaries().combine_chunks()
-    if isinstance(array, pa.ChunkedArray):
-        array = (
-            array.chunk(0) if array.num_chunks else pa.array([], pa.string()).dictionary_encode()
-        )
-    if array.null_count or array.dictionary.null_count:
-        raise ValueError("a text is missing")
-    given = [str(one) for one in array.dictionary.to_pylist()]
-    values = tuple(sorted(set(given)))
-    place = {text: number for number, text in enumerate(values)}
-    ranks = np.array([place[text] for text in given], dtype=np.int64)
-    codes = array.indices.to_numpy(zero_copy_only=False).astype(np.int64)
-    return TextColumn(values=values, codes=ranks[codes] if len(codes) else codes)
-
-
-EGO = "EGO_VEHICLE"
-"""Some releases annotate the ego itself, as a box at its frame's origin; it is no other agent."""
-
-TYPE_OF: dict[str, AgentType] = {
-    "REGULAR_VEHICLE": AgentType.VEHICLE,
-    "LARGE_VEHICLE": AgentType.VEHICLE,
-    "BOX_TRUCK": AgentType.VEHICLE,
-    "TRUCK": AgentType.VEHICLE,
-    "TRUCK_CAB": AgentType.VEHICLE,
-    "VEHICULAR_TRAILER": AgentType.VEHICLE,
-    "RAILED_VEHICLE": AgentType.VEHICLE,
-    "BUS": AgentType.BUS,
-    "SCHOOL_BUS": AgentType.BUS,
-    "ARTICULATED_BUS": AgentType.BUS,
-    "BICYCLE": AgentType.BICYCLE,
-    "BICYCLIST": AgentType.BICYCLE,
-    "MOTORCYCLE": AgentType.BICYCLE,
-    "MOTORCYCLIST": AgentType.BICYCLE,
-    "WHEELED_DEVICE": AgentType.BICYCLE,
-    "WHEELED_RIDER": AgentType.BICYCLE,
-    "PEDESTRIAN": AgentType.PEDESTRIAN,
-    "OFFICIAL_SIGNALER": AgentType.PEDESTRIAN,
-    "STROLLER": AgentType.PEDESTRIAN,
-    "WHEELCHAIR": AgentType.PEDESTRIAN,
-    "CONSTRUCTION_CONE": AgentType.TRAFFIC_CONE,
-    "CONSTRUCTION_BARREL": AgentType.BARRIER,
-    "SIGN": AgentType.CONSTRUCTION_SIGN,
-    "STOP_SIGN": AgentType.CONSTRUCTION_SIGN,
-    "MOBILE_PEDESTRIAN_CROSSING_SIGN": AgentType.CONSTRUCTION_SIGN,
-    "MESSAGE_BOARD_TRAILER": AgentType.CONSTRUCTION_SIGN,
-    "TRAFFIC_LIGHT_TRAILER": AgentType.GENERIC_OBJECT,
-    "BOLLARD": AgentType.GENERIC_OBJECT,
-    "ANIMAL": AgentType.GENERIC_OBJECT,
-    "DOG": AgentType.GENERIC_OBJECT,
-}
-"""A table without a rest: a category that is not in it is refused by name."""
-
-
 WHAT = "Argoverse 2 log"
-BOXES = "annotations.feather"
-POSES = "city_SE3_egovehicle.feather"
-
-EGO_LENGTH_M = 4.877
-EGO_WIDTH_M = 1.852
+MOTION = "Argoverse 2 forecasting scenario"
+LICENCE = "CC BY-NC-SA 4.0"
+BOXES, POSES = "annotations.feather", "city_SE3_egovehicle.feather"
+EGO_LENGTH_M, EGO_WIDTH_M = 4.877, 1.852
 REAR_AXLE_TO_CENTER_M = 1.42
 """The fleet's car, a Ford Fusion: half its length less the overhang behind the rear axle."""
+EGO = "EGO_VEHICLE"
+"""Some releases annotate the ego itself, as a box at its frame's origin; it is no other agent."""
+MOTION_EGO = "AV"
+STEP_S = 0.1
+MOST_STEPS = 10_000
 
-MOST_NAMED = 5
-
-FloatArray = NDArray[np.float64]
-
-_QUATERNION = ("qw", "qx", "qy", "qz")
-_PLACE = ("tx_m", "ty_m", "tz_m")
-
-
-def read_log(folder: Path) -> Log:
-    """Both tables of the log in that folder.
-
-    Raises:
-        InvalidDocument: A file or a column is missing or broken, a category is unknown, or a sweep
-            has no ego pose.
-    """
-    numbers = (*_QUATERNION, *_PLACE)
-    sized, texts = (*numbers, "length_m", "width_m"), ("track_uuid", "category")
-    stamp = ("timestamp_ns",)
-    boxes = read_arrow(folder / BOXES, what=WHAT, numbers=sized, texts=texts, whole=stamp)
-    poses = read_arrow(folder / POSES, what=WHAT, numbers=numbers, texts=(), whole=stamp)
-    _check_categories(boxes["category"])
-    stamps, sweep_of_row = np.unique(boxes["timestamp_ns"], return_inverse=True)
-    if len(stamps) == 0:
-        raise InvalidDocument(WHAT, [(BOXES, "has no annotated sweep")])
-    turn, place = _rigid(_taken(poses, _rows_at(poses["timestamp_ns"], stamps)))
-    times_s = (stamps - stamps[0]) * 1e-9
-    forward = turn[:, :2, 0]
-    heading = np.arctan2(forward[:, 1], forward[:, 0])
-    level = np.column_stack([np.cos(heading), np.sin(heading)])
-    center = place[:, :2] + REAR_AXLE_TO_CENTER_M * level
-    ego = np.column_stack([center, heading, speeds(times_s, center)])
-    box_turn, box_place = _rigid(boxes)
-    city_turn = turn[sweep_of_row]
-    xy = (np.einsum("rij,rj->ri", city_turn, box_place) + place[sweep_of_row])[:, :2]
-    ahead = np.einsum("rij,rj->ri", city_turn, box_turn[:, :, 0])
-    rows = np.column_stack([xy, np.arctan2(ahead[:, 1], ahead[:, 0])])
-    return Log(
-        what=WHAT,
-        times_s=times_s,
-        ego=ego,
-        ego_length_m=EGO_LENGTH_M,
-        ego_width_m=EGO_WIDTH_M,
-        tracks=tuple(_tracks(boxes, sweep_of_row, rows, times_s)),
-    )
-
-
-# Private
-
-
-def _check_categories(categories: TextColumn) -> None:
-    used = {categories.values[code] for code in np.unique(categories.codes)}
-    unknown = sorted(used - set(TYPE_OF) - {EGO})[:MOST_NAMED]
-    if unknown:
-        known = ", ".join(sorted(TYPE_OF))
-        problems = [(BOXES, f"unknown category {name!r}; known: {known}") for name in unknown]
-        raise InvalidDocument(WHAT, problems)
-
-
-def _rows_at(stamps: NDArray[np.int64], wanted: NDArray[np.int64]) -> NDArray[np.int64]:
-    """The rows (T,) of the poses at exactly the sweeps' time stamps."""
-    order = np.argsort(stamps, kind="stable")
-    places = np.searchsorted(stamps[order], wanted)
-    is_wanted = np.zeros(len(wanted), dtype=bool)
-    inside = places < len(stamps)
-    is_wanted[inside] = stamps[order][places[inside]] == wanted[inside]
-    if not is_wanted.all():
-        first = wanted[~is_wanted][0]
-        raise InvalidDocument(WHAT, [(POSES, f"has no pose at the annotated time {first} ns")])
-    return order[places]
-
-
-def _taken(columns: dict[str, Any], rows: NDArray[np.int64]) -> dict[str, Any]:
-    return {name: values[rows] for name, values in columns.items()}
-
-
-def _rigid(columns: dict[str, Any]) -> tuple[FloatArray, FloatArray]:
-    """Rotations (R, 3, 3) and places (R, 3) of quaternion and translation columns."""
-    quaternion = np.column_stack([columns[name] for name in _QUATERNION])
-    length = np.linalg.norm(quaternion, axis=1)
-    if (length < 1e-6).any():
-        row = int(np.argmin(length))
-        raise InvalidDocument(WHAT, [(f"row {row}", "has a quaternion of length 0")])
-    w, x, y, z = (quaternion / length[:, None]).T
-    rows = [
-        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-    ]
-    turn = np.moveaxis(np.array(rows), 2, 0)
-    return turn, np.column_stack([columns[name] for name in _PLACE])
-
-
-def _tracks(
-    boxes: dict[str, Any], sweeps: NDArray[np.int64], rows: FloatArray, times_s: FloatArray
-) -> Iterator[LoggedTrack]:
-    names, kinds = boxes["track_uuid"], boxes["category"]
-    order = np.lexsort((sweeps, names.codes))
-    uuids, starts = np.unique(names.codes[order], return_index=True)
-    for uuid, mine in zip(uuids.tolist(), np.split(order, starts[1:]), strict=True):
-        kind = kinds.values[kinds.codes[mine[0]]]
-        if kind == EGO:
-            continue
-        mine = mine[np.concatenate([[True], np.diff(sweeps[mine]) > 0])]
-        states = np.full((len(times_s), 4), np.nan)
-        states[sweeps[mine]] = np.column_stack(
-            [rows[mine], speeds(times_s[sweeps[mine]], rows[mine, :2])]
-        )
-        yield LoggedTrack(
-            name=names.values[uuid],
-            type=TYPE_OF[kind],
-            length_m=float(boxes["length_m"][mine[0]]),
-            width_m=float(boxes["width_m"][mine[0]]),
-            states=states,
-        )
-
-
-LICENCE = "CC BY-NC-SA 4.0"
-
-
-class MapPart(BaseModel):
-    """A part of the map file; fields that nobody needs here are allowed."""
-
-    model_config = ConfigDict(strict=True, extra="ignore", allow_inf_nan=False, frozen=True)
-
-
-class MapPoint(MapPart):
-    """A point of the city frame."""
-
-    x: float
-    y: float
-
-
-Points = Annotated[list[MapPoint], Field(fail_fast=True, min_length=2)]
-
-
-class MapSegment(MapPart):
-    """A lane segment; boundaries run in the direction of travel."""
-
-    id: int
-    is_intersection: bool
-    lane_type: Literal["VEHICLE", "BUS", "BIKE"]
-    left_lane_boundary: Points
-    right_lane_boundary: Points
-    predecessors: list[int]
-    successors: list[int]
-    left_neighbor_id: int | None = None
-    right_neighbor_id: int | None = None
-
-
-class MapCrossing(MapPart):
-    """A crosswalk, by its two long edges."""
-
-    edge1: Points
-    edge2: Points
-
-
-class MapDrivable(MapPart):
-    """A polygon that can be driven on."""
-
-    area_boundary: Annotated[list[MapPoint], Field(fail_fast=True, min_length=3)]
-
-
-class MapFile(MapPart):
-    """The map archive."""
-
-    lane_segments: dict[str, MapSegment]
-    drivable_areas: dict[str, MapDrivable] = {}
-    pedestrian_crossings: dict[str, MapCrossing] = {}
-
-
-def read_map(file: Path, *, what: str) -> RoadMap:
-    """The map in that file as segments and areas, with what maps of Argoverse 2 don't say.
-
-    Raises:
-        InvalidDocument: The file is no such map; with the path and the reason of every fault.
-    """
-    document = read_json(file, what=what)
-    try:
-        city = MapFile.model_validate(document)
-    except ValidationError as fault:
-        problems = [(f"{file.name}: {place}", text) for place, text in problems_of(fault)]
-        raise InvalidDocument(what, problems) from None
-    areas = [
-        (AreaKind.DRIVABLE, _points(area.area_boundary)) for area in city.drivable_areas.values()
-    ]
-    for crossing in city.pedestrian_crossings.values():
-        one, other = _points(crossing.edge1), _points(crossing.edge2)
-        same_way = float(np.dot(one[-1] - one[0], other[-1] - other[0])) > 0.0
-        areas.append((AreaKind.CROSSWALK, np.vstack([one, other[::-1] if same_way else other])))
-    driven = [one for one in city.lane_segments.values() if one.lane_type != "BIKE"]
-    bicycle_lanes = len(city.lane_segments) - len(driven)
-    return RoadMap(
-        what=what,
-        place=f"{file.name}: lane_segments",
-        segments=tuple(_segment(segment) for segment in driven),
-        areas=tuple(areas),
-        notes=(
-            Note(kind=SceneNoteKind.NO_SPEED_LIMITS),
-            Note(kind=SceneNoteKind.NO_LIGHTS),
-            Note(kind=SceneNoteKind.NO_WALKWAYS),
-            *count_notes({SceneNoteKind.BICYCLE_LANES_LEFT_OUT: bicycle_lanes}),
-        ),
-    )
-
-
-# Private
-
-
-def _segment(segment: MapSegment) -> Segment:
-    left, right = segment.left_neighbor_id, segment.right_neighbor_id
-    return Segment(
-        name=segment.id,
-        crosses=segment.is_intersection,
-        left=_points(segment.left_lane_boundary),
-        right=_points(segment.right_lane_boundary),
-        successors=tuple(segment.successors),
-        predecessors=tuple(segment.predecessors),
-        left_neighbors=() if left is None else (left,),
-        right_neighbors=() if right is None else (right,),
-    )
-
-
-def _points(points: Sequence[MapPoint]) -> NDArray[np.float64]:
-    return np.array([[point.x, point.y] for point in points])
+_CATEGORIES = {
+    AgentType.VEHICLE: "REGULAR_VEHICLE LARGE_VEHICLE BOX_TRUCK TRUCK TRUCK_CAB VEHICULAR_TRAILER "
+    "RAILED_VEHICLE",
+    AgentType.BUS: "BUS SCHOOL_BUS ARTICULATED_BUS",
+    AgentType.BICYCLE: "BICYCLE BICYCLIST MOTORCYCLE MOTORCYCLIST WHEELED_DEVICE WHEELED_RIDER",
+    AgentType.PEDESTRIAN: "PEDESTRIAN OFFICIAL_SIGNALER STROLLER WHEELCHAIR",
+    AgentType.TRAFFIC_CONE: "CONSTRUCTION_CONE",
+    AgentType.BARRIER: "CONSTRUCTION_BARREL",
+    AgentType.CONSTRUCTION_SIGN: "SIGN STOP_SIGN MOBILE_PEDESTRIAN_CROSSING_SIGN "
+    "MESSAGE_BOARD_TRAILER",
+    AgentType.GENERIC_OBJECT: "TRAFFIC_LIGHT_TRAILER BOLLARD ANIMAL DOG",
+}
+TYPE_OF = {name: kind for kind, names in _CATEGORIES.items() for name in names.split()}
+"""As nuPlan has it: two wheels are a bicycle, strollers and wheelchairs go with pedestrians. A
+table without a rest: a category that is not in it is refused by name."""
+MOTION_TYPE_OF = {
+    "vehicle": AgentType.VEHICLE,
+    "pedestrian": AgentType.PEDESTRIAN,
+    "motorcyclist": AgentType.BICYCLE,
+    "cyclist": AgentType.BICYCLE,
+    "riderless_bicycle": AgentType.BICYCLE,
+    "bus": AgentType.BUS,
+    "construction": AgentType.TRAFFIC_CONE,
+    "static": AgentType.GENERIC_OBJECT,
+    "background": AgentType.GENERIC_OBJECT,
+    "unknown": AgentType.GENERIC_OBJECT,
+}
+MERGED = frozenset({"motorcyclist", "riderless_bicycle", "construction", "static", "background"})
+_QUATERNION, _PLACE = ("qx", "qy", "qz", "qw"), ("tx_m", "ty_m", "tz_m")
+_POSITION = ("position_x", "position_y", "heading", "velocity_x", "velocity_y")
 
 
 class ArgoverseSensor:
@@ -455,25 +93,24 @@ class ArgoverseSensor:
 
     def moments(self, path: Path, *, every_s: float) -> Iterator[Moment]:
         """Sweeps that far apart."""
-        _check_folder(path)
-        times_s = read_log(path).times_s.tolist()
-        for frame in frames_every(times_s, every_s):
-            yield Moment(frame=frame, time_s=times_s[frame] - times_s[0])
+        return moments_of(_read_log(path), every_s)
 
     def read(self, path: Path, *, item: str | None, frame: int | None, name: str) -> Reading:
         """The scene at one annotated sweep, and what was recorded to the end of the log."""
-        _check_folder(path)
+        if not path.is_dir():
+            raise InvalidDocument(WHAT, [(str(path), "is not a folder")])
         if item is not None:
             raise InvalidDocument(WHAT, [("item", f"a log has no parts, {item!r} is not there")])
         frame = frame or 0
-        map_file = map_file_in(path / "map", WHAT)
-        log = read_log(path)
+        map_file = _map_file_in(path, "map/", WHAT)
+        log = _read_log(path)
+        city = re.search(r"____([A-Z]+)_city", map_file.name)
         return reading_at(
             log,
             frame,
-            read_map(map_file, what=WHAT),
+            _read_map(map_file, WHAT),
             name=name,
-            world=city_of(map_file),
+            world=f"Argoverse 2 city frame {city[1]}" if city else "Argoverse 2 city frame",
             provenance=(
                 f"Argoverse 2 Sensor data set, log {path.resolve().name}, frame {frame} of "
                 f"{len(log.times_s)}; {LICENCE}"
@@ -483,31 +120,351 @@ class ArgoverseSensor:
         )
 
 
-def map_file_in(folder: Path, what: str) -> Path:
-    """The one map archive in a folder.
+class ArgoverseMotion:
+    """The reader of Argoverse 2 Motion Forecasting scenarios; `item` is the track of the ego."""
 
-    Raises:
-        InvalidDocument: There is none, or several.
+    name = "av2-motion"
+    title = "Argoverse 2 Motion Forecasting scenario (folder, or its parquet file)"
+
+    def recognises(self, path: Path) -> bool:
+        """A scenario file by its name, or a folder with one."""
+        if path.is_dir():
+            return any(path.glob("scenario_*.parquet"))
+        return path.is_file() and path.match("scenario_*.parquet")
+
+    def moments(self, path: Path, *, every_s: float) -> Iterator[Moment]:
+        """Steps in which the ego is there."""
+        log, _ = _motion_log(_read_motion(_scenario_file(path)), MOTION_EGO)
+        return moments_of(log, every_s)
+
+    def read(self, path: Path, *, item: str | None, frame: int | None, name: str) -> Reading:
+        """The scene at one step, and what was recorded to the end of the scenario."""
+        file = _scenario_file(path)
+        table = _read_motion(file)
+        log, kinds = _motion_log(table, item or MOTION_EGO)
+        if frame is None:
+            frame = int(table["timestep"][table["observed"] > 0].max(initial=0))
+        notes = [Note(kind=SceneNoteKind.NO_BOX_SIZES)]
+        merged = [f"{kind}: {MOTION_TYPE_OF[kind].value}" for kind in sorted(kinds & MERGED)]
+        if merged:
+            notes.append(Note(kind=SceneNoteKind.CLASSES_MERGED, names=tuple(merged)))
+        ego = "" if item is None else f", track {item} as the ego"
+        return reading_at(
+            log,
+            frame,
+            _read_map(_map_file_in(file.parent, "", MOTION), MOTION),
+            name=name,
+            world="Argoverse 2 city frame",
+            provenance=(
+                f"Argoverse 2 Motion Forecasting data set, "
+                f"{file.stem.removeprefix('scenario_')[:80]}, step {frame} of "
+                f"{len(log.times_s)}{ego}; {LICENCE}"
+            ),
+            licence=LICENCE,
+            notes=notes,
+            item=item,
+        )
+
+
+# Tables
+
+
+def _read_table(
+    file: Path, what: str, *, numbers: Sequence[str], texts: Sequence[str], whole: Sequence[str]
+) -> dict[str, Any]:
+    """The named columns of a Feather or Parquet file, all present and finite.
+
+    Numbers become float64, whole ones int64, texts categorical series. Both formats can be
+    compressed a thousandfold, and pyarrow takes every length at its word: what is too large for
+    the memory of the reading process ends there (`sandbox`).
     """
-    files = sorted(folder.glob("log_map_archive_*.json"))
+    import pyarrow as pa
+    from pyarrow import parquet
+
+    faults = (
+        *(ValueError, TypeError, KeyError, IndexError, OSError, OverflowError, AttributeError),
+        *(NotImplementedError, pa.ArrowCapacityError, pa.ArrowSerializationError),
+    )
+    if not file.is_file():
+        raise InvalidDocument(what, [(file.name, f"is not in {file.parent}")])
+    wanted, source = [*whole, *numbers, *texts], pa.BufferReader(file.read_bytes())
+    try:
+        if file.suffix == ".parquet":
+            table = parquet.ParquetFile(source, read_dictionary=list(texts)).read()
+        else:
+            table = pa.ipc.open_file(source).read_all()
+        missing = [name for name in wanted if table.column_names.count(name) != 1]
+        table = table.select([name for name in wanted if name not in missing])
+        table.validate(full=True)
+    except faults as fault:
+        kind = file.suffix.removeprefix(".")
+        problem = f"is not a {kind} file, or can't be read: {str(fault)[:200]}"
+        raise InvalidDocument(what, [(file.name, problem)]) from None
+    if missing:
+        raise InvalidDocument(what, [(file.name, f"has no column {name!r}") for name in missing])
+    try:
+        frame = table.to_pandas(strings_to_categorical=True)
+        columns = {name: frame[name] for name in texts}
+        for name, column in columns.items():
+            if column.isna().any() or not all(
+                isinstance(one, str) for one in column.cat.categories
+            ):
+                raise ValueError(f"a text is missing in {name}")
+        columns |= {name: frame[name].to_numpy().astype(np.float64) for name in numbers}
+        columns |= {
+            name: frame[name].to_numpy().astype(np.int64, casting="safe") for name in whole
+        }
+    except faults as fault:
+        problem = f"has a column of a wrong kind: {str(fault)[:200]}"
+        raise InvalidDocument(what, [(file.name, problem)]) from None
+    for name in numbers:
+        broken = np.flatnonzero(~np.isfinite(columns[name]))
+        if len(broken):
+            raise InvalidDocument(what, [(f"{file.name}[{broken[0]}].{name}", "is not finite")])
+    return columns
+
+
+def _check_kinds(column: Any, known: Collection[str], what: str, place: str) -> frozenset[str]:
+    """The kinds of objects that are there, all of them known."""
+    used = frozenset(column.unique())
+    unknown = sorted(used - set(known))[:5]
+    if unknown:
+        names = ", ".join(sorted(known))
+        problems = [(place, f"unknown {one!r}; known: {names}") for one in unknown]
+        raise InvalidDocument(what, problems)
+    return used
+
+
+def _read_log(folder: Path) -> Log:
+    """The two tables of a log: boxes in the ego frame of their sweep, poses in the city frame.
+
+    The ego frame's origin lies under the rear axle; in the log the ego is its geometric centre.
+    R rows of boxes, T sweeps.
+    """
+    numbers, stamp = (*_QUATERNION, *_PLACE), ("timestamp_ns",)
+    boxes = _read_table(
+        folder / BOXES,
+        WHAT,
+        numbers=(*numbers, "length_m", "width_m"),
+        texts=("track_uuid", "category"),
+        whole=stamp,
+    )
+    poses = _read_table(folder / POSES, WHAT, numbers=numbers, texts=(), whole=stamp)
+    _check_kinds(boxes["category"], {*TYPE_OF, EGO}, WHAT, f"{BOXES}: category")
+    stamps, sweep_of_row = np.unique(boxes["timestamp_ns"], return_inverse=True)
+    if len(stamps) == 0:
+        raise InvalidDocument(WHAT, [(BOXES, "has no annotated sweep")])
+    posed, rows = np.unique(poses["timestamp_ns"], return_index=True)
+    unposed = np.setdiff1d(stamps, posed)
+    if len(unposed):
+        text = f"has no pose at the annotated time {unposed[0]} ns"
+        raise InvalidDocument(WHAT, [(POSES, text)])
+    rows = rows[np.searchsorted(posed, stamps)]
+    turn, place = _rigid({name: poses[name][rows] for name in numbers})
+    box_turn, box_place = _rigid(boxes)
+    times_s = (stamps - stamps[0]) * 1e-9
+    heading = np.arctan2(turn[:, 1, 0], turn[:, 0, 0])
+    level = np.column_stack([np.cos(heading), np.sin(heading)])
+    center = place[:, :2] + REAR_AXLE_TO_CENTER_M * level
+    city_turn = turn[sweep_of_row]
+    xy = (np.einsum("rij,rj->ri", city_turn, box_place) + place[sweep_of_row])[:, :2]
+    ahead = np.einsum("rij,rj->ri", city_turn, box_turn[:, :, 0])
+    states = np.column_stack([xy, np.arctan2(ahead[:, 1], ahead[:, 0])])
+    return Log(
+        what=WHAT,
+        times_s=times_s,
+        ego=np.column_stack([center, heading, speeds(times_s, center)]),
+        ego_length_m=EGO_LENGTH_M,
+        ego_width_m=EGO_WIDTH_M,
+        tracks=tuple(_log_tracks(boxes, sweep_of_row, states, times_s)),
+    )
+
+
+def _rigid(columns: Mapping[str, FloatArray]) -> tuple[FloatArray, FloatArray]:
+    """Rotations (R, 3, 3) and places (R, 3) of quaternion and translation columns."""
+    from scipy.spatial.transform import Rotation
+
+    try:
+        turn = Rotation.from_quat(np.column_stack([columns[name] for name in _QUATERNION]))
+    except ValueError:
+        raise InvalidDocument(WHAT, [("qw", "has a quaternion of length 0")]) from None
+    return turn.as_matrix(), np.column_stack([columns[name] for name in _PLACE])
+
+
+def _log_tracks(
+    boxes: dict[str, Any], sweeps: NDArray[np.int64], states: FloatArray, times_s: FloatArray
+) -> Iterator[LoggedTrack]:
+    kinds = boxes["category"]
+    for name, rows in (
+        boxes["track_uuid"].groupby(boxes["track_uuid"], observed=True).indices.items()
+    ):
+        kind = kinds.iloc[rows[0]]
+        if kind == EGO:
+            continue
+        seen, first = np.unique(sweeps[rows], return_index=True)
+        mine = rows[first]
+        track = np.full((len(times_s), 4), np.nan)
+        track[seen] = np.column_stack([states[mine], speeds(times_s[seen], states[mine, :2])])
+        yield LoggedTrack(
+            name=str(name),
+            type=TYPE_OF[kind],
+            length_m=float(boxes["length_m"][mine[0]]),
+            width_m=float(boxes["width_m"][mine[0]]),
+            states=track,
+        )
+
+
+def _scenario_file(path: Path) -> Path:
+    files = sorted(path.glob("scenario_*.parquet")) if path.is_dir() else [path]
     if len(files) != 1:
-        text = "no such file" if not files else f"{len(files)} such files; there must be one"
-        in_map = folder.name == "map"
-        place = "map/log_map_archive_*.json" if in_map else "log_map_archive_*.json"
-        where = folder.parent if in_map else folder
-        raise InvalidDocument(what, [(place, f"{text} in {where}")])
+        text = f"{len(files)} such files in {path}; there must be one"
+        raise InvalidDocument(MOTION, [("scenario_*.parquet", text)])
     return files[0]
 
 
-def city_of(map_file: Path) -> str:
-    """What the frame of a map is called."""
-    city = re.search(r"____([A-Z]+)_city", map_file.name)
-    return f"Argoverse 2 city frame {city[1]}" if city else "Argoverse 2 city frame"
+def _read_motion(file: Path) -> dict[str, Any]:
+    table = _read_table(
+        file,
+        MOTION,
+        numbers=_POSITION,
+        texts=("track_id", "object_type"),
+        whole=("timestep", "observed"),
+    )
+    steps = table["timestep"]
+    if not len(steps):
+        raise InvalidDocument(MOTION, [(file.name, "has no row")])
+    if steps.min() < 0 or steps.max() >= MOST_STEPS:
+        raise InvalidDocument(MOTION, [("timestep", f"lies outside of 0 to {MOST_STEPS - 1}")])
+    return table
 
 
-# Private
+def _motion_log(table: dict[str, Any], ego_id: str) -> tuple[Log, frozenset[str]]:
+    """The log of a scenario, and the object types that are here; positions are centres."""
+    kinds = _check_kinds(table["object_type"], MOTION_TYPE_OF, MOTION, "object_type")
+    x_m, y_m, heading_rad, *velocity_mps = (table[name] for name in _POSITION)
+    rows = np.column_stack([x_m, y_m, heading_rad, np.hypot(*velocity_mps)])
+    steps = table["timestep"]
+    tracks = {}
+    for name, mine in table["track_id"].groupby(table["track_id"], observed=True).indices.items():
+        kind = MOTION_TYPE_OF[table["object_type"].iloc[mine[0]]]
+        length_m, width_m = LENGTH_WIDTH_M[kind]
+        states = np.full((int(steps.max()) + 1, 4), np.nan)
+        states[steps[mine]] = rows[mine]
+        tracks[str(name)] = LoggedTrack(
+            name=str(name), type=kind, length_m=length_m, width_m=width_m, states=states
+        )
+    if ego_id not in tracks:
+        text = f"{ego_id[:40]!r} is not there; known: {', '.join(sorted(tracks)[:12])}"
+        raise InvalidDocument(MOTION, [("track_id", text)])
+    ego = tracks.pop(ego_id)
+    log = Log(
+        what=MOTION,
+        times_s=np.arange(len(ego.states), dtype=np.float64) * STEP_S,
+        ego=ego.states,
+        ego_length_m=EGO_LENGTH_M,
+        ego_width_m=EGO_WIDTH_M,
+        tracks=tuple(tracks.values()),
+    )
+    return log, kinds
 
 
-def _check_folder(path: Path) -> None:
-    if not path.is_dir():
-        raise InvalidDocument(WHAT, [(str(path), "is not a folder")])
+# Maps
+
+
+class _Part(BaseModel):
+    """A part of the map file; fields that nobody needs here are allowed."""
+
+    model_config = ConfigDict(strict=True, extra="ignore", allow_inf_nan=False, frozen=True)
+
+
+class _Point(_Part):
+    x: float
+    y: float
+
+
+_Points = Annotated[list[_Point], Field(fail_fast=True, min_length=2)]
+
+
+class _Segment(_Part):
+    """A lane segment; boundaries run in the direction of travel."""
+
+    id: int
+    is_intersection: bool
+    lane_type: Literal["VEHICLE", "BUS", "BIKE"]
+    left_lane_boundary: _Points
+    right_lane_boundary: _Points
+    predecessors: list[int]
+    successors: list[int]
+    left_neighbor_id: int | None = None
+    right_neighbor_id: int | None = None
+
+
+class _Crossing(_Part):
+    """A crosswalk, by its two long edges."""
+
+    edge1: _Points
+    edge2: _Points
+
+
+class _Drivable(_Part):
+    area_boundary: Annotated[list[_Point], Field(fail_fast=True, min_length=3)]
+
+
+class _Map(_Part):
+    lane_segments: dict[str, _Segment]
+    drivable_areas: dict[str, _Drivable] = {}
+    pedestrian_crossings: dict[str, _Crossing] = {}
+
+
+def _map_file_in(path: Path, folder: str, what: str) -> Path:
+    files = sorted((path / folder).glob("log_map_archive_*.json"))
+    if len(files) != 1:
+        text = "no such file" if not files else f"{len(files)} such files; there must be one"
+        raise InvalidDocument(what, [(f"{folder}log_map_archive_*.json", f"{text} in {path}")])
+    return files[0]
+
+
+def _read_map(file: Path, what: str) -> RoadMap:
+    """The map in that file, with what maps of Argoverse 2 don't say."""
+    document = read_json(file, what=what)
+    try:
+        city = _Map.model_validate(document)
+    except ValidationError as fault:
+        problems = [(f"{file.name}: {place}", text) for place, text in problems_of(fault)]
+        raise InvalidDocument(what, problems) from None
+    areas = [
+        (AreaKind.DRIVABLE, _points(area.area_boundary)) for area in city.drivable_areas.values()
+    ]
+    for crossing in city.pedestrian_crossings.values():
+        one, other = _points(crossing.edge1), _points(crossing.edge2)
+        is_same_way = float(np.dot(one[-1] - one[0], other[-1] - other[0])) > 0.0
+        areas.append((AreaKind.CROSSWALK, np.vstack([one, other[::-1] if is_same_way else other])))
+    driven = [one for one in city.lane_segments.values() if one.lane_type != "BIKE"]
+    missing = (SceneNoteKind.NO_SPEED_LIMITS, SceneNoteKind.NO_LIGHTS, SceneNoteKind.NO_WALKWAYS)
+    notes = [Note(kind=kind) for kind in missing]
+    bicycle_lanes = len(city.lane_segments) - len(driven)
+    if bicycle_lanes:
+        notes.append(Note(kind=SceneNoteKind.BICYCLE_LANES_LEFT_OUT, number=bicycle_lanes))
+    return RoadMap(
+        what=what,
+        place=f"{file.name}: lane_segments",
+        segments=tuple(
+            Segment(
+                name=one.id,
+                crosses=one.is_intersection,
+                left=_points(one.left_lane_boundary),
+                right=_points(one.right_lane_boundary),
+                successors=tuple(one.successors),
+                predecessors=tuple(one.predecessors),
+                left_neighbors=() if one.left_neighbor_id is None else (one.left_neighbor_id,),
+                right_neighbors=() if one.right_neighbor_id is None else (one.right_neighbor_id,),
+            )
+            for one in driven
+        ),
+        areas=tuple(areas),
+        notes=tuple(notes),
+    )
+
+
+def _points(points: Sequence[_Point]) -> FloatArray:
+    return np.array([[point.x, point.y] for point in points])

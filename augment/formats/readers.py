@@ -16,8 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from augment.errors import InvalidDocument, UnknownName
-from augment.formats.argoverse2 import ArgoverseSensor
-from augment.formats.argoverse2_motion import ArgoverseMotion
+from augment.formats.argoverse2 import ArgoverseMotion, ArgoverseSensor
 from augment.formats.commonroad.scenario import CommonRoad
 from augment.formats.nuplan_log import NuPlan
 from augment.formats.own_json import OwnJson

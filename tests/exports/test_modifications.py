@@ -1,8 +1,7 @@
-"""A job goes out as interPlan's file and comes back as reference modifications."""
+"""A job goes out as interPlan's file."""
 
 from __future__ import annotations
 
-import json
 from io import StringIO
 from pathlib import Path
 
@@ -55,24 +54,13 @@ def export(*options: str) -> tuple[str, str]:
     return out.getvalue(), err.getvalue()
 
 
-def test_a_job_goes_to_a_file_and_back(job: GenerationJob, tmp_path: Path) -> None:
+def test_a_job_goes_to_a_file(job: GenerationJob, tmp_path: Path) -> None:
     file = tmp_path / "interplan.yaml"
     _, said = export("--out", str(file))
     assert "Lost: crash-mill-junction by rule: there is no modification: refused." in said
     details = yaml.safe_load(file.read_text())["modification_details_dictionary"]
     assert set(details) == {token_of("mill-junction"), token_of("ferry-road")}
     assert list(details[token_of("mill-junction")]["special_scenario"]) == ["0", "1"]
-    call_command("read_interplan", str(file), "--out", str(tmp_path / "read"), stdout=StringIO())
-    for index, slug in ((0, SLUGS[0]), (1, SLUGS[1])):
-        name = f"{token_of('mill-junction')}-s{index}.json"
-        read = json.loads((tmp_path / "read" / name).read_text())
-        wanted = Scenario.objects.get(slug=slug).reference
-        assert wanted is not None
-        for made, given in zip(read["add"], wanted["add"], strict=True):
-            assert made["type"] == given["type"]
-            for key in ("x_m", "y_m"):
-                assert made[key] == pytest.approx(given[key], abs=0.01)
-            assert made["heading_rad"] == pytest.approx(given["heading_rad"], abs=0.001)
 
 
 @pytest.mark.parametrize(
@@ -115,28 +103,3 @@ def test_kept_traffic_is_said_when_it_is_lost_and_refused_when_strict(
     kept.augmentations.all().delete()
     export("--contestant", "reference", "--strict", "--out", str(file))
     assert file.exists()
-
-
-FOREIGN = (
-    'modification_details_dictionary: {"00000000000000ab": '
-    '{special_scenario: {"0": {type: avoid_crashed_cars}}}}'
-)
-
-
-@pytest.mark.parametrize(
-    ("text", "sentence"),
-    [
-        ("colour: red", "modification_details_dictionary: is missing"),
-        ("modification_details_dictionary: {}", "holds no special scenario"),
-        (FOREIGN, "none of its 1 base tokens has a scene here: 00000000000000ab; name the scenes"),
-    ],
-)
-def test_a_file_of_something_else_is_an_error_and_not_nothing_read(
-    text: str, sentence: str, tmp_path: Path
-) -> None:
-    file = tmp_path / "other.yaml"
-    file.write_text(text)
-    with pytest.raises(CommandError) as fault:
-        call_command("read_interplan", str(file), "--out", str(tmp_path / "read"))
-    assert sentence in str(fault.value)
-    assert not (tmp_path / "read").exists()

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from augment.formats.documents import read_yaml
+from augment.formats.interplan.file import WHAT, ReadEntry, file_of, read_entry
+from augment.scene.entities import Scene
 from tests.formats.nuplan_files import CITIES, token, write_log, write_map
 
 CITY = "sg-one-north"
@@ -159,3 +163,14 @@ def write_folder(root: Path, city: str = CITY) -> Path:
     write_map(data, city)
     write_log(logs, city)
     return root
+
+
+def entries_of(text: str, scenes: Mapping[str, Scene]) -> list[ReadEntry]:
+    """The special scenarios of the tokens that have a scene."""
+    by_token = file_of(read_yaml(text, what=WHAT)).modification_details_dictionary
+    return [
+        read_entry(token, index, entry, scenes[token])
+        for token, one in by_token.items()
+        if token in scenes
+        for index, entry in (one.special_scenario or {}).items()
+    ]

@@ -156,7 +156,7 @@ def without(rows: list[dict[str, Any]], column: str) -> list[dict[str, Any]]:
 def test_broken_tables_are_named(tmp_path: Path) -> None:
     rows = boxes()
     unknown = [rows[0] | {"category": "UNICORN"}, *rows[1:]]
-    assert "unknown category 'UNICORN'" in fault_of(write_log(tmp_path / "a", box_rows=unknown))
+    assert "category: unknown 'UNICORN'" in fault_of(write_log(tmp_path / "a", box_rows=unknown))
     broken = [rows[0], rows[1] | {"tx_m": math.nan}, *rows[2:]]
     folder = write_log(tmp_path / "b", box_rows=broken)
     assert "annotations.feather[1].tx_m: is not finite" in fault_of(folder)

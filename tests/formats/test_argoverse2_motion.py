@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from augment.errors import InvalidDocument
-from augment.formats.argoverse2_motion import ArgoverseMotion
+from augment.formats.argoverse2 import ArgoverseMotion
 from augment.formats.readers import recognise
 from augment.formats.reading import Reading
 from augment.scene.codec import scene_to_document

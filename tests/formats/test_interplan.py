@@ -8,8 +8,8 @@ import pytest
 import yaml
 
 from augment.errors import Conflict
-from augment.formats.interplan.file import ReadEntry, token_of
-from augment.formats.interplan.reader import read
+from augment.formats.documents import read_yaml
+from augment.formats.interplan.file import WHAT, ReadEntry, file_of, token_of
 from augment.formats.interplan.writer import interplan_text as write
 from augment.formats.writing import Cell
 from augment.geometry.frames import difference
@@ -21,6 +21,7 @@ from augment.scene.entities import (
     without_traffic,
 )
 from tests.fixtures.shelf import SLUGS, entry, shown_scene, whole_scene
+from tests.formats.interplan_files import entries_of
 
 UNTOLD = (AgentType.BARRIER, AgentType.CONSTRUCTION_SIGN)
 """interPlan's file has no keys for them."""
@@ -45,7 +46,7 @@ def tellable(slug: str) -> tuple[TrafficAgent, ...]:
 def read_again(one: Cell) -> ReadEntry:
     text, _ = write([one])
     scene = without_traffic(one.scene)
-    (found,) = read(text, {token_of(scene.name): scene}).entries
+    (found,) = entries_of(text, {token_of(scene.name): scene})
     return found
 
 
@@ -240,7 +241,7 @@ def test_a_name_with_control_characters_leaves_a_file_that_can_be_read() -> None
     assert yaml.safe_load(text)["accel_max"] == 1.0
 
 
-AB, CD = "00000000000000ab", "00000000000000cd"
+AB = "00000000000000ab"
 
 
 def test_what_a_modification_can_not_say_is_named() -> None:
@@ -264,22 +265,16 @@ modification_details_dictionary:
         pedestrian:
         - [{x_m}, {y_m}, {x_m + 8}, {y_m}, 12]
         - [{x_m}, {y_m}, {x_m}, {y_m}, null]
-  "{CD}": {{special_scenario: {{"7": {{type: avoid_crashed_cars}}}}, goal: {{left: "1, 2"}}}}
 """
-    given = read(text, {AB: scene})
-    (found,) = given.entries
+    (found,) = entries_of(text, {AB: scene})
     assert found.id == f"{AB}-s0"
     assert found.type is ScenarioType.JAYWALKER
     assert found.left_out == (
-        "config dh",
         "pedestrian 0 starts at iteration 12",
         "pedestrian 1 walks 0 m, which gives it no direction",
     )
     assert found.modification.added[0].speed_mps == pytest.approx(8.0 / 15.0, abs=0.01)
-    assert given.left_out == (
-        "key colour",
-        "scenario_specifics",
-        f"{AB}: spawn_in_intersection",
-        f"{AB}: key weather",
-    )
-    assert given.passed_over == {CD: 1}
+    file = file_of(read_yaml(text, what=WHAT))
+    assert file.left_out == ("key colour", "scenario_specifics")
+    details = file.modification_details_dictionary[AB]
+    assert details.left_out == ("spawn_in_intersection", "key weather")

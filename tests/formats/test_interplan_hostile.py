@@ -19,9 +19,10 @@ from augment.formats.documents import (
     read_yaml_file,
 )
 from augment.formats.documents import MOST_YAML_VALUES as MOST_VALUES
-from augment.formats.interplan.reader import FURTHEST_FROM_EGO_M, read
+from augment.formats.interplan.file import FURTHEST_FROM_EGO_M
 from augment.scene.entities import Scene, without_traffic
 from tests.fixtures.shelf import whole_scene
+from tests.formats.interplan_files import entries_of
 
 TOKEN = "00000000000000ab"
 TOP = "modification_details_dictionary"
@@ -53,12 +54,12 @@ HOSTILE = [
     (f"{TOP}: ", f"{TOP}: Input should be a valid dictionary"),
     (f"{TOP}: {{}}", "holds no special scenario"),
     (f'{TOP}: {{"{TOKEN}": {{}}}}', "holds no special scenario"),
-    (f"{TOP}: {{12345678: {{}}}}", "should be a valid string"),
+    (f"{TOP}: {{12345678: {{}}}}", "should match pattern"),
     (f"{TOP}: {{1234567e: {{}}}}", "should match pattern"),
     (f'{TOP}: {{"../../etc/passwd": {{}}}}', "should match pattern"),
     (special("", index='"../0"'), "should match pattern"),
-    (special("", index="100"), "less than or equal to 99"),
-    (special("", index="true"), "valid"),
+    (special("", index="100"), "should match pattern"),
+    (special("", index="true"), "should match pattern"),
     (special("").replace("jaywalking_pedestrian", "parade"), "Input should be 'approaching"),
     (special("cones: [[1]]"), "cones[0][1]: is missing"),
     (special("cones: [[1, 2, 3]]"), "cones[0]"),
@@ -78,8 +79,6 @@ HOSTILE = [
     (special("cones: [[0, 9000]]"), "cones[0]: is "),
     (special("type: avoid_crashed_cars"), "the key 'type' stands twice"),
     (f"{TOP}: {{}}\n{TOP}: {{}}", "line 2, column 1: the key"),
-    ("1: a\n0x1: b", "two keys mean the same number"),
-    (f"{2**61 - 1}: a\n{2 * (2**61 - 1)}: b", "a key is a number of more than 18 digits"),
     ("? [a, b]\n: 1", "line 1, column 3: a key is a text"),
     (LAUGHS, "line 1, column 5: anchors and aliases"),
     ("a: &b {c: *b}", "anchors and aliases"),
@@ -98,7 +97,7 @@ HOSTILE = [
 @pytest.mark.parametrize(("text", "said"), HOSTILE, ids=range(len(HOSTILE)))
 def test_a_hostile_file_is_our_own_error_and_says_where(text: str, said: str) -> None:
     with pytest.raises(InvalidDocument) as caught:
-        read(text, {TOKEN: scene()})
+        entries_of(text, {TOKEN: scene()})
     assert said in str(caught.value)
     assert len(str(caught.value)) < 2_000
 
@@ -156,12 +155,12 @@ def test_what_is_nowhere_near_its_scene_is_refused(away_m: float, is_read: bool)
     x_m = pose.x_m + FURTHEST_FROM_EGO_M + away_m
     text = special(f"cones: [[{pose.x_m}, {pose.y_m}], [{x_m}, {pose.y_m}]]")
     if is_read:
-        (entry,) = read(text, {TOKEN: scene()}).entries
+        (entry,) = entries_of(text, {TOKEN: scene()})
         far = entry.modification.added[1]
         assert math.hypot(far.x_m, far.y_m) == pytest.approx(999.5)
     else:
         with pytest.raises(InvalidDocument, match=r"cones\[1\]: is 100[01] m from the ego"):
-            read(text, {TOKEN: scene()})
+            entries_of(text, {TOKEN: scene()})
 
 
 def test_a_large_file_is_refused_unread(tmp_path: Path) -> None:

@@ -10,10 +10,10 @@ from dataclasses import replace
 import pytest
 
 from augment.formats.interplan.file import token_of
-from augment.formats.interplan.reader import read as read_interplan
 from augment.formats.interplan.writer import interplan_text as write_interplan
 from augment.scene.entities import AgentType, ScenarioType, without_traffic
 from tests.formats.cells import cell
+from tests.formats.interplan_files import entries_of
 from tests.formats.round_trips import agent_changes
 from tests.scenes import cone, pedestrian, vehicle
 
@@ -39,7 +39,7 @@ def test_what_interplan_changes_has_a_line_with_its_name(odd: str, kind: Scenari
     given = cell(added=(ODD[odd], cone("Agent10", 20.0, -1.0)), type=kind)
     text, losses = write_interplan([given])
     scene = without_traffic(given.scene)
-    (found,) = read_interplan(text, {token_of(scene.name): scene}).entries
+    (found,) = entries_of(text, {token_of(scene.name): scene})
     wanted, got = given.modification.added, found.modification.added
     assert len(got) == (1 if odd == "missing" else 2)
     changed = {change.name for change in agent_changes(wanted, got)}

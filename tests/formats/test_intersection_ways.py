@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from augment.formats.readers import READERS
-from augment.formats.road_map import Segment, crossing_segments, take_end_widths
+from augment.formats.road_map import Segment, crossing_segments, fill_widths
 from augment.scene.entities import TurnType
 
 Points = Sequence[tuple[float, float]]
@@ -61,12 +61,12 @@ def test_no_other_lanes_do(names: Sequence[str]) -> None:
 def test_an_assumed_width_inside_becomes_the_mean_of_its_ends() -> None:
     wide = replace(CROSSING["west in"], width_m=4.0)
     narrow = replace(CROSSING["north out"], width_m=3.0)
-    left = replace(CROSSING["left"], crosses=True)
-    made, still = take_end_widths([wide, left, narrow], {"left"})
+    left = replace(CROSSING["left"], crosses=True, width_m=None)
+    made, still = fill_widths([wide, left, narrow])
     assert ([one.width_m for one in made], still) == ([4.0, 3.5, 3.0], 0)
-    made, still = take_end_widths([left, replace(narrow, width_m=2.8)], {"left"})
+    made, still = fill_widths([left, replace(narrow, width_m=2.8)])
     assert ([one.width_m for one in made], still) == ([2.8, 2.8], 0)
-    _, still = take_end_widths([wide, CROSSING["left"]], {"left"})
+    _, still = fill_widths([wide, replace(left, crosses=False)])
     assert still == 1, "a lane that lies in no intersection keeps what was assumed"
 
 

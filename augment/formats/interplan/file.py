@@ -1,42 +1,121 @@
-"""interPlan's modification file: its keys, and what one special scenario holds.
+"""interPlan's modification file: its typed shape, its special scenarios as changes, its text.
 
-Frames: the file is in the global frame, metres and radians, which here is the frame that a
-scene's origin is given in; agents are in their scene's ego frame. Positions are box centres.
+Frames: the file is in the global frame, which is the one that a scene's origin is given in;
+changes are in their scene's ego frame. Metres and radians; positions are centres of boxes. Keys
+that nobody knows are kept aside, so that a reader can say that they say nothing here.
 """
 
 from __future__ import annotations
 
 import hashlib
+import math
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Annotated, Any, Final, TypeVar
 
+import numpy as np
 import yaml
 from pydantic import BaseModel, ConfigDict, Field, Strict, ValidationError
 
 from augment.checks.ground import Ground
 from augment.errors import InvalidDocument
 from augment.escaping import escape_controls
+from augment.geometry.frames import Pose, wrap
+from augment.scene.density import ExtraAgent, spawn_traffic
 from augment.scene.entities import (
+    LENGTH_WIDTH_M,
+    AgentType,
     Modification,
+    Point,
     ScenarioType,
+    Scene,
     SceneOptions,
+    TrafficAgent,
     TrafficDensity,
     TurnType,
 )
 from augment.scene.schema import path, problems_of
 
+WHAT = "interPlan file"
+OBJECTS = ("stopped_vehicle", "stopped_bus", "cones", "pedestrian")
+"""The keys of a special scenario whose rows a change writes anew."""
 STANDING_WALK_M: Final = 1.5
 """A walk up to here is a worker's: interPlan's construction workers step 1.0 m."""
 WALK_S: Final = 15.0
 """How long a walk takes after its activation, whatever its length."""
 MOST_ENTRIES: Final = 100
 """The index of a special scenario has at most two digits."""
+FURTHEST_FROM_EGO_M = 1_000.0
+"""What lies further from its scene's ego is in another frame, or another scene is meant."""
+_STANDS_M = 0.01
 
-GOALS: Final = ("left", "right", "straight")
-ACCEL_MAX_MPS2: Final = 1.0
-DECEL_MAX_MPS2: Final = 2.0
+_Item = TypeVar("_Item")
+_Objects = Annotated[list[_Item], Field(max_length=1_000, fail_fast=True)]
+_Metres = Annotated[float, Field(ge=-1e8, le=1e8)]
+_Standing = Annotated[
+    tuple[_Metres, _Metres, Annotated[float, Field(ge=-100.0, le=100.0)]], Strict(False)
+]
+_Place = Annotated[tuple[_Metres, _Metres], Strict(False)]
+_Iteration = Annotated[int, Field(ge=0, le=1_000_000)]
+_Walk = Annotated[tuple[_Metres, _Metres, _Metres, _Metres, _Iteration | None], Strict(False)]
+_GoalPlace = Annotated[str, Field(pattern=r"^\s*-?\d{1,9}(\.\d+)?\s*,\s*-?\d{1,9}(\.\d+)?\s*$")]
+_Token = Annotated[str, Field(pattern=r"^[0-9a-f]{16}$")]
+_Index = Annotated[str, Field(pattern=r"^[0-9]{1,2}$")]
+_Config = Annotated[str, Field(pattern=r"^(d[lmh]|g[lrs]|o[amc]|a\d|s\d{1,2})*$")]
+"""Density, goal, observation, amount of agents and special scenario, as one suffix."""
+
+
+class _Part(BaseModel):
+    model_config = ConfigDict(strict=True, extra="allow", allow_inf_nan=False, frozen=True)
+
+
+class SpecialScenario(_Part):
+    """One special scenario."""
+
+    type: Annotated[ScenarioType, Strict(False)]
+    config: _Config | None = None
+    stopped_vehicle: _Objects[_Standing] = []
+    stopped_bus: _Objects[_Standing] = []
+    cones: _Objects[_Place] = []
+    pedestrian: _Objects[_Walk] = []
+    roadblock_locations_to_spawn_agents: _Objects[_Place] | None = None
+
+
+class Details(_Part):
+    """What stands under one base token.
+
+    Attributes:
+        extra_agents_to_spawn: Rows of x, y and speed, and perhaps how the vehicle behaves.
+        goal: "x, y" by turn; None where the turn alone is said.
+    """
+
+    extra_agents_to_spawn: _Objects[Annotated[list[Any], Field(min_length=3)]] | None = None
+    roadblock_locations_to_spawn_agents: _Objects[_Place] | None = None
+    goal: dict[str, _GoalPlace | None] | None = None
+    spawn_in_intersection: bool | None = None
+    special_scenario: dict[_Index, SpecialScenario] | None = None
+
+    @property
+    def left_out(self) -> tuple[str, ...]:
+        """What changes nothing here; an export says it again."""
+        spawns = ["spawn_in_intersection"] if self.spawn_in_intersection else []
+        return (*spawns, *(f"key {key}" for key in self.model_extra or {}))
+
+
+class File(_Part):
+    """The whole file; in the published one the two accelerations refer to another: "${...}"."""
+
+    accel_max: float | str | None = None
+    decel_max: float | str | None = None
+    scenario_specifics: Any = None
+    modification_details_dictionary: dict[_Token, Details]
+
+    @property
+    def left_out(self) -> tuple[str, ...]:
+        """What stands at the top and says nothing here."""
+        specifics = [] if self.scenario_specifics is None else ["scenario_specifics"]
+        return (*(f"key {key}" for key in self.model_extra or {}), *specifics)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -68,47 +147,216 @@ class ReadEntry:
     """
 
     id: str
-    scene: str
     type: ScenarioType
     modification: Modification
     left_out: tuple[str, ...]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ReadFile:
-    """What a file holds.
+# Reading
 
-    Attributes:
-        entries: The special scenarios whose scenes are known, in the file's order.
-        passed_over: The base tokens without a scene, with the number of their special scenarios.
-        left_out: What stands besides special scenarios and says nothing here.
+
+def file_of(document: object) -> File:
+    """Return the document in its typed shape.
+
+    Raises:
+        InvalidDocument: It is not interPlan's, with the path and the reason of every fault, or
+            it holds no special scenario.
     """
+    if not isinstance(document, dict):
+        kind = type(document).__name__
+        problem = f"expected a mapping with interPlan's keys, got {kind}"
+        raise InvalidDocument(WHAT, [("", problem)])
+    try:
+        file = File.model_validate(document)
+    except ValidationError as fault:
+        raise InvalidDocument(WHAT, problems_of(fault)) from None
+    if not any(one.special_scenario for one in file.modification_details_dictionary.values()):
+        raise InvalidDocument(WHAT, [("", "holds no special scenario")])
+    return file
 
-    entries: tuple[ReadEntry, ...]
-    passed_over: Mapping[str, int]
-    left_out: tuple[str, ...]
+
+def place_of(token: str, index: str | int, *steps: str | int) -> str:
+    """Return where in a file a part of a special scenario stands."""
+    return path("modification_details_dictionary", token, "special_scenario", str(index), *steps)
+
+
+def read_entry(token: str, index: str | int, entry: SpecialScenario, scene: Scene) -> ReadEntry:
+    """Return a special scenario as a change: vehicles, buses, cones, pedestrians.
+
+    Boxes get our own usual sizes, cones the direction of the ego's way.
+
+    Args:
+        token: The base token.
+        index: Of the special scenario.
+        entry: The special scenario.
+        scene: In the file's frame, without the traffic that interPlan removes.
+
+    Raises:
+        InvalidDocument: An object is nowhere near the scene.
+    """
+    placer = _Placer(scene, token, index)
+    origin = scene.origin.pose
+    for kind, key in ((AgentType.VEHICLE, "stopped_vehicle"), (AgentType.BUS, "stopped_bus")):
+        for number, (x_m, y_m, yaw_rad) in enumerate(getattr(entry, key)):
+            placer.place(x_m, y_m, key, number)
+            pose = Pose(x_m=x_m, y_m=y_m, heading_rad=wrap(yaw_rad))
+            placer.add(kind, origin.pose_to_local(pose))
+    for number, cone in enumerate(entry.cones):
+        x_m, y_m = placer.place(*cone, "cones", number)
+        heading_rad = cone_heading(placer.ground, x_m, y_m)
+        placer.add(AgentType.TRAFFIC_CONE, Pose(x_m=x_m, y_m=y_m, heading_rad=heading_rad))
+    left_out: list[str] = []
+    for number, (from_x_m, from_y_m, to_x_m, to_y_m, iteration) in enumerate(entry.pedestrian):
+        x_m, y_m = placer.place(from_x_m, from_y_m, "pedestrian", number)
+        end_m = placer.place(to_x_m, to_y_m, "pedestrian", number)
+        walk_m = math.hypot(end_m[0] - x_m, end_m[1] - y_m)
+        way_rad = wrap(math.atan2(end_m[1] - y_m, end_m[0] - x_m))
+        walks = walk_m > STANDING_WALK_M
+        placer.add(
+            AgentType.PEDESTRIAN,
+            Pose(x_m=x_m, y_m=y_m, heading_rad=way_rad),
+            speed_mps=round(walk_m / WALK_S, 2) if walks else 0.0,
+            walk_to_m=end_m if walks else None,
+        )
+        if walk_m < _STANDS_M:
+            left_out.append(f"pedestrian {number} walks 0 m, which gives it no direction")
+        if iteration is not None:
+            left_out.append(f"pedestrian {number} starts at iteration {iteration}")
+    return ReadEntry(
+        id=f"{token}-s{index}",
+        type=entry.type,
+        modification=Modification(added=tuple(placer.added)),
+        left_out=(*left_out, *(f"key {key}" for key in entry.model_extra or {})),
+    )
+
+
+class _Placer:
+    """Puts what the file names into one scene's ego frame."""
+
+    def __init__(self, scene: Scene, token: str, index: str | int) -> None:
+        self._scene, self._entry = scene, (token, index)
+        self.ground = Ground.of(scene)
+        self.added: list[TrafficAgent] = []
+
+    def place(self, x_m: float, y_m: float, key: str, number: int) -> Point:
+        """Return a place of that row under that key, which must be near the ego."""
+        x_m, y_m = _to_local(self._scene, x_m, y_m)
+        away_m = math.hypot(x_m, y_m)
+        if away_m > FURTHEST_FROM_EGO_M:
+            problem = (
+                f"is {away_m:.0f} m from the ego of scene {self._scene.name}; more than "
+                f"{FURTHEST_FROM_EGO_M:.0f} m means another scene or another frame"
+            )
+            raise InvalidDocument(WHAT, [(place_of(*self._entry, key, number), problem)])
+        return x_m, y_m
+
+    def add(
+        self,
+        kind: AgentType,
+        pose: Pose,
+        *,
+        speed_mps: float = 0.0,
+        walk_to_m: Point | None = None,
+    ) -> None:
+        length_m, width_m = LENGTH_WIDTH_M[kind]
+        agent = TrafficAgent(
+            id=f"Agent{len(self._scene.everyone) + 1 + len(self.added)}",
+            type=kind,
+            x_m=pose.x_m,
+            y_m=pose.y_m,
+            heading_rad=pose.heading_rad,
+            width_m=width_m,
+            length_m=length_m,
+            speed_mps=speed_mps,
+            lane_id=self.ground.graph.under(pose.x_m, pose.y_m, pose.heading_rad),
+            walk_to_m=walk_to_m,
+        )
+        self.added.append(agent)
+
+
+def traffic_of(
+    entry: SpecialScenario,
+    details: Details,
+    scene: Scene,
+    *,
+    seed: str,
+    clear_of: Sequence[TrafficAgent] = (),
+) -> tuple[TrafficAgent, ...]:
+    """Return the traffic of a special scenario's density; none without one.
+
+    Args:
+        entry: Its roadblocks come before those of the token, an empty list too.
+        details: Of its base token.
+        scene: Cleared of the recorded traffic.
+        seed: interPlan takes the base token.
+        clear_of: Who is spawned keeps away from these.
+
+    Raises:
+        InvalidDocument: An extra agent has no place or speed.
+    """
+    density, _ = options_of(entry.config)
+    roadblocks = entry.roadblock_locations_to_spawn_agents
+    if roadblocks is None:
+        roadblocks = details.roadblock_locations_to_spawn_agents or []
+    extras = []
+    for values in (row[:3] for row in details.extra_agents_to_spawn or []):
+        if not all(isinstance(one, (int, float)) and math.isfinite(one) for one in values):
+            problem = f"{values!r} must be x, y and a speed in metres and metres per second"
+            raise InvalidDocument(WHAT, [("extra_agents_to_spawn", problem)])
+        x_m, y_m = _to_local(scene, values[0], values[1])
+        extras.append(ExtraAgent(x_m=x_m, y_m=y_m, speed_mps=abs(float(values[2]))))
+    return spawn_traffic(
+        scene,
+        density,
+        seed=seed,
+        roadblocks_m=[_to_local(scene, *place) for place in roadblocks],
+        extras=extras,
+        clear_of=clear_of,
+    )
+
+
+def goal_place(source: Mapping[str, Any] | None, goal: str, scene: Scene) -> Point | None:
+    """Return where a goal of interPlan's file lies in the ego frame, None where it has no place.
+
+    Args:
+        source: A scenario's parts of the file, as they are stored; None for one of another kind.
+        goal: left, right or straight.
+        scene: Whose origin tells the frame.
+    """
+    places = ((source or {}).get("details") or {}).get("goal") or {}
+    if not places.get(goal):
+        return None
+    x_m, y_m = (float(part) for part in places[goal].split(","))
+    return _to_local(scene, x_m, y_m)
+
+
+def _to_local(scene: Scene, x_m: float, y_m: float) -> Point:
+    x_m, y_m = scene.origin.pose.to_local(np.array([[x_m, y_m]]))[0].tolist()
+    return x_m, y_m
 
 
 def cone_heading(ground: Ground, x_m: float, y_m: float) -> float:
-    """The direction of the ego's way beside a place: what a cone gets, having none in the file."""
-    if ground.route is None:
-        return 0.0
-    return ground.route.locate(x_m, y_m).tangent_rad
+    """Return the direction of the ego's way beside a place: a cone has none in the file."""
+    return 0.0 if ground.route is None else ground.route.locate(x_m, y_m).tangent_rad
 
 
-def token_of(scene_name: str) -> str:
-    """The base token that stands for a scene: 16 hexadecimal digits, always the same."""
-    return hashlib.sha256(scene_name.encode()).hexdigest()[:16]
+# The suffix of options
+
+_CONFIG_PARTS: Final = re.compile(r"[dgo][a-z]|a\d|s\d{1,2}")
+_DENSITIES = {None: TrafficDensity.NONE} | {
+    one[0]: one for one in TrafficDensity if one is not TrafficDensity.NONE
+}
+_TURNS = {None: None, "l": TurnType.LEFT, "r": TurnType.RIGHT, "s": TurnType.STRAIGHT}
 
 
 def options_of(config: str | None) -> tuple[TrafficDensity, TurnType | None]:
-    """Density and goal of a suffix such as "dlgl"."""
+    """Return density and goal of a suffix such as "dlgl"."""
     parts = {part[0]: part[1:] for part in _CONFIG_PARTS.findall(config or "")}
     return _DENSITIES[parts.get("d")], _TURNS[parts.get("g")]
 
 
 def config_of(options: SceneOptions, given: str = "") -> str:
-    """The suffix that says a scenario's options; as given where that says the same already."""
+    """Return the suffix of a scenario's options; as given where that says the same already."""
     if options_of(given) == (options.density, options.goal):
         return given
     density = "" if options.density is TrafficDensity.NONE else f"d{options.density[0]}"
@@ -117,54 +365,47 @@ def config_of(options: SceneOptions, given: str = "") -> str:
     return "".join([density, goal, *others])
 
 
-def details(
-    entries: Mapping[str, Mapping[str, Any]], given: Mapping[str, Any] | None = None
-) -> dict[str, Any]:
-    """What interPlan keeps for one base token, with these special scenarios by index."""
-    special = {_Quoted(index): entry for index, entry in entries.items()}
-    if given:
-        return {**given, "special_scenario": special}
-    return {
-        "extra_agents_to_spawn": [],
-        "roadblock_locations_to_spawn_agents": [],
-        "goal": dict.fromkeys(GOALS),
-        "spawn_in_intersection": False,
-        "special_scenario": special,
-    }
+# Writing
+
+
+def token_of(scene_name: str) -> str:
+    """Return the base token that stands for a scene: 16 hexadecimal digits, always the same."""
+    return hashlib.sha256(scene_name.encode()).hexdigest()[:16]
 
 
 def yaml_text(
-    by_token: Mapping[str, dict[str, Any]],
+    by_token: Mapping[str, tuple[Mapping[str, Any], Mapping[str, Any]]],
     comments: list[str],
     given: Mapping[str, Any] | None = None,
 ) -> str:
-    """The whole file; tokens are quoted, since some would be read as numbers.
+    """Return the whole file; tokens are quoted, since some would be read as numbers.
 
     Args:
-        by_token: What stands under each base token.
+        by_token: Special scenarios by index, and what stands beside them (empty for interPlan's
+            fallbacks), by base token.
         comments: Lines at the top.
         given: What stands beside the tokens; None for interPlan's fallbacks.
     """
-    usual = {"accel_max": ACCEL_MAX_MPS2, "decel_max": DECEL_MAX_MPS2, "scenario_specifics": None}
+    usual = {"accel_max": 1.0, "decel_max": 2.0, "scenario_specifics": None}
+    beside = {
+        "extra_agents_to_spawn": [],
+        "roadblock_locations_to_spawn_agents": [],
+        "goal": dict.fromkeys(("left", "right", "straight")),
+        "spawn_in_intersection": False,
+    }
     document = {
         **(given or usual),
         "modification_details_dictionary": {
-            _Quoted(token): one for token, one in by_token.items()
+            _Quoted(token): {
+                **(details or beside),
+                "special_scenario": {_Quoted(index): entry for index, entry in entries.items()},
+            }
+            for token, (entries, details) in by_token.items()
         },
     }
     body = yaml.dump(document, Dumper=_Dumper, sort_keys=False, allow_unicode=True, width=99)
     head = "".join(f"# {escape_controls(' '.join(line.split()))}\n" for line in comments)
     return head + body
-
-
-_CONFIG_PARTS: Final = re.compile(r"[dgo][a-z]|a\d|s\d{1,2}")
-_DENSITIES = {
-    None: TrafficDensity.NONE,
-    "l": TrafficDensity.LOW,
-    "m": TrafficDensity.MEDIUM,
-    "h": TrafficDensity.HIGH,
-}
-_TURNS = {None: None, "l": TurnType.LEFT, "r": TurnType.RIGHT, "s": TurnType.STRAIGHT}
 
 
 class _Quoted(str):
@@ -178,118 +419,14 @@ class _Dumper(yaml.SafeDumper):
         return True
 
 
-def _quoted(dumper: _Dumper, text: _Quoted) -> yaml.ScalarNode:
+def _represent_quoted(dumper: _Dumper, text: _Quoted) -> yaml.ScalarNode:
     return dumper.represent_scalar("tag:yaml.org,2002:str", str(text), style='"')
 
 
-def _list(dumper: _Dumper, items: list[Any]) -> yaml.SequenceNode:
+def _represent_list(dumper: _Dumper, items: list[Any]) -> yaml.SequenceNode:
     is_row = all(isinstance(item, (float, int, type(None))) for item in items)
     return dumper.represent_sequence("tag:yaml.org,2002:seq", items, flow_style=is_row)
 
 
-_Dumper.add_representer(_Quoted, _quoted)
-_Dumper.add_representer(list, _list)
-
-
-WHAT = "interPlan file"
-MOST_OBJECTS = 1_000
-FURTHEST_M = 1e8
-WIDEST_RAD = 100.0
-
-OBJECTS = ("stopped_vehicle", "stopped_bus", "cones", "pedestrian")
-"""The keys of a special scenario whose rows a change writes anew."""
-
-_Item = TypeVar("_Item")
-_Objects = Annotated[list[_Item], Field(max_length=MOST_OBJECTS, fail_fast=True)]
-Metres = Annotated[float, Field(ge=-FURTHEST_M, le=FURTHEST_M)]
-Radians = Annotated[float, Field(ge=-WIDEST_RAD, le=WIDEST_RAD)]
-Standing = tuple[Metres, Metres, Radians]
-Place = Annotated[tuple[Metres, Metres], Strict(False)]
-CONFIG = r"^(d[lmh]|g[lrs]|o[amc]|a\d|s\d{1,2})*$"
-"""Density, goal, observation, amount of agents and special scenario, as one suffix."""
-GoalPlace = Annotated[str, Field(pattern=r"^\s*-?\d{1,9}(\.\d+)?\s*,\s*-?\d{1,9}(\.\d+)?\s*$")]
-Iteration = Annotated[int, Field(ge=0, le=1_000_000)]
-Token = Annotated[str, Field(pattern=r"^[0-9a-f]{16}$")]
-Index = Annotated[str, Field(pattern=r"^[0-9]{1,2}$")] | Annotated[int, Field(ge=0, le=99)]
-
-
-class _Part(BaseModel):
-    model_config = ConfigDict(strict=True, extra="allow", allow_inf_nan=False, frozen=True)
-
-
-class SpecialScenario(_Part):
-    """One special scenario."""
-
-    type: Annotated[ScenarioType, Strict(False)]
-    config: Annotated[str, Field(pattern=CONFIG)] | None = None
-    stopped_vehicle: _Objects[Annotated[Standing, Strict(False)]] = []
-    stopped_bus: _Objects[Annotated[Standing, Strict(False)]] = []
-    cones: _Objects[Annotated[tuple[Metres, Metres], Strict(False)]] = []
-    pedestrian: _Objects[
-        Annotated[tuple[Metres, Metres, Metres, Metres, Iteration | None], Strict(False)]
-    ] = []
-    roadblock_locations_to_spawn_agents: _Objects[Place] | None = None
-
-
-class Details(_Part):
-    """What stands under one base token; only its special scenarios hold objects to read.
-
-    Attributes:
-        extra_agents_to_spawn: Rows of x, y and speed, and perhaps how the vehicle behaves.
-        goal: "x, y" by turn; None where the turn alone is said.
-    """
-
-    extra_agents_to_spawn: _Objects[Annotated[list[Any], Field(min_length=3)]] | None = None
-    roadblock_locations_to_spawn_agents: _Objects[Place] | None = None
-    goal: dict[str, GoalPlace | None] | None = None
-    spawn_in_intersection: bool | None = None
-    special_scenario: dict[Index, SpecialScenario] | None = None
-
-
-class File(_Part):
-    """The whole file.
-
-    Attributes:
-        accel_max, decel_max: In the published file they refer to another one: "${...}".
-    """
-
-    accel_max: float | str | None = None
-    decel_max: float | str | None = None
-    scenario_specifics: Any = None
-    modification_details_dictionary: dict[Token, Details]
-
-
-def file_of(document: object) -> File:
-    """The document in its typed shape.
-
-    Raises:
-        InvalidDocument: It is not interPlan's, with the path and the reason of every fault.
-    """
-    if not isinstance(document, dict):
-        kind = type(document).__name__
-        raise InvalidDocument(
-            WHAT, [("", f"expected a mapping with interPlan's keys, got {kind}")]
-        )
-    try:
-        return File.model_validate(document)
-    except ValidationError as fault:
-        raise InvalidDocument(WHAT, problems_of(fault)) from None
-
-
-def left_out_of_file(file: File) -> Iterator[str]:
-    """What stands at the top of a file and says nothing here."""
-    yield from (f"key {key}" for key in file.model_extra or {})
-    if file.scenario_specifics is not None:
-        yield "scenario_specifics"
-
-
-def left_out_of_details(details: Details) -> Iterator[str]:
-    """What a base token says that changes nothing here; an export says it again."""
-    if details.spawn_in_intersection:
-        yield "spawn_in_intersection"
-    yield from (f"key {key}" for key in details.model_extra or {})
-
-
-def place_of(token: str, index: str | int, *steps: str | int) -> str:
-    """Where in a file a part of a special scenario stands."""
-    return path("modification_details_dictionary", token, "special_scenario", str(index), *steps)
+_Dumper.add_representer(_Quoted, _represent_quoted)
+_Dumper.add_representer(list, _represent_list)

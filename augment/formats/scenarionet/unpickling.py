@@ -45,7 +45,7 @@ class _Kind:
 
 
 class _Array:
-    """A numpy array, by its shape, kind and bytes."""
+    """A numpy array or number, by its shape, kind and bytes."""
 
     __slots__ = ("value",)
 
@@ -54,122 +54,90 @@ class _Array:
 
     def __setstate__(self, state: Any) -> None:
         _, shape, kind, is_column_wise, block = state
-        self.value = _filled(block, kind, shape, "F" if is_column_wise else "C")
+        self.fill(block, kind, shape, "F" if is_column_wise else "C")
+
+    def fill(self, block: Any, kind: Any, shape: Any, order: Any) -> _Array:
+        if not isinstance(kind, _Kind):
+            raise TypeError("an array needs its kind")
+        if "O" not in kind.name:
+            block = block.encode("latin1") if isinstance(block, str) else bytes(block)
+            self.value = np.frombuffer(block, dtype=kind.name).reshape(shape, order=order)
+        elif isinstance(block, list):
+            self.value = list(block)
+        else:
+            raise TypeError("an array of objects needs a list")
+        return self
 
 
-class _Scalar:
-    """A numpy number."""
-
-    __slots__ = ("value",)
-
-    def __init__(self, kind: Any, block: Any) -> None:
-        self.value = _filled(_as_bytes(block), kind, (), "C").item()
-
-
-class _Buffer(_Array):
-    """A numpy array in the form of newer protocols."""
-
-    __slots__ = ()
-
-    def __init__(self, block: Any, kind: Any, shape: Any, order: Any) -> None:
-        self.value = _filled(bytes(block), kind, shape, "F" if order == "F" else "C")
-
-
-class _Named:
-    """Something that is only ever handed on."""
+class _Name:
+    """A name that is only ever handed on."""
 
     __slots__ = ()
 
 
-class _Encode:
-    """How older protocols write bytes: as text."""
-
-    __slots__ = ()
-
-    def __call__(self, text: str, coding: str = "latin1") -> bytes:
-        if coding not in ("latin1", "latin-1"):
-            raise ValueError(f"bytes in the coding {coding[:20]!r} are not read")
-        return text.encode("latin1")
+def _build_scalar(kind: Any, block: Any) -> Any:
+    return _Array().fill(block, kind, (), "C").value.item()
 
 
-class _Counting:
-    """A dictionary with a default, which is dropped."""
-
-    __slots__ = ()
-
-    def __call__(self, *_: Any) -> dict[Any, Any]:
-        return {}
+def _build_from_buffer(block: Any, kind: Any, shape: Any, order: Any) -> _Array:
+    """Build the array of newer protocols."""
+    return _Array().fill(block, kind, shape, order if order == "F" else "C")
 
 
-_ALLOWED: dict[tuple[str, str], Any] = {
-    ("numpy", "ndarray"): _Named(),
-    ("numpy", "dtype"): _Kind,
-    ("collections", "defaultdict"): _Counting(),
-    ("collections", "OrderedDict"): _Counting(),
-    ("builtins", "int"): _Named(),
-    ("builtins", "set"): set,
-    ("__builtin__", "int"): _Named(),
-    ("__builtin__", "long"): _Named(),
-    ("__builtin__", "set"): set,
-    ("_codecs", "encode"): _Encode(),
-} | {
-    (module.replace("core", core), name): stand_in
-    for core in ("core", "_core")
-    for (module, name), stand_in in {
-        ("numpy.core.multiarray", "_reconstruct"): _Array,
-        ("numpy.core.multiarray", "scalar"): _Scalar,
-        ("numpy.core.numeric", "_frombuffer"): _Buffer,
-    }.items()
+def _build_dictionary(*_: Any) -> dict[Any, Any]:
+    """Build a dictionary with a default, which is dropped."""
+    return {}
+
+
+def _encode(text: str, coding: str = "latin1") -> bytes:
+    """Encode bytes, which older protocols write as text."""
+    if coding not in ("latin1", "latin-1"):
+        raise ValueError(f"bytes in the coding {coding[:20]!r} are not read")
+    return text.encode("latin1")
+
+
+_ALLOWED: dict[str, Any] = {
+    "numpy.ndarray": _Name(),
+    "numpy.dtype": _Kind,
+    "collections.defaultdict": _build_dictionary,
+    "collections.OrderedDict": _build_dictionary,
+    "builtins.int": _Name(),
+    "builtins.set": set,
+    "__builtin__.int": _Name(),
+    "__builtin__.long": _Name(),
+    "__builtin__.set": set,
+    "_codecs.encode": _encode,
+    "numpy.core.multiarray._reconstruct": _Array,
+    "numpy.core.multiarray.scalar": _build_scalar,
+    "numpy.core.numeric._frombuffer": _build_from_buffer,
 }
+"""Version 2 of numpy calls its `core` `_core`."""
+
+
+class _Unpickler(pickle.Unpickler):
+    def find_class(self, module: str, name: str) -> Any:
+        place = f"{module}.{name}"
+        if place.replace("numpy._core.", "numpy.core.") not in _ALLOWED:
+            raise pickle.UnpicklingError(f"{place} is not on the list")
+        return _ALLOWED[place.replace("numpy._core.", "numpy.core.")]
 
 
 def read_pickle(path: Path) -> Any:
-    """What the file holds: dictionaries, lists, texts, numbers, numpy arrays.
+    """Return what the file holds: dictionaries, lists, texts, numbers, numpy arrays.
 
     Raises:
         InvalidDocument: The file is no pickle, or names what is not on the list.
     """
     try:
-        block = path.read_bytes()
-    except OSError as fault:
-        raise _fault(path, fault.strerror or str(fault)) from None
-    try:
-        return _plain(_Unpickler(io.BytesIO(block), encoding="latin1").load())
-    except _FAULTS as fault:
-        raise _fault(path, f"can't be unpickled safely: {str(fault)[:200]}") from None
-
-
-# Private
-
-
-class _Unpickler(pickle.Unpickler):
-    def find_class(self, module: str, name: str) -> Any:
-        try:
-            return _ALLOWED[module, name]
-        except KeyError:
-            raise pickle.UnpicklingError(f"{module}.{name} is not on the list") from None
-
-
-def _filled(block: Any, kind: Any, shape: Any, order: Any) -> Any:
-    if not isinstance(kind, _Kind):
-        raise TypeError("an array needs its kind")
-    sizes = tuple(shape)
-    if any(not isinstance(size, int) or size < 0 for size in sizes):
-        raise ValueError("an array needs a shape")
-    if "O" in kind.name:
-        if not isinstance(block, list):
-            raise TypeError("an array of objects needs a list")
-        return list(block)
-    return np.frombuffer(_as_bytes(block), dtype=kind.name).reshape(sizes, order=order)
-
-
-def _as_bytes(block: Any) -> bytes:
-    return block.encode("latin1") if isinstance(block, str) else bytes(block)
+        return _plain(_Unpickler(io.BytesIO(path.read_bytes()), encoding="latin1").load())
+    except (OSError, *_FAULTS) as fault:
+        problem = f"can't be unpickled safely: {str(fault)[:200]}"
+        raise InvalidDocument(WHAT, [(path.name, problem)]) from None
 
 
 def _plain(value: Any) -> Any:
     """The value with arrays in the place of what stood for them."""
-    if isinstance(value, _Array | _Scalar):
+    if isinstance(value, _Array):
         return _plain(value.value)
     if isinstance(value, dict):
         return {_plain(key): _plain(one) for key, one in value.items()}
@@ -178,7 +146,3 @@ def _plain(value: Any) -> Any:
     if value is None or isinstance(value, str | bytes | int | float | np.ndarray):
         return value
     raise ValueError(f"holds a {type(value).__name__.strip('_')}, which is no plain value")
-
-
-def _fault(path: Path, text: str) -> InvalidDocument:
-    return InvalidDocument(WHAT, [(path.name, text)])

@@ -9,14 +9,8 @@ from typing import Any
 
 from django.core.management.base import CommandError
 
-from augment.services.scenarios.interplan import (
-    FileLeftOut,
-    LogLooked,
-    ScenarioDone,
-    ScenarioSkipped,
-    Step,
-    import_interplan,
-)
+from augment.errors import AugmentError
+from augment.services.scenarios.interplan import StepKind, import_interplan
 from augment.services.terminal import TerminalCommand
 
 
@@ -50,49 +44,21 @@ class Command(TerminalCommand):
 
     def handle(self, *args: Any, **options: Any) -> None:
         """Import one by one, and say each."""
-        counts: Counter[str] = Counter()
-        for step in import_interplan(
-            folder=options["folder"], data=options["nuplan"], instructions=options["instructions"]
-        ):
-            counts[_kind(step)] += 1
-            counts["same"] += isinstance(step, ScenarioDone) and bool(step.same_as)
-            self.stdout.write(_line(step))
-            self.stdout.flush()
-        new, old, skipped = counts["new"], counts["old"], counts["skipped"]
-        if counts["same"]:
-            self.stdout.write(f"{counts['same']} scenarios are the same as an earlier one.")
-        told = f"{new} scenarios imported, {old} were there already, {skipped} skipped."
+        counts: Counter[StepKind] = Counter()
+        folder, data, sentences = (options[one] for one in ("folder", "nuplan", "instructions"))
+        try:
+            for step in import_interplan(folder=folder, data=data, instructions=sentences):
+                counts[step.kind] += 1
+                self.stdout.write(step.text)
+                self.stdout.flush()
+        except AugmentError as fault:
+            raise CommandError(str(fault)) from fault
+        new, old = counts[StepKind.NEW], counts[StepKind.OLD]
+        skipped = f"{counts[StepKind.SKIPPED]} skipped"
+        summary = f"{new} scenarios imported, {old} were there already, {skipped}."
         if not new + old:
             raise CommandError(
-                f"{told} {counts['log']} logs were looked through; "
+                f"{summary} {counts[StepKind.LOG]} logs were looked through; "
                 "the lines above say why each was skipped."
             )
-        self.stdout.write(told)
-
-
-def _kind(step: Step) -> str:
-    match step:
-        case ScenarioDone():
-            return "new" if step.is_new else "old"
-        case ScenarioSkipped():
-            return "skipped"
-        case LogLooked():
-            return "log"
-        case FileLeftOut():
-            return "left out"
-
-
-def _line(step: Step) -> str:
-    match step:
-        case LogLooked():
-            told = step.fault or f"{len(step.tokens)} base tokens"
-            return f"Log {step.number} of {step.of}, {step.path.name}: {told}"
-        case ScenarioDone():
-            left_out = f"; left out: {', '.join(step.left_out)}" if step.left_out else ""
-            done = "" if step.is_new else " was there already"
-            same = f"; the same as {step.same_as}" if step.same_as else ""
-            return f"{step.id}: {step.row.slug}{done}{same}{left_out}"
-        case ScenarioSkipped():
-            return f"{step.id}: skipped. {step.reason}"
-        case FileLeftOut():
-            return f"Left out: {step.text}."
+        self.stdout.write(summary)

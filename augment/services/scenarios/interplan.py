@@ -1,4 +1,9 @@
-"""A job's modifications as interPlan's file, and such a file as reference modifications."""
+"""A job's modifications as interPlan's file, and interPlan's scenarios on nuPlan's logs.
+
+A folder holds interPlan's modification file and nuPlan's logs and maps, wherever in it. Each base
+token becomes a scene, each of its special scenarios a scenario with its human reference; what is
+stored already stays.
+"""
 
 from __future__ import annotations
 
@@ -6,6 +11,7 @@ import csv
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from enum import StrEnum
 from pathlib import Path
 from typing import Any
 
@@ -20,27 +26,23 @@ from augment.formats.interplan.file import (
     Details,
     File,
     InterplanSource,
-    ReadFile,
     SpecialScenario,
     file_of,
-    left_out_of_details,
-    left_out_of_file,
+    goal_place,
     options_of,
     place_of,
-    token_of,
+    read_entry,
+    traffic_of,
 )
 from augment.formats.interplan.intent import describe_reference
-from augment.formats.interplan.reader import goal_place, read_document, read_entry, traffic_of
 from augment.formats.interplan.writer import interplan_text
 from augment.formats.nuplan_log import NuPlan
-from augment.formats.reading import Reading
 from augment.formats.writing import Cell, Loss
 from augment.models import Augmentation, BaseScene, GenerationJob, Scenario
 from augment.scene.codec import (
     intent_to_document,
     modification_from_document,
     modification_to_document,
-    scene_from_document,
 )
 from augment.scene.entities import Scene, SceneOptions, without_traffic
 from augment.scene.intent import IntentOrigin
@@ -48,14 +50,15 @@ from augment.scene.recording import Note, SceneNoteKind
 from augment.services.scenarios.scene_imports import keep_reading
 from augment.services.scenarios.scenes import Circumstances, add_scenario, scene_of, type_of
 
-NUPLAN = NuPlan.name
 _MOST_LISTED = 12
+_KEY = "modification_details_dictionary"
+_COLUMNS = ("id", "instruction")
 
 
 def job_as_interplan(
     job: GenerationJob, *, contestant: str | None = None, strict: bool = False
 ) -> tuple[str, tuple[Loss, ...]]:
-    """All that a job made, in interPlan's YAML, and what the file can't say.
+    """Return all that a job made, in interPlan's YAML, and what the file can't say.
 
     Args:
         job: Whose modifications are written, ordered by scenario and contestant.
@@ -75,9 +78,8 @@ def job_as_interplan(
         rows = rows.filter(contestant__slug=contestant)
     cells, losses = [], []
     for row in rows.order_by("scenario__slug", "contestant__slug", "sample"):
-        name = f"{row.scenario.slug} by {row.contestant.slug}"
-        if job.samples > 1:
-            name += f", sample {row.sample}"
+        sample = f", sample {row.sample}" if job.samples > 1 else ""
+        name = f"{row.scenario.slug} by {row.contestant.slug}{sample}"
         if row.modification is None:
             text = f"there is no modification: {row.state}"
             losses.append(Loss(cell=name, text=text, changes_scene=True))
@@ -88,51 +90,6 @@ def job_as_interplan(
     if strict:
         refuse_changes(losses, where="interPlan")
     return text, tuple(losses)
-
-
-def references_from_interplan(path: Path, *, scenes: Mapping[str, str] | None = None) -> ReadFile:
-    """The special scenarios of an interPlan file whose scenes are stored here.
-
-    Args:
-        path: The YAML file.
-        scenes: Slugs of stored scenes in the file's frame by base token; None for the tokens
-            that `job_as_interplan` makes from the scenes' names.
-
-    Raises:
-        UnknownName: No such scene, or no such base token in the file.
-        InvalidDocument: The file can't be read or breaks its format.
-    """
-    stored = {row.slug: row for row in BaseScene.objects.defer("recording")}
-    given = tuple(scenes or ())
-    if scenes is None:
-        scenes = {token_of(slug): slug for slug in stored}
-        scenes |= {row.source_item: row.slug for row in stored.values() if row.source == NUPLAN}
-    for slug in scenes.values():
-        if slug not in stored:
-            raise UnknownName("scene", slug, sorted(stored))
-    document = read_yaml_file(path, what=WHAT)
-    known = {
-        token: without_traffic(scene_from_document(stored[slug].document))
-        for token, slug in scenes.items()
-    }
-    file = read_document(document, known)
-    tokens = [*dict.fromkeys(entry.id.partition("-")[0] for entry in file.entries)]
-    there = sorted({*tokens, *file.passed_over})
-    for token in given:
-        if token not in there:
-            raise UnknownName("base token", token, there)
-    if not file.entries:
-        raise InvalidDocument(
-            WHAT,
-            [
-                (
-                    "modification_details_dictionary",
-                    f"none of its {len(there)} base tokens has a scene here: "
-                    f"{', '.join(there[:_MOST_LISTED])}; name the scenes by --scene TOKEN=SLUG",
-                )
-            ],
-        )
-    return file
 
 
 def refuse_changes(losses: Sequence[Loss], *, where: str) -> None:
@@ -149,82 +106,36 @@ def refuse_changes(losses: Sequence[Loss], *, where: str) -> None:
 
 
 def _cell(name: str, row: Augmentation) -> Cell:
+    scenario, scene = row.scenario, row.scenario.base_scene
+    source = None
+    if scene.source == NuPlan.name and scene.source_item:
+        source = InterplanSource(token=scene.source_item, **(scenario.interplan or {}))
     return Cell(
         name=name,
-        scene=scene_of(row.scenario),
-        type=type_of(row.scenario.type),
+        scene=scene_of(scenario),
+        type=type_of(scenario.type),
         modification=modification_from_document(row.modification),
-        keeps_traffic=row.scenario.keep_traffic,
-        source=_source(row.scenario),
+        keeps_traffic=scenario.keep_traffic,
+        source=source,
     )
 
 
-def _source(scenario: Scenario) -> InterplanSource | None:
-    """Where a scenario comes from in nuPlan, None for a scene of another source."""
-    row = scenario.base_scene
-    if row.source != NUPLAN or not row.source_item:
-        return None
-    return InterplanSource(token=row.source_item, **(scenario.interplan or {}))
+class StepKind(StrEnum):
+    """What a step of an import was."""
+
+    LEFT_OUT = "left out"  # something of the file is not kept
+    LOG = "log"  # a log was looked through
+    NEW = "new"  # a scenario was added
+    OLD = "old"  # a scenario was there already
+    SKIPPED = "skipped"  # a special scenario is none here
 
 
-KEY = b"modification_details_dictionary"
-SLUG = "interplan"
-LOGS = "nuplan"
-COLUMNS = ("id", "instruction")
-_MOST_SENTENCES = 10_000
+@dataclass(frozen=True, slots=True)
+class Step:
+    """What was looked at, kept or skipped, and the sentence that says so."""
 
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class LogLooked:
-    """A log that was looked through for base tokens.
-
-    Attributes:
-        number, of: Which of how many.
-        tokens: The base tokens in it.
-        fault: Why it could not be read; empty if it could.
-    """
-
-    path: Path
-    number: int
-    of: int
-    tokens: tuple[str, ...]
-    fault: str = ""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ScenarioDone:
-    """A special scenario that is a scenario now.
-
-    Attributes:
-        id: interPlan's own name.
-        is_new: False where it was there before.
-        left_out: What of it changes nothing here; an export says it again.
-        same_as: The name of an earlier one that differs from it in nothing; empty for none.
-    """
-
-    id: str
-    row: Scenario
-    is_new: bool
-    left_out: tuple[str, ...]
-    same_as: str = ""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ScenarioSkipped:
-    """A special scenario that is none, and why."""
-
-    id: str
-    reason: str
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class FileLeftOut:
-    """What the file says besides, which is not kept."""
-
+    kind: StepKind
     text: str
-
-
-Step = LogLooked | ScenarioDone | ScenarioSkipped | FileLeftOut
 
 
 def import_interplan(
@@ -243,220 +154,164 @@ def import_interplan(
         actor: Who did it.
 
     Yields:
-        What was looked at, kept or skipped, as it happens.
+        Each step as it happens.
 
     Raises:
         InvalidDocument: There is not exactly one modification file, it breaks its format, or the
             sentences do.
     """
-    file = file_of(read_yaml_file(modification_file_in(folder), what=WHAT))
-    wanted = _wanted(file)
+    file = file_of(read_yaml_file(_modification_file_in(folder), what=WHAT))
+    by_token = file.modification_details_dictionary
+    wanted = {token: one for token, one in by_token.items() if one.special_scenario}
     sentences = {} if instructions is None else _sentences(instructions, wanted)
-    yield from (FileLeftOut(text=text) for text in left_out_of_file(file))
-    for token in file.modification_details_dictionary:
-        if token not in wanted:
-            yield FileLeftOut(text=f"base token {token}, which has no special scenario")
+    for text in file.left_out:
+        yield Step(StepKind.LEFT_OUT, f"Left out: {text}.")
+    for token in by_token.keys() - wanted.keys():
+        text = f"Left out: base token {token}, which has no special scenario."
+        yield Step(StepKind.LEFT_OUT, text)
     logs: dict[str, Path] = {}
-    for looked in _look_through(data or folder, wanted):
-        logs |= {token: looked.path for token in looked.tokens if token not in logs}
-        yield looked
+    paths = sorted((data or folder).rglob("*.db"))
+    for number, path in enumerate(paths, start=1):
+        tokens: tuple[str, ...] = ()
+        try:
+            tokens = UntrustedInput(path=path, format=NuPlan.name).tokens(list(wanted))
+            found = f"{len(tokens)} base tokens"
+        except InvalidDocument as fault:
+            found = str(fault)
+        logs = dict.fromkeys(tokens, path) | logs
+        yield Step(StepKind.LOG, f"Log {number} of {len(paths)}, {path.name}: {found}")
     for token, details in wanted.items():
         if token in logs:
             yield from _keep_token(token, file, logs[token], sentences, actor)
         else:
-            reason = "none of the logs has a frame of its base token"
-            yield from _skip_all(token, details, reason)
+            yield from _skip_all(token, details, "none of the logs has a frame of its base token")
 
 
-def modification_file_in(folder: Path) -> Path:
-    """The one modification file in a folder, whatever it is called.
-
-    Raises:
-        InvalidDocument: There is none, or several.
-    """
+def _modification_file_in(folder: Path) -> Path:
+    """The one modification file in a folder, whatever it is called."""
     if folder.is_file():
         return folder
     if not folder.is_dir():
         raise InvalidDocument(WHAT, [(str(folder), "is not a folder")])
+    candidates = [*sorted(folder.rglob("*.yaml")), *sorted(folder.rglob("*.yml"))]
     files = [
         file
-        for ending in ("*.yaml", "*.yml")
-        for file in sorted(folder.rglob(ending))
-        if file.is_file() and file.stat().st_size <= MAX_CHARACTERS and KEY in file.read_bytes()
+        for file in candidates
+        if file.is_file()
+        and file.stat().st_size <= MAX_CHARACTERS
+        and _KEY.encode() in file.read_bytes()
     ]
     if len(files) != 1:
         named = ", ".join(str(file.relative_to(folder)) for file in files[:5])
-        text = f"holds {len(files)} YAML files with {KEY.decode()}, there must be one: {named}"
+        text = f"holds {len(files)} YAML files with {_KEY}, there must be one: {named}"
         raise InvalidDocument(WHAT, [(str(folder), text.rstrip(": "))])
     return files[0]
 
 
-# Private
-
-
-def _wanted(file: File) -> dict[str, Details]:
-    by_token = file.modification_details_dictionary
-    wanted = {token: one for token, one in by_token.items() if one.special_scenario}
-    if not wanted:
-        raise InvalidDocument(WHAT, [("", "holds no special scenario")])
-    return wanted
-
-
-def _entries(token: str, details: Details) -> Iterator[tuple[str, str, SpecialScenario]]:
-    """Each special scenario with interPlan's name of it and its index."""
-    for index, entry in (details.special_scenario or {}).items():
-        yield f"{token}-s{index}", str(index), entry
-
-
-def _skip_all(token: str, details: Details, reason: str) -> Iterator[ScenarioSkipped]:
-    for name, _, _ in _entries(token, details):
-        yield ScenarioSkipped(id=name, reason=reason)
-
-
-def _look_through(data: Path, wanted: Mapping[str, Details]) -> Iterator[LogLooked]:
-    paths = sorted(data.rglob("*.db"))
-    for number, path in enumerate(paths, start=1):
-        tokens: tuple[str, ...] = ()
-        fault = ""
-        try:
-            tokens = UntrustedInput(path=path, format=LOGS).tokens(list(wanted))
-        except InvalidDocument as raised:
-            fault = str(raised)
-        yield LogLooked(path=path, number=number, of=len(paths), tokens=tokens, fault=fault)
+def _skip_all(token: str, details: Details, reason: str) -> Iterator[Step]:
+    for index in details.special_scenario or {}:
+        yield Step(StepKind.SKIPPED, f"{token}-s{index}: skipped. {reason}")
 
 
 def _keep_token(
     token: str, file: File, log: Path, sentences: Mapping[str, str], actor: User | None
 ) -> Iterator[Step]:
     details = file.modification_details_dictionary[token]
-    recorded = UntrustedInput(path=log, format=LOGS)
     try:
-        source, reading = recorded.read(item=token, frame=None, name=f"{SLUG}-{token}")
-        row, _ = keep_reading(
-            _with_notes(reading, token, details), source=source, path=log, actor=actor
-        )
+        recorded = UntrustedInput(path=log, format=NuPlan.name)
+        source, reading = recorded.read(item=token, frame=None, name=f"interplan-{token}")
+        if details.left_out:
+            note = Note(kind=SceneNoteKind.INTERPLAN_LEFT_OUT, names=details.left_out)
+            reading = replace(reading, notes=(*reading.notes, note))
+        row, _ = keep_reading(reading, source=source, path=log, actor=actor)
     except AugmentError as fault:
         yield from _skip_all(token, details, str(fault))
         return
     scene = without_traffic(reading.scene)
-    kept: dict[str, str] = {}
-    for name, index, entry in _entries(token, details):
+    for index, entry in (details.special_scenario or {}).items():
+        name = f"{token}-s{index}"
         try:
-            place = _Place(file=file, token=token, index=index, entry=entry)
-            done = _keep_entry(row, scene, place, sentences.get(name), actor)
+            kept = _documents(file, token, str(index), entry)
+            yield _keep_entry(row, scene, entry, details, kept, sentences.get(name), actor)
         except AugmentError as fault:
-            yield ScenarioSkipped(id=name, reason=str(fault))
-            continue
-        same = kept.setdefault(_asks(done.row), name)
-        yield replace(done, same_as="" if same == name else same)
+            yield Step(StepKind.SKIPPED, f"{name}: skipped. {fault}")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Place:
-    """A special scenario in its file."""
+def _documents(file: File, token: str, index: str, entry: SpecialScenario) -> dict[str, Any]:
+    """What is kept verbatim: all that an export has to say again."""
 
-    file: File
-    token: str
-    index: str
-    entry: SpecialScenario
+    def plain(part: BaseModel, *left_out: str) -> dict[str, Any]:
+        return part.model_dump(mode="json", exclude_unset=True, exclude=set(left_out))
 
-    @property
-    def details(self) -> Details:
-        return self.file.modification_details_dictionary[self.token]
-
-    def to_document(self) -> dict[str, Any]:
-        """What is kept verbatim: all that an export has to say again.
-
-        Raises:
-            InvalidDocument: An unknown key holds what JSON can't.
-        """
-        document = {
-            "index": self.index,
-            "entry": _plain(self.entry),
-            "details": _plain(self.details, "special_scenario"),
-            "file": _plain(self.file, "modification_details_dictionary"),
-        }
-        try:
-            json.dumps(document, allow_nan=False)
-        except ValueError:
-            where = place_of(self.token, self.index)
-            raise InvalidDocument(WHAT, [(where, "holds a number that is not finite")]) from None
-        return document
-
-
-def _plain(part: BaseModel, *left_out: str) -> dict[str, Any]:
-    return part.model_dump(mode="json", exclude_unset=True, exclude=set(left_out))
-
-
-def _asks(row: Scenario) -> str:
-    """What makes two scenarios of one scene the same: all but name and words."""
-    asked = [row.type, row.reference, row.traffic_density, row.goal, row.spawned]
-    return json.dumps(asked, sort_keys=True)
+    document = {
+        "index": index,
+        "entry": plain(entry),
+        "details": plain(file.modification_details_dictionary[token], "special_scenario"),
+        "file": plain(file, _KEY),
+    }
+    try:
+        json.dumps(document, allow_nan=False)
+    except ValueError:
+        where = place_of(token, index)
+        raise InvalidDocument(WHAT, [(where, "holds a number that is not finite")]) from None
+    return document
 
 
 def _keep_entry(
-    row: BaseScene, scene: Scene, place: _Place, sentence: str | None, actor: User | None
-) -> ScenarioDone:
-    entry, details = place.entry, place.details
-    found = read_entry(place.token, place.index, entry, scene)
-    slug = f"{row.slug}-s{place.index}"
-    before = Scenario.objects.filter(slug=slug, base_scene=row, type=found.type.value).first()
-    if before is not None:
-        return ScenarioDone(id=found.id, row=before, is_new=False, left_out=found.left_out)
+    row: BaseScene,
+    scene: Scene,
+    entry: SpecialScenario,
+    details: Details,
+    kept: dict[str, Any],
+    sentence: str | None,
+    actor: User | None,
+) -> Step:
+    token, slug = row.source_item, f"{row.slug}-s{kept['index']}"
+    read = read_entry(token, kept["index"], entry, scene)
+    left_out = f"; left out: {', '.join(read.left_out)}" if read.left_out else ""
+    if Scenario.objects.filter(slug=slug, base_scene=row, type=read.type.value).exists():
+        return Step(StepKind.OLD, f"{read.id}: {slug} was there already{left_out}")
     density, goal = options_of(entry.config)
-    source = place.to_document()
-    traffic = traffic_of(
-        entry, details, scene, seed=place.token, clear_of=found.modification.added
-    )
-    options = SceneOptions(
-        density=density, goal=goal, goal_m=goal_place(source, goal or "", scene)
-    )
+    added = read.modification.added
+    traffic = traffic_of(entry, details, scene, seed=token, clear_of=added)
+    goal_m = goal_place(kept, goal or "", scene)
+    options = SceneOptions(density=density, goal=goal, goal_m=goal_m)
     driven = replace(scene, agents=traffic, options=options)
-    generated, intent = describe_reference(found.type, found.modification, driven)
-    made = add_scenario(
+    generated, intent = describe_reference(read.type, read.modification, driven)
+    add_scenario(
         scene=row.slug,
-        type=found.type.value,
+        type=read.type.value,
         instruction=sentence or generated,
         slug=slug,
-        reference=modification_to_document(found.modification),
+        reference=modification_to_document(read.modification),
         intent=None if intent is None else intent_to_document(intent),
         intent_origin=IntentOrigin.DERIVED,
         circumstances=Circumstances(
             density=density,
             goal=goal,
             traffic=traffic,
-            interplan=source,
+            interplan=kept,
             instruction_is_generated=not sentence,
         ),
         actor=actor,
     )
-    return ScenarioDone(id=found.id, row=made, is_new=True, left_out=found.left_out)
-
-
-def _with_notes(reading: Reading, token: str, details: Details) -> Reading:
-    """With what interPlan says of the base token and a scenario here can't."""
-    left_out = [*left_out_of_details(details)]
-    if not left_out:
-        return reading
-    note = Note(kind=SceneNoteKind.INTERPLAN_LEFT_OUT, names=tuple(left_out))
-    return replace(reading, notes=(*reading.notes, note))
+    return Step(StepKind.NEW, f"{read.id}: {slug}{left_out}")
 
 
 def _sentences(file: Path, wanted: Mapping[str, Details]) -> dict[str, str]:
-    known = {name for token, one in wanted.items() for name, _, _ in _entries(token, one)}
-    what = "instructions"
+    known = {f"{token}-s{n}" for token, one in wanted.items() for n in one.special_scenario or {}}
     try:
         with file.open(encoding="utf-8-sig", newline="") as lines:
             rows = csv.DictReader(lines)
-            if rows.fieldnames is None or not set(COLUMNS) <= set(rows.fieldnames):
-                raise InvalidDocument(what, [(file.name, f"needs the columns {COLUMNS}")])
-            found = {}
-            for number, row in zip(range(2, _MOST_SENTENCES), rows, strict=False):
-                name = str(row["id"]).strip()
-                if name not in known:
-                    text = f"{name[:40]!r} is no special scenario of the file"
-                    raise InvalidDocument(what, [(f"{file.name}, line {number}", text)])
-                found[name] = str(row["instruction"] or "").strip()
-            return found
+            if not set(_COLUMNS) <= set(rows.fieldnames or ()):
+                raise InvalidDocument(
+                    "instructions", [(file.name, f"needs the columns {_COLUMNS}")]
+                )
+            found = {str(row["id"]).strip(): str(row["instruction"] or "").strip() for row in rows}
     except (OSError, UnicodeDecodeError, csv.Error) as fault:
-        raise InvalidDocument(what, [(str(file), f"can't be read: {fault}")]) from None
+        problem = (str(file), f"can't be read: {fault}")
+        raise InvalidDocument("instructions", [problem]) from None
+    for name in found.keys() - known:
+        text = f"{name[:40]!r} is no special scenario of the file"
+        raise InvalidDocument("instructions", [(file.name, text)])
+    return found

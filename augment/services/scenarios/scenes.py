@@ -14,7 +14,7 @@ from django.db import IntegrityError, transaction
 
 from augment.baselines.rule_placer import list_open
 from augment.errors import Conflict, InvalidDocument, UnknownName
-from augment.formats.interplan.reader import goal_place
+from augment.formats.interplan.file import goal_place
 from augment.models import BaseScene, Scenario
 from augment.models.scenes import GOALS
 from augment.scene.codec import (
