@@ -24,8 +24,8 @@ from arena.rating.comparisons import (
     PairCounts,
     count_pairs,
     renumber_codes,
+    restrict_to,
     select_votes,
-    split_votes,
 )
 from arena.rating.lines import Line
 from arena.rating.models import ELO_PER_LOGIT, Meetings, fit
@@ -327,11 +327,10 @@ def find_levels(votes: Comparisons, chains: Chains, unit: Unit) -> FloatArray:
     levels = np.zeros(len(votes.names))
     groups = chains.groups()
     if len(groups) < len(chains.sizes):
-        for group, inside in zip(groups, split_votes(votes, groups), strict=True):
-            members = list(group)
+        for members in map(list, groups):
             part_of = chains.part_of[members]
             if (part_of != part_of[0]).any():
-                levels[members] = _levels_of_group(inside, part_of, unit)
+                levels[members] = _levels_of_group(restrict_to(votes, members), part_of, unit)
     return levels
 
 

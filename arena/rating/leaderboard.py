@@ -36,7 +36,6 @@ from arena.rating.comparisons import (
     count_pairs,
     renumber_codes,
     restrict_to,
-    split_votes,
     tally,
 )
 from arena.rating.lines import Line
@@ -201,7 +200,7 @@ def _rate(votes: Comparisons, rules: Rules) -> Leaderboard:
         (part for part in chains.parts() if len(part) > 1),
         key=lambda part: (chains.group_of[part[0]], above[part[0]], part),
     )
-    rated = [rate_part(inside, rules, diagnosis.status) for inside in split_votes(counting, parts)]
+    rated = [rate_part(restrict_to(counting, part), rules, diagnosis.status) for part in parts]
     lines = _blank_lines(votes.names, counted.tolist(), present, diagnosis)
     for number, (part, found) in enumerate(zip(parts, rated, strict=True)):
         _fill(lines, [present[member] for member in part], number, found)
