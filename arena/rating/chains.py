@@ -23,7 +23,6 @@ from arena.rating.comparisons import (
     IntArray,
     PairCounts,
     count_pairs,
-    renumber_codes,
     restrict_to,
     select_votes,
 )
@@ -462,7 +461,7 @@ def _independent_votes(
     """
     fewest: FloatArray = np.full(meetings, np.inf)
     for kind in unit.kinds:
-        occurring, place = renumber_codes(getattr(votes, kind))
+        occurring, place = np.unique(getattr(votes, kind), return_inverse=True)
         met = np.unique(of_row * len(occurring) + place)
         different = np.bincount(met // len(occurring), minlength=meetings)
         fewest = np.where(different > 1, np.minimum(fewest, different), fewest)

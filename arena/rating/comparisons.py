@@ -180,7 +180,7 @@ def count_pairs(votes: Comparisons) -> PairCounts:
     """Count wins, ties and losses of every pair that met."""
     contestants = len(votes.names)
     low, high = np.minimum(votes.first, votes.second), np.maximum(votes.first, votes.second)
-    met, pair_of = renumber_codes(low * contestants + high)
+    met, pair_of = np.unique(low * contestants + high, return_inverse=True)
     outcome_of = (2.0 - 2.0 * votes.score).astype(np.int64)
     outcome_of = np.where(votes.first == low, outcome_of, 2 - outcome_of)
     place = pair_of * 3 + outcome_of
@@ -192,19 +192,6 @@ def count_pairs(votes: Comparisons) -> PairCounts:
         pair_of=pair_of,
         outcome_of=outcome_of,
     )
-
-
-def renumber_codes(codes: IntArray) -> tuple[IntArray, IntArray]:
-    """The different codes, in order, and (R,) the place of each row's code among them.
-
-    What `np.unique` gives, without sorting where the codes (R,), from 0, are not far apart.
-    """
-    below = int(codes.max(initial=-1)) + 1
-    if below > 10 * len(codes) + 10_000:
-        return np.unique(codes, return_inverse=True)
-    occurs = np.zeros(below, dtype=bool)
-    occurs[codes] = True
-    return np.flatnonzero(occurs), (np.cumsum(occurs) - 1)[codes]
 
 
 def tally(votes: Comparisons) -> IntArray:

@@ -30,14 +30,7 @@ from arena.rating.chains import (
     ranks_across,
     standing_order,
 )
-from arena.rating.comparisons import (
-    Comparisons,
-    FloatArray,
-    count_pairs,
-    renumber_codes,
-    restrict_to,
-    tally,
-)
+from arena.rating.comparisons import Comparisons, FloatArray, count_pairs, restrict_to, tally
 from arena.rating.lines import Line
 from arena.rating.logistic import Coefficient
 from arena.rating.parts import Rated, rate_part
@@ -222,8 +215,8 @@ def _rate(votes: Comparisons, rules: Rules) -> Leaderboard:
         rounds=rules.rounds,
         seed=rules.seed,
         votes=votes.votes,
-        experts=len(renumber_codes(votes.expert)[0]),
-        scenarios=len(renumber_codes(votes.scenario)[0]),
+        experts=len(np.unique(votes.expert)),
+        scenarios=len(np.unique(votes.scenario)),
         tie_share=float(counted[:, 1].sum() / counted.sum()) if len(votes) else None,
         tie_strength=whole.tie_strength,
         degenerate_rounds=max((found.degenerate for found in rated), default=0),
