@@ -10,7 +10,7 @@ from django.contrib.auth.models import User
 from django.urls import reverse
 
 from arena.models import Standing
-from arena.services.ratings import rate
+from arena.results.services.ratings import rate_now as rate
 from augment.models import Contestant, Scenario
 from tests import study_rows
 from tests.web.cast import people, signed_in, world
