@@ -41,7 +41,7 @@ from augment.services.judging.findings import Checked, check_augmentation
 from augment.services.running.calls import IMAGES
 from augment.services.running.intent_readings import plan_reading
 from augment.services.running.transcript_records import totals_of, transcript_of, tries_of
-from augment.services.scenarios.catalogue import load_own_catalogue
+from augment.services.scenarios.catalogue import Step, load_catalogue
 from augment.services.scenarios.editing import (
     accept_reading,
     enter_intent,
@@ -380,7 +380,7 @@ def load_scenarios(request: HttpRequest) -> HttpResponse:
     """Load one set of the catalogue, all of it or nothing, and those who ask nobody."""
     actor = cast(User, request.user)
     try:
-        report = load_own_catalogue(
+        report = load_catalogue(
             sets=[request.POST.get("set", "")],
             with_paraphrases="wordings" in request.POST,
             actor=actor,
@@ -391,9 +391,7 @@ def load_scenarios(request: HttpRequest) -> HttpResponse:
         ensure_builtin()
         done = "Scenarios: %(added)s added, %(changed)s changed, %(unchanged)s as they were."
         numbers = {
-            "added": report.scenarios_added,
-            "changed": report.scenarios_changed,
-            "unchanged": report.scenarios_unchanged,
+            name: report.scenarios[Step(name)] for name in ("added", "changed", "unchanged")
         }
         messages.success(request, done % numbers)
         if report.kept:
