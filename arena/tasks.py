@@ -8,11 +8,10 @@ from django.contrib.auth.models import User
 from arena.exports.study_files import STUDY_FILES
 from arena.jobs.exports.files import SCENARIO_FILES
 from arena.services.ratings import RATINGS
-from augment.broker import send
 from augment.models import Scenario
 from augment.services.scenarios import pictures
 from augment.services.work import register
-from augment.tasks import sender
+from augment.tasks import send, sender
 
 register(RATINGS, SCENARIO_FILES, STUDY_FILES)
 

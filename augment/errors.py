@@ -7,6 +7,9 @@ class AugmentError(Exception):
     """The root of augment's own errors: its text is a sentence for the person who caused it."""
 
 
+# --- What is wrong with an input ---------------------------------------------------------------
+
+
 class InvalidDocument(AugmentError):
     """A file or document breaks its format. Mend the input; nothing of it was kept.
 
@@ -40,11 +43,7 @@ class UnknownName(AugmentError):
         self.kind = kind
         self.name = name
         self.allowed = allowed
-        super().__init__(
-            f"Unknown {kind} '{name}'. Known: {', '.join(allowed)}."
-            if allowed
-            else f"Unknown {kind} '{name}'. Known: none yet."
-        )
+        super().__init__(f"Unknown {kind} '{name}'. Known: {', '.join(allowed) or 'none yet'}.")
 
 
 class Conflict(AugmentError):
@@ -65,6 +64,9 @@ class CannotPlace(AugmentError):
     def __init__(self, reason: str) -> None:
         self.reason = reason
         super().__init__(reason)
+
+
+# --- What goes wrong when a model is asked -----------------------------------------------------
 
 
 class ReplyUnreadable(AugmentError):
@@ -88,7 +90,6 @@ class ToolError(AugmentError):
     """
 
     def __init__(self, tool: str, problem: str) -> None:
-        self.tool = tool
         self.problem = problem
         super().__init__(f"{tool}: {problem}")
 
@@ -107,7 +108,7 @@ class ModelFault(AugmentError):
         self,
         message: str,
         *,
-        retryable: bool,
+        retryable: bool = False,
         status: int | None = None,
         retry_after_s: float | None = None,
     ) -> None:
@@ -132,15 +133,7 @@ class ParameterRefused(ModelFault):
 
 
 class NotSent(ModelFault):
-    """The request never left this computer: there is nothing to be billed for.
-
-    Args:
-        message: What kept it here.
-        retryable: Whether it may get through later.
-    """
-
-    def __init__(self, message: str, *, retryable: bool = False) -> None:
-        super().__init__(message, retryable=retryable)
+    """The request never left this computer: there is nothing to be billed for."""
 
 
 class EndpointBusy(NotSent):
@@ -148,11 +141,10 @@ class EndpointBusy(NotSent):
 
     Args:
         endpoint: Its label.
-        waited_s: For how long somebody waited.
+        waited_s: How long the call waited.
     """
 
     def __init__(self, endpoint: str, waited_s: float) -> None:
-        self.endpoint = endpoint
         super().__init__(
             f"no place was free at endpoint {endpoint!r} for {waited_s:g} s: "
             "raise its limits or run fewer workers"
@@ -160,14 +152,7 @@ class EndpointBusy(NotSent):
 
 
 class ContextTruncated(ModelFault):
-    """The endpoint silently cut the prompt. Give it a larger window; asking again cuts again.
-
-    Args:
-        message: What shows it, with numbers.
-    """
-
-    def __init__(self, message: str) -> None:
-        super().__init__(message, retryable=False)
+    """The endpoint silently cut the prompt. Give it a larger window; asking again cuts again."""
 
 
 class ModelRefused(AugmentError):
@@ -178,12 +163,15 @@ class ReviewUnusable(AugmentError):
     """A review could not be had. What was reviewed stands without one.
 
     Args:
-        reason: Who failed and how.
+        reason: What failed and how.
     """
 
     def __init__(self, reason: str) -> None:
         self.reason = reason
         super().__init__(f"The review is unusable: {reason}")
+
+
+# --- What stops work that has begun or waits ---------------------------------------------------
 
 
 class QueueFault(AugmentError):
@@ -195,14 +183,12 @@ class QueueRefused(QueueFault):
 
     Args:
         address: Where it is, free of passwords.
-        said: What it answered.
+        answer: What it answered.
     """
 
-    def __init__(self, address: str, said: str) -> None:
-        self.address = address
-        self.said = said
+    def __init__(self, address: str, answer: str) -> None:
         super().__init__(
-            f"Redis at {address} takes no messages: {said.rstrip('.')}. What was queued is "
+            f"Redis at {address} takes no messages: {answer.rstrip('.')}. What was queued is "
             "kept and runs as soon as Redis takes messages again."
         )
 
@@ -215,7 +201,6 @@ class QueueUnreachable(QueueFault):
     """
 
     def __init__(self, address: str) -> None:
-        self.address = address
         super().__init__(
             f"No Redis at {address}: start `manage.py serve` or set REDIS_URL. What was "
             "queued is kept and runs as soon as a worker starts."
@@ -227,11 +212,11 @@ class Unwanted(AugmentError):
 
 
 class WorkerStopping(Unwanted):
-    """This worker was told to stop and asks nobody any more. The row goes back to the queue."""
+    """Shutting down: no more model calls; the row is requeued."""
 
 
 class LeaseLost(Unwanted):
-    """Somebody else works on this row now. Drop the result; the new holder brings its own."""
+    """Another worker has this row now. Drop the result; the new holder brings its own."""
 
     def __init__(self) -> None:
         super().__init__("the row was taken back")
@@ -248,12 +233,12 @@ class Abandoned(ModelFault):
     """A call in flight was given up, because nobody needs its answer; it may be billed.
 
     Args:
-        why: Who does not need it.
+        why: What ended the need.
     """
 
     def __init__(self, why: Unwanted) -> None:
         self.why = why
-        super().__init__(f"given up before there was an answer: {why}", retryable=False)
+        super().__init__(f"given up before there was an answer: {why}")
 
 
 class KeyMissing(AugmentError):
@@ -266,7 +251,6 @@ class KeyMissing(AugmentError):
 
     def __init__(self, variable: str, endpoint: str) -> None:
         self.variable = variable
-        self.endpoint = endpoint
         super().__init__(
             f"The environment variable {variable}, which holds the key of endpoint "
             f"{endpoint!r}, is not set where the worker runs."
@@ -283,8 +267,6 @@ class KeyNotAllowed(AugmentError):
     """
 
     def __init__(self, variable: str, endpoint: str, rule: str) -> None:
-        self.variable = variable
-        self.endpoint = endpoint
         super().__init__(
             f"Endpoint {endpoint!r} names the environment variable {variable}, which may not be "
             f"sent to an endpoint: {rule} is needed."
@@ -330,36 +312,3 @@ class BudgetSpent(AugmentError):
     def __init__(self, limit: str) -> None:
         self.limit = limit
         super().__init__(f"The next call could pass the job's cap of {limit}.")
-
-
-__all__ = [
-    "Abandoned",
-    "AugmentError",
-    "BudgetSpent",
-    "CannotDrive",
-    "CannotPlace",
-    "Conflict",
-    "ContextTruncated",
-    "DatabaseLocked",
-    "EndpointBusy",
-    "InvalidDocument",
-    "InvalidModification",
-    "JobCancelled",
-    "KeyMissing",
-    "KeyNotAllowed",
-    "LeaseLost",
-    "MediaFault",
-    "ModelFault",
-    "ModelRefused",
-    "NotSent",
-    "ParameterRefused",
-    "QueueFault",
-    "QueueRefused",
-    "QueueUnreachable",
-    "ReplyUnreadable",
-    "ReviewUnusable",
-    "ToolError",
-    "UnknownName",
-    "Unwanted",
-    "WorkerStopping",
-]

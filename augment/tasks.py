@@ -1,40 +1,40 @@
 """Celery tasks: doors that carry the key of a row, and what brings lost work back.
 
 Rows are the truth. A message may come twice (the lease refuses the second) or never (recover
-sends another). Services never enqueue; doors do, by transaction.on_commit.
+sends another). Services never enqueue; doors do, by transaction.on_commit. Messages are sent over
+a connection that is tried once: where no broker answers, there is a sentence instead of a wait.
 """
 
 from __future__ import annotations
 
-import logging
 import os
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from datetime import timedelta
 from functools import partial
 from threading import Event, Thread
 from typing import Any
 
-from celery import shared_task
+import redis
+from celery import current_app, shared_task
 from celery.exceptions import Reject
 from celery.signals import worker_ready, worker_shutdown, worker_shutting_down
 from django.conf import settings
 from django.db import connection
 from django.db.models import Q
+from kombu.exceptions import OperationalError
 
-from augment.broker import open_broker, send
+from augment.errors import QueueRefused, QueueUnreachable
 from augment.services.clock import DATABASE_TIME, Moment
 from augment.services.endpoints.probing import PROBES
-from augment.services.judging import findings
+from augment.services.judging.findings import draw_marked
 from augment.services.judging.simulations import DRIVES
 from augment.services.running import workers
-from augment.services.running import workers as stopping
 from augment.services.running.intent_readings import READINGS
 from augment.services.running.runner import AUGMENTATIONS
 from augment.services.scenarios import pictures, prompts
 from augment.services.scenarios.uploads import MOMENTS, UPLOADS
 from augment.services.work import KINDS, WorkKind, register
-
-logger = logging.getLogger(__name__)
 
 RESEND_AFTER = timedelta(minutes=10)
 """A message that waits longer than this may be lost; a second one does no harm."""
@@ -45,11 +45,13 @@ QUEUE_BEFORE = "celery"
 BATCH = 100
 """So many messages are sent before the rows say so; a crash between sends them twice."""
 
+REFUSALS = (redis.ResponseError, redis.AuthenticationError, redis.BusyLoadingError)
+"""What a Redis says that is there and takes no messages: full, read only, loading, locked."""
 
 register(AUGMENTATIONS, DRIVES, READINGS, PROBES, UPLOADS, MOMENTS)
 
 DRAWN: Mapping[str, Callable[[int], object]] = {
-    "marks": lambda pk: findings.draw_marked(augmentation_pk=pk),
+    "marks": lambda pk: draw_marked(augmentation_pk=pk),
     "scene": pictures.draw_scene,
     "scenario": pictures.draw_scenario,
     "prompts": prompts.draw_prompts,
@@ -59,8 +61,8 @@ DRAWN: Mapping[str, Callable[[int], object]] = {
 
 @shared_task(name="augment.work", bind=True, acks_late=True, ignore_result=True)
 def work(self: Any, kind: str, pk: int) -> None:
-    """Work on one row, unless somebody else has it or it has an outcome."""
-    if stopping.is_stop_requested():
+    """Work on one row, unless another worker has it or it has an outcome."""
+    if workers.is_stop_requested():
         raise Reject("this worker stops", requeue=True)
     worker = f"{self.request.hostname or 'here'} {os.getpid()}"
     KINDS[kind].perform(pk, worker=worker[:120])
@@ -70,6 +72,56 @@ def work(self: Any, kind: str, pk: int) -> None:
 def draw(what: str, pk: int) -> None:
     """Draw what is missing; a second time nothing is left to do."""
     DRAWN[what](pk)
+
+
+# --- Sending messages --------------------------------------------------------------------------
+
+
+@contextmanager
+def open_broker(*, within_s: float = 5) -> Iterator[Any]:
+    """Open a connection that works, tried once; what breaks inside the block is named as well.
+
+    Args:
+        within_s: How long it may take to connect, and to answer.
+
+    Raises:
+        QueueUnreachable: No broker.
+        QueueRefused: It takes no messages.
+    """
+    with current_app.connection_for_write() as broker:
+        broker.transport_options |= {
+            "socket_connect_timeout": within_s,
+            "socket_timeout": within_s,
+        }
+        try:
+            broker.ensure_connection(max_retries=1, interval_start=0, timeout=within_s)
+            yield broker
+        except (OperationalError, redis.RedisError) as error:
+            # The password is masked, and the mask is shown even where there is none.
+            uri = broker.as_uri()
+            address = uri if broker.password else uri.replace(":**@", "")
+            cause: BaseException | None = error
+            while cause is not None:
+                if isinstance(cause, REFUSALS):
+                    raise QueueRefused(address, str(cause)) from error
+                cause = cause.__cause__
+            raise QueueUnreachable(address) from error
+
+
+def check_broker(*, within_s: float = 5) -> None:
+    """Raise QueueFault unless a broker can be reached and answers within so many seconds."""
+    with open_broker(within_s=within_s):
+        pass
+
+
+def send(task: Any, *arguments: str | int) -> None:
+    """Send one message; for transaction.on_commit.
+
+    Raises:
+        QueueFault: No broker, or it refuses.
+    """
+    with open_broker() as broker:
+        task.apply_async(arguments, connection=broker, retry=False)
 
 
 def enqueue(kind: WorkKind[Any], pks: Iterable[int]) -> int:
@@ -122,6 +174,9 @@ enqueue_scenario = partial(send, draw, "scenario")
 enqueue_scene = partial(send, draw, "scene")
 
 
+# --- Recovering lost work ----------------------------------------------------------------------
+
+
 def recover(*, now: Moment = DATABASE_TIME, at_start: bool = False) -> None:
     """Take back what dead workers held, finish what is over and send what has no message.
 
@@ -145,7 +200,7 @@ def recover(*, now: Moment = DATABASE_TIME, at_start: bool = False) -> None:
 @worker_ready.connect
 def start_recovering(**_: object) -> None:
     """Show that this worker lives and recover again and again, in threads of its main process."""
-    stopping.withdraw_stop()
+    workers.withdraw_stop()
     presence = workers.Presence(workers.worker_name(os.getpid()))
     Thread(target=_be_present, args=(presence,), name="presence", daemon=True).start()
     Thread(target=_recover_until_stopped, args=(presence,), name="recover", daemon=True).start()
@@ -154,55 +209,43 @@ def start_recovering(**_: object) -> None:
 @worker_shutting_down.connect
 def stop_recovering(**_: object) -> None:
     """Begin nothing new; what is under way may end."""
-    stopping.request_stop()
+    workers.request_stop()
 
 
 # --- Private -----------------------------------------------------------------------------------
 
 
 def _recover_until_stopped(presence: workers.Presence) -> None:
-    """One round at the start, then one every RECOVER_EVERY_S."""
+    """Do one round at the start, then one every RECOVER_EVERY_S."""
     rounds = workers.RecoveryRounds(lambda at_start: recover(at_start=at_start), presence)
-    while not stopping.is_stop_requested():
+    while not workers.is_stop_requested():
         rounds.go_on()
         connection.close()
-        stopping.wait(settings.RECOVER_EVERY_S)
+        workers.wait(settings.RECOVER_EVERY_S)
 
 
 def _be_present(presence: workers.Presence) -> None:
-    """A sign of life at once and every HEARTBEAT_S, until the process ends and says so."""
+    """Give a sign of life at once and every HEARTBEAT_S, until the process ends and says so."""
     ended = Event()
 
     def end(**_: object) -> None:
         ended.set()
-        with workers.Survived() as ending:
-            presence.end()
-        if ending.fault is not None:
-            logger.warning("The end of this worker was not stored: %s", ending.fault)
+        workers.survive(presence.end, "The end of this worker was not stored")
 
     worker_shutdown.connect(end, weak=False)
     while not ended.is_set():
-        with workers.Survived() as beat:
-            presence.beat()
-        if beat.fault is not None:
-            logger.warning("No sign of life of this worker: %s", beat.fault)
+        if not workers.survive(presence.beat, "No sign of life of this worker"):
             connection.close()
         ended.wait(settings.HEARTBEAT_S)
     connection.close()
 
 
 def _lost_after(queue: str) -> timedelta:
-    """How old a message in a queue is that must be lost, as its row still waits.
+    """Return how old a message in a queue is that must be lost, as its row still waits.
 
     Where nothing waits in the queue, nothing is on its way.
     """
-    if _messages_waiting({queue, QUEUE_BEFORE}):
-        return RESEND_AFTER
-    return timedelta(seconds=settings.STALE_AFTER_S)
-
-
-def _messages_waiting(queues: Iterable[str]) -> int:
-    """How many messages of these queues no worker has taken yet."""
     with open_broker() as broker:
         declare = broker.default_channel.queue_declare
-        return sum(int(declare(queue=name).message_count) for name in queues)
+        waiting = [int(declare(queue=name).message_count) for name in (queue, QUEUE_BEFORE)]
+    return RESEND_AFTER if any(waiting) else timedelta(seconds=settings.STALE_AFTER_S)

@@ -134,7 +134,7 @@ def _said(character: Character, body: bytes) -> str:
 
     What reads the answer is asked every time.
     """
-    return character.answer(chat_request(body), intents).text
+    return character.answer(chat_request(body), intents)[0]
 
 
 if __name__ == "__main__":

@@ -7,7 +7,7 @@ from typing import Any
 from django.conf import settings
 from django.core.files.uploadhandler import FileUploadHandler, SkipFile
 
-from arena.services.sent_files import FILE_TOO_LARGE
+from arena.scenarios.services import FILE_TOO_LARGE
 
 
 class BoundedUpload(FileUploadHandler):

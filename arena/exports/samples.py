@@ -12,9 +12,9 @@ from django.core.files.storage import default_storage
 
 from arena.exports.charts.drawing import INK, SIMULATED, SOFT, house_style, write_figure
 from arena.exports.tables import SIMULATED as SIMULATED_WORD
-from arena.jobs.queries import GridRow, JobGrid
 from augment.errors import UnknownName
-from augment.models import Augmentation, Contestant
+from augment.models import Augmentation, Contestant, GenerationJob, Scenario
+from augment.services.running.progress import cells_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -30,37 +30,48 @@ _LEGEND = (
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class SheetRow:
+    """One scenario with its cells, None where nothing was planned."""
+
+    scenario: Scenario
+    cells: list[Augmentation | None]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Sheet:
     """What is on the sheet, in its order."""
 
     job: str
     contestants: tuple[Contestant, ...]
-    rows: tuple[GridRow, ...]
+    rows: tuple[SheetRow, ...]
 
 
 def sheet_of(
-    job: str, grid: JobGrid, *, scenarios: Sequence[str], contestants: Sequence[str]
+    job: GenerationJob, *, scenarios: Sequence[str], contestants: Sequence[str], sample: int = 1
 ) -> Sheet:
-    """The chosen cells of a job's grid, in the order in which they were named.
+    """Return the chosen cells of a job, in the order in which they were named.
 
     Raises:
-        UnknownName: The job has no such scenario or contestant.
+        UnknownName: The job has no such scenario, contestant or sample.
     """
-    columns = {contestant.slug: n for n, contestant in enumerate(grid.contestants)}
-    lines = {row.scenario.slug: row for row in grid.rows}
+    cells = list(cells_of(job).filter(sample=sample))
+    across = {cell.contestant.slug: cell.contestant for cell in cells}
+    down = {cell.scenario.slug: cell.scenario for cell in cells}
+    samples = [str(number) for number in range(1, job.samples + 1)]
     for kind, names, known in (
-        ("contestant of this job", contestants, columns),
-        ("scenario of this job", scenarios, lines),
+        ("sample of this job", [str(sample)], samples),
+        ("contestant of this job", contestants, sorted(across)),
+        ("scenario of this job", scenarios, sorted(down)),
     ):
         for name in names:
             if name not in known:
                 raise UnknownName(kind, name, list(known))
-    chosen = [columns[slug] for slug in contestants]
+    by_place = {(cell.scenario.slug, cell.contestant.slug): cell for cell in cells}
     return Sheet(
-        job=job,
-        contestants=tuple(grid.contestants[n] for n in chosen),
+        job=job.name,
+        contestants=tuple(across[slug] for slug in contestants),
         rows=tuple(
-            GridRow(scenario=lines[slug].scenario, cells=[lines[slug].cells[n] for n in chosen])
+            SheetRow(scenario=down[slug], cells=[by_place.get((slug, who)) for who in contestants])
             for slug in scenarios
         ),
     )
@@ -157,7 +168,7 @@ def _word(cell: Augmentation | None) -> str:
     return f"no picture: {cell.get_state_display().lower()}"
 
 
-def _caption(letter: str, row: GridRow, across: int) -> str:
+def _caption(letter: str, row: SheetRow, across: int) -> str:
     text = f"({letter}) {row.scenario.get_type_display()}: “{row.scenario.instruction.strip()}”"
     return "\n".join(textwrap.wrap(text, width=50 * across, max_lines=2, placeholder=" …"))
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 from collections import defaultdict
 from collections.abc import Collection, Hashable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from uuid import UUID
 
 from django.contrib.auth.models import User
@@ -16,7 +16,6 @@ from django.db.models.functions import Cast
 from arena.errors import NotYours
 from arena.models import FaultLabel, LabellingRound, LabelTask, Study
 from arena.queries.remembering import Remembered, plan_of
-from augment.errors import UnknownName
 from augment.models import (
     Augmentation,
     Contestant,
@@ -28,7 +27,6 @@ from augment.models import (
 from augment.services.endpoints.known_models import CONTESTANT, Spending, sum_spending
 from augment.services.judging.analyses import JobAnalysis, analyse_job
 from augment.services.judging.simulations import Options
-from augment.services.running.progress import cells_of
 
 State = Augmentation.State
 
@@ -88,113 +86,59 @@ class GridPart:
 
 
 def grid_part(job: GenerationJob, part: Part) -> GridPart:
-    """Scenarios down, contestants across; five queries, however large the job is.
+    """Return scenarios down, contestants across; five queries, however large the job is.
 
     Pages beyond the last one are the last one.
     """
-    view = part.view
-    columns = Paginator(_contestants(job), view.columns).get_page(part.column)
+    view, cells = part.view, job.augmentations.order_by()
+    contestants = Contestant.objects.filter(pk__in=cells.values("contestant"))
+    lean = contestants.only("slug", "name", "kind", "code").order_by("name", "pk")
+    columns = Paginator(lean, view.columns).get_page(part.column)
     samples = Paginator(range(1, job.samples + 1), view.samples).get_page(part.sample)
+    if part.state:
+        cells = cells.filter(state=part.state)
+    scenarios = Scenario.objects.filter(pk__in=cells.values("scenario"))
+    if part.search:
+        scenarios = scenarios.filter(slug__icontains=part.search)
     wide = max(1, len(columns.object_list)) * len(samples.object_list)
     lines = min(view.rows, max(1, view.cells // wide))
-    scenarios = Paginator(_scenarios(job, part), lines).get_page(part.row)
+    ordered = scenarios.only("slug", "type", "code").order_by("type", "slug")
+    shown = Paginator(ordered, lines).get_page(part.row)
     return GridPart(
         part=part,
         contestants=columns,
         samples=samples,
-        scenarios=scenarios,
-        rows=_rows(job, columns, samples, scenarios),
+        scenarios=shown,
+        rows=_rows(job, list(columns.object_list), list(shown.object_list), samples),
     )
-
-
-# --- Private -----------------------------------------------------------------------------------
-
-
-def _contestants(job: GenerationJob) -> QuerySet[Contestant]:
-    found = Contestant.objects.filter(pk__in=job.augmentations.order_by().values("contestant"))
-    return found.only("slug", "name", "kind", "code").order_by("name", "pk")
-
-
-def _scenarios(job: GenerationJob, part: Part) -> QuerySet[Scenario]:
-    """Those with a cell of the wanted state, and with the wanted text in their slug."""
-    cells = job.augmentations.order_by()
-    if part.state:
-        cells = cells.filter(state=part.state)
-    found = Scenario.objects.filter(pk__in=cells.values("scenario"))
-    if part.search:
-        found = found.filter(slug__icontains=part.search)
-    return found.only("slug", "type", "code").order_by("type", "slug")
 
 
 def _rows(
-    job: GenerationJob, columns: Page[Contestant], samples: Page[int], scenarios: Page[Scenario]
+    job: GenerationJob,
+    contestants: list[Contestant],
+    scenarios: list[Scenario],
+    samples: Page[int],
 ) -> list[PartRow]:
-    who, where = list(columns.object_list), list(scenarios.object_list)
     numbers = list(samples.object_list)
-    found: defaultdict[tuple[int, int], list[Augmentation]] = defaultdict(list)
+    by_place: defaultdict[tuple[int, int], list[Augmentation]] = defaultdict(list)
     cells = Augmentation.objects.filter(
-        job=job, contestant__in=who, scenario__in=where, sample__range=(numbers[0], numbers[-1])
+        job=job,
+        contestant__in=contestants,
+        scenario__in=scenarios,
+        sample__range=(numbers[0], numbers[-1]),
     )
     for cell in cells.only(*_LEAN).order_by("sample"):
-        found[cell.scenario_id, cell.contestant_id].append(cell)
+        by_place[cell.scenario_id, cell.contestant_id].append(cell)
     return [
-        PartRow(scenario=scenario, cells=[found[scenario.pk, contestant.pk] for contestant in who])
-        for scenario in where
+        PartRow(
+            scenario=scenario,
+            cells=[by_place[scenario.pk, contestant.pk] for contestant in contestants],
+        )
+        for scenario in scenarios
     ]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class GridRow:
-    """One scenario of the grid.
-
-    Attributes:
-        cells: One sample of each contestant, None where nothing was planned.
-        samples: All of them.
-    """
-
-    scenario: Scenario
-    cells: list[Augmentation | None]
-    samples: list[list[Augmentation]] = field(default_factory=list)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class JobGrid:
-    """Scenarios down, contestants across."""
-
-    contestants: list[Contestant]
-    rows: list[GridRow]
-
-
-def grid(job: GenerationJob, *, sample: int = 1) -> JobGrid:
-    """What became of every scenario with every contestant.
-
-    Raises:
-        UnknownName: The job has no such sample.
-    """
-    if not 1 <= sample <= job.samples:
-        known = [str(number) for number in range(1, job.samples + 1)]
-        raise UnknownName("sample of this job", str(sample), known)
-    found: defaultdict[tuple[int, int], list[Augmentation]] = defaultdict(list)
-    for cell in cells_of(job):
-        found[cell.scenario_id, cell.contestant_id].append(cell)
-    every = [cell for cells in found.values() for cell in cells]
-    contestants = sorted({cell.contestant for cell in every}, key=lambda one: one.name)
-    scenarios = {cell.scenario_id: cell.scenario for cell in every}
-    ordered = sorted(scenarios.values(), key=lambda scenario: (scenario.type, scenario.slug))
-    return JobGrid(
-        contestants=contestants,
-        rows=[
-            GridRow(
-                scenario=scenario,
-                cells=[
-                    next((one for one in cells if one.sample == sample), None) for cells in line
-                ],
-                samples=line,
-            )
-            for scenario in ordered
-            for line in [[found[scenario.pk, who.pk] for who in contestants]]
-        ],
-    )
+# --- Drives ------------------------------------------------------------------------------------
 
 
 DRIVES = View(name="drives", cells=300, columns=10, samples=1, rows=50)
@@ -211,14 +155,10 @@ class DriveCells:
     reference: dict[int, Simulation]
 
 
-def options_of(row: Simulation) -> Options:
-    """How it was driven."""
-    return Options(planner=row.planner, offsets=row.offsets, is_reactive=row.is_reactive)
-
-
 def before_of(row: Simulation) -> Simulation | None:
     """The same scene before the change, driven the same way; None until that is done."""
-    rows = options_of(row).of(Simulation.objects.filter(scenario_id=row.scenario_id))
+    options = Options(planner=row.planner, offsets=row.offsets, is_reactive=row.is_reactive)
+    rows = options.of(Simulation.objects.filter(scenario_id=row.scenario_id))
     drives = rows.filter(subject=Simulation.Subject.UNMODIFIED, state=Simulation.State.DONE)
     return drives.exclude(pk=row.pk).first()
 
@@ -245,12 +185,8 @@ def drive_cells(job: GenerationJob, options: Options, part: Part) -> DriveCells:
 
 def shown_augmentations(study: Study) -> frozenset[int]:
     """The primary keys of all augmentations in the study's matchups; two queries at most."""
-    return _SHOWN.get(plan_of(study), lambda: _shown(study))
-
-
-def _shown(study: Study) -> frozenset[int]:
     rows = study.matchups.order_by().values_list("left", "right").distinct()
-    return frozenset(pk for pair in rows for pk in pair)
+    return _SHOWN.get(plan_of(study), lambda: frozenset(pk for pair in rows for pk in pair))
 
 
 _SHOWN: Remembered[frozenset[int]] = Remembered(8)
@@ -325,9 +261,8 @@ class LabellingProgress:
 
 
 def of_expert(expert: User) -> list[LabellingProgress]:
-    """The labellings that an expert was invited to, counted over their own showings."""
-    rows = LabellingRound.objects.filter(tasks__expert=expert)
-    return _counted(rows)
+    """Return the labellings that an expert was invited to, counted over their own showings."""
+    return _counted(LabellingRound.objects.filter(tasks__expert=expert))
 
 
 def labellings_of(job: GenerationJob) -> list[LabellingProgress]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import random
 from collections.abc import Sequence
-from functools import partial
 from uuid import UUID
 
 from django.contrib.auth.models import User
@@ -46,12 +45,14 @@ def open_labelling(
         NothingToPlan: Nothing of the job is left to label for these experts.
     """
     name = one_line("name", name, what="labelling")
-    if LabellingRound.objects.filter(name=name).exists():
-        raise _taken(name)
     people = _experts(experts)
     # Held, so that of two that are opened at once the second sees what the first has planned.
     GenerationJob.objects.select_for_update(no_key=True).get(pk=job.pk)
-    labelling = _insert(name, job, seed)
+    labelling, is_new = LabellingRound.objects.get_or_create(
+        name=name, defaults={"job": job, "seed": seed}
+    )
+    if not is_new:
+        raise Conflict(f"There is a labelling called '{name}' already; choose another name.")
     labelling.experts.set(people)
     tasks = [task for expert in people for task in _planned(labelling, expert)]
     if not tasks:
@@ -104,27 +105,10 @@ def save_label(
         AlreadyLabelled: It has another label.
         LabellingClosed: It has no label, and its labelling takes none any more.
     """
-    save = partial(_save, expert=expert, task_code=task_code, faults=faults, note=note)
     try:
-        return save()
-    except IntegrityError:
-        # Another request was faster; looked at again, this one is its replay or too late.
-        return save()
-
-
-# Private
-
-
-def _insert(name: str, job: GenerationJob, seed: int) -> LabellingRound:
-    try:
-        with transaction.atomic():
-            return LabellingRound.objects.create(name=name, job=job, seed=seed)
-    except IntegrityError:  # somebody else was faster
-        raise _taken(name) from None
-
-
-def _taken(name: str) -> Conflict:
-    return Conflict(f"There is a labelling called '{name}' already; choose another name.")
+        return _save(expert, task_code, faults, note)
+    except IntegrityError:  # another request was faster: this one is its replay, or too late
+        return _save(expert, task_code, faults, note)
 
 
 def _experts(usernames: Sequence[str]) -> list[User]:
@@ -151,9 +135,7 @@ def _planned(labelling: LabellingRound, expert: User) -> list[LabelTask]:
 
 
 @transaction.atomic
-def _save(
-    *, expert: User, task_code: UUID, faults: frozenset[FaultClass], note: str
-) -> FaultLabel:
+def _save(expert: User, task_code: UUID, faults: frozenset[FaultClass], note: str) -> FaultLabel:
     task = (
         LabelTask.objects.select_related("labelling", "augmentation__scenario__base_scene")
         .filter(code=task_code, expert=expert)
@@ -162,10 +144,10 @@ def _save(
     if task is None:
         raise NotYours("This picture is not yours to label.")
     note = make_storable(note.strip())[:NOTE_LENGTH]
-    said = {fault.value: fault in faults for fault in FaultClass}
+    seen = {fault.value: fault in faults for fault in FaultClass}
     known = FaultLabel.objects.filter(task=task).first()
     if known is not None:
-        if any(getattr(known, name) != value for name, value in said.items()):
+        if any(getattr(known, name) != value for name, value in seen.items()):
             raise AlreadyLabelled("You had labelled that picture before; your first label counts.")
         return known
     if task.labelling.closed_at is not None:
@@ -176,7 +158,7 @@ def _save(
         expert=expert,
         task=task,
         note=note,
-        **said,
+        **seen,
         **{
             f"guessed_{fault.value}": None if guessed is None else fault in guessed
             for fault in FaultClass

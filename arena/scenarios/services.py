@@ -1,8 +1,8 @@
-"""Which pictures an update of the program draws anew, and which somebody still has to judge."""
+"""Changes of scenarios and scenes that nothing depends on yet, references, and redrawing."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 from django.contrib.auth.models import User
@@ -21,6 +21,18 @@ from augment.services.scenarios.scenes import (
     set_wording,
 )
 
+MOST_NAMED = 8
+FILE_TOO_LARGE = "arena.file_too_large"
+"""In the META of a request one of whose files was skipped unread."""
+
+
+def was_too_large(meta: Mapping[str, object]) -> bool:
+    """Return whether a file was larger than any may be; it is not among the files then."""
+    return bool(meta.get(FILE_TOO_LARGE))
+
+
+# --- Redrawing ---------------------------------------------------------------------------------
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Redrawn:
@@ -28,7 +40,7 @@ class Redrawn:
 
     Attributes:
         pictures: How many have been drawn anew.
-        fault: Why they could not be drawn, "" where they could.
+        fault: Why they could not be drawn, empty where they could.
     """
 
     scenario: str
@@ -46,8 +58,8 @@ class Redrawn:
 def redraw_pictures() -> Iterator[Redrawn]:
     """Draw every scenario's pictures in today's window, one scenario after the other.
 
-    Open studies go on showing those that they were opened with. What can't be drawn is told, and
-    does not stop the others.
+    Open studies go on showing those that they were opened with. What can't be drawn is reported
+    and does not stop the others.
     """
     drawn = Scenario.objects.filter(augmentations__image__gt="").distinct().order_by("slug")
     for pk, slug in list(drawn.values_list("pk", "slug")):
@@ -59,17 +71,7 @@ def redraw_pictures() -> Iterator[Redrawn]:
             yield Redrawn(scenario=slug, fault=str(error))
 
 
-def find_judged_now(scenario: int) -> str:
-    """The open study or labelling that shows its pictures to somebody, empty for none."""
-    studies = Study.objects.filter(state=Study.State.OPEN, scenarios=scenario).order_by("pk")
-    tasks = LabelTask.objects.filter(
-        augmentation__scenario=scenario, label=None, labelling__closed_at=None
-    ).order_by("labelling")
-    return (
-        studies.values_list("name", flat=True).first()
-        or tasks.values_list("labelling__name", flat=True).first()
-        or ""
-    )
+# --- References --------------------------------------------------------------------------------
 
 
 @transaction.atomic
@@ -98,112 +100,38 @@ def drop_reference(scenario: Scenario, *, actor: User | None = None) -> Scenario
 
 
 def why_not_editable(scenario: Scenario) -> str:
-    """Why the reference of a scenario can't be changed now, empty where it can."""
+    """Return why the reference of a scenario can't be changed now, empty where it can."""
     try:
         editing.refuse_catalogue(scenario)
         _refuse_judged(scenario)
     except Conflict as conflict:
-        return conflict.args[0]  # type: ignore[no-any-return]
+        return str(conflict)
     return ""
 
 
 def _hold_unjudged(scenario: Scenario) -> None:
-    """Hold it, as an opening study does: none opens between the look and the change."""
+    """Lock it, as an opening study does: none opens between the check and the change."""
     Scenario.objects.select_for_update(of=("self",)).get(pk=scenario.pk)
     _refuse_judged(scenario)
 
 
 def _refuse_judged(scenario: Scenario) -> None:
-    if needed_by := find_judged_now(scenario.pk):
+    studies = Study.objects.filter(state=Study.State.OPEN, scenarios=scenario).order_by("pk")
+    tasks = LabelTask.objects.filter(
+        augmentation__scenario=scenario, label=None, labelling__closed_at=None
+    ).order_by("labelling")
+    needed_by = (
+        studies.values_list("name", flat=True).first()
+        or tasks.values_list("labelling__name", flat=True).first()
+    )
+    if needed_by:
         raise Conflict(
             f"“{needed_by}” is open and shows this scenario: its reference stays until that "
             "is over."
         )
 
 
-MOST_NAMED = 8
-
-
-@transaction.atomic
-def delete_scenario(scenario: Scenario, *, actor: User | None = None) -> None:
-    """Delete a scenario that no job, study, drive or other wording needs.
-
-    Raises:
-        Conflict: Something does; the text names it.
-    """
-    Scenario.objects.select_for_update(of=("self",)).get(pk=scenario.pk)
-    refuse_needed_scenario(scenario, "deleted")
-    _log_deletion("scenario", scenario, actor)
-    scenario.delete()
-
-
-@transaction.atomic
-def delete_scene(scene: BaseScene, *, actor: User | None = None) -> None:
-    """Delete a scene that no scenario stands on.
-
-    Raises:
-        Conflict: Some do; the text names them.
-    """
-    BaseScene.objects.select_for_update().only("pk").get(pk=scene.pk)
-    refuse_needed_scene(scene, "deleted")
-    _log_deletion("scene", scene, actor)
-    scene.delete()
-
-
-def refuse_needed_scenario(scenario: Scenario, what: str) -> None:
-    """Do nothing where no job, study, drive or other wording needs a scenario.
-
-    Args:
-        scenario: Locked by the caller.
-        what: What it is not to be: deleted, changed.
-
-    Raises:
-        Conflict: Something does; the text names it.
-    """
-    drives = scenario.simulations.count()
-    needed_by = [
-        *(f"the job “{job.name}”" for job in scenario.jobs.order_by("pk")),
-        *(f"the study “{study.name}”" for study in scenario.studies.order_by("pk")),
-        *(f"its other wording “{row.slug}”" for row in scenario.paraphrases.order_by("slug")),
-        *([f"{drives} drives"] if drives else []),
-    ]
-    _refuse_needed(scenario.slug, needed_by, what)
-
-
-def refuse_needed_scene(scene: BaseScene, what: str) -> None:
-    """Do nothing where no scenario stands on a scene.
-
-    Raises:
-        Conflict: Some do; the text names them.
-    """
-    slugs = scene.scenarios.order_by("slug").values_list("slug", flat=True)
-    _refuse_needed(scene.slug, [f"the scenario “{slug}”" for slug in slugs], what)
-
-
-# --- Private -----------------------------------------------------------------------------------
-
-
-def _refuse_needed(slug: str, needed_by: list[str], what: str) -> None:
-    if not needed_by:
-        return
-    more = len(needed_by) - MOST_NAMED
-    named = [*needed_by[:MOST_NAMED], *([f"{more} more"] if more > 0 else [])]
-    raise Conflict(f"“{slug}” can’t be {what}; it is needed by {_listed(named)}.")
-
-
-def _listed(names: Iterable[str]) -> str:
-    *first, last = names
-    return f"{', '.join(first)} and {last}" if first else last
-
-
-def _log_deletion(kind: str, row: Scenario | BaseScene, actor: User | None) -> None:
-    log_event(
-        actor=actor,
-        verb="delete",
-        object_kind=kind,
-        object_code=row.code,
-        before={"slug": row.slug},
-    )
+# --- Changing and deleting ---------------------------------------------------------------------
 
 
 @transaction.atomic
@@ -227,7 +155,7 @@ def change_scenario(
     row = Scenario.objects.select_for_update(of=("self",)).get(pk=scenario.pk)
     if row.in_catalogue:
         raise Conflict(f"“{row.slug}” is the catalogue’s own; change it in its file.")
-    refuse_needed_scenario(row, "changed")
+    _refuse_needed(row, "changed")
     before = _state(row)
     set_wording(row, instruction, type, type_label)
     change_circumstances(row, circumstances, keep_traffic=keep_traffic)
@@ -253,7 +181,7 @@ def rename_scene(scene: BaseScene, slug: str, *, actor: User | None = None) -> B
     """
     row = BaseScene.objects.select_for_update().get(pk=scene.pk)
     check_slug(slug, what="scene")
-    refuse_needed_scene(row, "renamed")
+    _refuse_needed(row, "renamed")
     if BaseScene.objects.filter(slug=slug).exclude(pk=row.pk).exists():
         raise Conflict(f"There is a scene called “{slug}” already; choose another slug.")
     before, row.slug = row.slug, slug
@@ -270,7 +198,43 @@ def rename_scene(scene: BaseScene, slug: str, *, actor: User | None = None) -> B
     return row
 
 
-# --- Private -----------------------------------------------------------------------------------
+@transaction.atomic
+def delete(row: Scenario | BaseScene, *, actor: User | None = None) -> None:
+    """Delete a scenario that no job, study, drive or other wording needs, or such a scene.
+
+    Raises:
+        Conflict: Something needs it; the text names it.
+    """
+    type(row).objects.select_for_update(of=("self",)).only("pk").get(pk=row.pk)
+    _refuse_needed(row, "deleted")
+    log_event(
+        actor=actor,
+        verb="delete",
+        object_kind="scenario" if isinstance(row, Scenario) else "scene",
+        object_code=row.code,
+        before={"slug": row.slug},
+    )
+    row.delete()
+
+
+def _refuse_needed(row: Scenario | BaseScene, what: str) -> None:
+    if isinstance(row, BaseScene):
+        slugs = row.scenarios.order_by("slug").values_list("slug", flat=True)
+        needed_by = [f"the scenario “{slug}”" for slug in slugs]
+    else:
+        drives = row.simulations.count()
+        needed_by = [
+            *(f"the job “{job.name}”" for job in row.jobs.order_by("pk")),
+            *(f"the study “{study.name}”" for study in row.studies.order_by("pk")),
+            *(f"its other wording “{other.slug}”" for other in row.paraphrases.order_by("slug")),
+            *([f"{drives} drives"] if drives else []),
+        ]
+    if not needed_by:
+        return
+    more = len(needed_by) - MOST_NAMED
+    *first, last = [*needed_by[:MOST_NAMED], *([f"{more} more"] if more > 0 else [])]
+    named = f"{', '.join(first)} and {last}" if first else last
+    raise Conflict(f"“{row.slug}” can’t be {what}; it is needed by {named}.")
 
 
 def _state(row: Scenario) -> dict[str, object]:

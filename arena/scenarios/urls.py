@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from django.urls import URLPattern, path
 
-from arena.scenarios.pages import editing, forms, prompts, scenarios, uploads
+from arena.scenarios.pages import augmentations, editing, forms, scenarios, uploads
 
 urlpatterns: list[URLPattern] = [
     path("scenes/", uploads.scenes_page, name="scenes"),
@@ -19,33 +19,50 @@ urlpatterns: list[URLPattern] = [
     path("scenarios/load/", scenarios.load_scenarios, name="catalogue-load"),
     path("scenarios/bulk/", forms.bulk_page, name="scenarios-bulk"),
     path("scenes/<uuid:code>/new/", forms.new_scenario_page, name="scenario-new"),
-    path("scenarios/<uuid:code>/prompts/", prompts.prompts_page, name="prompts"),
-    path("scenarios/<uuid:code>/prompt.json", prompts.prompt_file, name="prompt-file"),
+    path("scenarios/<uuid:code>/prompts/", augmentations.prompts_page, name="prompts"),
+    path("scenarios/<uuid:code>/prompt.json", augmentations.prompt_file, name="prompt-file"),
     path(
-        "scenarios/<uuid:code>/prompts/<int:number>.png", prompts.prompt_image, name="prompt-image"
+        "scenarios/<uuid:code>/prompts/<int:number>.png",
+        augmentations.prompt_image,
+        name="prompt-image",
     ),
     path("scenarios/<uuid:code>/", scenarios.scenario_page, name="scenario"),
     path("scenarios/<uuid:code>/reference/", editing.reference_page, name="reference-edit"),
     path("scenarios/<uuid:code>/reference/drop/", editing.drop, name="reference-drop"),
     path("scenarios/<uuid:code>/check/", editing.check, name="edit-check"),
-    path("scenarios/<uuid:code>/delete/", scenarios.delete_scenario_page, name="scenario-delete"),
-    path("scenes/<uuid:code>/delete/", scenarios.delete_scene_page, name="scene-delete"),
     path(
-        "scenarios/<uuid:code>/retired/", scenarios.set_scenario_retired, name="scenario-retired"
+        "scenarios/<uuid:code>/delete/",
+        scenarios.delete,
+        {"kind": "scenario"},
+        name="scenario-delete",
     ),
-    path("scenes/<uuid:code>/retired/", scenarios.set_scene_retired, name="scene-retired"),
-    path("scenes/<uuid:code>/slug/", scenarios.rename_scene_page, name="scene-rename"),
+    path("scenes/<uuid:code>/delete/", scenarios.delete, {"kind": "scene"}, name="scene-delete"),
+    path(
+        "scenarios/<uuid:code>/retired/",
+        scenarios.set_retired,
+        {"kind": "scenario"},
+        name="scenario-retired",
+    ),
+    path(
+        "scenes/<uuid:code>/retired/",
+        scenarios.set_retired,
+        {"kind": "scene"},
+        name="scene-retired",
+    ),
+    path("scenes/<uuid:code>/slug/", scenarios.rename_scene, name="scene-rename"),
     path("scenarios/<uuid:code>/edit/", forms.edit_page, name="scenario-edit"),
     path("scenarios/<uuid:code>/intent/fields/", forms.intent_page, name="intent-edit"),
     path("scenarios/<uuid:code>/intent/", scenarios.set_intent, name="set-intent"),
     path("scenarios/<uuid:code>/read/", scenarios.read_instruction, name="intent-read"),
     path("scenarios/<uuid:code>/intent.json", scenarios.intent_file, name="intent"),
-    path("pictures/<slug:kind>/<uuid:code>.png", scenarios.picture, name="picture"),
+    path("pictures/<slug:kind>/<uuid:code>.png", augmentations.picture, name="picture"),
     path(
-        "contestants/<uuid:code>/prompts/", prompts.contestant_prompts, name="contestant-prompts"
+        "contestants/<uuid:code>/prompts/",
+        augmentations.contestant_prompts,
+        name="contestant-prompts",
     ),
-    path("augmentations/<uuid:code>/", scenarios.augmentation_page, name="augmentation"),
+    path("augmentations/<uuid:code>/", augmentations.augmentation_page, name="augmentation"),
     path("augmentations/<uuid:code>/correct/", editing.correct_page, name="correct"),
-    path("augmentations/<uuid:code>/transcript.json", scenarios.transcript, name="transcript"),
-    path("asked/<slug:digest>.png", scenarios.asked_image, name="asked-image"),
+    path("augmentations/<uuid:code>/transcript.json", augmentations.transcript, name="transcript"),
+    path("asked/<slug:digest>.png", augmentations.asked_image, name="asked-image"),
 ]

@@ -12,9 +12,9 @@ from django.conf import settings
 from django.db import DatabaseError, connection
 from django.db.migrations.executor import MigrationExecutor
 
-from augment.broker import check_broker
 from augment.errors import QueueFault
 from augment.services.running.workers import workforce
+from augment.tasks import check_broker
 
 BROKER_WITHIN_S = 1.0
 HELD_FOR_S = 5.0

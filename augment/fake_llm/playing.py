@@ -1,10 +1,14 @@
-"""The stand-in's characters: each plays every role, in its own manner."""
+"""The stand-in's characters: each plays every role, in its own manner.
+
+It works the task out by its own rules. As a reviewer it compares with that; as a viewer it checks
+that there is a picture and says so: it is a stand-in without eyes.
+Frame: ego frame.
+"""
 
 from __future__ import annotations
 
 import json
 import math
-import random
 import re
 from collections.abc import Callable, Sequence
 from contextlib import suppress
@@ -13,7 +17,6 @@ from dataclasses import dataclass, replace
 from augment.baselines.rule_placer import place
 from augment.errors import CannotPlace
 from augment.fake_llm import careless
-from augment.fake_llm import careless as misreading
 from augment.fake_llm.sight import (
     Heard,
     Intents,
@@ -26,59 +29,178 @@ from augment.fake_llm.sight import (
     read_conversation,
     task_of,
 )
-from augment.fake_llm.wire import ChatRequest
+from augment.fake_llm.wire import Calls, ChatRequest
 from augment.geometry.frames import difference, wrap
-from augment.prompts.vectors import compass
+from augment.prompts.calls import TOOL
 from augment.scene.codec import intent_to_parts
-from augment.scene.ego_route import EgoRoute
 from augment.scene.entities import AgentType, Modification, Scene, TrafficAgent
 from augment.scene.intent import Intent
 from augment.scene.lane_graph import LaneGraph
 from augment.variants.respondents import ModelRole
 
 SEES_NOTHING = "I can't find a scene and an instruction in what I was given."
+UNKNOWN = "I am a stand-in and read no English; this sentence is not on my list of intents."
+
+_MOST_CALLS = 8
+_FAR_M = 3.0
+_TURNED_RAD = math.radians(20.0)
+_VEHICLES = frozenset({AgentType.VEHICLE, AgentType.BUS})
+_RATINGS = ("compliance", "realism", "logical_consistency")
+
+Problem = dict[str, str]
+Answer = tuple[str, Calls]
+"""A text, native calls of functions, or both."""
 
 
-def write_answer(task: Task, modification: Modification, summary: str) -> str:
-    """A whole answer: the modification, and how its numbers come about."""
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Character:
+    """A manner of playing every role.
+
+    Attributes:
+        hear: What it takes the wish to be, given the task and what was heard.
+        bend: What becomes of a right modification, given the task and what was heard.
+        spoil: What becomes of a modifier's finished answer.
+        judge: What a reviewer finds.
+        ratings: What a reviewer rates, by whether there are problems.
+        verdicts: What an engineer decides, by the same.
+        first_calls: Calls that come before the right ones.
+        never_stops: Whether it calls as long as it may, and longer.
+    """
+
+    hear: Callable[[Task, Heard], Intent | None] = lambda task, _: task.intent
+    bend: Callable[[Task, Modification, Heard], Modification] = lambda task, right, _: right
+    spoil: Callable[[Task, str, Heard], str] = lambda task, text, _: text
+    judge: Callable[[Task], list[Problem]] = lambda task: problems_of(task)
+    ratings: tuple[Sequence[object], Sequence[object]] = ((5, 5, 5), (2, 3, 2))
+    verdicts: tuple[str, str] = ("accept", "feedback")
+    first_calls: Calls = ()
+    never_stops: bool = False
+
+    def answer(self, request: ChatRequest, intents: Intents = knows_nothing) -> Answer:
+        """Answer from the request and the list of intents alone."""
+        heard = read_conversation(request)
+        if heard.role is ModelRole.VIEWER:
+            return _describe_picture(request), ()
+        try:
+            if heard.role is ModelRole.READER:
+                return _read_intent(intents(instruction_in(request.messages))), ()
+            task = task_of(request.messages, intents)
+        except NothingSeen:
+            return SEES_NOTHING, ()
+        if heard.role is ModelRole.MODIFIER:
+            return self._modify(task, heard)
+        if heard.role is ModelRole.REVIEWER:
+            return self._rate(self.judge(task)), ()
+        if any(message.role == "assistant" for message in request.messages):
+            problems = self.judge(task)
+            block = {"verdict": self.verdicts[bool(problems)], "feedback": problems}
+            return _fenced("I have weighed the answers.", block), ()
+        names = list(list_of(task.prompt, "Added agents"))[:6]
+        questions = [f"In which lane does {name} stand?" for name in names]
+        questions += ["Do any two blue objects overlap?", "Is a blue object off the road?"]
+        questions += ["Is the ego alone in its lane?"]
+        return _fenced("I ask the viewer.", {"questions": questions[:8]}), ()
+
+    def _modify(self, task: Task, heard: Heard) -> Answer:
+        if self.never_stops and (heard.may_call or heard.called):
+            return _call(heard, _named([{"lane": "Lane1", "start": "lane", "distance_m": 1.0}]))
+        if self.first_calls and heard.may_call and not heard.called:
+            return _call(heard, self.first_calls)
+        try:
+            right = _placed(task, self.hear(task, heard))
+        except CannotPlace as refused:
+            return _write_refusal(task, UNKNOWN if task.intent is None else refused.reason), ()
+        numbered = (
+            replace(agent, id=f"Agent{task.first_new + number}")
+            for number, agent in enumerate(right.added)
+        )
+        placed = self.bend(task, replace(right, added=tuple(numbered)), heard)
+        wanted = _calls_for(task.scene, placed)
+        spared = len(self.first_calls)
+        if heard.may_call and wanted and len(heard.results) <= spared:
+            return _call(heard, wanted[: _MOST_CALLS - spared])
+        placed = _with_results(task.scene, placed, heard.results[spared:])
+        return self.spoil(task, _write_answer(task, placed), heard), ()
+
+    def _rate(self, problems: list[Problem]) -> str:
+        ratings = dict(zip(_RATINGS, self.ratings[bool(problems)], strict=True))
+        found = "; ".join(problem["problem"] for problem in problems)
+        return _fenced(
+            "Summary: A road with the ego on it, and what the user wished for.\n\n"
+            "Questions:\n1. Is everything where it was wished for?\n\n"
+            f"Answers:\n1. {found or 'Nothing is to be corrected.'}\n\nRatings: See below.\n\n"
+            "Review:",
+            {"ratings": ratings, "feedback": problems},
+        )
+
+
+def problems_of(task: Task) -> list[Problem]:
+    """Return what is wrong with the work in the task, by the stand-in's own placement.
+
+    Nothing where it does not know what the wish asks for.
+    """
+    try:
+        right = list(place(task.scene, task.intent).modification.added)
+    except CannotPlace:
+        return []
+    vectors = list_of(task.prompt, "Added agents").items()
+    added = [agent_of(name, vector[:8]) for name, vector in vectors]
+    if len(added) != len(right):
+        said = f"{len(added)} agents were added, {len(right)} were asked for."
+        return [_problem(said, "Count.")]
+    problems = []
+    for agent in added:
+        meant = min(right, key=lambda one: _distance_m(one, agent))
+        right.remove(meant)
+        problem = _difference(agent, meant)
+        if problem is not None:
+            problems.append(problem)
+    return problems
+
+
+# --- Answers -----------------------------------------------------------------------------------
+
+
+def _write_answer(task: Task, modification: Modification) -> str:
+    """Write the paper's five sections around a modification."""
+    steps = [
+        f"Step {number}: {agent.id} is at ({agent.x_m:.2f}, {agent.y_m:.2f}), "
+        f"{math.hypot(agent.x_m, agent.y_m):.2f} m from the ego; the heading is "
+        f"{agent.heading_rad:.3f} rad."
+        for number, agent in enumerate(modification.changed, start=1)
+    ]
+    named = [("add", agent.id) for agent in modification.added]
+    named += [("move", agent.id) for agent in modification.moved]
+    named += [("remove", name) for name in modification.removed]
+    changes = [{"Action": action, "Modified_Agent": name} for action, name in named]
     return _sections(
         insights=_road(task.scene),
-        summary=summary,
-        changes=_change_list(modification),
-        calculations="\n".join(_steps(task.scene, modification)) or "Nothing is to be computed.",
-        block=block_of(modification),
+        summary=f"The user wants: {' '.join(task.instruction.split())}",
+        changes=json.dumps(changes),
+        calculations="\n".join(steps) or "Nothing is to be computed.",
+        modification=modification,
     )
 
 
-def write_refusal(task: Task, reason: str) -> str:
-    """An honest answer to what was not understood: readable, and nothing changes."""
+def _write_refusal(task: Task, reason: str) -> str:
+    """Write an honest answer to what was not understood: readable, and nothing changes."""
     return _sections(
         insights=f"{_road(task.scene)} I did not understand the instruction: {reason}",
         summary="The instruction is not clear to me, so I leave the scene as it is.",
         changes="none",
         calculations="none",
-        block=block_of(Modification()),
+        modification=Modification(),
     )
 
 
-def renumber_added(modification: Modification, first_new: int) -> Modification:
-    """The added agents numbered on from the first new id of the task."""
-    added = (replace(a, id=f"Agent{first_new + n}") for n, a in enumerate(modification.added))
-    return replace(modification, added=tuple(added))
-
-
-def block_of(modification: Modification) -> dict[str, object]:
-    """The machine-read block of a modification."""
-    return {
+def _sections(
+    *, insights: str, summary: str, changes: str, calculations: str, modification: Modification
+) -> str:
+    block = {
         "add": [_fields(agent) for agent in modification.added],
         "move": [_fields(agent) for agent in modification.moved],
         "remove": list(modification.removed),
     }
-
-
-def _sections(
-    *, insights: str, summary: str, changes: str, calculations: str, block: dict[str, object]
-) -> str:
     return (
         f"Insights: {insights}\n\nSummary: {summary}\n\nModification Dict: {changes}\n\n"
         f"Modification Calculations:\n{calculations}\n\n"
@@ -87,54 +209,14 @@ def _sections(
 
 
 def _road(scene: Scene) -> str:
-    lanes = len(scene.connectors)
+    ways = len(scene.connectors)
     ego_lane = LaneGraph(scene).under(0.0, 0.0, 0.0) or "no lane"
-    crossing = f" and {lanes} lane connectors" if lanes else ", no intersection"
+    crossing = f" and {ways} lane connectors" if ways else ", no intersection"
     return (
         f"The scene has {len(scene.lanes)} lanes{crossing}; the ego is on {ego_lane} and drives "
         f"eastwards. Traffic keeps {scene.traffic_side.value}. "
         f"Besides the ego there are {len(scene.agents)} agents."
     )
-
-
-def _change_list(modification: Modification) -> str:
-    named = [("add", agent.id) for agent in modification.added]
-    named += [("move", agent.id) for agent in modification.moved]
-    named += [("remove", name) for name in modification.removed]
-    return json.dumps([{"Action": action, "Modified_Agent": name} for action, name in named])
-
-
-def _steps(scene: Scene, modification: Modification) -> list[str]:
-    graph = LaneGraph(scene)
-    route = EgoRoute.of(scene, graph)
-    steps: list[str] = []
-    for agent in modification.changed:
-        nearest = graph.nearest(agent.x_m, agent.y_m)
-        if nearest is None:
-            continue
-        lane_id, place = nearest
-        line = graph.lanes[lane_id].centerline
-        x_m, y_m = line.position(place.s_m)
-        where = _ahead(graph, route, lane_id, place.s_m)
-        steps.append(
-            f"Step {len(steps) + 1}: {agent.id} lies {where}. The "
-            f"centreline of {lane_id} is at ({x_m:.2f}, {y_m:.2f}) there and leads "
-            f"{compass(line.heading_at(place.s_m))} ({line.heading_at(place.s_m):.3f} rad). "
-            f"{abs(place.d_m):.2f} m to its {'left' if place.d_m >= 0.0 else 'right'} is "
-            f"({agent.x_m:.2f}, {agent.y_m:.2f}); the heading is {agent.heading_rad:.3f} rad."
-        )
-    return steps
-
-
-def _ahead(graph: LaneGraph, route: EgoRoute | None, lane_id: str, s_m: float) -> str:
-    """Where a place on a way lies, along the lanes where the ego's own lead there."""
-    line = graph.lane(lane_id).centerline
-    if route is not None and lane_id in route.lane_ids:
-        end_m = route.ends_m[route.lane_ids.index(lane_id)]
-        along_m = end_m - line.length_m + s_m
-        return f"{along_m:.2f} m along the lanes from the ego, on {lane_id}"
-    x_m, y_m = line.position(s_m)
-    return f"{math.hypot(x_m, y_m):.2f} m from the ego, on {lane_id}"
 
 
 def _fields(agent: TrafficAgent) -> dict[str, object]:
@@ -154,101 +236,49 @@ def _fields(agent: TrafficAgent) -> dict[str, object]:
     return fields
 
 
-_FAR_M = 3.0
-_TURNED_RAD = math.radians(20.0)
-_VEHICLES = frozenset({AgentType.VEHICLE, AgentType.BUS})
-
-Problem = dict[str, str]
+def _fenced(words: str, block: object) -> str:
+    return f"{words}\n```json\n{json.dumps(block)}\n```\n"
 
 
-def problems_of(task: Task) -> list[Problem]:
-    """What is wrong with the work in the task, by the stand-in's own placement.
-
-    Nothing where it does not know what the wish asks for.
-    """
-    try:
-        right = list(place(task.scene, task.intent).modification.added)
-    except CannotPlace:
-        return []
-    added = list_of(task.prompt, "Added agents").items()
-    added_agents = [agent_of(name, vector[:8]) for name, vector in added]
-    if len(added_agents) != len(right):
-        return [
-            _problem(
-                f"{len(added_agents)} agents were added, {len(right)} were asked for.", "Count."
-            )
-        ]
-    problems: list[Problem] = []
-    for agent in added_agents:
-        meant = min(right, key=lambda one: _distance_m(one, agent))
-        right.remove(meant)
-        problems += _differences(agent, meant)
-    return problems
+def _read_intent(intent: Intent | None) -> str:
+    """Write the intent from the list, as a reader would; nothing is read."""
+    return UNKNOWN if intent is None else _fenced("From my list:", intent_to_parts(intent))
 
 
-def write_ratings(problems: Sequence[Problem]) -> str:
-    """A text reviewer's answer: low ratings with feedback, or high ones."""
-    low = {"compliance": 2, "realism": 3, "logical_consistency": 2}
-    high = dict.fromkeys(low, 5)
-    block = {"ratings": low if problems else high, "feedback": list(problems)}
-    feedback = (
-        "; ".join(problem["problem"] for problem in problems) or "Nothing is to be corrected."
-    )
-    return (
-        "Summary: A road with the ego on it, and what the user wished for.\n\n"
-        "Questions:\n1. Is everything where it was wished for?\n2. Does it face the right way?\n"
-        f"3. Is the number right?\n\nAnswers:\n1. to 3. {feedback}\n\nRatings: See below.\n\n"
-        f"Review:\n```json\n{json.dumps(block)}\n```\n"
-    )
-
-
-def write_questions(names: Sequence[str]) -> str:
-    """An engineer's questions about the agents of those names."""
-    about = [f"In which lane does {name} stand?" for name in names[:6]]
-    about += ["Do any two blue objects overlap?", "Is a blue object off the road?"]
-    about += ["Is the ego alone in its lane?"]
-    return f"I ask the viewer.\n```json\n{json.dumps({'questions': about[:8]})}\n```\n"
-
-
-def write_verdict(problems: Sequence[Problem]) -> str:
-    """An engineer's verdict."""
-    block = {"verdict": "feedback" if problems else "accept", "feedback": list(problems)}
-    return f"I have weighed the answers.\n```json\n{json.dumps(block)}\n```\n"
-
-
-def describe_picture(request: ChatRequest) -> str:
-    """A viewer's answer to each question: what picture it was given, and nothing it can't see."""
-    last = request.messages[-1]
+def _describe_picture(request: ChatRequest) -> str:
+    """Tell a viewer's questions what picture there is, and nothing that it can't see."""
     sizes = [image.size_px for message in request.messages for image in message.images]
-    count = len(re.findall(r"^[0-9]+\. ", last.text, re.MULTILINE)) or 1
     if not sizes:
         return "There is no picture."
     width, height = sizes[-1]
+    count = len(re.findall(r"^[0-9]+\. ", request.messages[-1].text, re.MULTILINE)) or 1
     lines = [f"1. The picture has {width} x {height} pixels; more I cannot see."]
-    return "\n".join(lines + [f"{n}. cannot see" for n in range(2, count + 1)])
+    return "\n".join(lines + [f"{number}. cannot see" for number in range(2, count + 1)])
 
 
-def overlook_some(problems: list[Problem], rng: random.Random) -> list[Problem]:
-    """What a careless reviewer finds of them: all or, as often, nothing."""
-    return problems if rng.random() < 0.5 else []
+# --- Placing and comparing ---------------------------------------------------------------------
 
 
-def _differences(agent: TrafficAgent, meant: TrafficAgent) -> list[Problem]:
+def _placed(task: Task, taken_for: Intent | None) -> Modification:
+    """Place the wish as it was heard; what can't be placed is heard rightly."""
+    if taken_for != task.intent:
+        with suppress(CannotPlace):
+            return place(task.scene, taken_for).modification
+    return place(task.scene, task.intent).modification
+
+
+def _difference(agent: TrafficAgent, meant: TrafficAgent) -> Problem | None:
     gap_m = _distance_m(agent, meant)
-    if agent.type is not meant.type:
-        return [_problem(f"{agent.id} is a {agent.type}, not a {meant.type}.", "Use that type.")]
-    if gap_m > _FAR_M:
-        return [
-            _problem(
-                f"{agent.id} is {gap_m:.1f} m from where it belongs.",
-                f"Move it to ({meant.x_m:.1f}, {meant.y_m:.1f}).",
-            )
-        ]
     turned = abs(difference(agent.heading_rad, meant.heading_rad))
+    if agent.type is not meant.type:
+        return _problem(f"{agent.id} is a {agent.type}, not a {meant.type}.", "Use that type.")
+    if gap_m > _FAR_M:
+        action = f"Move it to ({meant.x_m:.1f}, {meant.y_m:.1f})."
+        return _problem(f"{agent.id} is {gap_m:.1f} m from where it belongs.", action)
     if agent.type in _VEHICLES and turned > _TURNED_RAD:
         said = f"{agent.id} is turned by {math.degrees(turned):.0f} degrees."
-        return [_problem(said, f"Turn it to {meant.heading_rad:.3f} rad.")]
-    return []
+        return _problem(said, f"Turn it to {meant.heading_rad:.3f} rad.")
+    return None
 
 
 def _problem(said: str, action: str) -> Problem:
@@ -260,241 +290,115 @@ def _distance_m(one: TrafficAgent, other: TrafficAgent) -> float:
     return math.hypot(one.x_m - other.x_m, one.y_m - other.y_m)
 
 
-TOOL = "pose_on_lane"
-_MOST_CALLS = 8
-_LANE = "lane"
+# --- Calls of the function ---------------------------------------------------------------------
 
 
-def calls_for(scene: Scene, modification: Modification) -> list[dict[str, object]]:
-    """The arguments of one call for each of the first added agents, in their order."""
-    graph = LaneGraph(scene)
-    return [_arguments(graph, scene.ego, agent) for agent in modification.added[:_MOST_CALLS]]
-
-
-def with_results(
-    scene: Scene, modification: Modification, results: Sequence[dict[str, object] | None]
-) -> Modification:
-    """The added agents where the function says; those without a result stay where they are."""
-    graph = LaneGraph(scene)
-    pairs = zip(modification.added, results, strict=False)
-    placed = [agent if one is None else _placed(graph, agent, one) for agent, one in pairs]
-    return replace(modification, added=(*placed, *modification.added[len(placed) :]))
-
-
-def _arguments(graph: LaneGraph, ego: TrafficAgent, agent: TrafficAgent) -> dict[str, object]:
-    nearest = graph.nearest(agent.x_m, agent.y_m)
-    if nearest is None:
-        return {"lane": "Lane1", "start": _LANE, "distance_m": 0.0}
-    lane_id, place = nearest
-    start, distance_m = _LANE, place.s_m
-    if lane_id == ego.lane_id:
-        start = ego.id
-        distance_m -= graph.lane(lane_id).centerline.project(ego.x_m, ego.y_m).s_m
-    return {
-        "lane": lane_id,
-        "start": start,
-        "distance_m": round(distance_m, 3),
-        "lateral_m": round(max(-30.0, min(30.0, place.d_m)), 3),
-        "object": agent.type.value,
-    }
-
-
-def _placed(graph: LaneGraph, agent: TrafficAgent, result: dict[str, object]) -> TrafficAgent:
-    """The agent at the pose, turned against the lane as before; its walk goes along."""
-    nearest = graph.nearest(agent.x_m, agent.y_m)
-    if nearest is None:
-        return agent
-    x_m, y_m, heading_rad = (float(str(result[n])) for n in ("x_m", "y_m", "heading_rad"))
-    lane_rad = graph.lane(nearest[0]).centerline.heading_at(nearest[1].s_m)
-    walk = agent.walk_to_m
-    if walk is not None:
-        walk = (walk[0] + x_m - agent.x_m, walk[1] + y_m - agent.y_m)
-    return replace(
-        agent,
-        x_m=x_m,
-        y_m=y_m,
-        heading_rad=wrap(heading_rad + difference(agent.heading_rad, lane_rad)),
-        walk_to_m=walk,
-    )
-
-
-UNKNOWN = "I am a stand-in and read no English; this sentence is not on my list of intents."
-
-Calls = tuple[tuple[str, str], ...]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Said:
-    """An answer: a text, native calls of functions (name, arguments), or both."""
-
-    text: str
-    calls: Calls = ()
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Character:
-    """A manner of playing every role.
-
-    Attributes:
-        hear: What it takes the wish to be, given the task and what was heard.
-        bend: What becomes of a right modification, given the task and what was heard.
-        spoil: What becomes of a modifier's finished answer.
-        judge: What a reviewer finds.
-        rate: A reviewer's answer.
-        decide: An engineer's verdict.
-        first_calls: Calls that come before the right ones: name and arguments as written.
-        never_stops: Whether it calls as long as it may, and longer.
-    """
-
-    hear: Callable[[Task, Heard], Intent | None] = lambda task, _: task.intent
-    bend: Callable[[Task, Modification, Heard], Modification] = lambda task, right, _: right
-    spoil: Callable[[Task, str, Heard], str] = lambda task, text, _: text
-    judge: Callable[[Task], list[Problem]] = problems_of
-    rate: Callable[[Sequence[Problem]], str] = write_ratings
-    decide: Callable[[Sequence[Problem]], str] = write_verdict
-    first_calls: Calls = ()
-    never_stops: bool = False
-
-    def answer(self, request: ChatRequest, intents: Intents = knows_nothing) -> Said:
-        """What it says, from the request and the list of intents alone."""
-        understood = read_conversation(request)
-        if understood.part is ModelRole.VIEWER:
-            return Said(text=describe_picture(request))
-        if understood.part is ModelRole.READER:
-            return self._read(request, intents)
-        try:
-            task = task_of(request.messages, intents)
-        except NothingSeen:
-            return Said(text=SEES_NOTHING)
-        match understood.part:
-            case ModelRole.MODIFIER:
-                return self._modified(task, understood)
-            case ModelRole.REVIEWER:
-                return Said(text=self.rate(self.judge(task)))
-        if any(one.role == "assistant" for one in request.messages):
-            return Said(text=self.decide(self.judge(task)))
-        return Said(text=write_questions(list(list_of(task.prompt, "Added agents"))))
-
-    def _read(self, request: ChatRequest, intents: Intents) -> Said:
-        """The intent from the list, as a reader would write it; nothing is read."""
-        try:
-            intent = intents(instruction_in(request.messages))
-        except NothingSeen:
-            return Said(text=SEES_NOTHING)
-        if intent is None:
-            return Said(text=UNKNOWN)
-        return Said(text=f"From my list:\n```json\n{json.dumps(intent_to_parts(intent))}\n```\n")
-
-    def _modified(self, task: Task, understood: Heard) -> Said:
-        if self.never_stops and (understood.may_call or understood.called):
-            return _calling(understood, _endless())
-        if self.first_calls and understood.may_call and not understood.called:
-            return _calling(understood, self.first_calls)
-        try:
-            right = _placed_playing(task, self.hear(task, understood))
-        except CannotPlace as refused:
-            return Said(text=write_refusal(task, _why(task, refused)))
-        placed = self.bend(task, renumber_added(right, task.first_new), understood)
-        wanted = calls_for(task.scene, placed)
-        spared = len(self.first_calls)
-        if understood.may_call and wanted and len(understood.results) <= spared:
-            return _calling(understood, _named(wanted[: 8 - spared]))
-        results = understood.results[spared:]
-        placed = with_results(task.scene, placed, results)
-        text = write_answer(task, placed, _summary(task))
-        return Said(text=self.spoil(task, text, understood))
-
-
-def _placed_playing(task: Task, taken_for: Intent | None) -> Modification:
-    """What is placed for the wish as it was heard; what can't be placed is heard rightly."""
-    if taken_for != task.intent:
-        with suppress(CannotPlace):
-            return place(task.scene, taken_for).modification
-    return place(task.scene, task.intent).modification
-
-
-def _why(task: Task, refusal: CannotPlace) -> str:
-    if task.intent is None:
-        return UNKNOWN
-    return refusal.reason
-
-
-def _calling(understood: Heard, calls: Calls) -> Said:
-    if understood.is_native:
-        return Said(text="", calls=calls)
+def _call(heard: Heard, calls: Calls) -> Answer:
+    if heard.is_native:
+        return "", calls
     lines = "\n".join(
         f'{{"call": {json.dumps(name)}, "arguments": {arguments}}}' for name, arguments in calls
     )
-    return Said(text=f"I look up the places that I need.\n\n{lines}")
+    return f"I look up the places that I need.\n\n{lines}", ()
 
 
 def _named(wanted: Sequence[dict[str, object]]) -> Calls:
-    return tuple((TOOL, json.dumps(one)) for one in wanted)
+    return tuple((TOOL, json.dumps(arguments)) for arguments in wanted)
 
 
-def _endless() -> Calls:
-    return _named([{"lane": "Lane1", "start": "lane", "distance_m": 1.0}])
+def _calls_for(scene: Scene, modification: Modification) -> Calls:
+    """Return one call for each of the first added agents, in their order."""
+    graph, ego = LaneGraph(scene), scene.ego
+    wanted: list[dict[str, object]] = []
+    for agent in modification.added[:_MOST_CALLS]:
+        nearest = graph.nearest(agent.x_m, agent.y_m)
+        if nearest is None:
+            wanted.append({"lane": "Lane1", "start": "lane", "distance_m": 0.0})
+            continue
+        lane_id, at = nearest
+        start, distance_m = "lane", at.s_m
+        if lane_id == ego.lane_id:
+            start = ego.id
+            distance_m -= graph.lane(lane_id).centerline.project(ego.x_m, ego.y_m).s_m
+        wanted.append(
+            {
+                "lane": lane_id,
+                "start": start,
+                "distance_m": round(distance_m, 3),
+                "lateral_m": round(max(-30.0, min(30.0, at.d_m)), 3),
+                "object": agent.type.value,
+            }
+        )
+    return _named(wanted)
 
 
-def _summary(task: Task) -> str:
-    return f"The user wants: {' '.join(task.instruction.split())}"
+def _with_results(
+    scene: Scene, modification: Modification, results: Sequence[dict[str, float] | None]
+) -> Modification:
+    """Put the added agents where the function says, turned against their lanes as before.
+
+    Walks go along; agents without a result stay where they are.
+    """
+    graph = LaneGraph(scene)
+    placed = list(modification.added)
+    for number, (agent, result) in enumerate(zip(modification.added, results, strict=False)):
+        nearest = graph.nearest(agent.x_m, agent.y_m)
+        if nearest is None or result is None:
+            continue
+        x_m, y_m = float(result["x_m"]), float(result["y_m"])
+        lane_rad = graph.lane(nearest[0]).centerline.heading_at(nearest[1].s_m)
+        turn_rad = difference(agent.heading_rad, lane_rad)
+        moved = careless.put(agent, x_m, y_m, wrap(float(result["heading_rad"]) + turn_rad))
+        placed[number] = moved
+    return replace(modification, added=tuple(placed))
 
 
-def _misheard(task: Task, understood: Heard) -> Intent | None:
+# --- The characters ----------------------------------------------------------------------------
+
+
+def _all_told(task: Task, heard: Heard) -> str:
+    """Return the prompt and all feedback: a new round is a new throw of the dice."""
+    return "\n".join([task.prompt, *heard.feedback])
+
+
+def _mishear(task: Task, heard: Heard) -> Intent | None:
     if task.intent is None:
         return None
-    rng = careless.dice(f"{_all_told(task, understood)}\nas it was heard")
-    return misreading.misread(task.intent, rng)
+    return careless.misread(
+        task.intent, careless.dice(f"{_all_told(task, heard)}\nas it was heard")
+    )
 
 
-def _careless(task: Task, right: Modification, understood: Heard) -> Modification:
-    rng = careless.dice(_all_told(task, understood))
+def _bend(task: Task, right: Modification, heard: Heard) -> Modification:
+    rng = careless.dice(_all_told(task, heard))
     if careless.is_unreadable(rng):
         return right
-    spared = careless.SPARED_BY_TOOL if understood.called or understood.may_call else frozenset()
-    if not spared:
-        right = careless.lay_straight(task.scene, right)
-    return careless.bend(task.scene, right, rng, spared).modification
+    if heard.called or heard.may_call:
+        return careless.bend(task.scene, right, rng, careless.SPARED_BY_TOOL).modification
+    laid = careless.lay_straight(task.scene, right)
+    return careless.bend(task.scene, laid, rng).modification
 
 
-def _mumbled(task: Task, text: str, understood: Heard) -> str:
-    rng = careless.dice(_all_told(task, understood))
+def _mumble(task: Task, text: str, heard: Heard) -> str:
+    rng = careless.dice(_all_told(task, heard))
     return text.partition("```")[0] if careless.is_unreadable(rng) else text
 
 
-def _all_told(task: Task, understood: Heard) -> str:
-    """The prompt and all feedback: a new round is a new throw of the dice."""
-    return "\n".join([task.prompt, *understood.feedback])
+def _overlook(task: Task) -> list[Problem]:
+    """Find all problems or, as often, none."""
+    return problems_of(task) if careless.dice(task.prompt).random() < 0.5 else []
 
 
-def _overlooking(task: Task) -> list[Problem]:
-    return overlook_some(problems_of(task), careless.dice(task.prompt))
-
-
-def _learning(task: Task, right: Modification, understood: Heard) -> Modification:
-    """Too far at first, right after feedback."""
-    return right if understood.feedback else careless.too_far(task.scene, right)
-
-
-def _stubborn(task: Task, right: Modification, _: Heard) -> Modification:
-    return careless.too_far(task.scene, right)
-
-
-def _in_words(problems: Sequence[Problem]) -> str:
-    """Ratings as words, which is none of a reviewer's scale."""
-    block = {"ratings": dict.fromkeys(("compliance", "realism", "logical_consistency"), "four")}
-    return f"Review:\n```json\n{json.dumps(block | {'feedback': []})}\n```\n"
-
-
-def _perhaps(problems: Sequence[Problem]) -> str:
-    return 'It depends.\n```json\n{"verdict": "perhaps", "feedback": []}\n```\n'
+def _learn(task: Task, right: Modification, heard: Heard) -> Modification:
+    """Place too far at first, right after feedback."""
+    return right if heard.feedback else careless.too_far(task.scene, right)
 
 
 GOOD = Character()
-CARELESS = Character(hear=_misheard, bend=_careless, spoil=_mumbled, judge=_overlooking)
-LEARNING = Character(bend=_learning)
-STUBBORN = Character(bend=_stubborn)
-NONNUMERIC = Character(rate=_in_words, decide=_perhaps)
+CARELESS = Character(hear=_mishear, bend=_bend, spoil=_mumble, judge=_overlook)
+LEARNING = Character(bend=_learn)
+STUBBORN = Character(bend=lambda task, right, _: careless.too_far(task.scene, right))
+NONNUMERIC = Character(ratings=(("four",) * 3, ("four",) * 3), verdicts=("perhaps", "perhaps"))
 LOOPING = Character(never_stops=True)
 MISNAMING = Character(first_calls=(("nearest_lane", '{"x_m": 20.0, "y_m": 0.0}'),))
 MISCALLING = Character(

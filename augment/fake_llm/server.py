@@ -1,4 +1,9 @@
-"""The stand-in's HTTP server: /v1/chat/completions and /v1/models on this computer."""
+"""The stand-in's HTTP server and its models, whose names choose the behaviour.
+
+`fake-good` and `fake-careless` play every role; `fake-qa-...` are wrong at first, for ever, or
+review without ratings; three use their function wrongly; each of the others breaks in one way
+that real servers do. It also answers the tiny questions of a probe.
+"""
 
 from __future__ import annotations
 
@@ -7,14 +12,14 @@ import re
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
-from threading import Lock
 
 from augment.fake_llm import careless, playing
 from augment.fake_llm.sight import Intents, knows_nothing
 from augment.fake_llm.wire import (
     BadRequest,
+    Calls,
     ChatRequest,
     Response,
     as_json,
@@ -22,254 +27,13 @@ from augment.fake_llm.wire import (
     completion,
     error,
     prompt_tokens_of,
+    usage,
 )
 
 WINDOW_TOKENS = 2048
 """The context window of `fake-cuts-context`."""
 
 _KEPT_CHARACTERS = 6000
-_WORD = re.compile(r"Answer with the single word: (\w+)")
-_SUM = re.compile(r"How much is (\d+) and (\d+) together\?")
-_DOUBLE = re.compile(r"double the number (\d+)")
-_REMEMBER = re.compile(r"The word to remember is ([\w-]+)\.")
-
-
-def answer_to(request: ChatRequest) -> tuple[str, tuple[tuple[str, str], ...]] | None:
-    """A text and calls (name, arguments); None where the request is no question of a probe."""
-    message = request.messages[-1]
-    text = message.text
-    if match := _WORD.fullmatch(text):
-        return match.group(1), ()
-    if text.startswith("Write a story"):
-        return "A car stood on the road. " * 3, ()  # about as long as the limit allows
-    if match := _SUM.fullmatch(text):
-        total = int(match.group(1)) + int(match.group(2))
-        as_object = request.response_format is not None
-        return (json.dumps({"sum": total}) if as_object else f"That makes {total}."), ()
-    if (match := _DOUBLE.search(text)) and request.tools:
-        arguments = json.dumps({"number": int(match.group(1))})
-        return "", ((request.tools[0].function.name, arguments),)
-    if message.images and text.startswith("Name the colour of the left half"):
-        return "The left half is green, the right half is yellow.", ()
-    if text.rstrip().endswith("Answer with it alone."):
-        match = _REMEMBER.search(text)
-        return (match.group(1) if match else "I was told no word."), ()
-    return None
-
-
-def cut_to_window(request: ChatRequest) -> ChatRequest:
-    """The request as a server sees it that silently drops the front of a long prompt."""
-    last = request.messages[-1]
-    kept = last.model_copy(update={"content": last.text[-_KEPT_CHARACTERS:]})
-    return request.model_copy(update={"messages": [kept]})
-
-
-@dataclass(slots=True)
-class Surroundings:
-    """What an answer may depend on besides its request.
-
-    Attributes:
-        slow_s: How long `fake-slow` keeps everybody waiting.
-        intents: What an instruction asks for, by its text.
-    """
-
-    slow_s: float = 30.0
-    intents: Intents = knows_nothing
-    _seen: set[str] = field(default_factory=set)
-    _lock: Lock = field(default_factory=Lock)
-
-    def is_first(self, request: ChatRequest) -> bool:
-        """Whether this very request comes for the first time."""
-        key = request.model_dump_json()
-        with self._lock:
-            first = key not in self._seen
-            self._seen.add(key)
-        return first
-
-
-Behaviour = Callable[[ChatRequest, Surroundings], Response]
-
-
-def respond(request: ChatRequest, surroundings: Surroundings) -> Response:
-    """What the model of that name answers; an unknown one is a 404 that names the known."""
-    behaviour = MODELS.get(request.model)
-    if behaviour is None:
-        known = ", ".join(sorted(MODELS))
-        message = f"The model {request.model!r} does not exist. Known: {known}."
-        return error(404, message, param="model", code="model_not_found")
-    return behaviour(request, surroundings)
-
-
-def good_answer(request: ChatRequest, surroundings: Surroundings) -> str:
-    """A right answer in whatever role, or an honest one to what is not understood."""
-    return playing.GOOD.answer(request, surroundings.intents).text
-
-
-def _as(character: playing.Character) -> Behaviour:
-    def played(request: ChatRequest, surroundings: Surroundings) -> Response:
-        return as_json(_completed(character, request, surroundings))
-
-    return played
-
-
-def _completed(
-    character: playing.Character, request: ChatRequest, surroundings: Surroundings
-) -> dict[str, object]:
-    probed = answer_to(request)
-    if probed is not None:
-        return completion(request, probed[0] or None, calls=probed[1])
-    answer = character.answer(request, surroundings.intents)
-    return completion(request, answer.text or None, calls=answer.calls)
-
-
-_good = _as(playing.GOOD)
-
-
-def _no_vision(request: ChatRequest, surroundings: Surroundings) -> Response:
-    if any(message.images for message in request.messages):
-        return error(400, "This model does not support image input.", param="messages")
-    return _good(request, surroundings)
-
-
-def _cuts_context(request: ChatRequest, surroundings: Surroundings) -> Response:
-    """As servers do that keep to their window without a word: 200, and the front is gone."""
-    whole = _completed(playing.GOOD, request, surroundings)
-    if prompt_tokens_of(request) <= WINDOW_TOKENS:
-        return as_json(whole)
-    cut = _completed(playing.GOOD, cut_to_window(request), surroundings)
-    window = WINDOW_TOKENS
-    usage = {"prompt_tokens": window, "completion_tokens": 9, "total_tokens": window + 9}
-    return as_json(cut | {"usage": usage})
-
-
-def _slow(request: ChatRequest, surroundings: Surroundings) -> Response:
-    return replace(_good(request, surroundings), wait_s=surroundings.slow_s)
-
-
-def _always(response: Response) -> Behaviour:
-    """The same response to every request."""
-    return lambda request, surroundings: response
-
-
-def _complete(
-    text: str | None, changes: dict[str, object] | None = None, **more: str
-) -> Behaviour:
-    """A completion with that text, whatever is asked."""
-    return lambda request, surroundings: as_json(
-        completion(request, text, **more) | (changes or {})  # type: ignore[arg-type]
-    )
-
-
-def _too_many(retry_after: str) -> Behaviour:
-    return _always(
-        error(
-            429,
-            "Rate limit reached.",
-            kind="requests",
-            code="rate_limit_exceeded",
-            headers={"Retry-After": retry_after},
-        )
-    )
-
-
-def _spoilt_block(fields: str) -> Behaviour:
-    start = json.dumps({"id": "Agent2", "type": "VEHICLE"})[:-1]
-    return _complete(f'Modified Vectors:\n```json\n{{"add": [{start}, {fields}}}]}}\n```\n')
-
-
-_500 = _always(error(500, "The server had an error.", kind="server_error"))
-
-
-def _500_then_ok(request: ChatRequest, surroundings: Surroundings) -> Response:
-    answer = _500 if surroundings.is_first(request) else _good
-    return answer(request, surroundings)
-
-
-def _broken_json(request: ChatRequest, surroundings: Surroundings) -> Response:
-    whole = _good(request, surroundings)
-    return replace(whole, body=whole.body[: len(whole.body) // 2])
-
-
-def _dropped(request: ChatRequest, surroundings: Surroundings) -> Response:
-    whole = _good(request, surroundings)
-    return replace(whole, cut_at=len(whole.body) // 2)
-
-
-def _no_usage(request: ChatRequest, surroundings: Surroundings) -> Response:
-    answer = good_answer(request, surroundings)
-    return as_json(completion(request, answer, with_usage=False))
-
-
-def _cut_off(request: ChatRequest, surroundings: Surroundings) -> Response:
-    text = good_answer(request, surroundings)
-    middle = text.find("```json") + len("```json") + 40
-    return as_json(completion(request, text[:middle], finish_reason="length"))
-
-
-def _garbage(request: ChatRequest, _: Surroundings) -> Response:
-    rng = careless.dice(request.model_dump_json())
-    alphabet = '{}[]",:0123456789.-eE\n\\`#*abcXYZ \u00e9\u2028\x00add"move"remove"call"'
-    return as_json(completion(request, "".join(rng.choices(alphabet, k=2000))))
-
-
-MODELS: dict[str, Behaviour] = {
-    "fake-good": _good,
-    "fake-careless": _as(playing.CARELESS),
-    "fake-qa-low": _as(playing.LEARNING),
-    "fake-qa-never": _as(playing.STUBBORN),
-    "fake-qa-nonnumeric": _as(playing.NONNUMERIC),
-    "fake-tool-loop": _as(playing.LOOPING),
-    "fake-unknown-tool": _as(playing.MISNAMING),
-    "fake-bad-tool-args": _as(playing.MISCALLING),
-    "fake-garbage": _garbage,
-    "fake-no-vision": _no_vision,
-    "fake-cuts-context": _cuts_context,
-    "fake-500": _500,
-    "fake-500-then-ok": _500_then_ok,
-    "fake-429": _too_many("1"),
-    "fake-429-long": _too_many("600"),
-    "fake-quota": _always(
-        error(
-            429,
-            "You exceeded your current quota.",
-            kind="insufficient_quota",
-            code="insufficient_quota",
-        )
-    ),
-    "fake-context": _always(
-        error(
-            400,
-            "This model's maximum context length is 4096 tokens.",
-            param="messages",
-            code="context_length_exceeded",
-        )
-    ),
-    "fake-list-error": _always(
-        as_json(
-            [{"error": {"code": 400, "message": "Invalid value.", "status": "INVALID_ARGUMENT"}}],
-            status=400,
-        )
-    ),
-    "fake-html": _always(
-        Response(body=b"<html><body>Sign in</body></html>", content_type="text/html")
-    ),
-    "fake-slow": _slow,
-    "fake-broken-json": _broken_json,
-    "fake-dropped": _dropped,
-    "fake-no-choices": _complete("", {"choices": []}),
-    "fake-null-choices": _complete("", {"choices": None}),
-    "fake-no-usage": _no_usage,
-    "fake-refuse": _complete(None, refusal="I can't help with that."),
-    "fake-filtered": _complete(None, finish_reason="content_filter"),
-    "fake-prose": _complete(
-        "The car should stand some way ahead of the ego, a little to the side of its lane."
-    ),
-    "fake-cut-off": _cut_off,
-    "fake-nan": _spoilt_block('"x_m": NaN'),
-    "fake-too-few": _spoilt_block('"x_m": 20.0'),
-}
-
-
 _LONGEST_BODY = 32_000_000
 
 
@@ -297,9 +61,10 @@ class FakeServer(ThreadingHTTPServer):
         slow_s: float = 30.0,
         intents: Intents = knows_nothing,
     ) -> None:
-        self.latency_s = latency_s
-        self.surroundings = Surroundings(slow_s=slow_s, intents=intents)
+        self.latency_s, self.slow_s, self.intents = latency_s, slow_s, intents
         self.stopping = threading.Event()
+        self._seen: set[str] = set()
+        self._lock = threading.Lock()
         super().__init__((host, port), _Handler)
 
     @property
@@ -309,10 +74,18 @@ class FakeServer(ThreadingHTTPServer):
         return f"http://{host!s}:{port}/v1"
 
     def stop(self) -> None:
-        """End serving and close; who waits for a slow answer is let go."""
+        """Stop serving and close; whoever waits for a slow answer is let go."""
         self.stopping.set()
         self.shutdown()
         self.server_close()
+
+    def is_first(self, request: ChatRequest) -> bool:
+        """Return whether this very request comes for the first time."""
+        key = request.model_dump_json()
+        with self._lock:
+            first = key not in self._seen
+            self._seen.add(key)
+        return first
 
 
 @contextmanager
@@ -324,7 +97,7 @@ def running(
     slow_s: float = 30.0,
     intents: Intents = knows_nothing,
 ) -> Iterator[FakeServer]:
-    """A server that serves in the background until the block ends.
+    """Serve in the background until the block ends.
 
     Raises:
         OSError: The address is taken or is none of this computer's.
@@ -349,37 +122,34 @@ class _Handler(BaseHTTPRequestHandler):
 
     def do_GET(self) -> None:
         """List the models."""
-        if self.path.rstrip("/") == "/v1/models":
-            models = [{"id": name, "object": "model", "owned_by": "fake"} for name in MODELS]
-            self._send(as_json({"object": "list", "data": models}))
-        else:
-            self._send(_no_such_path(self.path))
+        models = [{"id": name, "object": "model", "owned_by": "fake"} for name in MODELS]
+        is_list = self.path.rstrip("/") == "/v1/models"
+        self._send(as_json({"object": "list", "data": models}) if is_list else self._no_path())
 
     def do_POST(self) -> None:
         """Answer a conversation."""
-        body = self._body()
-        if body is None:
+        length = self.headers.get("Content-Length", "")
+        if not length.isdecimal() or int(length) > _LONGEST_BODY:
             self.close_connection = True
             self._send(error(411, "Content-Length is missing or too large"))
-        elif self.path != "/v1/chat/completions":
-            self._send(_no_such_path(self.path))
-        else:
-            self._send(self._answer(body))
+            return
+        body = self.rfile.read(int(length))
+        if self.path != "/v1/chat/completions":
+            self._send(self._no_path())
+            return
+        try:
+            request = chat_request(body)
+        except BadRequest as refused:
+            self._send(error(400, str(refused), param=refused.param))
+            return
+        self._send(MODELS.get(request.model, _unknown)(request, self.server))
 
     def log_message(self, format: str, *args: object) -> None:
         """Stay quiet: a request may hold what nobody wants in a log."""
 
-    def _answer(self, body: bytes) -> Response:
-        try:
-            return respond(chat_request(body), self.server.surroundings)
-        except BadRequest as refused:
-            return error(400, str(refused), param=refused.param)
-
-    def _body(self) -> bytes | None:
-        length = self.headers.get("Content-Length", "")
-        if not length.isdecimal() or int(length) > _LONGEST_BODY:
-            return None
-        return self.rfile.read(int(length))
+    def _no_path(self) -> Response:
+        shown = json.dumps(self.path[:80])
+        return error(404, f"There is no {shown}; POST to /v1/chat/completions", code="not_found")
 
     def _send(self, response: Response) -> None:
         self.server.stopping.wait(max(self.server.latency_s, response.wait_s))
@@ -392,12 +162,176 @@ class _Handler(BaseHTTPRequestHandler):
             self.end_headers()
             self.wfile.write(response.body[: response.cut_at])
         except (BrokenPipeError, ConnectionResetError):
-            # Who asked has gone: nobody is left to tell.
             self.close_connection = True
         if response.cut_at is not None:
             self.close_connection = True
 
 
-def _no_such_path(path: str) -> Response:
-    shown = json.dumps(path[:80])
-    return error(404, f"There is no {shown}; POST to /v1/chat/completions", code="not_found")
+# --- The models --------------------------------------------------------------------------------
+
+Behaviour = Callable[[ChatRequest, FakeServer], Response]
+
+
+def _unknown(request: ChatRequest, server: FakeServer) -> Response:
+    message = f"The model {request.model!r} does not exist. Known: {', '.join(sorted(MODELS))}."
+    return error(404, message, param="model", code="model_not_found")
+
+
+def _as(character: playing.Character) -> Behaviour:
+    def played(request: ChatRequest, server: FakeServer) -> Response:
+        text, calls = _probed(request) or character.answer(request, server.intents)
+        return as_json(completion(request, text or None, calls=calls))
+
+    return played
+
+
+def _probed(request: ChatRequest) -> tuple[str, Calls] | None:
+    """Answer a question of a probe; None where the request is none."""
+    message = request.messages[-1]
+    text = message.text
+    if match := re.fullmatch(r"Answer with the single word: (\w+)", text):
+        return match[1], ()
+    if text.startswith("Write a story"):
+        return "A car stood on the road. " * 3, ()  # about as long as the limit allows
+    if match := re.fullmatch(r"How much is (\d+) and (\d+) together\?", text):
+        total = int(match[1]) + int(match[2])
+        as_object = request.response_format is not None
+        return (json.dumps({"sum": total}) if as_object else f"That makes {total}."), ()
+    if (match := re.search(r"double the number (\d+)", text)) and request.tools:
+        name = request.tools[0].function.name
+        return "", ((name, json.dumps({"number": int(match[1])})),)
+    if message.images and text.startswith("Name the colour of the left half"):
+        return "The left half is green, the right half is yellow.", ()
+    if text.rstrip().endswith("Answer with it alone."):
+        match = re.search(r"The word to remember is ([\w-]+)\.", text)
+        return (match[1] if match else "I was told no word."), ()
+    return None
+
+
+_good = _as(playing.GOOD)
+
+
+def _good_text(request: ChatRequest, server: FakeServer) -> str:
+    return playing.GOOD.answer(request, server.intents)[0]
+
+
+def _no_vision(request: ChatRequest, server: FakeServer) -> Response:
+    if any(message.images for message in request.messages):
+        return error(400, "This model does not support image input.", param="messages")
+    return _good(request, server)
+
+
+def _cuts_context(request: ChatRequest, server: FakeServer) -> Response:
+    """Answer as servers do that keep to their window without a word: the front is gone."""
+    if prompt_tokens_of(request) <= WINDOW_TOKENS:
+        return _good(request, server)
+    last = request.messages[-1]
+    kept = last.model_copy(update={"content": last.text[-_KEPT_CHARACTERS:]})
+    cut = _good(request.model_copy(update={"messages": [kept]}), server)
+    return as_json(json.loads(cut.body) | {"usage": usage(WINDOW_TOKENS, 9)})
+
+
+def _slow(request: ChatRequest, server: FakeServer) -> Response:
+    return replace(_good(request, server), wait_s=server.slow_s)
+
+
+def _500_then_ok(request: ChatRequest, server: FakeServer) -> Response:
+    return (_500 if server.is_first(request) else _good)(request, server)
+
+
+def _broken_json(request: ChatRequest, server: FakeServer) -> Response:
+    whole = _good(request, server)
+    return replace(whole, body=whole.body[: len(whole.body) // 2])
+
+
+def _dropped(request: ChatRequest, server: FakeServer) -> Response:
+    whole = _good(request, server)
+    return replace(whole, cut_at=len(whole.body) // 2)
+
+
+def _no_usage(request: ChatRequest, server: FakeServer) -> Response:
+    return as_json(completion(request, _good_text(request, server), with_usage=False))
+
+
+def _cut_off(request: ChatRequest, server: FakeServer) -> Response:
+    text = _good_text(request, server)
+    middle = text.find("```json") + len("```json") + 40
+    return as_json(completion(request, text[:middle], finish_reason="length"))
+
+
+def _garbage(request: ChatRequest, server: FakeServer) -> Response:
+    rng = careless.dice(request.model_dump_json())
+    alphabet = '{}[]",:0123456789.-eE\n\\`#*abcXYZ \u00e9\u2028\x00add"move"remove"call"'
+    return as_json(completion(request, "".join(rng.choices(alphabet, k=2000))))
+
+
+def _always(response: Response) -> Behaviour:
+    """Give the same response to every request."""
+    return lambda request, server: response
+
+
+def _complete(
+    text: str | None, changes: dict[str, object] | None = None, **more: str
+) -> Behaviour:
+    """Complete every request with that text."""
+    return lambda request, server: as_json(
+        completion(request, text, **more) | (changes or {})  # type: ignore[arg-type]
+    )
+
+
+def _too_many(retry_after: str) -> Behaviour:
+    headers = {"Retry-After": retry_after}
+    message, code = "Rate limit reached.", "rate_limit_exceeded"
+    return _always(error(429, message, kind="requests", code=code, headers=headers))
+
+
+def _spoilt_block(fields: str) -> Behaviour:
+    agent = f'{{"id": "Agent2", "type": "VEHICLE", {fields}}}'
+    return _complete(f'Modified Vectors:\n```json\n{{"add": [{agent}]}}\n```\n')
+
+
+_500 = _always(error(500, "The server had an error.", kind="server_error"))
+_QUOTA, _TOO_LONG = "insufficient_quota", "context_length_exceeded"
+_LIST_ERROR = {"error": {"code": 400, "message": "Invalid value.", "status": "INVALID_ARGUMENT"}}
+
+MODELS: dict[str, Behaviour] = {
+    "fake-good": _good,
+    "fake-careless": _as(playing.CARELESS),
+    "fake-qa-low": _as(playing.LEARNING),
+    "fake-qa-never": _as(playing.STUBBORN),
+    "fake-qa-nonnumeric": _as(playing.NONNUMERIC),
+    "fake-tool-loop": _as(playing.LOOPING),
+    "fake-unknown-tool": _as(playing.MISNAMING),
+    "fake-bad-tool-args": _as(playing.MISCALLING),
+    "fake-garbage": _garbage,
+    "fake-no-vision": _no_vision,
+    "fake-cuts-context": _cuts_context,
+    "fake-500": _500,
+    "fake-500-then-ok": _500_then_ok,
+    "fake-429": _too_many("1"),
+    "fake-429-long": _too_many("600"),
+    "fake-quota": _always(
+        error(429, "You exceeded your current quota.", kind=_QUOTA, code=_QUOTA)
+    ),
+    "fake-context": _always(
+        error(400, "This model's maximum context length is 4096 tokens.", code=_TOO_LONG)
+    ),
+    "fake-list-error": _always(as_json([_LIST_ERROR], status=400)),
+    "fake-html": _always(
+        Response(body=b"<html><body>Sign in</body></html>", content_type="text/html")
+    ),
+    "fake-slow": _slow,
+    "fake-broken-json": _broken_json,
+    "fake-dropped": _dropped,
+    "fake-no-choices": _complete("", {"choices": []}),
+    "fake-null-choices": _complete("", {"choices": None}),
+    "fake-no-usage": _no_usage,
+    "fake-refuse": _complete(None, refusal="I can't help with that."),
+    "fake-filtered": _complete(None, finish_reason="content_filter"),
+    "fake-prose": _complete(
+        "The car should stand some way ahead of the ego, a little to the side of its lane."
+    ),
+    "fake-cut-off": _cut_off,
+    "fake-nan": _spoilt_block('"x_m": NaN'),
+    "fake-too-few": _spoilt_block('"x_m": 20.0'),
+}

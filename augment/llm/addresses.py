@@ -10,9 +10,10 @@ from __future__ import annotations
 
 import socket
 from collections.abc import Callable
+from contextlib import suppress
 from ipaddress import IPv4Address, IPv6Address, IPv6Network, ip_address
 from typing import Any
-from urllib.parse import SplitResult, urlsplit
+from urllib.parse import urlsplit
 
 from augment.errors import InvalidDocument
 
@@ -23,15 +24,11 @@ _METADATA_NAMES = frozenset(
     {"metadata", "metadata.google.internal", "metadata.goog", "metadata.azure.internal"}
     | {"instance-data", "instance-data.ec2.internal"}
 )
+# Beside those of 169.254.0.0/16, which are link-local: Alibaba, Oracle, Azure; AWS, its pods,
+# Google, Scaleway.
 _METADATA_ADDRESSES = frozenset(
-    ip_address(text)
-    for text in (
-        # Beside those of 169.254.0.0/16, which are link-local: Alibaba, Oracle, Azure; AWS,
-        # its pods, Google, Scaleway.
-        *("100.100.100.200", "192.0.0.192", "168.63.129.16"),
-        *("fd00:ec2::254", "fd00:ec2::23", "fd20:ce::254", "fd00:42::42"),
-    )
-)
+    map(ip_address, ("100.100.100.200", "192.0.0.192", "168.63.129.16"))
+) | frozenset(map(ip_address, ("fd00:ec2::254", "fd00:ec2::23", "fd20:ce::254", "fd00:42::42")))
 _STAND_FOR_IPV4 = tuple(
     IPv6Network(text)
     for text in (
@@ -41,16 +38,29 @@ _STAND_FOR_IPV4 = tuple(
     )
 )
 _LOOPBACK = IPv6Address("::1")
+_FORBIDDEN = "a link-local or metadata address, or one that stands for another"
 
 
 def check_base_url(base_url: str) -> str:
-    """The address without a slash at its end.
+    """Return the address without a slash at its end.
 
     Raises:
         InvalidDocument: It is no http(s) address, it carries a password or a query, or it is a
             link-local, metadata or translated address.
     """
-    problem = _problem(base_url)
+    problem, host = "", ""
+    try:
+        parts = urlsplit(base_url)
+        parts.port  # noqa: B018 - reading it is what checks it
+        host = (parts.hostname or "").rstrip(".").lower()
+    except ValueError:
+        parts = urlsplit("")
+    if parts.scheme not in {"http", "https"} or not host:
+        problem = "an address such as https://api.openai.com/v1 is needed"
+    elif parts.username or parts.password or parts.query or parts.fragment:
+        problem = "keys and passwords don't belong into the address; name a variable for the key"
+    elif host in _METADATA_NAMES or _is_forbidden(host):
+        problem = f"{host} is {_FORBIDDEN}; no model is served from there"
     if problem:
         raise InvalidDocument("endpoint", [("base_url", problem)])
     return base_url.rstrip("/")
@@ -64,17 +74,15 @@ def check_resolved(base_url: str, *, resolve: Resolve = socket.getaddrinfo) -> N
     Raises:
         InvalidDocument: One of its addresses is forbidden.
     """
-    parts = _split(base_url)
-    try:
-        addresses_of((parts.hostname if parts else None) or "", resolve=resolve)
-    except (OSError, UnicodeError):
-        return
+    # ValueError also where the address can't be taken apart, UnicodeError among them.
+    with suppress(OSError, ValueError):
+        addresses_of(urlsplit(base_url).hostname or "", resolve=resolve)
 
 
 def addresses_of(
     host: str, *, resolve: Resolve = socket.getaddrinfo, checks: bool = True
 ) -> list[str]:
-    """The addresses of a host as numbers, in the order in which they are to be tried.
+    """Return the addresses of a host as numbers, in the order in which they are to be tried.
 
     Args:
         host: A name or a number.
@@ -88,71 +96,28 @@ def addresses_of(
     entries = resolve(host, None, type=socket.SOCK_STREAM)
     addresses = list(dict.fromkeys(str(entry[4][0]) for entry in entries))
     for text in addresses if checks else ():
-        address = _address(text)
-        if address is None or _is_forbidden(address):
+        if _is_forbidden(text, unknown=True):
             problem = f"{host} leads to {text}, {_FORBIDDEN}"
             raise InvalidDocument("endpoint", [("base_url", problem)])
     return addresses
 
 
-# --- Private -----------------------------------------------------------------------------------
-
-_FORBIDDEN = "a link-local or metadata address, or one that stands for another"
+# Private
 
 
-def _problem(base_url: str) -> str | None:
-    """What is wrong with the address, None when nothing is."""
-    parts = _split(base_url)
-    if parts is None or parts.scheme not in {"http", "https"} or not parts.hostname:
-        return "an address such as https://api.openai.com/v1 is needed"
-    if parts.username or parts.password or parts.query or parts.fragment:
-        return "keys and passwords don't belong into the address; name a variable for the key"
-    host = parts.hostname.rstrip(".").lower()
-    if _is_forbidden_host(host):
-        return (
-            f"{host} is a link-local or metadata address, or one that stands for another; no "
-            "model is served from there"
-        )
-    return None
-
-
-def _is_forbidden_host(host: str) -> bool:
-    """Return whether a host is forbidden by its name or as an address literal."""
-    name = host.rstrip(".").lower()
-    address = _address(name)
-    return name in _METADATA_NAMES or (address is not None and _is_forbidden(address))
-
-
-def _split(base_url: str) -> SplitResult | None:
-    """The parts, None when it can't be taken apart (a port of letters, half a bracket)."""
-    try:
-        parts = urlsplit(base_url)
-        parts.port  # noqa: B018 - reading it is what checks it
-    except ValueError:
-        return None
-    return parts
-
-
-def _address(host: str) -> IPv4Address | IPv6Address | None:
-    """The number that a host is written as, also in the short and hexadecimal forms of C."""
+def _is_forbidden(host: str, *, unknown: bool = False) -> bool:
+    """Return whether a number is forbidden, also in the forms of C; `unknown` for a name."""
+    address: IPv4Address | IPv6Address
     try:
         address = ip_address(host.partition("%")[0])
     except ValueError:
         try:
-            return IPv4Address(socket.inet_aton(host))
+            address = IPv4Address(socket.inet_aton(host))
         except OSError:
-            return None
-    return address
-
-
-def _is_forbidden(address: IPv4Address | IPv6Address) -> bool:
-    stands_for_another = (
-        isinstance(address, IPv6Address)
-        and address != _LOOPBACK
-        and any(address in network for network in _STAND_FOR_IPV4)
-    )
+            return unknown
+    is_other_v6 = isinstance(address, IPv6Address) and address != _LOOPBACK
     return (
-        stands_for_another
+        (is_other_v6 and any(address in network for network in _STAND_FOR_IPV4))
         or address.is_link_local
         or address.is_multicast
         or address.is_unspecified

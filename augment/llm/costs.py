@@ -8,11 +8,9 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from dataclasses import dataclass
 from decimal import Decimal
-
-import numpy as np
-from numpy.typing import NDArray
 
 from augment.errors import ContextTruncated
 from augment.llm.messages import Reply, Request
@@ -100,44 +98,16 @@ _WINDOWS = frozenset({2048, 4096, 8192})
 _FAR_BELOW = 0.7
 """So much less than the lower bound is no vocabulary's doing."""
 
-_SPACE, _SIGN, _DIGIT, _LETTER = range(4)
-
-
-def _classes() -> NDArray[np.uint8]:
-    """What each byte of UTF-8 is; beyond ASCII everything passes for a letter."""
-    table = np.full(256, _LETTER, dtype=np.uint8)
-    for code in range(128):
-        sign = chr(code)
-        if sign.isspace():
-            table[code] = _SPACE
-        elif sign.isdigit():
-            table[code] = _DIGIT
-        elif not sign.isalpha():
-            table[code] = _SIGN
-    return table
-
-
-_CLASSES = _classes()
+# Words, numbers of up to three digits, and runs of signs, but for one sign before a word; beyond
+# ASCII everything passes for a letter.
+_LETTER = r"[A-Za-z\u0080-\U0010ffff]"
+_SIGN = r"[^\s0-9A-Za-z\u0080-\U0010ffff]"
+_PIECE = re.compile(rf"{_LETTER}+|[0-9]{{1,3}}|{_SIGN}{{2,}}|{_SIGN}(?!{_LETTER})")
 
 
 def least_tokens(text: str) -> int:
-    """A number of tokens that the text has at least, whatever the vocabulary.
-
-    Usual vocabularies cut at least between words, numbers of up to three digits and runs of
-    signs; one sign before a word may belong to it. Counted over arrays, because a prompt has tens
-    of thousands of characters and this stands in the way of every answer.
-    """
-    kinds = _CLASSES[np.frombuffer(text.encode(errors="replace"), dtype=np.uint8)]
-    if not len(kinds):
-        return 0
-    starts = np.flatnonzero(np.diff(kinds, prepend=kinds[0] + 1))
-    lengths = np.diff(starts, append=len(kinds))
-    kind = kinds[starts]
-    before_word = np.append(kind[1:] == _LETTER, False)
-    words = int(np.count_nonzero(kind == _LETTER))
-    numbers = int(((lengths[kind == _DIGIT] + 2) // 3).sum())
-    signs = int(np.count_nonzero((kind == _SIGN) & (lengths > before_word)))
-    return words + numbers + signs
+    """Return how many tokens the text has at least: usual vocabularies cut at least there."""
+    return len(_PIECE.findall(text))
 
 
 def cut_of(
@@ -164,20 +134,13 @@ def cut_of(
             f"at least {least}; give it a larger context window"
         )
     windows = _WINDOWS if context_tokens is None else {context_tokens}
-    total = counted + _unfinished_tokens(request, reply)
+    # The length of an answer that ended before its own end and its limit.
+    written = reply.completion_tokens or 0
+    is_finished = reply.finish_reason == "stop" or written >= request.max_tokens
+    total = counted + (0 if is_finished else written)
     if total in windows and (total > counted or counted < least):
         return ContextTruncated(
             f"the endpoint silently cut the prompt: its count of tokens ends exactly at {total}, "
             "a context window; give it a larger one"
         )
     return None
-
-
-# --- Private -----------------------------------------------------------------------------------
-
-
-def _unfinished_tokens(request: Request, reply: Reply) -> int:
-    """Return the length of an answer that ended before its own end and its limit, else 0."""
-    written = reply.completion_tokens or 0
-    is_finished = reply.finish_reason == "stop" or written >= request.max_tokens
-    return 0 if is_finished else written

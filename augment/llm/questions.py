@@ -5,12 +5,12 @@ None of them can be answered well by chance, or by a server that drops what it d
 
 from __future__ import annotations
 
+import base64
 import json
-import struct
-import zlib
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import Any
 
 from augment.llm.messages import AnswerSchema, Message, Reply, Request, Speaker, Tool
 
@@ -21,8 +21,13 @@ MAX_TOKENS = 1024
 LIMIT_TOKENS = 16
 """The limit of an answer that would be much longer."""
 
-_SIDE_PX = 96
-_GREEN, _YELLOW = (0, 128, 0), (255, 255, 0)
+# Green on the left, yellow on the right, 96 x 96 pixels.
+_TWO_HALVES = base64.b64decode(
+    "iVBORw0KGgoAAAANSUhEUgAAAGAAAABgCAIAAABt+uBvAAAAvklEQVR4nO3QMQ3AMAAEsUAv82Qvgb/BkhH4nO+k"
+    "3NuyHxEkSJCgkPmIIEGCBIXsRwQJEiQoZD4iSJAgQSH7EUGCBAkKmY8IEiRIUMh+RJAgQYJC5iOCBAkSFLIfESRI"
+    "kKCQ+YggQYIEhexHBAkSJChkPiJIkCBBIfsRQYIECQqZjwgSJEhQyH5EkCBBgkLmI4IECRIUsh8RJEiQoJD5iCBB"
+    "ggSF7EcECRIkKGQ+IkiQIEEh+xFBggQJCpmP/DzArd6VCqDv6wAAAABJRU5ErkJggg=="
+)
 
 
 class Ability(StrEnum):
@@ -53,106 +58,69 @@ class ProbeQuestion:
 
 
 def questions_for(model: str) -> tuple[ProbeQuestion, ...]:
-    """The questions in the order in which they are asked; the first decides about the others."""
+    """Return the questions in order; the first decides about the rest."""
+
+    def question(
+        ability: Ability,
+        text: str,
+        is_good: Callable[[Reply], bool | None],
+        parameter: str = "",
+        images: tuple[bytes, ...] = (),
+        **changes: Any,
+    ) -> ProbeQuestion:
+        message = Message(speaker=Speaker.USER, text=text, images=images)
+        request = Request(
+            model=model, messages=(message,), **({"max_tokens": MAX_TOKENS} | changes)
+        )
+        return ProbeQuestion(
+            ability=ability, request=request, is_good=is_good, parameter=parameter
+        )
+
+    ready, steady = ("Answer with the single word: " + word for word in ("ready", "steady"))
+    story = "Write a story of five hundred words about a car."
+    total = "How much is 19 and 23 together?"
+    twice = "Use the function to double the number 21."
+    halves = "Name the colour of the left half of the picture, then that of the right half."
+    steadily: dict[str, Any] = {"temperature": 0.0, "seed": 1}
     return (
-        _question(model, Ability.ANSWERS, "Answer with the single word: ready", _says("ready")),
-        _question(
-            model,
-            Ability.ANSWER_LIMIT,
-            "Write a story of five hundred words about a car.",
-            _keeps_limit,
-            max_tokens=LIMIT_TOKENS,
-        ),
-        _question(
-            model,
-            Ability.TEMPERATURE,
-            "Answer with the single word: steady",
-            _says("steady"),
-            parameter="temperature",
-            temperature=0.0,
-            seed=1,
-        ),
-        _question(
-            model,
-            Ability.JSON_SCHEMA,
-            "How much is 19 and 23 together?",
-            _is_sum,
-            parameter="response_format",
-            answer_schema=_SUM,
-        ),
-        _question(
-            model,
-            Ability.NATIVE_TOOLS,
-            "Use the function to double the number 21.",
-            lambda reply: any(call.name == _DOUBLE.name for call in reply.tool_calls),
-            parameter="tools",
-            tools=(_DOUBLE,),
-        ),
-        _question(
-            model,
-            Ability.VISION,
-            "Name the colour of the left half of the picture, then that of the right half.",
-            _sees_both_halves,
-            images=(two_halves(),),
-        ),
-        _question(model, Ability.WHOLE_PROMPT, _long_text(), _says(MARKER)),
+        question(Ability.ANSWERS, ready, _says("ready")),
+        question(Ability.ANSWER_LIMIT, story, _keeps_limit, max_tokens=LIMIT_TOKENS),
+        question(Ability.TEMPERATURE, steady, _says("steady"), "temperature", **steadily),
+        question(Ability.JSON_SCHEMA, total, _is_sum, "response_format", answer_schema=_SUM),
+        question(Ability.NATIVE_TOOLS, twice, _calls_double, "tools", tools=(_DOUBLE,)),
+        question(Ability.VISION, halves, _sees_both_halves, images=(_TWO_HALVES,)),
+        question(Ability.WHOLE_PROMPT, _long_text(), _says(MARKER)),
     )
 
 
-def two_halves() -> bytes:
-    """A PNG that is green on the left and yellow on the right."""
-    half = _SIDE_PX // 2
-    row = b"\0" + bytes(_GREEN) * half + bytes(_YELLOW) * half
-    header = struct.pack(">IIBBBBB", _SIDE_PX, _SIDE_PX, 8, 2, 0, 0, 0)
-    chunks = ((b"IHDR", header), (b"IDAT", zlib.compress(row * _SIDE_PX)), (b"IEND", b""))
-    return b"\x89PNG\r\n\x1a\n" + b"".join(_chunk(kind, data) for kind, data in chunks)
+# Private
 
 
-# --- Private -----------------------------------------------------------------------------------
-
-_SUM = AnswerSchema(
-    name="sum",
-    schema={
+def _one_number(name: str) -> dict[str, object]:
+    return {
         "type": "object",
-        "properties": {"sum": {"type": "integer"}},
-        "required": ["sum"],
+        "properties": {name: {"type": "integer"}},
+        "required": [name],
         "additionalProperties": False,
-    },
-)
+    }
+
+
+_SUM = AnswerSchema(name="sum", schema=_one_number("sum"))
 _DOUBLE = Tool(
-    name="double",
-    description="Doubles a whole number.",
-    parameters={
-        "type": "object",
-        "properties": {"number": {"type": "integer"}},
-        "required": ["number"],
-        "additionalProperties": False,
-    },
+    name="double", description="Doubles a whole number.", parameters=_one_number("number")
 )
-
-
-def _question(
-    model: str,
-    ability: Ability,
-    text: str,
-    is_good: Callable[[Reply], bool | None],
-    *,
-    parameter: str = "",
-    images: tuple[bytes, ...] = (),
-    max_tokens: int = MAX_TOKENS,
-    **changes: object,
-) -> ProbeQuestion:
-    message = Message(speaker=Speaker.USER, text=text, images=images)
-    request = Request(model=model, messages=(message,), max_tokens=max_tokens, **changes)  # type: ignore[arg-type]
-    return ProbeQuestion(ability=ability, request=request, is_good=is_good, parameter=parameter)
 
 
 def _says(word: str) -> Callable[[Reply], bool]:
     return lambda reply: word in reply.text.lower()
 
 
+def _calls_double(reply: Reply) -> bool:
+    return any(call.name == _DOUBLE.name for call in reply.tool_calls)
+
+
 def _keeps_limit(reply: Reply) -> bool | None:
-    """Twice the limit is allowed: servers count the end of an answer differently."""
+    """Allow twice the limit: servers count the end of an answer differently."""
     written = reply.completion_tokens
     if written is None:
         return None
@@ -174,7 +142,7 @@ def _sees_both_halves(reply: Reply) -> bool:
 
 
 def _long_text() -> str:
-    """A word to remember, some 6,000 tokens of nothing, and the question for the word."""
+    """Return a word to remember, some 6,000 tokens of nothing, and the question for the word."""
     lines = [f"The word to remember is {MARKER}.", "What follows is of no importance."]
     lines += [
         f"Line {number}: a car of {number % 7 + 3}.{number % 10} m stands {number * 13 % 97} m "
@@ -183,8 +151,3 @@ def _long_text() -> str:
     ]
     lines.append("Which word were you told to remember at the very start? Answer with it alone.")
     return "\n".join(lines)
-
-
-def _chunk(kind: bytes, data: bytes) -> bytes:
-    checksum = struct.pack(">I", zlib.crc32(kind + data))
-    return struct.pack(">I", len(data)) + kind + data + checksum

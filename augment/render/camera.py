@@ -19,7 +19,7 @@ import numpy as np
 from PIL import Image, ImageDraw
 
 from augment.geometry.polyline import FloatArray
-from augment.render.shapes import ribbon
+from augment.render.shapes import ring_of, sides
 from augment.scene.entities import Modification, Scene, TrafficAgent
 from augment.scene.lane_graph import AnyLane
 
@@ -69,7 +69,7 @@ class Camera:
         return round((self.y_max_m - self.y_min_m) * self.px_per_m)
 
     def at_width(self, width_px: int) -> Camera:
-        """The same window as a picture of another width."""
+        """Return the same window as a picture of another width."""
         return replace(self, px_per_m=width_px / (self.x_max_m - self.x_min_m))
 
     @property
@@ -80,14 +80,14 @@ class Camera:
         return f"{LOOK}-{hashlib.sha256(shown.encode()).hexdigest()[:8]}"
 
     def to_pixels(self, points_m: FloatArray) -> FloatArray:
-        """Points (N, 2) of the ego frame as pixel coordinates (N, 2), also outside the picture."""
+        """Return points (N, 2) of the ego frame as pixels (N, 2), also outside the picture."""
         scale = self.px_per_m
         pixels = np.asarray(points_m, dtype=np.float64) * (scale, -scale)
         pixels += (-self.x_min_m * scale, self.y_max_m * scale)
         return pixels
 
     def shows(self, points_m: FloatArray, margin_m: float = 0.0) -> bool:
-        """Whether the bounding box of points (N, 2) touches the window, widened by a margin."""
+        """Return whether the bounding box of points (N, 2) touches the window with a margin."""
         low, high = np.min(points_m, axis=0), np.max(points_m, axis=0)
         return bool(
             high[0] >= self.x_min_m - margin_m
@@ -99,49 +99,6 @@ class Camera:
 
 AROUND_THE_EGO = Camera(x_min_m=-60.0, x_max_m=100.0, y_min_m=-60.0, y_max_m=60.0, px_per_m=10.0)
 """The same for every scene, and wide: on it objects are placed by hand."""
-
-
-@dataclass(frozen=True, slots=True)
-class _Need:
-    """What a window must hold, in whole metres: low and high corner."""
-
-    x_min: float
-    x_max: float
-    y_min: float
-    y_max: float
-
-    def and_points(self, points_m: FloatArray) -> _Need:
-        low = np.floor(points_m.min(axis=0) - MARGIN_M)
-        high = np.ceil(points_m.max(axis=0) + MARGIN_M)
-        return _Need(
-            min(self.x_min, float(low[0])),
-            max(self.x_max, float(high[0])),
-            min(self.y_min, float(low[1])),
-            max(self.y_max, float(high[1])),
-        )
-
-    def width_m(self, ratio: float, least_m: float) -> float:
-        """The least width in whole steps of a window of a shape that holds it."""
-        wanted = max(least_m, self.x_max - self.x_min, (self.y_max - self.y_min) * ratio)
-        return math.ceil(wanted / WIDTH_STEP_M) * WIDTH_STEP_M
-
-
-@dataclass(frozen=True, slots=True)
-class _Window:
-    x_min: float
-    y_min: float
-    width: float
-    height: float
-    blank_share: float
-
-    def camera(self) -> Camera:
-        return Camera(
-            x_min_m=self.x_min,
-            x_max_m=self.x_min + self.width,
-            y_min_m=self.y_min,
-            y_max_m=self.y_min + self.height,
-            px_per_m=WIDTH_PX / self.width,
-        )
 
 
 @lru_cache(maxsize=16)
@@ -162,82 +119,90 @@ def camera_for(
         reference: The scenario's reference, None without one.
         changes: What the scenario's contestants made of it.
     """
-    half_m = scene.ego.length_m / 2.0
     ahead_m = _OPEN_AHEAD_M if reference is None else _AHEAD_M
-    need = _Need(-math.ceil(half_m + _BEHIND_M), ahead_m, -_BESIDE_M, _BESIDE_M)
     least_m = OPEN_WIDTH_M if reference is None else LEAST_WIDTH_M
+    behind_m = -math.ceil(scene.ego.length_m / 2.0 + _BEHIND_M)
+    need = np.array([[behind_m, -_BESIDE_M], [ahead_m, _BESIDE_M]])
     places = [*_places(scene, reference or Modification())]
     for change in changes:
         places += [one for one in _places(scene, change) if _distance_m(one) <= FOLLOWED_M]
     for place in sorted(places, key=_distance_m):
-        more = need.and_points(place)
-        if more.width_m(TALL, least_m) <= MAX_WIDTH_M:
+        low = np.floor(np.minimum(need[0], place.min(axis=0) - MARGIN_M))
+        high = np.ceil(np.maximum(need[1], place.max(axis=0) + MARGIN_M))
+        more = np.array([low, high])
+        if _width_m(more, TALL, least_m) <= MAX_WIDTH_M:
             need = more
-    ground = _Ground(scene, need, reach_m=1.5 * need.width_m(TALL, least_m))
-    tall, long = (_best(need, ground, ratio, least_m) for ratio in (TALL, LONG))
-    is_worth_it = long.blank_share < tall.blank_share - _GAIN_SHARE and long.width <= min(
-        tall.width * _MOST_WIDENING, MAX_WIDTH_M
+    origin = need[1] - 1.5 * _width_m(need, TALL, least_m)
+    sums = _ground_sums(scene, origin, need[0] - need[1] + 3.0 * _width_m(need, TALL, least_m))
+    (tall, tall_share), (long, long_share) = (
+        _best(need, ratio, least_m, origin, sums) for ratio in (TALL, LONG)
     )
-    return (long if is_worth_it else tall).camera()
+    widest_m = min((tall.x_max_m - tall.x_min_m) * _MOST_WIDENING, MAX_WIDTH_M)
+    is_worth_it = long_share > tall_share + _GAIN_SHARE
+    return long if is_worth_it and long.x_max_m - long.x_min_m <= widest_m else tall
 
 
-class _Ground:
-    """How much of a rectangle is road, walkway or crosswalk, from sums over a coarse raster."""
-
-    def __init__(self, scene: Scene, need: _Need, reach_m: float) -> None:
-        self._x0, self._y0 = need.x_max - reach_m, need.y_max - reach_m
-        size_m = (need.x_min + reach_m - self._x0, need.y_min + reach_m - self._y0)
-        raster = Image.new("L", (int(size_m[0] * _CELLS_PER_M), int(size_m[1] * _CELLS_PER_M)))
-        pen = ImageDraw.Draw(raster)
-        lanes: list[AnyLane] = [*scene.lanes, *scene.connectors]
-        for polygon in (
-            *(ribbon(lane) for lane in lanes),
-            *(np.array(area.boundary_m, dtype=np.float64) for area in scene.areas),
-        ):
-            cells = (polygon - (self._x0, self._y0)) * _CELLS_PER_M
-            pen.polygon([(x, y) for x, y in cells.tolist()], fill=1)
-        sums = np.asarray(raster).astype(np.int64).cumsum(axis=0).cumsum(axis=1)
-        self._sums = np.pad(sums, ((1, 0), (1, 0)))
-
-    def share(
-        self, x_min: FloatArray, y_min: FloatArray, width: float, height: float
-    ) -> FloatArray:
-        """Of rectangles of one size with lower left corners x_min (C,) by y_min (R,): (R, C)."""
-        left = ((x_min - self._x0) * _CELLS_PER_M).astype(int)[None, :]
-        low = ((y_min - self._y0) * _CELLS_PER_M).astype(int)[:, None]
-        across, up = int(width * _CELLS_PER_M), int(height * _CELLS_PER_M)
-        sums = self._sums
-        covered = sums[low + up, left + across] - sums[low, left + across]
-        covered = covered - sums[low + up, left] + sums[low, left]
-        return np.asarray(covered / (across * up), dtype=np.float64)
+# Private
 
 
-def _best(need: _Need, ground: _Ground, ratio: float, least_m: float) -> _Window:
-    """Of the least windows of a shape the one with most ground; the most usual among equals.
+def _width_m(need: FloatArray, ratio: float, least_m: float) -> float:
+    """Return the least width in whole steps of a window of a shape that holds what is needed."""
+    across, up = (need[1] - need[0]).tolist()
+    return float(math.ceil(max(least_m, across, up * ratio) / WIDTH_STEP_M) * WIDTH_STEP_M)
 
-    As usual is one with the ego in the middle of its height and a quarter behind its left edge.
+
+def _ground_sums(scene: Scene, origin_m: FloatArray, size_m: FloatArray) -> np.ndarray:
+    """Return sums over a coarse raster of road, walkways and crosswalks, (R + 1, C + 1)."""
+    width, height = (int(side * _CELLS_PER_M) for side in size_m)
+    raster = Image.new("L", (width, height))
+    pen = ImageDraw.Draw(raster)
+    lanes: list[AnyLane] = [*scene.lanes, *scene.connectors]
+    for polygon in (
+        *(ring_of(*sides(lane)) for lane in lanes),
+        *(np.array(area.boundary_m, dtype=np.float64) for area in scene.areas),
+    ):
+        cells = (polygon - origin_m) * _CELLS_PER_M
+        pen.polygon([(x, y) for x, y in cells.tolist()], fill=1)
+    sums = np.asarray(raster).astype(np.int64).cumsum(axis=0).cumsum(axis=1)
+    return np.pad(sums, ((1, 0), (1, 0)))
+
+
+def _best(
+    need: FloatArray, ratio: float, least_m: float, origin_m: FloatArray, sums: np.ndarray
+) -> tuple[Camera, float]:
+    """Return the least window of a shape with most ground, and the share of ground in it.
+
+    Among equals the most usual one, with the ego in the middle of its height and a quarter
+    behind its left edge.
     """
-    width = need.width_m(ratio, least_m)
+    width = _width_m(need, ratio, least_m)
     height = width / ratio
-    x_min = np.arange(need.x_max - width, need.x_min + 0.5)
-    y_min = np.arange(math.ceil(need.y_max - height), math.floor(need.y_min) + 0.5)
-    share = ground.share(x_min, y_min, width, height)
+    x_min = np.arange(need[1, 0] - width, need[0, 0] + 0.5)
+    y_min = np.arange(math.ceil(need[1, 1] - height), math.floor(need[0, 1]) + 0.5)
+    left = ((x_min - origin_m[0]) * _CELLS_PER_M).astype(int)[None, :]
+    low = ((y_min - origin_m[1]) * _CELLS_PER_M).astype(int)[:, None]
+    across, up = int(width * _CELLS_PER_M), int(height * _CELLS_PER_M)
+    covered = sums[low + up, left + across] - sums[low, left + across]
+    share = (covered - sums[low + up, left] + sums[low, left]) / (across * up)
     usual = np.abs(x_min + width / 4.0)[None, :] + np.abs(y_min + height / 2.0)[:, None]
     # Half a hundredth of ground is nothing that anybody sees.
     order = np.lexsort((usual.ravel(), -np.round(share.ravel() * 200.0)))
     row, column = divmod(int(order[0]), len(x_min))
-    return _Window(
-        float(x_min[column]), float(y_min[row]), width, height, 1.0 - float(share[row, column])
+    x_m, y_m = float(x_min[column]), float(y_min[row])
+    camera = Camera(
+        x_min_m=x_m,
+        x_max_m=x_m + width,
+        y_min_m=y_m,
+        y_max_m=y_m + height,
+        px_per_m=WIDTH_PX / width,
     )
+    return camera, float(share[row, column])
 
 
 def _places(scene: Scene, change: Modification) -> Iterator[FloatArray]:
-    """The points (N, 2) of each place that a change touches."""
+    """Yield the points (N, 2) of each place that a change touches."""
     touched = {agent.id for agent in change.moved} | set(change.removed)
-    for agent in scene.agents:
-        if agent.id in touched:
-            yield _footprint(agent)
-    for agent in change.changed:
+    for agent in (*(one for one in scene.agents if one.id in touched), *change.changed):
         yield _footprint(agent)
 
 

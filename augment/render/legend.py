@@ -1,4 +1,9 @@
-"""What the marks of a reviewers' picture mean: a strip of samples with words, beneath it."""
+"""What a picture shows, in words: its legend, the names of its entries, the list of its changes.
+
+The list tells what the picture tells, and of what lies outside of it as well. Whatever is drawn in
+the changed colour is "changed", be it added or moved; whatever stood there before and no longer
+does is "gone". Ids, sizes and the order of a modification leave no trace, and numbers are rounded.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +18,7 @@ from augment.geometry.frames import wrap
 from augment.geometry.polyline import FloatArray
 from augment.render import palette
 from augment.render.camera import Camera
-from augment.render.canvas import Canvas, MetricCanvas, text_width_px
+from augment.render.canvas import Canvas, Spot, box_around, text_width_px
 from augment.render.marks import draw_mark, draw_motion, draw_walks, is_walking, stands
 from augment.render.palette import Colour, MarkStyle
 from augment.render.road import own_lanes
@@ -29,9 +34,14 @@ from augment.scene.entities import (
     TrafficLight,
 )
 
+CHANGED, GONE = "changed", "gone"
+STEP_DEG = 5
+"""Headings are told in these steps: finer ones can't be seen, and would be a handwriting."""
+
 _TEXT_PX = 14
 _ROW_PX, _SAMPLE_PX, _GAP_PX, _MARGIN_PX = 36.0, 56.0, 18.0, 10.0
 _PX_PER_M = 9.0
+_STEP_M = 4.0
 
 _NAMES = {
     AgentType.VEHICLE: "vehicle, true size",
@@ -49,165 +59,7 @@ _AREAS = {
     AreaKind.CARPARK: (palette.CARPARK, "car park"),
     AreaKind.INTERSECTION: (palette.INTERSECTION, "intersection"),
 }
-
-_Sample = Callable[[MetricCanvas, float, float], None]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Entry:
-    """A sample, drawn about a point in metres, and what it is."""
-
-    draw: _Sample
-    words: str
-
-
-def draw_legend(scene: Scene, modification: Modification, width_px: int) -> Canvas:
-    """The samples of all that is drawn of the changed scene, in rows as wide as the picture."""
-    places, height_px = _places(list(_entries(scene, modification)), width_px)
-    camera = Camera(
-        x_min_m=0.0,
-        x_max_m=width_px / _PX_PER_M,
-        y_min_m=0.0,
-        y_max_m=height_px / _PX_PER_M,
-        px_per_m=_PX_PER_M,
-    )
-    canvas = Canvas(width_px, camera.height_px, palette.PAPER)
-    ground = MetricCanvas(canvas, camera)
-    for entry, x_px, y_px in places:
-        middle_px = x_px + _SAMPLE_PX / 2.0
-        entry.draw(ground, middle_px / _PX_PER_M, camera.y_max_m - y_px / _PX_PER_M)
-        at = (x_px + _SAMPLE_PX + 6.0, y_px)
-        canvas.text(at, entry.words, palette.INK, _TEXT_PX, anchor="lm")
-    return canvas
-
-
-# Private
-
-
-def _places(
-    entries: list[_Entry], width_px: int
-) -> tuple[list[tuple[_Entry, float, float]], float]:
-    """Where each entry begins and its row lies, in pixels, and how high all rows are."""
-    places, x_px, y_px = [], _MARGIN_PX, _MARGIN_PX + _ROW_PX / 2.0
-    for entry in entries:
-        wide = _SAMPLE_PX + 6.0 + text_width_px(entry.words, _TEXT_PX) + _GAP_PX
-        if x_px + wide > width_px and x_px > _MARGIN_PX:
-            x_px, y_px = _MARGIN_PX, y_px + _ROW_PX
-        places.append((entry, x_px, y_px))
-        x_px += wide
-    return places, y_px + _ROW_PX / 2.0 + _MARGIN_PX
-
-
-def _entries(scene: Scene, modification: Modification) -> Iterator[_Entry]:
-    changed = {agent.id for agent in modification.changed}
-    yield _Entry(draw=_agent(AgentType.EGO_VEHICLE, palette.EGO_MARK), words="ego; arrow: front")
-    groups = (
-        ("changed: ", palette.CHANGED_MARK, modification.changed),
-        ("other ", palette.OTHER_MARK, [a for a in scene.agents if a.id not in changed]),
-    )
-    for prefix, style, agents in groups:
-        for kind in _NAMES:
-            if any(agent.type is kind for agent in agents):
-                yield _Entry(draw=_agent(kind, style), words=prefix + _NAMES[kind])
-    everyone = (scene.ego, *scene.agents, *modification.changed)
-    if any(agent.walk_to_m is not None for agent in everyone):
-        yield _Entry(draw=_walk, words="to where a walk ends")
-    if any(abs(agent.speed_mps) > 0.0 and agent.walk_to_m is None for agent in everyone):
-        yield _Entry(draw=_motion, words="way in one second")
-    if modification.moved or modification.removed:
-        yield _Entry(draw=_dashes(palette.GHOST, 5.0, 4.0), words="where something was before")
-    yield from _map_entries(scene)
-
-
-def _map_entries(scene: Scene) -> Iterator[_Entry]:
-    yield _Entry(draw=_dashes(palette.OWN_LANE, 7.0, 8.0), words="centre of the ego's lane")
-    yield _Entry(draw=_dashes(palette.OTHER_LANE, 7.0, 8.0), words="centre of another lane")
-    if scene.connectors:
-        yield _Entry(draw=_dashes(palette.CONNECTOR, 7.0, 8.0), words="centre of a connector")
-        yield _Entry(draw=_dashes(palette.INK, 2.0, 4.0), words="edge of a connector at the edit")
-    yield _Entry(draw=_solid(palette.LANE_SOLID), words="edge of a lane or of the road")
-    if any(lane.left_neighbor or lane.right_neighbor for lane in scene.lanes):
-        yield _Entry(draw=_between, words="between lanes of one direction")
-    dark = TrafficLight.NONE, TrafficLight.UNKNOWN
-    if any(one.traffic_light not in dark for one in scene.connectors):
-        yield _Entry(draw=_solid(palette.LIGHT_RED), words="bar in red, yellow or green: light")
-    yield _Entry(draw=_patch(palette.ROAD), words="road")
-    kinds = {area.kind for area in scene.areas}
-    for area_kind, (colour, words) in _AREAS.items():
-        if area_kind in kinds:
-            yield _Entry(draw=_patch(colour), words=words)
-
-
-def _agent(kind: AgentType, style: MarkStyle) -> _Sample:
-    length_m, width_m = LENGTH_WIDTH_M[kind]
-
-    def draw(ground: MetricCanvas, x_m: float, y_m: float) -> None:
-        sample = TrafficAgent(
-            id="", type=kind, x_m=x_m, y_m=y_m, heading_rad=0.0, width_m=width_m, length_m=length_m
-        )
-        draw_mark(ground, sample, style)
-
-    return draw
-
-
-def _walk(ground: MetricCanvas, x_m: float, y_m: float) -> None:
-    draw_walks(ground, [(_mover(x_m, y_m, walk=True), palette.CHANGED_MARK)])
-
-
-def _motion(ground: MetricCanvas, x_m: float, y_m: float) -> None:
-    draw_motion(ground, _mover(x_m, y_m, walk=False), palette.OTHER_MARK)
-
-
-def _mover(x_m: float, y_m: float, *, walk: bool) -> TrafficAgent:
-    return TrafficAgent(
-        id="",
-        type=AgentType.PEDESTRIAN,
-        x_m=x_m - 2.5,
-        y_m=y_m,
-        heading_rad=0.0,
-        width_m=0.8,
-        length_m=0.9,
-        speed_mps=4.0,
-        walk_to_m=(x_m + 2.0, y_m) if walk else None,
-    )
-
-
-def _dashes(colour: Colour, on_px: float, off_px: float) -> _Sample:
-    def draw(ground: MetricCanvas, x_m: float, y_m: float) -> None:
-        ground.canvas.dashed(_line_px(ground, x_m, y_m), colour, 1.6, on_px, off_px)
-
-    return draw
-
-
-def _solid(colour: Colour) -> _Sample:
-    def draw(ground: MetricCanvas, x_m: float, y_m: float) -> None:
-        ground.canvas.stroke(_line_px(ground, x_m, y_m), colour, 2.0)
-
-    return draw
-
-
-def _between(ground: MetricCanvas, x_m: float, y_m: float) -> None:
-    _patch(palette.ROAD)(ground, x_m, y_m)
-    x, y = ground.at(x_m, y_m)
-    ground.canvas.dashed(
-        np.array([[x - 16.0, y], [x + 16.0, y]]), palette.LANE_LINE, 3.0, 8.0, 6.0
-    )
-
-
-def _patch(colour: Colour) -> _Sample:
-    def draw(ground: MetricCanvas, x_m: float, y_m: float) -> None:
-        x, y = ground.at(x_m, y_m)
-        ground.canvas.plate((x - 18.0, y - 9.0, x + 18.0, y + 9.0), colour, palette.ROAD_EDGE, 2.0)
-
-    return draw
-
-
-def _line_px(ground: MetricCanvas, x_m: float, y_m: float) -> FloatArray:
-    x, y = ground.at(x_m, y_m)
-    return np.array([[x - 24.0, y], [x + 24.0, y]])
-
-
-_KINDS = {
+_AGENT_KEYS = {
     AgentType.BUS: "bus",
     AgentType.BICYCLE: "bicycle",
     AgentType.PEDESTRIAN: "person",
@@ -216,92 +68,14 @@ _KINDS = {
     AgentType.CONSTRUCTION_SIGN: "sign",
     AgentType.GENERIC_OBJECT: "object",
 }
-_AREAS_legend_keys = {AreaKind.CROSSWALK: "crosswalk", AreaKind.WALKWAY: "walkway"}
-_STEP_M = 4.0
+_AREA_KEYS = {AreaKind.CROSSWALK: "crosswalk", AreaKind.WALKWAY: "walkway"}
 _DARK = (TrafficLight.NONE, TrafficLight.UNKNOWN)
-
-
-def scene_keys(scene: Scene, view: Mapping[str, Any]) -> set[str]:
-    """Return the entries for what a picture shows before any change.
-
-    Args:
-        scene: With the traffic that contestants see.
-        view: Where metres lie in the picture: px_per_m, ego_px, width, height.
-    """
-    keys = {"ego", "grid"}
-    shown = [agent for agent in scene.agents if _is_inside([(agent.x_m, agent.y_m)], view)]
-    if shown:
-        keys.add("recorded")
-    for agent in (scene.ego, *shown):
-        keys |= set(_agent_keys(agent))
-    if scene.options.goal is not None:
-        keys.add("goal")
-    return keys | _map_keys(scene, view)
-
-
-def change_keys(change: Modification, view: Mapping[str, Any]) -> set[str]:
-    """Return the entries for what a change adds to a picture."""
-    keys: set[str] = set()
-    for agent in change.changed:
-        if _is_inside([(agent.x_m, agent.y_m)], view):
-            keys |= {"changed", *_agent_keys(agent)}
-        else:
-            keys.add("outside")
-    return keys
-
-
-# Private
-
-
-def _map_keys(scene: Scene, view: Mapping[str, Any]) -> set[str]:
-    keys: set[str] = set()
-    own = own_lanes(scene)
-    for lane in scene.lanes:
-        if _is_inside(lane.centerline.points_m, view):
-            keys.add("own" if lane.id in own else "other")
-    for connector in scene.connectors:
-        if _is_inside(connector.centerline.points_m, view):
-            keys.add("junction")
-            if connector.traffic_light not in _DARK:
-                keys.add("lights")
-    for area in scene.areas:
-        if area.kind in _AREAS_legend_keys and _is_inside(area.boundary_m, view):
-            keys.add(_AREAS_legend_keys[area.kind])
-    return keys
-
-
-def _agent_keys(agent: TrafficAgent) -> Iterator[str]:
-    if agent.type in _KINDS:
-        yield _KINDS[agent.type]
-    if is_walking(agent):
-        yield "walk"
-    elif not stands(agent):
-        yield "motion"
-
-
-def _is_inside(
-    points_m: FloatArray | Iterable[tuple[float, float]], view: Mapping[str, Any]
-) -> bool:
-    """Whether any of some points lies in the picture."""
-    points = np.asarray(points_m, dtype=np.float64)
-    if len(points) > 1:
-        points = resample_line(points, _STEP_M)
-    (ego_x, ego_y), scale = view["ego_px"], view["px_per_m"]
-    x, y = ego_x + points[:, 0] * scale, ego_y - points[:, 1] * scale
-    inside = (x >= 0.0) & (x <= view["width"]) & (y >= 0.0) & (y <= view["height"])
-    return bool(inside.any())
-
-
-CHANGED, GONE = "changed", "gone"
-
-STEP_DEG = 5
-"""Headings are told in these steps: finer ones can't be seen, and would be a handwriting."""
-
+# Drawn upright whatever their heading; drawn alike from either end.
 _UPRIGHT = {AgentType.TRAFFIC_CONE, AgentType.CONSTRUCTION_SIGN}
-"""Drawn upright whatever their heading."""
-
 _SYMMETRIC = {AgentType.BARRIER, AgentType.GENERIC_OBJECT}
-"""Drawn alike from either end."""
+
+_Sample = Callable[[Canvas, Spot], None]
+"""Draws a sample about a point in pixels."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -329,8 +103,71 @@ class DescribedAgent:
     walk_to_m: Point | None = None
 
 
+def draw_legend(scene: Scene, modification: Modification, width_px: int) -> Canvas:
+    """Draw samples of all that is drawn of the changed scene, in rows as wide as the picture."""
+    places: list[tuple[_Sample, str, Spot]] = []
+    x_px, y_px = _MARGIN_PX, _MARGIN_PX + _ROW_PX / 2.0
+    for sample, words in _entries(scene, modification):
+        wide = _SAMPLE_PX + 6.0 + text_width_px(words, _TEXT_PX) + _GAP_PX
+        if x_px + wide > width_px and x_px > _MARGIN_PX:
+            x_px, y_px = _MARGIN_PX, y_px + _ROW_PX
+        places.append((sample, words, (x_px, y_px)))
+        x_px += wide
+    camera = Camera(
+        x_min_m=0.0,
+        x_max_m=width_px / _PX_PER_M,
+        y_min_m=0.0,
+        y_max_m=(y_px + _ROW_PX / 2.0 + _MARGIN_PX) / _PX_PER_M,
+        px_per_m=_PX_PER_M,
+    )
+    canvas = Canvas(camera, palette.PAPER)
+    for sample, words, (left, middle) in places:
+        x_m, y_m = (left + _SAMPLE_PX / 2.0) / _PX_PER_M, camera.y_max_m - middle / _PX_PER_M
+        sample(canvas, (x_m, y_m))
+        at = (left + _SAMPLE_PX + 6.0, middle)
+        canvas.text(at, words, palette.INK, _TEXT_PX, anchor="lm")
+    return canvas
+
+
+def scene_keys(scene: Scene, view: Mapping[str, Any]) -> set[str]:
+    """Return the entries of the web's legend for what a picture shows before any change.
+
+    Args:
+        scene: With the traffic that contestants see.
+        view: Where metres lie in the picture: px_per_m, ego_px, width, height.
+    """
+    keys = {"ego", "grid"}
+    shown = [agent for agent in scene.agents if _is_inside([(agent.x_m, agent.y_m)], view)]
+    if shown:
+        keys.add("recorded")
+    for agent in (scene.ego, *shown):
+        keys |= _agent_keys(agent)
+    if scene.options.goal is not None:
+        keys.add("goal")
+    own = own_lanes(scene)
+    for lane in scene.lanes:
+        if _is_inside(lane.centerline.points_m, view):
+            keys.add("own" if lane.id in own else "other")
+    for connector in scene.connectors:
+        if _is_inside(connector.centerline.points_m, view):
+            keys |= {"junction"} if connector.traffic_light in _DARK else {"junction", "lights"}
+    for area in scene.areas:
+        if area.kind in _AREA_KEYS and _is_inside(area.boundary_m, view):
+            keys.add(_AREA_KEYS[area.kind])
+    return keys
+
+
+def change_keys(change: Modification, view: Mapping[str, Any]) -> set[str]:
+    """Return the entries for what a change adds to a picture."""
+    keys: set[str] = set()
+    for agent in change.changed:
+        inside = _is_inside([(agent.x_m, agent.y_m)], view)
+        keys |= {"changed"} | _agent_keys(agent) if inside else {"outside"}
+    return keys
+
+
 def describe(scene: Scene, modification: Modification) -> list[DescribedAgent]:
-    """What was changed, then what is gone, each the nearest first, then by kind.
+    """List what was changed, then what is gone, each the nearest first, then by kind.
 
     Args:
         scene: The scene before the change; ids that it does not have are passed over.
@@ -342,18 +179,148 @@ def describe(scene: Scene, modification: Modification) -> list[DescribedAgent]:
     return sorted(lines, key=_place)
 
 
-# Private
+# --- The legend's entries ----------------------------------------------------------------------
+
+
+def _entries(scene: Scene, modification: Modification) -> Iterator[tuple[_Sample, str]]:
+    changed = {agent.id for agent in modification.changed}
+    others = [agent for agent in scene.agents if agent.id not in changed]
+    yield _agent(AgentType.EGO_VEHICLE, palette.EGO_MARK), "ego; arrow: front"
+    groups = (
+        ("changed: ", palette.CHANGED_MARK, modification.changed),
+        ("other ", palette.OTHER_MARK, others),
+    )
+    for prefix, style, agents in groups:
+        kinds = {agent.type for agent in agents}
+        for kind in _NAMES:
+            if kind in kinds:
+                yield _agent(kind, style), prefix + _NAMES[kind]
+    everyone = (scene.ego, *scene.agents, *modification.changed)
+    if any(agent.walk_to_m is not None for agent in everyone):
+        yield _walk, "to where a walk ends"
+    if any(abs(agent.speed_mps) > 0.0 and agent.walk_to_m is None for agent in everyone):
+        yield _motion, "way in one second"
+    if modification.moved or modification.removed:
+        yield _dashes(palette.GHOST, 5.0, 4.0), "where something was before"
+    yield from _map_entries(scene)
+
+
+def _map_entries(scene: Scene) -> Iterator[tuple[_Sample, str]]:
+    yield _dashes(palette.OWN_LANE, 7.0, 8.0), "centre of the ego's lane"
+    yield _dashes(palette.OTHER_LANE, 7.0, 8.0), "centre of another lane"
+    if scene.connectors:
+        yield _dashes(palette.CONNECTOR, 7.0, 8.0), "centre of a connector"
+        yield _dashes(palette.INK, 2.0, 4.0), "edge of a connector at the edit"
+    yield _solid(palette.LANE_SOLID), "edge of a lane or of the road"
+    if any(lane.left_neighbor or lane.right_neighbor for lane in scene.lanes):
+        yield _between, "between lanes of one direction"
+    if any(one.traffic_light not in _DARK for one in scene.connectors):
+        yield _solid(palette.LIGHT_RED), "bar in red, yellow or green: light"
+    yield _patch(palette.ROAD), "road"
+    area_kinds = {area.kind for area in scene.areas}
+    for area_kind, (colour, words) in _AREAS.items():
+        if area_kind in area_kinds:
+            yield _patch(colour), words
+
+
+def _agent(kind: AgentType, style: MarkStyle) -> _Sample:
+    length_m, width_m = LENGTH_WIDTH_M[kind]
+
+    def draw(canvas: Canvas, at_m: Spot) -> None:
+        sample = TrafficAgent(
+            id="",
+            type=kind,
+            x_m=at_m[0],
+            y_m=at_m[1],
+            heading_rad=0.0,
+            width_m=width_m,
+            length_m=length_m,
+        )
+        draw_mark(canvas, sample, style)
+
+    return draw
+
+
+def _walk(canvas: Canvas, at_m: Spot) -> None:
+    draw_walks(canvas, [(_mover(at_m, walk_to_m=(at_m[0] + 2.0, at_m[1])), palette.CHANGED_MARK)])
+
+
+def _motion(canvas: Canvas, at_m: Spot) -> None:
+    draw_motion(canvas, _mover(at_m), palette.OTHER_MARK)
+
+
+def _mover(at_m: Spot, walk_to_m: Point | None = None) -> TrafficAgent:
+    return TrafficAgent(
+        id="",
+        type=AgentType.PEDESTRIAN,
+        x_m=at_m[0] - 2.5,
+        y_m=at_m[1],
+        heading_rad=0.0,
+        width_m=0.8,
+        length_m=0.9,
+        speed_mps=4.0,
+        walk_to_m=walk_to_m,
+    )
+
+
+def _line_px(canvas: Canvas, at_m: Spot, half_px: float = 24.0) -> FloatArray:
+    x, y = canvas.at(*at_m)
+    return np.array([[x - half_px, y], [x + half_px, y]])
+
+
+def _dashes(colour: Colour, on_px: float, off_px: float) -> _Sample:
+    return lambda canvas, at_m: canvas.dashed(_line_px(canvas, at_m), colour, 1.6, on_px, off_px)
+
+
+def _solid(colour: Colour) -> _Sample:
+    return lambda canvas, at_m: canvas.stroke(_line_px(canvas, at_m), colour, 2.0)
+
+
+def _patch(colour: Colour) -> _Sample:
+    return lambda canvas, at_m: canvas.plate(
+        box_around(canvas.at(*at_m), 18.0, 9.0), colour, palette.ROAD_EDGE, 2.0
+    )
+
+
+def _between(canvas: Canvas, at_m: Spot) -> None:
+    _patch(palette.ROAD)(canvas, at_m)
+    canvas.dashed(_line_px(canvas, at_m, 16.0), palette.LANE_LINE, 3.0, 8.0, 6.0)
+
+
+# --- Keys and lines ----------------------------------------------------------------------------
+
+
+def _agent_keys(agent: TrafficAgent) -> set[str]:
+    keys = {_AGENT_KEYS[agent.type]} if agent.type in _AGENT_KEYS else set()
+    if is_walking(agent):
+        keys.add("walk")
+    elif not stands(agent):
+        keys.add("motion")
+    return keys
+
+
+def _is_inside(points_m: FloatArray | Iterable[Point], view: Mapping[str, Any]) -> bool:
+    """Return whether any point of a line lies in the picture."""
+    points = np.asarray(points_m, dtype=np.float64)
+    if len(points) > 1:
+        points = resample_line(points, _STEP_M)
+    (ego_x, ego_y), scale = view["ego_px"], view["px_per_m"]
+    x, y = ego_x + points[:, 0] * scale, ego_y - points[:, 1] * scale
+    inside = (x >= 0.0) & (x <= view["width"]) & (y >= 0.0) & (y <= view["height"])
+    return bool(inside.any())
 
 
 def _line(change: str, agent: TrafficAgent) -> DescribedAgent:
     walks, moves = is_walking(agent), not stands(agent)
     is_thing = agent.type in _UPRIGHT | _SYMMETRIC
-    heading, along = None, None
+    heading = along = speed = None
     if moves or not is_thing:
         heading = _turn(agent.heading_rad)
+        speed = None if walks else _metres(agent.speed_mps) if moves else 0.0
     elif agent.type in _SYMMETRIC:
         along = _turn(math.remainder(agent.heading_rad, math.pi))
         along = 90 if along == -90 else along
+    end = agent.walk_to_m if walks else None
     return DescribedAgent(
         change=change,
         kind=agent.type.value,
@@ -361,30 +328,22 @@ def _line(change: str, agent: TrafficAgent) -> DescribedAgent:
         left_m=_metres(agent.y_m),
         heading_deg=heading,
         along_deg=along,
-        speed_mps=None if walks or (is_thing and not moves) else _speed(agent),
-        walk_to_m=_end(agent.walk_to_m) if walks else None,
+        speed_mps=speed,
+        walk_to_m=None if end is None else (_metres(end[0]), _metres(end[1])),
     )
 
 
 def _place(line: DescribedAgent) -> tuple[object, ...]:
-    """Everything that a line says, so that two which differ never stand as they came."""
+    """Sort by everything that a line says, so that two which differ never stand as they came."""
     distance_m = round(math.hypot(line.ahead_m, line.left_m), 3)
-    walk = line.walk_to_m or ()
     rest = (line.heading_deg, line.along_deg, line.speed_mps)
     known = tuple((value is not None, value or 0) for value in rest)
+    walk = line.walk_to_m or ()
     return (line.change, distance_m, line.kind, line.ahead_m, line.left_m, *known, walk)
-
-
-def _end(point: Point | None) -> Point | None:
-    return None if point is None else (_metres(point[0]), _metres(point[1]))
 
 
 def _metres(value: float) -> float:
     return round(value, 1) + 0.0  # no minus before a zero
-
-
-def _speed(agent: TrafficAgent) -> float:
-    return 0.0 if stands(agent) else _metres(agent.speed_mps)
 
 
 def _turn(angle_rad: float) -> int:

@@ -17,7 +17,7 @@ _REACH = 0.1
 
 
 def offset(points: FloatArray, distance: float) -> FloatArray:
-    """A line (P, 2) shifted by a distance to its left (negative: right), (P, 2)."""
+    """Shift a line (P, 2) by a distance to its left (negative: right), (P, 2)."""
     steps = points[1:] - points[:-1]
     steps = steps / np.hypot(steps[:, 0], steps[:, 1])[:, None]
     middle = np.empty_like(points, dtype=np.float64)
@@ -31,7 +31,7 @@ def offset(points: FloatArray, distance: float) -> FloatArray:
 
 
 def sides(lane: AnyLane) -> tuple[FloatArray, FloatArray]:
-    """The left and the right boundary of a lane, (P, 2) each, from its map or its width."""
+    """Return the left and the right boundary of a lane, (P, 2) each, from its map or its width."""
     line, half = lane.centerline.points_m, lane.width_m / 2.0
     left, right = lane.left_boundary, lane.right_boundary
     return (
@@ -40,40 +40,35 @@ def sides(lane: AnyLane) -> tuple[FloatArray, FloatArray]:
     )
 
 
-def ribbon(lane: AnyLane) -> FloatArray:
-    """The surface of a lane as a polygon (P, 2); it reaches a little into what comes next."""
-    return ring_of(*sides(lane))
-
-
 def ring_of(left: FloatArray, right: FloatArray) -> FloatArray:
-    """The polygon (P, 2) between two sides of a lane, (L, 2) and (R, 2), drawn out at its ends."""
+    """Return the polygon (P, 2) between two sides of a lane, drawn out a little at its ends."""
     return np.concatenate([_lengthened(left), _lengthened(right)[::-1]])
 
 
 def dashes(points: FloatArray, on: float, off: float) -> FloatArray:
-    """The dashes of a line (P, 2) as straight pieces (K, 2, 2); the first begins at its start."""
-    steps = np.diff(points, axis=0)
-    stations = np.concatenate([[0.0], np.cumsum(np.hypot(steps[:, 0], steps[:, 1]))])
+    """Return the dashes of a line (P, 2) as straight pieces (K, 2, 2)."""
+    stations = _stations(points)
     starts = np.arange(0.0, stations[-1], on + off)
     ends = np.minimum(starts + on, stations[-1])
-    both = np.stack([starts, ends], axis=1)
-    x = np.interp(both, stations, points[:, 0])
-    y = np.interp(both, stations, points[:, 1])
-    return np.stack([x, y], axis=2)
+    return _points_at(points, stations, np.stack([starts, ends], axis=1))
 
 
 def resample_line(points: FloatArray, spacing: float) -> FloatArray:
-    """A line (P, 2) cut into equal pieces no longer than the spacing, (K, 2)."""
-    steps = np.diff(points, axis=0)
-    stations = np.concatenate([[0.0], np.cumsum(np.hypot(steps[:, 0], steps[:, 1]))])
-    at = np.linspace(0.0, stations[-1], math.ceil(stations[-1] / spacing) + 1)
-    return np.column_stack(
-        [np.interp(at, stations, points[:, 0]), np.interp(at, stations, points[:, 1])]
-    )
+    """Cut a line (P, 2) into equal pieces no longer than the spacing, (K, 2)."""
+    stations = _stations(points)
+    count = math.ceil(stations[-1] / spacing) + 1
+    return _points_at(points, stations, np.linspace(0.0, stations[-1], count))
+
+
+def spread(points: FloatArray, every: float) -> FloatArray:
+    """Return points (K, 2) along a line (P, 2), at least three and about so far apart."""
+    stations = _stations(points)
+    count = max(2, int(np.hypot(*np.diff(points, axis=0).T).sum() / every)) + 1
+    return _points_at(points, stations, np.linspace(0.0, stations[-1], count))
 
 
 def runs(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """First and last index of each unbroken run of true flags."""
+    """Return first and last index of each unbroken run of true flags."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(np.int8)))
     return [(int(first), int(end) - 1) for first, end in edges.reshape(-1, 2)]
 
@@ -81,7 +76,7 @@ def runs(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
 def stripes(
     polygon: FloatArray, angle_rad: float, period: float, width: float
 ) -> list[FloatArray]:
-    """Parallel stripes in a convex polygon (P, 2), their long sides in the given direction.
+    """Return parallel stripes in a convex polygon (P, 2), long sides in the given direction.
 
     They lie evenly about the polygon's middle, which is left free.
     """
@@ -89,18 +84,16 @@ def stripes(
     across = polygon @ normal
     middle = (across.min() + across.max()) / 2.0
     count = math.ceil((across.max() - across.min()) / 2.0 / period)
-    polygons = []
+    pieces = []
     for index in range(-count, count):
         centre = middle + (index + 0.5) * period
         piece = _half(polygon, normal, centre - width / 2.0)
-        piece = _half(piece, -normal, -(centre + width / 2.0))
-        if len(piece) >= 3:
-            polygons.append(piece)
-    return polygons
+        pieces.append(_half(piece, -normal, -(centre + width / 2.0)))
+    return [piece for piece in pieces if len(piece) >= 3]
 
 
 def long_axis(polygon: FloatArray) -> tuple[float, float, float]:
-    """Direction of a polygon's longer extent, its length and its width (smallest rectangle)."""
+    """Return the direction, length and width of a polygon's smallest rectangle."""
     best = (0.0, math.inf, 1.0)
     for dx, dy in np.diff(np.vstack([polygon, polygon[:1]]), axis=0):
         if math.hypot(dx, dy) < 1e-6:
@@ -115,8 +108,23 @@ def long_axis(polygon: FloatArray) -> tuple[float, float, float]:
     return best if length >= width else (angle + math.pi / 2.0, width, length)
 
 
+# Private
+
+
+def _stations(points: FloatArray) -> FloatArray:
+    """Return how far along a line (P, 2) each point is, (P,)."""
+    steps = np.diff(points, axis=0)
+    return np.concatenate([[0.0], np.cumsum(np.hypot(steps[:, 0], steps[:, 1]))])
+
+
+def _points_at(points: FloatArray, stations: FloatArray, at: FloatArray) -> FloatArray:
+    """Return the points (..., 2) of a line at stations (...)."""
+    x, y = np.interp(at, stations, points[:, 0]), np.interp(at, stations, points[:, 1])
+    return np.stack([x, y], axis=-1)
+
+
 def _lengthened(points: FloatArray) -> FloatArray:
-    """A line with both ends drawn out; lanes that bend meet at a slight angle, with a gap."""
+    """Draw out both ends of a line; lanes that bend meet at a slight angle, with a gap."""
     longer = np.array(points, dtype=np.float64)
     for end, inner in ((0, 1), (-1, -2)):
         (x, y), (inner_x, inner_y) = points[end], points[inner]
@@ -126,17 +134,14 @@ def _lengthened(points: FloatArray) -> FloatArray:
 
 
 def _half(polygon: FloatArray, normal: FloatArray, limit: float) -> FloatArray:
-    """The part of a polygon where the product with the normal is at least the limit."""
-    if not len(polygon):
-        return polygon
-    depth = polygon @ normal - limit
+    """Return the part of a polygon where the product with the normal is at least the limit."""
+    depth = polygon @ normal - limit if len(polygon) else polygon
     kept: list[FloatArray] = []
     for index in range(len(polygon)):
-        here, following = depth[index], depth[(index + 1) % len(polygon)]
-        if here >= 0.0:
+        following = (index + 1) % len(polygon)
+        if depth[index] >= 0.0:
             kept.append(polygon[index])
-        if (here < 0.0) != (following < 0.0):
-            share = here / (here - following)
-            step = polygon[(index + 1) % len(polygon)] - polygon[index]
-            kept.append(polygon[index] + share * step)
+        if (depth[index] < 0.0) != (depth[following] < 0.0):
+            share = depth[index] / (depth[index] - depth[following])
+            kept.append(polygon[index] + share * (polygon[following] - polygon[index]))
     return np.array(kept).reshape(-1, 2)

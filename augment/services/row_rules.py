@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import zlib
 from collections.abc import Callable, Mapping
+from dataclasses import fields
 from typing import Any
 
 from django.db import models
@@ -71,14 +72,8 @@ def _check_scenario(row: Scenario) -> None:
 
 def _check_endpoint(row: Endpoint) -> None:
     check_slug(row.label, what="endpoint")
-    check_facts(
-        EndpointFacts(
-            base_url=row.base_url,
-            key_variable=row.key_variable,
-            max_concurrency=row.max_concurrency,
-            requests_per_minute=row.requests_per_minute,
-        )
-    )
+    names = [field.name for field in fields(EndpointFacts)]
+    check_facts(EndpointFacts(**{name: getattr(row, name) for name in names}))
 
 
 def _check_contestant(row: Contestant) -> None:

@@ -1,4 +1,4 @@
-"""The base of all commands: nothing that they print steers the terminal.
+"""The base of every command: it prints nothing that steers a terminal, and no traceback of ours.
 
 Names come out of files and rows, and answers out of models; a control character in one of them
 would move the cursor, recolour or rewrite what stands on the screen. So each text is escaped on
@@ -8,6 +8,7 @@ its way out, whoever wrote the command.
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 from django.core.management.base import BaseCommand, CommandError, OutputWrapper
@@ -37,22 +38,7 @@ class TerminalOutput(OutputWrapper):
 
 
 class TerminalCommand(BaseCommand):
-    """A command that escapes what it prints and reports refusals as one sentence.
-
-    Attributes:
-        failure: What that sentence begins with, such as "Nothing was restored."; a command that
-            sets it reports errors of the file system as well.
-    """
-
-    failure = ""
-
-    def execute(self, *args: Any, **options: Any) -> str | None:
-        """Run the command; an AugmentError becomes a CommandError."""
-        reported = (AugmentError, OSError) if self.failure else AugmentError
-        try:
-            return super().execute(*args, **options)
-        except reported as error:
-            raise CommandError(f"{self.failure} {error}".lstrip()) from error
+    """A command whose output is safe to look at, and whose foreseen errors are one sentence."""
 
     # Django sets both again when it is called with streams of its own.
 
@@ -73,6 +59,20 @@ class TerminalCommand(BaseCommand):
     @stderr.setter
     def stderr(self, given: Any) -> None:
         self._stderr = _wrapped(given)
+
+    def execute(self, *args: Any, **options: Any) -> str | None:
+        """Run the command; an AugmentError ends it as a CommandError with the same sentence."""
+        try:
+            return super().execute(*args, **options)
+        except AugmentError as error:
+            raise CommandError(str(error)) from error
+
+    def write_file(self, path: Path, content: bytes) -> None:
+        """Write a file that somebody named; a CommandError says why it can't be written."""
+        try:
+            path.write_bytes(content)
+        except OSError as error:
+            raise CommandError(f"{path} can't be written: {error.strerror}.") from error
 
 
 def _wrapped(given: OutputWrapper) -> TerminalOutput:

@@ -1,9 +1,10 @@
 """Read first: from a scene and an instruction to an outcome, along a recipe.
 
-Scene -> prompt -> answer -> Modification, and back with a review's findings where the recipe has
-a review. That loop is the only one of the house: it is bounded by the recipe's rounds, and every
-turn of it is in the transcript. A review never takes a result away: where it is unusable, or a
-later round can't be read, what the modifier made before stands, and the notes say so.
+In: a `Recipe`, a `Scene`, an instruction, and who is asked. Out: an `Outcome`; everything else is
+in the transcript. Prompt -> answer -> Modification, and back with a review's findings where the
+recipe has a review. That loop is the only one of the house, bounded by the recipe's rounds. A
+review never takes a result away: where it is unusable, or a later round can't be read, what the
+modifier made before stands, and the notes say so.
 
 An answer that nobody can read and a refusal are outcomes of the model and count as such; whoever
 changes nothing refuses. A broken wire is nobody's outcome and is raised.

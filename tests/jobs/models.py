@@ -15,7 +15,7 @@ from augment.models import Contestant, Endpoint, EndpointModel, GenerationJob
 from augment.services.running import jobs
 from augment.services.running.budget import NO_CAPS, Caps
 from tests.jobs.rows import INSTRUCTION, add_model, add_scenario
-from tests.variants.answers import GOOD
+from tests.variants.playing import GOOD
 
 MODEL = "llama3.1"
 PROMPT_TOKENS, COMPLETION_TOKENS = 2900, 120

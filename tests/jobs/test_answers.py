@@ -10,10 +10,9 @@ from augment.errors import ModelFault
 from augment.llm.messages import Reply
 from augment.models import Augmentation, GenerationJob, ModelCall
 from augment.services.running import jobs, runner
-from augment.services.running import jobs as retrying
 from tests.jobs.models import Model, llama_job, reply
 from tests.jobs.rows import only_row
-from tests.variants.answers import GOOD
+from tests.variants.playing import GOOD
 
 pytestmark = pytest.mark.django_db
 
@@ -52,7 +51,7 @@ def test_a_fault_is_no_answer() -> None:
     broken = Model(ModelFault("no", retryable=False, status=500))
     job = llama_job()
     ran(job, broken)
-    retrying.retry_failed(job)
+    jobs.retry_failed(job)
     model = Model()
     assert ran(job, model).state == DONE
     assert len(model.requests) == 1

@@ -8,17 +8,26 @@ from decimal import Decimal
 import pytest
 from django.utils import timezone
 
-from augment.errors import EndpointBusy, LeaseLost, ModelFault
+from augment.errors import Conflict, EndpointBusy, LeaseLost, ModelFault
 from augment.llm.costs import Price, WorstCase
 from augment.llm.messages import Reply
-from augment.models import Attempt, Augmentation, Event, GenerationJob, ModelCall
+from augment.models import (
+    Attempt,
+    Augmentation,
+    CallLease,
+    Endpoint,
+    Event,
+    GenerationJob,
+    ModelCall,
+)
+from augment.services.endpoints import client
 from augment.services.running import budget, jobs, runner
-from augment.services.running import budget as caps
 from augment.services.running.budget import Caps, Room, costs_of
+from augment.services.running.estimates import estimate
 from augment.services.running.runner import AUGMENTATIONS, Held
-from tests.jobs.models import Model, after_a_second_look, llama_job, reply
-from tests.jobs.rows import NOON, STALE, only_row
-from tests.variants.answers import GOOD
+from tests.jobs.models import Model, add_llama, after_a_second_look, llama_job, reply
+from tests.jobs.rows import NOON, STALE, add_kind, add_scenario, launch, leased, only_row
+from tests.variants.playing import GOOD
 
 pytestmark = pytest.mark.django_db
 
@@ -59,7 +68,7 @@ def test_unknown_usage_counts_with_its_worst_case_and_says_so() -> None:
     ("fault", "is_billed"),
     [
         (ModelFault("no such model", retryable=False, status=404), False),
-        (ModelFault("upstream broke", retryable=False, status=500), False),
+        (ModelFault("bad request", retryable=False, status=400), False),
         (ModelFault("too slow", retryable=False), True),
         (ModelFault("no choice", retryable=False, status=200), True),
     ],
@@ -128,7 +137,7 @@ def test_a_stopped_attempt_is_replayed_from_its_answers_also_in_a_fresh_job() ->
     job = llama_job(caps=Caps(calls=1), is_fresh=True)
     model = Model(after_a_second_look)
     assert ran(job, model).state == ROW.QUEUED
-    caps.raise_cap(job, caps=Caps(calls=2))
+    budget.raise_cap(job, caps=Caps(calls=2))
     jobs.resume(job)
     assert ran(job, model).state == ROW.DONE
     assert len(model.requests) == len(set(model.requests)) == 2
@@ -197,3 +206,158 @@ def in_flight(job: GenerationJob, held: Held, *, is_sent: bool = True) -> ModelC
         reserved_tokens=WORST.tokens,
         reserved_nano_usd=WORST.nano_usd(ONE_USD),
     )
+
+
+def test_a_money_cap_needs_every_price() -> None:
+    with pytest.raises(Conflict, match=r"nobody knows that of llama3\.1 at local: cap the job by"):
+        llama_job(caps=Caps(usd=Decimal(1)))
+    assert not GenerationJob.objects.exists()
+
+
+def test_a_money_cap_takes_contestants_that_cost_nothing() -> None:
+    add_llama(price="1")
+    add_scenario("street")
+    launch()
+    job = jobs.launch(
+        name="R",
+        contestants=["llama", "reference"],
+        scenarios=["street"],
+        caps=Caps(usd=Decimal("2.50")),
+    )
+    assert job.cap_usd == Decimal("2.5")
+    event = Event.objects.filter(verb="launch").first()
+    assert event is not None
+    assert event.after is not None
+    assert event.after["cap"] == "2.5 USD"
+
+
+@pytest.mark.parametrize(
+    "given",
+    [
+        Caps(usd=Decimal(0)),
+        Caps(usd=Decimal("NaN")),
+        Caps(usd=Decimal("-1")),
+        Caps(calls=0),
+        Caps(tokens=-5),
+        Caps(calls=10**12),
+    ],
+)
+def test_a_cap_that_can_not_be_is_refused(given: Caps) -> None:
+    with pytest.raises(Conflict, match="is more than 0 and at most"):
+        given.columns()
+
+
+NANO = 1_000_000
+
+INSTANT = timedelta(microseconds=1)
+
+
+@pytest.mark.parametrize(
+    ("cap", "spent", "reserved", "room"),
+    [
+        # One more call needs 1,000 tokens, 1,000,000 nano-dollars and 1 call.
+        ({"tokens": 1000}, {}, {}, Room.TAKEN),
+        ({"tokens": 999}, {}, {}, Room.SPENT),
+        ({"tokens": 1500}, {"tokens": 500}, {}, Room.TAKEN),
+        ({"tokens": 1500}, {"tokens": 501}, {}, Room.SPENT),
+        ({"tokens": 1500}, {}, {"tokens": 500}, Room.TAKEN),
+        ({"tokens": 1500}, {}, {"tokens": 501}, Room.BUSY),
+        ({"tokens": 1500}, {"tokens": 500}, {"tokens": 1}, Room.BUSY),
+        ({"nano_usd": NANO}, {}, {}, Room.TAKEN),
+        ({"nano_usd": NANO - 1}, {}, {}, Room.SPENT),
+        ({"nano_usd": 3 * NANO}, {"nano_usd": NANO}, {"nano_usd": NANO}, Room.TAKEN),
+        ({"nano_usd": 3 * NANO}, {"nano_usd": NANO}, {"nano_usd": NANO + 1}, Room.BUSY),
+        ({"nano_usd": 3 * NANO}, {"nano_usd": 2 * NANO + 1}, {}, Room.SPENT),
+        ({"calls": 1}, {}, {}, Room.TAKEN),
+        ({"calls": 1}, {"calls": 1}, {}, Room.SPENT),
+        ({"calls": 1}, {}, {"calls": 1}, Room.BUSY),
+        ({"calls": 2}, {"calls": 1}, {}, Room.TAKEN),
+        # Of several caps the first that is reached counts.
+        ({"calls": 9, "tokens": 999}, {}, {}, Room.SPENT),
+        ({"calls": 1, "tokens": 9999}, {}, {"calls": 1}, Room.BUSY),
+        ({}, {"tokens": 10**12}, {}, Room.TAKEN),
+    ],
+)
+def test_a_cap_has_room_up_to_its_last_unit(
+    cap: dict[str, int], spent: dict[str, int], reserved: dict[str, int], room: Room
+) -> None:
+    job = llama_job()
+    columns = {f"cap_{name}": value for name, value in cap.items()}
+    columns |= {f"spent_{name}": value for name, value in spent.items()}
+    columns |= {f"reserved_{name}": value for name, value in reserved.items()}
+    GenerationJob.objects.update(**columns)
+    assert budget.reserve(job_pk=job.pk, worst=WORST, price=ONE_USD) == room
+    after = GenerationJob.objects.get()
+    taken = int(room == Room.TAKEN)
+    assert after.reserved_tokens == reserved.get("tokens", 0) + 1000 * taken
+    assert after.reserved_calls == reserved.get("calls", 0) + taken
+    assert after.reserved_nano_usd == reserved.get("nano_usd", 0) + NANO * taken
+    assert (after.state == "stopped_at_cap") is (room == Room.SPENT)
+
+
+@pytest.mark.parametrize(
+    ("after_the_beat", "is_taken_back"),
+    [(STALE - INSTANT, False), (STALE, False), (STALE + INSTANT, True)],
+)
+def test_when_a_claim_without_a_beat_is_taken_back(
+    after_the_beat: timedelta, is_taken_back: bool
+) -> None:
+    row = only_row(launch())
+    leased(row, now=NOON)
+    now = NOON + after_the_beat
+    assert bool(AUGMENTATIONS.take_back_lost(now=now)) is is_taken_back
+
+
+@pytest.mark.parametrize(
+    ("age", "is_free"),
+    [(client.LEASE - INSTANT, False), (client.LEASE, True), (client.LEASE + INSTANT, True)],
+)
+def test_when_the_place_of_a_dead_worker_is_free(age: timedelta, is_free: bool) -> None:
+    endpoint = Endpoint.objects.create(label="x", base_url="http://x/v1", max_concurrency=1)
+    client.admit(endpoint_pk=endpoint.pk, clock=lambda: NOON)
+    found = client.admit(endpoint_pk=endpoint.pk, clock=lambda: NOON + age)
+    assert (not isinstance(found, float)) is is_free
+    assert CallLease.objects.count() == 1 + is_free
+
+
+@pytest.mark.parametrize(
+    ("age", "wait_s"),
+    [(client.MINUTE - INSTANT, 1e-6), (client.MINUTE, None), (client.MINUTE + INSTANT, None)],
+)
+def test_when_a_start_no_longer_counts_for_its_minute(
+    age: timedelta, wait_s: float | None
+) -> None:
+    endpoint = Endpoint.objects.create(
+        label="x", base_url="http://x/v1", max_concurrency=9, requests_per_minute=1
+    )
+    client.admit(endpoint_pk=endpoint.pk, clock=lambda: NOON)
+    found = client.admit(endpoint_pk=endpoint.pk, clock=lambda: NOON + age)
+    assert (found if isinstance(found, float) else None) == wait_s
+
+
+def test_without_earlier_runs_it_is_a_guess_from_the_prompts() -> None:
+    add_llama(price="2")
+    for number in range(4):
+        add_scenario(f"street-{number}")
+    add_kind("reference")
+    found = estimate(["llama", "reference"], [f"street-{number}" for number in range(4)])
+    (line,) = found.lines
+    assert (found.rows, found.asking_rows, line.seen) == (8, 4, 0)
+    assert line.calls == (4, 4, 8)
+    assert 4 * 1000 < line.tokens_in < 4 * 8000
+    assert line.tokens_out == 4 * 1200
+    assert line.usd is not None
+    assert line.usd_most is not None
+    assert line.usd == Decimal(2) * (line.tokens_in + line.tokens_out) / 10**6
+    assert line.usd_most > line.usd
+
+
+def test_after_a_run_it_is_what_was_used() -> None:
+    job = llama_job(price="1")
+    runner.work_on(augmentation_pk=only_row(job).pk, connect=Model())
+    for slug in ("other", "another"):
+        add_scenario(slug)
+    (line,) = estimate(["llama"], ["other", "another"]).lines
+    assert (line.seen, line.tokens_in, line.tokens_out) == (1, 2 * 2900, 2 * 120)
+    assert line.calls == (2, 2, 4)
+    assert line.usd == Decimal("0.00604")

@@ -20,7 +20,7 @@ from tests.jobs.models import llama_job, reply
 from tests.jobs.rows import only_row
 from tests.jobs.running import Wire, ran
 from tests.llm.raw_server import drip, head, speaking
-from tests.variants.answers import GOOD
+from tests.variants.playing import GOOD
 
 pytestmark = pytest.mark.django_db
 State = Augmentation.State

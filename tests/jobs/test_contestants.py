@@ -1,14 +1,20 @@
 from __future__ import annotations
 
 from io import StringIO
+from typing import Any
 
 import pytest
 from django.core.management import CommandError, call_command
 
 from augment.errors import Conflict, InvalidDocument
-from augment.models import Contestant, Endpoint, Event
+from augment.models import Augmentation, Contestant, Endpoint, EndpointModel, Event
 from augment.services.endpoints import contestants, known_endpoints
-from augment.services.endpoints.known_endpoints import ensure_endpoint
+from augment.services.endpoints.known_endpoints import ensure_endpoint, may_hold_key, move_of
+from augment.services.running import jobs, runner
+from augment.services.running.choosing import find_obstacle, keys_missing
+from tests.jobs.models import add_llama, llama_job
+from tests.jobs.rows import add_scenario, only_row
+from tests.llm.recorder import recorder
 
 pytestmark = pytest.mark.django_db
 LOCAL = "http://127.0.0.1:11434/v1"
@@ -90,43 +96,8 @@ def test_an_endpoint_that_moves_is_logged_before_and_after() -> None:
     endpoint = Endpoint.objects.get()
     assert endpoint.base_url == "http://127.0.0.1:9/v1"
     event = Event.objects.filter(verb="change").get()
-    assert event.before == {"base_url": LOCAL, "key_variable": ""}
-
-
-@pytest.mark.parametrize(
-    "base_url",
-    [
-        "http://169.254.169.254/v1",
-        "http://[fe80::1]/v1",
-        "http://[::ffff:169.254.169.254]/v1",
-        "http://[fd00:ec2::254]/v1",
-        "http://2852039166/v1",
-        "http://0xa9.254.169.254/v1",
-        "http://metadata.google.internal/v1",
-        "http://METADATA.google.internal./v1",
-        "http://100.100.100.200/",
-        "http://0.0.0.0:80/v1",
-    ],
-)
-def test_link_local_and_metadata_addresses_are_refused(base_url: str) -> None:
-    with pytest.raises(InvalidDocument, match="link-local or metadata"):
-        ensure_endpoint(label="local", base_url=base_url)
-    assert not Endpoint.objects.exists()
-
-
-@pytest.mark.parametrize(
-    "base_url", ["", "api.openai.com/v1", "ftp://x/v1", "file:///etc/passwd", "http://x:port/v1"]
-)
-def test_what_is_no_web_address_is_refused(base_url: str) -> None:
-    with pytest.raises(InvalidDocument, match="an address such as"):
-        ensure_endpoint(label="local", base_url=base_url)
-
-
-@pytest.mark.parametrize("base_url", ["https://me:secret@x/v1", "https://x/v1?key=secret"])
-def test_an_address_carries_no_secret(base_url: str) -> None:
-    with pytest.raises(InvalidDocument, match="don't belong") as caught:
-        ensure_endpoint(label="local", base_url=base_url)
-    assert "secret" not in str(caught.value)
+    assert event.before is not None
+    assert event.before["base_url"] == LOCAL
 
 
 def test_the_command_makes_endpoint_and_contestant_in_one_call() -> None:
@@ -144,3 +115,149 @@ def test_a_contestant_that_is_refused_leaves_no_endpoint_behind() -> None:
     with pytest.raises(CommandError, match="Unknown variant"):
         call_command("add_contestant", "fake", *facts)
     assert not Endpoint.objects.exists()
+
+
+def test_a_contestant_brings_its_model_which_is_unknown() -> None:
+    ensure_endpoint(label="local", base_url=LOCAL)
+    for variant in ("otm", "otm"):
+        contestants.add_contestant(
+            slug="llama", variant=variant, endpoint="local", model="llama3.1"
+        )
+    known = EndpointModel.objects.get()
+    assert (known.endpoint.label, known.model, known.model_class) == ("local", "llama3.1", "")
+    abilities = (known.native_tools, known.vision, known.json_schema, known.temperature)
+    assert abilities == (None, None, None, None)
+    assert (known.price_in_usd, known.price_out_usd) == (None, None)
+
+
+@pytest.mark.parametrize(
+    ("base_url", "says"),
+    [
+        ("http://169.254.169.254/v1", "link-local or metadata"),
+        ("api.openai.com/v1", "an address such as"),
+        ("https://x/v1?key=secret", "don't belong"),
+    ],
+)
+def test_an_address_that_no_model_is_served_from_is_refused(base_url: str, says: str) -> None:
+    with pytest.raises(InvalidDocument, match=says) as caught:
+        ensure_endpoint(label="local", base_url=base_url)
+    assert "secret" not in str(caught.value)
+    assert not Endpoint.objects.exists()
+
+
+SECRETS = ("ARENA_SECRET_KEY", "DATABASE_URL", "REDIS_URL", "AWS_SECRET_ACCESS_KEY", "HOME")
+URL = "http://127.0.0.1:9/v1"
+
+
+@pytest.mark.parametrize(
+    ("variable", "may"),
+    [
+        ("OPENAI_API_KEY", True),
+        ("_my_API_KEY", True),
+        ("LAB_TOKEN", True),
+        ("LAB_TOKEN_2", False),
+        ("LAB_TOKE", False),
+        ("lab_token", False),
+        ("API_KEY", False),
+        ("_API_KEY", False),
+        ("OPENAI_API_KEY_FILE", False),
+        ("openai_api_key", False),
+        ("2_API_KEY", False),
+        ("MY_API_KEY\n", False),
+        *((name, False) for name in SECRETS),
+    ],
+)
+def test_which_variables_may_hold_a_key(settings: Any, variable: str, may: bool) -> None:
+    settings.KEY_VARIABLES = ["LAB_TOKEN"]
+    assert may_hold_key(variable) is may
+
+
+@pytest.mark.parametrize("variable", SECRETS)
+def test_a_variable_that_is_not_for_keys_can_not_be_entered(variable: str) -> None:
+    with pytest.raises(InvalidDocument, match=f"{variable} may not be sent to an endpoint"):
+        ensure_endpoint(label="thief", base_url=URL, key_variable=variable)
+    with pytest.raises(CommandError, match="ends in _API_KEY"):
+        call_command(
+            *("add_contestant", "thief", "--variant", "otm", "--endpoint", "thief"),
+            *("--model", "m", "--base-url", URL, "--key-variable", variable),
+        )
+    assert not Endpoint.objects.exists()
+
+
+@pytest.mark.parametrize("variable", SECRETS)
+def test_a_variable_that_is_not_for_keys_is_never_read(
+    monkeypatch: pytest.MonkeyPatch, variable: str
+) -> None:
+    monkeypatch.setenv(variable, "the-crown-jewels")
+    row = only_row(llama_job())
+    with recorder() as server:
+        # As if it were written into the table by hand, or from before there was a rule.
+        Endpoint.objects.update(base_url=server.url, key_variable=variable)
+        runner.work_on(augmentation_pk=row.pk)
+    row.refresh_from_db()
+    assert server.heard == []
+    assert row.state == Augmentation.State.FAILED
+    assert f"names the environment variable {variable}, which may not be sent" in row.reason
+    assert "the-crown-jewels" not in row.reason
+
+
+def test_a_contestant_with_such_a_variable_is_refused_at_launch() -> None:
+    add_llama()
+    add_scenario("street")
+    Endpoint.objects.update(key_variable="DATABASE_URL")
+    llama = Contestant.objects.get()
+    assert "DATABASE_URL may not hold a key" in find_obstacle(llama)
+    assert keys_missing(llama) == []
+    with pytest.raises(Conflict, match="llama: the variable DATABASE_URL may not hold a key"):
+        jobs.launch(name="J", contestants=["llama"], scenarios=["street"])
+
+
+# --- Another host ------------------------------------------------------------------------------
+
+OLD, NEW = "https://models.example:443", "https://thief.example:443"
+
+
+def keyed() -> Endpoint:
+    return Endpoint.objects.create(
+        label="local", base_url="https://models.example/v1", key_variable="MY_API_KEY"
+    )
+
+
+@pytest.mark.parametrize(
+    ("base_url", "key_variable", "moves"),
+    [
+        ("https://thief.example/v1", "MY_API_KEY", True),
+        ("https://thief.example/v1", "OTHER_API_KEY", True),
+        ("http://models.example/v1", "MY_API_KEY", True),
+        ("https://models.example:8443/v1", "MY_API_KEY", True),
+        ("https://models.example.evil/v1", "MY_API_KEY", True),
+        ("https://thief.example/v1", "", False),
+        ("https://models.example/v2", "MY_API_KEY", False),
+        ("https://MODELS.example:443/v1", "MY_API_KEY", False),
+        ("https://models.example/v1", "OTHER_API_KEY", False),
+    ],
+)
+def test_when_a_key_would_go_to_another_server(
+    base_url: str, key_variable: str, moves: bool
+) -> None:
+    found = move_of(endpoint=keyed(), base_url=base_url, key_variable=key_variable)
+    assert (found is not None) is moves
+
+
+def test_a_key_goes_to_another_host_only_when_told_twice_and_is_logged() -> None:
+    keyed()
+    command = (
+        *("add_contestant", "one", "--variant", "otm", "--endpoint", "local", "--model", "m"),
+        *("--base-url", "https://thief.example/v1", "--key-variable", "MY_API_KEY"),
+    )
+    with pytest.raises(CommandError, match=f"went to {OLD} and would go to {NEW}. Say"):
+        call_command(*command)
+    assert Endpoint.objects.get().base_url == "https://models.example/v1"
+    assert not Event.objects.exists()
+    call_command(*command, "--move-key")
+    assert Endpoint.objects.get().base_url == "https://thief.example/v1"
+    event = Event.objects.get(verb="move key")
+    assert (event.before, event.after) == (
+        {"server": OLD},
+        {"server": NEW, "key_variable": "MY_API_KEY"},
+    )

@@ -15,7 +15,7 @@ from augment.services.running import jobs
 from augment.services.scenarios.pictures import original_picture
 from tests.jobs.models import llama_job
 from tests.jobs.running import Wire, ran
-from tests.variants.answers import GOOD
+from tests.variants.playing import GOOD
 
 pytestmark = pytest.mark.django_db
 State = Augmentation.State

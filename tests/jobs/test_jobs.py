@@ -1,18 +1,26 @@
 from __future__ import annotations
 
+from datetime import timedelta
+
 import pytest
 from django.contrib.auth.models import User
+from django.db import connection
+from django.test.utils import CaptureQueriesContext
 
+from arena.services.retrying import retry_cause as retry_unless_shown
 from augment.errors import Conflict, UnknownName
-from augment.models import Augmentation, Contestant, Event, GenerationJob
-from augment.services.running import jobs
-from augment.services.running import jobs as retrying
-from augment.services.running.progress import count_rows
+from augment.models import Augmentation, Contestant, Event, GenerationJob, ModelCall
+from augment.services.running import jobs, runner
+from augment.services.running.budget import Caps
+from augment.services.running.progress import cause_of, count_rows, failure_groups
 from augment.services.running.runner import AUGMENTATIONS
-from tests.jobs.rows import NOON, add_kind, add_scenario, done, failed, launch, leased
+from tests.jobs.models import Model, after_a_second_look, llama_job, reply
+from tests.jobs.rows import NOON, add_kind, add_scenario, done, failed, launch, leased, only_row
+from tests.variants.playing import GOOD
 
 pytestmark = pytest.mark.django_db
 State = Augmentation.State
+Job = GenerationJob.State
 
 
 def test_a_job_gets_one_waiting_row_per_cell() -> None:
@@ -31,7 +39,8 @@ def test_a_launch_is_logged_with_who_and_what() -> None:
     event = Event.objects.get()
     assert job.launched_by == admin
     assert (event.actor, event.verb, event.object_code) == (admin, "launch", str(job.code))
-    assert event.after == {"name": "R", "contestants": ["reference"], "scenarios": ["street"]}
+    assert event.after is not None
+    assert (event.after["name"], event.after["contestants"]) == ("R", ["reference"])
 
 
 def test_an_unknown_contestant_stops_the_launch_and_names_the_known() -> None:
@@ -89,7 +98,7 @@ def test_retry_queues_failed_rows_alone_and_opens_the_job_again() -> None:
     leased(first).settle(failed(), now=NOON)
     leased(second).settle(done(), now=NOON)
     jobs.finish_if_over(now=NOON)
-    retrying.retry_failed(job)
+    jobs.retry_failed(job)
     assert (job.state, job.finished_at) == (GenerationJob.State.RUNNING, None)
     first.refresh_from_db()
     second.refresh_from_db()
@@ -97,3 +106,100 @@ def test_retry_queues_failed_rows_alone_and_opens_the_job_again() -> None:
     assert second.state == State.DONE
     leased(first)
     assert first.attempts.count() == 2
+
+
+def test_a_paused_job_starts_nothing_and_what_is_in_flight_keeps_its_result() -> None:
+    job = launch(scenarios=3)
+    first, second, third = job.augmentations.order_by("pk")
+    held = leased(first)
+    job = jobs.pause(job)
+    assert job.state == Job.PAUSED
+    assert Event.objects.get(verb="pause").after == {
+        "state": "paused", "waiting": 2, "in_flight": 1,
+    }  # fmt: skip
+    assert AUGMENTATIONS.take(second.pk) is None
+    assert AUGMENTATIONS.find_unsent(older_than=timedelta(0)) == []
+    assert count_rows(job).is_moving, "one is in flight"
+    assert held.settle(done())
+    assert not count_rows(job).is_moving
+    jobs.finish_if_over()
+    job = jobs.resume(job)
+    assert job.state == Job.RUNNING
+    assert Event.objects.get(verb="resume").before == {"state": "paused"}
+    assert AUGMENTATIONS.find_unsent(older_than=timedelta(0)) == [second.pk, third.pk]
+    first.refresh_from_db()
+    assert first.state == State.DONE
+
+
+def test_all_calls_of_what_is_in_flight_are_made_though_the_job_is_paused_between_them() -> None:
+    def pause_once() -> None:
+        if GenerationJob.objects.get().state == Job.RUNNING:
+            jobs.pause(GenerationJob.objects.get())
+
+    model = Model(after_a_second_look, looking_on=pause_once)
+    row = only_row(llama_job(caps=Caps(calls=9)))
+    assert runner.work_on(augmentation_pk=row.pk, connect=model)
+    row.refresh_from_db()
+    assert (row.state, len(model.requests)) == (State.DONE, 2)
+    assert GenerationJob.objects.get().state == Job.FINISHED, "nothing is left to resume"
+
+
+@pytest.mark.parametrize(
+    ("reason", "other", "are_alike"),
+    [
+        ("HTTP 429: slow down, try in 3 s", "HTTP 429: slow down, try in 17.5 s", True),
+        ("HTTP 429: slow down", "HTTP 503: slow down", False),
+        ("request req_9f31ab20c4de77aa broke", "request req_0011ab20c4de77ff broke", True),
+        (
+            "no 3f2504e0-4f89-11d3-9a0c-0305e82c3301",
+            "no 3f2504e0-4f89-11d3-9a0c-0305e82c3302",
+            True,
+        ),
+        ("line 3 column 7: no block", "line 12 column 1: no block", True),
+        ("Lane3 is unknown", "Lane4 is unknown", False),
+        ("the wire broke", "the  wire\nbroke", True),
+        ("gpt-4 answered nothing", "gpt-5 answered nothing", False),
+    ],
+)
+def test_reasons_have_one_cause_where_only_numbers_and_ids_differ(
+    reason: str, other: str, are_alike: bool
+) -> None:
+    assert (cause_of(reason) == cause_of(other)) is are_alike
+
+
+def broken(job: GenerationJob, *reasons: str) -> None:
+    for row, reason in zip(job.augmentations.order_by("pk"), reasons, strict=True):
+        leased(row).settle(failed(reason))
+    jobs.finish_if_over()
+
+
+def test_an_unreadable_answer_is_asked_for_anew_and_not_served_again() -> None:
+    said = ["Sorry?", "Sorry, what?", GOOD]
+    model = Model(lambda request: reply(said.pop(0)))
+    job = llama_job()
+    row = only_row(job)
+    runner.work_on(augmentation_pk=row.pk, connect=model)
+    row.refresh_from_db()
+    assert row.state == State.UNREADABLE
+    (group,) = failure_groups(job)
+    jobs.retry_cause(job, key=group.key)
+    row.refresh_from_db()
+    assert (row.image, row.state) == ("", State.QUEUED)
+    runner.work_on(augmentation_pk=row.pk, connect=model)
+    row.refresh_from_db()
+    assert (row.state, len(model.requests)) == (State.DONE, 3)
+    assert not ModelCall.objects.exclude(served_from=None).exists()
+    assert list(row.attempts.values_list("outcome", flat=True)) == ["unreadable", "done"]
+
+
+def test_the_scenarios_are_held_before_somebody_looks_who_is_shown_a_row() -> None:
+    """Else a study could open with it between the look and the second try."""
+    job = launch(scenarios=2)
+    broken(job, "HTTP 429: slow down", "HTTP 429: slow down")
+    (group,) = failure_groups(job)
+    with CaptureQueriesContext(connection) as seen:
+        retry_unless_shown(job, key=group.key)
+    asked = [one["sql"] for one in seen]
+    look = next(n for n, sql in enumerate(asked) if "arena_matchup" in sql)
+    held = next(n for n, sql in enumerate(asked) if 'FROM "augment_scenario"' in sql)
+    assert held < look

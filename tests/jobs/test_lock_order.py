@@ -13,8 +13,6 @@ from django.utils import timezone
 from augment.errors import Conflict
 from augment.models import GenerationJob
 from augment.services.running import jobs, runner
-from augment.services.running import jobs as pausing
-from augment.services.running import jobs as retrying
 from augment.services.running.budget import Caps
 from augment.services.running.progress import count_rows, failure_groups
 from augment.services.running.runner import AUGMENTATIONS
@@ -42,21 +40,10 @@ def test_a_worker_holds_its_row_before_the_job() -> None:
     assert held(lambda: runner.work_on(augmentation_pk=pk, connect=Model())) == [ROWS, JOB]
 
 
-def test_who_cancels_a_job_holds_what_waits_before_the_job() -> None:
-    job = launch(scenarios=2)
-    assert held(lambda: jobs.cancel(job)) == [ROWS, JOB]
-
-
-def test_who_resumes_a_job_holds_what_waits_before_the_job() -> None:
-    job = llama_job(caps=Caps(tokens=5))
-    runner.work_on(augmentation_pk=job.augmentations.get().pk, connect=Model())
-    assert held(lambda: pausing.resume(job)) == [ROWS, JOB]
-
-
 def test_who_raises_a_cap_and_resumes_holds_what_waits_before_the_job() -> None:
     job = llama_job(caps=Caps(tokens=5))
     runner.work_on(augmentation_pk=job.augmentations.get().pk, connect=Model())
-    assert held(lambda: pausing.resume(job, higher=Caps(tokens=50_000))) == [ROWS, JOB]
+    assert held(lambda: jobs.resume(job, higher=Caps(tokens=50_000))) == [ROWS, JOB]
     job.refresh_from_db()
     assert (job.state, job.cap_tokens) == ("running", 50_000)
 
@@ -69,10 +56,10 @@ def all_failed() -> GenerationJob:
 
 def test_who_retries_holds_the_rows_before_the_job() -> None:
     job = all_failed()
-    assert held(lambda: retrying.retry_failed(job)) == [ROWS, JOB]
+    assert held(lambda: jobs.retry_failed(job)) == [ROWS, JOB]
     job.augmentations.update(state="failed", reason="the wire broke")
     (cause,) = failure_groups(job)
-    assert held(lambda: retrying.retry_cause(job, key=cause.key)) == [ROWS, JOB]
+    assert held(lambda: jobs.retry_cause(job, key=cause.key)) == [ROWS, JOB]
 
 
 @pytest.mark.django_db(transaction=True)
@@ -82,7 +69,7 @@ def test_two_who_retry_at_once_wait_for_each_other_and_never_in_a_circle() -> No
 
     def retry() -> str:
         try:
-            retrying.retry_failed(job)
+            jobs.retry_failed(job)
         except Conflict as refused:
             return str(refused)
         finally:
@@ -140,11 +127,3 @@ def test_a_call_is_settled_before_the_job_is_held() -> None:
     changes = [query["sql"].split('"')[1] for query in captured if query["sql"][:6] == "UPDATE"]
     reserved, settled, *_ = (place for place, table in enumerate(changes) if table == JOB)
     assert changes[reserved + 1 : settled].count("augment_modelcall") == 2, "sent, then answered"
-
-
-def test_a_job_that_is_over_keeps_what_waits() -> None:
-    job = launch()
-    GenerationJob.objects.update(state=GenerationJob.State.FINISHED)
-    with pytest.raises(Conflict):
-        jobs.cancel(job)
-    assert count_rows(job).queued == 1

@@ -10,12 +10,14 @@ from collections.abc import Callable
 import pytest
 from django.core.management import CommandError, call_command
 
-from augment.errors import InvalidDocument
-from augment.models import Contestant, ModelCall
+from augment.errors import Conflict, InvalidDocument
+from augment.models import Augmentation, Contestant, GenerationJob, ModelCall
 from augment.prompts.fill import prompt_version
 from augment.services.endpoints import contestants
 from augment.services.endpoints.known_endpoints import ensure_endpoint
 from augment.services.endpoints.treatments import options_of
+from augment.services.running import runner
+from augment.services.running.choosing import find_obstacle
 from augment.services.running.transcript_records import transcript_of
 from augment.variants.options import NAMES, ContestantOptions, options_from_document
 from tests.jobs.scripted import SCRIPTS, Bodies, Scripted, add, run
@@ -145,15 +147,11 @@ def test_the_command_takes_every_option_and_keeps_contestants_apart(
         assert options_of(made).prompt_version == prompt_version()
         with pytest.raises(CommandError, match="another contestant called 'a'"):
             call_command("add_contestant", "a", *asked, "--temperature=0.8")
-        call_command("add_contestant", "b", "--like=a", "--temperature=0.8")
-        assert Contestant.objects.get(slug="b").options == made.options | {"temperature": 0.8}
         with pytest.raises(CommandError, match=r"temperature.*from 0 to 2"):
             call_command("add_contestant", "c", *asked, "--temperature=2.1")
+        alone = ["--variant=otm", *asked[1:], "--rounds=2"]
         with pytest.raises(CommandError, match="otm has no review, so it has one round"):
-            call_command("add_contestant", "c", "--like=a", "--variant=otm", "--rounds=2")
-        call_command("add_contestant", "c", "--like=a", "--variant=otm")
-        left = made.options.keys() - Contestant.objects.get(slug="c").options.keys()
-        assert left == {"protocol", "rounds", "accepted_from"}
+            call_command("add_contestant", "c", *alone)
 
 
 @pytest.mark.parametrize(
@@ -182,3 +180,24 @@ def test_an_option_out_of_range_is_refused_with_its_name(
         assert refused.value.problems[0][0] == name
     with pytest.raises(InvalidDocument, match="is no option"):
         options_from_document({f"{name}s": good[0]})
+
+
+def test_who_ran_with_other_prompts_is_not_run_with_these() -> None:
+    with serving(Scripted()) as server:
+        add(server, "a")
+        run("a")
+        Contestant.objects.update(frozen_options={"prompt_version": "0" * 12})
+        assert "version 000000000000" in find_obstacle(Contestant.objects.get(slug="a"))
+        with pytest.raises(Conflict, match="Add another contestant like it"):
+            run("a")
+        row = Augmentation.objects.create(
+            job=GenerationJob.objects.get(),
+            scenario=Augmentation.objects.get().scenario,
+            contestant=Contestant.objects.get(),
+            sample=2,
+        )
+        runner.work_on(augmentation_pk=row.pk)
+        row.refresh_from_db()
+        assert (row.state, len(server.bodies)) == (Augmentation.State.FAILED, 1)
+        add(server, "b", seed=1)
+        run("b")

@@ -126,13 +126,6 @@ def test_what_a_server_can_not_do_is_found_and_nothing_else(lacks: str, ability:
     assert found == dict.fromkeys(Ability, True) | {ability: False}
 
 
-def test_a_cut_window_is_told_with_its_numbers() -> None:
-    with candidate(EVERYTHING - {"window"}):
-        report = asked()
-    assert "silently cut the prompt" in report.findings[-1].note
-    assert "4096" in report.findings[-1].note
-
-
 def test_a_limit_that_is_passed_over_is_sent_by_its_other_name() -> None:
     with candidate(EVERYTHING - {"max_completion_tokens"}):
         report = asked()

@@ -123,10 +123,6 @@ def test_the_command_reads_through_the_wire_shows_statements_and_accepts(tmp_pat
     assert Scenario.objects.get().intent_origin == "entered"
 
 
-def calls() -> list[ModelCall]:
-    return list(ModelCall.objects.all())
-
-
 def test_a_worker_asks_for_a_planned_reading_once() -> None:
     add_scenario("street", intent=None, intent_origin="")
     ensure_endpoint(label="here", base_url="http://127.0.0.1:1/v1")

@@ -2,21 +2,38 @@ from __future__ import annotations
 
 import json
 from datetime import timedelta
+from typing import Any
 
 import pytest
 from django.core.files.storage import default_storage
 from django.utils import timezone
 
-from augment.errors import LeaseLost
+from augment.errors import Conflict, LeaseLost
 from augment.llm.client import Sending, watch_nothing
 from augment.llm.messages import Reply, Request
-from augment.models import Augmentation, Endpoint, GenerationJob, ModelCall
-from augment.scene.codec import modification_from_document, modification_to_document
+from augment.models import Augmentation, Contestant, Endpoint, GenerationJob, ModelCall
+from augment.scene.codec import (
+    intent_to_document,
+    modification_from_document,
+    modification_to_document,
+)
+from augment.scene.entities import Modification
+from augment.scene.intent import Intent
+from augment.services.endpoints import contestants
 from augment.services.running import jobs, runner
 from augment.services.running.runner import AUGMENTATIONS
-from tests.jobs.rows import INSTRUCTION, TWO_CONES, add_model, add_scenario, launch, only_row
+from tests.intents import parked
+from tests.jobs.rows import (
+    INSTRUCTION,
+    TWO_CONES,
+    add_kind,
+    add_model,
+    add_scenario,
+    launch,
+    only_row,
+)
 from tests.jobs.running import Wire, ran
-from tests.variants.answers import GOOD
+from tests.variants.playing import GOOD
 
 pytestmark = pytest.mark.django_db
 State = Augmentation.State
@@ -59,15 +76,6 @@ def test_the_reference_runs_to_its_picture_and_the_job_is_finished() -> None:
     assert row.image != row.scenario.original_image
     row.job.refresh_from_db()
     assert row.job.state == GenerationJob.State.FINISHED
-
-
-def test_a_message_that_comes_twice_does_nothing_the_second_time() -> None:
-    row = ran(only_row(launch()))
-    finished_at = row.finished_at
-    assert not runner.work_on(augmentation_pk=row.pk)
-    row.refresh_from_db()
-    assert row.finished_at == finished_at
-    assert row.attempts.count() == 1
 
 
 def test_a_scene_that_can_not_be_read_is_a_failure_with_a_sentence() -> None:
@@ -138,16 +146,6 @@ def test_a_worker_whose_claim_was_taken_asks_no_model_and_writes_nothing() -> No
     assert not ModelCall.objects.exists()
 
 
-def test_a_claim_that_is_lost_while_drawing_ends_quietly() -> None:
-    row = only_row(launch())
-    held = AUGMENTATIONS.take(row.pk, now=timezone.now() - timedelta(minutes=1))
-    assert held is not None
-    AUGMENTATIONS.take_back_lost(now=timezone.now())
-    AUGMENTATIONS.work(held)
-    row.refresh_from_db()
-    assert (row.state, row.modification) == (State.QUEUED, None)
-
-
 def test_what_nobody_foresaw_fails_the_row_and_is_logged(caplog: pytest.LogCaptureFixture) -> None:
     row = model_job()
     wire = Wire()
@@ -162,6 +160,49 @@ def test_what_nobody_foresaw_fails_the_row_and_is_logged(caplog: pytest.LogCaptu
     assert row.job.state == GenerationJob.State.FINISHED
 
 
-def test_notes_that_a_database_can_not_take_are_kept_all_the_same() -> None:
-    row = ran(model_job(), Wire(GOOD.replace("One road", "One\0 road")))
-    assert (row.state, row.notes[:9]) == (State.DONE, "One\u2400 road")
+def one_job(kind: str, **columns: Any) -> Augmentation:
+    add_kind("someone", kind)
+    add_scenario("street", **columns)
+    return only_row(jobs.launch(name="R", contestants=["someone"], scenarios=["street"]))
+
+
+def test_a_reference_that_does_not_fit_is_a_failure_with_a_sentence() -> None:
+    gone = modification_to_document(Modification(removed=("Agent9",)))
+    row = ran(one_job(Contestant.Kind.REFERENCE, reference=gone))
+    assert row.state == State.FAILED
+    assert row.reason.startswith("The modification does not fit the scene: Agent9")
+
+
+def test_the_rule_placer_places_the_same_each_time() -> None:
+    first = ran(one_job(Contestant.Kind.RULE))
+    assert first.state == State.DONE
+    again = jobs.launch(name="R2", contestants=["someone"], scenarios=["street"])
+    second = ran(only_row(again))
+    assert second.modification == first.modification
+    assert second.image == first.image
+
+
+PARKED = parked(22.0)
+
+
+def quantised(slug: str, intent: Intent) -> Augmentation:
+    add_scenario(f"street-{slug}", intent=intent_to_document(intent))
+    contestants.ensure_builtin()
+    job = jobs.launch(name="Q", contestants=[slug], scenarios=[f"street-{slug}"])
+    return ran(only_row(job))
+
+
+@pytest.mark.parametrize("slug", ["quantised-5m", "quantised-20m"])
+def test_the_quantised_baselines_place_vehicles_and_tell_their_codes(slug: str) -> None:
+    row = quantised(slug, PARKED)
+    assert row.state == State.DONE
+    assert "Agent2: front right, 20 to " in row.notes
+    assert "direction same, stands" in row.notes
+
+
+def test_simulated_errors_of_an_earlier_version_run_no_more() -> None:
+    add_kind("someone", Contestant.Kind.SIMULATED)
+    Contestant.objects.filter(slug="someone").update(error_rates={"position": 0.1})
+    add_scenario("street")
+    with pytest.raises(Conflict, match="A job can't run someone"):
+        jobs.launch(name="R", contestants=["someone"], scenarios=["street"])

@@ -96,12 +96,6 @@ def test_a_drive_keeps_both_scores_their_parts_and_the_way() -> None:
     assert job.augmentations.count() == 1
 
 
-def test_a_row_is_driven_once() -> None:
-    (first, *_) = simulations.plan_job(job=finished_job(), options=STRAIGHT)
-    assert DRIVES.perform(first)
-    assert not DRIVES.perform(first)
-
-
 def test_a_planner_that_breaks_is_a_failed_row_that_can_be_driven_again() -> None:
     job = finished_job()
     driven(job, BROKEN)

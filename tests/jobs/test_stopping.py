@@ -20,7 +20,7 @@ from tests.jobs.models import llama_job
 from tests.jobs.rows import launch, only_row
 from tests.jobs.running import Wire
 from tests.llm.scripted import ScriptedClient
-from tests.variants.answers import GOOD
+from tests.variants.playing import GOOD
 
 pytestmark = pytest.mark.django_db
 State = Augmentation.State
@@ -69,14 +69,6 @@ def test_no_row_is_claimed_any_more_and_its_message_goes_back() -> None:
     row.refresh_from_db()
     assert row.state == State.QUEUED
     assert not row.attempts.exists()
-
-
-def test_a_call_in_flight_is_awaited_and_its_answer_used() -> None:
-    job = llama_job()
-    assert runner.work_on(augmentation_pk=only_row(job).pk, connect=StoppedAt(GOOD))
-    row, calls = only(job)
-    assert row.state == State.DONE
-    assert [bool(call.answer) for call in calls] == [True]
 
 
 def test_where_nothing_was_sent_the_row_goes_back_unpaid() -> None:

@@ -9,12 +9,12 @@ from django.core.management import CommandError, call_command
 from django.utils import timezone
 
 from augment import tasks
-from augment.broker import check_broker
 from augment.errors import QueueUnreachable
 from augment.management.commands.generate import Command
 from augment.models import Augmentation, GenerationJob
 from augment.services.running.progress import count_rows
 from augment.services.running.runner import AUGMENTATIONS
+from augment.tasks import check_broker
 from tests.brokers import Broker
 from tests.jobs.rows import add_scenario, done, launch, leased, only_row
 
@@ -52,12 +52,6 @@ def test_the_task_runs_its_row() -> None:
     row.refresh_from_db()
     assert row.state == State.DONE
     assert row.attempts.get().worker.startswith("here ")
-
-
-def test_recover_sends_what_was_never_sent(broker: Broker) -> None:
-    launch(scenarios=2)
-    tasks.recover(now=timezone.now())
-    assert len(broker) == 2
 
 
 def test_recover_takes_back_and_sends_what_a_dead_worker_held(broker: Broker) -> None:

@@ -14,11 +14,11 @@ from augment.services.running import budget, jobs, runner
 from augment.services.running.budget import Caps
 from augment.services.running.transcript_records import totals_of, transcript_of, tries_of
 from augment.variants.respondents import NoteKind
-from tests.jobs.models import Model, after_a_second_look, llama_job, reply
+from tests.jobs.models import Model, after_a_second_look, llama_job
 from tests.jobs.rows import INSTRUCTION, only_row
 from tests.llm.raw_server import speaking, whole
 from tests.llm.recorder import GOOD as HEARD
-from tests.variants.answers import GOOD
+from tests.variants.playing import GOOD
 from tests.web.cast import people, signed_in
 
 pytestmark = pytest.mark.django_db
@@ -125,17 +125,3 @@ def test_the_order_in_which_a_database_keeps_keys_does_not_show() -> None:
         prompt_version=call.prompt_version,
     )
     assert known == call.request_hash
-
-
-def test_long_texts_are_cut_with_a_mark_in_rows_and_on_the_page_and_answers_are_kept() -> None:
-    answer = "no " * 60_000
-    row = only_row(llama_job())
-    ran(row, Model(lambda request: reply(answer)))
-    call = ModelCall.objects.order_by("pk")[0]
-    assert call.answer == answer
-    shown = signed_in(people()["admin"]).get(reverse("augmentation", args=[row.code]))
-    page = shown.content.decode()
-    assert page.count("… [cut: 180000 characters]") >= 2
-    assert len(page) < 800_000
-    steps = transcript_of(row)["attempts"][0]["steps"]
-    assert steps[0]["answer"] == answer

@@ -123,14 +123,6 @@ def test_the_first_round_that_works_sends_what_waits() -> None:
     assert round_.first == [True, True, False]
 
 
-def test_a_worker_that_hangs_in_a_round_is_noticed() -> None:
-    worker = living()
-    long_ago(worker, "recovered_at", 119)
-    assert workforce().not_recovered_since is None
-    long_ago(worker, "recovered_at", 125)
-    assert workforce().not_recovered_since == worker.recovered_at
-
-
 # --- A Redis that is there and refuses -----------------------------------------------------------
 
 

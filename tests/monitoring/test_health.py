@@ -14,10 +14,10 @@ from prometheus_client.parser import text_string_to_metric_families
 from pytest_django import Settings
 
 from arena.serving import readiness
-from augment.broker import check_broker
 from augment.errors import QueueUnreachable
 from augment.models import Worker
 from augment.services.clock import DATABASE_TIME
+from augment.tasks import check_broker
 from tests.brokers import Broker
 from tests.study_rows import a_study, matchups_of, vote
 from tests.web.cast import people, signed_in

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import pytest
 
-from arena.jobs.queries import grid
+from arena.exports.samples import sheet_of
 from augment.errors import UnknownName
 from augment.models import Augmentation, GenerationJob
 from augment.scene.codec import modification_to_document
@@ -45,10 +45,11 @@ def job() -> GenerationJob:
 def test_a_job_has_a_row_for_every_sample() -> None:
     made = job()
     assert made.augmentations.count() == 8
-    assert [len(cells) for row in grid(made).rows for cells in row.samples] == [2, 2, 2, 2]
-    assert {cell.sample for row in grid(made, sample=2).rows for cell in row.cells if cell} == {2}
+    chosen = {"scenarios": ["street"], "contestants": ["b", "a"]}
+    (row,) = sheet_of(made, sample=2, **chosen).rows
+    assert [cell.sample for cell in row.cells if cell] == [2, 2]
     with pytest.raises(UnknownName, match="sample of this job '3'"):
-        grid(made, sample=3)
+        sheet_of(made, sample=3, **chosen)
 
 
 def test_what_varies_between_samples() -> None:

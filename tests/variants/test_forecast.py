@@ -35,8 +35,8 @@ class Playing:
     def complete(self, request: Request, *, sending: Sending = watch_nothing) -> Reply:
         sending()
         body = json.dumps(request.to_document()).encode()
-        said = self._character.answer(chat_request(body), intents)
-        return Reply(text=said.text, model="m", finish_reason="stop")
+        said, _ = self._character.answer(chat_request(body), intents)
+        return Reply(text=said, model="m", finish_reason="stop")
 
 
 def calls_made(variant: str, character: Character) -> dict[ModelRole, int]:

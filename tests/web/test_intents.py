@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
+from contextlib import AbstractContextManager
 
 import pytest
 from django.core.files.uploadedfile import SimpleUploadedFile
@@ -68,7 +70,9 @@ def test_a_file_replaces_the_intent_and_can_be_fetched_again(staff: Client) -> N
 
 
 def test_an_admin_has_an_instruction_read_by_a_worker(
-    staff: Client, monkeypatch: pytest.MonkeyPatch
+    staff: Client,
+    monkeypatch: pytest.MonkeyPatch,
+    django_capture_on_commit_callbacks: Callable[..., AbstractContextManager[object]],
 ) -> None:
     scenario = add_scenario("street", intent=None, intent_origin="")
     endpoint = ensure_endpoint(label="here", base_url="http://127.0.0.1:1/v1")
@@ -76,7 +80,8 @@ def test_an_admin_has_an_instruction_read_by_a_worker(
     sent: list[int] = []
     monkeypatch.setattr("arena.scenarios.pages.scenarios.enqueue_reading", sent.append)
     assert "m at here" in page(staff, scenario)
-    staff.post(f"/scenarios/{scenario.code}/read/", {"reader": str(reader.code)})
+    with django_capture_on_commit_callbacks(execute=True):
+        staff.post(f"/scenarios/{scenario.code}/read/", {"reader": str(reader.code)})
     row = IntentReading.objects.get()
     assert (sent, row.state, row.model) == ([row.pk], "running", "m")
     assert "m at here reads it now" in page(staff, scenario)

@@ -46,7 +46,7 @@ def test_the_page_has_the_picture_drawn_and_shows_it_with_the_same_numbers(
         before = analyst.get(url).content.decode()
     assert len(waiting) == 1
     assert "A worker is drawing the marks." in before
-    assert 'content="2; url=?drawing=1"' in before
+    assert 'content="2; url=?look=1"' in before
     name = draw_marked(augmentation_pk=row.pk)
     assert default_storage.exists(name)
     with django_capture_on_commit_callbacks() as waiting:  # type: ignore[attr-defined]

@@ -30,7 +30,7 @@ def server() -> Iterator[Scripted]:
 @pytest.fixture
 def analyst(monkeypatch: pytest.MonkeyPatch) -> Client:
     """Signed in; what is sent to a worker is done at once."""
-    monkeypatch.setattr("arena.scenarios.pages.prompts.enqueue_prompts", draw_prompts)
+    monkeypatch.setattr("arena.scenarios.pages.augmentations.enqueue_prompts", draw_prompts)
     monkeypatch.setattr("arena.site.acts.transaction.on_commit", lambda done: done())
     return signed_in(people()["analyst"])
 

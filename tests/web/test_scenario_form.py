@@ -31,7 +31,7 @@ street-scene,jaywalking_pedestrian,,Let somebody cross.,two,change.json
 @pytest.fixture
 def analyst(monkeypatch: pytest.MonkeyPatch) -> Client:
     """Signed in; what is sent to a worker is done at once."""
-    monkeypatch.setattr("arena.scenarios.pages.forms.enqueue_scene", draw_scene)
+    monkeypatch.setattr("arena.scenarios.pages.uploads.enqueue_scene", draw_scene)
     monkeypatch.setattr("arena.scenarios.pages.forms.enqueue_scenario", draw_scenario)
     monkeypatch.setattr("arena.site.acts.transaction.on_commit", lambda done: done())
     return signed_in(people()["analyst"])

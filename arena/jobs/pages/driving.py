@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import uuid
-from functools import partial
 from typing import Any
 
 from django.contrib import messages
@@ -15,12 +14,12 @@ from django.views.decorators.http import require_POST, require_safe
 
 from arena.exports.tables import LeaderboardTable
 from arena.jobs.exports.driving import FORMATS, SCORE_LABELS, DrivingTable, driving_table
-from arena.jobs.queries import DRIVES, Part, before_of, shown_augmentations
-from arena.jobs.queries import drive_cells as cells_of
+from arena.jobs.queries import DRIVES, Part, before_of, drive_cells, shown_augmentations
 from arena.models import Snapshot
 from arena.site.access import ADMIN, STAFF, allow_only
+from arena.site.acts import refusals_told, send_later
 from arena.site.listing import choice_asked, page_asked
-from augment.errors import AugmentError, QueueFault, UnknownName
+from augment.errors import UnknownName
 from augment.models import GenerationJob, Simulation
 from augment.services.judging import simulations
 from augment.services.judging.driving_scores import (
@@ -32,6 +31,9 @@ from augment.services.judging.simulations import FILES, NUPLAN, SCORES, Options,
 from augment.tasks import enqueue_simulations
 
 PDM_CLOSED = Options().planner
+OFFSETS = {"paper": "Up to 4 m (paper)", "original": "Up to 1 m (original)"}
+"""What the names of the lateral offsets mean."""
+
 PLANNERS = {PDM_CLOSED: "PDM-Closed", "idm": "IDM"}
 
 
@@ -47,21 +49,13 @@ def simulate_job(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         is_reactive=request.POST.get("reactive") == "on",
     )
     score = request.POST.get("score", NUPLAN)
-    try:
+    with refusals_told(request), transaction.atomic():
         if score not in SCORES:
             raise UnknownName("score", score, list(SCORES))
-        with transaction.atomic():
-            waiting = simulations.plan_job(job=job, options=options)
-            transaction.on_commit(partial(_send, request, waiting))
-    except AugmentError as error:
-        messages.error(request, str(error))
-    else:
-        number = len(waiting)
-        messages.success(
-            request,
-            ("%(number)s drive is queued." if number == 1 else "%(number)s drives are queued.")
-            % {"number": number},
-        )
+        waiting = simulations.plan_job(job=job, options=options)
+        send_later(request, lambda _pk: enqueue_simulations(waiting), job.pk)
+        drives = "drive is" if len(waiting) == 1 else "drives are"
+        messages.success(request, f"{len(waiting)} {drives} queued.")
     shown = f"?score={score}#driving" if score in SCORES else "#driving"
     return redirect(reverse("job", args=[code]) + shown)
 
@@ -69,7 +63,7 @@ def simulate_job(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
 @allow_only(*STAFF)
 @require_safe
 def drives_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
-    """The drives of a job in a grid, page by page."""
+    """Show the drives of a job in a grid, page by page."""
     job = get_object_or_404(GenerationJob, code=code)
     score = score_asked(request)
     known = options_driven(job)
@@ -80,7 +74,7 @@ def drives_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         column=page_asked(request, "column"),
         sample=page_asked(request, "sample"),
     )
-    cells = cells_of(job, known[way] if known else Options(), part)
+    cells = drive_cells(job, known[way] if known else Options(), part)
     lines = [
         {
             "scenario": row.scenario,
@@ -103,14 +97,15 @@ def drives_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
 @allow_only(*STAFF)
 @require_safe
 def drive_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
-    """One drive to look at, beside the same scene before the change."""
+    """Show one drive, beside the same scene before the change."""
     row = _driven(code)
     before = before_of(row)
+    metrics, old = _metrics(row), {one["name"]: one["value"] for one in _metrics(before)}
     context = {
         "drive": row,
         "before": before,
         "files": FILES if row.state == Simulation.State.DONE else (),
-        "metrics": _metrics(row, before),
+        "metrics": [metric | {"before": old.get(metric["name"])} for metric in metrics],
         "labels": SCORE_LABELS,
     }
     return render(request, "drives/drive.html", context)
@@ -119,7 +114,7 @@ def drive_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
 @allow_only(*STAFF)
 @require_safe
 def drive_trace(request: HttpRequest, code: uuid.UUID, form: str) -> HttpResponseBase:
-    """The drive as JSON for the page, or as a moving picture or a strip of stills."""
+    """Answer with the drive as JSON for the page, or as a moving picture or a strip of stills."""
     row = _driven(code)
     if row.state != Simulation.State.DONE or form not in FILES:
         raise Http404
@@ -132,26 +127,26 @@ def drive_trace(request: HttpRequest, code: uuid.UUID, form: str) -> HttpRespons
 
 
 def driving_section(request: HttpRequest, job: GenerationJob) -> dict[str, object]:
-    """What the part of the job's page shows."""
+    """Return the context of the driving part of a job's page."""
     table = driving_asked(request, job)
     known = options_driven(job)
     chosen = _way_asked(request, known)
     ways = [
         {
             "planner": PLANNERS.get(one.planner, one.planner),
-            "offsets": _offsets()[one.offsets] if one.planner == PDM_CLOSED else "",
+            "offsets": OFFSETS[one.offsets] if one.planner == PDM_CLOSED else "",
             "is_reactive": one.is_reactive,
             "is_shown": number == chosen,
         }
         for number, one in enumerate(known)
     ]
-    choices = {"planner": PLANNERS.items(), "offsets": _offsets().items()}
+    choices = {"planner": PLANNERS.items(), "offsets": OFFSETS.items()}
     asked = {"ways": ways, "driven": chosen, "choices": choices, "asked": table.scores.options}
     return {"table": table, "forms": FORMATS, **asked, **_shown(table)}
 
 
 def driving(snapshot: Snapshot, table: LeaderboardTable) -> dict[str, Any]:
-    """What the tab of a study's results shows: of the augmentations that it shows."""
+    """Return the context of a study's tab: the drives of the augmentations that it shows."""
     if not Simulation.objects.exists():
         return {"drivings": []}
     ids = shown_augmentations(snapshot.study)
@@ -163,9 +158,6 @@ def driving(snapshot: Snapshot, table: LeaderboardTable) -> dict[str, Any]:
         for score in SCORES
     ]
     return {"drivings": [{"table": one, **_shown(one)} for one in found if one.lines]}
-
-
-# Private
 
 
 def driving_asked(request: HttpRequest, job: GenerationJob) -> DrivingTable:
@@ -199,11 +191,6 @@ def _way_asked(request: HttpRequest, known: list[Options]) -> int:
     return int(choice_asked(request, "driven", numbers) or 0)
 
 
-def _offsets() -> dict[str, str]:
-    """What the names of the lateral offsets mean."""
-    return {"paper": "Up to 4 m (paper)", "original": "Up to 1 m (original)"}
-
-
 def _driven(code: uuid.UUID) -> Simulation:
     rows = Simulation.objects.select_related("scenario", "augmentation__contestant")
     return get_object_or_404(rows, code=code)
@@ -219,23 +206,6 @@ def _cell(row: Simulation | None, score: str) -> dict[str, Any] | None:
     }
 
 
-def _metrics(row: Simulation, before: Simulation | None) -> list[dict[str, Any]]:
-    """The parts of nuPlan's score, beside those before the change."""
-    if row.document is None:
-        return []
-    old = {} if before is None or before.document is None else _values(before.document)
-    return [
-        metric | {"before": old.get(metric["name"])} for metric in row.document["metrics"][NUPLAN]
-    ]
-
-
-def _values(document: dict[str, Any]) -> dict[str, float | None]:
-    return {metric["name"]: metric["value"] for metric in document["metrics"][NUPLAN]}
-
-
-def _send(request: HttpRequest, waiting: list[int]) -> None:
-    """Put drives on the queue; without a queue they wait, and the person is told."""
-    try:
-        enqueue_simulations(waiting)
-    except QueueFault as error:
-        messages.warning(request, str(error))
+def _metrics(row: Simulation | None) -> list[dict[str, Any]]:
+    """Return the parts of nuPlan's score."""
+    return [] if row is None or row.document is None else row.document["metrics"][NUPLAN]

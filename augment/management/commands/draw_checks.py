@@ -1,4 +1,4 @@
-"""manage.py draw_checks: pictures for attention checks."""
+"""Draw pictures for attention checks."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from augment.services.terminal import TerminalCommand
 
 
 class Command(TerminalCommand):
-    """The door to augment.services.scenarios.pictures.draw_checks."""
+    """draw_checks SLUG ..."""
 
     help = (
         "Draw, for scenarios with a reference, a picture that is broken on purpose: everything "

@@ -11,7 +11,6 @@ from django.core.management.base import CommandError
 from django.db import transaction
 from django.utils import timezone
 
-from augment.broker import check_broker
 from augment.formats.documents import read_yaml_file
 from augment.management.arguments import add_cap_arguments, caps_of
 from augment.models import Augmentation, GenerationJob
@@ -19,20 +18,14 @@ from augment.services.endpoints.contestants import ensure_builtin
 from augment.services.running import jobs
 from augment.services.running.budget import limit_of
 from augment.services.running.choosing import resolve_contestants, resolve_scenarios
-from augment.services.running.estimates import estimate
+from augment.services.running.estimates import ContestantEstimate, JobEstimate, estimate
 from augment.services.running.matrix import WHAT, Matrix, load_matrix
-from augment.services.running.progress import (
-    JobCounts,
-    contestant_lines,
-    count_rows,
-    failure_groups,
-)
+from augment.services.running.progress import contestant_lines, count_rows, failure_groups
 from augment.services.terminal import TerminalCommand
-from augment.tasks import enqueue_job
+from augment.tasks import check_broker, enqueue_job
 
 POLL_S = 0.5
 HINT_AFTER_S = 10.0
-BAR_CELLS = 30
 STOPPED = 3
 """Exit code of a wait that a cap, or somebody who paused the job, has ended."""
 
@@ -48,8 +41,8 @@ class Command(TerminalCommand):
             "--matrix",
             type=Path,
             metavar="FILE",
-            help="YAML with models x variants x options, scenarios and samples instead of the "
-            "arguments for these; checked as a whole before anything runs",
+            help="YAML with contestants, scenarios and samples instead of the arguments, "
+            "as the page of a new job writes it; checked as a whole before anything runs",
         )
         parser.add_argument("--contestants", nargs="+", help="slugs, or all")
         parser.add_argument(
@@ -82,54 +75,23 @@ class Command(TerminalCommand):
 
     def handle(self, *args: Any, **options: Any) -> None:
         """Launch the job, then wait if asked to."""
-        _refuse_both(options)
+        named = [f"--{name}" for name in ("contestants", "scenarios", "samples") if options[name]]
+        if options["matrix"] is not None and named:
+            raise CommandError(f"--matrix says what runs; it goes without {', '.join(named)}.")
+        if options["matrix"] is None and not (options["contestants"] and options["scenarios"]):
+            raise CommandError("Name --contestants and --scenarios, or --matrix FILE.")
         if options["estimate"]:
             with transaction.atomic():
-                self._estimate(options)
+                runs = _runs(options)
+                expected = estimate(runs.contestants, runs.scenarios, samples=runs.samples)
                 transaction.set_rollback(True)
+            self._say(runs, expected)
             return
         check_broker()
-        job = self._launch(options)
-        total = count_rows(job).total
-        self.stdout.write(f"Job {job.code}, {job.name!r}: {total} to run.")
-        if options["wait"]:
-            try:
-                self.wait(job, options["timeout"])
-            except KeyboardInterrupt:
-                raise CommandError("Not waited for; the job goes on.", returncode=130) from None
-            self.report(job)
-
-    def _estimate(self, options: dict[str, Any]) -> None:
-        runs = self._runs(options)
-        found = estimate(runs.contestants, runs.scenarios, samples=runs.samples)
-        for slug in runs.made:
-            self.stdout.write(f"Would be added: {slug}.")
-        self.stdout.write(f"{found.rows} to run, {found.asking_rows} of them ask models.")
-        for line in found.lines:
-            least, usual, most = line.calls
-            basis = f"{line.seen} earlier runs" if line.seen else "a guess from its prompts"
-            money = "cost unknown"
-            if line.usd is not None and line.usd_most is not None:
-                money = f"{line.usd:.4f} USD expected, {line.usd_most:.2f} at most"
-            self.stdout.write(
-                f"{line.slug}: calls {usual} expected ({least} to {most}), tokens "
-                f"{line.tokens_in} in, {line.tokens_out} out, {money} ({basis})"
-            )
-        if len(found.lines) > 1:
-            least, usual, most = found.calls
-            unknown = f", of {len(found.unpriced)} contestants unknown" if found.unpriced else ""
-            self.stdout.write(
-                f"In all: calls {usual} expected ({least} to {most}), tokens {found.tokens_in} "
-                f"in, {found.tokens_out} out, {found.usd:.4f} USD expected, {found.usd_most:.2f} "
-                f"at most{unknown}"
-            )
-
-    def _launch(self, options: dict[str, Any]) -> GenerationJob:
         with transaction.atomic():
-            runs = self._runs(options)
-            usual = f"Job of {timezone.now():%Y-%m-%d %H:%M} UTC"
+            runs = _runs(options)
             job = jobs.launch(
-                name=options["name"] or runs.name or usual,
+                name=options["name"] or runs.name or f"Job of {timezone.now():%Y-%m-%d %H:%M} UTC",
                 contestants=runs.contestants,
                 scenarios=runs.scenarios,
                 caps=caps_of(options),
@@ -137,20 +99,25 @@ class Command(TerminalCommand):
                 is_fresh=options["fresh"],
             )
             transaction.on_commit(lambda: enqueue_job(job.pk))
-        return job
+        self.stdout.write(f"Job {job.code}, {job.name!r}: {count_rows(job).total} to run.")
+        if options["wait"]:
+            try:
+                self.wait(job, options["timeout"])
+            except KeyboardInterrupt:
+                raise CommandError("Not waited for; the job goes on.", returncode=130) from None
+            self.report(job)
 
-    def _runs(self, options: dict[str, Any]) -> Matrix:
-        """What is to run, of the file or of the arguments."""
-        if options["matrix"] is not None:
-            return load_matrix(read_yaml_file(options["matrix"], what=WHAT))
-        ensure_builtin()
-        return Matrix(
-            name=None,
-            contestants=tuple(resolve_contestants(options["contestants"])),
-            scenarios=tuple(resolve_scenarios(options["scenarios"])),
-            samples=1 if options["samples"] is None else options["samples"],
-            made=(),
-        )
+    def _say(self, runs: Matrix, expected: JobEstimate) -> None:
+        for slug in runs.made:
+            self.stdout.write(f"Would be added: {slug}.")
+        self.stdout.write(f"{expected.rows} to run, {expected.asking_rows} of them ask models.")
+        for line in expected.lines:
+            basis = f"{line.seen} earlier runs" if line.seen else "a guess from its prompts"
+            self.stdout.write(f"{line.slug}: {_use(line)} ({basis})")
+        if len(expected.lines) > 1:
+            number = len(expected.unpriced)
+            unknown = f", of {number} contestants unknown" if number else ""
+            self.stdout.write(f"In all: {_use(expected)}{unknown}")
 
     def wait(self, job: GenerationJob, timeout_s: float) -> None:
         """Show the progress until nothing is under way.
@@ -159,90 +126,73 @@ class Command(TerminalCommand):
             CommandError: The time is up, or the job stopped at its cap.
         """
         started = time.monotonic()
-        shown, hinted = "", False
+        shown, is_hinted = "", False
         while True:
+            job.refresh_from_db(fields=["state"])
             counts = count_rows(job)
-            shown = self._show(counts, shown)
+            failed = f", {counts.failed} failed" if counts.failed else ""
+            text = f"{counts.settled} of {counts.total}, {counts.running} running{failed}"
+            if text != shown:
+                self.stdout.write(text)
+                shown = text
             if not counts.under_way:
-                self.stdout.write("" if self.stdout.isatty() else "Over.")
+                self.stdout.write("Over.")
                 return
-            held = state_held(job)
-            if held and not counts.running:
-                raise CommandError(_held_sentence(job, held, counts), returncode=STOPPED)
-            waited = time.monotonic() - started
-            if waited > timeout_s:
+            if counts.is_held and not counts.running:
+                why, how = f"Stopped at its cap of {limit_of(job)}", " with a higher cap"
+                if job.state == GenerationJob.State.PAUSED:
+                    why, how = "Paused by somebody", ""
+                again = f"`manage.py resume_job {job.code}`{how} goes on."
+                raise CommandError(f"{why} with {counts.queued} left; {again}", returncode=STOPPED)
+            waited_s = time.monotonic() - started
+            if waited_s > timeout_s:
                 raise CommandError(
                     f"Still under way after {timeout_s:g} s: {counts.queued} wait, "
                     f"{counts.running} run. The job goes on without this command."
                 )
-            if not hinted and waited > HINT_AFTER_S and counts.queued == counts.total:
+            if not is_hinted and waited_s > HINT_AFTER_S and counts.queued == counts.total:
                 self.stderr.write("No worker has taken anything yet; does `manage.py serve` run?")
-                hinted = True
+                is_hinted = True
             time.sleep(POLL_S)
 
-    def _show(self, counts: JobCounts, before: str) -> str:
-        """A bar that moves on a terminal, elsewhere a line whenever something changed."""
-        text = f"{counts.settled} of {counts.total}, {counts.running} running"
-        if counts.failed:
-            text += f", {counts.failed} failed"
-        if text != before:
-            if self.stdout.isatty():
-                cells = BAR_CELLS * counts.settled // counts.total
-                bar = "#" * cells + "." * (BAR_CELLS - cells)
-                self.stdout.write(f"[{bar}] {text}   ", ending="\r")
-                self.stdout.flush()
-            else:
-                self.stdout.write(text)
-        return text
-
     def report(self, job: GenerationJob) -> None:
-        """The table, the failures by reason, and exit code 1 if there is any."""
+        """Print the table and the failures by reason; exit code 1 if there is any."""
         lines = contestant_lines(job)
-        width = max(len(line.slug) for line in lines)
-        self.stdout.write(f"{'contestant':{max(width, 10)}}  done  unreadable  refused  failed")
+        width = max(10, *(len(line["slug"]) for line in lines))
+        self.stdout.write(f"{'contestant':{width}}  done  unreadable  refused  failed")
+        row = "{slug:{width}}  {done:4}  {unreadable:10}  {refused:7}  {failed:6}"
         for line in lines:
-            self.stdout.write(
-                f"{line.slug:{max(width, 10)}}  {line.done:4}  {line.unreadable:10}  "
-                f"{line.refused:7}  {line.failed:6}"
-            )
+            self.stdout.write(row.format(**line, width=width))
         failed = Augmentation.State.FAILED
         failures = [group for group in failure_groups(job) if group.state == failed]
         for group in failures:
-            self.stdout.write(
-                f"failed {group.number} time{'s' * (group.number > 1)}: {group.reason}"
-            )
+            times = f"{group.number} time{'s' * (group.number > 1)}"
+            self.stdout.write(f"failed {times}: {group.reason}")
         if failures:
             number = sum(group.number for group in failures)
             raise CommandError(f"{number} failed; see the reasons above.", returncode=1)
 
 
-def _refuse_both(options: dict[str, Any]) -> None:
-    """Either the file says what runs, or the arguments do.
-
-    Raises:
-        CommandError: Both do, or neither.
-    """
-    arguments = ("contestants", "scenarios", "samples")
-    named = [f"--{name}" for name in arguments if options[name] is not None]
-    if options["matrix"] is not None and named:
-        raise CommandError(f"--matrix says what runs; it goes without {', '.join(named)}.")
-    if options["matrix"] is None and not (options["contestants"] and options["scenarios"]):
-        raise CommandError("Name --contestants and --scenarios, or --matrix FILE.")
-
-
-def state_held(job: GenerationJob) -> str:
-    """In which state the job waits to be resumed right now; empty where it does not."""
-    held = GenerationJob.objects.filter(pk=job.pk, state__in=GenerationJob.HELD)
-    return held.values_list("state", flat=True).first() or ""
+def _runs(options: dict[str, Any]) -> Matrix:
+    """Return what is to run, of the file or of the arguments."""
+    if options["matrix"] is not None:
+        return load_matrix(read_yaml_file(options["matrix"], what=WHAT))
+    ensure_builtin()
+    return Matrix(
+        name=None,
+        contestants=tuple(resolve_contestants(options["contestants"])),
+        scenarios=tuple(resolve_scenarios(options["scenarios"])),
+        samples=1 if options["samples"] is None else options["samples"],
+        made=(),
+    )
 
 
-def _held_sentence(job: GenerationJob, state: str, counts: JobCounts) -> str:
-    if state == GenerationJob.State.PAUSED:
-        return (
-            f"Paused by somebody with {counts.queued} left; `manage.py resume_job {job.code}` "
-            "goes on."
-        )
+def _use(expected: JobEstimate | ContestantEstimate) -> str:
+    least, usual, most = expected.calls
+    money = "cost unknown"
+    if expected.usd is not None and expected.usd_most is not None:
+        money = f"{expected.usd:.4f} USD expected, {expected.usd_most:.2f} at most"
     return (
-        f"Stopped at its cap of {limit_of(job)} with {counts.queued} left; "
-        f"`manage.py resume_job {job.code}` with a higher cap goes on."
+        f"calls {usual} expected ({least} to {most}), tokens {expected.tokens_in} in, "
+        f"{expected.tokens_out} out, {money}"
     )

@@ -7,11 +7,10 @@ from typing import Any
 
 from django.core.management.base import CommandError
 
-from augment.errors import UnknownName
 from augment.llm.questions import Ability
-from augment.models import Endpoint
+from augment.services.endpoints.known_endpoints import find_endpoint
 from augment.services.endpoints.known_models import tell_sight
-from augment.services.endpoints.probing import ProbeFinding, ProbeReport, probe
+from augment.services.endpoints.probing import probe
 from augment.services.terminal import TerminalCommand
 from augment.services.texts import one_line
 
@@ -39,36 +38,27 @@ class Command(TerminalCommand):
 
     def handle(self, *args: Any, **options: Any) -> None:
         """Ask, print a table and fail where nobody answers."""
-        label = options["label"]
-        if not Endpoint.objects.filter(label=label).exists():
-            known = list(Endpoint.objects.values_list("label", flat=True))
-            raise UnknownName("endpoint", label, known)
+        endpoint = find_endpoint(options["label"])
+        model = one_line("model", options["model"], what="endpoint")
         if options["sees"]:
-            self._tell(label, options["model"], sees=options["sees"] == "yes")
+            sees = options["sees"] == "yes"
+            tell_sight(endpoint=endpoint, model=model, sees=sees)
+            self.stdout.write(f"{'vision':14}{_WORDS[sees]:9}as you say")
             return
-        report = probe(label=label, model=options["model"])
-        for finding in report.findings:
-            self.stdout.write(_line(finding))
-        self._sum_up(report)
-        if not report.has(Ability.ANSWERS):
-            raise CommandError(f"{options['model']} at endpoint {label} does not answer.")
-
-    def _tell(self, label: str, model: str, *, sees: bool) -> None:
-        endpoint = Endpoint.objects.get(label=label)
-        tell_sight(endpoint=endpoint, model=one_line("model", model, what="endpoint"), sees=sees)
-        self.stdout.write(f"{'vision':14}{_WORDS[sees]:9}as you say")
-
-    def _sum_up(self, report: ProbeReport) -> None:
-        self.stdout.write(f"{'usage':14}{_WORDS[report.counts_tokens]}")
-        returned = ", ".join(report.models_returned) or "unknown"
-        self.stdout.write(f"{'model id':14}{returned}")
-        if report.refused:
-            self.stdout.write(f"{'not taken':14}{', '.join(report.refused)}")
+        report = probe(label=endpoint.label, model=model)
+        for found in report.findings:
+            tokens = "" if found.prompt_tokens is None else f"{found.prompt_tokens} tokens in"
+            line = f"{found.ability:14}{_WORDS[found.has_it]:9}{tokens:16}{found.note}"
+            self.stdout.write(line.rstrip())
         cost = "unknown" if report.cost_usd is None else f"{report.cost_usd} USD"
-        calls = "1 call" if report.calls == 1 else f"{report.calls} calls"
-        self.stdout.write(f"{'cost':14}{cost}, {calls}")
-
-
-def _line(finding: ProbeFinding) -> str:
-    tokens = "" if finding.prompt_tokens is None else f"{finding.prompt_tokens} tokens in"
-    return f"{finding.ability:14}{_WORDS[finding.has_it]:9}{tokens:16}{finding.note}".rstrip()
+        facts = {
+            "usage": _WORDS[report.counts_tokens],
+            "model id": ", ".join(report.models_returned) or "unknown",
+            "not taken": ", ".join(report.refused),
+            "cost": f"{cost}, {report.calls} call{'s' * (report.calls != 1)}",
+        }
+        for name, fact in facts.items():
+            if fact:
+                self.stdout.write(f"{name:14}{fact}")
+        if not report.has(Ability.ANSWERS):
+            raise CommandError(f"{model} at endpoint {endpoint.label} does not answer.")

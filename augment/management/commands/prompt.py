@@ -12,7 +12,6 @@ from augment.prompts.fill import prompt_version
 from augment.services.scenarios.prompts import prompt_of
 from augment.services.terminal import TerminalCommand
 from augment.variants.respondents import ModelRole
-from augment.variants.showing import Shown
 
 
 class Command(TerminalCommand):
@@ -47,28 +46,16 @@ class Command(TerminalCommand):
         )
         pictures = [png for message in shown.messages for png in message.images]
         if options["picture"] is not None:
-            self._keep(options["picture"], pictures)
+            if not pictures:
+                raise CommandError("Only the viewer is shown a picture: --role viewer.")
+            self.write_file(options["picture"], pictures[0])
         for message in shown.messages:
             self.stdout.write(f"=== {message.speaker}\n{message.text}\n")
             for png in message.images:
                 self.stdout.write(f"[a PNG of {len(png)} bytes]\n")
         for tool in shown.tools:
             self.stdout.write(f"=== tool\n{tool}\n")
+        images = f" and {len(pictures)} picture" * bool(pictures)
         self.stdout.write("=== about this prompt")
-        for line in _facts(shown):
-            self.stdout.write(line)
-
-    def _keep(self, file: Path, pictures: list[bytes]) -> None:
-        if not pictures:
-            raise CommandError("Only the viewer is shown a picture: --role viewer.")
-        try:
-            file.write_bytes(pictures[0])
-        except OSError as error:
-            raise CommandError(f"{file} can't be written: {error.strerror}.") from error
-
-
-def _facts(shown: Shown) -> list[str]:
-    images = sum(len(message.images) for message in shown.messages)
-    facts = [f"About {shown.tokens} tokens of text" + (f" and {images} picture" * bool(images))]
-    facts.append(f"Prompt version {prompt_version()}")
-    return facts
+        self.stdout.write(f"About {shown.tokens} tokens of text{images}")
+        self.stdout.write(f"Prompt version {prompt_version()}")

@@ -13,6 +13,7 @@ from augment.management.arguments import add_cap_arguments, caps_of
 from augment.models import IntentReading
 from augment.scene.codec import intent_from_document
 from augment.scene.intent_statements import list_statements
+from augment.services.running.budget import NO_CAPS
 from augment.services.running.intent_readings import USUAL_CAPS, read_intent
 from augment.services.scenarios.editing import accept_reading, enter_intent
 from augment.services.terminal import TerminalCommand
@@ -43,39 +44,36 @@ class Command(TerminalCommand):
 
     def handle(self, *args: Any, **options: Any) -> None:
         """Do one of the three, and print the statements of what was read or counts now."""
-        asks = options["endpoint"] is not None or options["model"] is not None
+        endpoint, model, slug = options["endpoint"], options["model"], options["scenario"]
+        asks = endpoint is not None or model is not None
         if asks + options["accept"] + (options["enter"] is not None) != 1:
             raise CommandError("Give one of: --endpoint with --model, --accept, --enter FILE.")
-        if asks and (options["endpoint"] is None or options["model"] is None):
+        if asks and (endpoint is None or model is None):
             raise CommandError("--endpoint and --model go together.")
-        slug = options["scenario"]
         if asks:
-            self._read(slug, options)
-            return
-        if options["accept"]:
-            row = accept_reading(scenario=slug)
+            caps = caps_of(options)
+            reading = read_intent(
+                scenario=slug,
+                endpoint=endpoint,
+                model=model,
+                caps=USUAL_CAPS if caps == NO_CAPS else caps,
+                is_fresh=options["fresh"],
+            )
+            if reading.state != IntentReading.State.READ:
+                raise CommandError(f"Nothing was read: {reading.reason}")
+            document = reading.document
+            told = (
+                "It does not count yet. Hold each statement against the sentence, then accept "
+                f"it:\n  manage.py read_intent {slug} --accept"
+            )
         else:
-            row = enter_intent(scenario=slug, document=read_json(options["enter"], what="intent"))
-        self._print(row.intent)
-        self.stdout.write(f"This is the intent of {slug} now ({row.intent_origin}).")
-
-    def _read(self, slug: str, options: dict[str, Any]) -> None:
-        caps = caps_of(options)
-        reading = read_intent(
-            scenario=slug,
-            endpoint=options["endpoint"],
-            model=options["model"],
-            caps=caps if any((caps.usd, caps.calls, caps.tokens)) else USUAL_CAPS,
-            is_fresh=options["fresh"],
-        )
-        if reading.state != IntentReading.State.READ:
-            raise CommandError(f"Nothing was read: {reading.reason}")
-        self._print(reading.document)
-        self.stdout.write(
-            "It does not count yet. Hold each statement against the sentence, then accept it:\n"
-            f"  manage.py read_intent {slug} --accept"
-        )
-
-    def _print(self, document: object) -> None:
+            if options["accept"]:
+                row = accept_reading(scenario=slug)
+            else:
+                entered = read_json(options["enter"], what="intent")
+                row = enter_intent(scenario=slug, document=entered)
+            document = row.intent
+            told = f"This is the intent of {slug} now ({row.intent_origin})."
         for statement in list_statements(intent_from_document(document)):
             self.stdout.write(f"- {statement}")
+        self.stdout.write(told)

@@ -7,14 +7,13 @@ from typing import Any
 
 from django.db import transaction
 
-from augment.broker import check_broker
 from augment.management.arguments import add_cap_arguments, caps_of
-from augment.services.running import jobs
 from augment.services.running.budget import limit_of
 from augment.services.running.choosing import find_job
+from augment.services.running.jobs import resume
 from augment.services.running.progress import count_rows
 from augment.services.terminal import TerminalCommand
-from augment.tasks import enqueue_job
+from augment.tasks import check_broker, enqueue_job
 
 
 class Command(TerminalCommand):
@@ -32,12 +31,10 @@ class Command(TerminalCommand):
 
     def handle(self, *args: Any, **options: Any) -> None:
         """Raise what is given, then resume."""
-        wanted = caps_of(options)
         job = find_job(options["job"])
         check_broker()
         with transaction.atomic():
-            job = jobs.resume(job, higher=wanted)
-            pk = job.pk
-            transaction.on_commit(lambda: enqueue_job(pk))
+            resume(job, higher=caps_of(options))
+            transaction.on_commit(lambda: enqueue_job(job.pk))
         waiting = count_rows(job).queued
         self.stdout.write(f"Job {job.code}, capped at {limit_of(job)}: {waiting} to run.")

@@ -5,11 +5,9 @@ from __future__ import annotations
 from argparse import ArgumentParser
 from typing import Any
 
-from django.core.management.base import CommandError
-
-from augment.errors import UnknownName
 from augment.models import Contestant
 from augment.services.events import retire, take_back
+from augment.services.running.choosing import resolve_contestants
 from augment.services.terminal import TerminalCommand
 
 
@@ -27,15 +25,12 @@ class Command(TerminalCommand):
         parser.add_argument("--take-back", action="store_true", help="offer them again")
 
     def handle(self, *args: Any, **options: Any) -> None:
-        """All of them or none."""
-        found = {row.slug: row for row in Contestant.objects.filter(slug__in=options["slugs"])}
-        for slug in options["slugs"]:
-            if slug not in found:
-                known = list(Contestant.objects.values_list("slug", flat=True))
-                raise CommandError(str(UnknownName("contestant", slug, known)))
-        change, word = (
-            (take_back, "offered again") if options["take_back"] else (retire, "retired")
-        )
-        for slug in dict.fromkeys(options["slugs"]):
-            change(found[slug])
-            self.stdout.write(f"{slug}: {word}.")
+        """Retire all of them or none."""
+        slugs = dict.fromkeys(resolve_contestants(options["slugs"]))
+        for row in Contestant.objects.filter(slug__in=slugs):
+            if options["take_back"]:
+                take_back(row)
+                self.stdout.write(f"{row.slug}: offered again.")
+            else:
+                retire(row)
+                self.stdout.write(f"{row.slug}: retired.")

@@ -10,8 +10,6 @@ from typing import Any, Final
 from django.db import transaction
 from django.db.models import Q
 
-from augment.broker import check_broker
-from augment.errors import UnknownName
 from augment.models import Scenario, Simulation
 from augment.services.judging import simulations
 from augment.services.judging.driving_scores import (
@@ -24,7 +22,7 @@ from augment.services.judging.driving_scores import (
 from augment.services.judging.simulations import SCORES, Options
 from augment.services.running.choosing import find_job
 from augment.services.terminal import TerminalCommand
-from augment.tasks import enqueue_simulations
+from augment.tasks import check_broker, enqueue_simulations
 
 POLL_S: Final = 0.2
 
@@ -56,18 +54,13 @@ class Command(TerminalCommand):
             action="store_true",
             help="recorded vehicles answer to the ego instead of being replayed",
         )
-        parser.add_argument("--score", default="nuplan", help=f"one of {', '.join(SCORES)}")
+        parser.add_argument("--score", default="nuplan", choices=list(SCORES))
         parser.add_argument(
             "--queue", action="store_true", help="leave the drives to the workers and return"
         )
 
     def handle(self, *args: Any, **options: Any) -> None:
         """Plan the rows, drive them here or queue them, then say the scores."""
-        if options["score"] not in SCORES:
-            raise UnknownName("score", options["score"], list(SCORES))
-        self._simulate(options)
-
-    def _simulate(self, options: dict[str, Any]) -> None:
         how = Options(
             planner=options["planner"], offsets=options["offsets"], is_reactive=options["reactive"]
         )
@@ -78,45 +71,42 @@ class Command(TerminalCommand):
         if options["queue"]:
             check_broker()
         with transaction.atomic():
-            if scenario is not None:
+            if job is None:
+                assert scenario is not None
                 waiting = simulations.plan_scenario(scenario=scenario, options=how, also=also)
+                which = Q(scenario=scenario, augmentation=None)
             else:
-                assert job is not None
                 waiting = simulations.plan_job(job=job, options=how, also=also)
+                which = drives_of_job(job)
             if options["queue"]:
                 transaction.on_commit(lambda: enqueue_simulations(waiting))
         if options["queue"]:
             self.stdout.write(f"{len(waiting)} drives wait for the workers.")
             return
-        rows = drives_of_job(job) if job is not None else Q(scenario=scenario, augmentation=None)
-        asked = how.of(Simulation.objects.filter(rows))
+        asked = how.of(Simulation.objects.filter(which)).order_by("pk")
         # A worker that runs beside this command may have taken some: they are waited for.
-        open_rows = list(asked.filter(state__in=Simulation.UNDER_WAY).order_by("pk"))
-        for number, row in enumerate(open_rows, start=1):
-            self._say(_finished(row.pk, also), number, len(open_rows), options["score"])
+        under_way = list(asked.filter(state__in=Simulation.UNDER_WAY).values_list("pk", flat=True))
+        for number, pk in enumerate(under_way, start=1):
+            self._say(_finish(pk, also), f"{number}/{len(under_way)}", options["score"])
         if job is not None:
             self._table(scores_of_job(job, options=how, score=options["score"]))
-        elif not open_rows:
+        elif not under_way:
             for row in asked.select_related("scenario"):
-                self._say(row, 1, 1, options["score"])
+                self._say(row, "1/1", options["score"])
 
-    def _say(self, row: Simulation, number: int, total: int, score: str) -> None:
-        who = (
-            row.get_subject_display()
-            if row.augmentation is None
-            else row.augmentation.contestant.name
-        )
+    def _say(self, row: Simulation, place: str, score: str) -> None:
+        subject = row.get_subject_display()
+        who = subject if row.augmentation is None else row.augmentation.contestant.name
         value = getattr(row, SCORES[score])
         clearance = clearance_text(least_clearance_m(row))
-        said = row.reason if value is None else f"{100.0 * value:.1f}, clearance {clearance}"
-        self.stdout.write(f"[{number}/{total}] {row.scenario.slug}, {who}: {said}")
+        result = row.reason if value is None else f"{100.0 * value:.1f}, clearance {clearance}"
+        self.stdout.write(f"[{place}] {row.scenario.slug}, {who}: {result}")
         self.stdout.flush()
 
     def _table(self, table: DrivingScores) -> None:
         width = max([len(line.name) for line in table.lines], default=10)
-        self.stdout.write(
-            f"{'mean driving score, %':{width}}  score  before  drives  failed  clearance"
-        )
+        head = f"{'mean driving score, %':{width}}  score  before  drives  failed  clearance"
+        self.stdout.write(head)
         for line in table.lines:
             mean, before = (
                 "-" if value is None else f"{100.0 * value:.1f}"
@@ -133,10 +123,7 @@ class Command(TerminalCommand):
             )
 
 
-# Private
-
-
-def _finished(pk: int, also: Collection[str]) -> Simulation:
+def _finish(pk: int, also: Collection[str]) -> Simulation:
     """Drive a row, or wait until the worker that has it is done or has fallen silent."""
     drives = simulations.Drives(also)
     rows = Simulation.objects.select_related("scenario", "augmentation__contestant")

@@ -31,12 +31,9 @@ class Command(TerminalCommand):
         row = rows.filter(code=options["code"]).first()
         if row is None:
             raise CommandError(f"There is no augmentation {options['code']}.")
-        text = json.dumps(transcript_of(row), indent=2, ensure_ascii=False)
+        text = json.dumps(transcript_of(row), indent=2, ensure_ascii=False) + "\n"
         if options["out"] == "-":
-            self.stdout.write_data(text + "\n")
-            return
-        try:
-            Path(options["out"]).write_text(text + "\n", encoding="utf-8")
-        except OSError as error:
-            raise CommandError(f"Can't write {options['out']}: {error.strerror}.") from error
-        self.stdout.write(f"Written to {options['out']}.")
+            self.stdout.write_data(text)
+        else:
+            self.write_file(Path(options["out"]), text.encode())
+            self.stdout.write(f"Written to {options['out']}.")

@@ -1,4 +1,10 @@
-"""A client for one endpoint that keeps to its limits and to what its models take."""
+"""A client for one endpoint that keeps to its limits and to what its models take.
+
+How many calls an endpoint takes at once and in a minute counts over all workers: each call holds a
+lease, a row. Whether there is room for one more is counted while the endpoint's row is locked (on
+SQLite the transaction locks the whole file), so no two workers count the same place. A lease is
+renewed as long as its call lasts; that of a dead worker runs out.
+"""
 
 from __future__ import annotations
 
@@ -41,11 +47,11 @@ class Queue:
     """How a call waits for its place.
 
     Attributes:
-        longest_s: Who has waited that long gives up.
+        longest_s: A call that has waited that long gives up.
         still_wanted: Asked at every look; raises where nobody needs the call any more.
         clock: What time it is, the same for every worker.
         sleep: Waits for that many seconds.
-        rng: Where the jitter comes from, so that those who wait do not look in step.
+        rng: Where the jitter comes from, so that waiting calls do not look in step.
         minute: Within which starts are counted.
         renew_every_s: How often the lease of a long call is renewed.
     """
@@ -57,113 +63,6 @@ class Queue:
     rng: random.Random = field(default_factory=random.Random)
     minute: timedelta = MINUTE
     renew_every_s: float = RENEW_EVERY_S
-
-
-@contextmanager
-def place_at(endpoint: Endpoint, queue: Queue) -> Iterator[None]:
-    """Hold one of the endpoint's places while the block runs, after waiting for it.
-
-    Raises:
-        EndpointBusy: None was free for as long as the queue allows.
-    """
-    token = _wait_for(endpoint, queue)
-    renewing = repeating(
-        lambda: _renewed(token, queue.clock), every_s=queue.renew_every_s, name="call lease"
-    )
-    try:
-        with renewing:
-            yield
-    finally:
-        _give_back(token, queue.clock)
-
-
-@transaction.atomic
-def admit(
-    *, endpoint_pk: int, clock: Callable[[], datetime], minute: timedelta = MINUTE
-) -> uuid.UUID | float:
-    """Take a place, or say in how many seconds to look again (0: when a call ends).
-
-    The clock is read after the lock is held: the wait for it may have been long.
-    """
-    endpoint = Endpoint.objects.select_for_update(no_key=True).get(pk=endpoint_pk)
-    now = clock()
-    wait_s = _wait_s(endpoint, now, minute)
-    if wait_s is not None:
-        return wait_s
-    lease = CallLease.objects.create(endpoint=endpoint, started_at=now, expires_at=now + LEASE)
-    if lease.pk % _CLEAR_EVERY == 0:
-        clear_old(endpoint_pk=endpoint_pk, now=now, minute=minute)
-    return lease.token
-
-
-def clear_old(*, endpoint_pk: int, now: datetime, minute: timedelta = MINUTE) -> None:
-    """Delete the leases that count for nothing any more."""
-    old = CallLease.objects.filter(endpoint=endpoint_pk, started_at__lt=now - 2 * minute)
-    old.filter(Q(finished_at__isnull=False) | Q(expires_at__lt=now)).delete()
-
-
-# --- Private -----------------------------------------------------------------------------------
-
-
-def _wait_s(endpoint: Endpoint, now: datetime, minute: timedelta) -> float | None:
-    """None where there is room for a call now, else when to look again."""
-    leases = CallLease.objects.filter(endpoint=endpoint)
-    if leases.filter(finished_at=None, expires_at__gt=now).count() >= endpoint.max_concurrency:
-        return 0.0
-    limit = endpoint.requests_per_minute
-    if limit is None:
-        return None
-    recent = leases.filter(started_at__gt=now - minute).order_by("-started_at")
-    # With as many starts in the last minute as are allowed, the oldest of them has to age.
-    oldest = recent.values_list("started_at", flat=True)[limit - 1 : limit].first()
-    return None if oldest is None else (oldest + minute - now).total_seconds()
-
-
-def _wait_for(endpoint: Endpoint, queue: Queue) -> uuid.UUID:
-    """The token of a place, after waiting for it."""
-    give_up_at = time.monotonic() + queue.longest_s
-    backoff_s = _FIRST_WAIT_S
-    wait_s = admit(endpoint_pk=endpoint.pk, clock=queue.clock, minute=queue.minute)
-    while not isinstance(wait_s, uuid.UUID):
-        queue.still_wanted()
-        if time.monotonic() > give_up_at:
-            raise EndpointBusy(endpoint.label, queue.longest_s)
-        backoff_s = min(2.0 * backoff_s, _LONGEST_WAIT_S)
-        shortest_s = min(max(wait_s, 0.5 * backoff_s), _LONGEST_WAIT_S)
-        queue.sleep(shortest_s + 0.5 * backoff_s * queue.rng.random())
-        wait_s = _look(endpoint, queue)
-    return wait_s
-
-
-def _look(endpoint: Endpoint, queue: Queue) -> uuid.UUID | float:
-    """Look without a lock first: who waits must not keep those who work from writing."""
-    limits = Endpoint.objects.filter(pk=endpoint.pk).first()
-    if limits is not None:
-        wait_s = _wait_s(limits, queue.clock(), queue.minute)
-        if wait_s is not None:
-            return wait_s
-    return admit(endpoint_pk=endpoint.pk, clock=queue.clock, minute=queue.minute)
-
-
-def _give_back(token: uuid.UUID, clock: Callable[[], datetime]) -> None:
-    """Free the place; where the database can't take it now it runs out, and no answer is lost."""
-    try:
-        CallLease.objects.filter(token=token).update(finished_at=clock())
-    except OperationalError as error:
-        logger.warning("A call's place was not given back and runs out by itself: %s", error)
-        if not connection.in_atomic_block:
-            connection.close_if_unusable_or_obsolete()
-
-
-def _renewed(token: uuid.UUID, clock: Callable[[], datetime]) -> bool:
-    """One renewal; a database that can't take it now gets the next one."""
-    try:
-        lease = CallLease.objects.filter(token=token, finished_at=None)
-        return bool(lease.update(expires_at=clock() + LEASE))
-    except Error as error:
-        logger.warning("A call's lease was not renewed: %s", error)
-        connection.close()
-        return True
 
 
 class EndpointClient(AbstractContextManager["EndpointClient"]):
@@ -191,15 +90,18 @@ class EndpointClient(AbstractContextManager["EndpointClient"]):
         self._profiles = {} if treatment is None else treatment.at(endpoint)
 
     def fitted(self, request: Request) -> Request:
-        """The request with what the model is known to take.
+        """Return the request with what the model is known to take.
 
         Raises:
             ModelFault: It can't do without something that the model lacks.
         """
-        return self._profile(request.model).fitted(request)
+        if request.model not in self._profiles:
+            known: ModelProfile = profile_of(endpoint=self._endpoint, model=request.model)
+            self._profiles[request.model] = known
+        return self._profiles[request.model].fitted(request)
 
     def complete(self, request: Request, *, sending: Sending = watch_nothing) -> Reply:
-        """The endpoint's answer, after waiting for a place.
+        """Return the endpoint's answer, after waiting for a place.
 
         Raises:
             ParameterRefused: A parameter is not taken; it is left out from now on.
@@ -212,37 +114,23 @@ class EndpointClient(AbstractContextManager["EndpointClient"]):
             with place_at(self._endpoint, self._queue):
                 return self._wire.complete(request, sending=sending)
         except ParameterRefused as refused:
-            self._learn(request.model, refused)
+            endpoint, model, parameter = self._endpoint, request.model, refused.parameter
+            logger.warning(
+                "%s at endpoint %s does not take %r and is not sent it any more: %s",
+                *(model, endpoint.label, parameter, refused),
+            )
+            known = remember_refusal(endpoint=endpoint, model=model, parameter=parameter)
+            if self._treatment is not None:
+                known = self._treatment.without(refused, endpoint=endpoint, model=model)
+            self._profiles[model] = known
             raise
 
     def __exit__(self, *fault: object) -> None:
-        self.close()
-
-    def close(self) -> None:
-        """Close the connections."""
         self._wire.close()
-
-    def _profile(self, model: str) -> ModelProfile:
-        if model not in self._profiles:
-            self._profiles[model] = profile_of(endpoint=self._endpoint, model=model)
-        return self._profiles[model]
-
-    def _learn(self, model: str, refused: ParameterRefused) -> None:
-        logger.warning(
-            "%s at endpoint %s does not take %r and is not sent it any more: %s",
-            model,
-            self._endpoint.label,
-            refused.parameter,
-            refused,
-        )
-        known = remember_refusal(endpoint=self._endpoint, model=model, parameter=refused.parameter)
-        if self._treatment is not None:
-            known = self._treatment.without(refused, endpoint=self._endpoint, model=model)
-        self._profiles[model] = known
 
 
 def wire_to(endpoint: Endpoint, *, still_wanted: Callable[[], None] = watch_nothing) -> OpenAIWire:
-    """A wire; its calls are given up where `still_wanted` raises.
+    """Return a wire with the endpoint's key; its calls are given up where `still_wanted` raises.
 
     Raises:
         KeyNotAllowed: The variable that the endpoint names is not meant for keys.
@@ -257,3 +145,93 @@ def wire_to(endpoint: Endpoint, *, still_wanted: Callable[[], None] = watch_noth
         still_wanted=still_wanted,
         proxy_url=settings.LLM_PROXY,
     )
+
+
+@contextmanager
+def place_at(endpoint: Endpoint, queue: Queue) -> Iterator[None]:
+    """Hold one of the endpoint's places while the block runs, after waiting for it.
+
+    Raises:
+        EndpointBusy: None was free for as long as the queue allows.
+    """
+    lease = CallLease.objects.filter(token=_wait_for_place(endpoint, queue))
+
+    def renew() -> bool:
+        """A database that can't renew the lease now gets another try at the next beat."""
+        try:
+            is_held = lease.filter(finished_at=None).update(expires_at=queue.clock() + LEASE)
+        except Error as error:
+            logger.warning("A call's lease was not renewed: %s", error)
+            connection.close()
+            return True
+        return bool(is_held)
+
+    try:
+        with repeating(renew, every_s=queue.renew_every_s, name="call lease"):
+            yield
+    finally:
+        try:
+            lease.update(finished_at=queue.clock())
+        except OperationalError as error:  # no answer may be lost by it
+            logger.warning("A call's place was not given back and runs out by itself: %s", error)
+            if not connection.in_atomic_block:
+                connection.close_if_unusable_or_obsolete()
+
+
+@transaction.atomic
+def admit(
+    *, endpoint_pk: int, clock: Callable[[], datetime], minute: timedelta = MINUTE
+) -> uuid.UUID | float:
+    """Take a place, or say in how many seconds to look again (0: when a call ends).
+
+    The clock is read after the lock is held: the wait for it may have been long.
+    """
+    endpoint = Endpoint.objects.select_for_update(no_key=True).get(pk=endpoint_pk)
+    now = clock()
+    wait_s = _wait_s(endpoint, now, minute)
+    if wait_s is not None:
+        return wait_s
+    lease = CallLease.objects.create(endpoint=endpoint, started_at=now, expires_at=now + LEASE)
+    if lease.pk % _CLEAR_EVERY == 0:
+        old = CallLease.objects.filter(endpoint=endpoint, started_at__lt=now - 2 * minute)
+        old.filter(Q(finished_at__isnull=False) | Q(expires_at__lt=now)).delete()
+    return lease.token
+
+
+# --- Private -----------------------------------------------------------------------------------
+
+
+def _wait_s(endpoint: Endpoint, now: datetime, minute: timedelta) -> float | None:
+    """Return None where there is room for a call now, else when to look again."""
+    leases = CallLease.objects.filter(endpoint=endpoint)
+    if leases.filter(finished_at=None, expires_at__gt=now).count() >= endpoint.max_concurrency:
+        return 0.0
+    limit = endpoint.requests_per_minute
+    if limit is None:
+        return None
+    recent = leases.filter(started_at__gt=now - minute).order_by("-started_at")
+    # With as many starts in the last minute as are allowed, the oldest of them has to age.
+    oldest = recent.values_list("started_at", flat=True)[limit - 1 : limit].first()
+    return None if oldest is None else (oldest + minute - now).total_seconds()
+
+
+def _wait_for_place(endpoint: Endpoint, queue: Queue) -> uuid.UUID:
+    """Return the token of a place, after waiting for it."""
+    give_up_at = time.monotonic() + queue.longest_s
+    backoff_s = _FIRST_WAIT_S
+    place = admit(endpoint_pk=endpoint.pk, clock=queue.clock, minute=queue.minute)
+    while not isinstance(place, uuid.UUID):
+        queue.still_wanted()
+        if time.monotonic() > give_up_at:
+            raise EndpointBusy(endpoint.label, queue.longest_s)
+        backoff_s = min(2.0 * backoff_s, _LONGEST_WAIT_S)
+        shortest_s = min(max(place, 0.5 * backoff_s), _LONGEST_WAIT_S)
+        queue.sleep(shortest_s + 0.5 * backoff_s * queue.rng.random())
+        # Look without a lock first: waiting calls must not keep workers from writing.
+        limits = Endpoint.objects.filter(pk=endpoint.pk).first()
+        wait_s = None if limits is None else _wait_s(limits, queue.clock(), queue.minute)
+        if wait_s is None:
+            place = admit(endpoint_pk=endpoint.pk, clock=queue.clock, minute=queue.minute)
+        else:
+            place = wait_s
+    return place

@@ -1,4 +1,7 @@
-"""Probes that somebody asks for on a page: a row, made by a worker and seen line by line."""
+"""What a model at an endpoint can do: asked over the real wire, and written into its row.
+
+A fault that says nothing about the ability (a busy server) leaves the ability as it was.
+"""
 
 from __future__ import annotations
 
@@ -24,6 +27,9 @@ from augment.services.endpoints.known_models import model_at, price_of
 from augment.services.events import log_event
 from augment.services.texts import make_document_storable
 from augment.services.work import Lease, Settlement, WorkKind
+
+ABILITIES = tuple(ability.value for ability in Ability)
+"""What is asked about, in this order."""
 
 _REFUSALS = frozenset({400, 404, 415, 422})
 """With these an endpoint answers to what it can't do; with others to how it is today."""
@@ -68,7 +74,7 @@ class ProbeReport:
     cost_usd: str | None = None
 
     def has(self, ability: Ability) -> bool | None:
-        """What was found of the ability, None where nothing was."""
+        """Return what was found of the ability, None where nothing was."""
         return next((made.has_it for made in self.findings if made.ability == ability), None)
 
     @property
@@ -89,7 +95,7 @@ def probe(
     model: str,
     actor: User | None = None,
     patience: Patience | None = None,
-    on_finding: Callable[[ProbeFinding], None] = lambda found: None,
+    on_finding: Callable[[ProbeFinding], None] = lambda finding: None,
 ) -> ProbeReport:
     """Ask the questions and store what they show.
 
@@ -107,6 +113,7 @@ def probe(
     """
     endpoint = Endpoint.objects.get(label=label)
     row = model_at(endpoint=endpoint, model=model)
+    report = ProbeReport(probed_at=timezone.now())
     with wire_to(endpoint) as wire:
         prober = _Prober(
             client=wire,
@@ -118,152 +125,22 @@ def probe(
             ),
             context_tokens=row.context_tokens,
         )
-        report = prober.report(questions_for(model), now=timezone.now(), on_finding=on_finding)
+        for question in questions_for(model):
+            report.findings.append(prober.ask(question))
+            on_finding(report.findings[-1])
+            if report.findings[0].latency_s is None:
+                break  # nobody answers: the other questions would say the same
+    report.refused = sorted(prober.profile.refused)
+    report.calls = prober.calls
+    costs = [made.cost_usd for made in report.findings if made.latency_s is not None]
+    if costs and None not in costs:
+        report.cost_usd = f"{sum(Decimal(cost) for cost in costs if cost):f}"
     _store(row, report, actor)
     return report
 
 
-# --- Private -----------------------------------------------------------------------------------
-
-
-@dataclass(slots=True, kw_only=True)
-class _Prober:
-    """Asks within the endpoint's limits, and goes without what it was refused."""
-
-    client: ChatClient
-    endpoint: Endpoint
-    price: Price | None
-    patience: Patience
-    profile: ModelProfile
-    context_tokens: int | None
-    calls: int = 0
-
-    def report(
-        self,
-        questions: tuple[ProbeQuestion, ...],
-        *,
-        now: datetime,
-        on_finding: Callable[[ProbeFinding], None],
-    ) -> ProbeReport:
-        report = ProbeReport(probed_at=now)
-        for question in questions:
-            report.findings.append(self._finding(question))
-            on_finding(report.findings[-1])
-            if report.findings[0].latency_s is None:
-                break  # nobody answers: the other questions would say the same
-        report.refused = sorted(self.profile.refused)
-        report.calls = self.calls
-        costs = [made.cost_usd for made in report.findings if made.latency_s is not None]
-        if costs and None not in costs:
-            report.cost_usd = f"{sum(Decimal(cost) for cost in costs if cost):f}"
-        return report
-
-    def _finding(self, question: ProbeQuestion) -> ProbeFinding:
-        ability = question.ability
-        try:
-            request, reply = self._answer(question)
-        except ParameterRefused as refused:
-            self.profile = self.profile.without(refused.parameter)
-            return ProbeFinding(ability=ability, has_it=False, note=_short(str(refused)))
-        except ModelFault as fault:
-            refuses = fault.status in _REFUSALS and ability != Ability.ANSWERS
-            has_it = False if refuses or ability == Ability.ANSWERS else None
-            return ProbeFinding(ability=ability, has_it=has_it, note=_short(str(fault)))
-        cut = cut_of(request, reply, context_tokens=self.context_tokens)
-        is_good = question.is_good(reply) if cut is None else False
-        if ability == Ability.ANSWER_LIMIT and is_good is False and self._renames_limit(request):
-            return replace(self._finding(question), cost_usd=None)
-        # Any answer shows that the parameter is taken.
-        has_it = True if ability in (Ability.ANSWERS, Ability.TEMPERATURE) else is_good
-        return ProbeFinding(
-            ability=ability,
-            has_it=has_it,
-            note=_short(str(cut) if cut else reply.text or reply.refusal or _called(reply)),
-            model_returned=reply.model,
-            prompt_tokens=reply.prompt_tokens,
-            completion_tokens=reply.completion_tokens,
-            latency_s=reply.latency_s,
-            cost_usd=self._cost_usd(reply),
-        )
-
-    def _answer(self, question: ProbeQuestion) -> tuple[Request, Reply]:
-        """The request as it was sent, and its answer."""
-        attempt = 1
-        while True:
-            request = self.profile.fitted(question.request)
-            try:
-                with place_at(self.endpoint, Queue(longest_s=settings.LLM_QUEUE_S)):
-                    self.calls += 1
-                    return request, self.client.complete(request)
-            except ParameterRefused as refused:
-                if refused.parameter == question.parameter:
-                    raise
-                self.profile = self.profile.without(refused.parameter)
-            except ModelFault as fault:
-                wait_s = self.patience.wait_s(fault, attempt=attempt)
-                if wait_s is None:
-                    raise
-                self.patience.sleep(wait_s)
-                attempt += 1
-
-    def _renames_limit(self, request: Request) -> bool:
-        """Use the limit's other name from now on; return whether there is one left.
-
-        Some servers pass over a parameter that they do not know instead of refusing it.
-        """
-        profile = self.profile.without(request.length_name)
-        if profile.refused.issuperset(LengthName):
-            return False
-        self.profile = profile
-        return True
-
-    def _cost_usd(self, reply: Reply) -> str | None:
-        prompt, completion = reply.prompt_tokens, reply.completion_tokens
-        if self.price is None or prompt is None or completion is None:
-            return None
-        nano_usd = self.price.nano_usd(prompt_tokens=prompt, completion_tokens=completion)
-        return f"{usd_of(nano_usd):f}"
-
-
-def _called(reply: Reply) -> str:
-    return ", ".join(f"{call.name}({call.arguments})" for call in reply.tool_calls)
-
-
-def _short(text: str) -> str:
-    line = " ".join(text.split())
-    return shorten(line, _LONGEST_NOTE)
-
-
-@transaction.atomic
-def _store(row: EndpointModel, report: ProbeReport, actor: User | None) -> None:
-    """Write the report, and each ability that it tells of."""
-    document: dict[str, Any] = asdict(report)
-    document["probed_at"] = report.probed_at.isoformat()
-    changes: dict[str, Any] = {
-        "probed_at": report.probed_at,
-        "probe_report": make_document_storable(document),
-    }
-    found = {ability.value: report.has(ability) for ability in _STORED}
-    changes |= {name: has_it for name, has_it in found.items() if has_it is not None}
-    if report.has(Ability.ANSWERS):
-        changes["refused_parameters"] = report.refused
-    EndpointModel.objects.filter(pk=row.pk).update(**changes)
-    log_event(
-        actor=actor,
-        verb="probe",
-        object_kind="model",
-        object_code=row.code,
-        after={"model": row.model, "calls": report.calls, "cost_usd": report.cost_usd} | found,
-    )
-
-
-State = Probe.State
-ABILITIES = tuple(ability.value for ability in Ability)
-"""What is asked about, in this order."""
-
-
 def plan_probe(model: EndpointModel, *, actor: User | None = None) -> Probe:
-    """The row of a probe that nobody has made yet; the door sends its message.
+    """Create the row of a probe that nobody has made yet; the caller sends its message.
 
     Raises:
         Conflict: One is under way at this model.
@@ -286,18 +163,115 @@ class Probes(WorkKind[Probe]):
     def run(self, row: Probe, held: Lease[Probe]) -> Settlement:
         """Ask every question."""
 
-        def keep(found: ProbeFinding) -> None:
-            row.findings.append(make_document_storable(asdict(found)))
+        def keep(finding: ProbeFinding) -> None:
+            row.findings.append(make_document_storable(asdict(finding)))
             held.note(findings=row.findings)
 
         row.findings = []
-        probe(
-            label=row.model.endpoint.label,
-            model=row.model.model,
-            actor=row.asked_by,
-            on_finding=keep,
-        )
-        return Settlement(state=State.DONE)
+        model = row.model
+        probe(label=model.endpoint.label, model=model.model, actor=row.asked_by, on_finding=keep)
+        return Settlement(state=Probe.State.DONE)
 
 
 PROBES = Probes()
+
+
+# --- Private -----------------------------------------------------------------------------------
+
+
+@dataclass(slots=True, kw_only=True)
+class _Prober:
+    """Asks within the endpoint's limits, and goes without what it was refused."""
+
+    client: ChatClient
+    endpoint: Endpoint
+    price: Price | None
+    patience: Patience
+    profile: ModelProfile
+    context_tokens: int | None
+    calls: int = 0
+
+    def ask(self, question: ProbeQuestion) -> ProbeFinding:
+        ability = question.ability
+        try:
+            request, reply = self._answer(question)
+        except ParameterRefused as refused:
+            self.profile = self.profile.without(refused.parameter)
+            return ProbeFinding(ability=ability, has_it=False, note=_short(str(refused)))
+        except ModelFault as fault:
+            refuses = fault.status in _REFUSALS and ability != Ability.ANSWERS
+            has_it = False if refuses or ability == Ability.ANSWERS else None
+            return ProbeFinding(ability=ability, has_it=has_it, note=_short(str(fault)))
+        cut = cut_of(request, reply, context_tokens=self.context_tokens)
+        is_good = question.is_good(reply) if cut is None else False
+        if ability == Ability.ANSWER_LIMIT and is_good is False:
+            # Some servers pass over a parameter that they do not know instead of refusing it.
+            renamed = self.profile.without(request.length_name)
+            if not renamed.refused.issuperset(LengthName):
+                self.profile = renamed
+                return replace(self.ask(question), cost_usd=None)
+        calls = ", ".join(f"{call.name}({call.arguments})" for call in reply.tool_calls)
+        return ProbeFinding(
+            ability=ability,
+            # Any answer shows that the parameter is taken.
+            has_it=ability in (Ability.ANSWERS, Ability.TEMPERATURE) or is_good,
+            note=_short(str(cut) if cut else reply.text or reply.refusal or calls),
+            model_returned=reply.model,
+            prompt_tokens=reply.prompt_tokens,
+            completion_tokens=reply.completion_tokens,
+            latency_s=reply.latency_s,
+            cost_usd=self._cost_usd(reply),
+        )
+
+    def _answer(self, question: ProbeQuestion) -> tuple[Request, Reply]:
+        """Return the request as it was sent, and its answer."""
+        attempt = 1
+        while True:
+            request = self.profile.fitted(question.request)
+            try:
+                with place_at(self.endpoint, Queue(longest_s=settings.LLM_QUEUE_S)):
+                    self.calls += 1
+                    return request, self.client.complete(request)
+            except ParameterRefused as refused:
+                if refused.parameter == question.parameter:
+                    raise
+                self.profile = self.profile.without(refused.parameter)
+            except ModelFault as fault:
+                wait_s = self.patience.wait_s(fault, attempt=attempt)
+                if wait_s is None:
+                    raise
+                self.patience.sleep(wait_s)
+                attempt += 1
+
+    def _cost_usd(self, reply: Reply) -> str | None:
+        prompt, completion = reply.prompt_tokens, reply.completion_tokens
+        if self.price is None or prompt is None or completion is None:
+            return None
+        nano_usd = self.price.nano_usd(prompt_tokens=prompt, completion_tokens=completion)
+        return f"{usd_of(nano_usd):f}"
+
+
+def _short(text: str) -> str:
+    return shorten(" ".join(text.split()), _LONGEST_NOTE)
+
+
+@transaction.atomic
+def _store(row: EndpointModel, report: ProbeReport, actor: User | None) -> None:
+    """Write the report, and each ability that it tells of."""
+    document = asdict(report) | {"probed_at": report.probed_at.isoformat()}
+    abilities = {ability.value: report.has(ability) for ability in _STORED}
+    changes: dict[str, Any] = {
+        "probed_at": report.probed_at,
+        "probe_report": make_document_storable(document),
+        **{name: has_it for name, has_it in abilities.items() if has_it is not None},
+    }
+    if report.has(Ability.ANSWERS):
+        changes["refused_parameters"] = report.refused
+    EndpointModel.objects.filter(pk=row.pk).update(**changes)
+    log_event(
+        actor=actor,
+        verb="probe",
+        object_kind="model",
+        object_code=row.code,
+        after={"model": row.model, "calls": report.calls, "cost_usd": report.cost_usd} | abilities,
+    )

@@ -1,9 +1,9 @@
-"""What a contestant sends, fixed when it first runs: later probes and entries don't change it.
+"""Who plays a contestant's roles, and what it sends, fixed when it first runs.
 
-A contestant is one treatment. Were its tools called natively in one half of a study and in the
-answer in the other, its rating would be that of a mixture. So what was known of its models at its
-first run is kept with it, role by role, and so is the whole set of its options: what was chosen
-when it was added, and what counted then of what was left open.
+By default a contestant's own model plays all roles. A contestant is one treatment: were its tools
+called natively in one half of a study and in the answer in the other, its rating would be that of
+a mixture. So what was known of its models at its first run is kept with it, role by role, and so
+is the whole set of its options: what was chosen when it was added, and the defaults of then.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from augment.llm.client import ModelProfile
 from augment.llm.messages import LengthName
 from augment.models import Augmentation, Contestant, Endpoint, EndpointModel, ModelCall
 from augment.prompts.fill import prompt_version
-from augment.services.endpoints.known_models import price_of, profile_of, profiles_of
+from augment.services.endpoints.known_models import price_of, profile_of, profiles_at
 from augment.services.events import log_event
 from augment.variants.options import (
     NAMES,
@@ -31,10 +31,17 @@ from augment.variants.options import (
 from augment.variants.recipes import Recipe, find_recipe
 from augment.variants.respondents import ModelRole
 
+OPTIONS = NAMES
+"""Of a contestant, in the order in which they are shown."""
+
+_REFUSABLE = frozenset({"temperature", "seed", "reasoning_effort"})
+_SENT = _REFUSABLE | frozenset(LengthName)
+"""Parameters that some endpoints refuse and that contestants send."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Respondent:
-    """A model at an endpoint."""
+    """A model at an endpoint that plays a role."""
 
     endpoint: Endpoint
     model: str
@@ -50,7 +57,109 @@ class Respondent:
     @property
     def context_tokens(self) -> int | None:
         """The model's context window there, None where nobody entered it."""
-        return self.known.context_tokens if self.known else None
+        return known.context_tokens if (known := self.known) else None
+
+    @property
+    def sees(self) -> bool | None:
+        """Whether the model sees pictures, None where nobody probed it or said so."""
+        return known.vision if (known := self.known) else None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Treatment:
+    """What a contestant sends in each of its roles, and its options, none of ours left open."""
+
+    contestant_pk: int
+    respondents: Mapping[ModelRole, Respondent]
+    profiles: Mapping[ModelRole, ModelProfile]
+    options: ContestantOptions
+
+    def at(self, endpoint: Endpoint) -> dict[str, ModelProfile]:
+        """Return by model what it sends to an endpoint."""
+        return {
+            respondent.model: self.profiles[role]
+            for role, respondent in self.respondents.items()
+            if respondent.endpoint.pk == endpoint.pk
+        }
+
+    @transaction.atomic
+    def without(
+        self, refused: ParameterRefused, *, endpoint: Endpoint, model: str
+    ) -> ModelProfile:
+        """Return what it sends from now on to a model that does not take one parameter.
+
+        Raises:
+            ModelFault: Earlier answers of this contestant were made with the parameter.
+        """
+        parameter = refused.parameter
+        asked = Respondent(endpoint=endpoint, model=model)
+        roles = [role for role, respondent in self.respondents.items() if respondent == asked]
+        answers = ModelCall.objects.filter(
+            attempt__augmentation__contestant=self.contestant_pk,
+            role__in=roles,
+            answer__isnull=False,
+            request__has_key=parameter,
+        )
+        # Whether the limit of the answer's length has the one name or the other changes nothing.
+        if parameter not in frozenset(LengthName) and answers.exists():
+            raise ModelFault(
+                f"{model} at endpoint {endpoint.label} does not take {parameter!r} any "
+                "more, and this contestant's earlier answers were made with it; add another "
+                "contestant for what can be sent now",
+                retryable=False,
+                status=refused.status,
+            ) from None
+        row = Contestant.objects.select_for_update(no_key=True).get(pk=self.contestant_pk)
+        sends, profile = dict(row.sends or {}), ModelProfile()
+        for role in roles:
+            profile = _profile_of(sends[role.value]).without(parameter)
+            sends[role.value] = _document_of(profile)
+        if sends != row.sends:
+            row.sends = sends
+            row.save(update_fields=["sends"])
+        return profile
+
+
+@transaction.atomic
+def treatment_of(contestant: Contestant, respondents: Mapping[ModelRole, Respondent]) -> Treatment:
+    """Return what a contestant sends; roles that never ran are fixed to what is known now.
+
+    Args:
+        contestant: Who is about to run.
+        respondents: Who plays its roles.
+
+    Raises:
+        Conflict: It ran with prompts that are not installed any more, or is told to.
+    """
+    columns = Contestant.objects.values_list("sends", "frozen_options").get(pk=contestant.pk)
+    stored, frozen = columns[0] or {}, columns[1]
+    if frozen is None or any(role.value not in stored for role in respondents):
+        row = Contestant.objects.select_for_update(no_key=True).get(pk=contestant.pk)
+        before = row.sends or {}
+        new = {
+            role.value: _document_of(profile_of(endpoint=one.endpoint, model=one.model))
+            for role, one in respondents.items()
+            if role.value not in before
+        }
+        row.sends = stored = before | new
+        row.frozen_options = frozen = row.frozen_options or _completed(row).to_document()
+        row.save(update_fields=["sends", "frozen_options"])
+        log_event(
+            actor=None,
+            verb="fix",
+            object_kind="contestant",
+            object_code=row.code,
+            after={"slug": row.slug, "sends": new, "options": frozen},
+        )
+    options = options_from_document(frozen)
+    if (unlike := other_prompts(contestant.slug, options)) is not None:
+        raise Conflict(unlike)
+    return Treatment(
+        contestant_pk=contestant.pk,
+        respondents=respondents,
+        profiles={role: _profile_of(stored[role.value]) for role in respondents},
+        options=options,
+    )
 
 
 def check_roles(recipe: Recipe, roles: Iterable[ModelRole]) -> None:
@@ -67,7 +176,7 @@ def check_roles(recipe: Recipe, roles: Iterable[ModelRole]) -> None:
 
 
 def respondents_of(contestant: Contestant) -> dict[ModelRole, Respondent]:
-    """Who plays each role of a contestant's variant; nobody where it has none.
+    """Return who plays each role of a contestant's variant; nobody where it has none.
 
     Raises:
         UnknownName: Its variant is none of ours any more.
@@ -79,165 +188,48 @@ def respondents_of(contestant: Contestant) -> dict[ModelRole, Respondent]:
 def respondents_of_each(
     contestants: Sequence[Contestant],
 ) -> dict[int, dict[ModelRole, Respondent]]:
-    """The same of several, by primary key; one query at most where their endpoints are read.
-
-    Raises:
-        UnknownName: The variant of one is none of ours any more.
-        Conflict: An endpoint that one names is gone.
-    """
+    """Return the same of several, by primary key; one query where their endpoints are read."""
     labels = {role["endpoint"] for row in contestants for role in row.roles.values()}
     rows = Endpoint.objects.filter(label__in=labels) if labels else ()
     endpoints = {row.label: row for row in rows}
-    return {row.pk: _respondents(row, endpoints) for row in contestants}
+    playing: dict[int, dict[ModelRole, Respondent]] = {}
+    for row in contestants:
+        roles: dict[ModelRole, Respondent] = {}
+        if row.endpoint is not None:
+            own = Respondent(endpoint=row.endpoint, model=row.model)
+            roles = dict.fromkeys(find_recipe(row.variant).roles, own)
+            for name, chosen in row.roles.items():
+                endpoint = endpoints.get(chosen["endpoint"])
+                if endpoint is None:
+                    raise Conflict(
+                        f"The {name} of {row.slug} sits at endpoint '{chosen['endpoint']}', "
+                        "which does not exist any more."
+                    )
+                roles[ModelRole(name)] = Respondent(endpoint=endpoint, model=chosen["model"])
+        playing[row.pk] = roles
+    return playing
 
 
-def documents_of(respondents: Mapping[ModelRole, Respondent]) -> dict[str, dict[str, str]]:
-    """The respondents as they are stored with a contestant."""
-    return {
-        role.value: {"endpoint": respondent.endpoint.label, "model": respondent.model}
-        for role, respondent in sorted(respondents.items())
+def list_unpriced_models(contestants: Iterable[Contestant]) -> list[str]:
+    """Return the models without a price that contestants ask, as "model at endpoint"."""
+    unpriced = {
+        str(respondent)
+        for row in contestants
+        for respondent in respondents_of(row).values()
+        if price_of(respondent.endpoint, respondent.model) is None
     }
-
-
-def viewer_of(contestant: Contestant) -> Respondent | None:
-    """Who looks at pictures for a contestant, None where its variant shows none."""
-    return respondents_of(contestant).get(ModelRole.VIEWER)
-
-
-def sight_of(respondent: Respondent) -> bool | None:
-    """Whether a model sees pictures, None where nobody probed it or said so."""
-    known = respondent.known
-    return None if known is None else known.vision
-
-
-# --- Private -----------------------------------------------------------------------------------
-
-
-def _respondents(
-    contestant: Contestant, endpoints: Mapping[str, Endpoint]
-) -> dict[ModelRole, Respondent]:
-    if contestant.endpoint is None:
-        return {}
-    own = Respondent(endpoint=contestant.endpoint, model=contestant.model)
-    respondents = dict.fromkeys(find_recipe(contestant.variant).roles, own)
-    for name, chosen in contestant.roles.items():
-        endpoint = endpoints.get(chosen["endpoint"])
-        if endpoint is None:
-            raise Conflict(
-                f"The {name} of {contestant.slug} sits at endpoint '{chosen['endpoint']}', "
-                "which does not exist any more."
-            )
-        respondents[ModelRole(name)] = Respondent(endpoint=endpoint, model=chosen["model"])
-    return respondents
-
-
-OPTIONS = NAMES
-"""Of a contestant, in the order in which they are shown."""
-
-_REFUSABLE = frozenset({"temperature", "seed", "reasoning_effort"})
-_SENT = _REFUSABLE | frozenset(LengthName)
-"""Parameters that some endpoints refuse and that contestants send."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Treatment:
-    """What a contestant sends in each of its roles, and its options, none of ours left open."""
-
-    contestant_pk: int
-    respondents: Mapping[ModelRole, Respondent]
-    profiles: Mapping[ModelRole, ModelProfile]
-    options: ContestantOptions
-
-    def at(self, endpoint: Endpoint) -> dict[str, ModelProfile]:
-        """By model, what it sends to an endpoint."""
-        return {
-            respondent.model: self.profiles[role]
-            for role, respondent in self.respondents.items()
-            if respondent.endpoint.pk == endpoint.pk
-        }
-
-    def without(
-        self, refused: ParameterRefused, *, endpoint: Endpoint, model: str
-    ) -> ModelProfile:
-        """What it sends from now on to a model that does not take one parameter.
-
-        Raises:
-            ModelFault: Earlier answers of this contestant were made with the parameter.
-        """
-        roles = [
-            role
-            for role, respondent in self.respondents.items()
-            if (respondent.endpoint.pk, respondent.model) == (endpoint.pk, model)
-        ]
-        # Whether the limit of the answer's length has the one name or the other changes nothing.
-        is_only_a_name = refused.parameter in frozenset(LengthName)
-        if not is_only_a_name and _answered_with(self.contestant_pk, roles, refused.parameter):
-            raise ModelFault(
-                f"{model} at endpoint {endpoint.label} does not take {refused.parameter!r} any "
-                "more, and this contestant's earlier answers were made with it; add another "
-                "contestant for what can be sent now",
-                retryable=False,
-                status=refused.status,
-            ) from None
-        return _amend(self.contestant_pk, roles, refused.parameter)
-
-
-@transaction.atomic
-def treatment_of(contestant: Contestant, respondents: Mapping[ModelRole, Respondent]) -> Treatment:
-    """What a contestant sends; roles that never ran are fixed to what is known now.
-
-    Args:
-        contestant: Who is about to run.
-        respondents: Who plays its roles.
-
-    Raises:
-        Conflict: It ran with prompts that are not installed any more, or is told to.
-    """
-    columns = Contestant.objects.values_list("sends", "frozen_options").get(pk=contestant.pk)
-    stored, frozen = columns[0] or {}, columns[1]
-    if frozen is None or any(role.value not in stored for role in respondents):
-        row = Contestant.objects.select_for_update(no_key=True).get(pk=contestant.pk)
-        stored = dict(row.sends or {})
-        new = {
-            role.value: document_of(
-                profile_of(endpoint=respondent.endpoint, model=respondent.model)
-            )
-            for role, respondent in respondents.items()
-            if role.value not in stored
-        }
-        row.sends = stored = stored | new
-        row.frozen_options = frozen = row.frozen_options or _completed(row).to_document()
-        row.save(update_fields=["sends", "frozen_options"])
-        log_event(
-            actor=None,
-            verb="fix",
-            object_kind="contestant",
-            object_code=row.code,
-            after={"slug": row.slug, "sends": new, "options": frozen},
-        )
-    options = options_from_document(frozen)
-    unlike = other_prompts(contestant.slug, options)
-    if unlike is not None:
-        raise Conflict(unlike)
-    return Treatment(
-        contestant_pk=contestant.pk,
-        respondents=respondents,
-        profiles={role: profile_from_document(stored[role.value]) for role in respondents},
-        options=options,
-    )
+    return sorted(unpriced)
 
 
 def options_of(contestant: Contestant) -> ContestantOptions:
-    """The options of a contestant: fixed at its first run, before that as they would be now."""
+    """Return the options fixed at a contestant's first run, before that as they would be now."""
     if contestant.frozen_options is not None:
         return options_from_document(contestant.frozen_options)
-    if contestant.endpoint is None:
-        return ContestantOptions()
-    return _completed(contestant)
+    return _completed(contestant) if contestant.endpoint else ContestantOptions()
 
 
 def other_prompts(slug: str, options: ContestantOptions) -> str | None:
-    """What to say of options that name prompts which are not installed; None where they are."""
+    """Return what is wrong with options whose prompts are not installed; None where they are."""
     wanted, installed = options.prompt_version, prompt_version()
     if wanted is None or wanted == installed:
         return None
@@ -248,7 +240,7 @@ def other_prompts(slug: str, options: ContestantOptions) -> str | None:
 
 
 def left_out(contestant: Contestant) -> dict[str, list[str]]:
-    """By role, the chosen options that its model does not take and that are not sent therefore.
+    """Return by role the chosen options that are not sent, as its model does not take them.
 
     Of a contestant that has not run yet: as far as it is known now.
 
@@ -259,60 +251,64 @@ def left_out(contestant: Contestant) -> dict[str, list[str]]:
 
 
 def left_out_of_each(contestants: Sequence[Contestant]) -> dict[int, dict[str, list[str]]]:
-    """The same of several, by primary key, in two queries at most.
-
-    Raises:
-        Conflict: An endpoint that one of them names is gone.
-    """
+    """Return the same of several, by primary key, in two queries at most."""
     # Never of what is completed at the first run: no default of ours is one of these.
     chosen = {
         row.pk: _REFUSABLE & (row.frozen_options or row.options).keys() for row in contestants
     }
-    open_rows = [row for row in contestants if chosen[row.pk] and not row.sends]
-    playing = respondents_of_each(open_rows)
-    known = profiles_of(
-        [respondent for roles in playing.values() for respondent in roles.values()]
-    )
-    found: dict[int, dict[str, list[str]]] = {}
+    not_run = [row for row in contestants if chosen[row.pk] and not row.sends]
+    playing = respondents_of_each(not_run)
+    asked = {(one.endpoint.pk, one.model) for roles in playing.values() for one in roles.values()}
+    profiles = profiles_at(asked)
+    left: dict[int, dict[str, list[str]]] = {}
     for row in contestants:
         sends = row.sends or {
-            role.value: document_of(known[one.endpoint.pk, one.model])
+            role.value: _document_of(profiles[one.endpoint.pk, one.model])
             for role, one in playing.get(row.pk, {}).items()
         }
         refused = {
             role: sorted(chosen[row.pk] & set(sent["refused"]))
             for role, sent in sorted(sends.items())
         }
-        found[row.pk] = {role: names for role, names in refused.items() if names}
-    return found
+        left[row.pk] = {role: names for role, names in refused.items() if names}
+    return left
 
 
-def loosen_unanswered(contestants: Iterable[Contestant]) -> int:
-    """Let contestants be fixed anew that never had an answer and do not run: nothing can mix.
-
-    Returns:
-        How many there were.
-    """
-    pks = [contestant.pk for contestant in contestants]
-    calls = ModelCall.objects.filter(
+def loosen_unanswered(contestants: Iterable[Contestant]) -> None:
+    """Let contestants be fixed anew that never had an answer and do not run: nothing can mix."""
+    answers = ModelCall.objects.filter(
         attempt__augmentation__contestant=OuterRef("pk"), answer__isnull=False
     )
     running = Augmentation.objects.filter(
         contestant=OuterRef("pk"), state=Augmentation.State.RUNNING
     )
-    loose = Contestant.objects.filter(pk__in=pks, sends__isnull=False)
-    return (
-        loose.exclude(Exists(calls))
-        .exclude(Exists(running))
-        .update(sends=None, frozen_options=None)
+    fixed = Contestant.objects.filter(
+        pk__in=[contestant.pk for contestant in contestants], sends__isnull=False
+    )
+    loose = fixed.exclude(Exists(answers)).exclude(Exists(running))
+    loose.update(sends=None, frozen_options=None)
+
+
+# --- Private -----------------------------------------------------------------------------------
+
+
+def _completed(contestant: Contestant) -> ContestantOptions:
+    """Return what was chosen, and for the rest what counts now."""
+    modifier = (contestant.sends or {}).get("modifier")
+    if modifier is None:
+        assert contestant.endpoint is not None
+        known = profile_of(endpoint=contestant.endpoint, model=contestant.model)
+        modifier = _document_of(known)
+    return complete_options(
+        options_from_document(contestant.options),
+        find_recipe(contestant.variant),
+        native_tools=modifier["native_tools"],
+        prompt_version=prompt_version(),
     )
 
 
-def document_of(profile: ModelProfile) -> dict[str, Any]:
-    """What of a profile changes what contestants send, ready for JSON.
-
-    No variant sends a schema, so what is known of it is not among it.
-    """
+def _document_of(profile: ModelProfile) -> dict[str, Any]:
+    """Return what of a profile changes what contestants send; no variant sends a schema."""
     refused = profile.refused | ({"temperature"} if profile.temperature is False else set())
     return {
         "native_tools": profile.native_tools,
@@ -323,12 +319,7 @@ def document_of(profile: ModelProfile) -> dict[str, Any]:
     }
 
 
-def profile_from_document(document: Mapping[str, Any]) -> ModelProfile:
-    """The profile that was stored as this document.
-
-    Raises:
-        KeyError: It is none.
-    """
+def _profile_of(document: Mapping[str, Any]) -> ModelProfile:
     refused = frozenset(document["refused"])
     return ModelProfile(
         native_tools=document["native_tools"],
@@ -338,58 +329,3 @@ def profile_from_document(document: Mapping[str, Any]) -> ModelProfile:
         reasoning_effort=document["reasoning_effort"],
         max_output_tokens=document["max_output_tokens"],
     )
-
-
-# --- Private -----------------------------------------------------------------------------------
-
-
-def _completed(contestant: Contestant) -> ContestantOptions:
-    """What was chosen, and for the rest what counts now."""
-    recipe, modifier = find_recipe(contestant.variant), (contestant.sends or {}).get("modifier")
-    if modifier is None:
-        assert contestant.endpoint is not None
-        known = profile_of(endpoint=contestant.endpoint, model=contestant.model)
-        modifier = document_of(known)
-    return complete_options(
-        options_from_document(contestant.options),
-        recipe,
-        native_tools=modifier["native_tools"],
-        prompt_version=prompt_version(),
-    )
-
-
-def _answered_with(contestant_pk: int, roles: list[ModelRole], parameter: str) -> bool:
-    """Whether the contestant has an answer to a request that had this parameter."""
-    calls = ModelCall.objects.filter(
-        attempt__augmentation__contestant=contestant_pk,
-        role__in=roles,
-        answer__isnull=False,
-        request__has_key=parameter,
-    )
-    return calls.exists()
-
-
-@transaction.atomic
-def _amend(contestant_pk: int, roles: list[ModelRole], parameter: str) -> ModelProfile:
-    """Leave a parameter out of what is sent in these roles; what is sent then."""
-    row = Contestant.objects.select_for_update(no_key=True).get(pk=contestant_pk)
-    sends = dict(row.sends or {})
-    after = ModelProfile()
-    for role in roles:
-        after = profile_from_document(sends[role.value]).without(parameter)
-        sends[role.value] = document_of(after)
-    if sends != row.sends:
-        row.sends = sends
-        row.save(update_fields=["sends"])
-    return after
-
-
-def list_unpriced_models(contestants: Iterable[Contestant]) -> list[str]:
-    """What the contestants ask models whose price is unknown, as "model at endpoint"."""
-    unpriced = {
-        str(respondent)
-        for row in contestants
-        for respondent in respondents_of(row).values()
-        if price_of(respondent.endpoint, respondent.model) is None
-    }
-    return sorted(unpriced)

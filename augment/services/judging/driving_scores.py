@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections import defaultdict
-from collections.abc import Collection, Iterable, Sequence
+from collections import Counter, defaultdict
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from statistics import fmean
+from typing import Any
 
-from django.db.models import Q, QuerySet
+from django.db.models import Q
 
 from augment.models import GenerationJob, Scenario, Simulation
 from augment.scene.entities import ScenarioType, in_type_order
@@ -15,6 +17,13 @@ from augment.services.judging.simulations import SCORES, Options
 State, Subject = Simulation.State, Simulation.Subject
 CLOSE_M = 0.3
 """A least clearance below this is marked wherever a score is shown; the score does not ask."""
+
+_COLUMNS = (
+    *("code", "state", "reason", "subject", "nuplan_score", "interplan_score", "document"),
+    *("scenario__type", "augmentation__contestant__name", "augmentation__contestant__slug"),
+    *("augmentation__contestant__model", "augmentation__contestant__variant"),
+    "augmentation__contestant__kind",
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -68,6 +77,7 @@ class DrivingScores:
         under_way: How many drives wait or run.
         failures: Why drives failed, with how often.
         outlasting: How many drives went on after the end of their recording.
+        codes: By the key of an augmentation the code of its drive.
     """
 
     score: str
@@ -86,18 +96,17 @@ class DrivingScores:
 
 
 def scores_of_job(job: GenerationJob, *, options: Options, score: str) -> DrivingScores:
-    """The table of a job; one query for its drives."""
+    """Return the table of a job; one query for its drives."""
     return _scores(drives_of_job(job), options, score)
 
 
 def scores_of_augmentations(
     ids: Collection[int], *, options: Options, score: str
 ) -> DrivingScores:
-    """The table of the augmentations with these keys, with their scenes."""
+    """Return the table of the augmentations with these keys, with their scenes."""
     scenarios = Scenario.objects.filter(augmentations__in=ids)
-    return _scores(
-        Q(augmentation__in=ids) | Q(augmentation=None, scenario__in=scenarios), options, score
-    )
+    scenes = Q(augmentation=None, scenario__in=scenarios)
+    return _scores(Q(augmentation__in=ids) | scenes, options, score)
 
 
 def drives_of_job(job: GenerationJob) -> Q:
@@ -107,8 +116,7 @@ def drives_of_job(job: GenerationJob) -> Q:
 
 def least_clearance_m(row: Simulation) -> float | None:
     """Return how near the ego of a drive came to anybody; None without a drive or others."""
-    measures = (row.document or {}).get("criticality", {})
-    distance: float | None = measures.get("least_distance_m")
+    distance: float | None = _document(row).get("criticality", {}).get("least_distance_m")
     return distance
 
 
@@ -125,93 +133,79 @@ def clearance_text(least_distance_m: float | None) -> str:
 
 
 def options_driven(job: GenerationJob) -> list[Options]:
-    """Every way in which drives of a job were asked for, the latest first."""
-    found = (
-        Simulation.objects.filter(drives_of_job(job))
-        .order_by("-pk")
-        .values_list("planner", "offsets", "is_reactive")
-    )
+    """Return every way in which drives of a job were asked for, the latest first."""
+    rows = Simulation.objects.filter(drives_of_job(job)).order_by("-pk")
+    asked = dict.fromkeys(rows.values_list("planner", "offsets", "is_reactive"))
     return [
         Options(planner=planner, offsets=offsets, is_reactive=reactive)
-        for planner, offsets, reactive in dict.fromkeys(found)
+        for planner, offsets, reactive in asked
     ]
 
 
-# Private
+# --- Private -----------------------------------------------------------------------------------
 
 
 def _scores(which: Q, options: Options, score: str) -> DrivingScores:
-    rows = list(_rows(options.of(Simulation.objects.filter(which))))
-    under_way = [row for row in rows if row.state in Simulation.UNDER_WAY]
+    drives = options.of(Simulation.objects.filter(which))
+    read = drives.select_related("scenario", "augmentation__contestant").only(*_COLUMNS)
+    rows = list(read.order_by("pk"))
     before = {
-        row.scenario_id: getattr(row, SCORES[score])
+        row.scenario_id: float(getattr(row, SCORES[score]))
         for row in rows
         if row.subject == Subject.UNMODIFIED and row.state == State.DONE
     }
     cells: defaultdict[tuple[str, int], list[Simulation]] = defaultdict(list)
     for row in rows:
-        who = 0 if row.augmentation is None else row.augmentation.contestant_id
-        cells[row.subject, who].append(row)
+        contestant = 0 if row.augmentation is None else row.augmentation.contestant_id
+        cells[row.subject, contestant].append(row)
     kinds = in_type_order([*ScenarioType, *(row.scenario.type for row in rows)])
-    lines = [_line(cell, before, score, tuple(kinds)) for cell in cells.values()]
+    lines = [_line(cell, before, score, kinds) for cell in cells.values()]
+    failures = Counter(row.reason for row in rows if row.state == State.FAILED)
     return DrivingScores(
         score=score,
         options=options,
         lines=tuple(sorted(lines, key=_place)),
         total=len(rows),
-        under_way=len(under_way),
-        failures=_failures(rows),
-        outlasting=sum(bool((row.document or {}).get("outlasts_recording")) for row in rows),
+        under_way=sum(row.state in Simulation.UNDER_WAY for row in rows),
+        failures=tuple(sorted(failures.items(), key=lambda item: (-item[1], item[0]))),
+        outlasting=sum(bool(_document(row).get("outlasts_recording")) for row in rows),
         codes={row.augmentation_id: str(row.code) for row in rows if row.augmentation_id},
     )
 
 
-def _rows(found: QuerySet[Simulation]) -> QuerySet[Simulation]:
-    return (
-        found.select_related("scenario", "augmentation__contestant")
-        .only(
-            "code", "state", "reason", "subject", "nuplan_score", "interplan_score", "document",
-            "scenario__type", "augmentation__contestant__name", "augmentation__contestant__slug",
-            "augmentation__contestant__model", "augmentation__contestant__variant",
-            "augmentation__contestant__kind",
-        )
-        .order_by("pk")
-    )  # fmt: skip
-
-
 def _line(
-    cell: list[Simulation], before: dict[int, float], score: str, kinds: Sequence[str]
+    cell: list[Simulation], before: Mapping[int, float], score: str, kinds: Iterable[str]
 ) -> DrivingLine:
-    done = [row for row in cell if row.state == State.DONE]
-    paired = [row for row in done if row.scenario_id in before]
-    first = cell[0]
-    contestant = None if first.augmentation is None else first.augmentation.contestant
+    paired = [row for row in cell if row.state == State.DONE and row.scenario_id in before]
+    values = {row: float(getattr(row, SCORES[score])) for row in paired}
     clearances = [distance for row in paired if (distance := least_clearance_m(row)) is not None]
-    values = {row.pk: float(getattr(row, SCORES[score])) for row in paired}
+    collisions = [_document(row).get("collisions", ()) for row in paired]
+    first = cell[0]
+    who = None if first.augmentation is None else first.augmentation.contestant
     return DrivingLine(
         subject=first.subject,
-        name=first.get_subject_display() if contestant is None else contestant.name,
-        slug="" if contestant is None else contestant.slug,
-        model="" if contestant is None else contestant.model,
-        variant="" if contestant is None else contestant.variant,
-        is_simulated=contestant is not None and contestant.is_simulated,
+        name=who.name if who else first.get_subject_display(),
+        slug=who.slug if who else "",
+        model=who.model if who else "",
+        variant=who.variant if who else "",
+        is_simulated=who is not None and who.is_simulated,
         drives=len(paired),
         failed=sum(row.state == State.FAILED for row in cell),
-        mean=_mean(values.values()),
-        before=_mean(before[row.scenario_id] for row in paired),
+        mean=_mean(list(values.values())),
+        before=_mean([before[row.scenario_id] for row in paired]),
         by_type={
-            kind: _mean(values[row.pk] for row in paired if row.scenario.type == kind)
+            kind: _mean([value for row, value in values.items() if row.scenario.type == kind])
             for kind in kinds
         },
         least_clearance_m=min(clearances, default=None),
         close=sum(distance < CLOSE_M for distance in clearances),
-        collided=sum(_collided(row) for row in paired),
-        braked=sum(bool((row.document or {}).get("emergency_brake_steps")) for row in paired),
+        collided=sum(any(one["at_fault"] for one in drive) for drive in collisions),
+        braked=sum(bool(_document(row).get("emergency_brake_steps")) for row in paired),
     )
 
 
-def _collided(row: Simulation) -> bool:
-    return any(one["at_fault"] for one in (row.document or {}).get("collisions", ()))
+def _document(row: Simulation) -> dict[str, Any]:
+    return row.document or {}
 
 
 def _place(line: DrivingLine) -> tuple[int, float, str]:
@@ -220,14 +214,5 @@ def _place(line: DrivingLine) -> tuple[int, float, str]:
     return order.index(Subject(line.subject)), -lowered, line.name.lower()
 
 
-def _mean(values: Iterable[float]) -> float | None:
-    found = list(values)
-    return sum(found) / len(found) if found else None
-
-
-def _failures(rows: list[Simulation]) -> tuple[tuple[str, int], ...]:
-    counts: defaultdict[str, int] = defaultdict(int)
-    for row in rows:
-        if row.state == State.FAILED:
-            counts[row.reason] += 1
-    return tuple(sorted(counts.items(), key=lambda item: (-item[1], item[0])))
+def _mean(values: Sequence[float]) -> float | None:
+    return fmean(values) if values else None

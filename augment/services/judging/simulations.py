@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import zlib
-from collections.abc import Callable, Collection
+from collections.abc import Collection
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -88,14 +88,11 @@ def plan_job(*, job: GenerationJob, options: Options, also: Collection[str] = ()
     rows = job.augmentations.filter(state__in=Augmentation.SHOWABLE).select_related("scenario")
     if not rows:
         raise Conflict(f"“{job.name}” has no result yet that could be driven.")
-    made: list[Simulation] = []
-    for scenario in {row.scenario_id: row.scenario for row in rows}.values():
-        made += _of_scenario(scenario, options)
-    made += [
-        _row(row.scenario, Subject.AUGMENTATION, options, augmentation=row)
-        for row in rows.defer("modification")
-    ]
-    return [row.pk for row in made if row.state == State.QUEUED]
+    scenarios = {row.scenario_id: row.scenario for row in rows}
+    waiting = [pk for scenario in scenarios.values() for pk in _plan_scenario(scenario, options)]
+    for row in rows.defer("modification"):
+        waiting += _plan(row.scenario, Subject.AUGMENTATION, options, augmentation=row)
+    return waiting
 
 
 @transaction.atomic
@@ -104,7 +101,7 @@ def plan_scenario(
 ) -> list[int]:
     """Have one scenario driven before the change and with its reference; as `plan_job`."""
     load_planner(options, also=also)
-    return [row.pk for row in _of_scenario(scenario, options) if row.state == State.QUEUED]
+    return _plan_scenario(scenario, options)
 
 
 class Drives(WorkKind[Simulation]):
@@ -127,7 +124,27 @@ class Drives(WorkKind[Simulation]):
 
     def run(self, row: Simulation, held: Lease[Simulation]) -> Settlement:
         """Drive and score; a planner from outside may raise anything."""
-        columns = _driven(row, lambda step: held.insist(), self._also)
+        setting = _setting_of(row)
+        road = Road(setting.scene, setting.recording)
+        planner = load_planner(row, also=self._also)
+        drove = run(setting, planner, road=road, after_step=lambda step: held.insist())
+        expert = expert_of(setting, road)
+        scores = {
+            kind: score_drive(
+                drove,
+                expert,
+                kind=kind,
+                scenario_type=type_of(row.scenario.type),
+                modification=setting.modification,
+            )
+            for kind in ScoreKind
+        }
+        trace = trace_of(setting, drove, scores[ScoreKind.NUPLAN])
+        columns = {
+            **{SCORES[kind.value]: score.value for kind, score in scores.items()},
+            "document": document_of(drove, scores),
+            "trace": zlib.compress(json.dumps(trace, separators=(",", ":")).encode(), 6),
+        }
         return Settlement(state=State.DONE, columns=columns)
 
 
@@ -135,7 +152,7 @@ DRIVES = Drives()
 
 
 def document_of(drove: Drive, scores: dict[ScoreKind, Score]) -> dict[str, Any]:
-    """The parts of the scores, and what else is said of a drive; no series."""
+    """Return the parts of the scores, and what else is said of a drive; no series."""
     score = scores[ScoreKind.NUPLAN]
     return {
         "duration_s": round(drove.duration_s, 1),
@@ -157,12 +174,7 @@ def document_of(drove: Drive, scores: dict[ScoreKind, Score]) -> dict[str, Any]:
         "criticality": asdict(criticality(drove, score.collisions)),
         "metrics": {
             kind.value: [
-                {
-                    "name": metric.name,
-                    "value": metric.value,
-                    "weight": metric.weight,
-                    "parts": metric.parts,
-                }
+                {name: getattr(metric, name) for name in ("name", "value", "weight", "parts")}
                 for metric in found.metrics
             ]
             for kind, found in scores.items()
@@ -171,85 +183,9 @@ def document_of(drove: Drive, scores: dict[ScoreKind, Score]) -> dict[str, Any]:
 
 
 def trace_document(row: Simulation) -> dict[str, Any]:
-    """The drive to look at."""
+    """Return the drive to look at."""
     document: dict[str, Any] = json.loads(zlib.decompress(bytes(row.trace or b"")))
     return document
-
-
-# Private
-
-
-def _of_scenario(scenario: Scenario, options: Options) -> list[Simulation]:
-    made = [_row(scenario, Subject.UNMODIFIED, options)]
-    if scenario.reference is not None:
-        made.append(_row(scenario, Subject.REFERENCE, options))
-    return made
-
-
-def _row(
-    scenario: Scenario,
-    subject: Simulation.Subject,
-    options: Options,
-    *,
-    augmentation: Augmentation | None = None,
-) -> Simulation:
-    row, _ = Simulation.objects.get_or_create(
-        scenario=scenario, subject=subject, augmentation=augmentation, **options.columns
-    )
-    if row.state == State.FAILED:
-        row.wait_again()
-    return row
-
-
-def _driven(
-    row: Simulation, after_step: Callable[[int], None], also: Collection[str]
-) -> dict[str, Any]:
-    """The columns of a row's outcome."""
-    setting = setting_of(row)
-    road = Road(setting.scene, setting.recording)
-    planner = load_planner(row, also=also)
-    drove = run(setting, planner, road=road, after_step=after_step)
-    expert = expert_of(setting, road)
-    kind = type_of(row.scenario.type)
-    scores = {
-        name: score_drive(
-            drove, expert, kind=name, scenario_type=kind, modification=setting.modification
-        )
-        for name in ScoreKind
-    }
-    trace = json.dumps(trace_of(setting, drove, scores[ScoreKind.NUPLAN]), separators=(",", ":"))
-    return {
-        "nuplan_score": scores[ScoreKind.NUPLAN].value,
-        "interplan_score": scores[ScoreKind.INTERPLAN].value,
-        "document": document_of(drove, scores),
-        "trace": zlib.compress(trace.encode(), 6),
-    }
-
-
-def setting_of(row: Simulation) -> DriveSetting:
-    """What a row drives.
-
-    Raises:
-        InvalidDocument: Something stored can't be read.
-    """
-    scenario = row.scenario
-    recording = scenario.base_scene.recording
-    return DriveSetting(
-        scene=scene_of(scenario),
-        modification=_modification(row),
-        recording=None if recording is None else recording_from_document(recording),
-        replay=scenario.keep_traffic,
-        reactive=row.is_reactive,
-    )
-
-
-def _modification(row: Simulation) -> Modification:
-    """What changes; an answer that was unreadable or refused leaves the scene as it was."""
-    if row.subject == Subject.REFERENCE:
-        return reference_of(row.scenario) or Modification()
-    if row.augmentation is None or row.augmentation.modification is None:
-        return Modification()
-    return modification_from_document(row.augmentation.modification)
 
 
 FILES = {"json": "application/json", "gif": "image/gif", "apng": "image/apng", "png": "image/png"}
@@ -257,7 +193,7 @@ FILES = {"json": "application/json", "gif": "image/gif", "apng": "image/apng", "
 
 
 def drive_file(row: Simulation, form: str, *, before: Simulation | None = None) -> bytes:
-    """A driven row as a file.
+    """Return a driven row as a file.
 
     Args:
         row: With its trace.
@@ -273,5 +209,48 @@ def drive_file(row: Simulation, form: str, *, before: Simulation | None = None) 
 
 
 def blind_drive(row: Simulation) -> dict[str, Any]:
-    """A driven row as experts see it who must not learn who changed the scene."""
+    """Return a driven row without anything that tells who changed the scene."""
     return blind_trace(trace_document(row))
+
+
+# --- Private -----------------------------------------------------------------------------------
+
+
+def _plan_scenario(scenario: Scenario, options: Options) -> list[int]:
+    waiting = _plan(scenario, Subject.UNMODIFIED, options)
+    if scenario.reference is not None:
+        waiting += _plan(scenario, Subject.REFERENCE, options)
+    return waiting
+
+
+def _plan(
+    scenario: Scenario,
+    subject: Simulation.Subject,
+    options: Options,
+    *,
+    augmentation: Augmentation | None = None,
+) -> list[int]:
+    """Return the key of one drive if it waits now; what failed waits again."""
+    row, _ = Simulation.objects.get_or_create(
+        scenario=scenario, subject=subject, augmentation=augmentation, **options.columns
+    )
+    if row.state == State.FAILED:
+        row.wait_again()
+    return [row.pk] if row.state == State.QUEUED else []
+
+
+def _setting_of(row: Simulation) -> DriveSetting:
+    """Return what a row drives; without a modification the scene stays as it was."""
+    scenario, modification = row.scenario, None
+    if row.subject == Subject.REFERENCE:
+        modification = reference_of(scenario)
+    elif row.augmentation is not None and row.augmentation.modification is not None:
+        modification = modification_from_document(row.augmentation.modification)
+    recording = scenario.base_scene.recording
+    return DriveSetting(
+        scene=scene_of(scenario),
+        modification=modification or Modification(),
+        recording=None if recording is None else recording_from_document(recording),
+        replay=scenario.keep_traffic,
+        reactive=row.is_reactive,
+    )

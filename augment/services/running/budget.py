@@ -1,10 +1,10 @@
-"""What the calls of a job use: reserved before each by one conditional UPDATE, settled after it.
+"""What the calls of a job may use and use: reserved before each call, settled after it.
 
     spent + reserved + worst case <= cap
 
 holds for every cap whenever a call is sent, with any number of workers: the database compares and
-adds in one statement. A call that ends moves its reservation into what is spent. One that nobody
-saw the end of counts with its worst case if it was sent, and for nothing if it was not.
+adds in one conditional UPDATE. A call that ends moves its reservation into what is spent. A call
+whose end nobody saw counts with its worst case if it was sent, and for nothing if it was not.
 """
 
 from __future__ import annotations
@@ -29,10 +29,15 @@ from augment.services.events import log_event
 
 State = GenerationJob.State
 
+HIGHEST_USD = Decimal(1_000_000)
+HIGHEST_CALLS = 2_000_000_000
+HIGHEST_TOKENS = 10**15
+
 _COUNTED = (
     *("reserved_tokens", "reserved_nano_usd"),
     *("spent_tokens", "cost_nano_usd", "settled_at", "sent_at"),
 )
+_PAID = Q(served_from=None, sent_at__isnull=False, settled_at__isnull=False)
 
 
 class Room(StrEnum):
@@ -49,7 +54,7 @@ class Used:
 
     Attributes:
         nano_usd: None where the price is unknown.
-        is_estimated: Whether the worst case stands in for what nobody knows.
+        is_estimated: Whether the worst case stands in for an unknown usage.
         calls: 1, or 0 where nothing was sent.
     """
 
@@ -62,9 +67,65 @@ class Used:
 _NOTHING = Used(tokens=0, nano_usd=0, is_estimated=False, calls=0)
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Caps:
+    """What a job may use at most; None is no cap. Of several, the first that is reached counts."""
+
+    usd: Decimal | None = None
+    calls: int | None = None
+    tokens: int | None = None
+
+    def columns(self) -> dict[str, int]:
+        """Return the given caps as columns of a job.
+
+        Raises:
+            Conflict: A cap is nothing or less, or too high to be counted to.
+        """
+        columns: dict[str, int] = {}
+        caps = (
+            ("USD", "cap_nano_usd", self.usd, HIGHEST_USD),
+            ("calls", "cap_calls", self.calls, HIGHEST_CALLS),
+            ("tokens", "cap_tokens", self.tokens, HIGHEST_TOKENS),
+        )
+        for unit, column, value, highest in caps:
+            if value is None:
+                continue
+            if not (Decimal(value).is_finite() and 0 < value <= highest):
+                raise Conflict(f"A cap in {unit} is more than 0 and at most {highest}.")
+            columns[column] = nano_usd_of(value) if isinstance(value, Decimal) else value
+        return columns
+
+
+NO_CAPS = Caps()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class JobCosts:
+    """The calls of a job by what is known of their cost: an unknown cost is not zero.
+
+    Attributes:
+        paid: Calls that were sent and ended; those from the store are not among them.
+        priced: Paid calls that used something whose price is known.
+        unpriced: Paid calls whose price is unknown.
+        estimated: Paid calls that count with their worst case, because usage is unknown.
+        cached: Calls that were answered from the store.
+    """
+
+    paid: int
+    priced: int
+    unpriced: int
+    estimated: int
+    cached: int
+
+    @property
+    def is_money_unknown(self) -> bool:
+        """Whether nothing can be said about money."""
+        return self.unpriced > 0 == self.priced
+
+
 @transaction.atomic(savepoint=False)
 def reserve(*, job_pk: int, worst: WorstCase, price: Price | None) -> Room:
-    """Take room for one call, or stop the job if it could not have any.
+    """Reserve room for one call, or stop the job if it could never have any.
 
     Returns:
         TAKEN: The worst case is reserved. BUSY: calls in flight hold the room and may leave some
@@ -75,23 +136,26 @@ def reserve(*, job_pk: int, worst: WorstCase, price: Price | None) -> Room:
     """
     nano_usd = worst.nano_usd(price)
     jobs = GenerationJob.objects.filter(pk=job_pk)
-    fits = _within_caps(worst, nano_usd, with_reserved=True)
-    taken = (
-        jobs.filter(fits)
-        .exclude(state=State.STOPPED_AT_CAP)
-        .update(
-            reserved_nano_usd=F("reserved_nano_usd") + (nano_usd or 0),
-            reserved_calls=F("reserved_calls") + 1,
-            reserved_tokens=F("reserved_tokens") + worst.tokens,
-        )
-    )
-    if taken:
+    fitting = jobs.filter(_within_caps(worst, nano_usd, with_reserved=True))
+    if fitting.exclude(state=State.STOPPED_AT_CAP).update(
+        reserved_nano_usd=F("reserved_nano_usd") + (nano_usd or 0),
+        reserved_calls=F("reserved_calls") + 1,
+        reserved_tokens=F("reserved_tokens") + worst.tokens,
+    ):
         return Room.TAKEN
     if nano_usd is None and jobs.exclude(cap_nano_usd=None).exists():
         raise Conflict("The job is capped in USD, but the price of the model is unknown.")
     alone = _within_caps(worst, nano_usd, with_reserved=False)
     if jobs.filter(state=State.RUNNING).exclude(alone).update(state=State.STOPPED_AT_CAP):
-        _log_stop(jobs.get())
+        job = jobs.get()
+        log_event(
+            actor=None,
+            verb="stop",
+            object_kind="job",
+            object_code=job.code,
+            before={"state": State.RUNNING.value},
+            after={"state": State.STOPPED_AT_CAP.value, "cap": limit_of(job)},
+        )
     has_room = jobs.filter(alone).exclude(state=State.STOPPED_AT_CAP).exists()
     return Room.BUSY if has_room else Room.SPENT
 
@@ -134,28 +198,23 @@ def settle(*, call_pk: int, used: Used, now: Moment, answer: dict[str, Any] | No
 
 
 @transaction.atomic
-def settle_unseen(*, now: Moment, row_pk: int) -> int:
-    """Settle the calls in flight of a row that nobody will see the end of.
+def settle_unseen(*, now: Moment, row_pk: int) -> None:
+    """Settle the calls in flight of a row whose worker is gone.
 
     What was sent may have been answered and billed, so its worst case counts. What still waited
     for its place was not sent, and can't be any more: see `CallTranscript.sending`.
-
-    Returns:
-        How many there were.
     """
     # Locked, so that none is sent between the look at it and its settlement.
     calls = ModelCall.objects.select_for_update(of=("self",)).filter(settled_at=None)
-    unseen = list(calls.filter(attempt__augmentation=row_pk).only(*_COUNTED))
-    for call in unseen:
+    for call in calls.filter(attempt__augmentation=row_pk).only(*_COUNTED):
         fault = "nobody saw the end: its worker stopped"
         if call.sent_at is None:
             fault = "not sent: its worker stopped while it waited for a place"
         settle(call_pk=call.pk, used=_used_unseen(call), now=now, answer={"fault": fault})
-    return len(unseen)
 
 
 def used_by_reply(reply: Reply, *, worst: WorstCase, price: Price | None) -> Used:
-    """What an answered call used; where the server did not say, its worst case."""
+    """Return what an answered call used; where the server did not say, its worst case."""
     prompt, completion = reply.prompt_tokens, reply.completion_tokens
     seen = WorstCase(
         prompt_tokens=worst.prompt_tokens if prompt is None else prompt,
@@ -169,7 +228,7 @@ def used_by_reply(reply: Reply, *, worst: WorstCase, price: Price | None) -> Use
 
 
 def used_by_fault(fault: ModelFault, *, worst: WorstCase, price: Price | None) -> Used:
-    """What a call without an answer used.
+    """Return what a call without an answer used.
 
     An endpoint that answers with an error, or was not asked at all, bills nothing. A time-out, a
     broken connection or an answer that is none may be billed all the same.
@@ -182,103 +241,22 @@ def used_by_fault(fault: ModelFault, *, worst: WorstCase, price: Price | None) -
 
 
 def limit_of(job: GenerationJob) -> str:
-    """The caps of a job as a person reads them, in English."""
-    return ", ".join(limits_of(job))
-
-
-def limits_of(job: GenerationJob) -> tuple[str, ...]:
-    """Each cap of a job, to be said in any language."""
+    """Return the caps of a job as a person reads them."""
     parts = []
     if job.cap_nano_usd is not None:
-        usd = f"{usd_of(job.cap_nano_usd).normalize():f}"
-        parts.append(f"{usd} USD")
+        parts.append(f"{usd_of(job.cap_nano_usd).normalize():f} USD")
     if job.cap_calls is not None:
         parts.append(f"{job.cap_calls} calls")
     if job.cap_tokens is not None:
         parts.append(f"{job.cap_tokens} tokens")
-    return tuple(parts) or ("nothing",)
-
-
-# --- Private -----------------------------------------------------------------------------------
-
-
-def _used_unseen(call: ModelCall) -> Used:
-    """What counts for a call that nobody saw the end of."""
-    if call.sent_at is None:
-        return _NOTHING
-    return Used(tokens=call.reserved_tokens, nano_usd=call.reserved_nano_usd, is_estimated=True)
-
-
-def _within_caps(worst: WorstCase, nano_usd: int | None, *, with_reserved: bool) -> Q:
-    """Jobs that one more such call fits into; a cap in USD admits no unknown price."""
-    condition = Q()
-    needs = {"nano_usd": nano_usd, "calls": 1, "tokens": worst.tokens}
-    for name, needed in needs.items():
-        fits = Q(**{f"cap_{name}": None})
-        if needed is not None:
-            used = F(f"spent_{name}") + needed
-            if with_reserved:
-                used += F(f"reserved_{name}")
-            fits |= Q(**{f"cap_{name}__gte": used})
-        condition &= fits
-    return condition
-
-
-def _log_stop(job: GenerationJob) -> None:
-    log_event(
-        actor=None,
-        verb="stop",
-        object_kind="job",
-        object_code=job.code,
-        before={"state": State.RUNNING.value},
-        after={"state": State.STOPPED_AT_CAP.value, "cap": limit_of(job)},
-    )
-
-
-HIGHEST_USD = Decimal(1_000_000)
-HIGHEST_CALLS = 2_000_000_000
-HIGHEST_TOKENS = 10**15
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Caps:
-    """What a job may use at most; None is no cap. Of several, the first that is reached counts."""
-
-    usd: Decimal | None = None
-    calls: int | None = None
-    tokens: int | None = None
-
-    def columns(self) -> dict[str, int]:
-        """Those that there are, as columns of a job.
-
-        Raises:
-            Conflict: A cap is nothing or less, or too high to be counted to.
-        """
-        given: dict[str, int] = {}
-        if self.usd is not None:
-            if not (self.usd.is_finite() and Decimal(0) < self.usd <= HIGHEST_USD):
-                raise Conflict(f"A cap in USD is more than 0 and at most {HIGHEST_USD}.")
-            given["cap_nano_usd"] = nano_usd_of(self.usd)
-        for name, value, highest in (
-            ("calls", self.calls, HIGHEST_CALLS),
-            ("tokens", self.tokens, HIGHEST_TOKENS),
-        ):
-            if value is None:
-                continue
-            if not 0 < value <= highest:
-                raise Conflict(f"A cap in {name} is more than 0 and at most {highest}.")
-            given[f"cap_{name}"] = value
-        return given
-
-
-NO_CAPS = Caps()
+    return ", ".join(parts) or "nothing"
 
 
 def check_caps(caps: Caps, contestants: Sequence[Contestant]) -> dict[str, int]:
-    """The caps as columns of a new job.
+    """Return the caps as columns of a new job.
 
     Raises:
-        Conflict: A cap can't be, or there is one in USD and a price that nobody knows.
+        Conflict: A cap can't be, or there is one in USD and an unknown price.
     """
     columns = caps.columns()
     unknown = list_unpriced_models(contestants) if caps.usd is not None else []
@@ -291,9 +269,8 @@ def check_caps(caps: Caps, contestants: Sequence[Contestant]) -> dict[str, int]:
 
 
 def over_already(job: GenerationJob) -> str:
-    """Why nothing can be changed at a job that has ended."""
-    state = job.get_state_display().lower()
-    return f"Job '{job.name}' is {state} already."
+    """Return why nothing can be changed at a job that has ended."""
+    return f"Job '{job.name}' is {job.get_state_display().lower()} already."
 
 
 @transaction.atomic
@@ -309,13 +286,13 @@ def raise_cap(job: GenerationJob, *, caps: Caps, actor: User | None = None) -> G
     job = GenerationJob.objects.select_for_update().get(pk=job.pk)
     if job.state not in (State.RUNNING, *GenerationJob.HELD):
         raise Conflict(over_already(job))
-    before, limits = limit_of(job), limits_of(job)
+    before = limit_of(job)
     for name, value in columns.items():
-        held = getattr(job, name)
-        if held is None:
-            raise Conflict(f"Job '{job.name}' has no such cap; its cap is {', '.join(limits)}.")
-        if value <= held:
-            raise Conflict(f"The new cap must be higher than the one of {', '.join(limits)}.")
+        current = getattr(job, name)
+        if current is None:
+            raise Conflict(f"Job '{job.name}' has no such cap; its cap is {before}.")
+        if value <= current:
+            raise Conflict(f"The new cap must be higher than the one of {before}.")
         setattr(job, name, value)
     job.save(update_fields=list(columns))
     log_event(
@@ -329,41 +306,37 @@ def raise_cap(job: GenerationJob, *, caps: Caps, actor: User | None = None) -> G
     return job
 
 
-_PAID = Q(served_from=None, sent_at__isnull=False, settled_at__isnull=False)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class JobCosts:
-    """The calls of a job by what is known of their cost.
-
-    Attributes:
-        paid: Calls that were sent and ended; those from the store are not among them.
-        priced: Those of them that used something whose price is known.
-        unpriced: Those of them whose price is unknown.
-        estimated: Those of them that count with their worst case, because usage is unknown.
-        cached: Calls that were answered from the store.
-    """
-
-    paid: int
-    priced: int
-    unpriced: int
-    estimated: int
-    cached: int
-
-    @property
-    def is_money_unknown(self) -> bool:
-        """Whether nothing can be said about money."""
-        return self.unpriced > 0 == self.priced
-
-
 def costs_of(job: GenerationJob) -> JobCosts:
-    """By one query."""
-    return JobCosts(
-        **ModelCall.objects.filter(attempt__augmentation__job=job).aggregate(
-            paid=Count("pk", filter=_PAID),
-            priced=Count("pk", filter=_PAID & Q(cost_nano_usd__isnull=False, spent_tokens__gt=0)),
-            unpriced=Count("pk", filter=_PAID & Q(cost_nano_usd=None)),
-            estimated=Count("pk", filter=_PAID & Q(is_cost_estimated=True)),
-            cached=Count("pk", filter=Q(served_from__isnull=False)),
-        )
+    """Count the calls of a job by what is known of their cost; one query."""
+    counts = ModelCall.objects.filter(attempt__augmentation__job=job).aggregate(
+        paid=Count("pk", filter=_PAID),
+        priced=Count("pk", filter=_PAID & Q(cost_nano_usd__isnull=False, spent_tokens__gt=0)),
+        unpriced=Count("pk", filter=_PAID & Q(cost_nano_usd=None)),
+        estimated=Count("pk", filter=_PAID & Q(is_cost_estimated=True)),
+        cached=Count("pk", filter=Q(served_from__isnull=False)),
     )
+    return JobCosts(**counts)
+
+
+# --- Private -----------------------------------------------------------------------------------
+
+
+def _used_unseen(call: ModelCall) -> Used:
+    """Return what counts for a call whose end nobody saw."""
+    if call.sent_at is None:
+        return _NOTHING
+    return Used(tokens=call.reserved_tokens, nano_usd=call.reserved_nano_usd, is_estimated=True)
+
+
+def _within_caps(worst: WorstCase, nano_usd: int | None, *, with_reserved: bool) -> Q:
+    """Match jobs that one more such call fits into; a cap in USD admits no unknown price."""
+    condition = Q()
+    for name, needed in (("nano_usd", nano_usd), ("calls", 1), ("tokens", worst.tokens)):
+        fits = Q(**{f"cap_{name}": None})
+        if needed is not None:
+            used = F(f"spent_{name}") + needed
+            if with_reserved:
+                used += F(f"reserved_{name}")
+            fits |= Q(**{f"cap_{name}__gte": used})
+        condition &= fits
+    return condition

@@ -34,7 +34,7 @@ def keep_correction(
     notes: str = "",
     actor: User | None = None,
 ) -> Augmentation:
-    """A waiting row of a job of its own; the door sends its message.
+    """Create a waiting row of a job of its own; the caller sends its message.
 
     Args:
         original: What is corrected; it stays as it is.
@@ -50,12 +50,18 @@ def keep_correction(
         Conflict: Nothing was changed, nothing is left, or the slug is that of somebody who is no
             person or retired.
     """
-    modification = _corrected(original, document)
+    modification = read_edit(original.scenario, document)
+    if modification.is_empty:
+        raise Conflict("Nothing is added, moved or removed: there is nothing to keep.")
+    before = original.modification
+    if before is not None and modification == read_edit(original.scenario, before):
+        raise Conflict("Nothing was corrected: it is as it was.")
     if notes:
         check_prose("notes", notes, what="correction", longest=LONGEST_NOTES)
-    contestant = _person(slug, name)
+    contestant = _find_or_add_person(slug, name)
+    actor_pk = actor.pk if actor else None
     job = GenerationJob.objects.create(
-        name=f"By hand: {original.scenario.slug}", launched_by_id=actor.pk if actor else None
+        name=f"By hand: {original.scenario.slug}", launched_by_id=actor_pk
     )
     job.contestants.set([contestant])
     job.scenarios.set([original.scenario])
@@ -66,58 +72,38 @@ def keep_correction(
         modification=edit_to_document(modification),
         notes=notes.strip(),
         corrects=original,
-        made_by_id=actor.pk if actor else None,
+        made_by_id=actor_pk,
     )
-    _log_correction(row, original, actor)
-    return row
-
-
-def human_contestants() -> list[Contestant]:
-    """Those that corrections can count for."""
-    return list(Contestant.objects.filter(kind=Kind.HUMAN, retired_at=None))
-
-
-def starting_document(original: Augmentation) -> dict[str, object]:
-    """The modification that a correction begins with."""
-    if original.modification is None:
-        return edit_to_document(Modification())
-    return edit_to_document(modification_from_document(original.modification))
-
-
-def _corrected(original: Augmentation, document: object) -> Modification:
-    modification = read_edit(original.scenario, document)
-    if modification.is_empty:
-        raise Conflict("Nothing is added, moved or removed: there is nothing to keep.")
-    if original.modification is not None:
-        before = read_edit(original.scenario, original.modification)
-        if modification == before:
-            raise Conflict("Nothing was corrected: it is as it was.")
-    return modification
-
-
-def _log_correction(row: Augmentation, original: Augmentation, actor: User | None) -> None:
+    made = {"augmentation": str(row.code), "contestant": slug, "modification": row.modification}
     log_event(
         actor=actor,
         verb="correct",
         object_kind="augmentation",
         object_code=original.code,
-        before={"modification": original.modification},
-        after={
-            "augmentation": str(row.code),
-            "contestant": row.contestant.slug,
-            "modification": row.modification,
-        },
+        before={"modification": before},
+        after=made,
     )
+    return row
 
 
-def _person(slug: str, name: str) -> Contestant:
+def human_contestants() -> list[Contestant]:
+    """Return the contestants that corrections can count for."""
+    return list(Contestant.objects.filter(kind=Kind.HUMAN, retired_at=None))
+
+
+def starting_document(original: Augmentation) -> dict[str, object]:
+    """Return the modification that a correction begins with."""
+    stored = original.modification
+    return edit_to_document(modification_from_document(stored) if stored else Modification())
+
+
+def _find_or_add_person(slug: str, name: str) -> Contestant:
     check_slug(slug, what="contestant")
-    found = Contestant.objects.filter(slug=slug).first()
-    if found is None:
+    row = Contestant.objects.filter(slug=slug).first()
+    if row is None:
         shown = one_line("name", name or (NAME if slug == BY_HAND else slug), what="contestant")
         return Contestant.objects.create(slug=slug, name=shown, kind=Kind.HUMAN)
-    if found.kind != Kind.HUMAN:
-        raise Conflict(f"“{found.name}” is no person; choose another slug.")
-    if found.retired_at is not None:
-        raise Conflict(f"“{found.name}” is retired; choose another slug.")
-    return found
+    problem = "is no person" if row.kind != Kind.HUMAN else "is retired" if row.retired_at else ""
+    if problem:
+        raise Conflict(f"“{row.name}” {problem}; choose another slug.")
+    return row

@@ -1,4 +1,9 @@
-"""The tries at an augmentation: opened with its lease, closed with its outcome."""
+"""Every call to a language model as a row, within a budget, and the store of earlier answers.
+
+The request is stored and its worst case reserved before it is sent, the answer stored before it
+is read, each in a transaction of its own: a crash in between loses nothing that was paid for.
+Faults are never served from the store; a served answer is served again from its source.
+"""
 
 from __future__ import annotations
 
@@ -6,12 +11,11 @@ import logging
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from datetime import datetime
-from typing import Any
+from typing import Any, NamedTuple
 
 from django.db import OperationalError, connection, transaction
-from django.db.models import Max
 from django.utils import timezone
 
 from augment.errors import (
@@ -24,60 +28,49 @@ from augment.errors import (
 )
 from augment.llm.costs import Price, WorstCase, worst_case
 from augment.llm.messages import Reply, Request, ToolCall, image_reference, request_hash
-from augment.models import (
-    Attempt,
-    Augmentation,
-    Endpoint,
-    GenerationJob,
-    ModelCall,
-    TranscriptNote,
-)
-from augment.services.clock import Moment
+from augment.models import Augmentation, Endpoint, GenerationJob, ModelCall, TranscriptNote
 from augment.services.endpoints.known_models import price_of
 from augment.services.running import budget, workers
 from augment.services.scenarios.pictures import store
 from augment.services.texts import make_document_storable, make_storable
-from augment.services.work import Lease, TryEnd
+from augment.services.work import Lease
 from augment.variants.respondents import ModelRole, NoteKind
 
-CANCELLED = GenerationJob.objects.filter(state=GenerationJob.State.CANCELLED)
-CLOSED = GenerationJob.objects.filter(
-    state__in=(GenerationJob.State.CANCELLED, *GenerationJob.HELD)
+logger = logging.getLogger(__name__)
+
+IMAGES = "asked"
+"""The folder in the media storage of the images that models are shown."""
+
+FIRST_WAIT_S, LONGEST_WAIT_S = 0.05, 1.0
+"""Between looks at a budget whose room is held by calls in flight, and at a locked database."""
+
+STORE_WITHIN_S = 600.0
+"""How long an answer that was paid for is held until a locked database stores it."""
+
+_COPIED = (
+    *("answer", "refusal", "extras", "model_returned", "finish_reason"),
+    *("prompt_tokens", "completion_tokens"),
 )
-"""Jobs in which nothing is started any more, or not for now."""
 
 
-def open_attempt(pk: int, worker: str, now: Moment) -> None:
-    """The next try at an augmentation."""
-    tries = Attempt.objects.filter(augmentation_id=pk)
-    number = (tries.aggregate(last=Max("number"))["last"] or 0) + 1
-    Attempt.objects.create(augmentation_id=pk, number=number, worker=worker, started_at=now)
-
-
-def close_attempt(pk: int, end: str, reason: str, now: Moment) -> None:
-    """How the current try ended. One that was lost stays without a time: nobody saw its end."""
-    budget.settle_unseen(row_pk=pk, now=now)
-    finished_at = None if end == TryEnd.LOST else now
-    Attempt.objects.filter(augmentation_id=pk, finished_at=None, outcome="").update(
-        finished_at=finished_at, outcome=end, reason=reason
-    )
+class _CallInFlight(NamedTuple):
+    pk: int
+    worst: WorstCase
+    price: Price | None
 
 
 def insist_wanted(held: Lease[Augmentation], *, lock: bool = False) -> None:
-    """Return while the row is the holder's and its job goes on.
+    """Return while the lease is held and its job is not cancelled.
 
     Raises:
-        LeaseLost: The row is somebody else's now.
+        LeaseLost: Another worker has the row now.
         JobCancelled: Its job is cancelled.
     """
     if not held.is_held(lock=lock):
         raise LeaseLost
-    if CANCELLED.filter(augmentations=held.pk).exists():
+    cancelled = GenerationJob.objects.filter(state=GenerationJob.State.CANCELLED)
+    if cancelled.filter(augmentations=held.pk).exists():
         raise JobCancelled
-
-
-_COPIED = ("answer", "refusal", "extras", "model_returned", "finish_reason")
-_COUNTS = ("prompt_tokens", "completion_tokens")
 
 
 def find_earlier_answer(
@@ -88,7 +81,7 @@ def find_earlier_answer(
     is_fresh: bool,
     since: datetime | None = None,
 ) -> ModelCall | None:
-    """The last call that answered the same request, None where it is to be asked.
+    """Return the last call that answered the same request, None where it is to be asked.
 
     Args:
         request_hash: Of the request.
@@ -111,72 +104,12 @@ def find_earlier_answer(
     return calls.order_by("-pk").first()
 
 
-def columns_of(reply: Reply) -> dict[str, Any]:
-    """The answer as columns of its call; a refusal that says nothing else is the answer."""
-    return {
-        "answer": make_storable(reply.text or reply.refusal or ""),
-        "refusal": None if reply.refusal is None else make_storable(reply.refusal),
-        "extras": _extras_of(reply),
-        "model_returned": make_storable(reply.model)[:120],
-        "finish_reason": make_storable(reply.finish_reason)[:40],
-        "prompt_tokens": reply.prompt_tokens,
-        "completion_tokens": reply.completion_tokens,
-        "latency_s": reply.latency_s,
-    }
-
-
-def reply_of(call: ModelCall) -> Reply:
-    """The answer that a call had, as it would come again; it took no time."""
-    return Reply(
-        text=call.answer or "",
-        model=call.model_returned,
-        finish_reason=call.finish_reason,
-        refusal=call.refusal,
-        tool_calls=tuple(ToolCall(**made) for made in (call.extras or {}).get("tool_calls", [])),
-        prompt_tokens=call.prompt_tokens,
-        completion_tokens=call.completion_tokens,
-    )
-
-
-def columns_of_copy(source: ModelCall, *, now: datetime) -> dict[str, Any]:
-    """A call that was answered from another one: the same answer, and nothing spent."""
-    copied = {name: getattr(source, name) for name in (*_COPIED, *_COUNTS)}
-    nothing = {"spent_tokens": 0, "cost_nano_usd": 0, "started_at": now, "settled_at": now}
-    return copied | nothing | {"served_from_id": source.served_from_id or source.pk}
-
-
-# --- Private -----------------------------------------------------------------------------------
-
-
-def _extras_of(reply: Reply) -> dict[str, Any] | None:
-    """What a reply carries beside its text, None for most."""
-    if not reply.tool_calls:
-        return None
-    extras: dict[str, Any] = {"tool_calls": [asdict(made) for made in reply.tool_calls]}
-    if reply.calls_left_out:
-        extras["calls_left_out"] = reply.calls_left_out
-    return dict(make_document_storable(extras))
-
-
-IMAGES = "asked"
-"""The folder in the media storage of the images that models are shown."""
-
-FIRST_WAIT_S, LONGEST_WAIT_S = 0.05, 1.0
-"""Between looks at a budget whose room is held by calls in flight, and at a locked database."""
-
-STORE_WITHIN_S = 600.0
-"""For so many seconds of such waits an answer that was paid for is held until it is stored."""
-
-logger = logging.getLogger(__name__)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Open:
-    """A call in flight."""
-
-    pk: int
-    worst: WorstCase
-    price: Price | None
+def sentence_of(fault: ModelFault) -> str:
+    """Return what broke, with the HTTP status where there was one."""
+    text = str(fault)
+    if fault.status is None or str(fault.status) in text:
+        return text
+    return f"HTTP {fault.status}: {text}"
 
 
 class CallTranscript(ABC):
@@ -203,26 +136,24 @@ class CallTranscript(ABC):
     ) -> None:
         self._owner = owner
         self._endpoint = endpoint
-        self._others = dict(others or {})
+        self._others = others or {}
         self._key = key
         self._numbers = numbers
         self._sleep = sleep
-        self._open: dict[int, _Open] = {}
-        self._prices: dict[tuple[int, str], Price | None] = {}
-        self._last: tuple[ModelRole, Request, str, dict[str, Any]] | None = None
+        self._in_flight: dict[int, _CallInFlight] = {}
 
     @abstractmethod
     def insist(self) -> None:
         """Return while the calls are wanted; the row is locked until the transaction ends.
 
         Raises:
-            LeaseLost: The row is somebody else's now.
+            LeaseLost: Another worker has the row now.
             JobCancelled: Its job is cancelled.
         """
 
     @abstractmethod
     def earlier_answer(self, request_hash: str) -> ModelCall | None:
-        """The call whose answer serves that request again."""
+        """Return the call whose answer serves that request again."""
 
     @abstractmethod
     def reserve(self, worst: WorstCase, price: Price | None) -> budget.Room:
@@ -234,29 +165,37 @@ class CallTranscript(ABC):
 
     @abstractmethod
     def limit(self) -> str:
-        """The cap that leaves no room, as a person reads it."""
+        """Return the cap that leaves no room, as a person reads it."""
 
     @abstractmethod
     def note(self, kind: NoteKind, document: dict[str, object]) -> None:
         """Store what happened since the last call."""
 
     def known(self, role: ModelRole, request: Request, prompt_version: str) -> Reply | None:
-        """The answer that this request had before, recorded as a call that cost nothing.
+        """Return this request's earlier answer, recorded as a call that cost nothing.
 
         Raises:
-            LeaseLost: The row is somebody else's now.
+            LeaseLost: Another worker has the row now.
         """
         columns = self._columns(role, request, prompt_version)
         earlier = self.earlier_answer(columns["request_hash"])
         if earlier is None:
             return None
+        now = timezone.now()
         with transaction.atomic():
             self.insist()
             ModelCall.objects.create(
-                **columns, **columns_of_copy(earlier, now=timezone.now()), number=self._numbers + 1
+                **columns,
+                **{name: getattr(earlier, name) for name in _COPIED},
+                number=self._numbers + 1,
+                spent_tokens=0,
+                cost_nano_usd=0,
+                started_at=now,
+                settled_at=now,
+                served_from_id=earlier.served_from_id or earlier.pk,
             )
         self._numbers += 1
-        return reply_of(earlier)
+        return _reply_of(earlier)
 
     def asked(self, role: ModelRole, request: Request, prompt_version: str) -> int:
         """Reserve the worst case of a request and store it; returns its number, from 1.
@@ -264,7 +203,7 @@ class CallTranscript(ABC):
         Where calls in flight hold the room that this one needs, waits for them to end.
 
         Raises:
-            LeaseLost: The row is somebody else's now.
+            LeaseLost: Another worker has the row now.
             JobCancelled: Its job is cancelled.
             BudgetSpent: The job has no room for the call, and is stopped.
             WorkerStopping: This worker is to stop; what it was answered so far is kept.
@@ -274,14 +213,14 @@ class CallTranscript(ABC):
         for message in request.messages:
             for png in message.images:
                 store(png, folder=IMAGES)
-        worst, price = worst_case(request), self._price_of(self._at(role), request.model)
+        worst, price = worst_case(request), price_of(self._endpoint_of(role), request.model)
         wait_s = FIRST_WAIT_S
         while True:
             workers.insist_on_going_on()
-            room, pk = self._try(columns, worst, price)
+            room, pk = self._reserve_and_store(columns, worst, price)
             if room == budget.Room.TAKEN:
                 self._numbers += 1
-                self._open[self._numbers] = _Open(pk=pk, worst=worst, price=price)
+                self._in_flight[self._numbers] = _CallInFlight(pk, worst, price)
                 return self._numbers
             if room == budget.Room.SPENT:
                 raise BudgetSpent(self.limit())
@@ -292,11 +231,11 @@ class CallTranscript(ABC):
         """Store that the call is sent now; from here on it may be billed.
 
         Raises:
-            LeaseLost: Somebody took the row over and settled the call as one that never was.
+            LeaseLost: Another worker took the row and settled the call as one that never was.
             WorkerStopping: It waited for its place for so long that this worker is to stop.
         """
         workers.insist_on_going_on()
-        call = ModelCall.objects.filter(pk=self._open[number].pk, settled_at=None)
+        call = ModelCall.objects.filter(pk=self._in_flight[number].pk, settled_at=None)
         if not call.update(sent_at=timezone.now()):
             raise LeaseLost
 
@@ -305,23 +244,25 @@ class CallTranscript(ABC):
 
         An answer with a fault is kept and paid for, but never served again.
         """
-        call = self._open.pop(number)
-        used = budget.used_by_reply(reply, worst=call.worst, price=call.price)
-        answer = columns_of(reply)
-        # Also where there is none: the worker may have been thought dead meanwhile.
-        answer["fault"] = "" if fault is None else make_storable(sentence_of(fault))
-        self._settle(call, used, answer)
+        call = self._in_flight.pop(number)
+        # The fault also where there is none: the worker may have been thought dead meanwhile.
+        fault_text = "" if fault is None else make_storable(sentence_of(fault))
+        self._settle(
+            call.pk,
+            budget.used_by_reply(reply, worst=call.worst, price=call.price),
+            _columns_of(reply) | {"fault": fault_text},
+        )
 
     def broke(self, number: int, fault: ModelFault) -> None:
         """Store why there was no answer to that call, and what it may have used."""
-        call = self._open.pop(number)
-        used = budget.used_by_fault(fault, worst=call.worst, price=call.price)
-        broken: dict[str, Any] = {"fault": make_storable(sentence_of(fault))}
+        call = self._in_flight.pop(number)
+        columns: dict[str, Any] = {"fault": make_storable(sentence_of(fault))}
         if isinstance(fault, NotSent):
-            broken["sent_at"] = None
-        self._settle(call, used, broken)
+            columns["sent_at"] = None
+        used = budget.used_by_fault(fault, worst=call.worst, price=call.price)
+        self._settle(call.pk, used, columns)
 
-    def _settle(self, call: _Open, used: budget.Used, answer: dict[str, Any]) -> None:
+    def _settle(self, call_pk: int, used: budget.Used, answer: dict[str, Any]) -> None:
         """Store how a call ended. It was paid for, so a locked database is waited out.
 
         Raises:
@@ -330,7 +271,7 @@ class CallTranscript(ABC):
         wait_s, waited_s = FIRST_WAIT_S, 0.0
         while True:
             try:
-                budget.settle(call_pk=call.pk, used=used, now=timezone.now(), answer=answer)
+                budget.settle(call_pk=call_pk, used=used, now=timezone.now(), answer=answer)
                 return
             except OperationalError as error:
                 if waited_s >= STORE_WITHIN_S:
@@ -343,30 +284,23 @@ class CallTranscript(ABC):
             wait_s = min(1.5 * wait_s, LONGEST_WAIT_S)
 
     def _columns(self, role: ModelRole, request: Request, version: str) -> dict[str, Any]:
-        """What a call's row says about the request, whoever answers it.
-
-        Asked of one request several times in a row: whether it is known, and for each attempt.
-        """
-        if self._last is not None and self._last[:3] == (role, request, version):
-            return self._last[3]
+        """Return what a call's row says about the request, whoever answers it."""
         document = make_document_storable(request.to_document(image_url=image_reference))
-        columns = {
+        return {
             **self._owner,
             "role": role,
             "request": document,
             "request_hash": request_hash(
-                base_url=self._at(role).base_url,
+                base_url=self._endpoint_of(role).base_url,
                 document=document,
                 prompt_version=version,
                 options=self._key,
             ),
             "prompt_version": version,
         }
-        self._last = (role, request, version, columns)
-        return columns
 
     @transaction.atomic
-    def _try(
+    def _reserve_and_store(
         self, columns: dict[str, Any], worst: WorstCase, price: Price | None
     ) -> tuple[budget.Room, int]:
         """Take room and write the row in one transaction, or nothing of both."""
@@ -383,24 +317,15 @@ class CallTranscript(ABC):
         )
         return room, call.pk
 
-    def _at(self, role: ModelRole) -> Endpoint:
+    def _endpoint_of(self, role: ModelRole) -> Endpoint:
         return self._others.get(role, self._endpoint)
-
-    def _price_of(self, endpoint: Endpoint, model: str) -> Price | None:
-        asked = (endpoint.pk, model)
-        if asked not in self._prices:
-            self._prices[asked] = price_of(endpoint, model)
-        return self._prices[asked]
 
 
 class RowTranscript(CallTranscript):
     """The calls of one attempt at an augmentation, within the budget of its job.
 
-    Nothing more is asked for an attempt whose lease was taken back (its result would be dropped)
-    or whose job has no room for the call.
-
     Args:
-        held: The lease on the row.
+        held: The lease on the row; once it is lost, nothing more is asked.
         row: The augmentation, with its job.
         endpoint: As for every transcript, and so are the others.
     """
@@ -450,9 +375,36 @@ class RowTranscript(CallTranscript):
         )
 
 
-def sentence_of(fault: ModelFault) -> str:
-    """What broke, with the HTTP status where there was one."""
-    text = str(fault)
-    if fault.status is None or str(fault.status) in text:
-        return text
-    return f"HTTP {fault.status}: {text}"
+# --- Private -----------------------------------------------------------------------------------
+
+
+def _columns_of(reply: Reply) -> dict[str, Any]:
+    """Return the answer as columns; a refusal that says nothing else is the answer."""
+    extras: dict[str, Any] | None = None
+    if reply.tool_calls:
+        extras = {"tool_calls": [asdict(call) for call in reply.tool_calls]}
+        if reply.calls_left_out:
+            extras["calls_left_out"] = reply.calls_left_out
+    return {
+        "answer": make_storable(reply.text or reply.refusal or ""),
+        "refusal": None if reply.refusal is None else make_storable(reply.refusal),
+        "extras": make_document_storable(extras),
+        "model_returned": make_storable(reply.model)[:120],
+        "finish_reason": make_storable(reply.finish_reason)[:40],
+        "prompt_tokens": reply.prompt_tokens,
+        "completion_tokens": reply.completion_tokens,
+        "latency_s": reply.latency_s,
+    }
+
+
+def _reply_of(call: ModelCall) -> Reply:
+    """Return the answer that a call had, as it would come again; it took no time."""
+    return Reply(
+        text=call.answer or "",
+        model=call.model_returned,
+        finish_reason=call.finish_reason,
+        refusal=call.refusal,
+        tool_calls=tuple(ToolCall(**made) for made in (call.extras or {}).get("tool_calls", [])),
+        prompt_tokens=call.prompt_tokens,
+        completion_tokens=call.completion_tokens,
+    )

@@ -1,4 +1,4 @@
-"""Has a language model read an instruction; every call is recorded, paid for and within caps."""
+"""Have a language model read an instruction; every call is recorded and within caps."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from contextlib import AbstractContextManager
 from django.conf import settings
 from django.contrib.auth.models import User
 from django.db import transaction
+from django.db.models import Count, Sum
 
 from augment.errors import (
     BudgetSpent,
@@ -24,9 +25,9 @@ from augment.services.clock import DATABASE_TIME
 from augment.services.endpoints.client import EndpointClient, Queue, wire_to
 from augment.services.endpoints.known_models import price_of
 from augment.services.events import log_event
-from augment.services.running import budget, calls
+from augment.services.running import budget
 from augment.services.running.budget import Caps
-from augment.services.running.calls import CallTranscript, sentence_of
+from augment.services.running.calls import CallTranscript, find_earlier_answer, sentence_of
 from augment.services.work import Lease, Settlement, WorkKind
 from augment.variants.pipeline import ask_for_intent
 from augment.variants.respondents import NoteKind
@@ -82,13 +83,20 @@ def read_intent(
 def plan_reading(
     *, scenario: str, endpoint: str, model: str, caps: Caps = USUAL_CAPS, actor: User | None = None
 ) -> IntentReading:
-    """The row of a reading that nobody has been asked for yet.
+    """Create the row of a reading that nobody has been asked for yet.
 
     Raises:
         UnknownName: No such scenario or endpoint.
         Conflict: A cap can't be, or there is one in USD and nobody knows the price.
     """
-    row, site = _scenario(scenario), _endpoint(endpoint)
+    row = Scenario.objects.filter(slug=scenario).first()
+    if row is None:
+        slugs = Scenario.objects.values_list("slug", flat=True)
+        raise UnknownName("scenario", scenario, list(slugs))
+    site = Endpoint.objects.filter(label=endpoint).first()
+    if site is None:
+        labels = Endpoint.objects.values_list("label", flat=True)
+        raise UnknownName("endpoint", endpoint, list(labels))
     if caps.usd is not None and price_of(site, model) is None:
         raise Conflict("A cap in USD needs the price of the model, and nobody knows it.")
     return IntentReading.objects.create(
@@ -117,10 +125,8 @@ class Readings(WorkKind[IntentReading]):
 
     def run(self, row: IntentReading, held: Lease[IntentReading]) -> Settlement:
         """Ask the model; every foreseen fault is a failed reading with a sentence."""
-        site = row.endpoint
-        client = self._client or EndpointClient(
-            wire_to(site), site, Queue(longest_s=settings.LLM_QUEUE_S)
-        )
+        queue = Queue(longest_s=settings.LLM_QUEUE_S)
+        client = self._client or EndpointClient(wire_to(row.endpoint), row.endpoint, queue)
         transcript = ReadingTranscript(held, row, is_fresh=self._is_fresh)
         try:
             with client as opened:
@@ -177,21 +183,18 @@ class ReadingTranscript(CallTranscript):
     def earlier_answer(self, request_hash: str) -> ModelCall | None:
         if self._is_fresh:
             return None
-        return calls.find_earlier_answer(
+        return find_earlier_answer(
             request_hash=request_hash, augmentation_pk=0, attempt_pk=0, is_fresh=False
         )
 
     def reserve(self, worst: WorstCase, price: Price | None) -> budget.Room:
-        sent = self._reading.calls.exclude(sent_at=None)
-        used = {
-            "calls": sent.count(),
-            "tokens": sum(call.spent_tokens or 0 for call in sent),
-            "nano_usd": sum(call.cost_nano_usd or 0 for call in sent),
-        }
+        used = self._reading.calls.exclude(sent_at=None).aggregate(
+            calls=Count("pk"), tokens=Sum("spent_tokens"), nano_usd=Sum("cost_nano_usd")
+        )
         needs = {"calls": 1, "tokens": worst.tokens, "nano_usd": worst.nano_usd(price) or 0}
         for name, needed in needs.items():
             cap = getattr(self._reading, f"cap_{name}")
-            if cap is not None and used[name] + needed > cap:
+            if cap is not None and (used[name] or 0) + needed > cap:
                 self._limit = f"{cap} {name}"
                 return budget.Room.SPENT
         return budget.Room.TAKEN
@@ -201,22 +204,3 @@ class ReadingTranscript(CallTranscript):
 
     def note(self, kind: NoteKind, document: dict[str, object]) -> None:
         """A reading has no rounds, tools or reviews to note."""
-
-
-# --- Private -----------------------------------------------------------------------------------
-
-
-def _scenario(slug: str) -> Scenario:
-    row = Scenario.objects.filter(slug=slug).first()
-    if row is None:
-        raise UnknownName("scenario", slug, list(Scenario.objects.values_list("slug", flat=True)))
-    return row
-
-
-def _endpoint(label: str) -> Endpoint:
-    row = Endpoint.objects.filter(label=label).first()
-    if row is None:
-        raise UnknownName(
-            "endpoint", label, list(Endpoint.objects.values_list("label", flat=True))
-        )
-    return row

@@ -1,4 +1,4 @@
-"""Generation jobs: contestants x scenarios x samples, until nothing is under way."""
+"""Generation jobs: launched, paused, resumed, cancelled, retried, finished."""
 
 from __future__ import annotations
 
@@ -24,21 +24,27 @@ from augment.services.running.budget import (
     raise_cap,
 )
 from augment.services.running.choosing import refuse_impossible
-from augment.services.running.progress import rows_of_cause
+from augment.services.running.progress import count_rows, rows_of_cause
 from augment.services.texts import one_line
 from augment.services.work import change_all
 from augment.variants.options import MOST_SAMPLES
 
 State = Augmentation.State
-
-_Row = TypeVar("_Row", Contestant, Scenario)
-
+JobState = GenerationJob.State
 
 HIGHEST_SAMPLES = MOST_SAMPLES
 """Of one cell of a job."""
 
-OPEN = (GenerationJob.State.RUNNING, *GenerationJob.HELD)
+OPEN = (JobState.RUNNING, *GenerationJob.HELD)
 """States of jobs that are not over."""
+
+RETRIED = (State.FAILED, State.UNREADABLE)
+"""What may be tried again. A contestant that declined has answered and is not asked again."""
+
+_MAY_END = (JobState.RUNNING, JobState.PAUSED)
+"""A paused job whose last row was in flight has nothing left to resume."""
+
+_Row = TypeVar("_Row", Contestant, Scenario)
 
 
 @transaction.atomic
@@ -53,16 +59,14 @@ def launch(
     full_plan: dict[str, Any] | None = None,
     actor: User | None = None,
 ) -> GenerationJob:
-    """Write a job and its waiting rows, one per contestant, scenario and sample.
-
-    The door sends the messages.
+    """Write a job and its waiting rows; the caller sends the messages.
 
     Args:
         name: What people call it.
         contestants: Slugs; a slug given twice counts once.
         scenarios: Slugs; a slug given twice counts once.
         caps: What it may use at most.
-        samples: So often every contestant is asked about every scenario.
+        samples: Samples per contestant and scenario.
         is_fresh: Whether language models are asked anew what they answered in other jobs before.
         full_plan: Of a job that tries one scenario first: what was chosen for the whole one.
         actor: Who launches it, None for the machine.
@@ -71,13 +75,12 @@ def launch(
         InvalidDocument: The name is empty, too long or not one line.
         UnknownName: A slug that nobody registered.
         Conflict: Nothing is chosen, a contestant can't be run, the reference is to run on
-            scenarios that have none, a viewer can't see, or a cap in USD meets a price that
-            nobody knows.
+            scenarios that have none, a viewer can't see, or a cap in USD meets an unknown price.
     """
     name = one_line("name", name, what="job")
-    loosen_unanswered(_contestants(contestants))
-    who = _contestants(contestants)
-    where = _scenarios(scenarios)
+    loosen_unanswered(_in_order(Contestant.objects.all(), contestants, "contestant"))
+    who = _in_order(Contestant.objects.all(), contestants, "contestant")
+    where = _in_order(Scenario.objects.all(), scenarios, "scenario")
     refuse_impossible(who, where)
     check_samples(samples)
     job = GenerationJob.objects.create(
@@ -96,8 +99,16 @@ def launch(
         for scenario in where
         for contestant in who
     )
-    _log_launch(job, who, where, actor)
+    settings = {"samples": samples, "is_fresh": is_fresh, "cap": limit_of(job)}
+    slugs = {"contestants": [row.slug for row in who], "scenarios": [row.slug for row in where]}
+    _log(job, "launch", actor, after={"name": name, **slugs, **settings})
     return job
+
+
+def check_samples(samples: int) -> None:
+    """Raise Conflict for a number of samples that a job can't ask for."""
+    if not 1 <= samples <= MOST_SAMPLES:
+        raise Conflict(f"Samples go from 1 to {MOST_SAMPLES}, not {samples}.")
 
 
 @transaction.atomic
@@ -113,19 +124,109 @@ def cancel(job: GenerationJob, actor: User | None = None) -> GenerationJob:
     before = still_open.values_list("state", flat=True).first()
     now = timezone.now()
     waiting = Augmentation.objects.filter(job=job, state=State.QUEUED)
-    stopped = change_all(waiting, state=State.CANCELLED, finished_at=now)
-    if not still_open.update(state=GenerationJob.State.CANCELLED, finished_at=now):
+    cancelled = change_all(waiting, state=State.CANCELLED, finished_at=now)
+    if not still_open.update(state=JobState.CANCELLED, finished_at=now):
         job.refresh_from_db()
         raise Conflict(over_already(job))
-    log_event(
-        actor=actor,
-        verb="cancel",
-        object_kind="job",
-        object_code=str(job.code),
-        before={"state": before},
-        after={"state": GenerationJob.State.CANCELLED.value, "cancelled": stopped},
-    )
-    job.refresh_from_db()
+    after = {"state": JobState.CANCELLED.value, "cancelled": cancelled}
+    _log(job, "cancel", actor, before={"state": before}, after=after)
+    return job
+
+
+@transaction.atomic
+def pause(job: GenerationJob, *, actor: User | None = None) -> GenerationJob:
+    """Start nothing new; what is in flight ends and keeps its results.
+
+    Raises:
+        Conflict: The job is not running.
+    """
+    running = GenerationJob.objects.filter(pk=job.pk, state=JobState.RUNNING)
+    if not running.update(state=JobState.PAUSED):
+        job.refresh_from_db()
+        reason = over_already(job)
+        if job.state in GenerationJob.HELD:
+            reason = f"{reason[:-1]}: it starts nothing until it is resumed."
+        raise Conflict(reason)
+    counts = count_rows(job)
+    after = {"state": JobState.PAUSED, "waiting": counts.queued, "in_flight": counts.running}
+    _log(job, "pause", actor, before={"state": JobState.RUNNING.value}, after=after)
+    return job
+
+
+@transaction.atomic
+def resume(
+    job: GenerationJob, *, higher: Caps = NO_CAPS, actor: User | None = None
+) -> GenerationJob:
+    """Let a job that is paused or stopped at its cap go on; the caller sends the messages.
+
+    Attempts that were stopped are replayed from the answers that they had, and pay for none twice.
+
+    Args:
+        job: Which.
+        higher: The caps that are raised first; the others stay.
+        actor: Who wants it.
+
+    Raises:
+        Conflict: The job is not held, or a cap would not be higher than it is.
+    """
+    held = GenerationJob.objects.filter(pk=job.pk, state__in=GenerationJob.HELD)
+    waiting = Augmentation.objects.filter(job=job.pk, state=State.QUEUED)
+    queued = change_all(waiting, sent_at=None)
+    if higher != NO_CAPS:
+        raise_cap(job, caps=higher, actor=actor)
+    before = held.select_for_update().values_list("state", flat=True).first()
+    if not held.update(state=JobState.RUNNING):
+        job.refresh_from_db()
+        raise Conflict(
+            f"Job '{job.name}' is {job.get_state_display().lower()}; only one that is paused "
+            "or stopped at its cap can be resumed."
+        )
+    after = {"state": JobState.RUNNING.value, "queued": queued}
+    _log(job, "resume", actor, before={"state": before}, after=after)
+    return job
+
+
+@transaction.atomic
+def retry_cause(job: GenerationJob, *, key: str, actor: User | None = None) -> GenerationJob:
+    """Let the rows that ended for one cause wait again; the caller sends the messages.
+
+    What failed goes on from the answers that it had. What was unreadable is asked anew, because
+    the same answer would be read the same way; the attempt that counted so far stays on record.
+
+    Args:
+        job: Whose rows they are.
+        key: Of the cause, as `failure_groups` gives it.
+        actor: Who wants it.
+
+    Raises:
+        UnknownName: No row has that cause (any more).
+        Conflict: The job was cancelled, or the contestants have refused.
+    """
+    state, cause, pks = rows_of_cause(job, key)
+    if state not in RETRIED:
+        raise Conflict(
+            "Who refused has answered: it is not asked again. Launch a new job instead."
+        )
+    anew: dict[str, object] = {}
+    if state == State.UNREADABLE:
+        anew = {"image": "", "notes": "", "asked_anew_at": database_now()}
+    rows = Augmentation.objects.filter(pk__in=pks, state=state)
+    _let_wait(job, rows, actor, {"state": state.value, "cause": cause}, **anew)
+    return job
+
+
+@transaction.atomic
+def retry_failed(job: GenerationJob, actor: User | None = None) -> GenerationJob:
+    """Let every failed row wait again; outcomes of the contestants themselves stay.
+
+    In a job that is paused or stopped at its cap they wait, with the others, until it is resumed.
+
+    Raises:
+        Conflict: The job was cancelled, or nothing in it failed.
+    """
+    failed = Augmentation.objects.filter(job=job, state=State.FAILED)
+    if not _let_wait(job, failed, actor, {}):
+        raise Conflict(f"Nothing in job '{job.name}' failed; there is nothing to try again.")
     return job
 
 
@@ -137,9 +238,10 @@ def open_again(job: GenerationJob) -> None:
     Raises:
         Conflict: The job was cancelled.
     """
-    states = GenerationJob.State
-    kept = Case(When(state__in=GenerationJob.HELD, then=F("state")), default=Value(states.RUNNING))
-    not_cancelled = GenerationJob.objects.filter(pk=job.pk).exclude(state=states.CANCELLED)
+    kept = Case(
+        When(state__in=GenerationJob.HELD, then=F("state")), default=Value(JobState.RUNNING)
+    )
+    not_cancelled = GenerationJob.objects.filter(pk=job.pk).exclude(state=JobState.CANCELLED)
     if not not_cancelled.update(state=kept, finished_at=None):
         raise Conflict(f"Job '{job.name}' was cancelled; launch a new one instead.")
     loosen_unanswered(job.contestants.all())
@@ -166,9 +268,6 @@ def finish_if_over(*, now: Moment = DATABASE_TIME, job_pk: int | None = None) ->
 
 # --- Private -----------------------------------------------------------------------------------
 
-_MAY_END = (GenerationJob.State.RUNNING, GenerationJob.State.PAUSED)
-"""A paused job whose last row was in flight has nothing left to resume."""
-
 
 @transaction.atomic
 def _finish(job_pk: int, now: Moment) -> int:
@@ -182,200 +281,43 @@ def _finish(job_pk: int, now: Moment) -> int:
         return 0
     if Augmentation.objects.filter(job=job_pk, state__in=Augmentation.UNDER_WAY).exists():
         return 0
-    return running.update(state=GenerationJob.State.FINISHED, finished_at=now)
-
-
-def _log_launch(
-    job: GenerationJob, who: list[Contestant], where: list[Scenario], actor: User | None
-) -> None:
-    after: dict[str, Any] = {
-        "name": job.name,
-        "contestants": [contestant.slug for contestant in who],
-        "scenarios": [scenario.slug for scenario in where],
-    }
-    if job.is_capped:
-        after["cap"] = limit_of(job)
-    if job.is_fresh:
-        after["is_fresh"] = True
-    if job.samples > 1:
-        after["samples"] = job.samples
-    log_event(
-        actor=actor, verb="launch", object_kind="job", object_code=str(job.code), after=after
-    )
-
-
-def check_samples(samples: int) -> None:
-    """Refuse what a job can't ask for, with a Conflict."""
-    if not 1 <= samples <= MOST_SAMPLES:
-        raise Conflict(f"Samples go from 1 to {MOST_SAMPLES}, not {samples}.")
-
-
-def _contestants(slugs: Sequence[str]) -> list[Contestant]:
-    return _in_order(Contestant.objects.all(), slugs, "contestant")
-
-
-def _scenarios(slugs: Sequence[str]) -> list[Scenario]:
-    """Without their scenes."""
-    return _in_order(Scenario.objects.all(), slugs, "scenario")
-
-
-def _in_order(rows: QuerySet[_Row], slugs: Sequence[str], what: str) -> list[_Row]:
-    """The rows of those slugs in the given order, each once."""
-    by_slug = {row.slug: row for row in rows.filter(slug__in=slugs)}
-    for slug in slugs:
-        if slug not in by_slug:
-            raise UnknownName(what, slug, list(rows.values_list("slug", flat=True)))
-    return [by_slug[slug] for slug in dict.fromkeys(slugs)]
-
-
-@transaction.atomic
-def pause(job: GenerationJob, *, actor: User | None = None) -> GenerationJob:
-    """Start nothing new; what is in flight ends and keeps its results.
-
-    Raises:
-        Conflict: The job is not running.
-    """
-    running = GenerationJob.objects.filter(pk=job.pk, state=GenerationJob.State.RUNNING)
-    if not running.update(state=GenerationJob.State.PAUSED):
-        job.refresh_from_db()
-        if job.state in GenerationJob.HELD:
-            raise Conflict(
-                f"Job '{job.name}' is {job.get_state_display().lower()} already: it starts "
-                "nothing until it is resumed."
-            )
-        raise Conflict(over_already(job))
-    log_event(
-        actor=actor,
-        verb="pause",
-        object_kind="job",
-        object_code=job.code,
-        before={"state": GenerationJob.State.RUNNING.value},
-        after={
-            "state": GenerationJob.State.PAUSED.value,
-            "waiting": _count(job, Augmentation.State.QUEUED),
-            "in_flight": _count(job, Augmentation.State.RUNNING),
-        },
-    )
-    job.refresh_from_db()
-    return job
-
-
-@transaction.atomic
-def resume(
-    job: GenerationJob, *, higher: Caps = NO_CAPS, actor: User | None = None
-) -> GenerationJob:
-    """Let a job that is paused or stopped at its cap go on; the door sends the messages.
-
-    Attempts that were stopped are replayed from the answers that they had, and pay for none twice.
-
-    Args:
-        job: Which.
-        higher: The caps that are raised first; the others stay.
-        actor: Who wants it.
-
-    Raises:
-        Conflict: The job is not held, or a cap would not be higher than it is.
-    """
-    held = GenerationJob.objects.filter(pk=job.pk, state__in=GenerationJob.HELD)
-    waiting = Augmentation.objects.filter(job=job.pk, state=Augmentation.State.QUEUED)
-    again = change_all(waiting, sent_at=None)
-    if higher != NO_CAPS:
-        raise_cap(job, caps=higher, actor=actor)
-    before = held.select_for_update().values_list("state", flat=True).first()
-    if not held.update(state=GenerationJob.State.RUNNING):
-        job.refresh_from_db()
-        raise Conflict(
-            f"Job '{job.name}' is {job.get_state_display().lower()}; only one that is paused "
-            "or stopped at its cap can be resumed."
-        )
-    log_event(
-        actor=actor,
-        verb="resume",
-        object_kind="job",
-        object_code=job.code,
-        before={"state": before},
-        after={"state": GenerationJob.State.RUNNING.value, "queued": again},
-    )
-    job.refresh_from_db()
-    return job
-
-
-# --- Private -----------------------------------------------------------------------------------
-
-
-def _count(job: GenerationJob, state: Augmentation.State) -> int:
-    return Augmentation.objects.filter(job=job.pk, state=state).count()
-
-
-RETRIED = (State.FAILED, State.UNREADABLE)
-"""What may be tried again. Who declined has answered, and is not asked until it says yes."""
-
-
-@transaction.atomic
-def retry_cause(job: GenerationJob, *, key: str, actor: User | None = None) -> GenerationJob:
-    """Let the rows that ended for one cause wait again; the door sends the messages.
-
-    What failed goes on from the answers that it had. What was unreadable is asked anew, because
-    the same answer would be read the same way; the attempt that counted so far stays on record.
-
-    Args:
-        job: Whose rows they are.
-        key: Of the cause, as `failure_groups` gives it.
-        actor: Who wants it.
-
-    Raises:
-        UnknownName: No row has that cause (any more).
-        Conflict: The job was cancelled, or the contestants have refused.
-    """
-    state, cause, pks = rows_of_cause(job, key)
-    if state not in RETRIED:
-        raise Conflict(
-            "Who refused has answered: it is not asked again. Launch a new job instead."
-        )
-    anew: dict[str, object] = {}
-    if state == State.UNREADABLE:
-        anew = {"image": "", "notes": "", "asked_anew_at": database_now()}
-    rows = Augmentation.objects.filter(pk__in=pks, state=state)
-    _let_wait(job, rows, actor, told={"state": state.value, "cause": cause}, **anew)
-    return job
-
-
-@transaction.atomic
-def retry_failed(job: GenerationJob, actor: User | None = None) -> GenerationJob:
-    """Let every failed row wait again; outcomes of the contestants themselves stay.
-
-    In a job that is paused or stopped at its cap they wait, with the others, until it is resumed.
-
-    Raises:
-        Conflict: The job was cancelled, or nothing in it failed.
-    """
-    failed = Augmentation.objects.filter(job=job, state=State.FAILED)
-    if not _let_wait(job, failed, actor, told={}):
-        raise Conflict(f"Nothing in job '{job.name}' failed; there is nothing to try again.")
-    return job
-
-
-# --- Private -----------------------------------------------------------------------------------
+    return running.update(state=JobState.FINISHED, finished_at=now)
 
 
 def _let_wait(
     job: GenerationJob,
     rows: QuerySet[Augmentation],
     actor: User | None,
-    *,
-    told: dict[str, str],
+    logged: dict[str, str],
     **columns: object,
 ) -> int:
-    """Returns how many wait again; the job goes on with them."""
+    """Let rows wait again and their job go on; returns how many there are."""
     waiting = {"state": State.QUEUED, "reason": "", "finished_at": None, "sent_at": None}
-    again = change_all(rows, **waiting, **columns)
+    queued = change_all(rows, **waiting, **columns)
     open_again(job)
+    _log(job, "retry", actor, after={"queued": queued, **logged})
+    return queued
+
+
+def _log(
+    job: GenerationJob,
+    verb: str,
+    actor: User | None,
+    *,
+    after: dict[str, Any],
+    before: dict[str, Any] | None = None,
+) -> None:
+    """Log a change that is written, and read the job anew."""
     log_event(
-        actor=actor,
-        verb="retry",
-        object_kind="job",
-        object_code=job.code,
-        after={"queued": again, **told},
+        actor=actor, verb=verb, object_kind="job", object_code=job.code, before=before, after=after
     )
     job.refresh_from_db()
-    return again
+
+
+def _in_order(rows: QuerySet[_Row], slugs: Sequence[str], what: str) -> list[_Row]:
+    """Return the rows of those slugs in the given order, each once."""
+    by_slug = {row.slug: row for row in rows.filter(slug__in=slugs)}
+    for slug in slugs:
+        if slug not in by_slug:
+            raise UnknownName(what, slug, list(rows.values_list("slug", flat=True)))
+    return [by_slug[slug] for slug in dict.fromkeys(slugs)]

@@ -14,9 +14,9 @@ from typing import Any
 
 from django.conf import settings
 from django.db import Error, OperationalError
-from django.db.models import QuerySet
+from django.db.models import Max, QuerySet
 
-from augment.baselines.registry import PLACERS, RULE_PLACER, PlaceIntent
+from augment.baselines.registry import PLACERS, RULE_PLACER
 from augment.errors import (
     AugmentError,
     BudgetSpent,
@@ -29,7 +29,7 @@ from augment.errors import (
 )
 from augment.llm.client import ChatClient
 from augment.llm.messages import shorten
-from augment.models import Augmentation, Contestant, Endpoint
+from augment.models import Attempt, Augmentation, Contestant, Endpoint, GenerationJob
 from augment.scene.codec import modification_from_document, modification_to_document
 from augment.scene.entities import Modification, Scene
 from augment.services.clock import Moment
@@ -40,20 +40,12 @@ from augment.services.endpoints.treatments import (
     respondents_of,
     treatment_of,
 )
-from augment.services.running import jobs, workers
-from augment.services.running.calls import (
-    CANCELLED,
-    CLOSED,
-    RowTranscript,
-    close_attempt,
-    insist_wanted,
-    open_attempt,
-    sentence_of,
-)
+from augment.services.running import budget, jobs, workers
+from augment.services.running.calls import RowTranscript, insist_wanted, sentence_of
 from augment.services.scenarios.pictures import camera_of, original_picture, picture_of, redraw
 from augment.services.scenarios.scenes import intent_of, reference_of, scene_of, seed_of
 from augment.services.texts import LONGEST_NOTES, make_document_storable, make_storable
-from augment.services.work import Lease, Settlement, WorkKind, change_all
+from augment.services.work import Lease, Settlement, TryEnd, WorkKind, change_all
 from augment.variants import pipeline
 from augment.variants.options import ToolProtocol, recipe_with
 from augment.variants.recipes import find_recipe
@@ -66,6 +58,12 @@ State = Augmentation.State
 Connect = Callable[[Endpoint], AbstractContextManager[ChatClient]]
 Held = Lease[Augmentation]
 
+CANCELLED = GenerationJob.objects.filter(state=GenerationJob.State.CANCELLED)
+CLOSED = GenerationJob.objects.filter(
+    state__in=(GenerationJob.State.CANCELLED, *GenerationJob.HELD)
+)
+"""Jobs in which nothing is started any more, or not for now."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Answer:
@@ -75,27 +73,6 @@ class Answer:
     modification: Modification | None = None
     notes: str = ""
     reason: str = ""
-
-
-def open_wire(
-    endpoint: Endpoint, held: Held, treatment: Treatment | None = None
-) -> AbstractContextManager[ChatClient]:
-    """A client for the endpoint, with the key that its variable holds right now.
-
-    Its calls wait for a place at the endpoint, and for their answer, as long as the lease is
-    held and the job not cancelled.
-
-    Raises:
-        KeyNotAllowed: The variable is not meant for keys.
-        KeyMissing: The variable is not set here.
-        ModelFault: The key can't be sent, or the address is forbidden.
-    """
-    queue = Queue(
-        longest_s=settings.LLM_QUEUE_S, still_wanted=lambda: _insist_before_sending(held)
-    )
-    return EndpointClient(
-        wire_to(endpoint, still_wanted=lambda: _insist_if_told(held)), endpoint, queue, treatment
-    )
 
 
 class Augmentations(WorkKind[Augmentation]):
@@ -123,11 +100,16 @@ class Augmentations(WorkKind[Augmentation]):
 
     def begun(self, pk: int, worker: str, now: Moment) -> None:
         """Open the next attempt."""
-        open_attempt(pk, worker, now)
+        tries = Attempt.objects.filter(augmentation_id=pk)
+        number = (tries.aggregate(last=Max("number"))["last"] or 0) + 1
+        tries.create(augmentation_id=pk, number=number, worker=worker, started_at=now)
 
     def ended(self, pk: int, end: str, reason: str, now: Moment) -> None:
-        """Close the attempt and settle its calls."""
-        close_attempt(pk, end, reason, now)
+        """Close the attempt and settle its calls; one that was lost has no time of its end."""
+        budget.settle_unseen(row_pk=pk, now=now)
+        Attempt.objects.filter(augmentation_id=pk, finished_at=None, outcome="").update(
+            finished_at=None if end == TryEnd.LOST else now, outcome=end, reason=reason
+        )
 
     def over(self, row: Augmentation, outcome: Settlement | None) -> None:
         """Draw the others anew where a change needs a wider window; finish the job."""
@@ -138,7 +120,7 @@ class Augmentations(WorkKind[Augmentation]):
             jobs.finish_if_over(job_pk=row.job_id)
 
     def outcome_of_loss(self, row: Augmentation) -> Settlement | None:
-        """A row of a cancelled job is cancelled."""
+        """Cancel a row of a cancelled job."""
         if CANCELLED.filter(pk=row.job_id).exists():
             return Settlement(state=State.CANCELLED)
         return super().outcome_of_loss(row)
@@ -159,7 +141,7 @@ def work_on(*, augmentation_pk: int, worker: str = "", connect: Connect | None =
 
 
 def run(row: Augmentation, *, held: Held, connect: Connect | None = None) -> Settlement:
-    """How the row ends. Every foreseen fault is a failed outcome with a sentence.
+    """Return how the row ends. Every foreseen fault is a failed outcome with a sentence.
 
     Raises:
         LeaseLost, WorkerStopping: The row was taken back meanwhile, or this worker stops.
@@ -168,15 +150,15 @@ def run(row: Augmentation, *, held: Held, connect: Connect | None = None) -> Set
     try:
         scene = scene_of(row.scenario)
         unchanged = original_picture(row.scenario)
-        answer = _kept(row) or _asked(row, scene, held, connect)
+        answer = _stored_answer(row) or _ask(row, scene, held, connect)
         if answer.state == State.FAILED:
-            return _failed(answer.reason)
+            return Settlement(state=State.FAILED, reason=answer.reason)
         if answer.modification is None:
             return Settlement(
                 state=answer.state, reason=answer.reason, columns={"image": unchanged}
             )
         columns = _columns(answer, answer.modification)
-        held.note(**columns)
+        held.note(**columns)  # a second try only has to draw
         image = picture_of(scene, answer.modification, camera_of(row.scenario))
         return Settlement(state=answer.state, columns=columns | {"image": image})
     except JobCancelled as cancelled:
@@ -184,35 +166,53 @@ def run(row: Augmentation, *, held: Held, connect: Connect | None = None) -> Set
     except (Unwanted, BudgetSpent):
         raise
     except ModelFault as fault:
-        return _failed(sentence_of(fault))
+        reason = sentence_of(fault)
     except InvalidModification as error:
-        return _failed(f"The modification does not fit the scene: {error}")
+        reason = f"The modification does not fit the scene: {error}"
     except AugmentError as error:
-        return _failed(str(error))
+        reason = str(error)
     except OperationalError as error:
         # What was answered is in its rows: a second try pays for none of it.
-        return _failed(str(DatabaseLocked(str(error))))
+        reason = str(DatabaseLocked(str(error)))
+    return Settlement(state=State.FAILED, reason=reason)
+
+
+def open_wire(
+    endpoint: Endpoint, held: Held, treatment: Treatment | None = None
+) -> AbstractContextManager[ChatClient]:
+    """Return a client for the endpoint, with the key that its variable holds right now.
+
+    Its calls wait for a place at the endpoint, and for their answer, as long as the lease is
+    held and the job not cancelled.
+
+    Raises:
+        KeyNotAllowed: The variable is not meant for keys.
+        KeyMissing: The variable is not set here.
+        ModelFault: The key can't be sent, or the address is forbidden.
+    """
+
+    def insist_before_sending() -> None:
+        """A worker that is to stop sends nothing more; what it has sent it waits for."""
+        workers.insist_on_going_on()
+        insist_wanted(held)
+
+    def insist_in_flight() -> None:
+        """A database that can't say whether a call is wanted ends no call that is paid."""
+        try:
+            insist_wanted(held)
+        except Error as error:
+            logger.warning("Nobody could say whether a call is still wanted: %s", error)
+
+    queue = Queue(longest_s=settings.LLM_QUEUE_S, still_wanted=insist_before_sending)
+    wire = wire_to(endpoint, still_wanted=insist_in_flight)
+    return EndpointClient(wire, endpoint, queue, treatment)
 
 
 # --- Private -----------------------------------------------------------------------------------
 
 
-def _insist_before_sending(held: Held) -> None:
-    """A worker that is to stop sends nothing more; what it has sent it waits for."""
-    workers.insist_on_going_on()
-    insist_wanted(held)
-
-
-def _insist_if_told(held: Held) -> None:
-    """The same while a call is in flight: a database that can't say ends no call that is paid."""
-    try:
-        insist_wanted(held)
-    except Error as error:
-        logger.warning("Nobody could say whether a call is still wanted: %s", error)
-
-
-def _kept(row: Augmentation) -> Answer | None:
-    """The answer of an earlier attempt that was stored but not drawn any more."""
+def _stored_answer(row: Augmentation) -> Answer | None:
+    """Return the answer of an earlier attempt that was stored but not drawn any more."""
     if row.modification is None:
         return None
     modification = modification_from_document(row.modification)
@@ -220,87 +220,73 @@ def _kept(row: Augmentation) -> Answer | None:
 
 
 def _columns(answer: Answer, modification: Modification) -> dict[str, Any]:
-    """What is stored before it is drawn, so that a second try only has to draw."""
     notes = {"notes": shorten(make_storable(answer.notes), LONGEST_NOTES)} if answer.notes else {}
     document = make_document_storable(modification_to_document(modification))
     return {"modification": document, **notes}
 
 
-def _asked(row: Augmentation, scene: Scene, held: Held, connect: Connect | None) -> Answer:
-    """What the contestant says now."""
-    match row.contestant.kind:
+def _ask(row: Augmentation, scene: Scene, held: Held, connect: Connect | None) -> Answer:
+    contestant = row.contestant
+    match contestant.kind:
         case Kind.REFERENCE:
-            return _from_reference(row)
+            reference = reference_of(row.scenario)
+            if reference is None:
+                reason = "The scenario has no reference modification."
+                return Answer(state=State.FAILED, reason=reason)
+            return Answer(state=State.DONE, modification=reference)
         case Kind.RULE:
-            return _from_placer(row, PLACERS[RULE_PLACER].place, scene)
-        case Kind.BASELINE if row.contestant.slug in PLACERS:
-            return _from_placer(row, PLACERS[row.contestant.slug].place, scene)
-        case Kind.LLM | Kind.SIMULATED if row.contestant.endpoint is not None:
-            return _from_model(row, row.contestant.endpoint, scene, held, connect)
-    return Answer(
-        state=State.FAILED, reason=f"A job can't run contestants of kind {row.contestant.kind!r}."
-    )
+            return _place(row, RULE_PLACER, scene)
+        case Kind.BASELINE if contestant.slug in PLACERS:
+            return _place(row, contestant.slug, scene)
+        case Kind.LLM | Kind.SIMULATED if contestant.endpoint is not None:
+            return _ask_model(row, contestant.endpoint, scene, held, connect)
+    reason = f"A job can't run contestants of kind {contestant.kind!r}."
+    return Answer(state=State.FAILED, reason=reason)
 
 
-def _from_reference(row: Augmentation) -> Answer:
-    reference = reference_of(row.scenario)
-    if reference is None:
-        return Answer(state=State.FAILED, reason="The scenario has no reference modification.")
-    return Answer(state=State.DONE, modification=reference)
-
-
-def _from_placer(row: Augmentation, place: PlaceIntent, scene: Scene) -> Answer:
-    """What a contestant that asks nobody makes of the intent, or why it refuses."""
+def _place(row: Augmentation, placer: str, scene: Scene) -> Answer:
+    """Return what a contestant without a model makes of the intent, or why it refuses."""
+    slug = row.scenario.slug
+    # Each sample has a seed of its own; the first keeps that of jobs without samples.
+    seed = seed_of(slug if row.sample == 1 else f"{slug}#{row.sample}")
     try:
-        placed = place(
-            scene, intent_of(row.scenario), seed=seed_of(_drawn(row, row.scenario.slug))
-        )
+        placed = PLACERS[placer].place(scene, intent_of(row.scenario), seed=seed)
     except CannotPlace as refusal:
         return Answer(state=State.REFUSED, reason=refusal.reason)
     return Answer(state=State.DONE, modification=placed.modification, notes=placed.notes)
 
 
-def _drawn(row: Augmentation, what: str) -> str:
-    """What a draw depends on: each sample has one of its own, and the first is as ever."""
-    return what if row.sample == 1 else f"{what}#{row.sample}"
-
-
-def _from_model(
+def _ask_model(
     row: Augmentation, endpoint: Endpoint, scene: Scene, held: Held, connect: Connect | None
 ) -> Answer:
     respondents = respondents_of(row.contestant)
     treatment = treatment_of(row.contestant, respondents)
     options = treatment.options
     held.note(options=options.to_document())
-    sites = {respondent.endpoint.pk: respondent.endpoint for respondent in respondents.values()}
+    endpoints = {one.endpoint.pk: one.endpoint for one in respondents.values()}
     with ExitStack() as opened:
         clients = {
             pk: opened.enter_context(
                 open_wire(site, held, treatment) if connect is None else connect(site)
             )
-            for pk, site in sites.items()
+            for pk, site in endpoints.items()
         }
-        others: dict[ModelRole, RespondentClient] = {
-            role: _client_for(respondent, clients)
-            for role, respondent in respondents.items()
-            if role is not ModelRole.MODIFIER
-        }
+        playing = {role: _client_for(one, clients) for role, one in respondents.items()}
+        is_native = options.protocol is ToolProtocol.NATIVE
+        modifier = replace(playing.pop(ModelRole.MODIFIER), native_tools=is_native)
         outcome = pipeline.run(
             recipe_with(find_recipe(row.contestant.variant), options),
             scene=scene,
             instruction=row.scenario.instruction,
-            modifier=replace(
-                _client_for(respondents[ModelRole.MODIFIER], clients),
-                native_tools=options.protocol is ToolProtocol.NATIVE,
-            ),
+            modifier=modifier,
             transcript=RowTranscript(
                 held,
                 row,
                 endpoint,
-                others={role: respondents[role].endpoint for role in others},
+                others={role: respondents[role].endpoint for role in playing},
                 key=options.key(row.sample),
             ),
-            others=others,
+            others=playing,
             intent=intent_of(row.scenario),
             sampling=options.sampling(row.sample),
         )
@@ -318,7 +304,3 @@ def _client_for(respondent: Respondent, clients: dict[int, ChatClient]) -> Respo
         model=respondent.model,
         context_tokens=respondent.context_tokens,
     )
-
-
-def _failed(reason: str) -> Settlement:
-    return Settlement(state=State.FAILED, reason=reason)

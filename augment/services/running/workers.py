@@ -1,4 +1,4 @@
-"""Which workers live, and since when nobody has brought lost work back."""
+"""Worker processes: which live, since when nobody recovers lost work, and whether to stop."""
 
 from __future__ import annotations
 
@@ -8,8 +8,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 from threading import Event, Lock
-from types import TracebackType
-from typing import Self
 
 from django.conf import settings
 
@@ -28,7 +26,9 @@ MOST_HEARD = 200
 """So many of the last heard are looked at; crashed ones leave a row each."""
 
 LATE_ROUNDS = 4
-"""Whose last round is so many rounds ago brings nothing back, whatever it does instead."""
+"""A worker whose last good round is so many rounds ago does not recover lost work."""
+
+_stop_requested = Event()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -39,7 +39,7 @@ class Workforce:
         living: How many were heard a moment ago.
         silent_since: Where none lives: when the last one ended or was last heard, None where
             there has been none.
-        not_recovered_since: Where workers live and none brings lost work back: since when.
+        not_recovered_since: Where workers live and none recovers lost work: since when.
         fault: Why they can't, as far as they said so.
     """
 
@@ -50,7 +50,7 @@ class Workforce:
 
     @property
     def works(self) -> bool:
-        """Whether somebody lives, and what is lost is brought back."""
+        """Whether a worker lives and lost work is recovered."""
         return self.living > 0 and self.not_recovered_since is None
 
 
@@ -59,30 +59,18 @@ def worker_name(pid: int) -> str:
     return f"{socket.gethostname()} {pid}"[:120]
 
 
-class Survived:
-    """A block that may break in any way without ending who goes on; `fault` says how it did.
-
-    For loops that must outlive what nobody foresaw; whoever uses it tells the fault.
-    """
-
-    def __init__(self) -> None:
-        self.fault: Exception | None = None
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> bool:
-        self.fault = error if isinstance(error, Exception) else None
-        return self.fault is not None
+def survive(action: Callable[[], object], complaint: str) -> bool:
+    """Do what may break in any way without ending the caller's loop; False with a log line."""
+    try:
+        action()
+    except Exception:
+        logger.exception(complaint)
+        return False
+    return True
 
 
 class Presence:
-    """One worker's row: made when it is first heard, made anew when somebody deleted it.
+    """One worker's row: made when it is first heard, and anew when somebody deleted it.
 
     Args:
         name: Host and process.
@@ -94,38 +82,37 @@ class Presence:
         self._making = Lock()
 
     def beat(self) -> None:
-        """Say that it lives."""
+        """Record a sign of life."""
         # Two threads of a worker beat; at its start both would make a row, and one never ended.
         with self._making:
             if not self._update(seen_at=DATABASE_TIME):
-                _forget_old()
-                made = Worker.objects.create(
-                    name=self._name, started_at=DATABASE_TIME, seen_at=DATABASE_TIME
-                )
-                self._pk = made.pk
+                old = Worker.objects.filter(seen_at__lt=DATABASE_TIME - KEPT)
+                last = Worker.objects.first()
+                if last is not None:
+                    old.exclude(pk=last.pk).delete()
+                times = {"started_at": DATABASE_TIME, "seen_at": DATABASE_TIME}
+                self._pk = Worker.objects.create(name=self._name, **times).pk
 
     def recovered(self) -> None:
-        """Say that it has brought back what was lost."""
+        """Record that it has recovered what was lost."""
         self.beat()
         self._update(recovered_at=DATABASE_TIME, fault="")
 
     def failed(self, fault: str) -> None:
-        """Say why it could not."""
+        """Record why it could not."""
         self.beat()
         self._update(fault=make_storable(fault)[:FAULT_LENGTH] or "unknown")
 
     def end(self) -> None:
-        """Say that it ends in order."""
+        """Record that it ends in order."""
         self._update(seen_at=DATABASE_TIME, ended_at=DATABASE_TIME)
 
     def _update(self, **changes: object) -> bool:
-        if self._pk is None:
-            return False
-        return bool(Worker.objects.filter(pk=self._pk).update(**changes))
+        return bool(Worker.objects.filter(pk=self._pk).update(**changes)) if self._pk else False
 
 
 class RecoveryRounds:
-    """Brings lost work back, round after round; no fault ends it.
+    """Recovers lost work, round after round; no fault ends it.
 
     Args:
         recover: One round; told whether it is the first that works.
@@ -140,53 +127,46 @@ class RecoveryRounds:
         self._worked_at: datetime | None = None
 
     def go_on(self) -> bool:
-        """One round; whether it worked. What went wrong is logged and kept for the pages."""
-        with Survived() as round_:
+        """Do one round; returns whether it worked. Faults are logged and kept for the pages."""
+        try:
             self._recover(self._at_start)
             self._presence.recovered()
             now = database_now()
-        if round_.fault is not None:
+        except Exception as error:
             self._failed += 1
-            self._tell(round_.fault)
+            fault = str(error) or type(error).__name__
+            since = f"{self._worked_at:%Y-%m-%d %H:%M:%S} UTC" if self._worked_at else "the start"
+            text = "Could not bring lost work back since %s (%d rounds), will try again: %s: %s"
+            values = (since, self._failed, type(error).__name__, fault)
+            if self._failed == 1:
+                logger.exception(text, *values)
+            else:  # a fault that stays is told in full once
+                logger.warning(text, *values)
+            survive(lambda: self._presence.failed(fault), "This could not be stored for the pages")
             return False
         if self._failed:
             logger.info("Lost work is brought back again, after %d failed rounds.", self._failed)
         self._at_start, self._failed, self._worked_at = False, 0, now
         return True
 
-    def _tell(self, error: Exception) -> None:
-        since = f"{self._worked_at:%Y-%m-%d %H:%M:%S} UTC" if self._worked_at else "the start"
-        fault = str(error) or type(error).__name__
-        # A fault that stays is told in full once.
-        logger.warning(
-            "Could not bring lost work back since %s (%d rounds), will try again: %s: %s",
-            since,
-            self._failed,
-            type(error).__name__,
-            fault,
-            exc_info=error if self._failed == 1 else None,
-        )
-        with Survived() as storing:
-            self._presence.failed(fault)
-        if storing.fault is not None:
-            logger.warning("This could not be stored for the pages: %s", storing.fault)
-
 
 def workforce() -> Workforce:
-    """Who lives now, on the database's clock; one query."""
+    """Return which workers live now, on the database's clock; one query."""
     heard = list(Worker.objects.annotate(now=DATABASE_TIME)[:MOST_HEARD])
     if not heard:
         return Workforce(living=0)
     now: datetime = heard[0].now
     silent_for = timedelta(seconds=settings.STALE_AFTER_S)
-    living = [found for found in heard if not found.ended_at and now - found.seen_at <= silent_for]
+    living = [row for row in heard if not row.ended_at and now - row.seen_at <= silent_for]
     if not living:
         return Workforce(living=0, silent_since=heard[0].seen_at)
     late = now - timedelta(seconds=LATE_ROUNDS * settings.RECOVER_EVERY_S)
-    if any(not worker.fault and _worked_at(worker) >= late for worker in living):
+    # A new worker is still at its first round.
+    worked_at = {row.pk: row.recovered_at or row.started_at for row in living}
+    if any(not row.fault and worked_at[row.pk] >= late for row in living):
         return Workforce(living=len(living))
-    last = max(living, key=_worked_at)
-    return Workforce(living=len(living), not_recovered_since=_worked_at(last), fault=last.fault)
+    last = max(living, key=lambda row: worked_at[row.pk])
+    return Workforce(living=len(living), not_recovered_since=worked_at[last.pk], fault=last.fault)
 
 
 def is_silent(*, pid: int, for_s: float) -> bool:
@@ -200,49 +180,30 @@ def is_silent(*, pid: int, for_s: float) -> bool:
     return database_now() - newest.seen_at > timedelta(seconds=for_s)
 
 
-# --- Private -----------------------------------------------------------------------------------
-
-
-def _worked_at(worker: Worker) -> datetime:
-    """When its last round worked; a new one is still at its first."""
-    return worker.recovered_at or worker.started_at
-
-
-def _forget_old() -> None:
-    old = Worker.objects.filter(seen_at__lt=DATABASE_TIME - KEPT)
-    last = Worker.objects.first()
-    if last is not None:
-        old.exclude(pk=last.pk).delete()
-
-
-_told = Event()
+# --- Whether this process is to stop -----------------------------------------------------------
 
 
 def request_stop() -> None:
     """Let nothing new begin; safe to call from a signal handler."""
-    _told.set()
+    _stop_requested.set()
 
 
 def withdraw_stop() -> None:
-    """As at the start of a process."""
-    _told.clear()
+    """Go on as at the start of a process."""
+    _stop_requested.clear()
 
 
 def is_stop_requested() -> bool:
-    """Whether this process is to stop."""
-    return _told.is_set()
+    """Return whether this process is to stop."""
+    return _stop_requested.is_set()
 
 
 def wait(seconds: float) -> None:
-    """Until so many seconds have passed or the process is to stop."""
-    _told.wait(seconds)
+    """Wait until so many seconds have passed or the process is to stop."""
+    _stop_requested.wait(seconds)
 
 
 def insist_on_going_on() -> None:
-    """Return while there is no reason to stop.
-
-    Raises:
-        WorkerStopping: The process was told to.
-    """
-    if is_stop_requested():
+    """Raise WorkerStopping if the process was told to stop."""
+    if _stop_requested.is_set():
         raise WorkerStopping("this worker was told to stop")

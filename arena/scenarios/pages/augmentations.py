@@ -1,0 +1,231 @@
+"""Pages of single augmentations and of the prompts that lead to them, with all pictures."""
+
+from __future__ import annotations
+
+import json
+import re
+import uuid
+from typing import Any
+from urllib.parse import urlencode
+
+from django.http import Http404, HttpRequest, HttpResponse, HttpResponseBase, JsonResponse
+from django.shortcuts import get_object_or_404, redirect, render
+from django.urls import reverse
+from django.views.decorators.http import require_safe
+
+from arena.contestants.queries import asking_of
+from arena.scenarios.queries import modification_lines
+from arena.site.access import STAFF, allow_only
+from arena.site.acts import looks_again, send_later
+from arena.web.pictures import picture_response, sized_picture_response
+from augment.errors import AugmentError, UnknownName
+from augment.models import Augmentation, BaseScene, Contestant, Scenario, Simulation, UploadMoment
+from augment.services.endpoints.contestants import asking_contestants, preview_contestant
+from augment.services.endpoints.treatments import respondents_of
+from augment.services.judging.displacement import of_augmentation
+from augment.services.judging.findings import check_augmentation
+from augment.services.running.calls import IMAGES
+from augment.services.running.transcript_records import totals_of, transcript_of, tries_of
+from augment.services.scenarios.pictures import SceneView, reference_picture, scene_picture
+from augment.services.scenarios.prompts import Preview, list_choices, preview_prompt
+from augment.tasks import enqueue_marks, enqueue_prompts
+
+
+@allow_only(*STAFF)
+@require_safe
+def augmentation_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
+    """Show one augmentation with everything that led to it."""
+    augmentation = _augmentation(code)
+    tries, checked = tries_of(augmentation), check_augmentation(augmentation)
+    waits = checked is not None and bool(checked.picture) and not checked.is_drawn
+    look = looks_again(request, waits=waits)
+    if look == 1:
+        send_later(request, enqueue_marks, augmentation.pk)
+    context = {
+        "augmentation": augmentation,
+        "lines": modification_lines(augmentation.modification),
+        "corrections": augmentation.corrections.select_related("contestant", "made_by"),
+        "drive": augmentation.simulations.filter(state=Simulation.State.DONE).first(),
+        "measured": of_augmentation(augmentation),
+        "checked": checked,
+        "look": look,
+        "tries": tries,
+        "asking": asking_of(augmentation.contestant, augmentation.options),
+        "totals": totals_of(tries),
+    }
+    return render(request, "jobs/augmentation.html", context)
+
+
+def _augmentation(code: uuid.UUID) -> Augmentation:
+    rows = Augmentation.objects.select_related(
+        *("job", "scenario__base_scene", "contestant__endpoint", "made_by"), "corrects__contestant"
+    )
+    return get_object_or_404(rows.defer("scenario__base_scene__recording"), code=code)
+
+
+@allow_only(*STAFF)
+@require_safe
+def transcript(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
+    """Answer with the whole record of an augmentation as one JSON file."""
+    answer = JsonResponse(
+        transcript_of(_augmentation(code)), json_dumps_params={"indent": 2, "ensure_ascii": False}
+    )
+    answer["Content-Disposition"] = f'attachment; filename="transcript-{code}.json"'
+    answer["Cache-Control"] = "private, no-store"
+    return answer
+
+
+@allow_only(*STAFF)
+@require_safe
+def asked_image(request: HttpRequest, digest: str) -> HttpResponseBase:
+    """Answer with an image that a language model was shown, by the hash in its request."""
+    if not re.fullmatch(r"[0-9a-f]{64}", digest):
+        raise Http404
+    return picture_response(f"{IMAGES}/{digest}.png")
+
+
+@allow_only(*STAFF)
+@require_safe
+def picture(request: HttpRequest, kind: str, code: uuid.UUID) -> HttpResponseBase:
+    """Answer with a picture by what it shows; experts' pictures have other addresses."""
+    match kind:
+        case "original":
+            rows = Scenario.objects.only("original_image")
+            name = get_object_or_404(rows, code=code).original_image
+        case "augmentation":
+            name = get_object_or_404(Augmentation.objects.only("image"), code=code).image
+        case "marked":
+            checked = check_augmentation(_augmentation(code))
+            name = "" if checked is None else checked.picture
+        case "moment":
+            name = get_object_or_404(UploadMoment.objects.only("picture"), code=code).picture
+        case "reference":
+            scenario = get_object_or_404(Scenario.objects.select_related("base_scene"), code=code)
+            name = reference_picture(scenario)
+        case _ if kind in set(SceneView):
+            scene = get_object_or_404(BaseScene.objects.defer("recording"), code=code)
+            name = scene_picture(scene, SceneView(kind))
+        case _:
+            raise Http404
+    return sized_picture_response(request, name)
+
+
+# --- Prompts -----------------------------------------------------------------------------------
+
+
+@allow_only(*STAFF)
+@require_safe
+def prompts_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
+    """Show the exact messages of a variant's role, with about how many tokens they are."""
+    scenario, contestant = _scenario(code), _contestant(request)
+    problem, preview = "", Preview(shown=None)
+    try:
+        preview = _preview(request, scenario)
+    except AugmentError as error:
+        problem = str(error)
+    look = looks_again(request, waits=preview.shown is None and not problem)
+    if look == 1:
+        send_later(request, enqueue_prompts, scenario.pk)
+    role, variant = request.GET.get("role", "modifier"), request.GET.get("variant", "otm")
+    choices = list_choices()
+    context = {
+        "contestants": asking_contestants(),
+        "contestant": contestant,
+        **_how(contestant, role),
+        "scenario": scenario,
+        "choices": choices,
+        "chosen": next((one for one in choices if one.slug == variant), None),
+        "role": role,
+        "is_native": "native" in request.GET,
+        "preview": preview,
+        "size": len(_written(preview).encode()),
+        "problem": problem,
+        "query": request.GET.urlencode(),
+        "look": look,
+    }
+    return render(request, "scenarios/prompts.html", context)
+
+
+@allow_only(*STAFF)
+@require_safe
+def contestant_prompts(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
+    """Redirect to what a contestant would send for the chosen scenario, else the first one."""
+    contestant = get_object_or_404(Contestant, code=code)
+    rows = Scenario.objects.order_by("type", "slug")
+    if slug := request.GET.get("scenario"):
+        rows = rows.filter(slug=slug)
+    scenario = rows.only("code").first()
+    if scenario is None:
+        raise Http404
+    address = reverse("prompts", args=[scenario.code])
+    return redirect(f"{address}?{urlencode({'contestant': contestant.slug})}")
+
+
+@allow_only(*STAFF)
+@require_safe
+def prompt_file(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
+    """Answer with messages and tools as they would be sent, as JSON."""
+    scenario = _scenario(code)
+    try:
+        preview = _preview(request, scenario)
+    except UnknownName as error:
+        raise Http404 from error
+    except AugmentError as error:
+        return HttpResponse(str(error), status=422, content_type="text/plain; charset=utf-8")
+    if preview.shown is None:
+        raise Http404
+    answer = HttpResponse(_written(preview), content_type="application/json")
+    answer["Content-Disposition"] = f'attachment; filename="prompt-{scenario.slug}.json"'
+    return answer
+
+
+@allow_only(*STAFF)
+@require_safe
+def prompt_image(request: HttpRequest, code: uuid.UUID, number: int) -> HttpResponseBase:
+    """Answer with a picture that the viewer of a variant would be shown."""
+    try:
+        images = _preview(request, _scenario(code)).images
+    except AugmentError as error:
+        raise Http404 from error
+    if number >= len(images):
+        raise Http404
+    return picture_response(images[number])
+
+
+def _scenario(code: uuid.UUID) -> Scenario:
+    rows = Scenario.objects.select_related("base_scene").defer("base_scene__recording")
+    return get_object_or_404(rows, code=code)
+
+
+def _contestant(request: HttpRequest) -> Contestant | None:
+    """Return the contestant that the address names, if any; 404 for an unknown one."""
+    slug = request.GET.get("contestant")
+    rows = Contestant.objects.select_related("endpoint")
+    return get_object_or_404(rows, slug=slug) if slug else None
+
+
+def _how(contestant: Contestant | None, role: str) -> dict[str, Any]:
+    """Return what goes with the messages of a contestant: its options, and who is asked."""
+    if contestant is None:
+        return {}
+    try:
+        respondents = {one.value: who for one, who in respondents_of(contestant).items()}
+        return {"asking": asking_of(contestant), "respondent": respondents.get(role)}
+    except AugmentError:  # shown above the messages, of which there are none
+        return {}
+
+
+def _preview(request: HttpRequest, scenario: Scenario) -> Preview:
+    contestant, role = _contestant(request), request.GET.get("role", "modifier")
+    if contestant is not None:
+        return preview_contestant(scenario, contestant, role=role)
+    return preview_prompt(
+        scenario,
+        variant=request.GET.get("variant", "otm"),
+        role=role,
+        native_tools="native" in request.GET,
+    )
+
+
+def _written(preview: Preview) -> str:
+    return json.dumps(preview.to_document(), ensure_ascii=False)
