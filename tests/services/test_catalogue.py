@@ -18,7 +18,7 @@ from augment.models import Augmentation, BaseScene, Contestant, Event, Generatio
 from augment.scene.codec import CatalogueEntry, entry_to_document, scene_to_document
 from augment.scene.entities import Modification, ScenarioType
 from augment.services.running.choosing import resolve_scenarios
-from augment.services.scenarios.catalogue import CatalogueReport, Step, load_catalogue
+from augment.services.scenarios.catalogue import CatalogueReport, CatalogueStep, load_catalogue
 from augment.services.scenarios.scene_imports import import_scene
 from augment.services.scenarios.scenes import add_scenario, reference_of
 from tests.fixtures.shelf import HARD
@@ -63,7 +63,7 @@ def augment(scenario: Scenario) -> None:
 
 
 def report(*, scenes: tuple[int, int, int], scenarios: tuple[int, int, int]) -> CatalogueReport:
-    steps = (Step.ADDED, Step.CHANGED, Step.UNCHANGED)
+    steps = (CatalogueStep.ADDED, CatalogueStep.CHANGED, CatalogueStep.UNCHANGED)
     return CatalogueReport(
         scenes=Counter(dict(zip(steps, scenes, strict=True))),
         scenarios=Counter(dict(zip(steps, scenarios, strict=True))),

@@ -6,7 +6,7 @@ from argparse import ArgumentParser
 from typing import Any
 
 from augment.management.arguments import add_folder_argument, add_set_argument, sets_of
-from augment.services.scenarios.catalogue import Step, load_catalogue
+from augment.services.scenarios.catalogue import CatalogueStep, load_catalogue
 from augment.services.terminal import TerminalCommand
 
 
@@ -36,7 +36,7 @@ class Command(TerminalCommand):
             with_paraphrases=options["paraphrases"],
         )
         for kind, counts in (("scenes", report.scenes), ("scenarios", report.scenarios)):
-            steps = ", ".join(f"{counts[step]} {step}" for step in list(Step)[:3])
+            steps = ", ".join(f"{counts[step]} {step}" for step in list(CatalogueStep)[:3])
             self.stdout.write(f"{kind}: {steps}")
         if report.kept:
             self.stdout.write(

@@ -108,7 +108,7 @@ def _read_files(
 # Rows
 
 
-class Step(StrEnum):
+class CatalogueStep(StrEnum):
     """What became of a file; `KEPT` where the stored version is another one and in use."""
 
     ADDED = "added"
@@ -126,8 +126,8 @@ class CatalogueReport:
             something was made from them or from their scene.
     """
 
-    scenes: Counter[Step]
-    scenarios: Counter[Step]
+    scenes: Counter[CatalogueStep]
+    scenarios: Counter[CatalogueStep]
     kept: tuple[str, ...] = ()
 
 
@@ -162,18 +162,18 @@ def load_catalogue(
     for name in sets:
         if name not in list(CatalogueSet):
             raise UnknownName("set", name, list(CatalogueSet))
-    scene_steps: dict[str, Step] = {}
-    steps: dict[str, Step] = {}
+    scene_steps: dict[str, CatalogueStep] = {}
+    steps: dict[str, CatalogueStep] = {}
     for which in map(CatalogueSet, sets):
         place = folder or settings.BASE_DIR / "fixtures"
         scenes, entries = read_catalogue(folder_of(place, which))
         scene_steps |= {name: _store_scene(scene, actor) for name, scene in scenes.items()}
         for entry in entries:
-            if scene_steps[entry.scene] is Step.KEPT:
-                steps[entry.slug] = Step.KEPT
+            if scene_steps[entry.scene] is CatalogueStep.KEPT:
+                steps[entry.slug] = CatalogueStep.KEPT
                 continue
             steps[entry.slug] = _store_scenario(entry, which, None, actor)
-            if not with_paraphrases or steps[entry.slug] is Step.KEPT:
+            if not with_paraphrases or steps[entry.slug] is CatalogueStep.KEPT:
                 continue
             original = Scenario.objects.get(slug=entry.slug)
             for number, wording in enumerate(entry.paraphrases, start=1):
@@ -183,11 +183,11 @@ def load_catalogue(
     return CatalogueReport(
         scenes=Counter(scene_steps.values()),
         scenarios=Counter(steps.values()),
-        kept=tuple(slug for slug, step in steps.items() if step is Step.KEPT),
+        kept=tuple(slug for slug, step in steps.items() if step is CatalogueStep.KEPT),
     )
 
 
-def _store_scene(scene: Scene, actor: User | None) -> Step:
+def _store_scene(scene: Scene, actor: User | None) -> CatalogueStep:
     document = scene_to_document(scene)
     wanted = {
         "document": document,
@@ -203,21 +203,21 @@ def _store_scene(scene: Scene, actor: User | None) -> Step:
             "the catalogue does not replace it."
         )
     if not is_new and row.document == document:
-        return Step.UNCHANGED
+        return CatalogueStep.UNCHANGED
     if not is_new:
         is_augmented = Augmentation.objects.filter(scenario__base_scene=row).exists()
         if is_augmented or row.scenarios.filter(catalogue_set="").exists():
-            return Step.KEPT
+            return CatalogueStep.KEPT
         BaseScene.objects.filter(pk=row.pk).update(**wanted)
         row.scenarios.update(original_image="")
     verb = "add" if is_new else "change"
     _log(actor, verb, "scene", row, slug=row.slug, source=SOURCE)
-    return Step.ADDED if is_new else Step.CHANGED
+    return CatalogueStep.ADDED if is_new else CatalogueStep.CHANGED
 
 
 def _store_scenario(
     entry: CatalogueEntry, which: CatalogueSet, original: Scenario | None, actor: User | None
-) -> Step:
+) -> CatalogueStep:
     row = Scenario.objects.filter(slug=entry.slug).select_related("base_scene").first()
     reference = modification_to_document(entry.reference)
     intent = None if entry.intent is None else intent_to_document(entry.intent)
@@ -235,7 +235,7 @@ def _store_scenario(
             actor=actor,
         )
         Scenario.objects.filter(pk=row.pk).update(**own)
-        return Step.ADDED
+        return CatalogueStep.ADDED
     if not row.in_catalogue:
         raise Conflict(
             f"There is a scenario called {row.slug!r} already that is not the catalogue's; "
@@ -252,15 +252,15 @@ def _store_scenario(
     }
     changed = sorted(name for name, value in wanted.items() if getattr(row, name) != value)
     if not changed:
-        return Step.UNCHANGED
+        return CatalogueStep.UNCHANGED
     # An intent where there was none changes nothing that anybody was shown or asked.
     seen = set(changed) - {"intent", "intent_origin"}
     if (row.intent is not None or seen) and row.augmentations.exists():
-        return Step.KEPT
+        return CatalogueStep.KEPT
     image = {"original_image": ""} if seen else {}
     Scenario.objects.filter(pk=row.pk).update(**wanted, **image)
     _log(actor, "change", "scenario", row, slug=row.slug, changed=changed)
-    return Step.CHANGED
+    return CatalogueStep.CHANGED
 
 
 def _log(
