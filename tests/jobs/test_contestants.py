@@ -7,7 +7,7 @@ import pytest
 from django.core.management import CommandError, call_command
 
 from augment.errors import Conflict, InvalidDocument
-from augment.models import Augmentation, Contestant, Endpoint, EndpointModel, Event
+from augment.models import Augmentation, Contestant, Endpoint, Event
 from augment.services.endpoints import contestants, known_endpoints
 from augment.services.endpoints.known_endpoints import ensure_endpoint, may_hold_key, move_of
 from augment.services.running import jobs, runner
@@ -57,11 +57,6 @@ def test_a_model_on_a_real_endpoint_is_a_language_model() -> None:
     assert (event.verb, event.object_code) == ("add", str(made.code))
     assert event.after is not None
     assert event.after["endpoint"] == "local"
-
-
-def test_a_model_on_a_simulated_endpoint_is_simulated() -> None:
-    local(is_simulated=True)
-    assert add().is_simulated
 
 
 def test_the_same_contestant_twice_is_one() -> None:
@@ -115,19 +110,6 @@ def test_a_contestant_that_is_refused_leaves_no_endpoint_behind() -> None:
     with pytest.raises(CommandError, match="Unknown variant"):
         call_command("add_contestant", "fake", *facts)
     assert not Endpoint.objects.exists()
-
-
-def test_a_contestant_brings_its_model_which_is_unknown() -> None:
-    ensure_endpoint(label="local", base_url=LOCAL)
-    for variant in ("otm", "otm"):
-        contestants.add_contestant(
-            slug="llama", variant=variant, endpoint="local", model="llama3.1"
-        )
-    known = EndpointModel.objects.get()
-    assert (known.endpoint.label, known.model, known.model_class) == ("local", "llama3.1", "")
-    abilities = (known.native_tools, known.vision, known.json_schema, known.temperature)
-    assert abilities == (None, None, None, None)
-    assert (known.price_in_usd, known.price_out_usd) == (None, None)
 
 
 @pytest.mark.parametrize(

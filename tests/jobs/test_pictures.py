@@ -6,7 +6,6 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
-from django.core.files.base import ContentFile
 from django.core.files.storage import default_storage
 from pytest_django import Settings
 
@@ -22,12 +21,6 @@ WORKERS = 4
 def read(name: str) -> bytes:
     with default_storage.open(name) as file:
         return bytes(file.read())
-
-
-def test_a_picture_that_was_cut_off_is_written_again() -> None:
-    default_storage.save(NAME, ContentFile(b"p"))
-    assert store(b"png") == NAME
-    assert read(NAME) == b"png"
 
 
 def test_workers_with_the_same_picture_never_meet_half_of_it(

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import pytest
 
 from augment.models import Augmentation, EndpointModel
@@ -11,31 +9,13 @@ from augment.services.endpoints import contestants
 from augment.services.endpoints.known_endpoints import ensure_endpoint
 from augment.services.running import jobs, runner
 from tests.jobs.rows import add_scenario
-from tests.llm.json_server import JsonServer, serving
+from tests.jobs.scripted import Scripted
+from tests.llm.json_server import serving
 
 pytestmark = pytest.mark.django_db
-REFUSED = {"error": {"message": "Unsupported parameter", "code": "unsupported_parameter"}}
 
 
-class Model(JsonServer):
-    """Answers nothing readable, remembers what it was sent, and refuses what it is told to."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.refuses: set[str] = set()
-        self.bodies: list[dict[str, Any]] = []
-
-    def answer(self, body: dict[str, Any]) -> tuple[int, dict[str, Any]]:
-        for name in sorted(self.refuses & body.keys()):
-            return 400, {"error": REFUSED["error"] | {"param": name}}
-        self.bodies.append(body)
-        message = {"role": "assistant", "content": "Sorry?"}
-        choice = {"index": 0, "finish_reason": "stop", "message": message}
-        made = {"id": "1", "object": "chat.completion", "created": 0, "model": body["model"]}
-        return 200, made | {"choices": [choice]}
-
-
-def job_at(server: Model, variant: str = "fc") -> None:
+def job_at(server: Scripted, variant: str = "fc") -> None:
     ensure_endpoint(label="here", base_url=server.url)
     contestants.add_contestant(slug="one", variant=variant, endpoint="here", model="m")
     add_scenario("first")
@@ -54,7 +34,7 @@ def learn(**known: object) -> None:
     EndpointModel.objects.filter(model="m").update(**known)
 
 
-def shapes(server: Model) -> set[tuple[str, ...]]:
+def shapes(server: Scripted) -> set[tuple[str, ...]]:
     """The names of all that was sent, and what stood beside the messages."""
     return {
         tuple(f"{name}={body[name]}" for name in sorted(body) if name != "messages")
@@ -77,7 +57,7 @@ def shapes(server: Model) -> set[tuple[str, ...]]:
 def test_what_is_learnt_after_the_first_run_changes_nothing_that_is_sent(
     later: dict[str, object],
 ) -> None:
-    with serving(Model()) as server:
+    with serving(Scripted("Sorry?")) as server:
         job_at(server)
         run("first")
         before = shapes(server)
@@ -99,7 +79,7 @@ def test_what_is_learnt_after_the_first_run_changes_nothing_that_is_sent(
 
 
 def test_a_parameter_that_is_refused_before_any_answer_is_left_out_for_good() -> None:
-    with serving(Model()) as server:
+    with serving(Scripted("Sorry?")) as server:
         server.refuses = {"reasoning_effort", "max_completion_tokens"}
         job_at(server)
         learn(reasoning_effort="low")
@@ -111,7 +91,7 @@ def test_a_parameter_that_is_refused_before_any_answer_is_left_out_for_good() ->
 
 
 def test_a_parameter_that_is_refused_after_answers_with_it_is_a_fault_and_no_mixture() -> None:
-    with serving(Model()) as server:
+    with serving(Scripted("Sorry?")) as server:
         job_at(server)
         learn(reasoning_effort="low")
         run("first")

@@ -112,9 +112,8 @@ def add_contestant(
     check_roles(recipe, roles or {})
     chosen = options or ContestantOptions()
     check_options(recipe, chosen)
-    own = Respondent(
-        endpoint=find_endpoint(endpoint, actor), model=one_line("model", model, what="contestant")
-    )
+    model = one_line("model", model, what="contestant")
+    own = Respondent(endpoint=find_endpoint(endpoint, actor), model=model)
     others = _reviewers(roles or {}, own, actor)
     for respondent in (own, *others.values()):
         model_at(endpoint=respondent.endpoint, model=respondent.model)
