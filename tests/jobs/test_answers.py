@@ -9,9 +9,8 @@ import pytest
 from augment.errors import ModelFault
 from augment.llm.messages import Reply
 from augment.models import Augmentation, GenerationJob, ModelCall
-from augment.services.running import jobs, runner
-from tests.jobs.models import Model, llama_job, reply
-from tests.jobs.rows import only_row
+from augment.services.running import jobs
+from tests.jobs.models import Model, llama_job, ran, reply
 from tests.variants.answers import GOOD
 
 pytestmark = pytest.mark.django_db
@@ -23,13 +22,6 @@ def again(*, is_fresh: bool = False) -> GenerationJob:
     return jobs.launch(
         name="Again", contestants=["llama"], scenarios=["street-1"], is_fresh=is_fresh
     )
-
-
-def ran(job: GenerationJob, model: Model) -> Augmentation:
-    row = only_row(job)
-    runner.work_on(augmentation_pk=row.pk, connect=model)
-    row.refresh_from_db()
-    return row
 
 
 def test_the_same_request_is_answered_once_and_the_copy_costs_nothing() -> None:

@@ -25,7 +25,7 @@ from augment.services.running import budget, jobs, runner
 from augment.services.running.budget import Caps, Room, costs_of
 from augment.services.running.estimates import estimate
 from augment.services.running.runner import AUGMENTATIONS, Held
-from tests.jobs.models import Model, add_llama, after_a_second_look, llama_job, reply
+from tests.jobs.models import Model, add_llama, after_a_second_look, llama_job, ran, reply
 from tests.jobs.rows import NOON, STALE, add_kind, add_scenario, launch, leased, only_row
 from tests.variants.answers import GOOD
 
@@ -36,17 +36,9 @@ ONE_USD = Price(prompt_usd=Decimal(1), completion_usd=Decimal(1))
 WORST = WorstCase(prompt_tokens=600, completion_tokens=400)
 
 
-def ran(job: GenerationJob, model: Model | None = None) -> Augmentation:
-    row = only_row(job)
-    runner.work_on(augmentation_pk=row.pk, worker="w", connect=model or Model())
-    row.refresh_from_db()
-    job.refresh_from_db()
-    return row
-
-
 def test_a_call_turns_its_reservation_into_what_it_used() -> None:
     job = llama_job(price="2")
-    assert ran(job).state == ROW.DONE
+    assert ran(job, Model()).state == ROW.DONE
     call = ModelCall.objects.get()
     assert call.spent_tokens == 3020 < call.reserved_tokens
     assert call.reserved_usd == 2 * Decimal(call.reserved_tokens) / 1_000_000

@@ -13,8 +13,7 @@ from django.conf import LazySettings
 from augment.models import Augmentation, ModelCall
 from augment.services.running import jobs
 from augment.services.scenarios.pictures import original_picture
-from tests.jobs.models import llama_job
-from tests.jobs.running import Wire, ran
+from tests.jobs.models import Wire, llama_job, ran
 from tests.variants.answers import GOOD
 
 pytestmark = pytest.mark.django_db

@@ -25,11 +25,12 @@ from augment.models import (
 )
 from augment.services.endpoints import contestants
 from augment.services.endpoints.known_endpoints import ensure_endpoint
-from augment.services.running import jobs, runner
+from augment.services.running import jobs
 from augment.services.running.budget import Caps
 from augment.services.running.choosing import find_obstacle
 from augment.variants.respondents import ModelRole
 from tests.intents import intents
+from tests.jobs.models import ran
 from tests.jobs.rows import add_scenario, only_row
 
 pytestmark = pytest.mark.django_db
@@ -154,8 +155,7 @@ def test_each_role_is_asked_at_its_own_endpoint(server: FakeServer) -> None:
         EndpointModel.objects.filter(model="fake-careless").update(vision=True)
         job = jobs.launch(name="J", contestants=["two"], scenarios=["street-1"])
         row = only_row(job)
-        runner.work_on(augmentation_pk=row.pk, connect=opened)
-    row.refresh_from_db()
+        ran(row, opened)
     assert row.state == Augmentation.State.DONE, row.reason
     asked = [
         (call.role[0], call.request["model"]) for call in ModelCall.objects.order_by("number")

@@ -23,6 +23,7 @@ from augment.services.endpoints import contestants
 from augment.services.running import jobs, runner
 from augment.services.running.runner import AUGMENTATIONS
 from tests.intents import parked
+from tests.jobs.models import Wire, ran
 from tests.jobs.rows import (
     INSTRUCTION,
     TWO_CONES,
@@ -32,7 +33,6 @@ from tests.jobs.rows import (
     launch,
     only_row,
 )
-from tests.jobs.running import Wire, ran
 from tests.variants.answers import GOOD
 
 pytestmark = pytest.mark.django_db

@@ -16,9 +16,8 @@ from augment.llm.messages import Reply, Request
 from augment.models import Augmentation, Endpoint, GenerationJob, ModelCall
 from augment.services.endpoints.client import Queue, place_at
 from augment.services.running import runner, workers
-from tests.jobs.models import llama_job
+from tests.jobs.models import Wire, llama_job
 from tests.jobs.rows import launch, only_row
-from tests.jobs.running import Wire
 from tests.llm.scripted import ScriptedClient
 from tests.variants.answers import GOOD
 

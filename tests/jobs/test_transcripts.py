@@ -14,7 +14,7 @@ from augment.services.running import budget, jobs, runner
 from augment.services.running.budget import Caps
 from augment.services.running.transcript_records import totals_of, transcript_of, tries_of
 from augment.variants.respondents import NoteKind
-from tests.jobs.models import Model, after_a_second_look, llama_job
+from tests.jobs.models import Model, after_a_second_look, llama_job, ran
 from tests.jobs.rows import INSTRUCTION, only_row
 from tests.llm.raw_server import speaking, whole
 from tests.llm.recorder import GOOD as HEARD
@@ -22,12 +22,6 @@ from tests.variants.answers import GOOD
 from tests.web.cast import people, signed_in
 
 pytestmark = pytest.mark.django_db
-
-
-def ran(row: Augmentation, model: Model) -> Augmentation:
-    runner.work_on(augmentation_pk=row.pk, worker="w", connect=model)
-    row.refresh_from_db()
-    return row
 
 
 def test_the_document_holds_the_whole_record() -> None:
