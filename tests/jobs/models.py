@@ -44,14 +44,14 @@ class Model:
     """Answers every request the same way, from any thread, and remembers them all.
 
     Args:
-        answer: What it answers, or the fault that it breaks with.
+        answer: What it answers, or what it breaks with.
         looking_on: Is called while a call is in flight.
         waiting: Is called before it, while the call waits for its place.
     """
 
     def __init__(
         self,
-        answer: Answer | ModelFault | None = None,
+        answer: Answer | BaseException | None = None,
         *,
         looking_on: Callable[[], None] = lambda: None,
         waiting: Callable[[], None] = lambda: None,
@@ -71,7 +71,7 @@ class Model:
         with self._lock:
             self.requests.append(request)
         self._looking_on()
-        if isinstance(self._answer, ModelFault):
+        if isinstance(self._answer, BaseException):
             raise self._answer
         return self._answer(request)
 

@@ -9,9 +9,8 @@ from django.core.files.storage import default_storage
 from django.utils import timezone
 
 from augment.errors import Conflict, LeaseLost
-from augment.llm.client import Sending, watch_nothing
-from augment.llm.messages import Reply, Request
-from augment.models import Augmentation, Contestant, Endpoint, GenerationJob, ModelCall
+from augment.llm.messages import Reply
+from augment.models import Augmentation, Contestant, GenerationJob, ModelCall
 from augment.scene.codec import (
     intent_to_document,
     modification_from_document,
@@ -23,46 +22,12 @@ from augment.services.endpoints import contestants
 from augment.services.running import jobs, runner
 from augment.services.running.runner import AUGMENTATIONS
 from tests.intents import parked
-from tests.jobs.models import Wire, ran
-from tests.jobs.rows import (
-    INSTRUCTION,
-    TWO_CONES,
-    add_kind,
-    add_model,
-    add_scenario,
-    launch,
-    only_row,
-)
+from tests.jobs.models import Model, Wire, llama_job, ran
+from tests.jobs.rows import INSTRUCTION, TWO_CONES, add_kind, add_scenario, launch, only_row
 from tests.variants.answers import GOOD
 
 pytestmark = pytest.mark.django_db
 State = Augmentation.State
-
-
-class Stumbling:
-    """A client that breaks in a way that nobody foresaw, after doing something."""
-
-    def __init__(self, error: BaseException) -> None:
-        self.error = error
-
-    def fitted(self, request: Request) -> Request:
-        return request
-
-    def complete(self, request: Request, *, sending: Sending = watch_nothing) -> Reply:
-        sending()
-        raise self.error
-
-
-def model_job(*, key_variable: str = "", is_simulated: bool = False) -> Augmentation:
-    endpoint = Endpoint.objects.create(
-        label="local",
-        base_url="http://127.0.0.1:9/v1",
-        key_variable=key_variable,
-        is_simulated=is_simulated,
-    )
-    add_model("llama", endpoint=endpoint, model="llama3.1")
-    add_scenario("street")
-    return only_row(jobs.launch(name="R", contestants=["llama"], scenarios=["street"]))
 
 
 def test_the_reference_runs_to_its_picture_and_the_job_is_finished() -> None:
@@ -97,7 +62,7 @@ def test_a_model_is_asked_and_every_call_is_kept() -> None:
         latency_s=1.5,
     )
     wire = Wire(reply)
-    row = ran(model_job(), wire)
+    row = ran(only_row(llama_job()), wire)
     assert (row.state, wire.opened) == (State.DONE, ["local"])
     assert row.notes == "One road, two lanes.\n\nA parked car ahead."
     call = ModelCall.objects.get()
@@ -112,7 +77,7 @@ def test_a_model_is_asked_and_every_call_is_kept() -> None:
 
 
 def test_an_answer_that_nobody_can_read_is_an_outcome_with_the_unchanged_picture() -> None:
-    row = ran(model_job(), Wire("Sorry?", "Pardon?"))
+    row = ran(only_row(llama_job()), Wire("Sorry?", "Pardon?"))
     assert row.state == State.UNREADABLE
     assert row.reason
     assert row.modification is None
@@ -123,7 +88,7 @@ def test_an_answer_that_nobody_can_read_is_an_outcome_with_the_unchanged_picture
 
 
 def test_an_attempt_that_was_lost_before_drawing_is_only_drawn_again() -> None:
-    row = model_job()
+    row = only_row(llama_job())
     now = timezone.now()
     held = AUGMENTATIONS.take(row.pk, now=now - timedelta(minutes=1))
     assert held is not None
@@ -137,7 +102,7 @@ def test_an_attempt_that_was_lost_before_drawing_is_only_drawn_again() -> None:
 
 
 def test_a_worker_whose_claim_was_taken_asks_no_model_and_writes_nothing() -> None:
-    row = model_job()
+    row = only_row(llama_job())
     held = AUGMENTATIONS.take(row.pk, now=timezone.now() - timedelta(minutes=1))
     assert held is not None
     AUGMENTATIONS.take_back_lost(now=timezone.now())
@@ -147,12 +112,9 @@ def test_a_worker_whose_claim_was_taken_asks_no_model_and_writes_nothing() -> No
 
 
 def test_what_nobody_foresaw_fails_the_row_and_is_logged(caplog: pytest.LogCaptureFixture) -> None:
-    row = model_job()
-    wire = Wire()
-    wire.client = Stumbling(ZeroDivisionError("division by zero"))
-    runner.work_on(augmentation_pk=row.pk, connect=wire)
+    row = only_row(llama_job())
+    row = ran(row, Model(ZeroDivisionError("division by zero")))
     assert "Traceback" in caplog.text
-    row.refresh_from_db()
     assert row.state == State.FAILED
     assert row.reason == "unexpected: ZeroDivisionError: division by zero"
     assert row.attempts.get().outcome == "failed"

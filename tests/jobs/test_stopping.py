@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import AbstractContextManager, nullcontext
 
 import pytest
 from celery.exceptions import Reject
@@ -11,14 +10,11 @@ from django.conf import settings
 
 from augment import tasks
 from augment.errors import WorkerStopping
-from augment.llm.client import Sending, watch_nothing
-from augment.llm.messages import Reply, Request
-from augment.models import Augmentation, Endpoint, GenerationJob, ModelCall
+from augment.models import Augmentation, GenerationJob, ModelCall
 from augment.services.endpoints.client import Queue, place_at
 from augment.services.running import runner, workers
-from tests.jobs.models import Wire, llama_job
+from tests.jobs.models import Model, Wire, llama_job, reply
 from tests.jobs.rows import launch, only_row
-from tests.llm.scripted import ScriptedClient
 from tests.variants.answers import GOOD
 
 pytestmark = pytest.mark.django_db
@@ -30,27 +26,6 @@ def _going_on() -> Iterator[None]:
     workers.withdraw_stop()
     yield
     workers.withdraw_stop()
-
-
-class StoppedAt:
-    """An endpoint that answers; the worker is told to stop at one moment of a call."""
-
-    def __init__(self, *answers: str, before: bool = False) -> None:
-        self._client = ScriptedClient(answers)
-        self._before = before
-
-    def __call__(self, endpoint: Endpoint) -> AbstractContextManager[StoppedAt]:
-        return nullcontext(self)
-
-    def fitted(self, request: Request) -> Request:
-        return request
-
-    def complete(self, request: Request, *, sending: Sending = watch_nothing) -> Reply:
-        if self._before:
-            workers.request_stop()
-        reply = self._client.complete(request, sending=sending)
-        workers.request_stop()
-        return reply
 
 
 def only(job: GenerationJob) -> tuple[Augmentation, list[ModelCall]]:
@@ -72,7 +47,9 @@ def test_no_row_is_claimed_any_more_and_its_message_goes_back() -> None:
 
 def test_where_nothing_was_sent_the_row_goes_back_unpaid() -> None:
     job = llama_job()
-    assert runner.work_on(augmentation_pk=only_row(job).pk, connect=StoppedAt(GOOD, before=True))
+    assert runner.work_on(
+        augmentation_pk=only_row(job).pk, connect=Model(waiting=workers.request_stop)
+    )
     row, calls = only(job)
     assert (row.state, row.sent_at, row.claim) == (State.QUEUED, None, None)
     assert [(call.sent_at, call.spent_tokens) for call in calls] == [(None, 0)]
@@ -84,7 +61,8 @@ def test_where_nothing_was_sent_the_row_goes_back_unpaid() -> None:
 def test_an_answer_before_the_stop_is_not_asked_for_again() -> None:
     """It can't be read, so the model is asked once more: by whoever takes the row next."""
     job = llama_job()
-    assert runner.work_on(augmentation_pk=only_row(job).pk, connect=StoppedAt("no answer at all"))
+    unreadable = Model(lambda _: reply("no answer at all"), looking_on=workers.request_stop)
+    assert runner.work_on(augmentation_pk=only_row(job).pk, connect=unreadable)
     row, calls = only(job)
     assert row.state == State.QUEUED
     assert len(calls) == 1
