@@ -16,7 +16,7 @@ from augment.services.running import jobs, runner
 from augment.services.running.budget import NO_CAPS, Caps
 from tests.jobs.rows import INSTRUCTION, add_model, add_scenario, only_row
 from tests.llm.scripted import ScriptedClient
-from tests.variants.answers import GOOD
+from tests.variants.playing import GOOD
 
 MODEL = "llama3.1"
 PROMPT_TOKENS, COMPLETION_TOKENS = 2900, 120

@@ -28,7 +28,7 @@ from augment.services.running.estimates import estimate
 from augment.services.running.runner import AUGMENTATIONS, Held
 from tests.jobs.models import Model, add_llama, after_a_second_look, llama_job, ran, reply
 from tests.jobs.rows import NOON, STALE, add_kind, add_scenario, launch, leased, only_row
-from tests.variants.answers import GOOD
+from tests.variants.playing import GOOD
 
 pytestmark = pytest.mark.django_db
 

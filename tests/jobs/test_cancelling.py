@@ -19,7 +19,7 @@ from augment.services.running.runner import AUGMENTATIONS
 from tests.jobs.models import Wire, llama_job, ran, reply
 from tests.jobs.rows import only_row
 from tests.llm.raw_server import drip, head, speaking
-from tests.variants.answers import GOOD
+from tests.variants.playing import GOOD
 
 pytestmark = pytest.mark.django_db
 State = Augmentation.State

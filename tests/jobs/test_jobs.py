@@ -16,7 +16,7 @@ from augment.services.running.progress import cause_of, count_rows, failure_grou
 from augment.services.running.runner import AUGMENTATIONS
 from tests.jobs.models import Model, after_a_second_look, llama_job, ran, reply
 from tests.jobs.rows import NOON, add_kind, add_scenario, done, failed, launch, leased
-from tests.variants.answers import GOOD
+from tests.variants.playing import GOOD
 
 pytestmark = pytest.mark.django_db
 State = Augmentation.State

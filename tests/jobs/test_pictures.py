@@ -20,7 +20,7 @@ from augment.services.scenarios.pictures import camera_of, original_picture, pic
 from augment.services.scenarios.scenes import scene_of
 from tests.jobs.models import Wire, llama_job, ran
 from tests.jobs.rows import add_scenario
-from tests.variants.answers import GOOD
+from tests.variants.playing import GOOD
 
 NAME = f"bev/{hashlib.sha256(b'png').hexdigest()}.png"
 WORKERS = 4

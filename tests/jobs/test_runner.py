@@ -29,7 +29,7 @@ from augment.services.running.runner import AUGMENTATIONS
 from tests.intents import parked
 from tests.jobs.models import Model, Wire, llama_job, ran, reply
 from tests.jobs.rows import INSTRUCTION, TWO_CONES, add_kind, add_scenario, launch, only_row
-from tests.variants.answers import GOOD
+from tests.variants.playing import GOOD
 
 pytestmark = pytest.mark.django_db
 State = Augmentation.State

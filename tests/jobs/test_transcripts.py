@@ -22,7 +22,7 @@ from tests.jobs.models import Model, after_a_second_look, llama_job, ran
 from tests.jobs.rows import INSTRUCTION, NOON, launch, only_row
 from tests.llm.raw_server import speaking, whole
 from tests.llm.recorder import GOOD as HEARD
-from tests.variants.answers import GOOD
+from tests.variants.playing import GOOD
 from tests.web.cast import people, signed_in
 
 pytestmark = pytest.mark.django_db
