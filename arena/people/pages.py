@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import uuid
-from typing import Any, cast
+from typing import Any
 
 from django import forms
 from django.contrib import messages
@@ -47,6 +47,7 @@ from arena.site.access import (
     user_of,
 )
 from arena.site.acts import refusals_in, refusals_told
+from arena.site.forms import offer
 
 PAGES = ["GET", "HEAD", "POST"]
 ROLE_NAMES = {
@@ -91,9 +92,9 @@ class TokenForm(forms.Form):
 
     def __init__(self, data: Any = None, *, roles: tuple[str, ...]) -> None:
         super().__init__(data)
-        role, days = (cast(forms.ChoiceField, self.fields[name]) for name in ("role", "days"))
-        role.choices = [(name, ROLE_NAMES[name]) for name in roles]
-        days.choices = [(str(n), ngettext("%(n)s day", "%(n)s days", n) % {"n": n}) for n in DAYS]
+        offer(self, "role", [(name, ROLE_NAMES[name]) for name in roles])
+        days = [(str(n), ngettext("%(n)s day", "%(n)s days", n) % {"n": n}) for n in DAYS]
+        offer(self, "days", days)
 
 
 # --- Signing in --------------------------------------------------------------------------------

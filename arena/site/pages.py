@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
-from typing import Any, cast
+from typing import Any
 
 from django import forms
 from django.contrib.auth.decorators import login_not_required
@@ -26,6 +26,7 @@ from arena.people.services import keep_preference
 from arena.queries.studies.results import ResultsAccess, results_access
 from arena.serving.readiness import look_at_parts, opens_metrics
 from arena.site.access import ADMIN, allow_only, user_of
+from arena.site.forms import offer
 from arena.site.language import use_english
 from arena.site.listing import read_page
 from arena.site.queries import MACHINE, actors, acts, distinct, read_gauges, take_inventory
@@ -198,7 +199,7 @@ class AuditForm(forms.Form):
             "kind": [("", "anything"), *((kind, kind) for kind in distinct("object_kind"))],
         }
         for name, choices in offered.items():
-            cast(forms.ChoiceField, self.fields[name]).choices = choices
+            offer(self, name, choices)
         for name in ("since", "until"):
             self.fields[name].widget.input_type = "date"
 

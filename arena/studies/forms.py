@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, cast
+from typing import Any
 
 from django import forms
 from django.contrib.auth.models import User
 
 from arena.errors import NothingToPlan
-from arena.pairing.target_lines import read_targets
-from arena.site.forms import ChoiceForm, form_field
+from arena.pairing.rules import read_targets
+from arena.site.forms import ChoiceForm, form_field, offer
 from arena.studies.services.drafts import SWITCHES
 from arena.studies.services.outlook import ESTIMATE_INPUTS, StudyEstimate
 from arena.studies.services.plan import PLAN_INPUTS, StudyPlan
@@ -30,8 +30,8 @@ class StudyForm(ChoiceForm):
         }
         self.accounts = experts
         self.all_jobs = jobs
-        self._offer("jobs", [(str(job.code), job.name) for job in jobs])
-        self._offer("experts", [(user.get_username(), user.get_username()) for user in experts])
+        offer(self, "jobs", [(str(job.code), job.name) for job in jobs])
+        offer(self, "experts", [(user.get_username(), user.get_username()) for user in experts])
         self.fields["experts"].error_messages["required"] = "Choose at least one expert."
 
     def rules(self) -> list[forms.BoundField]:
@@ -40,16 +40,6 @@ class StudyForm(ChoiceForm):
             one.name for one in PLAN_INPUTS if one.kind not in (InputKind.TEXT, InputKind.NAMES)
         ]
         return [self[name] for name in sorted(names, key=lambda name: name in SWITCHES)]
-
-    @property
-    def chosen_experts(self) -> list[str]:
-        """For the template."""
-        return self.chosen("experts")
-
-    @property
-    def chosen_jobs(self) -> list[str]:
-        """For the template."""
-        return self.chosen("jobs")
 
     def clean_targets(self) -> list[str]:
         """Refuse targets that can't be read."""
@@ -80,9 +70,8 @@ class HandOverForm(forms.Form):
 
     def __init__(self, *args: Any, givers: list[str], takers: list[str], **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)
-        for name, offered in (("giver", givers), ("takers", takers)):
-            field = cast(forms.ChoiceField, self.fields[name])
-            field.choices = [(username, username) for username in offered]
+        offer(self, "giver", [(username, username) for username in givers])
+        offer(self, "takers", [(username, username) for username in takers])
 
 
 class PlanningForm(forms.Form):

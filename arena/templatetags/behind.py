@@ -1,7 +1,9 @@
-"""Numbers of the results that lead to what is behind them."""
+"""What is behind the results: links from numbers to votes, and the log of a study in words."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 from urllib.parse import urlencode
 
@@ -12,6 +14,9 @@ from django.utils.html import format_html
 from django.utils.safestring import SafeString
 
 from arena.queries.votes.search import VoteSearch
+from arena.templatetags.results import left_out, method_label
+from augment.models import Event
+from augment.services.scenarios.scenes import type_label
 
 register = template.Library()
 
@@ -45,3 +50,97 @@ def behind(
         '<a class="behind" href="{}" data-votes="{}">{}</a>',
         votes_url(context, **search), number, said,
     )  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Detail:
+    """A part of what happened: its name, how it reads, and the rating that it leads to."""
+
+    label: str
+    text: str
+    rating: str = ""
+
+
+@register.simple_tag
+def details_of(event: Event, names: Mapping[str, str]) -> list[Detail]:
+    """The parts of an event that say something.
+
+    Args:
+        event: Of the log.
+        names: Pseudonyms by code and by account, names of contestants by slug.
+    """
+    before, after = event.before or {}, event.after or {}
+    details = []
+    for key, value in after.items():
+        text = _text(key, value, names)
+        if key in before and before[key] != value:
+            text = f"{_text(key, before[key], names)}, then {text}"
+        rating = str(value) if key == "snapshot" else ""
+        details.append(Detail(label=LABELS.get(key, key), text=text, rating=rating))
+    for key in before.keys() - after.keys():
+        text = _text(key, before[key], names)
+        details.append(Detail(label=f"before: {LABELS.get(key, key)}", text=text))
+    return [detail for detail in details if detail.text]
+
+
+LABELS = {
+    "ends_voting": "votes no longer in this study",
+    "filters": "which votes",
+    "matchups": "pairs",
+    "sha256": "SHA-256",
+    "snapshot": "rating",
+    "what": "seen",
+}
+"""What parts of an event are called, where it is not by their key."""
+
+
+def _text(key: str, value: Any, names: Mapping[str, str]) -> str:
+    """Return a part of an event as a person reads it, empty where it says nothing."""
+    match key:
+        case "ends_voting":
+            return "yes" if value else ""
+        case "filters" if isinstance(value, Mapping):
+            return _filters(value)
+        case "matchups" if isinstance(value, list):  # older lines name each
+            return str(len(value))
+        case "method":
+            return method_label(value)
+        case "snapshot":
+            return str(value)[:8]
+        case "sha256":
+            return f"{str(value)[:12]}…"
+        case "what" if value == "results":
+            return "the results"
+        case _:
+            return _plain(value, names)
+
+
+def _plain(value: Any, names: Mapping[str, str]) -> str:
+    """Return yes and no in words, names instead of codes, parts one after the other."""
+    if value is None or value == "":
+        return ""
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, Mapping):
+        parts = ((names.get(str(k), str(k)), _plain(v, names)) for k, v in value.items())
+        return ", ".join(f"{key}: {text}" for key, text in parts if text)
+    if isinstance(value, list | tuple):
+        return ", ".join(_plain(item, names) for item in value)
+    return names.get(str(value), str(value))
+
+
+def _filters(value: Mapping[str, Any]) -> str:
+    """Return which votes a rating asked for; "all" where it asked for all main ones."""
+    texts = []
+    if types := value.get("types"):
+        texts.append(", ".join(type_label(name) for name in types))
+    if experts := value.get("experts"):
+        n = experts if isinstance(experts, int) else len(experts)
+        texts.append("1 expert" if n == 1 else f"{n} experts")
+    if "repeat" in value.get("kinds", ()):
+        texts.append("hidden repeats count")
+    if value.get("leave_out_settled"):
+        texts.append("pairs that nobody can tell apart are left out")
+    if value.get("leave_out_own"):
+        texts.append(f"left out: {left_out('own')}")
+    return "; ".join(texts) or "all"

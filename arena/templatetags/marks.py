@@ -1,16 +1,22 @@
-"""Marks of states: always a shape, a colour and a word."""
+"""States as a shape, a colour and a word; numbers and money as people read them; pagers."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from decimal import Decimal
+from typing import Any, TypeVar
 
 from django import template
+from django.core.paginator import Page
+from django.http import HttpRequest
+from django.template.context import Context
+from django.utils.formats import number_format
 from django.utils.html import format_html
 from django.utils.safestring import SafeString
 
 from arena.models import Study
 from augment.models import Augmentation, GenerationJob
-from augment.services.judging.findings import Finding
 from augment.services.running.progress import JobCounts
 
 register = template.Library()
@@ -43,17 +49,6 @@ class Mark:
     label: str
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class BarSegment:
-    """A part of a stacked bar, in percent of its width."""
-
-    tone: str
-    label: str
-    number: int
-    start: float
-    width: float
-
-
 @register.filter
 def mark(row: Augmentation | GenerationJob | Study) -> Mark:
     """The mark of a row with a state."""
@@ -72,12 +67,11 @@ def job_mark(counts: JobCounts) -> Mark:
         label = "Finished without a modification"
         return Mark(tone="warn", icon="icons/unreadable.svg", label=label)
     running = counts.by_state[Augmentation.State.RUNNING]
-    if job.state == states.PAUSED and running:
-        label = "Pausing, %(n)s still runs" if running == 1 else "Pausing, %(n)s still run"
-        return Mark(tone="busy", icon="icons/paused.svg", label=label % {"n": running})
-    if job.state == states.CANCELLED and running:
-        label = "Cancelled, %(n)s still runs" if running == 1 else "Cancelled, %(n)s still run"
-        return Mark(tone="busy", icon="icons/cancelled.svg", label=label % {"n": running})
+    words: dict[str, str] = {states.PAUSED: "Pausing", states.CANCELLED: "Cancelled"}
+    if running and job.state in words:
+        runs = "runs" if running == 1 else "run"
+        label = f"{words[job.state]}, {running} still {runs}"
+        return Mark(tone="busy", icon=f"icons/{job.state}.svg", label=label)
     return mark(job)
 
 
@@ -94,33 +88,19 @@ def mark_of(state: Augmentation.State) -> Mark:
 
 
 @register.filter
-def segments(by_state: dict[Augmentation.State, int]) -> list[BarSegment]:
+def segments(by_state: dict[Augmentation.State, int]) -> list[dict[str, Any]]:
     """A stacked bar of the states that occur; what waits stays empty, what runs comes last."""
     begun = [state for state in by_state if state != Augmentation.State.QUEUED]
     order = sorted(begun, key=lambda state: state in Augmentation.UNDER_WAY)
     total = sum(by_state.values()) or 1
-    found, start = [], 0.0
+    bar, start = [], 0.0
     for state in order:
         width = 100.0 * by_state[state] / total
-        if width:
-            look = _mark(state.value, str(state.label))
-            found.append(
-                BarSegment(
-                    tone=look.tone,
-                    label=look.label,
-                    number=by_state[state],
-                    start=start,
-                    width=width,
-                )
-            )
+        look = mark_of(state)
+        segment = {"tone": look.tone, "label": look.label, "number": by_state[state]}
+        bar.append(segment | {"start": start, "width": width})
         start += width
-    return found
-
-
-@register.filter
-def say_finding(finding: Finding) -> str:
-    """What a check found, with its numbers; agents and lanes go by their ids."""
-    return finding.sentence()
+    return [segment for segment in bar if segment["width"]]
 
 
 @register.filter
@@ -150,3 +130,86 @@ def percent(part: int, whole: int) -> SafeString:
 
 def _mark(state: str, label: str) -> Mark:
     return Mark(tone=_TONES[state], icon=f"icons/{_ICONS.get(state, state)}.svg", label=label)
+
+
+_SMALLEST = Decimal("0.0001")
+
+
+@register.filter
+def usd(amount: Decimal | None) -> str:
+    """An amount in dollars: in cents where it is whole ones, else to a hundredth of a cent.
+
+    Unknown is said in words and never shown as zero.
+    """
+    if amount is None:
+        return "unknown"
+    if amount == amount.quantize(Decimal("0.01")):
+        return f"${amount:,.2f}"
+    if amount < _SMALLEST:
+        return "less than $0.0001"
+    return f"${amount:,.4f}"
+
+
+@register.filter
+def grouped(number: int | None) -> str:
+    """A whole number in groups of three digits; empty where there is none."""
+    return "" if number is None else number_format(number, force_grouping=True)
+
+
+K = TypeVar("K")
+V = TypeVar("V")
+
+
+@register.filter
+def at(table: Mapping[K, V], key: K) -> V | None:
+    """What the table holds under a key, None if nothing."""
+    return table.get(key)
+
+
+@register.inclusion_tag("parts/pager.html", takes_context=True)
+def pager(context: Context, page: Page[Any], name: str = "page", what: str = "") -> dict[str, Any]:
+    """The way to the other pages; nothing where there is one alone.
+
+    Args:
+        context: With the request, whose address is kept but for the page.
+        page: Which one is shown.
+        name: What the address calls it.
+        what: What is paged, for those who can't see where the links stand.
+    """
+    here, last = page.number, page.paginator.num_pages
+    near = {1, last, *range(max(1, here - 1), min(last, here + 1) + 1)}
+    links: list[dict[str, Any]] = []
+    for number in sorted(near):
+        if links and number > links[-1]["number"] + 1:
+            links.append({"number": None})
+        query = _query(context["request"], name, number)
+        links.append({"number": number, "query": query, "is_current": number == here})
+    return {
+        "links": links if last > 1 else [],
+        "what": what,
+        "page": page,
+        "previous": _query(context["request"], name, here - 1) if page.has_previous() else "",
+        "next": _query(context["request"], name, here + 1) if page.has_next() else "",
+    }
+
+
+@register.simple_tag(takes_context=True)
+def query_with(context: Context, **changes: object) -> str:
+    """The address's query with these changes, from the first page on; empty values go."""
+    query = context["request"].GET.copy()
+    for name in ("page", "row", "column", "sample"):
+        query.pop(name, None)
+    for name, value in changes.items():
+        query.pop(name, None)
+        if value not in ("", None):
+            query[name] = str(value)
+    return f"?{query.urlencode()}"
+
+
+# --- Private -----------------------------------------------------------------------------------
+
+
+def _query(request: HttpRequest, name: str, number: int) -> str:
+    query = request.GET.copy()
+    query[name] = str(number)
+    return f"?{query.urlencode()}"

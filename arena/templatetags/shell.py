@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import Any
 
 from django import template
 from django.http import HttpRequest
@@ -11,26 +11,9 @@ from django.urls import reverse
 from django.utils.functional import Promise
 from django.utils.translation import gettext_lazy as _
 
-from arena.people.queries import Profile, profile_of
+from arena.people.queries import profile_of
 
 register = template.Library()
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Link:
-    """One entry of the navigation."""
-
-    label: str
-    url: str
-    is_current: bool
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Shell:
-    """What the frame needs to know; without a profile nobody is signed in."""
-
-    profile: Profile | None
-    links: list[Link]
 
 
 _SECTIONS: dict[str, tuple[Promise, frozenset[str]]] = {
@@ -50,23 +33,18 @@ _MENU = {
 
 
 @register.simple_tag(takes_context=True)
-def shell(context: Context) -> Shell:
-    """Profile and navigation of whoever made the request."""
+def shell(context: Context) -> dict[str, Any]:
+    """Return profile and navigation of whoever made the request."""
     request: HttpRequest | None = context.get("request")
     user = getattr(request, "user", None)
     profile = profile_of(user) if user is not None else None
     if request is None or profile is None or profile.role is None:
-        return Shell(profile=profile, links=[])
+        return {"profile": profile, "links": []}
     match = request.resolver_match
     here = match.route.partition("/")[0] if match else None
-    return Shell(
-        profile=profile,
-        links=[
-            Link(
-                label=str(_SECTIONS[name][0]),
-                url=reverse(name),
-                is_current=here in _SECTIONS[name][1],
-            )
-            for name in _MENU[profile.role]
-        ],
-    )
+    links = [
+        {"label": label, "url": reverse(name), "is_current": here in beginnings}
+        for name, (label, beginnings) in _SECTIONS.items()
+        if name in _MENU[profile.role]
+    ]
+    return {"profile": profile, "links": links}

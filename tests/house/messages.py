@@ -14,7 +14,7 @@ VOTER_MODULES = (
     *("arena/api/errors.py", "arena/models/votes.py", "arena/templatetags/shell.py"),
     *("arena/queries/voting/descriptions.py", "arena/queries/voting/measures.py"),
     *("arena/queries/voting/keys.py", "arena/people/services.py", "arena/people/links.py"),
-    *("arena/people/pages.py", "arena/site/forms.py", "arena/voting/screen.py"),
+    *("arena/people/pages.py", "arena/voting/forms.py", "arena/voting/screen.py"),
     *("arena/studies/pages/experts.py", "arena/studies/services/taking_part.py"),
     *("arena/web/voting/practice.py", "arena/web/voting/pages.py"),
 )

@@ -9,7 +9,8 @@ from django.utils import timezone
 from arena.errors import NothingToPlan
 from arena.models import Study
 from arena.pairing.plan import plan
-from arena.studies.services.opening import close_study, rules_of
+from arena.studies.services.opening import close_study
+from arena.studies.services.planning import rules_of
 from augment.errors import Conflict, UnknownName
 from augment.models import Augmentation, Contestant, Event, Scenario
 from tests.opening import open_study

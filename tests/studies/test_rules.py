@@ -7,8 +7,7 @@ from collections import Counter
 import pytest
 
 from arena.models import Study
-from arena.studies.services.opening import rules_of
-from arena.studies.services.planning import pictures_of, plan_batch
+from arena.studies.services.planning import pictures_of, plan_batch, rules_of
 from arena.studies.services.taking_part import hand_over
 from augment.models import Augmentation, Scenario
 from augment.scene.codec import modification_to_document

@@ -7,7 +7,7 @@ from decimal import Decimal
 import pytest
 from django.urls import reverse
 
-from arena.templatetags.money import usd
+from arena.templatetags.marks import usd
 from augment.models import GenerationJob
 from augment.services.running import runner
 from augment.services.running.budget import Caps

@@ -5,6 +5,7 @@ from __future__ import annotations
 import uuid
 from typing import Any
 
+from django import forms
 from django.contrib import messages
 from django.contrib.auth.models import User
 from django.core.exceptions import PermissionDenied
@@ -25,9 +26,36 @@ from arena.people.queries import by_pseudonym, experts, role_of
 from arena.queries.voting.showings import original_beside
 from arena.site.access import ADMIN, EXPERT, STAFF, allow_only, user_of
 from arena.site.acts import Confirmation, ask, is_sure, refusals_in, refusals_told, wants_to_change
-from arena.site.forms import LabelForm, LabellingForm
+from arena.site.forms import offer
 from augment.models import GenerationJob
 from augment.services.judging.findings import FaultClass
+
+
+class LabelForm(forms.Form):
+    """The faults that an expert sees in one picture: any of three, or none."""
+
+    task = forms.UUIDField()
+    position = forms.BooleanField(required=False)
+    heading = forms.BooleanField(required=False)
+    logic = forms.BooleanField(required=False)
+    note = forms.CharField(required=False, max_length=2000)
+
+    def faults(self) -> frozenset[FaultClass]:
+        """Return what was ticked, once the form is valid."""
+        return frozenset(fault for fault in FaultClass if self.cleaned_data[fault.value])
+
+
+class LabellingForm(forms.Form):
+    """A new labelling of a job."""
+
+    name = forms.CharField(max_length=120, strip=True)
+    experts = forms.MultipleChoiceField(error_messages={"required": "Choose at least one expert."})
+    seed = forms.IntegerField(initial=1, min_value=0, max_value=2**63 - 1)
+
+    def __init__(self, *args: Any, experts: list[User], **kwargs: Any) -> None:
+        super().__init__(*args, **kwargs)
+        self.accounts = [user for user in experts if not user.person.is_simulated]
+        offer(self, "experts", [(user.username, user.username) for user in self.accounts])
 
 
 @allow_only(EXPERT)

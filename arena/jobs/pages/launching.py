@@ -17,7 +17,7 @@ from arena.contestants.pages import OptionsForm
 from arena.scenarios.queries import by_type, set_asked, set_choices
 from arena.site.access import ADMIN, allow_only, user_of
 from arena.site.acts import refusals_in, send_later
-from arena.site.forms import CapsForm, ChoiceForm, Offer
+from arena.site.forms import CapsForm, ChoiceForm, Offer, offer
 from augment.errors import AugmentError, Conflict
 from augment.models import Contestant, EndpointModel, GenerationJob
 from augment.services.endpoints.known_endpoints import is_key_here
@@ -53,7 +53,7 @@ class LaunchForm(ChoiceForm, CapsForm, OptionsForm):
         self.models = models
         self.matrix = matrix_of(models)
         keys = [cell.key for row in self.matrix for cell, obstacle in row.cells if not obstacle]
-        self._offer("cells", [(key, key) for key in keys])
+        offer(self, "cells", [(key, key) for key in keys])
         self.cells_chosen = ChosenCells()
 
     def clean_samples(self) -> int:
@@ -88,7 +88,7 @@ class LaunchForm(ChoiceForm, CapsForm, OptionsForm):
     @property
     def chosen_cells(self) -> list[str]:
         """For the template: the keys that are ticked."""
-        return self.chosen("cells")
+        return list(self["cells"].value() or ())
 
     def chosen_rows(self) -> list[Contestant]:
         """Return whoever is chosen, each once; those of cells may not be stored yet."""

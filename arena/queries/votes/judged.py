@@ -14,8 +14,7 @@ from django.db.models import Max, Q
 
 from arena.models import ImportedVote, Person, Study, Vote
 from arena.pairing.order import MAIN
-from arena.pairing.rules import Entry, grid_of, scenario_of
-from arena.pairing.settled import draw_ties
+from arena.pairing.rules import Entry, draw_ties, grid_of, scenario_of
 from augment.models import Contestant
 
 AUTOMATIC = "automatic"
@@ -118,7 +117,7 @@ def entrants_of(study: Study, votes: Iterable[Judged]) -> tuple[Entrant, ...]:
 
 
 def settled_ties(study: Study, lines: Iterable[Judged]) -> list[Judged]:
-    """Ties on the pairs that the study settled without showing; see arena.pairing.settled.
+    """Ties on the pairs that the study settled without showing; see arena.pairing.rules.
 
     Args:
         study: A study; one of votes from elsewhere has no such pairs.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import uuid
-from typing import Any, cast
+from typing import Any
 
 from django import forms
 from django.contrib import messages
@@ -27,6 +27,7 @@ from arena.people.queries import by_pseudonym, invitation_by_token, may_be_let_i
 from arena.services.cells import csv_text
 from arena.site.access import ADMIN, BACKEND, GONE, allow_only, keep_secret, user_of
 from arena.site.acts import Confirmation, ask, is_sure, refusals_in, refusals_told, tell_errors
+from arena.site.forms import offer
 from arena.site.listing import read_page
 from arena.studies.queries import (
     authorships_of,
@@ -79,10 +80,9 @@ class AuthorForm(forms.Form):
             for code, user in self.accounts.items()
         ]
         made = study.contestants.order_by("name", "slug").values_list("slug", "name")
-        for name, offered in (("expert", named), ("contestant", made)):
-            field = cast(forms.ChoiceField, self.fields[name])
-            field.choices = [("", "Choose …"), *offered]
-            field.widget.attrs["class"] = "input"
+        for name, offered in (("expert", named), ("contestant", [*made])):
+            offer(self, name, [("", "Choose …"), *offered])
+            self.fields[name].widget.attrs["class"] = "input"
 
 
 class EnrolmentForm(forms.Form):

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 import uuid
-from dataclasses import asdict
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -226,20 +225,20 @@ def _opening(study_plan: StudyPlan, draft: StudyDraft | None) -> Confirmation:
         ArenaError, AugmentError: It can't be opened.
     """
     preview = drafts.preview_study(study_plan)
-    numbers = asdict(preview) | {"seconds": f"{preview.seconds:g}"}
+    numbers: dict[str, object] = {**preview, "seconds": f"{preview['seconds']:g}"}
     facts = [
         "Experts: {experts}. Votes: {votes}. Contestants: {contestants}. Scenarios: {scenarios}.",
         "On top of the votes: hidden repeats {repeats}, attention checks {checks}.",
         "Pairs of a scenario that are judged: {judged}; by two experts or more: {shared}.",
         "Minutes for each expert: about {minutes}, at {seconds} s a pair.",
     ]
-    if preview.settled:
+    if preview["settled"]:
         facts.append(
             "Pairs that are settled as ties and shown to nobody: {settled}; within 0.15 m and 2° "
             "in every object: {alike}, identical pictures among them. A tenth of those that are "
             "alike and not identical is shown all the same."
         )
-    if preview.later:
+    if preview["later"]:
         facts.append("Votes that are planned later, by those before: {later}.")
     if study_plan.allow_simulated:
         facts.append("What is simulated may take part; every page and file then says so.")

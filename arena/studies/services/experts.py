@@ -1,7 +1,6 @@
-"""The practice round before an expert's first pair of a study.
+"""What experts do beside voting: practise before their first pair, and report what is wrong.
 
-In: a study with the rule and an expert. Out: up to five `PracticePair`s, made once; answers to
-them, which no rating, progress or export of votes ever sees.
+Neither changes a vote; no rating, progress or export of votes sees answers to practice pairs.
 """
 
 from __future__ import annotations
@@ -13,26 +12,28 @@ from uuid import UUID
 
 from django.contrib.auth.models import User
 from django.db import IntegrityError, transaction
-from django.db.models import F
+from django.db.models import QuerySet
 
 from arena.errors import InvalidVote, NothingToPlan, NotYours, StudyNotOpen
 from arena.models import Matchup, PracticePair, Report, Study, Vote
 from arena.queries.voting.ballots import matchup_of
 from arena.services.decisions import LONGEST_COMMENT
-from arena.studies.services.pictures import find_showable
+from arena.studies.services.pictures import latest_pairs
 from augment.errors import Conflict
-from augment.models import Augmentation, Contestant, Scenario
-from augment.services.scenarios.pictures import window_of
+from augment.models import Scenario
 from augment.services.texts import make_storable
 
 PAIRS = 5
+SIDES = {"A": Report.Side.LEFT, "B": Report.Side.RIGHT, "both": Report.Side.BOTH}
+"""What a browser says of a side: the left picture is A."""
 
-_GOOD, _BROKEN = Contestant.Kind.REFERENCE, Contestant.Kind.CHECK
 Answer = PracticePair.Answer
+
+# --- Practice ----------------------------------------------------------------------------------
 
 
 def is_due(study: Study, expert: User) -> bool:
-    """Whether the expert practises now: the study wants it, nothing is voted, a pair is open."""
+    """Return whether the expert practises now: nothing is voted yet and a pair is unanswered."""
     if not study.practice or study.state != Study.State.OPEN:
         return False
     if Vote.objects.filter(matchup__study=study, expert=expert).exists():
@@ -42,20 +43,21 @@ def is_due(study: Study, expert: User) -> bool:
 
 @transaction.atomic
 def practice_pairs(study: Study, expert: User) -> list[PracticePair]:
-    """The expert's round, made when it is first asked for; empty where nothing can be shown.
+    """Return the expert's round, made when it is first asked for.
 
     Scenarios that are not in the study come first, then the study's own; of each group one of
     every type before a second one.
     """
-    mine = PracticePair.objects.filter(study=study, expert=expert).order_by("position")
-    kept = list(mine.select_related("scenario__base_scene", "good", "broken"))
+    rows = PracticePair.objects.filter(study=study, expert=expert).order_by("position")
+    mine = rows.select_related("scenario__base_scene", "good", "broken")
+    kept = list(mine)
     if kept or not study.practice or study.state != Study.State.OPEN:
         return kept
     # Two windows of one browser may ask at once.
     Study.objects.select_for_update().get(pk=study.pk)
-    if not mine.exists():
-        PracticePair.objects.bulk_create(_drawn(study, expert))
-    return list(mine.select_related("scenario__base_scene", "good", "broken"))
+    if not rows.exists():
+        PracticePair.objects.bulk_create(_draw_round(study, expert))
+    return list(mine.all())
 
 
 @transaction.atomic
@@ -68,35 +70,25 @@ def answer_practice(*, study: Study, expert: User, position: int, answer: str) -
     """
     if answer not in (Answer.LEFT, Answer.EQUAL, Answer.RIGHT):
         raise InvalidVote({"outcome": "It is none of the answers."})
-    _check_open(study)
-    PracticePair.objects.filter(study=study, expert=expert, position=position, answer="").update(
-        answer=answer
-    )
+    _unanswered(study, expert).filter(position=position).update(answer=answer)
 
 
 def skip_practice(*, study: Study, expert: User) -> None:
-    """End the round; it does not come again.
+    """End the round for good.
 
     Raises:
         StudyNotOpen: The study is over.
     """
-    _check_open(study)
-    PracticePair.objects.filter(study=study, expert=expert, answer="").update(
-        answer=Answer.SKIPPED
-    )
+    _unanswered(study, expert).update(answer=Answer.SKIPPED)
 
 
 def has_practice() -> bool:
-    """Whether there is something to practise on."""
-    return bool(_ready())
+    """Return whether there is something to practise on."""
+    return bool(latest_pairs(Scenario.objects.all()))
 
 
 def require_practice_pictures() -> None:
-    """Do nothing where there is something to practise on.
-
-    Raises:
-        NothingToPlan: There is not; the text says what to do.
-    """
+    """Raise NothingToPlan, with what to do, where there is nothing to practise on."""
     if not has_practice():
         raise NothingToPlan(
             "There is nothing to practise on yet: no scenario has a picture of its reference "
@@ -106,22 +98,20 @@ def require_practice_pictures() -> None:
         )
 
 
-# --- Private -----------------------------------------------------------------------------------
-
-
-def _check_open(study: Study) -> None:
+def _unanswered(study: Study, expert: User) -> QuerySet[PracticePair]:
     if study.state != Study.State.OPEN:
         raise StudyNotOpen(f"The study {study.name!r} takes no votes: it is {study.state}.")
+    return PracticePair.objects.filter(study=study, expert=expert, answer="")
 
 
-def _drawn(study: Study, expert: User) -> list[PracticePair]:
+def _draw_round(study: Study, expert: User) -> list[PracticePair]:
     own = set(study.scenarios.values_list("pk", flat=True))
     others = Study.objects.filter(experts=expert, state=Study.State.OPEN)
     seen = set(others.values_list("scenarios", flat=True)) - own
-    ready = _ready()
-    kinds = dict(Scenario.objects.filter(pk__in=ready).values_list("pk", "type"))
+    pairs = {pair[0].scenario_id: pair for pair in latest_pairs(Scenario.objects.all()).values()}
+    kinds = dict(Scenario.objects.filter(pk__in=pairs).values_list("pk", "type"))
     dice = random.Random(f"{study.seed} {UUID(str(expert.person.code)).int}")
-    order = sorted(ready)
+    order = sorted(pairs)
     dice.shuffle(order)
     types: Counter[tuple[int, str]] = Counter()
     ranked = []
@@ -136,34 +126,15 @@ def _drawn(study: Study, expert: User) -> list[PracticePair]:
             expert=expert,
             position=position,
             scenario_id=pk,
-            good=ready[pk][0],
-            broken=ready[pk][1],
+            good=pairs[pk][0],
+            broken=pairs[pk][1],
             good_is_left=dice.random() < 0.5,
         )
         for position, pk in enumerate(chosen, start=1)
     ]
 
 
-def _ready() -> dict[int, tuple[Augmentation, Augmentation]]:
-    """By scenario: its latest reference and its latest broken picture, in one window."""
-    rows = find_showable(list(Scenario.objects.only("pk"))).filter(
-        contestant__kind__in=[_GOOD, _BROKEN], state=Augmentation.State.DONE
-    )
-    latest: dict[tuple[int, str], Augmentation] = {}
-    for row in rows.order_by(F("finished_at").asc(nulls_first=True), "pk"):
-        latest[row.scenario_id, row.contestant.kind] = row
-    found = {}
-    for scenario in {pk for pk, _ in latest}:
-        good, broken = latest.get((scenario, _GOOD)), latest.get((scenario, _BROKEN))
-        if good is None or broken is None or good.image == broken.image:
-            continue
-        if window_of(good.image) == window_of(broken.image):
-            found[scenario] = (good, broken)
-    return found
-
-
-SIDES = {"A": Report.Side.LEFT, "B": Report.Side.RIGHT, "both": Report.Side.BOTH}
-"""What a browser says of a side: the left picture is A."""
+# --- Reports -----------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -207,14 +178,13 @@ def report(*, expert: User, matchup_code: UUID | str, key: UUID, said: Complaint
         if matchup.study.state != Study.State.OPEN:
             raise StudyNotOpen(f"The study {matchup.study.name!r} is {matchup.study.state}.")
         stored = _insert(matchup, expert, key, said)
-    same = (matchup.pk, said.reason, said.side)
-    if (stored.matchup_id, stored.reason, stored.side) != same:
+    if (stored.matchup_id, stored.reason, stored.side) != (matchup.pk, said.reason, said.side):
         raise Conflict("This key belongs to another report; make a new key for every report.")
     return stored
 
 
 def check_complaint(said: Complaint) -> None:
-    """Refuse parts that are unknown or too long, with an InvalidVote."""
+    """Raise InvalidVote for parts that are unknown or too long."""
     wrong = {}
     if said.reason not in Report.Reason.values:
         wrong["reason"] = f"One of these is needed: {', '.join(Report.Reason.values)}."
@@ -230,20 +200,16 @@ def check_complaint(said: Complaint) -> None:
 
 def _insert(matchup: Matchup, expert: User, key: UUID, said: Complaint) -> Report:
     across, down = said.mark or (None, None)
+    values = {
+        "matchup": matchup,
+        "expert": expert,
+        "reason": said.reason,
+        "side": said.side,
+        "mark_x": across,
+        "mark_y": down,
+        "comment": make_storable(said.comment.strip()),
+    }
     try:
-        with transaction.atomic():
-            return Report.objects.create(
-                key=key,
-                matchup=matchup,
-                expert=expert,
-                reason=said.reason,
-                side=said.side,
-                mark_x=across,
-                mark_y=down,
-                comment=make_storable(said.comment.strip()),
-            )
-    except IntegrityError:
-        same = Report.objects.filter(key=key).first()
-        if same is None:  # the pair was handed over at this moment
-            raise NotYours("This matchup is not yours.") from None
-        return same  # it arrived twice at once
+        return Report.objects.get_or_create(key=key, defaults=values)[0]
+    except IntegrityError:  # the pair was handed over at this moment
+        raise NotYours("This matchup is not yours.") from None

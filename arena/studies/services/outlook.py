@@ -7,6 +7,7 @@ from statistics import median
 from typing import Any
 
 from django.contrib.auth.models import User
+from django.db.models import Count, Max, Min
 
 from arena.models import Snapshot, Study, Vote
 from arena.queries.studies.results import ResultsAccess, latest_snapshot, results_access
@@ -96,8 +97,7 @@ class Known:
 
     Attributes:
         values: By the fields of StudyEstimate; only what is known.
-        from_results: Whether spread, ties and effects are among them: only where whoever asks may
-            read the results.
+        from_results: Whether spread, ties and effects are among them.
     """
 
     values: dict[str, Any]
@@ -105,7 +105,7 @@ class Known:
 
 
 def usual_seconds(study: Study | None = None) -> float | None:
-    """The median time of a vote, of a study or of all; None where too few were timed."""
+    """Return the median time of a vote, of a study or of all; None where too few were timed."""
     votes = Vote.objects.filter(is_simulated=False, ms_visible__isnull=False)
     if study is not None:
         votes = votes.filter(matchup__study=study)
@@ -116,7 +116,7 @@ def usual_seconds(study: Study | None = None) -> float | None:
 
 
 def known_of(study: Study, reader: User | None = None) -> Known:
-    """What a study says; nothing of its results where the reader may not see them.
+    """Return what a study says; nothing of its results where the reader may not see them.
 
     Args:
         study: Any.
@@ -125,45 +125,37 @@ def known_of(study: Study, reader: User | None = None) -> Known:
     Raises:
         Conflict: The votes of its rating are not what they were.
     """
+    shares = {"repeats": "repeat_share", "checks": "check_share"}
     values: dict[str, Any] = {
         "contestants": study.contestants.count(),
         "experts": study.experts.count(),
         "scenarios": study.scenarios.count(),
         "seconds": usual_seconds(study),
+        **{name: round(100 * study.rules.get(share, 0), 2) for name, share in shares.items()},
     }
-    for name, key in (("repeats", "repeat_share"), ("checks", "check_share")):
-        if key in study.rules:
-            values[name] = round(100 * study.rules[key], 2)
     values = {name: value for name, value in values.items() if value}
-    snapshot = latest_snapshot(study) if _may_read(study, reader) else None
-    if snapshot is None:
-        return Known(values=values)
-    found = _of_results(snapshot)
-    return Known(values=values | found, from_results=bool(found))
-
-
-# --- Private -----------------------------------------------------------------------------------
-
-
-def _may_read(study: Study, reader: User | None) -> bool:
-    if reader is None:
-        return study.state == Study.State.CLOSED
-    return results_access(user=reader, study=study) is ResultsAccess.FULL
+    may_read = study.state == Study.State.CLOSED
+    if reader is not None:
+        may_read = results_access(user=reader, study=study) is ResultsAccess.FULL
+    snapshot = latest_snapshot(study) if may_read else None
+    results = {} if snapshot is None else _of_results(snapshot)
+    return Known(values=values | results, from_results=bool(results))
 
 
 def _of_results(snapshot: Snapshot) -> dict[str, Any]:
     votes = votes_of(snapshot)
     comparisons = vote_arrays(votes.entrants, votes.counted).comparisons
-    ratings = snapshot.standings.exclude(rating=None).values_list("rating", flat=True)
-    found = [rating for rating in ratings if rating is not None]
+    rated = snapshot.standings.exclude(rating=None).aggregate(
+        best=Max("rating"), worst=Min("rating"), n=Count("pk")
+    )
     effects = estimate_effects(comparisons)
-    if effects is None or len(found) < 2:
+    if effects is None or rated["n"] < 2:
         return {}
     return {
         "contestants": len(votes.entrants),
         "experts": len(set(comparisons.expert.tolist())),
         "scenarios": len(set(comparisons.scenario.tolist())),
-        "spread": round(max(found) - min(found)),
+        "spread": round(rated["best"] - rated["worst"]),
         "ties": round(100 * float((comparisons.score == 0.5).mean()), 1),
         "expert_sd": round(effects.expert_sd),
         "scenario_sd": round(effects.scenario_sd),

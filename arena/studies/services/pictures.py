@@ -1,4 +1,4 @@
-"""Which pictures can be shown at all, what is missing, and which windows they show."""
+"""Which pictures a study can show: of contestants, and of attention checks."""
 
 from __future__ import annotations
 
@@ -15,9 +15,12 @@ from arena.services.frames import MOST_NAMED, Cells
 from augment.models import Augmentation, Contestant, Scenario
 from augment.services.scenarios.pictures import window_of
 
+Pair = tuple[Augmentation, Augmentation]
+"""A right picture and a broken one of the same scenario."""
 
-def find_showable(scenarios: list[Scenario]) -> QuerySet[Augmentation]:
-    """Every augmentation of these scenarios that has a picture to judge."""
+
+def find_showable(scenarios: Iterable[Scenario]) -> QuerySet[Augmentation]:
+    """Return every augmentation of these scenarios that has a picture to judge."""
     return (
         Augmentation.objects.filter(scenario__in=scenarios, state__in=Augmentation.SHOWABLE)
         .exclude(image="")
@@ -45,11 +48,7 @@ def with_picture(row: Augmentation, is_wanted: Callable[[str], bool]) -> Augment
 def refuse_missing(
     contestants: list[Contestant], scenarios: list[Scenario], cells: Collection[tuple[str, str]]
 ) -> None:
-    """Do nothing where everybody has a picture of every scenario.
-
-    Raises:
-        NothingToPlan: Pictures are missing; the text names them.
-    """
+    """Raise NothingToPlan where a contestant has no picture of a scenario."""
     missing = [
         f"{contestant.slug} on {scenario.slug}"
         for contestant in contestants
@@ -57,83 +56,91 @@ def refuse_missing(
         if (scenario.slug, contestant.slug) not in cells
     ]
     if missing:
-        raise NothingToPlan(_no_pictures(missing))
+        more = len(missing) - MOST_NAMED
+        names = ", ".join(missing[:MOST_NAMED]) + (f" and {more} more" if more > 0 else "")
+        raise NothingToPlan(f"There is no picture yet of {names}. Generate them first.")
 
 
 def windows_of(entries: Iterable[Entry]) -> dict[str, str]:
-    """By scenario, the window that its pictures in a study show: of the first sample, if apart."""
-    found: dict[str, str] = {}
-    for entry in sorted(entries, key=lambda one: one.scenario):
-        found.setdefault(scenario_of(entry.scenario), window_of(entry.picture))
-    return found
+    """Return by scenario the window that its pictures in a study show."""
+    windows: dict[str, str] = {}
+    for entry in sorted(entries, key=lambda entry: entry.scenario):
+        windows.setdefault(scenario_of(entry.scenario), window_of(entry.picture))
+    return windows
 
 
-# --- Private -----------------------------------------------------------------------------------
+# --- Attention checks --------------------------------------------------------------------------
 
 
-def _no_pictures(missing: list[str]) -> str:
-    if len(missing) <= MOST_NAMED:
-        return f"There is no picture yet of {', '.join(missing)}. Generate them first."
-    return (
-        f"There is no picture yet of {', '.join(missing[:MOST_NAMED])} and "
-        f"{len(missing) - MOST_NAMED} more. Generate them first."
+def latest_pairs(
+    scenarios: Iterable[Scenario], windows: Mapping[str, str] | None = None
+) -> dict[str, Pair]:
+    """Return by scenario the latest reference and the latest broken picture, in one window.
+
+    Args:
+        scenarios: Where to look.
+        windows: By scenario the window that is wanted; None where any will do.
+    """
+    kinds = Contestant.Kind.REFERENCE, Contestant.Kind.CHECK
+    rows = find_showable(scenarios).filter(
+        contestant__kind__in=kinds, state=Augmentation.State.DONE
     )
+    latest: dict[tuple[str, str], Augmentation] = {}
+    for row in rows.order_by(F("finished_at").asc(nulls_first=True), "pk"):
+        slug = row.scenario.slug
+        is_wanted = partial(_is_in, (windows or {}).get(slug))
+        if windows is None or with_picture(row, is_wanted):
+            latest[slug, row.contestant.kind] = row
+    pairs = {}
+    for slug in sorted({slug for slug, _kind in latest}):
+        good, broken = (latest.get((slug, kind)) for kind in kinds)
+        if good is None or broken is None or good.image == broken.image:
+            continue
+        if window_of(good.image) == window_of(broken.image):
+            pairs[slug] = (good, broken)
+    return pairs
 
 
-Kind = Contestant.Kind
+def _is_in(window: str | None, image: str) -> bool:
+    return window_of(image) == window
 
 
 def check_pictures(
-    scenarios: list[Scenario], windows: Mapping[str, str]
+    scenarios: Iterable[Scenario], windows: Mapping[str, str], *, shows_all: bool
 ) -> tuple[tuple[Check, ...], Cells]:
-    """What attention checks there can be: the latest reference against the latest broken one.
+    """Return the attention checks that there can be, at the places of a plan.
 
     Args:
         scenarios: Of the study.
         windows: By scenario; pictures of another window stay out.
+        shows_all: Whether samples are judged apart: then a check goes with the first one.
     """
-    found = find_showable(scenarios).filter(
-        contestant__kind__in=[Kind.REFERENCE, Kind.CHECK], state=Augmentation.State.DONE
-    )
-    latest: dict[tuple[str, str], Augmentation] = {}
-    for row in found.order_by(F("finished_at").asc(nulls_first=True), "pk"):
-        window = windows.get(row.scenario.slug)
-        if shown := with_picture(row, partial(_is_in, window)):
-            latest[row.scenario.slug, row.contestant.kind] = shown
     checks: list[Check] = []
     cells: Cells = {}
-    for scenario in sorted({slug for slug, _ in latest}):
-        good, broken = latest.get((scenario, Kind.REFERENCE)), latest.get((scenario, Kind.CHECK))
-        if good is None or broken is None or good.image == broken.image:
-            continue
-        names = good.contestant.slug, broken.contestant.slug
-        checks.append(Check(scenario=scenario, good=names[0], broken=names[1]))
-        cells |= {(scenario, names[0]): good, (scenario, names[1]): broken}
+    for slug, pair in latest_pairs(scenarios, windows).items():
+        place = place_of(slug, 1) if shows_all else slug
+        good, broken = (row.contestant.slug for row in pair)
+        checks.append(Check(scenario=place, good=good, broken=broken))
+        cells |= {(place, row.contestant.slug): row for row in pair}
     return tuple(checks), cells
 
 
-def enough_checks(
-    scenarios: list[Scenario], *, windows: Mapping[str, str], wanted: int
-) -> tuple[tuple[Check, ...], Cells]:
-    """What `check_pictures` gives, if that is as much as a study asks for.
+def require_checks(checks: Collection[Check], scenarios: list[Scenario], *, wanted: int) -> None:
+    """Raise NothingToPlan, with what to do, where there are too few attention checks.
 
     Args:
+        checks: That there are.
         scenarios: Of the study; an expert sees at most one check of each.
-        windows: By scenario, as `check_pictures` takes them.
         wanted: How many each expert is to see.
-
-    Raises:
-        NothingToPlan: There are too few; the text says what to do.
     """
-    checks, cells = check_pictures(scenarios, windows) if wanted else ((), {})
     if len(checks) >= wanted:
-        return checks, cells
-    ready = {check.scenario for check in checks}
+        return
+    ready = {scenario_of(check.scenario) for check in checks}
     with_reference = Scenario.objects.filter(
         pk__in=[row.pk for row in scenarios], reference__isnull=False
     )
-    missing = [row.slug for row in with_reference if row.slug not in ready]
-    if len(ready) + len(missing) >= wanted:
+    possible = len(ready | set(with_reference.values_list("slug", flat=True)))
+    if possible >= wanted:
         raise NothingToPlan(
             f"Attention checks wanted for each expert: {wanted}; scenarios with pictures for "
             f"one: {len(checks)}. Generate the contestant reference and press “Draw missing "
@@ -141,32 +148,16 @@ def enough_checks(
         )
     raise NothingToPlan(
         f"Attention checks wanted for each expert: {wanted}; each needs a scenario of its "
-        f"own with a reference, and the study has {len(ready) + len(missing)}. Ask for "
+        f"own with a reference, and the study has {possible}. Ask for "
         "fewer, or choose more scenarios."
     )
 
 
-def placed_checks(
-    checks: tuple[Check, ...], cells: Cells, *, shows_all: bool
-) -> tuple[tuple[Check, ...], Cells]:
-    """Attention checks at the places of a plan: where samples are apart, with the first one."""
-    if not shows_all:
-        return checks, cells
-    return (
-        tuple(replace(check, scenario=place_of(check.scenario, 1)) for check in checks),
-        {(place_of(scenario, 1), who): row for (scenario, who), row in cells.items()},
-    )
-
-
 def without_lost_checks(rules: PlanRules, cells: Cells) -> PlanRules:
-    """The rules with those attention checks that still have both of their pictures."""
+    """Return the rules with those attention checks that still have both of their pictures."""
     kept = tuple(
         check
         for check in rules.checks
         if {(check.scenario, check.good), (check.scenario, check.broken)} <= cells.keys()
     )
     return replace(rules, checks=kept)
-
-
-def _is_in(window: str | None, image: str) -> bool:
-    return window_of(image) == window

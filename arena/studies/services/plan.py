@@ -8,10 +8,13 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any, Self
 
+from django.contrib.auth.models import User
+
 from arena.errors import NothingToPlan
 from arena.models import Snapshot, Study
-from arena.pairing.demands import MOST_ADAPTIVE, MOST_CHECKS, MOST_OVERLAP, MOST_REPEATS
+from arena.pairing.rules import MOST_ADAPTIVE, MOST_CHECKS, MOST_OVERLAP, MOST_REPEATS
 from arena.services.shown_pictures import SampleRule
+from augment.services.events import log_event
 from augment.services.inputs import InputKind, input_field, inputs_of
 
 MOST = 100
@@ -21,7 +24,7 @@ _PAIR = re.compile(r"(\S+)\s+above\s+(\S+)")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Hypothesis:
-    """A line.
+    """A line that was written down before the first vote.
 
     Attributes:
         text: As it was entered.
@@ -63,92 +66,100 @@ class Answered:
 
 
 def read_hypotheses(lines: Sequence[str], contestants: Sequence[str]) -> tuple[Hypothesis, ...]:
-    """Lines of text; “SLUG above SLUG” alone on a line is an expected pair.
+    """Read lines of text; “SLUG above SLUG” alone on a line is an expected pair.
 
     Args:
-        lines: Empty ones are passed over.
+        lines: Empty ones are skipped.
         contestants: Slugs of the study.
 
     Raises:
         NothingToPlan: A pair names somebody else or somebody twice, a line is too long or comes
             twice, or there are too many.
     """
-    found = [" ".join(line.split()) for line in lines if line.strip()]
-    if len(found) > MOST or len(set(found)) < len(found):
+    texts = [" ".join(line.split()) for line in lines if line.strip()]
+    if len(texts) > MOST or len(set(texts)) < len(texts):
         raise NothingToPlan(f"At most {MOST} hypotheses, each once, are allowed.")
-    return tuple(_read(line, contestants) for line in found)
+    return tuple(_read_hypothesis(text, contestants) for text in texts)
+
+
+def _read_hypothesis(text: str, contestants: Sequence[str]) -> Hypothesis:
+    if len(text) > LONGEST:
+        raise NothingToPlan(f"A hypothesis has at most {LONGEST} signs: “{text[:40]}…”.")
+    match = _PAIR.fullmatch(text)
+    if match is None:
+        return Hypothesis(text=text)
+    better, other = match.groups()
+    for slug in (better, other):
+        if slug not in contestants:
+            allowed = ", ".join(sorted(contestants))
+            raise NothingToPlan(
+                f"“{text}”: {slug} is no contestant of this study; allowed are {allowed}."
+            )
+    if better == other:
+        raise NothingToPlan(f"“{text}” names one contestant twice.")
+    return Hypothesis(text=text, above=(better, other))
 
 
 def hypotheses_of(study: Study) -> tuple[Hypothesis, ...]:
-    """Those that were frozen at the opening."""
+    """Return the hypotheses that were frozen at the opening."""
     return tuple(
-        Hypothesis(
-            text=kept["text"], above=None if kept["above"] is None else tuple(kept["above"])
-        )
+        Hypothesis(text=kept["text"], above=kept["above"] and tuple(kept["above"]))
         for kept in study.rules.get("hypotheses", ())
     )
 
 
 def answer_hypotheses(snapshot: Snapshot) -> tuple[Answered, ...]:
-    """What a rating says of each of the study's hypotheses; one query where there are any."""
+    """Return what a rating says of each of the study's hypotheses."""
     hypotheses = hypotheses_of(snapshot.study)
     if not hypotheses:
         return ()
     ratings = dict(snapshot.standings.values_list("slug", "rating"))
     board = snapshot.results.board
     p_values = {frozenset((one.a, one.b)): one.p for one in board.p_values or ()}
-    return tuple(_answered(one, ratings, board.above, p_values) for one in hypotheses)
-
-
-# --- Private -----------------------------------------------------------------------------------
-
-
-def _read(line: str, contestants: Sequence[str]) -> Hypothesis:
-    if len(line) > LONGEST:
-        raise NothingToPlan(
-            f"A hypothesis has at most {LONGEST} signs: “{line[:40]}…”."
-        )  # fmt: skip
-    found = _PAIR.fullmatch(line)
-    if found is None:
-        return Hypothesis(text=line)
-    better, other = found.groups()
-    for slug in (better, other):
-        if slug not in contestants:
-            raise NothingToPlan(
-                f"“{line}”: {slug} is no contestant of this study; allowed are "
-                f"{', '.join(sorted(contestants))}."
-            )
-    if better == other:
-        raise NothingToPlan(f"“{line}” names one contestant twice.")
-    return Hypothesis(text=line, above=(better, other))
-
-
-def _answered(
-    one: Hypothesis,
-    ratings: dict[str, float | None],
-    above: tuple[tuple[str, str], ...] | None,
-    p_values: dict[frozenset[str], float],
-) -> Answered:
-    if one.above is None:
-        return Answered(hypothesis=one)
-    better, other = one.above
-    high, low = ratings.get(better), ratings.get(other)
-    difference = None if high is None or low is None else high - low
-    if above is None:
-        verdict = HypothesisVerdict.NOT_JUDGED
-    elif (better, other) in above:
-        verdict = HypothesisVerdict.HELD
-    elif (other, better) in above:
-        verdict = HypothesisVerdict.CONTRADICTED
-    else:
+    answers = []
+    for hypothesis in hypotheses:
+        if hypothesis.above is None:
+            answers.append(Answered(hypothesis=hypothesis))
+            continue
+        better, other = hypothesis.above
+        high, low = ratings.get(better), ratings.get(other)
         verdict = HypothesisVerdict.UNDECIDED
-    return Answered(
-        hypothesis=one,
-        verdict=verdict,
-        difference=difference,
-        p=p_values.get(frozenset(one.above)),
+        if board.above is None:
+            verdict = HypothesisVerdict.NOT_JUDGED
+        elif (better, other) in board.above:
+            verdict = HypothesisVerdict.HELD
+        elif (other, better) in board.above:
+            verdict = HypothesisVerdict.CONTRADICTED
+        answers.append(
+            Answered(
+                hypothesis=hypothesis,
+                verdict=verdict,
+                difference=None if high is None or low is None else high - low,
+                p=p_values.get(frozenset((better, other))),
+            )
+        )
+    return tuple(answers)
+
+
+def log_study(
+    study: Study,
+    verb: str,
+    actor: User | None,
+    before: dict[str, Any] | None = None,
+    after: dict[str, Any] | None = None,
+) -> None:
+    """Log what was done to a study."""
+    log_event(
+        actor=actor,
+        verb=verb,
+        object_kind="study",
+        object_code=study.code,
+        before=before,
+        after=after,
     )
 
+
+# --- What is asked for -------------------------------------------------------------------------
 
 LONGEST_NAME = 120
 HIGHEST_SEED = 2**63 - 1

@@ -22,9 +22,9 @@ from arena.queries.voting.replays import drives_of_pair
 from arena.queries.voting.showings import picture_shown
 from arena.services.votes import receive_vote
 from arena.site.access import ADMIN, EXPERT, allow_only
-from arena.site.forms import ReportForm, VoteForm
 from arena.studies.queries import voting_study
 from arena.studies.services.experts import is_due, report
+from arena.voting.forms import ReportForm, VoteForm
 from arena.voting.screen import over_context, vote_context
 from arena.web.pictures import picture_response
 from augment.errors import Conflict
