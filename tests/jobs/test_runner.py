@@ -112,7 +112,7 @@ def test_a_worker_whose_claim_was_taken_asks_no_model_and_writes_nothing() -> No
     assert held is not None
     AUGMENTATIONS.take_back_lost(now=timezone.now())
     with pytest.raises(LeaseLost):
-        runner.run(row, held=held, connect=Wire(GOOD))
+        runner.Augmentations(Wire(GOOD)).run(row, held)
     assert not ModelCall.objects.exists()
 
 

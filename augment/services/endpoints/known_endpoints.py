@@ -140,7 +140,9 @@ def change_endpoint(
         setattr(row, name, value)
     row.save(update_fields=list(wanted))
     _log_change(row, before, actor)
-    log_move(move, endpoint=row, actor=actor)
+    if move is not None:
+        after = {"server": move[1], "key_variable": row.key_variable}
+        log_change(row, "move key", actor, before={"server": move[0]}, after=after)
     return row
 
 
@@ -338,18 +340,6 @@ def move_of(*, endpoint: Endpoint, base_url: str, key_variable: str) -> tuple[st
     before, after = _server(endpoint.base_url), _server(base_url)
     has_key = bool(endpoint.key_variable and key_variable)
     return (before, after) if has_key and before != after else None
-
-
-def log_move(move: tuple[str, str] | None, *, endpoint: Endpoint, actor: User | None) -> None:
-    """Log that a key goes elsewhere from now on; nothing where it does not."""
-    if move is not None:
-        log_change(
-            endpoint,
-            "move key",
-            actor,
-            before={"server": move[0]},
-            after={"server": move[1], "key_variable": endpoint.key_variable},
-        )
 
 
 # --- Private -----------------------------------------------------------------------------------
