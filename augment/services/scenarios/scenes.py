@@ -39,7 +39,7 @@ from augment.scene.entities import ScenarioType as ScenarioType
 from augment.scene.entities import in_type_order as in_type_order
 from augment.scene.intent import Intent, IntentOrigin
 from augment.scene.lane_graph import LaneGraph
-from augment.services.events import log_event
+from augment.services.events import log_change
 from augment.services.texts import check_prose, one_line
 
 LONGEST_TYPE = 40
@@ -288,11 +288,10 @@ def change_circumstances(scenario: Scenario, given: Circumstances, *, keep_traff
 
 
 def _log_addition(scenario: Scenario, actor: User | None) -> None:
-    log_event(
-        actor=actor,
-        verb="add",
-        object_kind="scenario",
-        object_code=scenario.code,
+    log_change(
+        scenario,
+        "add",
+        actor,
         after={
             "slug": scenario.slug,
             "scene": scenario.base_scene.slug,
