@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cache, partial, wraps
 from typing import Any, TypeVar, cast
@@ -32,6 +33,8 @@ from arena.api.fields import SoundJSONParser, StrictSerializer
 from augment.errors import QueueFault
 
 Row = TypeVar("Row", bound=Model)
+Given = dict[str, Any]
+"""The validated body or query of a request."""
 
 
 class ApiView(APIView):
@@ -73,6 +76,45 @@ class ApiView(APIView):
         found.exception = True
         return found
 
+    def answer_page(
+        self,
+        rows: QuerySet[Row],
+        query: Given,
+        line: type[serializers.Serializer[Any]],
+        *,
+        order: str = "-pk",
+        lines: Callable[[Sequence[Row]], Sequence[Any]] = list,
+    ) -> Response:
+        """Return a page of the rows, with the address of the next one.
+
+        No row is lost or repeated while others are added, and no primary key is shown.
+
+        Args:
+            rows: All rows of the list, unless `query` names values of their columns.
+            query: The validated `PageQuery`; other names in it are columns to filter by.
+            line: Serializer of a row.
+            order: A unique column; a minus before it for descending order.
+            lines: Makes what `line` serializes of all rows of the page at once.
+
+        Raises:
+            ValidationError: No row has the code `after`.
+        """
+        limit, after = query.pop("limit"), query.pop("after", None)
+        column, sign = order.removeprefix("-"), "lt" if order.startswith("-") else "gt"
+        rows = rows.filter(**query).order_by(order)
+        if after is not None:
+            last = rows.filter(code=after).values_list(column, flat=True).first()
+            if last is None:
+                raise ValidationError({"after": ["No row of this list has that code."]})
+            rows = rows.filter(**{f"{column}__{sign}": last})
+        found = list(rows[: limit + 1])
+        shown = found[:limit]
+        body: dict[str, Any] = {"results": line(lines(shown), many=True).data, "next": None}
+        if len(found) > limit:
+            kept = self.request.query_params.dict() | {"after": str(shown[-1].code)}  # type: ignore[attr-defined]
+            body["next"] = f"{self.request.path}?{urlencode(kept)}"
+        return Response(body)
+
 
 class FileView(ApiView):
     """Answers with a file, whatever the request accepts; errors stay JSON."""
@@ -80,6 +122,14 @@ class FileView(ApiView):
     def perform_content_negotiation(self, request: Request, force: bool = False) -> Any:
         """Never answer 406."""
         return super().perform_content_negotiation(request, force=True)
+
+
+class RowDocument(serializers.ModelSerializer[Row]):
+    """A row of the database, to be read."""
+
+    def get_extra_kwargs(self) -> dict[str, Any]:
+        """Mark every column as read-only."""
+        return {name: {"read_only": True} for name in self.Meta.fields}
 
 
 class WarnedDocument(serializers.Serializer[Any]):
@@ -199,23 +249,21 @@ class ArenaSchema(AutoSchema):
 
 
 def operation(
-    summary: str,
+    answers: Any,
     *,
     name: str,
-    answers: Any,
     takes: type[serializers.Serializer[Any]] | None = None,
     query: type[serializers.Serializer[Any]] | None = None,
     status: int = 200,
 ) -> Callable[[Callable[..., Any]], Callable[..., HttpResponseBase]]:
-    """Describe an operation, validate its input, and serialize its result.
+    """Describe an operation by its docstring, validate its input, and serialize its result.
 
     The method gets the validated body or query as `given`. It returns what `answers` serializes,
     beside a list of warnings where workers are involved, or a finished response.
 
     Args:
-        summary: One line for people.
-        name: Operation id.
         answers: Serializer of the answer, `many` where it is a list.
+        name: Operation id.
         takes: Serializer of the body.
         query: Serializer of the address's parameters.
         status: Of a successful answer.
@@ -228,14 +276,14 @@ def operation(
                 path["given"] = validate(takes, request.data)
             elif query is not None:
                 path["given"] = validate(query, request.query_params.dict())
-            found = method(view, request, **path)
-            if isinstance(found, HttpResponseBase):
-                return found
-            row, warnings = found if isinstance(found, tuple) else (found, [])
+            result = method(view, **path)
+            if isinstance(result, HttpResponseBase):
+                return result
+            row, warnings = result if isinstance(result, tuple) else (result, [])
             return Response(answers(row, context={"warnings": warnings}).data, status=status)
 
         described: Callable[..., HttpResponseBase] = extend_schema(
-            summary=summary,
+            **_texts(method),
             request=takes,
             responses={status: answers},
             parameters=[] if query is None else [query],
@@ -244,6 +292,12 @@ def operation(
         return described
 
     return decorate
+
+
+def _texts(method: Callable[..., Any]) -> dict[str, Any]:
+    """Return the first line and the rest of a docstring as summary and description."""
+    summary, _, description = (inspect.getdoc(method) or "").partition("\n\n")
+    return {"summary": summary.rstrip("."), "description": description}
 
 
 def validate(serializer: type[serializers.Serializer[Any]], data: Any) -> dict[str, Any]:
@@ -258,32 +312,29 @@ def validate(serializer: type[serializers.Serializer[Any]], data: Any) -> dict[s
 
 
 def file_operation(
-    summary: str,
-    *,
-    name: str,
-    types: Iterable[str],
-    words: Mapping[str, Iterable[str]] | None = None,
+    *, name: str, types: Iterable[str], words: Mapping[str, Iterable[str]] | None = None
 ) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
-    """Describe an operation that answers with a file.
+    """Describe an operation that answers with a file, by its docstring.
 
     Args:
-        summary: One line for people.
         name: Operation id.
         types: Content types that it can have.
         words: By part of the path, its allowed values.
     """
     parts = [
-        OpenApiParameter(one, OpenApiTypes.STR, OpenApiParameter.PATH, enum=sorted(set(allowed)))
-        for one, allowed in (words or {}).items()
+        OpenApiParameter(part, OpenApiTypes.STR, OpenApiParameter.PATH, enum=sorted(set(allowed)))
+        for part, allowed in (words or {}).items()
     ]
-    kinds = {kind.partition(";")[0] for kind in types}
-    described: Callable[[Callable[..., Any]], Callable[..., Any]] = extend_schema(
-        summary=summary,
-        operation_id=name,
-        parameters=parts,
-        responses={(200, kind): OpenApiTypes.BINARY for kind in sorted(kinds)},
-    )
-    return described
+    kinds = sorted({kind.partition(";")[0] for kind in types})
+    responses = {(200, kind): OpenApiTypes.BINARY for kind in kinds}
+
+    def decorate(method: Callable[..., Any]) -> Callable[..., Any]:
+        described: Callable[..., Any] = extend_schema(
+            **_texts(method), operation_id=name, parameters=parts, responses=responses
+        )(method)
+        return described
+
+    return decorate
 
 
 USUAL, MOST = 100, 500
@@ -312,42 +363,3 @@ def page_of(line: type[serializers.Serializer[Any]]) -> serializers.Serializer[A
             ),
         },
     )
-
-
-def answer_page(
-    request: Request,
-    rows: QuerySet[Row],
-    query: dict[str, Any],
-    line: type[serializers.Serializer[Any]],
-    *,
-    order: str = "-pk",
-    lines: Callable[[Sequence[Row]], Sequence[Any]] = list,
-) -> Response:
-    """Return a page of the rows.
-
-    Args:
-        request: Its address is that of the next page.
-        rows: All rows of the list, unless `query` names values of their columns.
-        query: The validated `PageQuery`; other names in it are columns to filter by.
-        line: Serializer of a row.
-        order: A unique column; a minus before it for descending order.
-        lines: Makes what `line` serializes of all rows of the page at once.
-
-    Raises:
-        ValidationError: No row has the code `after`.
-    """
-    limit, after = query.pop("limit"), query.pop("after", None)
-    column, sign = order.removeprefix("-"), "lt" if order.startswith("-") else "gt"
-    rows = rows.filter(**query).order_by(order)
-    if after is not None:
-        last = rows.filter(code=after).values_list(column, flat=True).first()
-        if last is None:
-            raise ValidationError({"after": ["No row of this list has that code."]})
-        rows = rows.filter(**{f"{column}__{sign}": last})
-    found = list(rows[: limit + 1])
-    shown = found[:limit]
-    body: dict[str, Any] = {"results": line(lines(shown), many=True).data, "next": None}
-    if len(found) > limit:
-        kept = request.query_params.dict() | {"after": str(shown[-1].code)}  # type: ignore[attr-defined]
-        body["next"] = f"{request.path}?{urlencode(kept)}"
-    return Response(body)

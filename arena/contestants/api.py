@@ -11,16 +11,16 @@ from django.http import Http404
 from django.shortcuts import get_object_or_404
 from drf_spectacular.utils import extend_schema_field
 from rest_framework import serializers
-from rest_framework.request import Request
 from rest_framework.response import Response
 
 from arena.api.access import ADMINS, STAFF
 from arena.api.fields import FlagField, StrictSerializer, TextField, WholeNumberField
 from arena.api.views import (
     ApiView,
+    Given,
     PageQuery,
+    RowDocument,
     WarnedDocument,
-    answer_page,
     keep_and_send,
     operation,
     page_of,
@@ -91,28 +91,23 @@ class ContestantsView(ApiView):
 
     readers, writers = STAFF, ADMINS
 
-    @operation(
-        "Contestants by slug",
-        answers=page_of(WholeContestantDocument),
-        query=ContestantQuery,
-        name="listContestants",
-    )
-    def get(self, request: Request, given: dict[str, Any]) -> Response:
-        """Retired ones have a date in `retired_at`."""
+    @operation(page_of(WholeContestantDocument), query=ContestantQuery, name="listContestants")
+    def get(self, given: Given) -> Response:
+        """Contestants by slug.
+
+        Retired ones have a date in `retired_at`.
+        """
         rows = Contestant.objects.exclude(kind=Contestant.Kind.CHECK).select_related("endpoint")
-        return answer_page(
-            request, rows, given, WholeContestantDocument, order="slug", lines=_documents
+        return self.answer_page(
+            rows, given, WholeContestantDocument, order="slug", lines=_documents
         )
 
-    @operation(
-        "Add a contestant that asks a language model",
-        takes=ContestantBody,
-        answers=WholeContestantDocument,
-        status=201,
-        name="createContestant",
-    )
-    def post(self, request: Request, given: dict[str, Any]) -> dict[str, Any]:
-        """The same one twice is one."""
+    @operation(WholeContestantDocument, takes=ContestantBody, status=201, name="createContestant")
+    def post(self, given: Given) -> dict[str, Any]:
+        """Add a contestant that asks a language model.
+
+        The same one twice is one.
+        """
         endpoint = EnteredEndpoint(label=given.pop("endpoint"))
         return _documents([enter_contestant(**given, endpoint=endpoint, actor=self.user)])[0]
 
@@ -124,7 +119,7 @@ def _documents(rows: Sequence[Contestant]) -> list[dict[str, Any]]:
     ]
 
 
-class EndpointDocument(serializers.ModelSerializer[Endpoint]):
+class EndpointDocument(RowDocument[Endpoint]):
     """An endpoint; `key_variable` names an environment variable of the workers."""
 
     class Meta:
@@ -133,7 +128,6 @@ class EndpointDocument(serializers.ModelSerializer[Endpoint]):
             *("code", "label", "base_url", "key_variable", "is_simulated"),
             *("max_concurrency", "requests_per_minute"),
         )
-        read_only_fields = fields
 
 
 class EndpointBody(StrictSerializer):
@@ -155,7 +149,7 @@ class EndpointBody(StrictSerializer):
     )
 
 
-class EndpointModelDocument(serializers.ModelSerializer[EndpointModel]):
+class EndpointModelDocument(RowDocument[EndpointModel]):
     """A model of an endpoint; null or empty is unknown. Prices are for a million tokens."""
 
     endpoint = serializers.CharField(source="endpoint.label")
@@ -168,7 +162,6 @@ class EndpointModelDocument(serializers.ModelSerializer[EndpointModel]):
             *("temperature", "reasoning_effort", "context_tokens", "max_output_tokens"),
             *("price_in_usd", "price_out_usd", "price_as_of", "price_source"),
         )
-        read_only_fields = fields
 
 
 class NewModelBody(StrictSerializer):
@@ -194,7 +187,7 @@ class ProbeLineDocument(serializers.Serializer[Any]):
     cost_usd = serializers.DecimalField(None, 9, allow_null=True)
 
 
-class ProbeDocument(serializers.ModelSerializer[Probe], WarnedDocument):
+class ProbeDocument(RowDocument[Probe], WarnedDocument):
     """A probe with a line for each ability."""
 
     lines = serializers.SerializerMethodField()
@@ -202,7 +195,6 @@ class ProbeDocument(serializers.ModelSerializer[Probe], WarnedDocument):
     class Meta:
         model = Probe
         fields = ("code", "state", "reason", "lines", "created_at", "finished_at", "warnings")
-        read_only_fields = fields
 
     @extend_schema_field(ProbeLineDocument(many=True))
     def get_lines(self, probe: Probe) -> Any:
@@ -215,15 +207,12 @@ class EndpointsView(ApiView):
 
     writers = ADMINS
 
-    @operation(
-        "Add an endpoint",
-        takes=EndpointBody,
-        answers=EndpointDocument,
-        status=201,
-        name="createEndpoint",
-    )
-    def post(self, request: Request, given: dict[str, Any]) -> Endpoint:
-        """409 where the label is taken."""
+    @operation(EndpointDocument, takes=EndpointBody, status=201, name="createEndpoint")
+    def post(self, given: Given) -> Endpoint:
+        """Add an endpoint.
+
+        409 where the label is taken.
+        """
         return known_endpoints.add_endpoint(
             label=given.pop("label"),
             is_simulated=given.pop("is_simulated"),
@@ -237,15 +226,12 @@ class ModelsView(ApiView):
 
     writers = ADMINS
 
-    @operation(
-        "Add a model to an endpoint",
-        takes=NewModelBody,
-        answers=EndpointModelDocument,
-        status=201,
-        name="addModel",
-    )
-    def post(self, request: Request, code: uuid.UUID, given: dict[str, Any]) -> EndpointModel:
-        """Comes with its listed price; all else is unknown before a probe."""
+    @operation(EndpointModelDocument, takes=NewModelBody, status=201, name="addModel")
+    def post(self, code: uuid.UUID, given: Given) -> EndpointModel:
+        """Add a model to an endpoint.
+
+        Comes with its listed price; all else is unknown before a probe.
+        """
         row = get_object_or_404(Endpoint, code=code)
         return known_endpoints.add_model(row, model=given["model"], actor=self.user)
 
@@ -255,17 +241,23 @@ class ProbeView(ApiView):
 
     readers, writers = STAFF, ADMINS
 
-    @operation("The last probe of a model", answers=ProbeDocument, name="getProbe")
-    def get(self, request: Request, code: uuid.UUID) -> Probe:
-        """Line by line while it runs; 404 before the first."""
+    @operation(ProbeDocument, name="getProbe")
+    def get(self, code: uuid.UUID) -> Probe:
+        """The last probe of a model.
+
+        Line by line while it runs; 404 before the first.
+        """
         found = _model(code).probes.first()
         if found is None:
             raise Http404
         return found
 
-    @operation("Have a model probed", answers=ProbeDocument, status=202, name="probeModel")
-    def post(self, request: Request, code: uuid.UUID) -> tuple[Probe, list[str]]:
-        """Poll it until its state is done or failed."""
+    @operation(ProbeDocument, status=202, name="probeModel")
+    def post(self, code: uuid.UUID) -> tuple[Probe, list[str]]:
+        """Have a model probed.
+
+        Poll it until its state is done or failed.
+        """
         return keep_and_send(partial(plan_probe, _model(code), actor=self.user), enqueue_probe)
 
 

@@ -19,9 +19,9 @@ from arena.api.fields import FlagField, StrictSerializer, TextField, WholeNumber
 from arena.api.views import (
     ApiView,
     FileView,
+    Given,
     PageQuery,
     WarnedDocument,
-    answer_page,
     file_operation,
     keep_and_send,
     operation,
@@ -167,20 +167,20 @@ class JobsView(ApiView):
 
     readers, writers = STAFF, ADMINS
 
-    @operation(
-        "Jobs, the youngest first", answers=page_of(JobDocument), query=JobQuery, name="listJobs"
-    )
-    def get(self, request: Request, given: dict[str, Any]) -> Response:
-        """With their counts."""
-        return answer_page(
-            request, GenerationJob.objects.all(), given, JobDocument, lines=count_each
-        )
+    @operation(page_of(JobDocument), query=JobQuery, name="listJobs")
+    def get(self, given: Given) -> Response:
+        """Jobs, the youngest first.
 
-    @operation(
-        "Launch a job", takes=JobBody, answers=ChangedJobDocument, status=201, name="launchJob"
-    )
-    def post(self, request: Request, given: dict[str, Any]) -> tuple[JobCounts, list[str]]:
-        """Workers begin at once."""
+        With their counts.
+        """
+        return self.answer_page(GenerationJob.objects.all(), given, JobDocument, lines=count_each)
+
+    @operation(ChangedJobDocument, takes=JobBody, status=201, name="launchJob")
+    def post(self, given: Given) -> tuple[JobCounts, list[str]]:
+        """Launch a job.
+
+        Workers begin at once.
+        """
         limits = Caps(**{name: given.pop(f"cap_{name}") for name in ("usd", "calls", "tokens")})
         launch = partial(jobs.launch, caps=limits, **given, actor=self.user)
         job, warnings = keep_and_send(launch, enqueue_job)
@@ -192,9 +192,12 @@ class JobView(ApiView):
 
     readers = STAFF
 
-    @operation("A job", answers=JobDocument, name="getJob")
-    def get(self, request: Request, code: uuid.UUID) -> JobCounts:
-        """With its counts."""
+    @operation(JobDocument, name="getJob")
+    def get(self, code: uuid.UUID) -> JobCounts:
+        """A job.
+
+        With its counts.
+        """
         return count_rows(get_object_or_404(GenerationJob, code=code))
 
 
@@ -203,9 +206,12 @@ class JobProgressView(ApiView):
 
     readers = STAFF
 
-    @operation("The progress of a job", answers=ProgressDocument, name="getJobProgress")
-    def get(self, request: Request, code: uuid.UUID) -> JobCounts:
-        """Counts by state, and whether workers are busy with it."""
+    @operation(ProgressDocument, name="getJobProgress")
+    def get(self, code: uuid.UUID) -> JobCounts:
+        """The progress of a job.
+
+        Counts by state, and whether workers are busy with it.
+        """
         return count_rows(get_object_or_404(GenerationJob, code=code))
 
 
@@ -214,11 +220,12 @@ class EstimateView(ApiView):
 
     writers = ADMINS
 
-    @operation(
-        "What a job would use", takes=EstimateBody, answers=EstimateDocument, name="estimateJob"
-    )
-    def post(self, request: Request, given: dict[str, Any]) -> Any:
-        """From recorded calls where there are some, else a guess."""
+    @operation(EstimateDocument, takes=EstimateBody, name="estimateJob")
+    def post(self, given: Given) -> Any:
+        """What a job would use.
+
+        From recorded calls where there are some, else a guess.
+        """
         return estimate(**given)
 
 
@@ -228,7 +235,6 @@ class JobExportView(FileView):
     readers = STAFF
 
     @file_operation(
-        "A table of a job as a file",
         types=[
             one.content_type for table in JOB_TABLES.values() for one in table.formats.values()
         ],
@@ -239,7 +245,10 @@ class JobExportView(FileView):
         },
     )
     def get(self, request: Request, code: uuid.UUID, name: str, form: str) -> HttpResponseBase:
-        """The same bytes as on its page."""
+        """A table of a job as a file.
+
+        The same bytes as on its page.
+        """
         job = get_object_or_404(GenerationJob, code=code)
         if name not in JOB_TABLES:
             raise Http404

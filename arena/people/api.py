@@ -8,11 +8,10 @@ from django.contrib.auth.models import User
 from django.db import transaction
 from django.urls import reverse
 from rest_framework import serializers
-from rest_framework.request import Request
 
 from arena.api.access import ADMINS
 from arena.api.fields import StrictSerializer, TextField
-from arena.api.views import ApiView, operation
+from arena.api.views import ApiView, Given, operation
 from arena.people.links import make_api_token
 from arena.people.queries import ROLES, role_given, role_of
 from arena.people.services import (
@@ -83,18 +82,15 @@ class PeopleView(ApiView):
 
     writers = ADMINS
 
-    @operation(
-        "Make an account and the link that lets its owner in",
-        takes=PersonBody,
-        answers=NewPersonDocument,
-        status=201,
-        name="createPerson",
-    )
-    def post(self, request: Request, given: dict[str, Any]) -> User:
-        """The link is shown this once."""
+    @operation(NewPersonDocument, takes=PersonBody, status=201, name="createPerson")
+    def post(self, given: Given) -> User:
+        """Make an account and the link that lets its owner in.
+
+        The link is shown this once.
+        """
         made = create_person(**given, password=None, actor=self.user)
         path = reverse("welcome", args=[make_welcome_token(made, actor=self.user)])
-        made.link = request.build_absolute_uri(path)  # type: ignore[attr-defined]
+        made.link = self.request.build_absolute_uri(path)  # type: ignore[attr-defined]
         return made
 
 
@@ -104,15 +100,12 @@ class FirstView(ApiView):
     authentication_classes = ()
     permission_classes = ()
 
-    @operation(
-        "Make the first admin by the link that `serve` prints",
-        takes=FirstBody,
-        answers=TokenDocument,
-        status=201,
-        name="makeFirstAdmin",
-    )
-    def post(self, request: Request, given: dict[str, Any]) -> dict[str, Any]:
-        """Answers with a token of the new admin."""
+    @operation(TokenDocument, takes=FirstBody, status=201, name="makeFirstAdmin")
+    def post(self, given: Given) -> dict[str, Any]:
+        """Make the first admin by the link that `serve` prints.
+
+        Answers with a token of the new admin.
+        """
         check_password_strength(given["password"])
         user = make_first_admin(
             token=_end_of(given["link"]), username=given["username"], password=given["password"]
@@ -126,15 +119,12 @@ class WelcomeView(ApiView):
     authentication_classes = ()
     permission_classes = ()
 
-    @operation(
-        "Set the password of an account by its link",
-        takes=WelcomeBody,
-        answers=TokenDocument,
-        status=201,
-        name="acceptWelcome",
-    )
-    def post(self, request: Request, given: dict[str, Any]) -> dict[str, Any]:
-        """Answers with a token of the account, in its role."""
+    @operation(TokenDocument, takes=WelcomeBody, status=201, name="acceptWelcome")
+    def post(self, given: Given) -> dict[str, Any]:
+        """Set the password of an account by its link.
+
+        Answers with a token of the account, in its role.
+        """
         with transaction.atomic():  # the link stays valid where no token can be made
             user = accept_welcome(token=_end_of(given["link"]), password=given["password"])
             return _token(user, "welcome")

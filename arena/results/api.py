@@ -19,23 +19,33 @@ from rest_framework.request import Request
 from arena import tasks
 from arena.api.access import STAFF
 from arena.api.fields import FlagField, StrictSerializer, TextField, WholeNumberField
-from arena.api.views import ApiView, FileView, as_file, file_operation, keep_and_send, operation
+from arena.api.views import (
+    ApiView,
+    FileView,
+    Given,
+    RowDocument,
+    as_file,
+    file_operation,
+    keep_and_send,
+    operation,
+)
 from arena.errors import NoSnapshot
-from arena.exports.bundle import bundle
-from arena.exports.charts.rating import CONTENT_TYPES, chart_bytes
+from arena.exports.files import CONTENT_TYPE as ZIP_TYPE
 from arena.exports.formats import download
-from arena.exports.tables import LeaderboardTable, leaderboard_table
-from arena.exports.votes import VOTE_FORMATS, vote_table
-from arena.exports.writers import FORMATS as LEADERBOARD
-from arena.exports.zips import CONTENT_TYPE as ZIP_TYPE
 from arena.models import Snapshot, Study
 from arena.models.ratings import STORED
 from arena.pairing.order import MAIN, REPEAT
-from arena.queries.studies.results import must_read_results
-from arena.queries.votes.sets import Filters
 from arena.rating.leaderboard import Intervals, Line, Method
 from arena.rating.rules import Unit
-from arena.services.ratings import DEFAULT_ROUNDS, MOST_ROUNDS, is_big, plan_snapshot, rate
+from arena.results.exports.charts import CONTENT_TYPES, chart_bytes
+from arena.results.exports.tables import LeaderboardTable, leaderboard_table
+from arena.results.exports.votes import VOTE_FORMATS, vote_table
+from arena.results.exports.writers import FORMATS as LEADERBOARD
+from arena.results.exports.writers import bundle
+from arena.results.queries.access import must_read_results
+from arena.results.queries.votes import Filters
+from arena.results.services.ratings import DEFAULT_ROUNDS, MOST_ROUNDS, is_big, plan_snapshot
+from arena.results.services.ratings import rate_now as rate
 from arena.studies.api import get_study
 from arena.studies.services.plan import HIGHEST_SEED
 from augment.errors import UnknownName
@@ -83,7 +93,7 @@ class TableDocument(serializers.Serializer[Any]):
         return list(table.warnings)
 
 
-class SnapshotDocument(serializers.ModelSerializer[Snapshot]):
+class SnapshotDocument(RowDocument[Snapshot]):
     """A rating with its table, which is null until it is ready."""
 
     study = serializers.UUIDField(source="study.code")
@@ -101,7 +111,6 @@ class SnapshotDocument(serializers.ModelSerializer[Snapshot]):
             *("seed", "filters", "votes", "votes_sha256", "is_early", "includes_simulated"),
             *("status", "made_at", "table"),
         )
-        read_only_fields = fields
 
     @extend_schema_field(TableDocument(allow_null=True))
     def get_table(self, row: Snapshot) -> Any:
@@ -144,15 +153,12 @@ class SnapshotsView(ApiView):
 
     writers = STAFF
 
-    @operation(
-        "Rate the votes as they are now",
-        takes=SnapshotBody,
-        answers=SnapshotDocument,
-        status=201,
-        name="rateStudy",
-    )
-    def post(self, request: Request, code: uuid.UUID, given: dict[str, Any]) -> Snapshot:
-        """A worker rates large studies: poll the rating until its state is ready."""
+    @operation(SnapshotDocument, takes=SnapshotBody, status=201, name="rateStudy")
+    def post(self, code: uuid.UUID, given: Given) -> Snapshot:
+        """Rate the votes as they are now.
+
+        A worker rates large studies: poll the rating until its state is ready.
+        """
         study = get_study(code)
         must_read_results(user=self.user, study=study)
         wanted = _wanted(given) | {"early": study.state == Study.State.OPEN, "actor": self.user}
@@ -169,9 +175,12 @@ class SnapshotView(ApiView):
 
     readers = STAFF
 
-    @operation("A rating with its table", answers=SnapshotDocument, name="getSnapshot")
-    def get(self, request: Request, code: uuid.UUID) -> Snapshot:
-        """Of an open study only after an early look, which is taken on its page."""
+    @operation(SnapshotDocument, name="getSnapshot")
+    def get(self, code: uuid.UUID) -> Snapshot:
+        """A rating with its table.
+
+        Of an open study only after an early look, which is taken on its page.
+        """
         return get_snapshot(self, code)
 
 
@@ -196,7 +205,6 @@ class SnapshotExportView(FileView):
     readers = STAFF
 
     @file_operation(
-        "A rating as a file",
         types=[
             *(one.content_type for one in LEADERBOARD.values()),
             *(one.content_type for one in VOTE_FORMATS.values()),
@@ -210,7 +218,10 @@ class SnapshotExportView(FileView):
         },
     )
     def get(self, request: Request, code: uuid.UUID, name: str, form: str) -> HttpResponseBase:
-        """Its table, votes, a chart, or all of them in a zip."""
+        """A rating as a file.
+
+        Its table, votes, a chart, or all of them in a zip.
+        """
         snapshot = get_snapshot(self, code)
         if snapshot.state != Snapshot.State.READY:
             raise NoSnapshot("This rating is not ready.")

@@ -18,9 +18,10 @@ from arena.api.access import STAFF
 from arena.api.fields import FlagField, StrictSerializer, TextField, WholeNumberField
 from arena.api.views import (
     ApiView,
+    Given,
     PageQuery,
+    RowDocument,
     WarnedDocument,
-    answer_page,
     keep_and_send,
     operation,
     page_of,
@@ -54,7 +55,7 @@ class ScenarioQuery(PageQuery):
     slug = serializers.CharField(max_length=80, required=False)
 
 
-class ScenarioDocument(serializers.ModelSerializer[Scenario]):
+class ScenarioDocument(RowDocument[Scenario]):
     """A scenario of a list."""
 
     set = serializers.CharField(source="catalogue_set")
@@ -66,7 +67,6 @@ class ScenarioDocument(serializers.ModelSerializer[Scenario]):
         fields: tuple[str, ...] = (
             *("code", "slug", "type", "set", "instruction", "scene", "has_reference"),
         )
-        read_only_fields = fields
 
 
 class NewScenarioDocument(ScenarioDocument, WarnedDocument):
@@ -82,7 +82,6 @@ class NewScenarioDocument(ScenarioDocument, WarnedDocument):
             *ScenarioDocument.Meta.fields,
             *("reference", "intent", "keep_traffic", "density", "goal", "warnings"),
         )
-        read_only_fields = fields
 
 
 class ScenarioBody(StrictSerializer):
@@ -118,29 +117,24 @@ class ScenariosView(ApiView):
 
     readers = writers = STAFF
 
-    @operation(
-        "Scenarios by slug",
-        answers=page_of(ScenarioDocument),
-        query=ScenarioQuery,
-        name="listScenarios",
-    )
-    def get(self, request: Request, given: dict[str, Any]) -> Response:
-        """Without their scenes, references and intents."""
+    @operation(page_of(ScenarioDocument), query=ScenarioQuery, name="listScenarios")
+    def get(self, given: Given) -> Response:
+        """Scenarios by slug.
+
+        Without their scenes, references and intents.
+        """
         if "set" in given:
             chosen = given.pop("set")
             given["catalogue_set"] = "" if chosen == OWN else chosen
         rows = _scenarios().defer("reference", "intent")
-        return answer_page(request, rows, given, ScenarioDocument, order="slug")
+        return self.answer_page(rows, given, ScenarioDocument, order="slug")
 
-    @operation(
-        "Add a scenario",
-        takes=ScenarioBody,
-        answers=NewScenarioDocument,
-        status=201,
-        name="addScenario",
-    )
-    def post(self, request: Request, given: dict[str, Any]) -> tuple[Scenario, list[str]]:
-        """A worker draws it."""
+    @operation(NewScenarioDocument, takes=ScenarioBody, status=201, name="addScenario")
+    def post(self, given: Given) -> tuple[Scenario, list[str]]:
+        """Add a scenario.
+
+        A worker draws it.
+        """
         circumstances = read_circumstances(given.pop("density"), given.pop("goal"))
         add = partial(add_scenario, **given, circumstances=circumstances, actor=self.user)
         row, warnings = keep_and_send(add, enqueue_scenario)
@@ -197,7 +191,7 @@ class RecordingPartDocument(serializers.Serializer[Any]):
     stops = StopDocument(many=True)
 
 
-class UploadDocument(serializers.ModelSerializer[SceneUpload], WarnedDocument):
+class UploadDocument(RowDocument[SceneUpload], WarnedDocument):
     """A recording, and once it is read the moments that it offers."""
 
     tracks = RecordingPartDocument(many=True, read_only=True)
@@ -208,10 +202,9 @@ class UploadDocument(serializers.ModelSerializer[SceneUpload], WarnedDocument):
             *("code", "name", "size_bytes", "digest", "state", "reason", "format", "is_cut"),
             *("created_at", "finished_at", "tracks", "warnings"),
         )
-        read_only_fields = fields
 
 
-class MomentDocument(serializers.ModelSerializer[UploadMoment], WarnedDocument):
+class MomentDocument(RowDocument[UploadMoment], WarnedDocument):
     """A moment of a recording, with a report of what is in it."""
 
     upload = serializers.UUIDField(source="upload.code")
@@ -225,7 +218,6 @@ class MomentDocument(serializers.ModelSerializer[UploadMoment], WarnedDocument):
             *("code", "upload", "item", "frame", "state", "reason", "report"),
             *("notes", "scene", "warnings"),
         )
-        read_only_fields = fields
 
     def get_notes(self, row: UploadMoment) -> list[str]:
         """Return them as sentences."""
@@ -245,15 +237,12 @@ class UploadsView(ApiView):
         if was_too_large(request.META):
             raise RequestDataTooBig
 
-    @operation(
-        "Send a recording; a worker reads it",
-        takes=UploadBody,
-        answers=UploadDocument,
-        status=202,
-        name="sendRecording",
-    )
-    def post(self, request: Request, given: dict[str, Any]) -> tuple[SceneUpload, list[str]]:
-        """Poll it until its state is read or failed."""
+    @operation(UploadDocument, takes=UploadBody, status=202, name="sendRecording")
+    def post(self, given: Given) -> tuple[SceneUpload, list[str]]:
+        """Send a recording; a worker reads it.
+
+        Poll it until its state is read or failed.
+        """
         file, source = given["file"], given["format"]
         keep = partial(uploads.keep_upload, name=file.name or "", content=file, source=source)
         return keep_and_send(partial(keep, actor=self.user), enqueue_upload)
@@ -264,9 +253,12 @@ class UploadView(ApiView):
 
     readers = STAFF
 
-    @operation("A recording that was sent", answers=UploadDocument, name="getUpload")
-    def get(self, request: Request, code: uuid.UUID) -> SceneUpload:
-        """With the moments that it offers, once it is read."""
+    @operation(UploadDocument, name="getUpload")
+    def get(self, code: uuid.UUID) -> SceneUpload:
+        """A recording that was sent.
+
+        With the moments that it offers, once it is read.
+        """
         return get_object_or_404(SceneUpload, code=code)
 
 
@@ -275,17 +267,12 @@ class MomentsView(ApiView):
 
     writers = STAFF
 
-    @operation(
-        "Have a moment of a recording drawn",
-        takes=MomentBody,
-        answers=MomentDocument,
-        status=202,
-        name="showMoment",
-    )
-    def post(
-        self, request: Request, code: uuid.UUID, given: dict[str, Any]
-    ) -> tuple[UploadMoment, list[str]]:
-        """The same one twice is one; poll it until it is drawn."""
+    @operation(MomentDocument, takes=MomentBody, status=202, name="showMoment")
+    def post(self, code: uuid.UUID, given: Given) -> tuple[UploadMoment, list[str]]:
+        """Have a moment of a recording drawn.
+
+        The same one twice is one; poll it until it is drawn.
+        """
         upload = get_object_or_404(SceneUpload, code=code)
         is_new = False
 
@@ -306,9 +293,12 @@ class MomentView(ApiView):
 
     readers = STAFF
 
-    @operation("A moment of a recording", answers=MomentDocument, name="getMoment")
-    def get(self, request: Request, code: uuid.UUID) -> UploadMoment:
-        """With a report of what is in it."""
+    @operation(MomentDocument, name="getMoment")
+    def get(self, code: uuid.UUID) -> UploadMoment:
+        """A moment of a recording.
+
+        With a report of what is in it.
+        """
         return _find_moment(code)
 
 
@@ -317,17 +307,12 @@ class KeepMomentView(ApiView):
 
     writers = STAFF
 
-    @operation(
-        "Have a drawn moment kept as a scene",
-        takes=KeepBody,
-        answers=MomentDocument,
-        status=202,
-        name="keepMoment",
-    )
-    def post(
-        self, request: Request, code: uuid.UUID, given: dict[str, Any]
-    ) -> tuple[UploadMoment, list[str]]:
-        """Poll it until its state is kept; `scene` then names the scene."""
+    @operation(MomentDocument, takes=KeepBody, status=202, name="keepMoment")
+    def post(self, code: uuid.UUID, given: Given) -> tuple[UploadMoment, list[str]]:
+        """Have a drawn moment kept as a scene.
+
+        Poll it until its state is kept; `scene` then names the scene.
+        """
 
         def ask() -> UploadMoment:
             upload_moments.ask_to_keep(_find_moment(code), slug=given["slug"], actor=self.user)

@@ -7,12 +7,11 @@ from typing import Any
 
 from django.shortcuts import get_object_or_404
 from rest_framework import serializers
-from rest_framework.request import Request
 from rest_framework.response import Response
 
 from arena.api.access import ADMINS, EXPERTS, STAFF
 from arena.api.fields import Field, StrictSerializer, body_field
-from arena.api.views import ApiView, PageQuery, answer_page, operation, page_of
+from arena.api.views import ApiView, Given, PageQuery, operation, page_of
 from arena.models import Study
 from arena.people.queries import role_of
 from arena.studies.queries import StudyProgress, of_these, studies_seen_by
@@ -84,33 +83,27 @@ class StudiesView(ApiView):
 
     readers, writers = (*STAFF, *EXPERTS), ADMINS
 
-    @operation(
-        "Studies, the youngest first",
-        answers=page_of(StudyDocument),
-        query=StudyQuery,
-        name="listStudies",
-    )
-    def get(self, request: Request, given: dict[str, Any]) -> Response:
-        """An expert gets their own with their own progress, staff all with everybody's."""
+    @operation(page_of(StudyDocument), query=StudyQuery, name="listStudies")
+    def get(self, given: Given) -> Response:
+        """Studies, the youngest first.
+
+        An expert gets their own with their own progress, staff all with everybody's.
+        """
         is_staff = role_of(self.user) in STAFF
         expert = None if is_staff else self.user
-        return answer_page(
-            request,
+        return self.answer_page(
             studies_seen_by(self.user, is_staff=is_staff),
             given,
             StudyDocument,
             lines=lambda page: of_these(page, expert=expert),
         )
 
-    @operation(
-        "Plan a study and open it",
-        takes=StudyBody,
-        answers=WholeStudyDocument,
-        status=201,
-        name="openStudy",
-    )
-    def post(self, request: Request, given: dict[str, Any]) -> StudyProgress:
-        """Its experts can vote at once."""
+    @operation(WholeStudyDocument, takes=StudyBody, status=201, name="openStudy")
+    def post(self, given: Given) -> StudyProgress:
+        """Plan a study and open it.
+
+        Its experts can vote at once.
+        """
         return _progress(open_study(StudyPlan.read(given), actor=self.user))
 
 
@@ -119,9 +112,12 @@ class StudyView(ApiView):
 
     readers = STAFF
 
-    @operation("A study", answers=WholeStudyDocument, name="getStudy")
-    def get(self, request: Request, code: uuid.UUID) -> StudyProgress:
-        """With its participants."""
+    @operation(WholeStudyDocument, name="getStudy")
+    def get(self, code: uuid.UUID) -> StudyProgress:
+        """A study.
+
+        With its participants.
+        """
         return _progress(get_study(code))
 
 
@@ -130,9 +126,12 @@ class CloseStudyView(ApiView):
 
     writers = ADMINS
 
-    @operation("Close a study", answers=WholeStudyDocument, name="closeStudy")
-    def post(self, request: Request, code: uuid.UUID) -> StudyProgress:
-        """Ends voting for good. Twice changes nothing."""
+    @operation(WholeStudyDocument, name="closeStudy")
+    def post(self, code: uuid.UUID) -> StudyProgress:
+        """Close a study.
+
+        Ends voting for good. Twice changes nothing.
+        """
         return _progress(close_study(study=get_study(code), actor=self.user))
 
 

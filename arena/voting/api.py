@@ -22,16 +22,15 @@ from arena.api.fields import (
     TextField,
     WholeNumberField,
 )
-from arena.api.views import ApiView, FileView, file_operation, operation
+from arena.api.views import ApiView, FileView, Given, file_operation, operation
 from arena.errors import StudyNotOpen
 from arena.models import AIDS, OUTCOME_LETTERS, Matchup, Report, Study, Vote
 from arena.people.services import keep_voting
-from arena.queries.voting.showings import as_shown, picture_shown
-from arena.services.decisions import LONGEST_COMMENT, decision_of
-from arena.services.votes import receive_vote
 from arena.studies.queries import voting_study
 from arena.studies.services.experts import SIDES, Complaint, report
 from arena.studies.services.planning import next_pairs
+from arena.voting.queries.showings import as_shown, picture_shown
+from arena.voting.services.casting import LONGEST_COMMENT, decision_of, receive_vote
 
 PNG = "image/png"
 OUTCOMES = {letter: outcome for outcome, letter in OUTCOME_LETTERS.items()}
@@ -159,14 +158,12 @@ class MatchupsView(ApiView):
     readers = EXPERTS
     is_never_cached = True
 
-    @operation(
-        "The next pairs of the expert who asks",
-        answers=MatchupDocument(many=True),
-        query=MatchupsQuery,
-        name="listMatchups",
-    )
-    def get(self, request: Request, given: dict[str, Any]) -> Response:
-        """An empty list when all is done."""
+    @operation(MatchupDocument(many=True), query=MatchupsQuery, name="listMatchups")
+    def get(self, given: Given) -> Response:
+        """The next pairs of the expert who asks.
+
+        An empty list when all is done.
+        """
         study = voting_study(expert=self.user, code=given["study"])
         if study.state != Study.State.OPEN:
             raise StudyNotOpen(f"The study {study.name!r} takes no votes: it is {study.state}.")
@@ -180,9 +177,12 @@ class VotesView(ApiView):
     writers = EXPERTS
     is_never_cached = True
 
-    @operation("Vote", takes=VoteBody, answers=ReceivedDocument, name="vote")
-    def post(self, request: Request, given: dict[str, Any]) -> Response:
-        """The same key counts once, however often it arrives."""
+    @operation(ReceivedDocument, takes=VoteBody, name="vote")
+    def post(self, given: Given) -> Response:
+        """Vote.
+
+        The same key counts once, however often it arrives.
+        """
         n, outcome = given.pop("n"), OUTCOMES[given.pop("outcome")]
         decision = decision_of(matchup_code=given.pop("matchup"), outcome=outcome, **given)
         received = receive_vote(expert=self.user, decision=decision, ahead=n)
@@ -206,14 +206,12 @@ class ReportsView(ApiView):
 
     writers = EXPERTS
 
-    @operation(
-        "Report that something is wrong with a pair",
-        takes=ReportBody,
-        answers=SavedDocument,
-        name="report",
-    )
-    def post(self, request: Request, given: dict[str, Any]) -> dict[str, bool]:
-        """The same key counts once, however often it arrives."""
+    @operation(SavedDocument, takes=ReportBody, name="report")
+    def post(self, given: Given) -> dict[str, bool]:
+        """Report that something is wrong with a pair.
+
+        The same key counts once, however often it arrives.
+        """
         mark = given["mark"]
         said = Complaint(
             reason=given["reason"],
@@ -230,14 +228,12 @@ class PreferencesView(ApiView):
 
     permission_classes = (IsAuthenticated,)
 
-    @operation(
-        "Keep voting preferences",
-        takes=PreferencesBody,
-        answers=PreferencesDocument,
-        name="keepPreferences",
-    )
-    def post(self, request: Request, given: dict[str, Any]) -> Any:
-        """Answers with all of them."""
+    @operation(PreferencesDocument, takes=PreferencesBody, name="keepPreferences")
+    def post(self, given: Given) -> Any:
+        """Keep voting preferences.
+
+        Answers with all of them.
+        """
         keys = given.pop("keys", None)
         return keep_voting(user=self.user, switches=given, keys=keys).as_json()
 
@@ -248,9 +244,12 @@ class ShownPictureView(FileView):
     readers = (*EXPERTS, *ADMINS)
     is_never_cached = True
 
-    @file_operation("A picture of a pair", types=[PNG], name="getShownPicture")
+    @file_operation(types=[PNG], name="getShownPicture")
     def get(self, request: Request, token: str) -> HttpResponseBase:
-        """Has neither a name nor an ETag, which would show which pictures are the same."""
+        """A picture of a pair.
+
+        Has neither a name nor an ETag, which would show which pictures are the same.
+        """
         name = picture_shown(user=self.user, token=token)
         if not name or not default_storage.exists(name):
             raise Http404

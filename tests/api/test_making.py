@@ -37,12 +37,12 @@ def sent(monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, int]]:
     """Messages to the workers, as task and key; nobody takes them but the test."""
     found: list[tuple[str, int]] = []
     for place, name in (
-        ("uploads", "enqueue_upload"),
-        ("uploads", "enqueue_moment"),
+        ("scenarios", "enqueue_upload"),
+        ("scenarios", "enqueue_moment"),
         ("scenarios", "enqueue_scenario"),
-        ("endpoints", "enqueue_probe"),
+        ("contestants", "enqueue_probe"),
     ):
-        monkeypatch.setattr(f"arena.api.{place}.{name}", _noting(found, name))
+        monkeypatch.setattr(f"arena.{place}.api.{name}", _noting(found, name))
     monkeypatch.setattr("arena.api.views.transaction.on_commit", lambda done: done())
     return found
 
