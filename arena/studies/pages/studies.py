@@ -19,7 +19,7 @@ from django.views.decorators.http import require_http_methods, require_POST, req
 from arena import tasks
 from arena.models import Report, Study, StudyFile
 from arena.people.queries import by_pseudonym, experts
-from arena.results.pages.ratings import rate_or_send
+from arena.results.pages.rating_form import rate_or_send
 from arena.results.queries.access import ResultsAccess, latest_snapshot, results_access
 from arena.results.queries.votes import is_imported
 from arena.results.services.written_files import (
