@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from django.db.models import Count, QuerySet
+from django.db.models import Case, Count, IntegerField, QuerySet, Value, When
 
 from augment.models import Augmentation, BaseScene, Contestant, Scenario, SceneUpload
 from augment.services.scenarios.scenes import type_choices
@@ -40,12 +40,34 @@ def by_type(chosen: str = "", *, with_paraphrases: bool = True) -> list[TypeGrou
         found = found.filter(catalogue_set="" if chosen == OWN else chosen)
     if not with_paraphrases:
         found = found.filter(paraphrase_of=None)
-    rows = list(found)
+    return group_by_type(list(found))
+
+
+def group_by_type(rows: list[Scenario]) -> list[TypeGroup]:
+    """Return rows in groups, in the order of the types."""
     groups = [
         TypeGroup(type=name, label=label, scenarios=[row for row in rows if row.type == name])
         for name, label in type_choices()
     ]
     return [group for group in groups if group.scenarios]
+
+
+def listed_scenarios(chosen: str, *, is_retired: bool) -> QuerySet[Scenario]:
+    """Return scenarios in the order of the types, without paraphrases and documents.
+
+    Args:
+        chosen: A set of the catalogue, `own` for those in none; empty for all.
+        is_retired: Those that forms offer no more, instead of the others.
+    """
+    rows = Scenario.objects.filter(paraphrase_of=None, retired_at__isnull=not is_retired)
+    if chosen:
+        rows = rows.filter(catalogue_set="" if chosen == OWN else chosen)
+    places = [When(type=name, then=Value(n)) for n, (name, _) in enumerate(type_choices())]
+    place = Case(*places, default=Value(len(places)), output_field=IntegerField())
+    lean = rows.select_related("base_scene").defer(
+        "reference", "base_scene__document", "base_scene__recording"
+    )
+    return lean.alias(place=place).order_by("place", "slug")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -19,7 +19,7 @@ from augment.metrics.displacement import displacement
 from augment.variants.pipeline import Outcome, OutcomeStatus, run
 from augment.variants.recipes import RECIPES, Tools, find_recipe
 from augment.variants.respondents import MemoryTranscript, RespondentClient
-from tests.baselines.test_rule_placer_catalogue import placed
+from tests.baselines.test_rule_placer import placed
 from tests.fixtures.shelf import SLUGS, entry, shown_scene
 from tests.intents import intents
 
@@ -120,14 +120,6 @@ def test_a_low_rating_costs_one_more_round(server: FakeServer, variant: str, slu
     outcome, transcript = played(server, "fake-qa-low", variant, slug)
     assert (order(transcript), outcome.is_accepted) == (CALLS_OF_LOW[variant], True)
     _is_where_it_belongs(outcome, slug)
-
-
-@pytest.mark.parametrize("slug", SLUGS[::10])
-def test_native_calls_place_as_calls_in_the_answer_do(server: FakeServer, slug: str) -> None:
-    written, _ = played(server, "fake-good", "fc", slug)
-    native, transcript = played(server, "fake-good", "fc", slug, native=True)
-    assert order(transcript) == "mm"
-    assert native.modification == written.modification
 
 
 def _is_complete(

@@ -12,10 +12,10 @@ from django.shortcuts import get_object_or_404, redirect, render
 from django.urls import reverse
 from django.views.decorators.http import require_POST, require_safe
 
-from arena.exports.tables import LeaderboardTable
 from arena.jobs.exports.driving import FORMATS, SCORE_LABELS, DrivingTable, driving_table
 from arena.jobs.queries import DRIVES, Part, before_of, drive_cells, shown_augmentations
 from arena.models import Snapshot
+from arena.results.exports.tables import LeaderboardTable
 from arena.site.access import ADMIN, STAFF, allow_only
 from arena.site.acts import refusals_told, send_later
 from arena.site.listing import choice_asked, page_asked

@@ -23,8 +23,8 @@ from django.utils.text import slugify
 from django.views.decorators.http import require_POST, require_safe
 
 from arena import tasks
+from arena.exports.files import CONTENT_TYPE
 from arena.exports.formats import download
-from arena.exports.zips import CONTENT_TYPE
 from arena.jobs.exports import displacement_files, driving
 from arena.jobs.exports.displacement import DisplacementTable, displacement_table
 from arena.jobs.exports.files import TRANSCRIPT_FORMATS, transcript_lines
