@@ -20,6 +20,7 @@ from arena.rating.comparisons import (
     Comparisons,
     FloatArray,
     IntArray,
+    count_wins,
     select_votes,
 )
 from arena.rating.leaderboard import Leaderboard, rate
