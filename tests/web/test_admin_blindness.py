@@ -14,7 +14,7 @@ from arena.models import Matchup, Snapshot, Standing, Study, Vote
 from arena.results.services.ratings import open_early
 from arena.results.services.ratings import rate_now as rate
 from arena.studies.services.opening import close_study
-from augment.models import Augmentation, Contestant
+from augment.models import Contestant
 from tests import study_rows
 from tests.web.cast import people, signed_in, world
 
@@ -82,9 +82,6 @@ def test_a_clerk_with_rights_but_no_role_sees_none_either() -> None:
 @pytest.mark.parametrize(
     ("model", "asked"),
     [
-        (Augmentation, {"wins__isnull": "0"}),
-        (Augmentation, {"wins__outcome": "left"}),
-        (Augmentation, {"shown_left__votes__outcome": "left"}),
         (Contestant, {"standings__rank": "1"}),
         (Contestant, {"standings__rating__gt": "1000"}),
         (Study, {"snapshots__votes_counted__gt": "1"}),
