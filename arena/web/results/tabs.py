@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from arena.exports.tables import LeaderboardTable
-from arena.jobs.pages.driving import driving
+from arena.jobs.pages.measures import driving
 from arena.models import Snapshot
 from arena.queries.studies.results import log_of, names_in_log, snapshots_of
 from arena.web.results.cost import cost, displacement
