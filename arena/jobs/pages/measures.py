@@ -22,9 +22,8 @@ from django.utils.text import slugify
 from django.views.decorators.http import require_POST, require_safe
 
 from arena import tasks
+from arena.exports.files import CONTENT_TYPE
 from arena.exports.formats import download
-from arena.exports.tables import LeaderboardTable
-from arena.exports.zips import CONTENT_TYPE
 from arena.jobs.exports import displacement_files
 from arena.jobs.exports import driving as driving_exports
 from arena.jobs.exports.displacement import DisplacementTable, displacement_table
@@ -42,6 +41,7 @@ from arena.jobs.queries import (
 )
 from arena.jobs.services import ask_for_file
 from arena.models import ScenarioFile, Snapshot
+from arena.results.exports.tables import LeaderboardTable
 from arena.site.access import ADMIN, STAFF, allow_only, user_of
 from arena.site.acts import refusals_told, send_later
 from arena.site.listing import choice_asked, page_asked
