@@ -19,7 +19,7 @@ from pathlib import Path
 
 import numpy as np
 
-from arena.pairing.adaptive import draw_units, ratings_so_far
+from arena.pairing.later import draw_units, ratings_so_far
 from arena.pairing.plan import Entry, PlanRules, plan
 from arena.pairing.rules import Grid, grid_of
 from arena.rating.comparisons import LOSS, TIE, WIN, Comparisons, FloatArray, IntArray, PairCounts

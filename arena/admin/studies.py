@@ -1,7 +1,7 @@
 """Studies and what came of them in Django's admin, to be read alone.
 
 What an open study has brought so far is shown to those alone who opened its results early on its
-own page, which the log keeps: see arena.services.early_looks.
+own page, which the log keeps: see arena.results.services.ratings.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from arena.models import (
     Study,
     Vote,
 )
-from arena.queries.studies.results import unread_studies
+from arena.results.queries.access import unread_studies
 from arena.site.access import user_of
 
 

@@ -1,22 +1,23 @@
-"""Plans that are made while votes come in: who judges which unit.
+"""Plans that are made while votes come in: who judges which unit, and in which order.
 
-Used for an expert whose remaining pairs are handed over, and for the adaptive part. Both are pure
-functions of what is planned so far and of a generator.
+For an expert whose remaining pairs are handed over, for somebody who joins, and for the adaptive
+part. All are pure functions of what is planned so far and of a generator.
 
-Notation: P pairs, S scenarios.
+Notation: P pairs, S scenarios, C contestants. Ratings are in logits.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import math
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from arena.errors import NothingToPlan
-from arena.pairing.arrays import IntArray
-from arena.pairing.order import MAIN
-from arena.pairing.rules import Grid, PlannedMatchup
+from arena.pairing.order import CHECK, MAIN, REPEAT, BoolArray, FloatArray, IntArray
+from arena.pairing.rules import Grid, PlannedMatchup, PlanRules
 
 Unit = tuple[int, int]
 """A row and a column of the grid: a pair on a scenario."""
@@ -30,15 +31,19 @@ class Wanted:
     scenario: int
     chance: float
 
+    @property
+    def unit(self) -> Unit:
+        """Pair and scenario."""
+        return self.pair, self.scenario
+
 
 def units_of(grid: Grid, showings: Sequence[PlannedMatchup]) -> list[Wanted]:
-    """The units of the main showings."""
-    pairs = {frozenset(pair): row for row, pair in enumerate(grid.pairs)}
-    places = {scenario: column for column, scenario in enumerate(grid.scenarios)}
+    """Return the units of the main showings."""
+    rows, columns = grid.row_of_pair, grid.column_of_scenario
     return [
         Wanted(
-            pair=pairs[frozenset((showing.left, showing.right))],
-            scenario=places[showing.scenario],
+            pair=rows[frozenset((showing.left, showing.right))],
+            scenario=columns[showing.scenario],
             chance=showing.draw_probability,
         )
         for showing in showings
@@ -47,11 +52,11 @@ def units_of(grid: Grid, showings: Sequence[PlannedMatchup]) -> list[Wanted]:
 
 
 def judges(grid: Grid, so_far: Mapping[str, Sequence[PlannedMatchup]]) -> IntArray:
-    """How many experts are to judge each unit (P, S)."""
+    """Return how many experts are to judge each unit (P, S)."""
     counts = np.zeros(grid.showable.shape, dtype=np.int64)
     for showings in so_far.values():
-        for unit in units_of(grid, showings):
-            counts[unit.pair, unit.scenario] += 1
+        for wanted in units_of(grid, showings):
+            counts[wanted.unit] += 1
     return counts
 
 
@@ -77,42 +82,420 @@ def deal(
     Raises:
         NothingToPlan: A pair has no scenario left for any of them.
     """
-    known = {name: {(u.pair, u.scenario) for u in units_of(grid, so_far[name])} for name in to}
+    known = {name: {wanted.unit for wanted in units_of(grid, so_far[name])} for name in to}
     counts = judges(grid, so_far)
     dealt: dict[str, list[Wanted]] = {name: [] for name in to}
     for index in rng.permutation(len(units)):
-        unit = units[index]
+        wanted = units[index]
         order = sorted(to, key=lambda name: (len(dealt[name]), rng.random()))
-        fits = [name for name in order if (unit.pair, unit.scenario) not in known[name]]
+        fits = [name for name in order if wanted.unit not in known[name]]
         taker, scenario = (
-            (fits[0], unit.scenario) if fits else _elsewhere(grid, counts, known, order, unit, rng)
+            (fits[0], wanted.scenario)
+            if fits
+            else _find_elsewhere(grid, counts, known, order, wanted, rng)
         )
-        dealt[taker].append(Wanted(pair=unit.pair, scenario=scenario, chance=unit.chance))
-        known[taker].add((unit.pair, scenario))
+        dealt[taker].append(Wanted(pair=wanted.pair, scenario=scenario, chance=wanted.chance))
+        known[taker].add((wanted.pair, scenario))
     return dealt
 
 
-def _elsewhere(
+def _find_elsewhere(
     grid: Grid,
     counts: IntArray,
     known: Mapping[str, set[Unit]],
     order: Sequence[str],
-    unit: Wanted,
+    wanted: Wanted,
     rng: np.random.Generator,
 ) -> tuple[str, int]:
-    """Who judges the pair on which other scenario."""
+    """Return who judges the pair on which other scenario."""
     for name in order:
         free = [
             int(column)
-            for column in rng.permutation(np.flatnonzero(grid.showable[unit.pair]))
-            if (unit.pair, int(column)) not in known[name]
+            for column in rng.permutation(np.flatnonzero(grid.showable[wanted.pair]))
+            if (wanted.pair, int(column)) not in known[name]
         ]
         if free:
-            best = min(free, key=lambda column: counts[unit.pair, column])
-            counts[unit.pair, best] += 1
+            best = min(free, key=lambda column: counts[wanted.pair, column])
+            counts[wanted.pair, best] += 1
             return name, best
-    first, second = grid.pairs[unit.pair]
+    first, second = grid.pairs[wanted.pair]
     raise NothingToPlan(
         f"Everybody who could take over has judged {first} against {second} on every "
         "scenario. Hand over to more experts."
     )
+
+
+# --- Units one after the other -------------------------------------------------------------------
+
+
+Chances = Callable[[IntArray, IntArray], FloatArray]
+"""(n,) how likely each of these pairs (n,) is drawn next, by the judges of each unit (P, S)."""
+
+
+def choose_for_newcomer(
+    grid: Grid, judges: IntArray, count: int, rng: np.random.Generator
+) -> list[Wanted]:
+    """Choose units for somebody who joins, so that pairs and scenarios stay as equal as they can.
+
+    Of the pairs that come least in this choice one of those that are planned least so far.
+
+    Args:
+        grid: What can be shown.
+        judges: (P, S) how many experts have each unit.
+        count: How many; fewer where there are not so many units.
+        rng: The lots.
+    """
+    before = judges.sum(axis=1)
+
+    def chances(pairs: IntArray, counts: IntArray) -> FloatArray:
+        planned = counts.sum(axis=1)
+        best = _least((planned - before)[pairs], planned[pairs])
+        return np.where(np.isin(np.arange(len(pairs)), best), 1.0 / len(best), 0.0)
+
+    return _draw(grid.showable, judges, count, chances, lambda pair: None, rng)
+
+
+def _draw(
+    free: BoolArray,
+    judges: IntArray,
+    count: int,
+    chances: Chances,
+    after_each: Callable[[int], None],
+    rng: np.random.Generator,
+) -> list[Wanted]:
+    """Draw units (P, S) one after the other: a pair by its chance, then one of its scenarios.
+
+    That is one of those with the fewest judges of the pair, of these one that comes least in this
+    draw, then one that is planned least over all pairs.
+    """
+    free, counts = free.copy(), judges.copy()
+    used = np.zeros(free.shape[1], dtype=np.int64)
+    drawn: list[Wanted] = []
+    while len(drawn) < count and free.any():
+        pairs = np.flatnonzero(free.any(axis=1))
+        chance = chances(pairs, counts)
+        place = int(rng.choice(len(pairs), p=chance / chance.sum()))
+        pair = int(pairs[place])
+        open_ = np.flatnonzero(free[pair])
+        fewest = open_[_least(counts[pair, open_], used[open_], counts[:, open_].sum(axis=0))]
+        scenario = int(rng.choice(fewest))
+        drawn.append(
+            Wanted(pair=pair, scenario=scenario, chance=float(chance[place]) / len(fewest))
+        )
+        free[pair, scenario] = False
+        counts[pair, scenario] += 1
+        used[scenario] += 1
+        after_each(pair)
+    return drawn
+
+
+def _least(*keys: IntArray) -> IntArray:
+    """Return where the first key is least, among those where the second is, and so on."""
+    left = np.arange(len(keys[0]))
+    for key in keys:
+        left = left[key[left] == key[left].min()]
+    return left
+
+
+# --- The adaptive part ---------------------------------------------------------------------------
+
+
+PRIOR_SD = 200.0 * math.log(10.0) / 400.0
+NEWTON_STEPS = 50
+
+
+def contestants_of(grid: Grid) -> list[str]:
+    """Return the order of rows and columns of ratings and covariance."""
+    return sorted({name for pair in grid.pairs for name in pair})
+
+
+def ratings_so_far(scores: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return ratings (C,) and their covariance (C, C) by the votes so far and a prior.
+
+    The prior has a standard deviation of 200 points of the Elo scale.
+
+    Args:
+        scores: (C, C) what the row scored against the column: a win 1, a tie one half.
+    """
+    votes = scores + scores.T
+    prior = np.eye(len(scores)) / PRIOR_SD**2
+    ratings = np.zeros(len(scores))
+    for _ in range(NEWTON_STEPS):
+        expected = 1.0 / (1.0 + np.exp(ratings[None, :] - ratings[:, None]))
+        slope = (scores - votes * expected).sum(axis=1) - ratings / PRIOR_SD**2
+        weight = votes * expected * (1.0 - expected)
+        information = np.diag(weight.sum(axis=1)) - weight + prior
+        step = np.linalg.solve(information, slope)
+        ratings += step
+        if np.abs(step).max() < 1e-10:
+            break
+    return ratings, np.asarray(np.linalg.inv(information), dtype=np.float64)
+
+
+def gains(
+    pairs: Sequence[tuple[int, int]], ratings: FloatArray, covariance: FloatArray
+) -> FloatArray:
+    """Return by how much a vote on each pair (P,) shrinks the trace of the covariance."""
+    first, second = np.array(pairs).T
+    weight, along, spread = _vote_on(first, second, ratings, covariance)
+    return np.asarray(weight * (along**2).sum(axis=0) / (1.0 + weight * spread))
+
+
+def draw_units(
+    grid: Grid,
+    known: set[Unit],
+    judges: IntArray,
+    ratings: FloatArray,
+    covariance: FloatArray,
+    uniform_share: float,
+    count: int,
+    rng: np.random.Generator,
+) -> list[Wanted]:
+    """Draw units for one expert, one after the other, each as if the one before were voted.
+
+    A pair is drawn by how much one more vote on it shrinks the summed variance of the ratings
+    (A-optimality: Chaloner and Verdinelli 1995), mixed with a uniform draw, so that every pair
+    stays possible and its probability is known.
+
+    Args:
+        grid: What can be shown.
+        known: Units that the expert has.
+        judges: (P, S) how many experts have each unit.
+        ratings: (C,) in the order of `contestants_of`.
+        covariance: (C, C) of the ratings.
+        uniform_share: The probability that the pair is drawn uniformly.
+        count: How many; fewer where the expert knows all others.
+        rng: The lots.
+    """
+    names = {name: index for index, name in enumerate(contestants_of(grid))}
+    pairs = [(names[first], names[second]) for first, second in grid.pairs]
+    free = grid.showable.copy()
+    for unit in known:
+        free[unit] = False
+    covariance = covariance.copy()
+
+    def chances(open_: IntArray, _: IntArray) -> FloatArray:
+        gain = gains([pairs[pair] for pair in open_], ratings, covariance)
+        is_best = gain >= gain.max() * (1.0 - 1e-9)
+        best = np.where(is_best, (1.0 - uniform_share) / is_best.sum(), 0.0)
+        return np.asarray(best + uniform_share / len(open_))
+
+    def after_a_vote(pair: int) -> None:
+        first, second = (np.array([end]) for end in pairs[pair])
+        weight, along, spread = _vote_on(first, second, ratings, covariance)
+        covariance[:] -= weight * (along @ along.T) / (1.0 + weight * spread)
+
+    return _draw(free, judges, count, chances, after_a_vote, rng)
+
+
+def _vote_on(
+    first: IntArray, second: IntArray, ratings: FloatArray, covariance: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return of votes on pairs (n,) the information, and where in the covariance they tell."""
+    chance = 1.0 / (1.0 + np.exp(ratings[second] - ratings[first]))
+    along = covariance[:, first] - covariance[:, second]
+    places = np.arange(len(first))
+    return chance * (1.0 - chance), along, along[first, places] - along[second, places]
+
+
+# --- What follows on an expert's order so far ----------------------------------------------------
+
+
+@dataclass(slots=True, kw_only=True, eq=False)
+class _Item:
+    """Something to be shown, before it has a place.
+
+    Attributes:
+        again: Position of what a repeat shows again, if that is known already.
+        of: The item that a repeat shows again, if that is new as well.
+    """
+
+    kind: str
+    scenario: int
+    pair: int
+    chance: float
+    again: int | None = None
+    of: _Item | None = None
+
+
+def follow_on(
+    rules: PlanRules,
+    grid: Grid,
+    expert: str,
+    so_far: Sequence[PlannedMatchup],
+    units: Sequence[Wanted],
+    rng: np.random.Generator,
+) -> tuple[list[PlannedMatchup], int]:
+    """Put one expert's next units in an order, with sides, and with repeats and checks on top.
+
+    Args:
+        rules: Of the study.
+        grid: What can be shown.
+        expert: Whose order goes on.
+        so_far: The expert's showings, by position.
+        units: What comes now; none of it is known to the expert.
+        rng: Shuffles.
+
+    Returns:
+        The showings, and the scenario gap that holds from the last known showing on.
+    """
+    items = [_Item(kind=MAIN, scenario=u.scenario, pair=u.pair, chance=u.chance) for u in units]
+    items += _draw_repeats(rules, grid, so_far, items, rng)
+    items += _draw_checks(rules, grid, so_far, len(units), rng)
+    order, gap = _find_order(items, [showing.scenario for showing in so_far], grid, rules, rng)
+    # Behind everything; positions that were handed over leave holes.
+    start = so_far[-1].position + 1 if so_far else 1
+    position_of = {id(item): position for position, item in enumerate(order, start=start)}
+    again = [item.again if item.of is None else position_of[id(item.of)] for item in order]
+    sides = _deal_sides(rules, grid, so_far, list(zip(order, again, strict=True)), start, rng)
+    return [
+        PlannedMatchup(
+            expert=expert,
+            position=position,
+            scenario=grid.scenarios[item.scenario],
+            left=left,
+            right=right,
+            draw_probability=item.chance,
+            kind=item.kind,
+            repeats=repeated if item.kind == REPEAT else None,
+        )
+        for position, (item, repeated, (left, right)) in enumerate(
+            zip(order, again, sides, strict=True), start=start
+        )
+    ], gap
+
+
+def _draw_repeats(
+    rules: PlanRules,
+    grid: Grid,
+    so_far: Sequence[PlannedMatchup],
+    items: Sequence[_Item],
+    rng: np.random.Generator,
+) -> list[_Item]:
+    """Draw hidden repeats: of what was shown long enough ago, else of what comes now."""
+    done = {showing.repeats for showing in so_far if showing.kind == REPEAT}
+    mains = [showing for showing in so_far if showing.kind == MAIN]
+    count = min(round(rules.repeat_share * (len(mains) + len(items))) - len(done), len(items))
+    if count < 1:
+        return []
+    latest = (so_far[-1].position + 1 if so_far else 1) - rules.repeat_distance
+    old = [s for s in mains if s.position <= latest and s.position not in done]
+    offered = [
+        _Item(kind=REPEAT, scenario=w.scenario, pair=w.pair, chance=0.0, again=showing.position)
+        for showing, w in zip(old, units_of(grid, old), strict=True)
+    ]
+    if len(offered) < count:
+        offered = [
+            _Item(kind=REPEAT, scenario=item.scenario, pair=item.pair, chance=0.0, of=item)
+            for item in items
+        ]
+    chosen = [offered[index] for index in rng.permutation(len(offered))[:count]]
+    for item in chosen:
+        item.chance = len(chosen) / len(offered)
+    return chosen
+
+
+def _draw_checks(
+    rules: PlanRules,
+    grid: Grid,
+    so_far: Sequence[PlannedMatchup],
+    more: int,
+    rng: np.random.Generator,
+) -> list[_Item]:
+    shown = {showing.scenario for showing in so_far if showing.kind == CHECK}
+    mains = sum(showing.kind == MAIN for showing in so_far) + more
+    unused = [check for check in rules.checks if check.scenario not in shown]
+    count = min(max(round(rules.check_share * mains) - len(shown), 0), len(unused))
+    return [
+        _Item(
+            kind=CHECK,
+            scenario=grid.column_of_scenario[unused[index].scenario],
+            pair=-1,
+            chance=1.0 / len(unused),
+        )
+        for index in rng.permutation(len(unused))[:count]
+    ]
+
+
+def _find_order(
+    items: Sequence[_Item],
+    before: Sequence[str],
+    grid: Grid,
+    rules: PlanRules,
+    rng: np.random.Generator,
+) -> tuple[list[_Item], int]:
+    """Order the items with the largest gap that can be kept, also to what was shown before."""
+    bases = [int(base) for base in grid.bases]
+    last = [bases[grid.column_of_scenario[name]] for name in before[-rules.scenario_gap :]]
+    for gap in range(rules.scenario_gap, -1, -1):
+        for _ in range(5):
+            order = _try_order(items, last[len(last) - min(gap, len(last)) :], gap, rng, bases)
+            if order is not None:
+                return order, gap
+    raise AssertionError("without a gap any order will do")
+
+
+def _try_order(
+    items: Sequence[_Item],
+    last: list[int],
+    gap: int,
+    rng: np.random.Generator,
+    bases: Sequence[int],
+) -> list[_Item] | None:
+    """The fullest allowed scenario first; a repeat only after what it shows. None if it sticks."""
+    waiting: dict[int, list[_Item]] = {}
+    for index in rng.permutation(len(items)):
+        waiting.setdefault(items[index].scenario, []).append(items[index])
+    for queue in waiting.values():  # taken from the end: what is repeated comes before its repeat
+        queue.sort(key=lambda item: item.of is None)
+    recent, order = list(last), list[_Item]()
+    for _ in items:
+        barred = set(recent[-gap:]) if gap else set()
+        open_ = [place for place in waiting if waiting[place] and bases[place] not in barred]
+        if not open_:
+            return None
+        place = max(open_, key=lambda place: len(waiting[place]) + rng.random())
+        order.append(waiting[place].pop())
+        recent.append(bases[place])
+    return order
+
+
+def _deal_sides(
+    rules: PlanRules,
+    grid: Grid,
+    so_far: Sequence[PlannedMatchup],
+    order: Sequence[tuple[_Item, int | None]],
+    start: int,
+    rng: np.random.Generator,
+) -> list[tuple[str, str]]:
+    """Left and right of every item: what was on the left more often goes to the right.
+
+    A repeat is turned around; checks have the broken picture on either side in turn.
+    """
+    ahead: Counter[frozenset[str]] = Counter()
+    left_of = {showing.position: showing.left for showing in so_far}
+    for showing in so_far:
+        if showing.kind == MAIN:
+            names = frozenset((showing.left, showing.right))
+            ahead[names] += 1 if showing.left < showing.right else -1
+    checks = {check.scenario: (check.good, check.broken) for check in rules.checks}
+    broken_left = bool(rng.random() < 0.5)
+    made = []
+    for position, (item, repeated) in enumerate(order, start=start):
+        if item.kind == CHECK:
+            sides = checks[grid.scenarios[item.scenario]]
+            turn, broken_left = broken_left, not broken_left
+        else:
+            sides = grid.pairs[item.pair]
+            lead = ahead[frozenset(sides)]
+            turn = (
+                left_of[repeated or 0] == sides[0]
+                if item.kind == REPEAT
+                else (lead > 0 or (lead == 0 and bool(rng.random() < 0.5)))
+            )
+        if item.kind == MAIN:
+            ahead[frozenset(sides)] += -1 if turn else 1
+        left, right = sides[::-1] if turn else sides
+        left_of[position] = left
+        made.append((left, right))
+    return made

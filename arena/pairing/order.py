@@ -6,8 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
-from arena.pairing.arrays import BoolArray, IntArray
+BoolArray = NDArray[np.bool_]
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
 
 MAIN, REPEAT, CHECK = "main", "repeat", "check"
 """What a showing is for; the words of the stored rows."""

@@ -22,13 +22,34 @@ from __future__ import annotations
 
 import numpy as np
 
-from arena.pairing.arrays import BoolArray, FloatArray
-from arena.pairing.demands import check_rules, pair_totals
-from arena.pairing.order import CHECK, MAIN, REPEAT, Extras, Slot, deal_sides, put_in_order
-from arena.pairing.overlap import bring_together
-from arena.pairing.rules import Check, Entry, Grid, MatchupPlan, PlannedMatchup, PlanRules
-from arena.pairing.targets import choose_wanted, share_out
-from arena.pairing.units import choose_units, draw_probability
+from arena.pairing.order import (
+    CHECK,
+    MAIN,
+    REPEAT,
+    BoolArray,
+    Extras,
+    FloatArray,
+    Slot,
+    deal_sides,
+    put_in_order,
+)
+from arena.pairing.rules import (
+    Check,
+    Entry,
+    Grid,
+    MatchupPlan,
+    PlannedMatchup,
+    PlanRules,
+    check_rules,
+    pair_totals,
+)
+from arena.pairing.units import (
+    bring_together,
+    choose_units,
+    choose_wanted,
+    draw_probability,
+    share_out,
+)
 
 __all__ = ["Check", "Entry", "MatchupPlan", "PlanRules", "PlannedMatchup", "plan"]
 

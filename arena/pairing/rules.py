@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import math
+import re
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
+from random import Random
 
 import numpy as np
 
-from arena.pairing.arrays import BoolArray, IntArray
-from arena.pairing.order import MAIN
+from arena.errors import NothingToPlan
+from arena.pairing.order import MAIN, BoolArray, IntArray
+from arena.pairing.units import votes_by_appearances
 
 DEFAULT_SCENARIO_GAP = 5
 """How many other matchups an expert judges before a scenario comes again."""
@@ -155,6 +160,16 @@ class Grid:
     identical: tuple[tuple[str, str, str], ...]
 
     @property
+    def row_of_pair(self) -> dict[frozenset[str], int]:
+        """The row of each pair, either way round."""
+        return {frozenset(pair): row for row, pair in enumerate(self.pairs)}
+
+    @property
+    def column_of_scenario(self) -> dict[str, int]:
+        """The column of each scenario."""
+        return {scenario: column for column, scenario in enumerate(self.scenarios)}
+
+    @property
     def bases(self) -> IntArray:
         """(S,) which columns are samples of one scenario: those with the same number."""
         names = [scenario_of(place) for place in self.scenarios]
@@ -181,3 +196,205 @@ def grid_of(entries: tuple[Entry, ...], alike: tuple[tuple[str, str, str], ...] 
             else:
                 showable[row, column] = True
     return Grid(scenarios=scenarios, pairs=pairs, showable=showable, identical=tuple(identical))
+
+
+_OF_ONE = re.compile(r"([a-z0-9-]+)\s*[=:\s]\s*(\d+)")
+_OF_TWO = re.compile(r"([a-z0-9-]+)\s+(?:vs\.?|against)\s+([a-z0-9-]+)\s*[=:\s]\s*(\d+)")
+
+Appearances = tuple[tuple[str, int], ...]
+PairVotes = tuple[tuple[str, str, int], ...]
+
+
+def read_targets(lines: Iterable[str]) -> tuple[Appearances, PairVotes]:
+    """What lines like "interplan 1960" or "interplan vs gpt-4o-otm 330" say; empty ones nothing.
+
+    Raises:
+        NothingToPlan: A line says neither.
+    """
+    of_one, of_two = [], []
+    for line in lines:
+        text = line.strip()
+        if not text:
+            continue
+        if match := _OF_TWO.fullmatch(text):
+            of_two.append((match[1], match[2], int(match[3])))
+        elif match := _OF_ONE.fullmatch(text):
+            of_one.append((match[1], int(match[2])))
+        else:
+            raise NothingToPlan(
+                f"'{text}' is no target: write CONTESTANT NUMBER, or CONTESTANT vs "
+                "CONTESTANT NUMBER."
+            )
+    return tuple(of_one), tuple(of_two)
+
+
+Triple = tuple[str, str, str]
+"""Scenario (or sample of one) and two contestants."""
+
+SHOWN_SHARE = 0.1
+"""Of the pairs alike within the tolerance: whether experts take these for equal is seen there."""
+
+
+def draw_shown(alike: Sequence[Triple], entries: Sequence[Entry], *, seed: int) -> list[Triple]:
+    """Return the pairs to show, a tenth of those whose pictures differ at all, sorted."""
+    pictures = {(entry.scenario, entry.contestant): entry.picture for entry in entries}
+    differing = sorted(
+        (place, one, other)
+        for place, one, other in alike
+        if pictures[place, one] != pictures[place, other]
+    )
+    number = round(SHOWN_SHARE * len(differing))
+    return sorted(Random(f"shown {seed}").sample(differing, number))
+
+
+def draw_ties(
+    settled: Sequence[Triple], votes_by_judge: Mapping[str, int], *, showable: int, seed: int
+) -> list[tuple[Triple, str]]:
+    """Return who gives a tie on which settled pair.
+
+    Args:
+        settled: Pairs that nobody was shown.
+        votes_by_judge: Decided votes on shown pairs.
+        showable: How many pairs could be shown.
+        seed: Of the lots that round the average and choose the judges.
+    """
+    average = sum(votes_by_judge.values()) / showable if showable else 0.0
+    drawn = []
+    for triple in settled:
+        dice = Random(f"ties {seed} {triple}")
+        number = math.floor(average) + (dice.random() < average % 1.0)
+        # Each judge's place in line: without replacement, in proportion to the votes.
+        turn = {judge: dice.random() ** (1.0 / n) for judge, n in sorted(votes_by_judge.items())}
+        chosen = sorted(turn, key=lambda judge: -turn[judge])[:number]
+        drawn += [(triple, judge) for judge in sorted(chosen)]
+    return drawn
+
+
+MOST_OVERLAP = 0.8
+"""More can't be brought together where all pairs and scenarios stay balanced for everybody."""
+
+MOST_CHECKS = 0.5
+MOST_REPEATS = 0.5
+MOST_ADAPTIVE = 0.9
+ATTENTION_CHECKS = "attention checks"
+
+
+def check_rules(rules: PlanRules, grid: Grid) -> None:
+    """Refuse rules that no plan can meet.
+
+    Raises:
+        NothingToPlan: The text has the numbers.
+    """
+    if rules.seed < 0:
+        raise NothingToPlan(f"The seed must be 0 or more, not {rules.seed}.")
+    if rules.votes_per_expert < 1:
+        raise NothingToPlan(f"Votes per expert must be 1 or more, not {rules.votes_per_expert}.")
+    if not rules.experts:
+        raise NothingToPlan("There is nobody to vote: name at least one expert.")
+    if len(set(rules.experts)) < len(rules.experts):
+        raise NothingToPlan("An expert is named twice.")
+    if not grid.pairs:
+        contestants = len({entry.contestant for entry in rules.entries})
+        raise NothingToPlan(
+            f"A comparison needs two contestants with pictures, not {contestants}."
+        )
+    _check_extras(rules, grid)
+    units = int(grid.showable.sum())
+    if units < rules.votes_per_expert:
+        same = f" (and {len(grid.identical)} with identical pictures)" if grid.identical else ""
+        raise NothingToPlan(
+            f"Nobody sees the same pair of a scenario twice: {len(grid.scenarios)} scenarios have "
+            f"{units} different pairs to show{same}, but each expert is to judge "
+            f"{rules.votes_per_expert}."
+        )
+
+
+def check_share(part: str, share: float, most: float) -> None:
+    """Refuse a share that is not from 0 to the most that there can be.
+
+    Raises:
+        NothingToPlan: It is none.
+    """
+    if not 0 <= share <= most:
+        raise NothingToPlan(f"The share of {part} goes from 0 to {most:.0%}, not {share:.1%}.")
+
+
+def _check_extras(rules: PlanRules, grid: Grid) -> None:
+    check_share("repeats", rules.repeat_share, MOST_REPEATS)
+    check_share("what two experts judge", rules.overlap_share, MOST_OVERLAP)
+    check_share(ATTENTION_CHECKS, rules.check_share, MOST_CHECKS)
+    check_share("the adaptive part", rules.adaptive_share, MOST_ADAPTIVE)
+    places = [check.scenario for check in rules.checks]
+    has_targets = bool(rules.appearances or rules.pair_votes)
+    refusals = {
+        "At least 20 % of the adaptive draws are uniform, else no vote could be weighted; not "
+        f"{rules.uniform_share:.0%}.": not 0.2 <= rules.uniform_share <= 1,
+        "For pairs that two experts judge there must be two.": rules.overlap_share > 0
+        and len(rules.experts) < 2,
+        "Targets are given by contestant or by pair, not both.": bool(rules.appearances)
+        and bool(rules.pair_votes),
+        "Targets fix every vote, so none are left for an adaptive part.": has_targets
+        and rules.adaptive_share > 0,
+        "Each check is on a scenario of its own out of those of the study.": not set(places)
+        <= set(grid.scenarios)
+        or len(set(places)) < len(places),
+    }
+    for sentence, is_refused in refusals.items():
+        if is_refused:
+            raise NothingToPlan(sentence)
+
+
+def pair_totals(rules: PlanRules, grid: Grid) -> IntArray:
+    """Votes of every pair (P,) over all experts, where the rules say how often.
+
+    Raises:
+        NothingToPlan: The wanted numbers can't be met; the text has them.
+    """
+    experts, votes = len(rules.experts), len(rules.experts) * rules.votes_per_expert
+    capacity = experts * grid.showable.sum(axis=1)
+    totals = (
+        _by_pair(rules, grid, votes)
+        if rules.pair_votes
+        else _by_contestant(rules, grid, votes, capacity)
+    )
+    for pair, wanted, most in zip(grid.pairs, totals, capacity, strict=True):
+        if wanted > most:
+            raise NothingToPlan(
+                f"{pair[0]} against {pair[1]} is to get {int(wanted)} votes, but {experts} "
+                f"experts on {int(most) // experts} scenarios can give {int(most)}."
+            )
+    return totals
+
+
+def _by_pair(rules: PlanRules, grid: Grid, votes: int) -> IntArray:
+    totals = np.zeros(len(grid.pairs), dtype=np.int64)
+    rows = grid.row_of_pair
+    for first, second, wanted in rules.pair_votes:
+        if (names := frozenset((first, second))) not in rows:
+            raise NothingToPlan(f"{first} against {second} is no pair of this study.")
+        totals[rows[names]] += wanted
+    if totals.sum() != votes:
+        raise NothingToPlan(
+            f"The targets add up to {totals.sum():,} votes, but the experts' quotas to {votes:,}."
+        )
+    return totals
+
+
+def _by_contestant(rules: PlanRules, grid: Grid, votes: int, capacity: IntArray) -> IntArray:
+    names = sorted({name for pair in grid.pairs for name in pair})
+    wanted = dict(rules.appearances)
+    if set(wanted) != set(names) or len(wanted) < len(rules.appearances):
+        odd = tuple(sorted(set(wanted) ^ set(names))) or ("one is named twice",)
+        raise NothingToPlan(f"Each contestant of the study needs one target: {', '.join(odd)}.")
+    given = sum(wanted.values())
+    if given != 2 * votes:
+        raise NothingToPlan(
+            f"The targets add up to {given:,} appearances, but the experts' quotas to "
+            f"{2 * votes:,}."
+        )
+    most = np.zeros((len(names), len(names)), dtype=np.int64)
+    rows, columns = np.triu_indices(len(names), 1)  # in the order of the pairs
+    most[rows, columns] = most[columns, rows] = capacity
+    sums = np.array([wanted[name] for name in names], dtype=np.int64)
+    found: IntArray = votes_by_appearances(names, sums, most)[rows, columns]
+    return found

@@ -6,11 +6,15 @@ Notation: E experts, P pairs, S scenarios.
 from __future__ import annotations
 
 import itertools
+import math
 from collections import deque
+from collections.abc import Sequence
+from itertools import product
 
 import numpy as np
 
-from arena.pairing.arrays import BoolArray, FloatArray, IntArray
+from arena.errors import NothingToPlan
+from arena.pairing.order import BoolArray, FloatArray, IntArray
 
 
 def choose_units(
@@ -24,20 +28,45 @@ def choose_units(
     judges = np.zeros((pairs, scenarios))
     for expert in range(experts):
         mine = chosen[expert]
-        wanted = of_pair[expert].astype(float)
-        for scenario in rng.permutation(scenarios):
-            # The pair that is owed most, then the one that fewest have judged here, then by lot.
-            score = 1e4 * wanted - judges[:, scenario] + rng.random(pairs)
-            score[~showable[:, scenario]] = -np.inf
-            picked = np.argsort(-score)[: of_scenario[expert, scenario]]
-            mine[picked, scenario] = True
-            wanted[picked] -= 1
+        order = rng.permutation(scenarios)
+        _fill(mine, showable, judges, order, of_scenario[expert], of_pair[expert], rng)
         even_out(mine, showable, of_pair[expert])
         judges += mine
     flat = chosen.transpose(1, 0, 2).reshape(pairs, experts * scenarios)
     everywhere = np.tile(showable, (1, experts))
     even_out(flat, everywhere, np.zeros(pairs, dtype=np.int64))
     return flat.reshape(pairs, experts, scenarios).transpose(1, 0, 2)
+
+
+def _fill(
+    mine: BoolArray,
+    showable: BoolArray,
+    judges: FloatArray,
+    order: IntArray,
+    take: IntArray,
+    owed: IntArray,
+    rng: np.random.Generator,
+) -> None:
+    """Choose rows of `mine` (n, K) column by column.
+
+    Those that are owed most, then those that fewest have judged there, then by lot.
+
+    Args:
+        mine: Changed in place.
+        showable: (n, K), where a unit can be.
+        judges: (n, K) how many experts have each unit.
+        order: Of the columns.
+        take: (K,) how many rows of each column.
+        owed: (n,) how many columns each row should have.
+        rng: The lots.
+    """
+    wanted = owed.astype(float)
+    for column in order:
+        score = 1e4 * wanted - judges[:, column] + rng.random(len(wanted))
+        score[~showable[:, column]] = -np.inf
+        picked = np.argsort(-score)[: take[column]]
+        mine[picked, column] = True
+        wanted[picked] -= 1
 
 
 def draw_probability(showable: BoolArray, votes: int) -> FloatArray:
@@ -126,3 +155,223 @@ def _level(capacity: IntArray, total: int) -> FloatArray:
         level += poured
         left -= poured.sum()
     return level
+
+
+ROUNDS = 2000
+"""Of the proportional fitting; it stops earlier when it is exact."""
+
+
+def votes_by_appearances(
+    names: Sequence[str], appearances: IntArray, capacity: IntArray
+) -> IntArray:
+    """Votes of every pair (C, C), symmetric, whose row sums are the wanted appearances exactly.
+
+    The pairs are as independent as the sums allow (proportional fitting), then rounded.
+
+    Args:
+        names: Of the contestants, for the error.
+        appearances: (C,) in how many votes each contestant is to appear.
+        capacity: (C, C) how many votes each pair can have at most, symmetric, 0 on the diagonal.
+
+    Raises:
+        NothingToPlan: No numbers of votes have these sums.
+    """
+    wanted = _fitted(appearances.astype(float), capacity.astype(float))
+    votes = np.minimum(np.floor(wanted + 1e-9).astype(np.int64), capacity)
+    lacking = appearances - votes.sum(axis=1)
+    rows, columns = np.triu_indices(len(names), 1)
+    for best in np.argsort(-(wanted - votes)[rows, columns], kind="stable"):
+        i, j = rows[best], columns[best]
+        if lacking[i] > 0 and lacking[j] > 0 and votes[i, j] < capacity[i, j]:
+            _add(votes, i, j, 1)
+            lacking[[i, j]] -= 1
+    while lacking.any():
+        if not _mend(votes, lacking, wanted, capacity):
+            left = np.flatnonzero(lacking).tolist()
+            short = ", ".join(f"{names[i]} {appearances[i]}" for i in left)
+            raise NothingToPlan(
+                f"These appearances can't be reached with the pairs that can be shown: {short}."
+            )
+    return votes
+
+
+def share_out(totals: IntArray, experts: int, rng: np.random.Generator) -> IntArray:
+    """The votes of each pair per expert (E, P): equal to one, each expert with the same sum.
+
+    Args:
+        totals: (P,) votes over all experts; their sum is a multiple of the experts.
+        experts: How many there are.
+        rng: Says who gets the odd ones.
+    """
+    shares = np.tile(totals // experts, (experts, 1))
+    turn = int(rng.integers(experts))
+    for pair in rng.permutation(len(totals)):
+        for _ in range(int(totals[pair] % experts)):
+            shares[turn % experts, pair] += 1
+            turn += 1
+    return shares
+
+
+def choose_wanted(showable: BoolArray, of_pair: IntArray, rng: np.random.Generator) -> BoolArray:
+    """Units per expert, (E, P, S), with exactly `of_pair` (E, P) votes of every pair.
+
+    Scenarios are as equal as those counts allow; within a pair, scenarios that few experts judge
+    go first.
+    """
+    experts, pairs = of_pair.shape
+    votes = int(of_pair[0].sum())
+    used = showable & (of_pair.sum(axis=0) > 0)[:, None]
+    of_scenario = quotas(used.sum(axis=0), experts, votes, rng)
+    chosen = np.zeros((experts, pairs, showable.shape[1]), dtype=bool)
+    judges = np.zeros(showable.shape)
+    for expert in range(experts):
+        mine = chosen[expert]
+        order = np.argsort(-of_pair[expert] - rng.random(pairs))
+        _fill(mine.T, showable.T, judges.T, order, of_pair[expert], of_scenario[expert], rng)
+        even_out(mine.T, showable.T, of_scenario[expert])
+        judges += mine
+    return chosen
+
+
+# --- Private -----------------------------------------------------------------------------------
+
+
+def _fitted(sums: FloatArray, capacity: FloatArray) -> FloatArray:
+    """The independent shares (C, C) with these row sums, none above its capacity."""
+    weight = np.sqrt(np.maximum(sums, 0.0))
+    for _ in range(ROUNDS):
+        shares: FloatArray = np.minimum(np.outer(weight, weight), capacity)
+        rows = shares.sum(axis=1)
+        if np.abs(rows - sums).max() < 1e-9:
+            break
+        scale = np.divide(sums, rows, out=np.zeros_like(sums), where=rows > 0)
+        weight = np.clip(weight * np.sqrt(scale), 0.0, 1e9)
+    return shares
+
+
+def _mend(votes: IntArray, lacking: IntArray, wanted: FloatArray, capacity: IntArray) -> bool:
+    """Give two more appearances by moving a vote: +(i, k), -(k, l), +(l, j); False if none can.
+
+    Too many appearances are mended the other way around.
+    """
+    sign = 1 if (lacking > 0).any() else -1
+    open_ = np.flatnonzero(lacking * sign > 0)
+    i = int(open_[0])
+    j = int(open_[1]) if len(open_) > 1 else i
+    if i == j and abs(lacking[i]) < 2:
+        return False
+    if i != j and 0 <= votes[i, j] + sign <= capacity[i, j]:
+        moves = [[(i, j, sign)]]
+    else:
+        others = [n for n in range(len(lacking)) if n not in (i, j)]
+        moves = [
+            [(i, k, sign), (k, o, -sign), (o, j, sign)]
+            for k, o in product(others, others)
+            if k != o
+        ]
+    fits = [
+        move
+        for move in moves
+        if all(0 <= votes[a, b] + change <= capacity[a, b] for a, b, change in move)
+    ]
+    if not fits:
+        return False
+    best = min(fits, key=lambda move: _strain(move, votes, wanted))
+    for a, b, change in best:
+        _add(votes, a, b, change)
+    lacking[i] -= sign
+    lacking[j] -= sign
+    return True
+
+
+def _strain(move: list[tuple[int, int, int]], votes: IntArray, wanted: FloatArray) -> float:
+    """How much further from the wanted shares a move leads."""
+    return float(
+        sum(
+            abs(votes[a, b] + change - wanted[a, b]) - abs(votes[a, b] - wanted[a, b])
+            for a, b, change in move
+        )
+    )
+
+
+def _add(votes: IntArray, i: int, j: int, change: int) -> None:
+    votes[i, j] += change
+    votes[j, i] += change
+
+
+_MOST_AT_ONCE = 250
+"""Units of an expert that are held against each other at a time."""
+_TRIES = 8
+"""Rounds over all experts without an exchange, after which there is none."""
+
+
+def overlap_of(chosen: BoolArray) -> tuple[int, int]:
+    """How many units of a plan (E, P, S) somebody judges, and how many two experts or more."""
+    judges = chosen.sum(axis=0)
+    return int((judges > 0).sum()), int((judges > 1).sum())
+
+
+def bring_together(
+    chosen: BoolArray, showable: BoolArray, share: float, rng: np.random.Generator
+) -> None:
+    """Exchange units until so many of the judged ones are judged by two experts or more.
+
+    Args:
+        chosen: (E, P, S), changed in place; sums over pairs and over scenarios stay for everybody.
+        showable: (P, S), where a unit can be.
+        share: Of the judged units, from 0 to 1; a plan that has more keeps it.
+        rng: Says which.
+
+    Raises:
+        NothingToPlan: It can't be reached; the text says how far.
+    """
+    judges = chosen.sum(axis=0)
+    idle = 0
+    while not _is_reached(judges, share):
+        moved = sum(
+            _exchange(chosen[expert], judges, showable, rng)
+            for expert in rng.permutation(len(chosen))
+            if not _is_reached(judges, share)
+        )
+        idle = 0 if moved else idle + 1
+        if idle == _TRIES:
+            judged, shared = overlap_of(chosen)
+            raise NothingToPlan(
+                f"Of the pairs that are judged, {share:.0%} are to be judged by two experts or "
+                f"more; with these experts, votes and pictures {shared} of {judged} are reached. "
+                "Ask for less, or for more votes per expert."
+            )
+
+
+# --- Private -----------------------------------------------------------------------------------
+
+
+def _is_reached(judges: IntArray, share: float) -> bool:
+    judged = int((judges > 0).sum())
+    return int((judges > 1).sum()) >= math.ceil(share * judged - 1e-9)
+
+
+def _exchange(
+    mine: BoolArray, judges: IntArray, showable: BoolArray, rng: np.random.Generator
+) -> bool:
+    """Make the best exchange of one expert (P, S); False where none brings units together."""
+    alone = np.argwhere(mine & (judges == 1))
+    drawn = rng.permutation(len(alone))[:_MOST_AT_ONCE]
+    pair, scenario = alone[drawn].T
+    free = showable & ~mine
+    fits = free[pair[:, None], scenario[None, :]] & free[pair[None, :], scenario[:, None]]
+    others = judges[pair[:, None], scenario[None, :]]
+    gain = np.minimum(others, 1) + np.minimum(others.T, 1)
+    gain[~fits] = 0
+    if not gain.size or not gain.max():
+        return False
+    one, other = np.unravel_index(int(gain.argmax()), gain.shape)
+    for unit, change in (
+        ((pair[one], scenario[one]), -1),
+        ((pair[other], scenario[other]), -1),
+        ((pair[one], scenario[other]), 1),
+        ((pair[other], scenario[one]), 1),
+    ):
+        mine[unit] = change > 0
+        judges[unit] += change
+    return True

@@ -26,10 +26,10 @@ from arena.errors import ArenaError
 from arena.jobs.services import NOTE_LENGTH
 from arena.models import FaultLabel, Matchup, Report, Snapshot, Study, Vote
 from arena.rating.rules import Intervals, Method, Unit
-from arena.services.decisions import decision_of
 from arena.studies.services.experts import Complaint, check_complaint
 from arena.studies.services.opening import check_seed
 from arena.studies.services.planning import rules_of
+from arena.voting.services.casting import decision_of
 from augment.errors import AugmentError, Conflict, InvalidDocument
 from augment.models import FAILED, Augmentation, GenerationJob, ModelCall, Work
 from augment.services import row_rules

@@ -9,7 +9,7 @@ from django import forms
 from django.contrib.auth.models import User
 
 from arena.errors import NothingToPlan
-from arena.pairing.target_lines import read_targets
+from arena.pairing.rules import read_targets
 from arena.site.forms import ChoiceForm, form_field, offer
 from arena.studies.services.drafts import SWITCHES
 from arena.studies.services.outlook import ESTIMATE_INPUTS, StudyEstimate

@@ -7,11 +7,39 @@ from dataclasses import replace
 
 import pytest
 
-from augment.fake_llm.careless import MISTAKES, bend, dice, is_unreadable
+from augment.fake_llm.careless import MISTAKES, bend, dice, is_unreadable, lay_straight, misread
 from augment.fake_llm.server import FakeServer
-from augment.scene.entities import Modification, Scene, TrafficAgent
-from tests.fake_llm.asking import outcome
+from augment.llm.client import Patience
+from augment.llm.openai_wire import OpenAIWire
+from augment.scene.entities import Modification, Scene, TrafficAgent, TurnType
+from augment.scene.intent import Intent
+from augment.variants.pipeline import Outcome, run
+from augment.variants.recipes import find_recipe
+from augment.variants.respondents import MemoryTranscript, RespondentClient
+from tests.fixtures.shelf import SLUGS, entry, shown_scene
 from tests.scenes import curve, pedestrian, scene, vehicle
+
+
+def outcome(
+    server: FakeServer,
+    model: str,
+    scene: Scene,
+    instruction: str,
+    *,
+    transcript: MemoryTranscript | None = None,
+    key: str | None = None,
+    timeout_s: float = 60.0,
+) -> Outcome:
+    with OpenAIWire(base_url=server.url, api_key=key, timeout_s=timeout_s) as client:
+        return run(
+            find_recipe("otm"),
+            scene=scene,
+            instruction=instruction,
+            modifier=RespondentClient(client=client, model=model),
+            transcript=transcript or MemoryTranscript(),
+            patience=Patience(sleep=lambda _: None, rng=random.Random(0)),
+        )
+
 
 PARKED = replace(vehicle("Agent2", 21.4, 0.6), lane_id="Lane1")
 ROUND_THE_BEND = replace(vehicle("Agent2", 10.0 + 40.0 * math.sin(0.7), 9.4, 0.7), lane_id="Lane1")
@@ -74,3 +102,34 @@ def test_it_answers_most_wishes_wrongly_and_always_the_same(server: FakeServer) 
     ]
     assert len(errors_m) >= 24
     assert sum(error > 2.0 for error in errors_m) >= len(errors_m) / 3
+
+
+def intent_of(slug: str) -> Intent:
+    intent = entry(slug).intent
+    assert intent is not None
+    return intent
+
+
+def heard(slug: str) -> list[Intent]:
+    return [misread(intent_of(slug), random.Random(seed)) for seed in range(20)]
+
+
+def test_on_the_paper_set_nothing_is_misread() -> None:
+    """But for distances from another object of the same wish, which its ten roadworks have."""
+    anchored = [s for s in SLUGS if any(one.spot.anchor for one in intent_of(s).requests)]
+    plain = [slug for slug in SLUGS if slug not in anchored]
+    assert len(plain) == 40
+    assert all(set(heard(slug)) == {intent_of(slug)} for slug in plain)
+    for slug in SLUGS[::5]:
+        assert lay_straight(shown_scene(slug), entry(slug).reference) == entry(slug).reference
+
+
+@pytest.mark.parametrize("slug", ["windmill-circle-first-exit", "orchard-circle-third-exit"])
+def test_a_turn_is_passed_over_or_taken_the_other_way(slug: str) -> None:
+    routes = {one.route for one in heard(slug)}
+    assert TurnType.STRAIGHT in routes
+    assert len(routes) == 3  # straight, the other way, and right but counted from the ego
+
+
+def test_what_can_t_be_met_is_done_anyway_at_times() -> None:
+    assert {bool(one.unmet) for one in heard("hairpin-hill-no-bus")} == {True, False}

@@ -2,9 +2,26 @@ from __future__ import annotations
 
 import http.client
 import json
+import os
+import signal
+import socket
+import subprocess
+import sys
 from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
 
 from augment.fake_llm.server import FakeServer
+from augment.fake_llm.sight import task_of
+from augment.fake_llm.wire import BadRequest, SpokenMessage, chat_request
+from augment.llm.messages import Message, Request, Speaker, data_url
+from augment.prompts.fill import modifier_messages
+from augment.render.camera import camera_for
+from augment.scene.entities import Scene, TrafficSide
+from tests.render.pictures import draw_original
+from tests.scenes import cone, junction, scene, vehicle
 
 HELLO = {"role": "user", "content": "Hello"}
 
@@ -42,3 +59,113 @@ def test_a_bad_request_is_a_400_that_names_the_field(server: FakeServer) -> None
     assert isinstance(answer["error"], dict)
     assert answer["error"]["param"] == "colour"
     assert answer["error"]["type"] == "invalid_request_error"
+
+
+PICTURE = draw_original(scene(), camera_for(scene(), None))
+PNG = {"type": "image_url", "image_url": {"url": data_url(PICTURE)}}
+
+
+def body(**changes: object) -> bytes:
+    document = {"model": "fake-good", "messages": [HELLO]} | changes
+    return json.dumps(document).encode()
+
+
+def test_what_our_own_client_sends_is_accepted() -> None:
+    messages = (
+        Message(speaker=Speaker.SYSTEM, text="Be good."),
+        Message(speaker=Speaker.USER, text="Look", images=(PICTURE,)),
+        Message(speaker=Speaker.ASSISTANT, text="Yes"),
+        Message(speaker=Speaker.USER, text="Again"),
+    )
+    sent = Request(model="fake-good", messages=messages, temperature=0.5, seed=3)
+    request = chat_request(json.dumps(sent.to_document()).encode())
+    assert [message.text for message in request.messages] == ["Be good.", "Look", "Yes", "Again"]
+
+
+@pytest.mark.parametrize(
+    ("sent", "param"),
+    [
+        (b"", None),
+        (b"[" * 100_000, None),
+        (b"[]", ""),
+        (body(model=""), "model"),
+        (body(model=None), "model"),
+        (body(messages=[]), "messages"),
+        (body(colour="red"), "colour"),
+        (body(stream=True), "stream"),
+        (body(temperature="0"), "temperature"),
+        (body(temperature=3.0), "temperature"),
+        (body(max_completion_tokens=0), "max_completion_tokens"),
+        (body(messages=[HELLO | {"role": "robot"}]), "messages.0.role"),
+        (body(messages=[HELLO | {"name": "x"}]), "messages.0.name"),
+        (body(messages=[{"role": "user"}]), "messages.0.content"),
+        (body(messages=[HELLO | {"content": " "}]), "messages.0.content"),
+        (body(messages=[HELLO | {"content": []}]), None),
+        (body(messages=[HELLO, {"role": "assistant", "content": "Hi"}]), "messages"),
+        (
+            body(messages=[{"role": "system", "content": [{"type": "text", "text": "a"}]}, HELLO]),
+            "messages.0.content",
+        ),
+        (body(messages=[HELLO | {"content": [{"type": "audio"}]}]), None),
+        (
+            body(messages=[HELLO | {"content": [PNG | {"image_url": {"url": "http://a/b.png"}}]}]),
+            None,
+        ),
+    ],
+)
+def test_a_request_that_breaks_the_rules_is_refused(sent: bytes, param: str | None) -> None:
+    with pytest.raises(BadRequest) as raised:
+        chat_request(sent)
+    assert str(raised.value)
+    if param is not None:
+        assert raised.value.param == param
+
+
+WISH = "Add a parked car 17 m ahead.\nIt stands 0.4 m left of the centre."
+
+
+def messages(shown: Scene, wish: str = WISH) -> list[SpokenMessage]:
+    return [
+        SpokenMessage.model_validate(message.to_document())
+        for message in modifier_messages(shown, wish)
+    ]
+
+
+def test_the_scene_and_the_wish_are_read_back() -> None:
+    shown = replace(
+        junction(),
+        agents=(vehicle("Agent2", 12.0, 0.0, 0.1), cone("Agent6", 30.0, 2.0)),
+        traffic_side=TrafficSide.LEFT,
+        areas=scene().areas,
+    )
+    task = task_of(messages(shown))
+    assert (task.instruction, task.first_new) == (WISH, 7)
+    assert task.scene.traffic_side is TrafficSide.LEFT
+    assert [a.id for a in task.scene.agents] == ["Agent2", "Agent6"]
+    assert task.scene.agents[0] == shown.agents[0]
+    assert task.scene.ego.lane_id == "Lane1"
+    assert [(w.id, w.from_lane, w.to_lane, w.turn_type) for w in task.scene.connectors] == [
+        (w.id, w.from_lane, w.to_lane, w.turn_type) for w in shown.connectors
+    ]
+    assert [w.width_m for w in task.scene.connectors] == [3.5, 3.5]
+    assert [(a.id, a.kind) for a in task.scene.areas] == [(a.id, a.kind) for a in shown.areas]
+
+
+MANAGE = Path(__file__).parents[2] / "manage.py"
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_it_says_where_it_listens_and_stops_cleanly(number: signal.Signals) -> None:
+    command = [sys.executable, str(MANAGE), "fake_llm", "--port", "0"]
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=os.environ
+    ) as process:
+        assert process.stdout is not None
+        line = process.stdout.readline()
+        assert "http://127.0.0.1:" in line
+        port = int(line.rsplit(":", 1)[1].split("/")[0])
+        socket.create_connection(("127.0.0.1", port), timeout=60).close()
+        process.send_signal(number)
+        out, err = process.communicate(timeout=60)
+    assert (process.returncode, err) == (0, "")
+    assert "has stopped" in out

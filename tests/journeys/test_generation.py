@@ -10,7 +10,7 @@ import pytest
 
 from tests.formats.hostile_files import scenarionet_of_nested_tuples_as_a_key
 from tests.processes import Machine, WaitingModel, machine, wait_until
-from tests.variants.answers import GOOD
+from tests.variants.playing import GOOD
 
 pytestmark = [pytest.mark.redis, pytest.mark.slow, pytest.mark.timeout(600)]
 

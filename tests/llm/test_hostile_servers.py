@@ -3,16 +3,62 @@
 from __future__ import annotations
 
 import gzip
+import json
 import time
 import tracemalloc
 import zlib
+from typing import Any
 
 import pytest
 
-from augment.errors import Abandoned, JobCancelled, Unwanted
+from augment.errors import Abandoned, JobCancelled, ModelFault, NotSent, Unwanted
+from augment.llm.messages import Message, Reply, Request, Speaker
+from augment.llm.openai_wire import (
+    LONGEST_ARGUMENTS,
+    LONGEST_EXTRA,
+    MOST_CALLS,
+    MOST_TOKENS,
+    OpenAIWire,
+)
 from augment.llm.wire_transport import OutOfTime, Watch
-from tests.llm.hostile import BODY, EMPTY_BLOCK, LIMIT_S, PACKED, ask, fault
-from tests.llm.raw_server import Say, drip, head, whole
+from tests.llm.raw_server import Say, drip, head, speaking, whole
+from tests.llm.recorder import GOOD
+
+ASKED = Request(model="m", messages=(Message(speaker=Speaker.USER, text="Hello"),))
+BODY = json.dumps(GOOD).encode()
+LIMIT_S = 0.25
+
+PACKED = (
+    head("Transfer-Encoding: chunked", "Content-Encoding: gzip")
+    + b"a\r\n\x1f\x8b\x08\0\0\0\0\0\0\0\r\n"
+)
+EMPTY_BLOCK = b"5\r\n\0\0\0\xff\xff\r\n"
+"""The beginning of a packed answer, and a piece that unpacks to nothing."""
+
+
+def ask(say: Say, *, reads: bool = True, asked: Request = ASKED, **settings: Any) -> Reply:
+    settings = {"timeout_s": 20.0, "api_key": None} | settings
+    with (
+        speaking(say, reads=reads) as server,
+        OpenAIWire(base_url=server.url, **settings) as client,
+    ):
+        return client.complete(asked)
+
+
+def fault(say: Say, **settings: Any) -> ModelFault:
+    with pytest.raises(ModelFault) as raised:
+        ask(say, **settings)
+    return raised.value
+
+
+def answered(body: object) -> Reply:
+    return ask(whole(json.dumps(body).encode()))
+
+
+def message(**parts: object) -> dict[str, object]:
+    said = {"role": "assistant", "content": "Hi"} | parts
+    return GOOD | {"choices": [{"index": 0, "finish_reason": "stop", "message": said}]}
+
 
 # --- Time --------------------------------------------------------------------------------------
 
@@ -142,17 +188,6 @@ def test_an_answer_without_end_stops_at_the_limit(say: Say) -> None:
     assert "longer than 0.2 MB" in str(broken)
 
 
-@pytest.mark.parametrize(
-    "say",
-    [
-        drip(b"HTTP/1.1 200 OK\r\n", b"X: " + b"y" * 30_000 + b"\r\n", every_s=0),
-        drip(b"HTTP/1.1 200 OK\r\nX: ", b"y" * 30_000, every_s=0),
-    ],
-)
-def test_headers_without_end_are_a_broken_connection(say: Say) -> None:
-    assert "the connection failed" in str(fault(say))
-
-
 @pytest.mark.parametrize("packing", ["br", "zstd", "gzip, gzip", "deflate"])
 def test_a_packing_that_nobody_asked_for_is_named(packing: str) -> None:
     broken = fault(whole(BODY, f"Content-Encoding: {packing}"))
@@ -162,3 +197,109 @@ def test_a_packing_that_nobody_asked_for_is_named(packing: str) -> None:
 @pytest.mark.parametrize("packed", [gzip.compress(BODY)[:-12], b"nonsense", b""])
 def test_a_packed_answer_that_is_broken_is_named(packed: bytes) -> None:
     assert "can't be unpacked: gzip" in str(fault(whole(packed, "Content-Encoding: gzip")))
+
+
+@pytest.mark.parametrize("deep", ["[" * 100_000, '{"a":' * 100_000, "[" * 90_000 + "]" * 90_000])
+def test_json_that_nests_without_end_is_a_fault(deep: str) -> None:
+    broken = fault(whole(deep.encode()))
+    assert broken.retryable
+    assert "nested too deeply" in str(broken) or "not valid JSON" in str(broken)
+
+
+@pytest.mark.parametrize(
+    ("said", "wait_s"),
+    [
+        ("0", 0.0),
+        ("-5", 0.0),
+        ("1e3", 1000.0),
+        ("99999999999999999999", 1e20),
+        ("inf", None),
+        ("1e400", None),
+        ("-inf", None),
+        ("9" * 5000, None),
+        ("Wed, 21 Oct 2015 07:28:00 -0000", 0.0),
+        ("Wed, 21 Oct 99999 07:28:00 GMT", None),
+        ("Wed, 21 Oct 999999999999999999999999 07:28:00 GMT", None),
+        ("Mon, 01 Jan 0001 00:00:00 +2359", 0.0),
+        ("Wed, 21 Oct 2015 07:28:00 +999999999999999", None),
+        (",", None),
+    ],
+)
+def test_a_wait_that_no_clock_knows_is_none(said: str, wait_s: float | None) -> None:
+    broken = fault(whole(b"{}", f"Retry-After: {said}", status="429 Too Many"))
+    assert (broken.status, broken.retryable) == (429, True)
+    assert broken.retry_after_s == wait_s
+
+
+@pytest.mark.parametrize(
+    ("written", "count"),
+    [
+        ("0", 0),
+        ("7", 7),
+        ("7.0", 7),
+        ("7.5", None),
+        ("-1", None),
+        ("true", None),
+        ('"7"', None),
+        ("null", None),
+        ("[7]", None),
+        (str(MOST_TOKENS), MOST_TOKENS),
+        (str(MOST_TOKENS + 1), None),
+        ("9" * 400, None),
+        ("1e300", None),
+        ("1e999", None),
+        ("NaN", None),
+    ],
+)
+def test_a_count_of_tokens_that_can_not_be_is_unknown(written: str, count: int | None) -> None:
+    body = json.dumps(GOOD | {"usage": {"prompt_tokens": "HERE", "completion_tokens": "HERE"}})
+    reply = ask(whole(body.replace('"HERE"', written).encode()))
+    assert (reply.text, reply.prompt_tokens, reply.completion_tokens) == ("Hi", count, count)
+
+
+@pytest.mark.parametrize("code", ["c" * 80, "c" * 81, "c" * 1_000_000])
+def test_what_an_error_says_is_cut_with_a_mark(code: str) -> None:
+    body = json.dumps({"error": {"message": "m" * 1_000_000, "code": code}}).encode()
+    said = str(fault(whole(body, status="400 Bad")))
+    assert len(said) < 500
+    assert "m… [cut: 1000000 characters]" in said
+    assert (f"c… [cut: {len(code)} characters]" in said) == (len(code) > 80)
+
+
+def test_calls_of_tools_are_bounded_in_number_and_length() -> None:
+    call = {"id": "i" * 9000, "function": {"name": "n" * 9000, "arguments": "a" * 90_000}}
+    kept = {"x": "y" * (LONGEST_EXTRA - 9)}
+    assert len(json.dumps(kept)) == LONGEST_EXTRA
+    calls = [call | {"x": "y" * LONGEST_EXTRA}, call | kept] + [call] * MOST_CALLS
+    reply = answered(message(tool_calls=calls))
+    assert (len(reply.tool_calls), reply.calls_left_out) == (MOST_CALLS, 2)
+    first, second, *_ = reply.tool_calls
+    assert len(first.arguments) == LONGEST_ARGUMENTS
+    assert first.arguments.endswith("… [cut: 90000 characters]")
+    assert (len(first.name), len(first.id)) == (200, 200)
+    assert (first.extra, len(second.extra)) == ("", LONGEST_EXTRA)
+
+
+@pytest.mark.parametrize(
+    "said",
+    [
+        b"",
+        b"HTTP/1.1 20",
+        head("Content-Length: 500") + BODY[:40],
+        b"\x00\x01\x02 nonsense\r\n\r\n",
+    ],
+)
+def test_a_connection_that_is_closed_midway_may_be_billed_and_may_pass(said: bytes) -> None:
+    broken = fault(lambda connection: connection.sendall(said))
+    assert broken.retryable
+    assert "the connection failed" in str(broken)
+    assert not isinstance(broken, NotSent)
+
+
+@pytest.mark.parametrize("status", ["301 Moved", "302 Found", "303 See", "307 Moved", "308 Moved"])
+def test_no_redirect_is_followed_not_even_to_this_computer(status: str) -> None:
+    with speaking(whole(BODY)) as other:
+        say = whole(b"", f"Location: {other.url}/chat/completions", status=status)
+        broken = fault(say, api_key="sk-planted-4f7a9c0d1e2b3a")
+    assert broken.status == int(status[:3])
+    assert other.heard == []

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import socket
 import ssl
+import threading
 import time
 import traceback
 from collections.abc import Callable, Iterator
@@ -11,11 +12,14 @@ from typing import Any
 
 import pytest
 
-from augment.errors import ModelFault, NotSent
-from augment.fake_llm.server import FakeServer, running
+from augment.errors import ModelFault, NotSent, ParameterRefused
+from augment.fake_llm.server import FakeServer
+from augment.llm import wire_transport
 from augment.llm.messages import Message, Reply, Request, Speaker
 from augment.llm.openai_wire import OpenAIWire
+from tests.llm.raw_server import speaking, whole
 from tests.llm.recorder import GOOD, recorder
+from tests.llm.test_hostile_servers import ASKED, BODY
 
 KEY = "sk-planted-4f7a9c0d1e2b3a"
 
@@ -89,16 +93,6 @@ def test_a_fault_says_whether_it_may_pass(
     )
 
 
-def test_a_slow_endpoint_is_given_up_after_the_timeout() -> None:
-    with (
-        running(slow_s=3600.0) as server,
-        OpenAIWire(base_url=server.url, api_key=None, timeout_s=0.3) as client,
-    ):
-        broken = fault(lambda model: client.complete(request(model)), "fake-slow")
-    assert (broken.retryable, broken.status) == (True, None)
-    assert "took too long" in str(broken)
-
-
 def test_an_address_where_nobody_listens_was_sent_nothing_and_may_be_asked_again() -> None:
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
@@ -107,12 +101,6 @@ def test_an_address_where_nobody_listens_was_sent_nothing_and_may_be_asked_again
     assert isinstance(broken, NotSent)
     assert broken.retryable
     assert "refused" in str(broken)
-
-
-def test_a_refusal_and_a_filtered_answer_are_replies(ask: Ask) -> None:
-    assert ask("fake-refuse").refusal == "I can't help with that."
-    filtered = ask("fake-filtered")
-    assert (filtered.text, filtered.finish_reason) == ("", "content_filter")
 
 
 @pytest.mark.parametrize("body", [[], "text", 7, None, {"choices": [None]}, {"choices": {}}])
@@ -127,14 +115,7 @@ def test_any_other_json_is_a_fault(body: object) -> None:
 
 @pytest.mark.parametrize(
     ("headers", "wait_s"),
-    [
-        ({"retry-after-ms": "250"}, 0.25),
-        ({"Retry-After": "7"}, 7.0),
-        ({"Retry-After": "Wed, 21 Oct 2015 07:28:00 GMT"}, 0.0),
-        ({"Retry-After": "nan"}, None),
-        ({"Retry-After": "soon"}, None),
-        ({}, None),
-    ],
+    [({"retry-after-ms": "250"}, 0.25), ({"Retry-After": "soon"}, None), ({}, None)],
 )
 def test_the_wait_that_an_endpoint_asks_for(headers: dict[str, str], wait_s: float | None) -> None:
     with (
@@ -186,18 +167,6 @@ def test_a_key_that_can_not_be_sent_is_refused_unseen(key: str) -> None:
     assert KEY not in str(raised.value)
 
 
-def test_a_redirect_is_not_followed() -> None:
-    with recorder() as other:
-        moved = {"Location": f"{other.url}/chat/completions"}
-        with (
-            recorder(307, {}, moved) as server,
-            OpenAIWire(base_url=server.url, api_key=KEY) as client,
-        ):
-            broken = fault(lambda model: client.complete(request(model)), "m")
-    assert (broken.status, broken.retryable) == (307, False)
-    assert other.heard == []
-
-
 @pytest.mark.parametrize("status", [200, 401, 500])
 def test_a_key_that_a_server_echoes_is_taken_out(status: int) -> None:
     said = f"Incorrect key {KEY}."
@@ -221,3 +190,178 @@ def test_the_certificate_of_an_endpoint_is_checked() -> None:
         checked_by = inner._client._transport._pool._ssl_context
     assert checked_by.verify_mode is ssl.CERT_REQUIRED
     assert checked_by.check_hostname
+
+
+WITH_SEED = Request(
+    model="m", messages=(Message(speaker=Speaker.USER, text="Hello"),), temperature=0.0, seed=7
+)
+
+
+def error(message: str, param: str | None = None, code: str | None = None) -> object:
+    return {"error": {"message": message, "type": "x", "param": param, "code": code}}
+
+
+def refusal_to(body: object, status: int = 400) -> ModelFault:
+    with (
+        recorder(status, body) as server,
+        OpenAIWire(base_url=server.url, api_key=None) as client,
+        pytest.raises(ModelFault) as caught,
+    ):
+        client.complete(WITH_SEED)
+    return caught.value
+
+
+@pytest.mark.parametrize(
+    ("body", "parameter"),
+    [
+        (error("Only the default (1) is supported.", "temperature"), "temperature"),
+        (
+            error("Unsupported parameter", "max_completion_tokens", "unsupported_parameter"),
+            "max_completion_tokens",
+        ),
+        (error("Unknown field max_completion_tokens."), "max_completion_tokens"),
+        ([error('Invalid JSON payload. Unknown name "seed": Cannot find field.')], "seed"),
+        (error("[{'loc': ('body', 'seed'), 'msg': 'Extra inputs are not permitted'}]"), "seed"),
+    ],
+)
+@pytest.mark.parametrize("status", [400, 422])
+def test_a_parameter_that_is_not_taken_is_named(body: object, parameter: str, status: int) -> None:
+    refused = refusal_to(body, status)
+    assert isinstance(refused, ParameterRefused)
+    assert (refused.parameter, refused.status, refused.retryable) == (parameter, status, True)
+
+
+@pytest.mark.parametrize(
+    "body",
+    [
+        error("max_completion_tokens is too large: 8192.", "max_completion_tokens"),
+        error("'max_tokens' or 'max_completion_tokens' is too large: 8192."),
+        error("Too long.", "messages", "context_length_exceeded"),
+        error("Not supported.", "response_format"),
+        error("Something is wrong."),
+        {},
+        "nonsense",
+    ],
+)
+def test_what_the_request_can_not_do_without_is_another_fault(body: object) -> None:
+    other = refusal_to(body)
+    assert not isinstance(other, ParameterRefused)
+    assert not other.retryable
+
+
+class Names:
+    """A name service whose every look finds the next answer; the last one stays."""
+
+    def __init__(self, *answers: str) -> None:
+        self.answers = list(answers)
+        self.asked: list[str] = []
+
+    def __call__(self, host: str, port: object, **_: object) -> list[Any]:
+        self.asked.append(host)
+        answer = self.answers.pop(0) if len(self.answers) > 1 else self.answers[0]
+        return [(0, 0, 0, "", (address, 0)) for address in answer.split()]
+
+
+def test_a_name_is_connected_to_where_it_was_looked_up_and_keeps_its_host_header() -> None:
+    names = Names("127.0.0.1")
+    with (
+        speaking(whole(BODY)) as server,
+        OpenAIWire(
+            base_url=f"http://models.example:{server.port}/v1", api_key=KEY, resolve=names
+        ) as client,
+    ):
+        assert client.complete(ASKED).text == "Hi"
+    assert f"host: models.example:{server.port}\r\n".encode() in server.heard[0].lower()
+    assert names.asked == ["models.example"] * 2
+
+
+@pytest.mark.parametrize("later", ["169.254.169.254", "127.0.0.1 fd00:ec2::254", "64:ff9b::1"])
+def test_a_name_that_leads_elsewhere_after_the_check_is_not_connected_to(later: str) -> None:
+    with (
+        speaking(whole(BODY)) as server,
+        OpenAIWire(
+            base_url=f"http://models.example:{server.port}/v1",
+            api_key=KEY,
+            resolve=Names("127.0.0.1", later),
+        ) as client,
+        pytest.raises(NotSent, match=r"models\.example leads to .*metadata") as raised,
+    ):
+        client.complete(ASKED)
+    assert not raised.value.retryable
+    assert server.heard == []
+
+
+def test_the_next_address_is_tried_where_nobody_listens_at_the_first() -> None:
+    with (
+        speaking(whole(BODY)) as server,
+        OpenAIWire(
+            base_url=f"http://models.example:{server.port}/v1",
+            api_key=None,
+            resolve=Names("::1 127.0.0.1"),
+        ) as client,
+    ):
+        assert client.complete(ASKED).text == "Hi"
+
+
+def test_the_certificate_is_held_against_the_name_and_not_the_address() -> None:
+    # The first bytes of a handshake name the server in clear.
+    with (
+        speaking(lambda connection: None, reads=False) as server,
+        OpenAIWire(
+            base_url=f"https://models.example:{server.port}/v1",
+            api_key=KEY,
+            resolve=Names("127.0.0.1"),
+        ) as client,
+        pytest.raises(NotSent, match="the connection failed"),
+    ):
+        client.complete(ASKED)
+    assert b"models.example" in server.heard[0]
+
+
+def test_a_name_that_is_never_found_takes_no_longer_than_a_call(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(wire_transport, "CONNECT_TIMEOUT_S", 0.1)
+    over = threading.Event()
+    is_first = iter([True, False])
+
+    def resolve(*_: object, **__: object) -> list[Any]:
+        if not next(is_first):
+            over.wait()
+        return Names("127.0.0.1")("", None)
+
+    try:
+        with (
+            OpenAIWire(
+                base_url="http://models.example/v1", api_key=None, resolve=resolve
+            ) as client,
+            pytest.raises(NotSent, match="the connection failed") as raised,
+        ):
+            client.complete(ASKED)
+    finally:
+        over.set()
+    assert raised.value.retryable
+
+
+def test_a_name_that_nobody_knows_was_sent_nothing() -> None:
+    def nobody(*_: object, **__: object) -> list[Any]:
+        raise socket.gaierror(socket.EAI_NONAME, "Name or service not known")
+
+    with (
+        OpenAIWire(base_url="http://models.example/v1", api_key=None, resolve=nobody) as client,
+        pytest.raises(NotSent, match="Name or service not known"),
+    ):
+        client.complete(ASKED)
+
+
+def test_the_proxy_that_is_named_gets_everything_but_what_stays_here() -> None:
+    with speaking(whole(BODY)) as proxy, speaking(whole(BODY)) as server:
+        settings: dict[str, Any] = {"api_key": None, "proxy_url": f"http://127.0.0.1:{proxy.port}"}
+        with OpenAIWire(base_url="http://models.example/v1", **settings) as client:
+            client.complete(ASKED)
+        with OpenAIWire(base_url=server.url, **settings) as client:
+            client.complete(ASKED)
+    assert [heard.split()[1] for heard in proxy.heard] == [
+        b"http://models.example/v1/chat/completions"
+    ]
+    assert len(server.heard) == 1

@@ -14,8 +14,7 @@ import numpy as np
 import pytest
 from django.core.management import call_command
 
-from arena.management.rate_csv import CsvNotRated, run
-from arena.management.rated_csv import COLUMNS
+from arena.management.rate_csv import COLUMNS, CsvNotRated, run
 from arena.rating.comparisons import Comparisons
 from arena.rating.leaderboard import rate
 from tests.house.source import ROOT

@@ -7,9 +7,18 @@ import numpy as np
 import pytest
 
 from arena.errors import NothingToPlan
-from arena.pairing.adaptive import PRIOR_SD, contestants_of, draw_units, gains, ratings_so_far
-from arena.pairing.following import follow_on
-from arena.pairing.later import Wanted, deal, judges, units_of
+from arena.pairing.later import (
+    PRIOR_SD,
+    Wanted,
+    contestants_of,
+    deal,
+    draw_units,
+    follow_on,
+    gains,
+    judges,
+    ratings_so_far,
+    units_of,
+)
 from arena.pairing.order import CHECK, MAIN, REPEAT
 from arena.pairing.plan import PlannedMatchup, plan
 from arena.pairing.rules import PlanRules, grid_of

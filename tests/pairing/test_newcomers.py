@@ -8,7 +8,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from arena.pairing.newcomers import choose_units
+from arena.pairing.later import choose_for_newcomer as choose_units
 from arena.pairing.rules import Entry, Grid, grid_of
 
 NAMES = ("ann", "bob", "cid", "dot")

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 
-from arena.pairing.rules import Entry
-from arena.pairing.settled import draw_shown, draw_ties
+from arena.pairing.rules import Entry, draw_shown, draw_ties
 
 ALIKE = [(f"place-{number}", "ann", "bob") for number in range(400)]
 

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from arena.errors import NothingToPlan
 from arena.pairing.order import MAIN
 from arena.pairing.plan import Entry, PlanRules, plan
-from arena.pairing.targets import votes_by_appearances
+from arena.pairing.units import votes_by_appearances
 from tests.pairing.studies import (
     APPEARANCES,
     appearances,

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from augment.prompts.calls import MOST_LOOKED_AT, WrittenCall, calls_in, read_arguments
-from tests.variants.answers import GOOD
+from tests.variants.playing import GOOD
 
 ONE = '{"call": "pose_on_lane", "arguments": {"lane": "Lane1"}}'
 READ = WrittenCall(name="pose_on_lane", arguments={"lane": "Lane1"})
@@ -159,12 +159,6 @@ def test_no_text_breaks_the_reader_of_calls(text: str, data: st.DataObject) -> N
 def test_the_time_for_a_hostile_answer_is_bounded(piece: str) -> None:
     # Of a limited number of places each is read over a limited number of characters.
     assert len(calls_in(piece * (199_000 // len(piece)))) <= MOST_LOOKED_AT
-
-
-@given(st.lists(st.sampled_from([ONE, '{"call":', "```", "\n", "}", "{", '"', "NaN", " ", "a"])))
-def test_no_answer_breaks_the_reader_of_calls(parts: list[str]) -> None:
-    for call in calls_in("".join(parts)):
-        assert call.problem or call.name
 
 
 def test_arguments_of_a_megabyte_are_refused_unread() -> None:

@@ -17,7 +17,7 @@ from augment.geometry.polyline import Polyline
 from augment.prompts.calls import calls_in
 from augment.prompts.fill import read_text
 from augment.prompts.reply import notes_of, read_reply
-from augment.prompts.vectors import SPACING_M, LaneFormat, scene_text
+from augment.prompts.vectors import LaneFormat, scene_text
 from augment.scene.entities import Lane, LaneConnector, Scene, TurnType
 from augment.variants.pose_tool import PoseTool
 from tests.scenes import EGO, scene
@@ -95,22 +95,6 @@ def test_the_answer_of_the_example_is_read_and_right(work: str) -> None:
         assert math.dist(spot_m, (place.pose.x_m, place.pose.y_m)) <= 0.02
     way = math.atan2(walker.walk_to_m[1] - walker.y_m, walker.walk_to_m[0] - walker.x_m)
     assert walker.heading_rad == pytest.approx(way, abs=0.01)
-
-
-def test_a_place_added_up_by_the_rule_of_the_prompt_is_the_one_of_the_tool() -> None:
-    """Each piece counts 5 m, and the lane bulges out of a piece by its length x turn / 8."""
-    line = bend()
-    points = np.array(line.resampled(SPACING_M).points_m).round(2)
-    headings = np.arctan2(*np.diff(points, axis=0).T[::-1])
-    (x, y), step = points[1], points[2] - points[1]
-    turn_rad = (headings[2] - headings[0]) * SPACING_M / (SPACING_M + 3.5)
-    bulge_m = SPACING_M * turn_rad / 8.0
-    right = np.array([math.sin(headings[1]), -math.cos(headings[1])])
-    middle = np.array([x, y]) + step / 2.0 + bulge_m * right
-    place = PoseTool(example()).pose_on_lane("Lane1", "Agent1", 17.5).pose
-    assert math.dist(middle, (place.x_m, place.y_m)) <= 0.02
-    straight = np.array([x, y]) + step / 2.0
-    assert math.dist(straight, (place.x_m, place.y_m)) > 0.09
 
 
 if __name__ == "__main__":

@@ -11,10 +11,10 @@ from hypothesis import strategies as st
 
 from augment.render.bev import draw
 from augment.render.camera import camera_for
-from augment.render.legend import CHANGED, GONE, DescribedAgent, describe
-from augment.scene.entities import AgentType, Modification, TrafficAgent
+from augment.render.legend import CHANGED, GONE, DescribedAgent, change_keys, describe, scene_keys
+from augment.scene.entities import AgentType, Modification, SceneOptions, TrafficAgent, TurnType
 from tests.properties import examples
-from tests.scenes import cone, pedestrian, scene, vehicle
+from tests.scenes import cone, junction, pedestrian, scene, vehicle
 
 STREET = scene(agents=(vehicle("Agent2", 20.04, -3.46), vehicle("Agent3", -12.0, 3.5, math.pi)))
 
@@ -122,41 +122,26 @@ def test_neither_ids_nor_their_order_leave_a_trace(
     assert describe(STREET, changed(shuffled, "zyxwvu")) == told
 
 
-@examples(60)
-@given(AGENTS)
-def test_in_a_mirror_left_and_right_change_places_and_nothing_else(
-    agents: list[TrafficAgent],
-) -> None:
-    told = describe(STREET, changed(agents))
-    mirrored = describe(STREET, changed([in_a_mirror(agent) for agent in agents]))
-    assert key(mirrored) == key([other_hand(line) for line in told])
+VIEW = {"px_per_m": 20.0, "ego_px": [300.0, 400.0], "width": 1200, "height": 800}
 
 
-def in_a_mirror(agent: TrafficAgent) -> TrafficAgent:
-    end = agent.walk_to_m
-    return replace(
-        agent,
-        y_m=-agent.y_m,
-        heading_rad=-agent.heading_rad,
-        walk_to_m=None if end is None else (end[0], -end[1]),
+def test_traffic_junctions_and_goals_are_named_where_they_are_drawn() -> None:
+    moving = replace(vehicle("Agent2", 20.0, 0.0), speed_mps=5.0)
+    assert scene_keys(scene(agents=(moving,)), VIEW) >= {"recorded", "motion"}
+    far = replace(moving, x_m=500.0)
+    assert not scene_keys(scene(agents=(far,)), VIEW) & {"recorded"}
+    left = replace(junction(), options=SceneOptions(goal=TurnType.LEFT))
+    assert scene_keys(left, VIEW) >= {"junction", "goal"}
+
+
+def test_a_change_names_its_marks_and_what_lies_outside() -> None:
+    change = Modification(
+        added=(
+            replace(vehicle("Added1", 20.0, 0.0), type=AgentType.BUS),
+            cone("Added2", 10.0, 1.0),
+            pedestrian("Added3", 15.0, -4.0, (15.0, 4.0)),
+        )
     )
-
-
-def other_hand(line: DescribedAgent) -> DescribedAgent:
-    end = line.walk_to_m
-    return replace(
-        line,
-        left_m=0.0 - line.left_m,
-        heading_deg=turned(line.heading_deg, either=180),
-        along_deg=turned(line.along_deg, either=90),
-        walk_to_m=None if end is None else (end[0], 0.0 - end[1]),
-    )
-
-
-def turned(degrees: int | None, *, either: int) -> int | None:
-    """The same angle to the other side; one is the same on both."""
-    return degrees if degrees in (None, either) else -degrees
-
-
-def key(lines: list[DescribedAgent]) -> list[str]:
-    return sorted(map(repr, lines))
+    assert change_keys(change, VIEW) == {"changed", "bus", "cone", "person", "walk"}
+    away = Modification(added=(cone("Added1", 100.0, 0.0),))
+    assert change_keys(away, VIEW) == {"outside"}

@@ -66,10 +66,3 @@ def test_ego_changed_and_others_differ_for_colour_blind_eyes(sight: np.ndarray) 
     for index, one in enumerate(seen):
         for other in seen[index + 1 :]:
             assert math.dist(one, other) > 0.3
-
-
-def test_only_changed_marks_are_hatched_and_theirs_is_the_thickest_outline() -> None:
-    changed, rest = palette.CHANGED_MARK, (palette.EGO_MARK, palette.OTHER_MARK)
-    assert changed.hatch is not None
-    assert all(style.hatch is None for style in rest)
-    assert all(style.outline_px < changed.outline_px for style in rest)

@@ -14,7 +14,7 @@ from augment.services.endpoints.known_models import Spending
 from augment.services.running import jobs, runner
 from tests.jobs.models import Model, llama_job, reply
 from tests.jobs.rows import only_row
-from tests.variants.answers import GOOD
+from tests.variants.playing import GOOD
 
 pytestmark = pytest.mark.django_db
 

@@ -18,10 +18,9 @@ from django.core.files.base import ContentFile
 from django.core.files.storage import default_storage
 from django.core.management import CommandError, call_command
 
-from arena.management.backups.archive import MANIFEST, ZipSource, read_manifest
-from arena.management.backups.taking import take_backup
+from arena.management.backups import MANIFEST, read_manifest, take_backup, zip_members
 from arena.models import Vote
-from arena.services.stored_rows import as_line, columns_of
+from arena.results.services.stored_rows import as_line, columns_of
 from augment.models import GenerationJob, Scenario, Simulation
 from augment.services.judging.simulations import DRIVES
 from augment.services.running.runner import AUGMENTATIONS
@@ -86,7 +85,7 @@ def test_a_row_that_does_not_fit_takes_everything_back(tmp_path: Path) -> None:
     path = tmp_path / "b.zip"
     take_backup(path, now=NOW, say=quiet)
     with path.open("rb") as file:
-        manifest = read_manifest(ZipSource(file))
+        manifest = read_manifest(zip_members(file))
     manifest.rows["arena.vote"] += 1
     change(path, lambda found: with_manifest(found, rows=manifest.rows))
     empty()

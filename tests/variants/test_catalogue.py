@@ -122,14 +122,6 @@ def test_a_low_rating_costs_one_more_round(server: FakeServer, variant: str, slu
     _is_where_it_belongs(outcome, slug)
 
 
-@pytest.mark.parametrize("slug", SLUGS[::10])
-def test_native_calls_place_as_calls_in_the_answer_do(server: FakeServer, slug: str) -> None:
-    written, _ = played(server, "fake-good", "fc", slug)
-    native, transcript = played(server, "fake-good", "fc", slug, native=True)
-    assert order(transcript) == "mm"
-    assert native.modification == written.modification
-
-
 def _is_complete(
     transcript: MemoryTranscript, variant: str, *, looks_up: bool, doubted: bool
 ) -> None:

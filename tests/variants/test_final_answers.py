@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import random
-import re
 
 import pytest
 
@@ -11,7 +10,6 @@ from augment.fake_llm.playing import CARELESS, GOOD
 from augment.llm.client import Patience
 from augment.prompts.blocks import names_changes
 from augment.prompts.calls import calls_in
-from augment.prompts.fill import read_text
 from augment.variants.pipeline import run
 from augment.variants.recipes import find_recipe
 from augment.variants.respondents import MemoryTranscript, RespondentClient
@@ -45,10 +43,3 @@ def test_of_all_answers_on_the_catalogue_only_those_without_a_block_call(slug: s
             assert calls_in(told) == ()
     for answer in answers(slug, "otm", CARELESS):
         assert calls_in(answer) == ()
-
-
-@pytest.mark.parametrize("name", ["work_called.md", "work_native.md", "work_walked.md"])
-def test_the_final_answers_of_the_prompts_examples_call_nothing(name: str) -> None:
-    final = re.split(r"^(?:Second|Third) answer:$", read_text(name), flags=re.MULTILINE)[-1]
-    assert names_changes(final)
-    assert calls_in(final) == ()

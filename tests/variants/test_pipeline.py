@@ -15,7 +15,7 @@ from augment.variants.recipes import OTM, TQA
 from augment.variants.respondents import MemoryTranscript, RespondentClient
 from tests.llm.scripted import ScriptedClient
 from tests.scenes import scene
-from tests.variants.answers import GOOD, agent, answer, block
+from tests.variants.playing import GOOD, agent, answer, block
 
 
 class Run:
@@ -65,38 +65,12 @@ def test_an_unreadable_answer_is_asked_for_once_more_with_its_faults() -> None:
     assert "add.0.x_m: Input should be a valid number" in second[3].text
 
 
-def test_two_unreadable_answers_are_an_outcome_and_no_third_call() -> None:
-    made = Run(["I would put it there.", "Really, there."])
-    outcome = made.outcome()
-    assert (outcome.status, outcome.modification) == (OutcomeStatus.UNREADABLE, None)
-    assert 'no fenced JSON block with the keys "add", "move", "remove"' in outcome.reason
-    assert [c.reply.text for c in made.transcript.calls if c.reply] == [
-        "I would put it there.",
-        "Really, there.",
-    ]
-
-
 def test_a_cut_off_answer_is_asked_for_again_with_twice_the_room() -> None:
     made = Run([Reply(text=GOOD[:-40], finish_reason="length"), GOOD])
     assert made.outcome().status is OutcomeStatus.DONE
     first, second = made.client.requests
     assert second.max_tokens == 2 * first.max_tokens
     assert "cut off at its length limit" in second.messages[-1].text
-
-
-@pytest.mark.parametrize(
-    ("reply", "reason"),
-    [
-        (Reply(text="", refusal="I can't help with that."), "I can't help with that."),
-        (Reply(text="", finish_reason="content_filter"), "content filter"),
-    ],
-)
-def test_a_refusal_is_an_outcome_and_not_asked_again(reply: Reply, reason: str) -> None:
-    made = Run([reply])
-    outcome = made.outcome()
-    assert outcome.status is OutcomeStatus.REFUSED
-    assert reason in outcome.reason
-    assert made.transcript.calls[0].reply == reply
 
 
 def test_the_transcript_has_the_answer_before_anybody_reads_it() -> None:

@@ -1,7 +1,5 @@
 from __future__ import annotations
 
-import math
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -9,10 +7,7 @@ import pytest
 from augment.prompts.vectors import short_names
 from augment.scene.entities import Scene
 from augment.scene.lane_graph import LaneGraph
-from augment.variants.pose_tool import PoseTool
 from tests.recorded import recorded
-from tests.scenes import curve
-from tests.scenes import scene as scene_of
 from tests.variants.pose_accuracy import (
     FILES,
     Accuracy,
@@ -47,16 +42,6 @@ def test_on_recorded_lanes_the_tool_and_the_text_are_on_the_lane(
     tool = whole_map(recorded_scenes(realdata)[number])
     assert_within(accuracy(tool), *BY_ID)
     assert_within(text_accuracy(tool), *BY_TEXT)
-
-
-def test_the_heading_at_the_ends_of_a_bend_is_that_of_the_bend() -> None:
-    line = curve(40.0).lanes[0].centerline
-    bend = PoseTool(
-        scene_of(lanes=(replace(curve().lanes[0], centerline=line.between(60.0, 99.0)),))
-    )
-    for s_m in (0.0, 0.3, 20.0, 38.9):
-        heading = bend.pose_on_lane("Lane1", "lane", s_m).pose.heading_rad
-        assert heading == pytest.approx(s_m / 40.0, abs=math.radians(0.5))
 
 
 @pytest.mark.realdata

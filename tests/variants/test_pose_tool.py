@@ -9,7 +9,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from augment.errors import ToolError
-from augment.geometry.polyline import Polyline
 from augment.prompts.vectors import control_points, short_names
 from augment.scene.ego_route import EgoRoute
 from augment.scene.entities import AreaKind, SceneOptions, TurnType
@@ -120,13 +119,6 @@ def test_a_place_that_is_taken_names_who_stands_there_and_the_nearest_free_one(
         assert again["taken_by"] is None
 
 
-def test_a_distance_runs_on_along_the_goal_of_the_ego() -> None:
-    left = SceneOptions(goal=TurnType.LEFT)
-    tool = PoseTool(replace(junction(), options=left))
-    assert tool.pose_on_lane("Lane1", "Agent1", 30.0).route == ("Lane1", "Connector2")
-    assert JUNCTION.pose_on_lane("Lane1", "Agent1", 30.0).route == ("Lane1", "Connector1")
-
-
 @pytest.mark.parametrize("goal", [None, TurnType.STRAIGHT, TurnType.LEFT, TurnType.RIGHT])
 @pytest.mark.parametrize("name", ["market-crossing", "theatre-crossing", "orchard-circle"])
 def test_the_tool_goes_where_the_checks_measure(name: str, goal: TurnType | None) -> None:
@@ -139,23 +131,6 @@ def test_the_tool_goes_where_the_checks_measure(name: str, goal: TurnType | None
         place = tool.pose_on_lane(start, "Agent1", ahead_m).pose
         gap_m = math.dist((place.x_m, place.y_m), route.position(ahead_m))
         assert gap_m < 0.02, ahead_m
-
-
-def test_the_edges_of_the_road_are_told_from_the_centre_of_the_lane() -> None:
-    ahead = STREET.pose_on_lane("Lane1", "lane", 60.0, 1.0)
-    assert [ahead.left.edge_m, ahead.right.edge_m] == pytest.approx([5.25, 1.75])
-    back = STREET.pose_on_lane("Lane2", "lane", 60.0)
-    assert [back.left.edge_m, back.right.edge_m] == pytest.approx([5.25, 1.75])
-
-
-def test_a_seam_between_lanes_is_no_edge_and_a_verge_is_one() -> None:
-    first = scene().lanes[0]
-    row = [
-        replace(first, id=f"Lane{n}", centerline=Polyline([(-50, y), (100, y)]))
-        for n, y in ((1, 0.0), (2, 3.75), (3, 7.9))
-    ]
-    place = PoseTool(scene(lanes=tuple(row), areas=())).pose_on_lane("Lane1", "lane", 60.0)
-    assert place.left.edge_m == pytest.approx(3.75 + 1.75)
 
 
 def test_a_distance_runs_on_straight_over_connectors_and_back_again() -> None:
@@ -265,18 +240,3 @@ any_json = st.recursive(
 )
 def test_whatever_is_called_the_answer_is_json(arguments: object) -> None:
     json.dumps(JUNCTION.answer(arguments), allow_nan=False)
-
-
-@given(
-    control=st.lists(
-        st.lists(st.floats(-1000, 1000, allow_subnormal=False), min_size=2, max_size=2),
-        min_size=4,
-        max_size=4,
-    ),
-    distance_m=st.floats(-50, 500),
-)
-def test_any_curve_has_a_finite_answer_or_an_error(
-    control: list[list[float]], distance_m: float
-) -> None:
-    answer = JUNCTION.answer({"lane": control, "start": "Agent1", "distance_m": distance_m})
-    json.dumps(answer, allow_nan=False)

@@ -22,16 +22,6 @@ def test_a_mean_below_four_sends_the_feedback_back() -> None:
     assert "- It is too near. Reason: Because. Corrective action: Move it." in again[3].text
 
 
-def test_the_reviewer_gets_vectors_and_no_reasoning() -> None:
-    play = Play("tqa", [car(21.4), HIGH])
-    told, task = play.client.requests[1].messages
-    assert "Common problems" in told.text
-    assert "One road, two lanes" not in task.text  # the modifier's insights
-    assert '"Agent2": ["VEHICLE",21.4,0,0,2,4.8,0,"Lane1"]' in task.text
-    assert "> Add a parked car 21.4 m ahead." in task.text
-    assert '"Lane1": [1,"Eastwards"' in task.text
-
-
 def test_the_best_rated_of_three_rounds_counts_and_each_is_on_record() -> None:
     rounds = [car(10.0), rating(2, 2, 2, "a"), car(20.0), rating(3, 4, 4, "b"), car(30.0)]
     play = Play("tqa", [*rounds, rating(1, 1, 1, "c")])
@@ -69,20 +59,10 @@ def test_an_unusable_review_lets_the_modifiers_result_stand() -> None:
     assert "unusable" in play.notes("review")[0]
 
 
-def test_a_later_review_that_fails_leaves_the_newest_round() -> None:
-    play = Play("tqa", [car(10.0), LOW, car(20.0), "Fine.", "Fine."])
-    assert play.x_m == 20.0
-
-
 def test_a_regeneration_that_can_not_be_read_leaves_the_round_before() -> None:
     play = Play("tqa", [car(10.0), LOW, "There.", "There."])
     assert (play.roles, play.x_m, play.outcome.is_accepted) == ("mrmm", 10.0, False)
     assert "Round 2 brought no modification" in play.outcome.notes
-
-
-def test_an_unreadable_first_round_is_never_reviewed() -> None:
-    play = Play("tqa", ["There.", "There."])
-    assert (play.roles, play.outcome.status) == ("mm", OutcomeStatus.UNREADABLE)
 
 
 def test_engineer_viewer_engineer_and_an_accepted_round_ends_it() -> None:
@@ -141,12 +121,6 @@ def test_a_modifier_that_insists_on_what_is_only_doubtful_has_the_last_word() ->
     play = Play("geo", [kerb, kerb])
     assert (play.roles, play.outcome.is_accepted) == ("mm", True)
     assert "0 findings wrong" in play.outcome.notes
-
-
-def test_a_modifier_that_insists_on_what_is_wrong_has_not() -> None:
-    off = car(21.4, y_m=30.0)
-    play = Play("geo", [off, off, off])
-    assert (play.roles, play.outcome.is_accepted) == ("mmm", False)
 
 
 def test_a_geometric_review_holds_the_modification_against_the_intent_where_there_is_one() -> None:

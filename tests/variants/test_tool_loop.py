@@ -9,7 +9,7 @@ import pytest
 from augment.llm.messages import Message, Speaker, ToolChoice
 from augment.variants.pipeline import OutcomeStatus
 from tests.prompts.test_calls import FORMS
-from tests.variants.playing import Play, call, car, native, rating
+from tests.variants.playing import Play, call, car, native
 
 POSE = '{"lane": "Lane1", "start": "Agent1", "distance_m": 21.4, "lateral_m": 0.5}'
 
@@ -31,11 +31,6 @@ def test_calls_in_an_answer_are_answered_in_order_and_then_read_on() -> None:
     assert [(one["x_m"], one["y_m"]) for one in results(told)] == [(21.4, 0.0), (30.0, -1.0)]
     assert play.client.requests[0].tools == ()
     assert [note["tool"] for note in play.notes("tool_call")] == ["pose_on_lane"] * 2
-
-
-def test_an_answer_with_a_call_is_no_final_answer() -> None:
-    play = Play("fc", [f"{call()}\n{car(99.0)}", car(21.4)])
-    assert play.x_m == 21.4
 
 
 @pytest.mark.parametrize(
@@ -139,11 +134,3 @@ def test_broken_native_arguments_are_told_and_go_back_as_none() -> None:
     said, told = play.client.requests[1].messages[2:]
     assert said.calls[0].arguments == "{}"
     assert "the arguments are not JSON" in json.loads(told.text)["error"]
-
-
-def test_each_round_has_calls_of_its_own() -> None:
-    calls = [call(distance_m=float(n)) for n in range(1, 9)]
-    low, high = rating(1, 1, 1, "Too near."), rating(5, 5, 5)
-    play = Play("fc+tqa", [*calls, car(10.0), low, *calls, car(21.4), high])
-    assert play.roles == "m" * 9 + "r" + "m" * 9 + "r"
-    assert play.x_m == 21.4

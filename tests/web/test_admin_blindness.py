@@ -11,8 +11,8 @@ from django.test import Client
 from django.urls import reverse
 
 from arena.models import Matchup, Snapshot, Standing, Study, Vote
-from arena.services.early_looks import open_early
-from arena.services.ratings import rate
+from arena.results.services.ratings import open_early
+from arena.results.services.ratings import rate_now as rate
 from arena.studies.services.opening import close_study
 from augment.models import Augmentation, Contestant
 from tests import study_rows

@@ -8,7 +8,7 @@ from typing import Any
 from django.core.management.base import CommandParser
 from django.utils import timezone
 
-from arena.management.backups.taking import take_backup
+from arena.management.backups import take_backup
 from augment.services.terminal import TerminalCommand
 
 

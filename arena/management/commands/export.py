@@ -9,11 +9,8 @@ from django.core.management.base import CommandError, CommandParser
 
 from arena.errors import ArenaError
 from arena.exports.files import write_whole
-from arena.exports.study_folder.writing import write_study
-from arena.management.exporting.jobs import add_jobs
-from arena.management.exporting.kinds import ExportedFile
-from arena.management.exporting.scenarios import add_scenarios
-from arena.management.exporting.studies import add_studies
+from arena.management.exporting import KINDS, ExportedFile, add_kinds
+from arena.results.exports.study_folder import write_study
 from arena.studies.queries import study_named
 from augment.errors import AugmentError
 from augment.services.terminal import TerminalCommand
@@ -27,23 +24,17 @@ class Command(TerminalCommand):
     def add_arguments(self, parser: CommandParser) -> None:
         """What to export, of which study or job, where to."""
         kinds = parser.add_subparsers(dest="what", required=True, metavar="WHAT")
-        add_studies(kinds)
-        whole = kinds.add_parser("study", help="a whole study; OUT is a new folder")
+        add_kinds(kinds)
+        whole = kinds.add_parser("study", help="a whole study")
         whole.add_argument("study", help="its name or its code; it is closed")
-        add_jobs(kinds)
-        add_scenarios(kinds)
-        for kind in kinds.choices.values():
-            kind.add_argument("--out", required=True, help="a file; - for standard output")
+        whole.add_argument("--out", required=True, help="a new folder")
 
     def handle(self, *args: Any, **options: Any) -> None:
         """Write the file."""
-        if options["what"] == "study":
-            self._study(options)
+        if options["what"] != "study":
+            written = KINDS[options["what"]].write(options, self.stderr.write)
+            self._deliver(written, options["out"])
             return
-        written: ExportedFile = options["write"](options, self.stderr.write)
-        self._deliver(written, options["out"])
-
-    def _study(self, options: dict[str, Any]) -> None:
         try:
             study = study_named(options["study"])
             write_study(study, Path(options["out"]), say=self.stderr.write)
@@ -57,15 +48,13 @@ class Command(TerminalCommand):
                 raise CommandError(f"A {written.suffix} file can't go to a terminal: name a file.")
             self.stdout.write_data(written.content.decode())
             return
-        path = Path(out)
-        if written.name and path.suffix != f".{written.suffix}":
-            try:
-                path.mkdir(parents=True, exist_ok=True)
-            except OSError as error:
-                raise CommandError(f"{out} can't be made a folder: {error.strerror}.") from error
-            path /= written.name
+        path, failure = Path(out), f"{out} can't be made a folder"
         try:
+            if written.name and path.suffix != f".{written.suffix}":
+                path.mkdir(parents=True, exist_ok=True)
+                path /= written.name
+            failure = f"{path} can't be written"
             write_whole(path, written.content)
         except OSError as error:
-            raise CommandError(f"{path} can't be written: {error.strerror}.") from error
+            raise CommandError(f"{failure}: {error.strerror}.") from error
         self.stderr.write(f"Wrote {path}.")

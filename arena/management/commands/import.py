@@ -7,7 +7,7 @@ from typing import Any
 
 from django.core.management.base import CommandParser
 
-from arena.management.backups.restoring import import_study
+from arena.management.backups import import_study
 from augment.services.terminal import TerminalCommand
 
 

@@ -7,12 +7,12 @@ from typing import Any
 
 from django.core.management.base import CommandParser
 
-from arena.services.vote_imports import import_votes
+from arena.results.services.vote_files import import_votes
 from augment.services.terminal import TerminalCommand
 
 
 class Command(TerminalCommand):
-    """The door to arena.services.vote_imports.import_votes."""
+    """The door to arena.results.services.vote_files.import_votes."""
 
     help = (
         "Import votes from a CSV file with the columns model_a, model_b, winner (model_a, "

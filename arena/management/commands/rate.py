@@ -6,19 +6,19 @@ from typing import Any
 
 from django.core.management.base import CommandParser
 
-from arena.exports.tables import leaderboard_table
-from arena.exports.writers import plain_text
-from arena.queries.votes.sets import Filters
 from arena.rating.rules import Intervals, Unit
-from arena.services.covariates import COVARIATES
-from arena.services.early_looks import log_early_look
-from arena.services.ratings import DEFAULT_ROUNDS, rate
+from arena.results.exports.tables import leaderboard_table
+from arena.results.exports.writers import plain_text
+from arena.results.queries.votes import Filters
+from arena.results.services.covariates import COVARIATES
+from arena.results.services.ratings import DEFAULT_ROUNDS, log_early_look
+from arena.results.services.ratings import rate_now as rate
 from arena.studies.queries import study_named
 from augment.services.terminal import TerminalCommand
 
 
 class Command(TerminalCommand):
-    """The door to arena.services.ratings.rate."""
+    """The door to arena.results.services.ratings.rate_now."""
 
     help = "Rate the contestants of a study by its votes and keep the result."
 

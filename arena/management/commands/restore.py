@@ -7,7 +7,7 @@ from typing import Any
 
 from django.core.management.base import CommandParser
 
-from arena.management.backups.restoring import restore_backup
+from arena.management.backups import restore_backup
 from augment.services.terminal import TerminalCommand
 
 

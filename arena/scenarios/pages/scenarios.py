@@ -23,7 +23,7 @@ from augment.models import BaseScene, EndpointModel, Scenario
 from augment.services.endpoints.contestants import ensure_builtin
 from augment.services.events import retire, take_back
 from augment.services.running.intent_readings import plan_reading
-from augment.services.scenarios.catalogue import load_own_catalogue
+from augment.services.scenarios.catalogue import CatalogueStep, load_catalogue
 from augment.services.scenarios.editing import (
     accept_reading,
     enter_intent,
@@ -74,7 +74,7 @@ def scenarios_page(request: HttpRequest) -> HttpResponse:
 def load_scenarios(request: HttpRequest) -> HttpResponse:
     """Load one set of the catalogue, all of it or nothing, and the built-in contestants."""
     with refusals_told(request):
-        report = load_own_catalogue(
+        report = load_catalogue(
             sets=[request.POST.get("set", "")],
             with_paraphrases="wordings" in request.POST,
             actor=user_of(request),
@@ -82,8 +82,9 @@ def load_scenarios(request: HttpRequest) -> HttpResponse:
         ensure_builtin()
         messages.success(
             request,
-            f"Scenarios: {report.scenarios_added} added, {report.scenarios_changed} changed, "
-            f"{report.scenarios_unchanged} as they were.",
+            "Scenarios: {added} added, {changed} changed, {unchanged} as they were.".format(
+                **{step.value: report.scenarios[step] for step in CatalogueStep}
+            ),
         )
         if report.kept:
             names = ", ".join(report.kept)

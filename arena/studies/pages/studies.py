@@ -19,11 +19,15 @@ from django.views.decorators.http import require_http_methods, require_POST, req
 from arena import tasks
 from arena.models import Report, Study, StudyFile
 from arena.people.queries import by_pseudonym, experts
-from arena.queries.studies.results import ResultsAccess, latest_snapshot, results_access
-from arena.queries.votes.judged import is_imported
-from arena.queries.voting.ballots import tallies
-from arena.queries.voting.showings import view_shown
-from arena.services.study_files import SHOWS_RESULTS, ask_for_study_file, study_files_of, why_not
+from arena.results.pages.rating_form import rate_or_send
+from arena.results.queries.access import ResultsAccess, latest_snapshot, results_access
+from arena.results.queries.votes import is_imported
+from arena.results.services.written_files import (
+    SHOWS_RESULTS,
+    ask_for_study_file,
+    study_files_of,
+    why_not,
+)
 from arena.site.access import ADMIN, STAFF, allow_only, user_of
 from arena.site.acts import (
     WHY,
@@ -47,7 +51,8 @@ from arena.studies.services.opening import (
 )
 from arena.studies.services.plan import PLAN_INPUTS, hypotheses_of, plan_of
 from arena.studies.services.taking_part import hand_over
-from arena.web.results.rating import rate_or_send
+from arena.voting.queries.ballots import tallies
+from arena.voting.queries.showings import view_shown
 from augment.services.inputs import InputKind
 
 STUDIES_AT_ONCE = 25

@@ -20,20 +20,28 @@ from django.utils import timezone
 
 from arena.errors import StudyNotOpen
 from arena.models import Study
-from arena.pairing.demands import ATTENTION_CHECKS, MOST_CHECKS, check_share
 from arena.pairing.plan import Check, Entry, MatchupPlan, PlanRules, plan
-from arena.pairing.settled import Triple, draw_shown
-from arena.pairing.target_lines import read_targets
+from arena.pairing.rules import (
+    ATTENTION_CHECKS,
+    MOST_CHECKS,
+    Triple,
+    check_share,
+    draw_shown,
+    read_targets,
+)
 from arena.people.queries import experts as expert_accounts
 from arena.rating.snapshot_document import VERSION as RESULTS_VERSION
-from arena.services.frames import Cells
-from arena.services.replays import replays_of
-from arena.services.shown_pictures import SampleRule, StudyPictures, choose_pictures
-from arena.services.vote_rows import VERSION as VOTES_VERSION
+from arena.results.services.vote_files import VERSION as VOTES_VERSION
 from arena.studies.services.experts import require_practice_pictures
-from arena.studies.services.pictures import check_pictures, require_checks, windows_of
+from arena.studies.services.pictures import Cells, check_pictures, require_checks, windows_of
 from arena.studies.services.plan import SWITCH_COLUMNS, StudyPlan, log_study, read_hypotheses
 from arena.studies.services.planning import store
+from arena.voting.services.shown_pictures import (
+    SampleRule,
+    StudyPictures,
+    choose_pictures,
+    replays_of,
+)
 from augment.errors import Conflict, UnknownName
 from augment.models import Contestant, Scenario
 from augment.services.endpoints.treatments import options_of

@@ -16,9 +16,9 @@ from django.utils.translation import gettext
 
 from arena.errors import EnrolmentOver, NothingToPlan, StudyNotOpen
 from arena.models import EnrolledVoter, Enrolment, Invitation, Matchup, Person, Study
-from arena.pairing.arrays import IntArray
+from arena.pairing.later import choose_for_newcomer as choose_units
 from arena.pairing.later import deal, units_of
-from arena.pairing.newcomers import choose_units
+from arena.pairing.order import IntArray
 from arena.pairing.rules import Grid, place_of
 from arena.people.queries import experts as expert_accounts
 from arena.people.queries import forgotten_name

@@ -1,0 +1,282 @@
+from __future__ import annotations
+
+import base64
+import hashlib
+import random
+from dataclasses import replace
+from decimal import Decimal
+
+import pytest
+
+from augment.errors import ModelFault
+from augment.llm.client import ModelProfile, Patience
+from augment.llm.costs import (
+    IMAGE_TOKENS,
+    Price,
+    cut_of,
+    least_tokens,
+    nano_usd_of,
+    usd_of,
+    worst_case,
+)
+from augment.llm.messages import (
+    AnswerSchema,
+    Message,
+    Reply,
+    Request,
+    Speaker,
+    Tool,
+    image_reference,
+    request_hash,
+    shorten,
+)
+
+
+def test_a_request_says_only_what_was_asked_for() -> None:
+    request = Request(model="m", messages=(Message(speaker=Speaker.USER, text="Hello"),))
+    assert request.to_document() == {
+        "model": "m",
+        "messages": [{"role": "user", "content": "Hello"}],
+        "max_completion_tokens": 8192,
+    }
+
+
+def test_an_image_goes_as_a_png_data_url_after_the_text() -> None:
+    message = Message(speaker=Speaker.USER, text="Look", images=(b"\x89PNG",))
+    content = message.to_document()["content"]
+    assert isinstance(content, list)
+    assert [part["type"] for part in content] == ["text", "image_url"]
+    url = content[1]["image_url"]["url"]
+    assert base64.b64decode(url.removeprefix("data:image/png;base64,")) == b"\x89PNG"
+
+
+@pytest.mark.parametrize("length", [0, 39, 40])
+def test_a_text_that_fits_stays_as_it_is(length: int) -> None:
+    assert shorten("x" * length, 40) == "x" * length
+
+
+@pytest.mark.parametrize("length", [41, 1000, 10_000_000])
+def test_a_text_that_is_too_long_says_how_long_it_was(length: int) -> None:
+    shown = shorten("x" * length, 40)
+    assert len(shown) == 40
+    assert shown.startswith("xx")
+    assert shown.endswith(f"x… [cut: {length} characters]")
+
+
+ASKED = Request(
+    model="m",
+    messages=(Message(speaker=Speaker.USER, text="Look.", images=(b"png",)),),
+    max_tokens=10,
+    temperature=0.5,
+    seed=1,
+)
+
+
+def hash_of(
+    request: Request = ASKED, *, base_url: str = "http://a/v1", version: str = "p1"
+) -> str:
+    document = request.to_document(image_url=image_reference)
+    return request_hash(base_url=base_url, document=document, prompt_version=version)
+
+
+def test_an_image_is_named_by_its_bytes_and_not_carried_along() -> None:
+    document = ASKED.to_document(image_url=image_reference)
+    assert hashlib.sha256(b"png").hexdigest() in str(document)
+    assert "base64" not in str(document)
+
+
+def test_everything_that_an_answer_depends_on_changes_the_hash() -> None:
+    message = ASKED.messages[0]
+    others = [
+        hash_of(base_url="http://b/v1"),
+        hash_of(version="p2"),
+        hash_of(replace(ASKED, model="n")),
+        hash_of(replace(ASKED, max_tokens=11)),
+        hash_of(replace(ASKED, temperature=None)),
+        hash_of(replace(ASKED, seed=2)),
+        hash_of(replace(ASKED, messages=(replace(message, text="Look!"),))),
+        hash_of(replace(ASKED, messages=(replace(message, images=(b"other",)),))),
+        hash_of(replace(ASKED, messages=(replace(message, speaker=Speaker.SYSTEM),))),
+    ]
+    assert len({hash_of(), *others}) == 1 + len(others)
+
+
+GPT_4O = Price(prompt_usd=Decimal("2.50"), completion_usd=Decimal("10"))
+
+
+def request(text: str = "x", *, images: tuple[bytes, ...] = (), max_tokens: int = 100) -> Request:
+    message = Message(speaker=Speaker.USER, text=text, images=images)
+    return Request(model="m", messages=(message,), max_tokens=max_tokens)
+
+
+def test_a_bill_is_counted_in_whole_nano_dollars() -> None:
+    assert GPT_4O.nano_usd(prompt_tokens=1_000_000, completion_tokens=0) == nano_usd_of(
+        Decimal("2.5")
+    )
+    assert usd_of(GPT_4O.nano_usd(prompt_tokens=900, completion_tokens=120)) == Decimal("0.00345")
+
+
+@pytest.mark.parametrize("text", ["", "a" * 5000, "3.14, -2.71; " * 400, "ü€😀" * 300, "\ud800"])
+def test_no_text_has_more_tokens_than_bytes_and_those_are_the_bound(text: str) -> None:
+    needed = len(text.encode("utf-8", "surrogatepass"))
+    assert worst_case(request(text)).prompt_tokens >= needed
+
+
+def test_images_count_by_themselves_and_not_by_their_bytes() -> None:
+    none = worst_case(request()).prompt_tokens
+    small = worst_case(request(images=(b"1", b"2"))).prompt_tokens
+    assert worst_case(request(images=(b"1" * 99_999, b"2"))).prompt_tokens == small
+    assert small - none >= 2 * IMAGE_TOKENS
+
+
+def test_the_answer_may_use_its_whole_length() -> None:
+    worst = worst_case(request(max_tokens=777))
+    assert (worst.completion_tokens, worst.tokens) == (777, worst.prompt_tokens + 777)
+
+
+LONG = 'Lane7: [7, "Eastwards", 3.50, [[-12.25, 1.75], [-7.25, 1.75]]]\n' * 300
+
+
+def asking(text: str = LONG, max_tokens: int = 1000) -> Request:
+    message = Message(speaker=Speaker.USER, text=text)
+    return Request(model="m", messages=(message,), max_tokens=max_tokens)
+
+
+def reply(prompt: int | None, completion: int | None = 10, finish: str = "stop") -> Reply:
+    return Reply(
+        text="x", prompt_tokens=prompt, completion_tokens=completion, finish_reason=finish
+    )
+
+
+@pytest.mark.parametrize(
+    ("text", "least"),
+    [
+        ("", 0),
+        ("   \n", 0),
+        ("One road, two lanes.", 6),
+        ("21.4", 3),
+        ("-12.25", 4),
+        ("1234567", 3),
+        ('"x_m": 20.0', 6),
+        ("...", 1),
+    ],
+)
+def test_a_text_has_at_least_so_many_tokens(text: str, least: int) -> None:
+    assert least_tokens(text) == least
+
+
+@pytest.mark.parametrize("counted", [1200, 4096])
+def test_a_count_far_below_what_was_sent_is_a_cut_prompt(counted: int) -> None:
+    assert least_tokens(LONG) > 6000
+    cut = cut_of(asking(), reply(counted))
+    assert f"counted {counted} tokens, the prompt has at least" in str(cut)
+    assert cut is not None
+    assert not cut.retryable
+
+
+@pytest.mark.parametrize("window", [2048, 4096, 8192])
+def test_a_finished_answer_to_a_prompt_of_exactly_a_window_is_sound(window: int) -> None:
+    assert cut_of(asking("Hello"), reply(window)) is None
+    assert cut_of(asking("Hello"), reply(window), context_tokens=window) is None
+
+
+@pytest.mark.parametrize(
+    ("words", "known", "is_cut"),
+    [(4096, None, False), (4097, None, True), (4097, 4096, True), (4097, 8192, False)],
+)
+def test_a_count_at_the_window_below_the_least_is_a_cut(
+    words: int, known: int | None, is_cut: bool
+) -> None:
+    cut = cut_of(asking("word " * words), reply(4096), context_tokens=known)
+    assert (cut is not None) == is_cut
+
+
+@pytest.mark.parametrize(
+    ("prompt", "completion", "finish", "is_cut"),
+    [
+        (4000, 96, "length", True),
+        (4000, 96, "", True),
+        (4000, 96, "stop", False),
+        (3000, 1096, "length", False),
+        (4000, 95, "length", False),
+        (4000, None, "length", False),
+    ],
+)
+def test_an_answer_that_runs_into_the_window_shows_a_cut(
+    prompt: int, completion: int | None, finish: str, is_cut: bool
+) -> None:
+    cut = cut_of(asking("Hello"), reply(prompt, completion, finish))
+    assert (cut is not None) == is_cut
+
+
+def fault(*, retryable: bool = True, retry_after_s: float | None = None) -> ModelFault:
+    return ModelFault("broken", retryable=retryable, retry_after_s=retry_after_s)
+
+
+def patience(**changes: float) -> Patience:
+    return Patience(rng=random.Random(1), **changes)  # type: ignore[arg-type]
+
+
+def test_the_wait_doubles_within_its_jitter_and_its_bound() -> None:
+    patient = patience(attempts=9, first_wait_s=1.0, longest_wait_s=5.0)
+    for attempt, full_s in [(1, 1.0), (2, 2.0), (3, 4.0), (4, 5.0), (5, 5.0)]:
+        wait_s = patient.wait_s(fault(), attempt=attempt)
+        assert wait_s is not None
+        assert full_s / 2.0 <= wait_s <= full_s
+
+
+def test_what_the_endpoint_asked_for_is_not_undercut() -> None:
+    assert patience().wait_s(fault(retry_after_s=12.0), attempt=1) == 12.0
+
+
+@pytest.mark.parametrize("asked_s", [30.1, 600.0, float("inf")])
+def test_who_asks_for_too_long_a_wait_is_left_for_later(asked_s: float) -> None:
+    assert patience().wait_s(fault(retry_after_s=asked_s), attempt=1) is None
+
+
+HELLO = Message(speaker=Speaker.USER, text="Hello")
+SCHEMA = AnswerSchema(name="sum", schema={"type": "object"})
+TOOL = Tool(name="double", description="Doubles.", parameters={"type": "object"})
+WITH_SCHEMA = Request(model="m", messages=(HELLO,), temperature=0.0, seed=7, answer_schema=SCHEMA)
+
+
+@pytest.mark.parametrize(
+    ("parameter", "left_out"),
+    [("temperature", "temperature"), ("seed", "seed"), ("response_format", "answer_schema")],
+)
+def test_what_was_refused_is_left_out(parameter: str, left_out: str) -> None:
+    fitted = ModelProfile().without(parameter).fitted(WITH_SCHEMA)
+    assert fitted == replace(WITH_SCHEMA, **{left_out: None})  # type: ignore[arg-type]
+    assert parameter not in fitted.to_document()
+
+
+def test_a_model_without_a_limit_of_the_length_is_not_asked() -> None:
+    boundless = ModelProfile().without("max_completion_tokens").without("max_tokens")
+    with pytest.raises(ModelFault, match="its cost has no bound") as caught:
+        boundless.fitted(WITH_SCHEMA)
+    assert not caught.value.retryable
+
+
+def test_a_blind_model_is_shown_nothing() -> None:
+    seen = replace(WITH_SCHEMA, messages=(replace(HELLO, images=(b"\x89PNG",)),))
+    assert ModelProfile(vision=True).fitted(seen) == ModelProfile().fitted(seen) == seen
+    with pytest.raises(ModelFault, match="m at this endpoint can't see pictures"):
+        ModelProfile(vision=False).fitted(seen)
+
+
+def test_tools_and_schemas_have_the_form_of_the_wire() -> None:
+    assert WITH_SCHEMA.to_document()["response_format"] == {
+        "type": "json_schema",
+        "json_schema": {"name": "sum", "schema": {"type": "object"}, "strict": True},
+    }
+    armed = replace(WITH_SCHEMA, answer_schema=None, tools=(TOOL,))
+    assert armed.to_document()["tools"] == [
+        {
+            "type": "function",
+            "function": {
+                "name": "double",
+                "description": "Doubles.",
+                "parameters": {"type": "object"},
+            },
+        }
+    ]

@@ -1,0 +1,195 @@
+"""Marks stand where the findings are, and nothing of them is in a picture for a vote."""
+
+from __future__ import annotations
+
+import io
+import math
+from dataclasses import replace
+from itertools import combinations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from PIL import Image
+
+from augment.render import legend, palette
+from augment.render.bev import FaultMark, draw, draw_annotated, draw_for_review, lanes_near
+from augment.render.camera import Camera, camera_for
+from augment.render.canvas import Box, Canvas
+from augment.render.labels import Badge, place_badges
+from augment.render.road import scale_box
+from augment.scene.entities import AgentType, Modification, Scene, TrafficAgent
+from tests import scenes
+from tests.render.pictures import WIDE, opened
+from tests.scenes import cone, junction, pedestrian, scene, vehicle
+
+CAR = vehicle("Agent2", 25.0, 0.0)
+CHANGE = Modification(added=(CAR,))
+WRONG = FaultMark(number=1, agents=("Agent2",), is_wrong=True)
+
+
+def places(png: bytes, colour: tuple[int, ...]) -> np.ndarray:
+    """Where pixels (N, 2) of that colour are, in metres of the ego frame."""
+    pixels = np.asarray(opened(png)).astype(int)
+    rows, columns = np.nonzero((np.abs(pixels - np.array(colour[:3])) < 6).all(axis=2))
+    origin = WIDE.to_pixels(np.array([[0.0, 0.0]]))[0]
+    x_m = (columns - origin[0]) / WIDE.px_per_m
+    return np.column_stack([x_m, (origin[1] - rows) / WIDE.px_per_m])
+
+
+def test_a_mark_is_round_its_agent_and_nowhere_else() -> None:
+    found = places(draw_annotated(scene(), CHANGE, WIDE, [WRONG]), palette.WRONG)
+    assert len(found) > 400
+    assert np.abs(found - [25.0, 0.0]).max() < 4.0
+
+
+def test_what_is_missing_is_marked_where_it_belongs() -> None:
+    mark = FaultMark(number=1, agents=(), is_wrong=True, belongs_m=(20.0, 3.5))
+    found = places(draw_annotated(scene(), Modification(), WIDE, [mark]), palette.WRONG)
+    assert np.abs(found - [20.0, 3.5]).max() < 4.0
+
+
+def test_several_marks_of_one_agent_do_not_cover_each_other() -> None:
+    marks = [FaultMark(number=n, agents=("Agent2",), is_wrong=True) for n in range(1, 7)]
+    one = places(draw_annotated(scene(), CHANGE, WIDE, marks[:1]), palette.WRONG)
+    six = places(draw_annotated(scene(), CHANGE, WIDE, marks), palette.WRONG)
+    ring = 2.0 * (CAR.length_m + CAR.width_m) * WIDE.px_per_m * 2.0
+    assert len(six) - len(one) > 4.5 * (len(one) - ring)
+
+
+def test_who_is_out_of_the_picture_or_gone_breaks_nothing() -> None:
+    far = Modification(added=(vehicle("Agent2", 300.0, 0.0),))
+    marks = [WRONG, FaultMark(number=2, agents=("Agent77",), is_wrong=True)]
+    found = places(draw_annotated(scene(), far, WIDE, marks), palette.WRONG)
+    assert len(found) > 800
+
+
+def test_a_picture_for_a_vote_has_none_of_it() -> None:
+    png = draw(scene(), CHANGE, WIDE)
+    for colour in (palette.WRONG, palette.DOUBTFUL, palette.STAMP):
+        assert len(places(png, colour)) == 0
+
+
+GROUND = Canvas(WIDE, (255, 255, 255))
+SCALE = scale_box(WIDE, (False, False))
+
+
+def badges(*lost: TrafficAgent, seen: tuple[TrafficAgent, ...] = ()) -> list[Badge]:
+    return place_badges(GROUND, list(lost), list(seen), taken=(SCALE,))
+
+
+def apart(one: Box, other: Box) -> bool:
+    return one[2] <= other[0] or other[2] <= one[0] or one[3] <= other[1] or other[3] <= one[1]
+
+
+@pytest.mark.parametrize(
+    ("x_m", "y_m", "side"),
+    [(0.0, 90.0, "top"), (0.0, -90.0, "bottom"), (-90.0, 0.0, "left"), (90.0, 0.0, "right")],
+)
+def test_the_arrow_sits_on_the_side_where_the_agent_is(x_m: float, y_m: float, side: str) -> None:
+    (badge,) = badges(scenes.vehicle("New1", x_m, y_m))
+    left, top, right, bottom = badge.box_px
+    gaps = {"left": left, "top": top, "right": 1200.0 - right, "bottom": 800.0 - bottom}
+    assert min(gaps, key=lambda name: gaps[name]) == side
+
+
+@pytest.mark.parametrize("count", [2, 30, 120])
+def test_arrows_stay_inside_and_apart(count: int) -> None:
+    crowd = [
+        scenes.vehicle(f"New{index}", 100.0 * math.cos(index / 9.0), 90.0 * math.sin(index / 9.0))
+        for index in range(count)
+    ]
+    found = badges(*crowd)
+    assert len(found) == count
+    boxes = [badge.box_px for badge in found] + [SCALE]
+    assert all(apart(one, other) for one, other in combinations(boxes, 2))
+    for left, top, right, bottom in boxes:
+        assert left >= 0.0
+        assert top >= 0.0
+        assert right <= 1200.0
+        assert bottom <= 800.0
+
+
+def test_arrows_keep_clear_of_the_marks_that_are_seen() -> None:
+    seen = scenes.vehicle("New2", 42.0, 0.0)
+    (badge,) = badges(scenes.vehicle("New1", 500.0, 0.0), seen=(seen,))
+    assert badge.box_px[3] < 400.0 - 20.0 or badge.box_px[1] > 400.0 + 20.0
+
+
+def reviewed(
+    monkeypatch: object, base: Scene, change: Modification, camera: Camera | None = None
+) -> tuple[tuple[bytes, ...], list[tuple[float, float, str]]]:
+    """The pictures, and every text with its place, of the first picture and its legend first."""
+    said: list[tuple[float, float, str]] = []
+    original = Canvas.text
+
+    def text(
+        self: Canvas, at_px: tuple[float, float], words: str, *args: object, **more: object
+    ) -> None:
+        said.append((*at_px, words))
+        original(self, at_px, words, *args, **more)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(Canvas, "text", text)  # type: ignore[attr-defined]
+    return draw_for_review(base, change, camera or camera_for(base, change)), said
+
+
+def pixels(png: bytes) -> NDArray[np.uint8]:
+    return np.asarray(Image.open(io.BytesIO(png)).convert("RGB"))
+
+
+def test_every_edited_object_and_every_lane_near_it_carries_its_label(monkeypatch: object) -> None:
+    crowd = [cone(f"Agent{n}", 24.0 + 0.25 * (n % 4), 0.3 * (n // 4)) for n in range(2, 14)]
+    base = junction()
+    _, said = reviewed(monkeypatch, base, Modification(added=tuple(crowd)))
+    words = [one[2] for one in said]
+    assert {agent.id for agent in crowd} <= set(words)
+    near = {lane.id for lane in lanes_near(base, tuple(crowd))}
+    assert {"Connector1", "Connector2", "Lane1"} <= near <= set(words)
+    ids = [one for one in said if one[2].startswith(("Agent", "Lane", "Connector"))]
+    for number, (x, y, word) in enumerate(ids):
+        half = 4.2 * len(word)
+        for other_x, other_y, other in ids[number + 1 :]:
+            apart = abs(x - other_x) > half + 4.2 * len(other) - 12.0 or abs(y - other_y) > 14.0
+            assert apart, (word, other)
+
+
+def test_what_is_small_is_shown_enlarged_as_well() -> None:
+    base = scene()
+    assert (
+        len(
+            draw_for_review(
+                base, Modification(added=(vehicle("Agent2", 15.0, 0.0),)), camera_for(base, None)
+            )
+        )
+        == 1
+    )
+    bicycle = replace(
+        vehicle("Agent2", 15.0, 0.0), type=AgentType.BICYCLE, length_m=1.8, width_m=0.6
+    )
+    change = Modification(added=(bicycle,))
+    whole, closer = (pixels(png) for png in draw_for_review(base, change, camera_for(base, None)))
+    blue = [
+        (np.abs(one.astype(int) - palette.CHANGED_MARK.fill).sum(axis=2) < 30).sum()
+        for one in (whole, closer)
+    ]
+    assert blue[1] > 2 * blue[0]
+
+
+def test_the_legend_names_what_is_drawn_and_what_is_not_to_scale(monkeypatch: object) -> None:
+    base = replace(junction(), agents=(vehicle("Agent2", 8.0, 4.0),))
+    things = (pedestrian("Agent3", 10.0, -3.0, (10.0, 3.0)), cone("Agent4", 12.0, 1.0))
+    change = Modification(added=things)
+    _, said = reviewed(monkeypatch, base, change)
+    words = " | ".join(one[2] for one in said)
+    for wanted in (
+        "ego; arrow: front",
+        "changed: pedestrian, beak where he faces, not to scale",
+        "changed: cone, not to scale, no front",
+        "other vehicle, true size",
+        "to where a walk ends",
+        "edge of a connector at the edit",
+        "bar in red, yellow or green: light",
+    ):
+        assert wanted in words
+    assert "sign" not in words
+    assert legend.draw_legend(base, change, 600).height_px > 100
