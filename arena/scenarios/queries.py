@@ -40,7 +40,11 @@ def by_type(chosen: str = "", *, with_paraphrases: bool = True) -> list[TypeGrou
         found = found.filter(catalogue_set="" if chosen == OWN else chosen)
     if not with_paraphrases:
         found = found.filter(paraphrase_of=None)
-    rows = list(found)
+    return group_by_type(list(found))
+
+
+def group_by_type(rows: list[Scenario]) -> list[TypeGroup]:
+    """Return rows in groups, in the order of the types."""
     groups = [
         TypeGroup(type=name, label=label, scenarios=[row for row in rows if row.type == name])
         for name, label in type_choices()
