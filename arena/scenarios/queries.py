@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from django.db.models import Count
+from django.db.models import Case, Count, IntegerField, QuerySet, Value, When
 
 from augment.models import Augmentation, Contestant, Scenario, SceneUpload
 from augment.services.scenarios.scenes import type_choices
@@ -50,6 +50,24 @@ def group_by_type(rows: list[Scenario]) -> list[TypeGroup]:
         for name, label in type_choices()
     ]
     return [group for group in groups if group.scenarios]
+
+
+def listed_scenarios(chosen: str, *, is_retired: bool) -> QuerySet[Scenario]:
+    """Return scenarios in the order of the types, without paraphrases and documents.
+
+    Args:
+        chosen: A set of the catalogue, `own` for those in none; empty for all.
+        is_retired: Those that forms offer no more, instead of the others.
+    """
+    rows = Scenario.objects.filter(paraphrase_of=None, retired_at__isnull=not is_retired)
+    if chosen:
+        rows = rows.filter(catalogue_set="" if chosen == OWN else chosen)
+    places = [When(type=name, then=Value(n)) for n, (name, _) in enumerate(type_choices())]
+    place = Case(*places, default=Value(len(places)), output_field=IntegerField())
+    lean = rows.select_related("base_scene").defer(
+        "reference", "base_scene__document", "base_scene__recording"
+    )
+    return lean.alias(place=place).order_by("place", "slug")
 
 
 def set_choices(chosen: str) -> list[dict[str, Any]]:
