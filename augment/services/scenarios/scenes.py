@@ -413,7 +413,7 @@ def check_reference(scene: Scene, modification: Modification) -> None:
         raise InvalidDocument("modification", problems)
 
 
-def check_slug(slug: str, *, what: str) -> None:
+def check_slug(slug: str, *, what: str, key: str = "slug") -> None:
     """Whether a slug can be stored.
 
     Raises:
@@ -421,7 +421,7 @@ def check_slug(slug: str, *, what: str) -> None:
     """
     if len(slug) > SLUG_LENGTH or not re.fullmatch(r"[a-z0-9]+(-[a-z0-9]+)*", slug):
         rule = f"lower-case letters, digits and single hyphens, at most {SLUG_LENGTH}"
-        raise InvalidDocument(what, [("slug", f"{slug!r} must be {rule}")])
+        raise InvalidDocument(what, [(key, f"{slug!r} must be {rule}")])
 
 
 # Private
