@@ -5,9 +5,9 @@ from __future__ import annotations
 from celery import shared_task
 from django.contrib.auth.models import User
 
-from arena.exports.study_files import STUDY_FILES
 from arena.jobs.exports.files import SCENARIO_FILES
-from arena.services.ratings import RATINGS
+from arena.results.exports.study_files import STUDY_FILES
+from arena.results.services.ratings import RATINGS
 from augment.models import Scenario
 from augment.services.scenarios import pictures
 from augment.services.work import register

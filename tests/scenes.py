@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from augment.geometry.frames import Pose, wrap
 from augment.geometry.polyline import Polyline
 from augment.scene.entities import (
     AgentType,
@@ -158,3 +159,9 @@ def junction() -> Scene:
         ),
         areas=(),
     )
+
+
+def pose_in_parent(frame: Pose, seen: Pose) -> Pose:
+    """A pose seen from another, in the frame that one is given in."""
+    x_m, y_m = frame.to_parent(np.array([[seen.x_m, seen.y_m]]))[0].tolist()
+    return Pose(x_m=x_m, y_m=y_m, heading_rad=wrap(seen.heading_rad + frame.heading_rad))

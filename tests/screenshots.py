@@ -75,7 +75,7 @@ def _shots() -> list[Shot]:
 
     from arena.management.demo import JOB, OPEN_STUDY, SIMULATED_STUDY
     from arena.models import Study, Vote
-    from arena.web.results.tabs import TABS
+    from arena.results.pages.tabs import TABS
     from augment.models import Augmentation, GenerationJob, Simulation
     from tests.web.addresses import address
     from tests.web.cast import World
@@ -107,7 +107,8 @@ def _shots() -> list[Shot]:
         shots.append(Shot(name=name, who=who, path=address(name, here)))
     results = address("results", rated)
     shots += [
-        Shot(name=f"results-{tab.name}", who="admin", path=f"{results}{tab.name}/") for tab in TABS
+        Shot(name=f"results-{tab.name}", who="admin", path=f"{results}{tab.name}/")
+        for tab in TABS.values()
     ]
     if drive is not None:
         shots.append(Shot(name="drive", who="admin", path=f"/drives/{drive.code}/"))

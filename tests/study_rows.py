@@ -10,8 +10,7 @@ from django.utils import timezone
 
 from arena.models import Matchup, Study, Vote
 from arena.people.services import create_person
-from arena.services.decisions import decision_of
-from arena.services.votes import cast_vote
+from arena.voting.services.casting import cast_vote, decision_of
 from augment.models import Augmentation, BaseScene, Contestant, GenerationJob, Scenario
 from augment.scene.codec import modification_to_document, scene_to_document
 from augment.scene.entities import Modification, ScenarioType

@@ -14,7 +14,7 @@ from django.http.response import HttpResponseBase
 
 from arena.config import faults
 from arena.errors import DatabaseBusy
-from arena.services.turns import is_transient, limit_waiting
+from arena.voting.services.turns import is_transient, limit_waiting
 from augment.errors import MediaFault
 
 logger = logging.getLogger(__name__)

@@ -1,8 +1,9 @@
-"""What all writers share: what formats there are, and how a value is written."""
+"""What all writers share: the formats that there are, Parquet files, and rounded numbers."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+import io
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Generic, Protocol, TypeVar
@@ -14,6 +15,9 @@ from augment.errors import UnknownName
 Table = TypeVar("Table")
 Named = TypeVar("Named")
 Drawn = TypeVar("Drawn", contravariant=True)
+
+TEXT, WHOLE, NUMBER, YES_NO = "string", "int64", "double", "bool"
+"""What a column of a Parquet file can hold; every cell may be empty."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -74,6 +78,26 @@ class _Drawing(Protocol[Drawn]):
 def drawings(chart: _Drawing[Table]) -> dict[str, Callable[[Table], bytes]]:
     """The writers of a chart."""
     return {name: partial(chart, file_format=name) for name in ("svg", "pdf", "png")}
+
+
+def parquet_bytes(columns: Mapping[str, str], rows: Iterable[Sequence[object]]) -> bytes:
+    """A Parquet file; the same rows always give the same bytes.
+
+    Args:
+        columns: What each holds, by its name.
+        rows: Their cells, in the order of the columns; None is unknown.
+    """
+    import pyarrow
+    from pyarrow import parquet
+
+    kinds = [pyarrow.type_for_alias(kind) for kind in columns.values()]
+    cells = list(zip(*rows, strict=True)) or [() for _ in columns]
+    arrays = [
+        pyarrow.array(list(column), type=kind) for column, kind in zip(cells, kinds, strict=True)
+    ]
+    file = io.BytesIO()
+    parquet.write_table(pyarrow.table(arrays, names=list(columns)), file, compression="zstd")
+    return file.getvalue()
 
 
 def round_value(value: float | None) -> float | None:

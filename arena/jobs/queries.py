@@ -15,7 +15,7 @@ from django.db.models.functions import Cast
 
 from arena.errors import NotYours
 from arena.models import FaultLabel, LabellingRound, LabelTask, Study
-from arena.queries.remembering import Remembered, plan_of
+from arena.voting.queries.remembering import Remembered, plan_of
 from augment.models import (
     Augmentation,
     Contestant,

@@ -13,7 +13,7 @@ from django.utils import timezone
 from arena.errors import AlreadyLabelled, LabellingClosed, NothingToPlan, NotYours
 from arena.models import FaultLabel, LabellingRound, LabelTask, ScenarioFile
 from arena.people.queries import experts as expert_accounts
-from arena.services.written_files import waiting_row
+from arena.results.services.written_files import waiting_row
 from augment.errors import Conflict, UnknownName
 from augment.models import Augmentation, GenerationJob
 from augment.services.events import log_event

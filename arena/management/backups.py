@@ -37,10 +37,10 @@ from django.db import DatabaseError, IntegrityError, connection, models, transac
 
 from arena.errors import ArenaError
 from arena.exports.files import write_whole
-from arena.exports.study_folder.closure import TRAVELLING
-from arena.exports.study_folder.writing import FORMAT as STUDY
-from arena.services import stored_rows
-from arena.services.written_files import FOLDERS
+from arena.results.exports.closure import TRAVELLING
+from arena.results.exports.study_folder import FORMAT as STUDY
+from arena.results.services import stored_rows
+from arena.results.services.written_files import FOLDERS
 from arena.serving.readiness import find_unapplied_migrations
 from arena.site.services import check_row, check_votes, end_restored_work, is_unfinished
 from augment.models import Endpoint, Simulation

@@ -17,11 +17,11 @@ from django.contrib.auth.models import User
 
 from arena.errors import ArenaError
 from arena.exports.files import write_whole
-from arena.exports.tables import leaderboard_table
-from arena.exports.writers import FORMATS, plain_text
 from arena.models import Study
 from arena.people.services import create_person
-from arena.services.ratings import rate
+from arena.results.exports.tables import leaderboard_table
+from arena.results.exports.writers import FORMATS, plain_text
+from arena.results.services.ratings import rate_now as rate
 from arena.services.simulation import simulate_votes
 from arena.studies.services.opening import close_study, open_study
 from arena.studies.services.plan import StudyPlan

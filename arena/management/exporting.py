@@ -11,24 +11,22 @@ from uuid import UUID
 from django.utils.text import slugify
 
 from arena.errors import StudyStillOpen
-from arena.exports.bundle import bundle
-from arena.exports.charts.rating import CONTENT_TYPES, chart_bytes
-from arena.exports.contact_sheet import contact_sheet, sheet_pdf
+from arena.exports.files import ZIP
 from arena.exports.formats import Format, format_named
-from arena.exports.samples import SHEET_FORMATS, sheet_bytes, sheet_of
-from arena.exports.tables import leaderboard_table
-from arena.exports.votes import VOTE_FORMATS, unrated_votes, vote_table
-from arena.exports.writers import FORMATS
-from arena.exports.zips import ZIP
 from arena.jobs.exports import displacement_files, driving
 from arena.jobs.exports.displacement import displacement_table
 from arena.jobs.exports.files import scenario_zip, zip_name
 from arena.jobs.exports.registry import PLAIN_TABLES, TRANSCRIPTS, JobTable
 from arena.jobs.exports.tables import ANALYSES, TABLE_FORMATS, analysis_sheet, object_sheet
 from arena.models import Snapshot, Study
-from arena.queries.studies.results import snapshot_to_export
-from arena.queries.votes.judged import is_imported
-from arena.services.early_looks import log_early_look
+from arena.results.exports.charts import CONTENT_TYPES, chart_bytes
+from arena.results.exports.sheets import SHEET_FORMATS, contact_sheet, find_cells, sample_sheet
+from arena.results.exports.tables import leaderboard_table
+from arena.results.exports.votes import VOTE_FORMATS, unrated_votes, vote_table
+from arena.results.exports.writers import FORMATS, bundle
+from arena.results.queries.access import snapshot_to_export
+from arena.results.queries.votes import is_imported
+from arena.results.services.ratings import log_early_look
 from arena.studies.queries import study_named
 from augment.errors import Conflict, UnknownName
 from augment.services.judging import scenario_export
@@ -146,8 +144,7 @@ def _write_contact_sheet(options: Chosen, say: Say) -> ExportedFile:
     if is_imported(snapshot.study):
         raise Conflict("Votes from a file have no pictures, so there is no contact sheet.")
     scenarios = list(snapshot.study.scenarios.defer("reference").order_by("type", "slug"))
-    sheet = contact_sheet(snapshot, leaderboard_table(snapshot), scenarios)
-    return ExportedFile(sheet_pdf(sheet), "pdf", False)
+    return ExportedFile(contact_sheet(snapshot, scenarios), "pdf", False)
 
 
 # --- Of a job ------------------------------------------------------------------------------------
@@ -179,13 +176,9 @@ def _write_samples(options: Chosen, say: Say) -> ExportedFile:
     form = options["format"] or Path(options["out"]).suffix.removeprefix(".")
     if form not in SHEET_FORMATS:
         raise UnknownName("format", form, list(SHEET_FORMATS))
-    sheet = sheet_of(
-        find_job(options["job"]),
-        scenarios=options["scenarios"],
-        contestants=options["contestants"],
-        sample=options["sample"],
-    )
-    return ExportedFile(sheet_bytes(sheet, file_format=form), form, False)
+    shown = {"scenarios": options["scenarios"], "contestants": options["contestants"]}
+    cells = find_cells(find_job(options["job"]), sample=options["sample"], **shown)
+    return ExportedFile(sample_sheet(cells, file_format=form, **shown), form, False)
 
 
 def _write_driving(options: Chosen, say: Say) -> ExportedFile:

@@ -15,7 +15,6 @@ from django.utils import timezone
 
 from arena.errors import NotYours
 from arena.models import ApiToken, Invitation, Person, token_digest
-from arena.queries.plain import instances
 
 ROLES = ("admin", "analyst", "expert")
 """The groups of accounts, the most powerful first."""
@@ -135,9 +134,8 @@ def _highest(user: User, groups: Collection[str]) -> str | None:
     return next((role for role in ROLES if role in groups), None)
 
 
-_COLUMNS = tuple(field.attname for field in User._meta.concrete_fields)
-_ACCOUNT = f"""
-SELECT {", ".join(f"account.{name}" for name in _COLUMNS)}, auth_group.name
+_ACCOUNT = """
+SELECT account.*, auth_group.name AS role
 FROM auth_user account
 LEFT JOIN auth_user_groups ON auth_user_groups.user_id = account.id
 LEFT JOIN auth_group ON auth_group.id = auth_user_groups.group_id
@@ -153,11 +151,11 @@ class AccountBackend(ModelBackend):
 
         Its `role_names` hold the names of its groups for `role_of`, as of this request.
         """
-        rows = instances(User, _COLUMNS, _ACCOUNT, {"id": user_id})
-        if not rows or not self.user_can_authenticate(rows[0][0]):
+        rows: list[Any] = list(User.objects.raw(_ACCOUNT, {"id": user_id}))
+        if not rows or not self.user_can_authenticate(rows[0]):
             return None
-        user: Any = rows[0][0]
-        user.role_names = frozenset(role for _, (role,) in rows)
+        user = rows[0]
+        user.role_names = frozenset(row.role for row in rows)
         return user  # type: ignore[no-any-return]
 
 

@@ -20,7 +20,7 @@ from django.utils.translation import gettext as _
 from arena.errors import InvalidPreference, LinkOver
 from arena.models import Person
 from arena.people.queries import ROLES, has_admin, is_forgotten, role_of
-from arena.queries.voting.keys import (
+from arena.voting.queries.keys import (
     KEY_LABELS,
     SOMETIMES,
     SWITCHES,

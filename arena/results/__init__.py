@@ -1,1 +1,1 @@
-"""Ratings and what is read from them."""
+"""Results of a study: which votes count, ratings, evidence, files and pages."""

@@ -30,21 +30,22 @@ from arena.api.views import (
     operation,
 )
 from arena.errors import NoSnapshot
-from arena.exports.bundle import bundle
-from arena.exports.charts.rating import CONTENT_TYPES, chart_bytes
+from arena.exports.files import CONTENT_TYPE as ZIP_TYPE
 from arena.exports.formats import download
-from arena.exports.tables import LeaderboardTable, leaderboard_table
-from arena.exports.votes import VOTE_FORMATS, vote_table
-from arena.exports.writers import FORMATS as LEADERBOARD
-from arena.exports.zips import CONTENT_TYPE as ZIP_TYPE
 from arena.models import Snapshot, Study
 from arena.models.ratings import STORED
 from arena.pairing.order import MAIN, REPEAT
-from arena.queries.studies.results import must_read_results
-from arena.queries.votes.sets import Filters
 from arena.rating.leaderboard import Intervals, Line, Method
 from arena.rating.rules import Unit
-from arena.services.ratings import DEFAULT_ROUNDS, MOST_ROUNDS, is_big, plan_snapshot, rate
+from arena.results.exports.charts import CONTENT_TYPES, chart_bytes
+from arena.results.exports.tables import LeaderboardTable, leaderboard_table
+from arena.results.exports.votes import VOTE_FORMATS, vote_table
+from arena.results.exports.writers import FORMATS as LEADERBOARD
+from arena.results.exports.writers import bundle
+from arena.results.queries.access import must_read_results
+from arena.results.queries.votes import Filters
+from arena.results.services.ratings import DEFAULT_ROUNDS, MOST_ROUNDS, is_big, plan_snapshot
+from arena.results.services.ratings import rate_now as rate
 from arena.studies.api import get_study
 from arena.studies.services.plan import HIGHEST_SEED
 from augment.errors import UnknownName

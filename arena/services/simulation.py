@@ -16,9 +16,8 @@ import numpy as np
 from django.db import transaction
 
 from arena.models import Matchup, Study, Vote
-from arena.services.decisions import decision_of
-from arena.services.votes import cast_vote
 from arena.studies.services.planning import plan_batch
+from arena.voting.services.casting import cast_vote, decision_of
 from augment.errors import Conflict
 from augment.models import Augmentation
 from augment.services.events import log_event

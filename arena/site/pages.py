@@ -23,7 +23,7 @@ from arena.models import Study
 from arena.people.pages import keep_language
 from arena.people.queries import Language, Theme, role_of
 from arena.people.services import keep_preference
-from arena.queries.studies.results import ResultsAccess, results_access
+from arena.results.queries.access import ResultsAccess, results_access
 from arena.serving.readiness import look_at_parts, opens_metrics
 from arena.site.access import ADMIN, allow_only, user_of
 from arena.site.forms import offer

@@ -8,14 +8,13 @@ from django.urls import URLPattern, path
 from arena.contestants.urls import urlpatterns as CONTESTANTS
 from arena.jobs.urls import urlpatterns as JOBS
 from arena.people import pages as people
+from arena.results.pages import evidence as results_votes
+from arena.results.pages import ratings as results
+from arena.results.pages import ratings as results_files
 from arena.scenarios.urls import urlpatterns as SCENARIOS
 from arena.site import pages
 from arena.studies.pages import experts, planning, setup, studies
-from arena.web.results import evidence as results_votes
-from arena.web.results import files as results_files
-from arena.web.results import pages as results
-from arena.web.voting import pages as voting
-from arena.web.voting import practice
+from arena.voting import pages as voting
 
 urlpatterns: list[URLPattern] = [
     *SCENARIOS,
@@ -70,7 +69,7 @@ urlpatterns: list[URLPattern] = [
     path("studies/<uuid:code>/reports/<uuid:key>/", studies.report_page, name="report"),
     path("studies/<uuid:code>/vote/", voting.vote_page, name="vote"),
     path("studies/<uuid:code>/vote/help/", voting.help_page, name="vote-help"),
-    path("studies/<uuid:code>/vote/practice/", practice.practice_page, name="vote-practice"),
+    path("studies/<uuid:code>/vote/practice/", voting.practice_page, name="vote-practice"),
     path("studies/<uuid:code>/vote/skipped/", voting.skipped_page, name="vote-skipped"),
     path("studies/<uuid:code>/vote/report/", voting.report_pair, name="vote-report"),
     path("i/<str:token>", voting.matchup_image, name="matchup-image"),
@@ -100,12 +99,12 @@ urlpatterns: list[URLPattern] = [
     path("studies/<uuid:code>/results.<slug:form>", results_files.export, name="results-export"),
     path(
         "studies/<uuid:code>/results-votes.<slug:form>",
-        results_files.export_votes,
+        results.export_votes,
         name="results-votes-export",
     ),
     path(
         "studies/<uuid:code>/results-charts/<slug:name>.<slug:form>",
-        results_files.export_chart,
+        results.export_chart,
         name="results-chart",
     ),
     path("studies/<uuid:code>/rate/", results.rate_study, name="study-rate"),

@@ -29,7 +29,7 @@ from arena.models import (
     Vote,
 )
 from arena.people.queries import experts, may_be_let_in, natural_order
-from arena.queries.voting.ballots import ExpertTally, tallies
+from arena.voting.queries.ballots import ExpertTally, tallies
 from augment.errors import UnknownName
 from augment.models import Contestant, GenerationJob, Scenario
 

@@ -13,7 +13,7 @@ from django.urls import reverse
 from django.utils.html import format_html
 from django.utils.safestring import SafeString
 
-from arena.queries.votes.search import VoteSearch
+from arena.results.queries.search import VoteSearch
 from arena.templatetags.results import left_out, method_label
 from augment.models import Event
 from augment.services.scenarios.scenes import type_label

@@ -6,12 +6,11 @@ from collections.abc import Callable
 
 from django import template
 
-from arena.exports.columns import Column
-from arena.exports.tables import Row
 from arena.models import Vote
 from arena.models.votes import AID_LABELS
 from arena.rating.comparisons import Estimate
 from arena.rating.lines import interval_text, rating_text, whole_percent, with_minus
+from arena.results.exports.tables import Column, Row
 from augment.services.judging.driving_scores import clearance_text
 from augment.services.scenarios.scenes import type_label
 

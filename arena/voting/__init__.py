@@ -1,1 +1,1 @@
-"""What experts see and decide."""
+"""Blind voting: what experts are shown, what they decide, and storing it once."""

@@ -26,12 +26,11 @@ from arena.api.views import ApiView, FileView, Given, file_operation, operation
 from arena.errors import StudyNotOpen
 from arena.models import AIDS, OUTCOME_LETTERS, Matchup, Report, Study, Vote
 from arena.people.services import keep_voting
-from arena.queries.voting.showings import as_shown, picture_shown
-from arena.services.decisions import LONGEST_COMMENT, decision_of
-from arena.services.votes import receive_vote
 from arena.studies.queries import voting_study
 from arena.studies.services.experts import SIDES, Complaint, report
 from arena.studies.services.planning import next_pairs
+from arena.voting.queries.showings import as_shown, picture_shown
+from arena.voting.services.casting import LONGEST_COMMENT, decision_of, receive_vote
 
 PNG = "image/png"
 OUTCOMES = {letter: outcome for outcome, letter in OUTCOME_LETTERS.items()}

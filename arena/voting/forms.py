@@ -8,8 +8,8 @@ from django import forms
 from django.utils.translation import gettext_lazy as _
 
 from arena.models import Report, Vote
-from arena.services.decisions import LONGEST_COMMENT, Decision, decision_of
 from arena.studies.services.experts import SIDES, Complaint
+from arena.voting.services.casting import LONGEST_COMMENT, Decision, decision_of
 
 
 class VoteForm(forms.Form):

@@ -13,18 +13,18 @@ from django.utils.translation import gettext as _
 from django.utils.translation import pgettext
 
 from arena.models import OUTCOME_LETTERS, Report, Study, Vote
-from arena.queries.voting.ballots import VotingProgress, recent_votes, skip_of, voting_progress
-from arena.queries.voting.keys import (
+from arena.studies.queries import longest_instructions, own_enrolment
+from arena.studies.services.experts import SIDES
+from arena.studies.services.planning import next_pairs
+from arena.voting.queries.ballots import VotingProgress, recent_votes, skip_of, voting_progress
+from arena.voting.queries.keys import (
     KEY_LABELS,
     SOMETIMES,
     USUAL_KEYS,
     VotingPreferences,
     voting_preferences,
 )
-from arena.queries.voting.showings import as_shown
-from arena.studies.queries import longest_instructions, own_enrolment
-from arena.studies.services.experts import SIDES
-from arena.studies.services.planning import next_pairs
+from arena.voting.queries.showings import as_shown
 
 AHEAD = 5
 """The pair on the screen and four that are decoded ahead."""

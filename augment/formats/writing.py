@@ -5,7 +5,7 @@ Frame of a cell: the ego frame of its scene.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from datetime import date
 from functools import cached_property
@@ -16,7 +16,7 @@ from augment.errors import InvalidDocument
 from augment.formats.interplan.file import InterplanSource
 from augment.geometry.polyline import Polyline
 from augment.scene.codec import scene_to_document
-from augment.scene.entities import Modification, ScenarioType, Scene, apply
+from augment.scene.entities import LaneConnector, Modification, ScenarioType, Scene, apply
 from augment.scene.lane_graph import AnyLane
 from augment.scene.motion import SETS_OUT_WITHIN_M, Motion, MotionSource, Movement, motion_of
 from augment.scene.recording import Recording
@@ -238,3 +238,18 @@ def beside(line: Polyline, d_m: float) -> Polyline:
     stretch = np.maximum((mean * after).sum(axis=1), 0.5)
     normals = np.column_stack([-mean[:, 1], mean[:, 0]]) / stretch[:, None]
     return Polyline(line.points_m + d_m * normals)
+
+
+def group_connectors(connectors: Iterable[LaneConnector]) -> list[list[LaneConnector]]:
+    """Return the connectors by junction: those that share a lane at either end are of one."""
+    groups: list[tuple[set[str], list[LaneConnector]]] = []
+    for connector in connectors:
+        ends = {f"from {connector.from_lane}", f"to {connector.to_lane or connector.id}"}
+        members, others = [connector], []
+        for names, group in groups:
+            if names & ends:
+                ends, members = ends | names, [*group, *members]
+            else:
+                others.append((names, group))
+        groups = [*others, (ends, members)]
+    return [members for _, members in groups]

@@ -66,19 +66,19 @@ class CubicBezier:
         return float(self._lengths_m[-1])
 
     def points(self, t: FloatArray) -> FloatArray:
-        """The points (N, 2) at the parameters (N,)."""
+        """Return the points (N, 2) at the parameters (N,)."""
         c0, c1, c2, c3 = self._powers
         column = t[:, None]
         return np.asarray(c0 + column * (c1 + column * (c2 + column * c3)), dtype=np.float64)
 
     def derivatives(self, t: FloatArray) -> FloatArray:
-        """The change of the point with the parameter, (N, 2), at the parameters (N,)."""
+        """Return the change of the point with the parameter, (N, 2), at the parameters (N,)."""
         _, c1, c2, c3 = self._powers
         column = t[:, None]
         return np.asarray(c1 + column * (2.0 * c2 + column * 3.0 * c3), dtype=np.float64)
 
     def headings(self, t: FloatArray) -> FloatArray:
-        """The directions of travel (N,) in radians at the parameters (N,)."""
+        """Return the directions of travel (N,) in radians at the parameters (N,)."""
         steps = self.derivatives(t)
         still = np.hypot(steps[:, 0], steps[:, 1]) < 1e-6 * np.ptp(self.control_m, axis=0).max()
         if still.any():
@@ -88,7 +88,7 @@ class CubicBezier:
         return np.arctan2(steps[:, 1], steps[:, 0])
 
     def parameters_at(self, stations_m: ArrayLike) -> FloatArray:
-        """The parameters (N,) at the arc lengths (N,), which are clipped to the curve."""
+        """Return the parameters (N,) at the arc lengths (N,), which are clipped to the curve."""
         lengths = self._lengths_m
         stations = np.clip(np.asarray(stations_m, dtype=np.float64), 0.0, lengths[-1])
         index = np.clip(np.searchsorted(lengths, stations, side="right") - 1, 0, _INTERVALS - 1)
@@ -103,38 +103,30 @@ class CubicBezier:
         return t
 
     def length_to(self, t: float) -> float:
-        """The arc length from the first control point to the parameter."""
+        """Return the arc length from the first control point to the parameter."""
         index = min(int(t * _INTERVALS), _INTERVALS - 1)
         low, high = np.array([_KNOTS[index]]), np.array([t])
         return float(self._lengths_m[index] + self._run(low, high)[0])
 
     def pose_at(self, s_m: float, d_m: float = 0.0) -> Pose:
-        """Position and direction of travel at s, d to the left; the ends are extended straight."""
+        """Return position and direction at s, d to the left; the ends are extended straight."""
         t = self.parameters_at([s_m])
         heading_rad = float(self.headings(t)[0])
         over_m = s_m - min(max(s_m, 0.0), self.length_m)
         return _pose_off(self.points(t)[0], heading_rad, over_m, d_m)
 
     def project(self, x_m: float, y_m: float) -> Projection:
-        """The nearest place on the curve; of equally near ones the first."""
+        """Return the nearest place on the curve; of equally near ones the first."""
         point = np.array([[x_m, y_m]])
-        t = _nearest_parameters(self, point, self._first_guess(point))
+        gaps = self.points(_KNOTS) - point
+        guess = _KNOTS[[int(np.argmin((gaps * gaps).sum(axis=1)))]]
+        t = _nearest_parameters(self, point, guess)
         ((dx, dy),) = point - self.points(t)
         heading_rad = float(self.headings(t)[0])
         left = math.cos(heading_rad) * dy - math.sin(heading_rad) * dx
         distance = math.hypot(dx, dy)
         return Projection(
             s_m=self.length_to(float(t[0])), d_m=math.copysign(distance, left), distance_m=distance
-        )
-
-    def split(self, t: float) -> tuple[CubicBezier, CubicBezier]:
-        """The curve before and behind a parameter strictly between 0 and 1 (de Casteljau)."""
-        levels = [self.control_m]
-        while len(levels[-1]) > 1:
-            levels.append((1.0 - t) * levels[-1][:-1] + t * levels[-1][1:])
-        return (
-            CubicBezier([level[0] for level in levels]),
-            CubicBezier([level[-1] for level in reversed(levels)]),
         )
 
     @cached_property
@@ -158,10 +150,6 @@ class CubicBezier:
         speeds = self._speeds(t.ravel()).reshape(t.shape)
         return np.asarray((high - low) * (speeds @ _WEIGHTS), dtype=np.float64)
 
-    def _first_guess(self, point: FloatArray) -> FloatArray:
-        gaps = self.points(_KNOTS) - point
-        return _KNOTS[[int(np.argmin((gaps * gaps).sum(axis=1)))]]
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FitError:
@@ -179,7 +167,7 @@ class FitError:
 def fit(
     line: Polyline, *, start_rad: float | None = None, end_rad: float | None = None
 ) -> CubicBezier:
-    """The cubic with the line's two ends that comes closest to it in the sense of least squares.
+    """Return the cubic with the line's two ends that is closest to it by least squares.
 
     The parameters of the line's points start as their share of the way and are then moved to the
     nearest points of the curve, a few times over.
@@ -204,7 +192,7 @@ def fit(
 def fit_error(
     curve: CubicBezier, line: Polyline, start_m: float = 0.0, end_m: float | None = None
 ) -> FitError:
-    """How far the curve is from the line between two stations, at every 0.05 m (600 at most).
+    """Return how far the curve is from the line between two stations, at 600 places at most.
 
     The same part of the way is compared with the same part: a curve that has the right shape but
     runs ahead of its line is wrong by that much.
@@ -225,7 +213,7 @@ def fit_error(
 
 
 def chord_headings(line: Polyline, stations_m: FloatArray) -> FloatArray:
-    """The headings (N,) of the chords from `CHORD_REACH_M` before stations (N,) to past them."""
+    """Return the headings (N,) of the chords from `CHORD_REACH_M` before stations to past them."""
     chords = line.points_at(stations_m + CHORD_REACH_M) - line.points_at(
         stations_m - CHORD_REACH_M
     )
@@ -233,14 +221,19 @@ def chord_headings(line: Polyline, stations_m: FloatArray) -> FloatArray:
 
 
 def travel_pose(line: Polyline, s_m: float, d_m: float = 0.0) -> Pose:
-    """The line's own point at s with the heading of what drives along it, d to the left.
+    """Return the line's own point at s with the heading of what drives along it, d to the left.
 
     The heading is the chord's. Nearer to an end than the chord reaches it is that of the parabola
     through the end and the two points that follow a reach apart. The ends are extended straight.
     """
-    heading_rad = _travel_heading(line, min(max(s_m, 0.0), line.length_m))
-    over_m = s_m - min(max(s_m, 0.0), line.length_m)
-    return _pose_off(line.points_at(np.array([s_m]))[0], heading_rad, over_m, d_m)
+    on_m = min(max(s_m, 0.0), line.length_m)
+    reach_m = min(CHORD_REACH_M, line.length_m / 2.0)
+    inner_m = min(max(on_m, reach_m), line.length_m - reach_m)
+    before, middle, after = line.points_at(inner_m + np.array([-reach_m, 0.0, reach_m]))
+    bend = (before - 2.0 * middle + after) * (on_m - inner_m) / reach_m
+    dx, dy = (after - before) / 2.0 + bend
+    point = line.points_at(np.array([s_m]))[0]
+    return _pose_off(point, math.atan2(dy, dx), s_m - on_m, d_m)
 
 
 # Private
@@ -255,15 +248,6 @@ def _pose_off(point_m: FloatArray, heading_rad: float, over_m: float, d_m: float
         y_m=float(y_m) + over_m * sin + d_m * cos,
         heading_rad=heading_rad,
     )
-
-
-def _travel_heading(line: Polyline, s_m: float) -> float:
-    reach_m = min(CHORD_REACH_M, line.length_m / 2.0)
-    inner_m = min(max(s_m, reach_m), line.length_m - reach_m)
-    before, middle, after = line.points_at(inner_m + np.array([-reach_m, 0.0, reach_m]))
-    bend = (before - 2.0 * middle + after) * (s_m - inner_m) / reach_m
-    dx, dy = (after - before) / 2.0 + bend
-    return math.atan2(dy, dx)
 
 
 def _arms(heading_rad: float | None) -> FloatArray:
@@ -287,8 +271,8 @@ def _least_squares(
     square = (inner @ inner.T)[side[:, None], side] * (arm @ arm.T)
     wanted = ((inner @ missing)[side] * arm).sum(axis=1)
     # The normal equations have four unknowns at most; lstsq bears it if they depend on each other.
-    found = np.linalg.lstsq(square, wanted, rcond=None)[0]
-    starts, finishes = found[: len(arms[0])], found[len(arms[0]) :]
+    moves = np.linalg.lstsq(square, wanted, rcond=None)[0]
+    starts, finishes = moves[: len(arms[0])], moves[len(arms[0]) :]
     # A curve that leaves against its heading would turn back on itself.
     if len(starts) == 1:
         starts = np.maximum(starts, 1e-2)

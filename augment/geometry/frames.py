@@ -1,4 +1,7 @@
-"""Rigid frames in the plane."""
+"""Angles, rigid frames in the plane, and oriented boxes.
+
+Angles are in radians, counter-clockwise from +x.
+"""
 
 from __future__ import annotations
 
@@ -6,17 +9,20 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
+import shapely
 from numpy.typing import NDArray
+
+_CORNERS = np.array([[0.5, 0.5], [-0.5, 0.5], [-0.5, -0.5], [0.5, -0.5]])
 
 
 def wrap(angle_rad: float) -> float:
-    """The same direction in (-pi, pi]."""
+    """Return the same direction in (-pi, pi]."""
     wrapped = math.remainder(angle_rad, 2.0 * math.pi)
     return math.pi if wrapped == -math.pi else wrapped
 
 
 def difference(to_rad: float, from_rad: float) -> float:
-    """The turn from one heading to another, in (-pi, pi], positive to the left."""
+    """Return the turn from one heading to another, in (-pi, pi], positive to the left."""
     return wrap(to_rad - from_rad)
 
 
@@ -29,13 +35,13 @@ class Pose:
     heading_rad: float
 
     def to_local(self, points_m: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Points (N, 2) of the frame this pose is given in, seen from the pose."""
+        """Return points (N, 2) of the frame this pose is given in, seen from the pose."""
         cos, sin = math.cos(self.heading_rad), math.sin(self.heading_rad)
         moved = np.asarray(points_m, dtype=np.float64) - np.array([self.x_m, self.y_m])
         return np.asarray(moved @ np.array([[cos, -sin], [sin, cos]]), dtype=np.float64)
 
     def to_parent(self, points_m: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Points (N, 2) seen from the pose, in the frame the pose is given in."""
+        """Return points (N, 2) seen from the pose, in the frame the pose is given in."""
         cos, sin = math.cos(self.heading_rad), math.sin(self.heading_rad)
         turned = np.asarray(points_m, dtype=np.float64) @ np.array([[cos, sin], [-sin, cos]])
         return np.asarray(turned + np.array([self.x_m, self.y_m]), dtype=np.float64)
@@ -50,21 +56,9 @@ class Pose:
         return replace(self, heading_rad=wrap(self.heading_rad + turn_rad))
 
     def pose_to_local(self, other: Pose) -> Pose:
-        """Another pose of the same parent frame, seen from this one."""
-        x_m, y_m = self.to_local(np.array([[other.x_m, other.y_m]]))[0]
-        return Pose(
-            x_m=float(x_m), y_m=float(y_m), heading_rad=wrap(other.heading_rad - self.heading_rad)
-        )
-
-    def pose_to_parent(self, other: Pose) -> Pose:
-        """A pose seen from this one, in the frame this one is given in."""
-        x_m, y_m = self.to_parent(np.array([[other.x_m, other.y_m]]))[0]
-        return Pose(
-            x_m=float(x_m), y_m=float(y_m), heading_rad=wrap(other.heading_rad + self.heading_rad)
-        )
-
-
-_CORNERS = np.array([[0.5, 0.5], [-0.5, 0.5], [-0.5, -0.5], [0.5, -0.5]])
+        """Return another pose of the same parent frame, seen from this one."""
+        x_m, y_m = self.to_local(np.array([[other.x_m, other.y_m]]))[0].tolist()
+        return Pose(x_m=x_m, y_m=y_m, heading_rad=wrap(other.heading_rad - self.heading_rad))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -74,11 +68,6 @@ class Box:
     pose: Pose
     length_m: float
     width_m: float
-
-    @property
-    def area_m2(self) -> float:
-        """Length times width."""
-        return self.length_m * self.width_m
 
     @property
     def corners_m(self) -> NDArray[np.float64]:
@@ -106,58 +95,27 @@ APART = Overlap(depth_m=0.0, area_m2=0.0, share_of_first=0.0, share_of_second=0.
 
 
 def corners(pose: Pose, length_m: float, width_m: float) -> NDArray[np.float64]:
-    """The corners (4, 2): front left, rear left, rear right, front right (nuPlan's order)."""
+    """Return the corners (4, 2): front left, rear left, rear right, front right (as nuPlan)."""
     return pose.to_parent(_CORNERS * np.array([length_m, width_m]))
 
 
 def overlap(first: Box, second: Box) -> Overlap:
-    """What two boxes of one frame have in common."""
-    depth_m = _depth(first.corners_m, second.corners_m)
+    """Return what two boxes of one frame have in common.
+
+    The depth is the smallest overlap of their shadows on the four side directions.
+    """
+    one, other = first.corners_m, second.corners_m
+    sides = np.concatenate([np.diff(one[:3], axis=0), np.diff(other[:3], axis=0)])
+    axes = sides / np.hypot(sides[:, 0], sides[:, 1])[:, None]
+    a, b = one @ axes.T, other @ axes.T
+    ends = np.minimum(a.max(axis=0) - b.min(axis=0), b.max(axis=0) - a.min(axis=0))
+    depth_m = float(ends.min())
     if depth_m <= 0.0:
         return APART
-    area_m2 = _area(_clipped(first.corners_m, second.corners_m))
+    area_m2 = float(shapely.Polygon(one).intersection(shapely.Polygon(other)).area)
     return Overlap(
         depth_m=depth_m,
         area_m2=area_m2,
-        share_of_first=min(1.0, area_m2 / first.area_m2),
-        share_of_second=min(1.0, area_m2 / second.area_m2),
+        share_of_first=min(1.0, area_m2 / (first.length_m * first.width_m)),
+        share_of_second=min(1.0, area_m2 / (second.length_m * second.width_m)),
     )
-
-
-# Private
-
-
-def _depth(first: NDArray[np.float64], second: NDArray[np.float64]) -> float:
-    """The smallest overlap (m) of the shadows on the four side directions; <= 0 when apart."""
-    sides = np.concatenate([np.diff(first[:3], axis=0), np.diff(second[:3], axis=0)])
-    axes = sides / np.hypot(sides[:, 0], sides[:, 1])[:, None]
-    a, b = first @ axes.T, second @ axes.T
-    ends = np.minimum(a.max(axis=0) - b.min(axis=0), b.max(axis=0) - a.min(axis=0))
-    return float(ends.min())
-
-
-def _clipped(subject: NDArray[np.float64], window: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The part (P, 2) of a convex polygon inside a convex counter-clockwise window."""
-    for start, end in zip(window, np.roll(window, -1, axis=0), strict=True):
-        if len(subject) == 0:
-            break
-        direction, offset = end - start, subject - start
-        left = direction[0] * offset[:, 1] - direction[1] * offset[:, 0]
-        kept: list[NDArray[np.float64]] = []
-        for index, point in enumerate(subject):
-            following = (index + 1) % len(subject)
-            if left[index] >= 0.0:
-                kept.append(point)
-            if left[index] * left[following] < 0.0:
-                part = left[index] / (left[index] - left[following])
-                kept.append(point + part * (subject[following] - point))
-        subject = np.array(kept).reshape(-1, 2)
-    return subject
-
-
-def _area(polygon: NDArray[np.float64]) -> float:
-    """The area (m2) of a counter-clockwise polygon (P, 2); about its first point, for accuracy."""
-    if len(polygon) < 3:
-        return 0.0
-    x, y = (polygon - polygon[0]).T
-    return max(0.0, 0.5 * float(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y)))

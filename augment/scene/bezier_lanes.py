@@ -14,12 +14,12 @@ every part of the program, and no distance is lost or gained at a joint.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from augment.geometry.bezier import (
     CHORD_REACH_M,
@@ -40,9 +40,10 @@ _LOOSER = 1.03
 _END_SAMPLES = 21
 _END_M = 2.0 * CHORD_REACH_M
 _FREE_ENDS = ((False, False), (False, True), (True, False))
+_Span = tuple[float, float]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True)
 class Tolerance:
     """How far a piece may be from its centreline.
 
@@ -53,14 +54,18 @@ class Tolerance:
     heading_rad: float = math.radians(2.9)
 
     def loosened(self, factor: float) -> Tolerance:
-        """So many times as much."""
-        return Tolerance(
-            position_m=factor * self.position_m, heading_rad=factor * self.heading_rad
-        )
+        """Return so many times as much."""
+        return Tolerance(factor * self.position_m, factor * self.heading_rad)
 
-    def used_by(self, error: FitError) -> float:
-        """The larger share of the two that an error uses up; above 1 it is too large."""
-        return max(error.position_m / self.position_m, error.heading_rad / self.heading_rad)
+    def used_by(self, *pieces: LanePiece) -> float:
+        """Return the largest share that the errors of pieces use up; above 1 it is too large."""
+        return max(
+            max(
+                piece.error.position_m / self.position_m,
+                piece.error.heading_rad / self.heading_rad,
+            )
+            for piece in pieces
+        )
 
 
 STRAIGHT = Tolerance().loosened(0.75)
@@ -86,14 +91,6 @@ class LanePiece:
         """The arc length of the part of the source centreline."""
         return self.end_m - self.start_m
 
-    def own_station(self, s_m: float) -> float:
-        """The curve's own arc length at the lane's s."""
-        return (s_m - self.start_m) * self.curve.length_m / self.length_m
-
-    def lane_station(self, own_m: float) -> float:
-        """The lane's s at the curve's own arc length."""
-        return self.start_m + own_m * self.length_m / self.curve.length_m
-
 
 @dataclass(frozen=True, kw_only=True)
 class BezierLane:
@@ -106,11 +103,6 @@ class BezierLane:
         """The arc length of the source centreline."""
         return self.pieces[-1].end_m
 
-    @property
-    def control_m(self) -> tuple[NDArray[np.float64], ...]:
-        """The control points (4, 2) of each piece, in order of travel."""
-        return tuple(piece.curve.control_m for piece in self.pieces)
-
     @cached_property
     def error(self) -> FitError:
         """The worst error of all pieces."""
@@ -120,35 +112,35 @@ class BezierLane:
         )
 
     def pose_at(self, s_m: float, d_m: float = 0.0) -> Pose:
-        """Position and direction of travel at s, d to the left; the ends are extended straight."""
+        """Return position and direction of travel at s, d to the left; the ends go straight on."""
         piece = self.pieces[self.piece_at(s_m)]
-        return piece.curve.pose_at(piece.own_station(s_m), d_m)
+        own_m = (s_m - piece.start_m) * piece.curve.length_m / piece.length_m
+        return piece.curve.pose_at(own_m, d_m)
 
     def position(self, s_m: float, d_m: float = 0.0) -> tuple[float, float]:
-        """The point s along the lane and d to its left."""
+        """Return the point s along the lane and d to its left."""
         pose = self.pose_at(s_m, d_m)
         return pose.x_m, pose.y_m
 
     def heading_at(self, s_m: float) -> float:
-        """The direction of travel at s, in (-pi, pi]."""
+        """Return the direction of travel at s, in (-pi, pi]."""
         return self.pose_at(s_m).heading_rad
 
     def project(self, x_m: float, y_m: float) -> Projection:
-        """The nearest place on the lane; of equally near ones the first."""
+        """Return the nearest place on the lane; of equally near ones the first."""
         projections = [(piece, piece.curve.project(x_m, y_m)) for piece in self.pieces]
         piece, place = min(projections, key=lambda item: item[1].distance_m)
-        return Projection(
-            s_m=piece.lane_station(place.s_m), d_m=place.d_m, distance_m=place.distance_m
-        )
+        s_m = piece.start_m + place.s_m * piece.length_m / piece.curve.length_m
+        return replace(place, s_m=s_m)
 
     def piece_at(self, s_m: float) -> int:
-        """The number of the piece at s, from 0; a joint belongs to the piece that begins there."""
+        """Return the number of the piece at s; a joint belongs to the piece that begins there."""
         return max(0, sum(piece.start_m <= s_m for piece in self.pieces) - 1)
 
 
 @lru_cache(maxsize=4096)
 def bezier_lane(line: Polyline, tolerance: Tolerance | None = None) -> BezierLane:
-    """Pieces that stay within the tolerance; a piece that does not is cut where that helps most.
+    """Return pieces within the tolerance; a piece that is not is cut where that helps most.
 
     Pieces share their heading at a joint as long as that keeps to the tolerance; where a lane
     turns on the spot they may meet at an angle within it. A line can be too restless even then:
@@ -158,24 +150,27 @@ def bezier_lane(line: Polyline, tolerance: Tolerance | None = None) -> BezierLan
     lanes in every augmentation of a scene: what was fitted lately is remembered.
     """
     allowed = tolerance or Tolerance()
-    found: list[tuple[LanePiece, ...]] = []
+    # Pieces that may stay, and those that a cut is judged by; the first way needs fewest pieces
+    # and no long search.
+    ways = ((_loose_piece, _smooth_piece), (_smooth_piece,) * 2, (_loose_piece,) * 2)
+    found: list[list[LanePiece]] = []
     # A cut is judged by what it leaves: where one aim leads nowhere, a looser one may.
     for aim in (allowed, allowed.loosened(_LOOSER)):
-        for way in _ways_to_cut():
-            found.append(tuple(_cut(line, (0.0, line.length_m), aim, way)))
-            if _within(found[-1], aim):
-                return BezierLane(pieces=found[-1])
-    return BezierLane(pieces=min(found, key=lambda pieces: _used(pieces, allowed)))
+        for kept, tried in ways:
+            found.append(_cut(line, (0.0, line.length_m), aim, kept, tried))
+            if aim.used_by(*found[-1]) <= 1.0:
+                return BezierLane(pieces=tuple(found[-1]))
+    return BezierLane(pieces=tuple(min(found, key=lambda pieces: allowed.used_by(*pieces))))
 
 
 def straight_curve(start_m: ArrayLike, end_m: ArrayLike) -> CubicBezier:
-    """From a point (2,) straight to another, at an even pace."""
+    """Return the curve from a point (2,) straight to another, at an even pace."""
     ends = np.array([start_m, end_m], dtype=np.float64)
     return CubicBezier(np.linspace(ends[0], ends[1], 4))
 
 
 def piece_ids(lane_id: str, count: int) -> tuple[str, ...]:
-    """How the pieces of a lane are called: "Lane3" where it is one, else "Lane3a", "Lane3b"."""
+    """Return how pieces of a lane are called: "Lane3" where it is one, else "Lane3a", "Lane3b"."""
     if count == 1:
         return (lane_id,)
     return tuple(lane_id + _letters(number) for number in range(count))
@@ -184,87 +179,70 @@ def piece_ids(lane_id: str, count: int) -> tuple[str, ...]:
 # Private
 
 
-_Fitting = Callable[[Polyline, float, float, Tolerance], LanePiece]
-_Span = tuple[float, float]
+def _letters(number: int) -> str:
+    """The letters a to z, then aa, ab and so on."""
+    before, last = divmod(number, 26)
+    return ("" if before == 0 else _letters(before - 1)) + chr(ord("a") + last)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Way:
-    """How pieces are fitted: those that may stay, and those that a cut is judged by."""
-
-    kept: _Fitting
-    tried: _Fitting
+_Fitting = Callable[[Polyline, _Span, Tolerance], LanePiece]
 
 
-def _ways_to_cut() -> tuple[_Way, ...]:
-    """In the order in which they are tried: the first needs fewest pieces and no long search."""
-    return (
-        _Way(kept=_loose_piece, tried=_smooth_piece),
-        _Way(kept=_smooth_piece, tried=_smooth_piece),
-        _Way(kept=_loose_piece, tried=_loose_piece),
-    )
-
-
-def _used(pieces: Iterable[LanePiece], allowed: Tolerance) -> float:
-    return max(allowed.used_by(piece.error) for piece in pieces)
-
-
-def _within(pieces: Iterable[LanePiece], allowed: Tolerance) -> bool:
-    return _used(pieces, allowed) <= 1.0
-
-
-def _cut(line: Polyline, span: _Span, allowed: Tolerance, way: _Way) -> list[LanePiece]:
+def _cut(
+    line: Polyline, span: _Span, allowed: Tolerance, kept: _Fitting, tried: _Fitting
+) -> list[LanePiece]:
     """The part of the line as the pieces that it takes to stay within the tolerance."""
     straight = _straight_piece(line, span)
-    if _within([straight], STRAIGHT):
+    if STRAIGHT.used_by(straight) <= 1.0:
         return [straight]
-    whole = way.kept(line, *span, allowed)
-    if _within([whole], allowed) or whole.length_m < 2.0 * SHORTEST_PIECE_M:
+    whole = kept(line, span, allowed)
+    if allowed.used_by(whole) <= 1.0 or whole.length_m < 2.0 * SHORTEST_PIECE_M:
         return [whole]
-    halves = _best_halves(line, span, allowed, way.tried)
+    halves = _best_halves(line, span, allowed, tried)
     strays = whole.error.position_m > allowed.position_m
-    if not strays and _used(halves, allowed) >= allowed.used_by(whole.error):
+    if not strays and allowed.used_by(*halves) >= allowed.used_by(whole):
         return [whole]
-    return [
-        small for half in halves for small in _cut(line, (half.start_m, half.end_m), allowed, way)
-    ]
+    spans = [(half.start_m, half.end_m) for half in halves]
+    return [small for half in spans for small in _cut(line, half, allowed, kept, tried)]
 
 
 def _best_halves(
     line: Polyline, span: _Span, allowed: Tolerance, piece_of: _Fitting
 ) -> tuple[LanePiece, LanePiece]:
-    """The two pieces whose worse one is best, over a coarse row of cuts and then a fine one."""
+    """The two pieces whose worse one is best, over a coarse row of cuts and then a fine one.
+
+    Above all none may be off its place, for it would have to be cut again.
+    """
+
+    def badness(halves: tuple[LanePiece, LanePiece]) -> tuple[bool, float]:
+        strays = any(half.error.position_m > allowed.position_m for half in halves)
+        return strays, allowed.used_by(*halves)
+
     start_m, end_m = span
     low_m, high_m = start_m + SHORTEST_PIECE_M, end_m - SHORTEST_PIECE_M
     for _ in range(2):
         cuts_m = np.linspace(low_m, high_m, _CUTS_TRIED)
         halves = [
-            (piece_of(line, start_m, cut_m, allowed), piece_of(line, cut_m, end_m, allowed))
+            (piece_of(line, (start_m, cut_m), allowed), piece_of(line, (cut_m, end_m), allowed))
             for cut_m in cuts_m.tolist()
         ]
-        best = min(range(_CUTS_TRIED), key=lambda number: _badness(halves[number], allowed))
+        best = min(range(_CUTS_TRIED), key=lambda number: badness(halves[number]))
         low_m, high_m = cuts_m[max(0, best - 1)], cuts_m[min(best + 1, _CUTS_TRIED - 1)]
     return halves[best]
 
 
-def _badness(halves: tuple[LanePiece, LanePiece], allowed: Tolerance) -> tuple[bool, float]:
-    """What to keep small: above all a place that is off, for it would have to be cut again."""
-    strays = any(half.error.position_m > allowed.position_m for half in halves)
-    return strays, _used(halves, allowed)
-
-
-def _smooth_piece(line: Polyline, start_m: float, end_m: float, allowed: Tolerance) -> LanePiece:
+def _smooth_piece(line: Polyline, span: _Span, allowed: Tolerance) -> LanePiece:
     """One cubic with the line's heading at both of its ends."""
-    return _piece(line, (start_m, end_m), fixed=(True, True))
+    return _piece(line, span, fixed=(True, True))
 
 
-def _loose_piece(line: Polyline, start_m: float, end_m: float, allowed: Tolerance) -> LanePiece:
+def _loose_piece(line: Polyline, span: _Span, allowed: Tolerance) -> LanePiece:
     """One cubic with the line's headings, or without where it comes closer so."""
-    smooth = _smooth_piece(line, start_m, end_m, allowed)
-    if _within([smooth], allowed):
+    smooth = _smooth_piece(line, span, allowed)
+    if allowed.used_by(smooth) <= 1.0:
         return smooth
-    free = [_piece(line, (start_m, end_m), fixed=fixed) for fixed in _FREE_ENDS]
-    return min([smooth, *free], key=lambda piece: allowed.used_by(piece.error))
+    free = [_piece(line, span, fixed=fixed) for fixed in _FREE_ENDS]
+    return min([smooth, *free], key=allowed.used_by)
 
 
 @lru_cache(maxsize=1024)  # where a cut leads nowhere, the next way to cut asks for the same
@@ -277,14 +255,13 @@ def _straight_piece(line: Polyline, span: _Span) -> LanePiece:
 
 @lru_cache(maxsize=1024)
 def _piece(line: Polyline, span: _Span, *, fixed: tuple[bool, bool]) -> LanePiece:
-    start_m, end_m = span
-    curve = fit(
-        line.between(start_m, end_m),
-        start_rad=_heading_of(line, start_m) if fixed[0] else None,
-        end_rad=_heading_of(line, end_m) if fixed[1] else None,
+    start_rad, end_rad = (
+        _heading_of(line, s_m) if is_fixed else None
+        for s_m, is_fixed in zip(span, fixed, strict=True)
     )
-    error = fit_error(curve, line, start_m, end_m)
-    return LanePiece(curve=curve, start_m=start_m, end_m=end_m, error=error)
+    curve = fit(line.between(*span), start_rad=start_rad, end_rad=end_rad)
+    error = fit_error(curve, line, *span)
+    return LanePiece(curve=curve, start_m=span[0], end_m=span[1], error=error)
 
 
 def _heading_of(line: Polyline, s_m: float) -> float:
@@ -300,9 +277,3 @@ def _heading_of(line: Polyline, s_m: float) -> float:
     powers = np.column_stack([inwards_m, inwards_m * inwards_m])
     dx, dy = np.linalg.lstsq(powers, points - points[0], rcond=None)[0][0]
     return math.atan2(dy, dx) if s_m == 0.0 else math.atan2(-dy, -dx)
-
-
-def _letters(number: int) -> str:
-    """The letters a to z, then aa, ab and so on."""
-    before, last = divmod(number, 26)
-    return ("" if before == 0 else _letters(before - 1)) + chr(ord("a") + last)

@@ -9,10 +9,10 @@ from __future__ import annotations
 
 import math
 import random
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
-from augment.geometry.frames import Box, Pose, overlap
+from augment.geometry.frames import Pose, overlap
 from augment.geometry.polyline import Polyline
 from augment.scene.ego_route import find_ego_lane
 from augment.scene.entities import (
@@ -38,6 +38,7 @@ CLEAR_S = 2.0
 """Who would reach something of the change at a constant speed in this time is not spawned."""
 _FALLBACK_MPS = 10.0
 _ROLLS_MPS = 1.0
+_LIGHTS = (TrafficLight.RED, TrafficLight.YELLOW, TrafficLight.GREEN)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -58,7 +59,7 @@ def spawn_traffic(
     extras: Sequence[ExtraAgent] = (),
     clear_of: Sequence[TrafficAgent] = (),
 ) -> tuple[TrafficAgent, ...]:
-    """The vehicles of that density; the same for the same seed.
+    """Return the vehicles of that density, the nearest first; the same for the same seed.
 
     Args:
         scene: Cleared of the recorded traffic.
@@ -73,14 +74,29 @@ def spawn_traffic(
     graph = LaneGraph(scene)
     blocks = [find_ego_lane(scene, graph), *(graph.under(*place) for place in roadblocks_m)]
     lanes = dict.fromkeys(
-        name for block in blocks if block is not None for name in _roadblock(scene, graph, block)
+        name for block in blocks if block is not None for name in _roadblock(graph, block)
     )
     rng = random.Random(seed)
     wished = [
         agent for name in lanes for agent in _on_lane(scene, graph, name, WIDEST_M[density], rng)
     ]
-    wished += [one for extra in extras if (one := _extra(graph, extra))]
-    kept = _kept(wished, scene, clear_of)
+    for extra in extras:
+        nearest = graph.nearest(extra.x_m, extra.y_m)
+        if nearest is not None:
+            pose = graph.place(nearest[0], nearest[1].s_m).pose
+            wished.append(_vehicle(graph, pose, extra.speed_mps))
+    kept: list[TrafficAgent] = []
+    for agent in wished:
+        ahead_m = CLEAR_S * agent.speed_mps
+        way = replace(
+            agent,
+            x_m=agent.x_m + ahead_m / 2.0 * math.cos(agent.heading_rad),
+            y_m=agent.y_m + ahead_m / 2.0 * math.sin(agent.heading_rad),
+            length_m=agent.length_m + ahead_m,
+        )
+        if not _meets(agent, scene.everyone + tuple(kept)) and not _meets(way, clear_of):
+            kept.append(agent)
+    kept.sort(key=lambda agent: (math.hypot(agent.x_m, agent.y_m), agent.x_m))
     return tuple(
         replace(agent, id=f"Agent{number}") for number, agent in enumerate(kept, start=FIRST_ID)
     )
@@ -89,34 +105,25 @@ def spawn_traffic(
 # Private
 
 
-def _roadblock(scene: Scene, graph: LaneGraph, lane_id: str) -> tuple[str, ...]:
+def _meets(agent: TrafficAgent, others: Sequence[TrafficAgent]) -> bool:
+    return any(overlap(agent.box, other.box).depth_m > 0.0 for other in others)
+
+
+def _roadblock(graph: LaneGraph, lane_id: str) -> tuple[str, ...]:
     """The lane and its neighbours of the same direction; connectors that join such lanes alike."""
     way = graph.lane(lane_id)
     if isinstance(way, Lane):
-        return _abreast(graph, way)
-    begins, ends = (_abreast_of(graph, end) for end in (way.from_lane, way.to_lane))
+        return graph.abreast(lane_id)
+    begins, ends = (
+        graph.abreast(name) if isinstance(graph.lanes.get(name or ""), Lane) and name else ()
+        for name in (way.from_lane, way.to_lane)
+    )
     return tuple(
         one.id
-        for one in scene.connectors
-        if one.id == lane_id or (one.from_lane in begins and one.to_lane in ends)
+        for one in graph.lanes.values()
+        if one is way
+        or (isinstance(one, LaneConnector) and one.from_lane in begins and one.to_lane in ends)
     )
-
-
-def _abreast_of(graph: LaneGraph, name: str | None) -> tuple[str, ...]:
-    way = graph.lanes.get(name or "")
-    return _abreast(graph, way) if isinstance(way, Lane) else ()
-
-
-def _abreast(graph: LaneGraph, lane: Lane) -> tuple[str, ...]:
-    names, waiting = [lane.id], [lane]
-    while waiting:
-        here = waiting.pop()
-        for name in (here.left_neighbor, here.right_neighbor):
-            beside = graph.lanes.get(name or "")
-            if isinstance(beside, Lane) and beside.id not in names:
-                names.append(beside.id)
-                waiting.append(beside)
-    return tuple(names)
 
 
 def _extended(graph: LaneGraph, lane_id: str) -> list[str]:
@@ -127,33 +134,31 @@ def _extended(graph: LaneGraph, lane_id: str) -> list[str]:
         while missing_m > 0.0:
             options = graph.successors(here) if forwards else graph.predecessors(here)
             here = next((name for name in options if name not in names), "")
-            if not here or _has_light(graph, here):
+            way = graph.lanes.get(here)
+            if way is None or (isinstance(way, LaneConnector) and way.traffic_light in _LIGHTS):
                 break
             names.insert(len(names) if forwards else 0, here)
-            missing_m -= graph.lane(here).centerline.length_m
+            missing_m -= way.centerline.length_m
     return names
-
-
-def _has_light(graph: LaneGraph, name: str) -> bool:
-    way = graph.lane(name)
-    lights = (TrafficLight.RED, TrafficLight.YELLOW, TrafficLight.GREEN)
-    return isinstance(way, LaneConnector) and way.traffic_light in lights
 
 
 def _on_lane(
     scene: Scene, graph: LaneGraph, lane_id: str, widest_m: int, rng: random.Random
 ) -> Iterator[TrafficAgent]:
+    """Vehicles as fast as the ego, as interPlan's released code has it.
+
+    Behind a gap, where the ego stands.
+    """
     names = _extended(graph, lane_id)
     lines = [graph.lane(name).centerline for name in names]
     line = Polyline([point for one in lines for point in one.points_m.tolist()])
     first = names.index(lane_id)
     begins_m = sum(one.length_m for one in lines[:first])
     from_m = max(0.0, begins_m - BEYOND_M)
-    last_m = min(line.length_m, begins_m + lines[first].length_m + BEYOND_M)
+    here_m = min(line.length_m, begins_m + lines[first].length_m + BEYOND_M)
     ego = line.project(scene.ego.x_m, scene.ego.y_m)
     is_egos = lane_id == find_ego_lane(scene, graph)
     limit_mps = graph.lane(lane_id).speed_limit_mps or _FALLBACK_MPS
-    here_m = last_m
     while True:
         gap_m = rng.randint(NARROWEST_M, widest_m)
         here_m -= gap_m
@@ -162,23 +167,10 @@ def _on_lane(
         if is_egos and abs(here_m - ego.s_m) < NARROWEST_M:
             here_m = ego.s_m  # the slot is the ego's
             continue
-        pose = line.pose_at(here_m)
-        yield _vehicle(graph, pose, min(limit_mps, _speed_mps(scene, gap_m)))
-
-
-def _speed_mps(scene: Scene, gap_m: float) -> float:
-    """As fast as the ego, as interPlan's released code has it; behind a gap where that stands."""
-    if scene.ego.speed_mps >= _ROLLS_MPS:
-        return scene.ego.speed_mps
-    return math.sqrt(2.0 * DECEL_MPS2 * gap_m)
-
-
-def _extra(graph: LaneGraph, extra: ExtraAgent) -> TrafficAgent | None:
-    nearest = graph.nearest(extra.x_m, extra.y_m)
-    if nearest is None:
-        return None
-    lane_id, beside = nearest
-    return _vehicle(graph, graph.lane(lane_id).centerline.pose_at(beside.s_m), extra.speed_mps)
+        speed_mps = scene.ego.speed_mps
+        if speed_mps < _ROLLS_MPS:
+            speed_mps = math.sqrt(2.0 * DECEL_MPS2 * gap_m)
+        yield _vehicle(graph, line.pose_at(here_m), min(limit_mps, speed_mps))
 
 
 def _vehicle(graph: LaneGraph, pose: Pose, speed_mps: float) -> TrafficAgent:
@@ -194,31 +186,3 @@ def _vehicle(graph: LaneGraph, pose: Pose, speed_mps: float) -> TrafficAgent:
         speed_mps=round(max(speed_mps, 0.0), 2),
         lane_id=graph.under(pose.x_m, pose.y_m, pose.heading_rad),
     )
-
-
-def _kept(
-    wished: Iterable[TrafficAgent], scene: Scene, clear_of: Sequence[TrafficAgent]
-) -> list[TrafficAgent]:
-    """Those who stand in nobody and run into nothing of the change, the nearest first."""
-    kept: list[TrafficAgent] = []
-    for agent in wished:
-        taken = [one.box for one in (scene.ego, *scene.agents, *kept)]
-        in_way = [one.box for one in clear_of]
-        if not _meets(agent.box, taken) and not _meets(_strip(agent), in_way):
-            kept.append(agent)
-    return sorted(kept, key=lambda one: (math.hypot(one.x_m, one.y_m), one.x_m))
-
-
-def _strip(agent: TrafficAgent) -> Box:
-    """What an agent covers in 2 s at its speed."""
-    ahead_m = CLEAR_S * agent.speed_mps
-    pose = Pose(
-        x_m=agent.x_m + ahead_m / 2.0 * math.cos(agent.heading_rad),
-        y_m=agent.y_m + ahead_m / 2.0 * math.sin(agent.heading_rad),
-        heading_rad=agent.heading_rad,
-    )
-    return Box(pose=pose, length_m=agent.length_m + ahead_m, width_m=agent.width_m)
-
-
-def _meets(box: Box, others: Iterable[Box]) -> bool:
-    return any(overlap(box, other).depth_m > 0.0 for other in others)

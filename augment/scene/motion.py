@@ -105,7 +105,8 @@ def motion_of(
     """
     if recording is not None and len(recording.times_s) < 2:
         recording = None  # of one moment nothing follows
-    times_s = _times(recording)
+    last_s = LENGTH_S if recording is None else float(recording.times_s[-1])
+    times_s = np.asarray(np.arange(round(last_s / STEP_S) + 1) * STEP_S, dtype=np.float64)
     graph = LaneGraph(scene)
     ego = _ego_movement(scene.ego, recording, times_s, graph)
     tracks = {} if recording is None else {track.agent_id: track for track in recording.tracks}
@@ -127,11 +128,6 @@ def motion_of(
 # Private
 
 
-def _times(recording: Recording | None) -> FloatArray:
-    last_s = LENGTH_S if recording is None else float(recording.times_s[-1])
-    return np.asarray(np.arange(round(last_s / STEP_S) + 1) * STEP_S, dtype=np.float64)
-
-
 def _ego_movement(
     ego: TrafficAgent, recording: Recording | None, times_s: FloatArray, graph: LaneGraph
 ) -> Movement:
@@ -148,7 +144,7 @@ def _ego_movement(
         states[gaps, column] = np.interp(times_s[gaps], times_s[seen], known[:, column])
     states[gaps, 2] = _wrapped(states[gaps, 2])
     if last + 1 < len(times_s):
-        x_m, y_m, heading_rad, speed_mps = (float(value) for value in states[last])
+        x_m, y_m, heading_rad, speed_mps = states[last].tolist()
         lane_id = graph.under(x_m, y_m, heading_rad)
         there = replace(
             ego, x_m=x_m, y_m=y_m, heading_rad=heading_rad, speed_mps=speed_mps, lane_id=lane_id
@@ -208,13 +204,11 @@ def _walk(agent: TrafficAgent, times_s: FloatArray, ego: Movement) -> Movement:
     near = np.flatnonzero(gap <= SETS_OUT_WITHIN_M)
     if length_m < 1e-6 or not len(near):
         return Movement(agent=agent, source=MotionSource.STANDING, states=states)
-    pace_mps = walking_pace_mps(agent)
-    walked = np.clip((times_s - times_s[near[0]]) * pace_mps / length_m, 0.0, 1.0)
+    pace_mps, since_s = walking_pace_mps(agent), times_s[near[0]]
+    walked = np.clip((times_s - since_s) * pace_mps / length_m, 0.0, 1.0)
     states[:, :2] += walked[:, None] * walk
-    moves = (times_s >= times_s[near[0]]) & (walked < 1.0)
-    states[moves, 2] = math.atan2(walk[1], walk[0])
-    states[walked >= 1.0, 2] = math.atan2(walk[1], walk[0])
-    states[moves, 3] = pace_mps
+    states[times_s >= since_s, 2] = math.atan2(walk[1], walk[0])
+    states[(times_s >= since_s) & (walked < 1.0), 3] = pace_mps
     states[0, 2] = agent.heading_rad
     return Movement(agent=agent, source=MotionSource.WALK, states=states)
 

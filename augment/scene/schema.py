@@ -8,7 +8,9 @@ not finite. Names carry their units.
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any, TypeVar
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from typing import Annotated, Any, Generic, TypeVar
 
 from pydantic import (
     BaseModel,
@@ -79,40 +81,76 @@ class Document(BaseModel):
 
 
 Value = TypeVar("Value")
+Problem = tuple[str, str]
+"""The path of a fault inside its document, and a sentence."""
 
 
-def read(document: object, shape: TypeAdapter[Value], *, what: str, format_name: str) -> Value:
-    """The value that a document describes.
+@dataclass(frozen=True, slots=True)
+class Codec(Generic[Value]):
+    """A value as a JSON document and back, exactly; fields without a value are left out.
 
-    Args:
-        document: What `json.loads` returned, or a dict like it.
+    Attributes:
+        what: The kind of document, for sentences and for its "format".
         shape: Of the value.
-        what: The kind of document, for the sentence.
-        format_name: What its "format" must say.
-
-    Raises:
-        InvalidDocument: With one problem a fault, each with its path inside the document.
+        problems: Finds faults that reach over more than one field.
     """
-    if not isinstance(document, dict):
-        raise InvalidDocument(what, [("", f"expected an object, got {type(document).__name__}")])
-    if document.get("format") != format_name:
-        given = _shown(document.get("format"))
-        raise InvalidDocument(what, [("format", f"expected {format_name!r}, got {given}")])
-    version = document.get("version")
-    if type(version) is not int or version != VERSION:
-        text = f"version {_shown(version)} is not known; this program reads version {VERSION}"
-        raise InvalidDocument(what, [("version", text)])
-    inner = {name: part for name, part in document.items() if name not in ("format", "version")}
-    try:
-        return shape.validate_python(inner)
-    except ValidationError as fault:
-        raise InvalidDocument(what, problems_of(fault)) from None
 
+    what: str
+    shape: TypeAdapter[Value]
+    problems: Callable[[Value], Iterable[Problem]] = lambda value: ()
 
-def write(value: Value, shape: TypeAdapter[Value], *, format_name: str) -> dict[str, Any]:
-    """The document that describes a value; fields without a value are left out."""
-    fields = shape.dump_python(value, mode="json", by_alias=True, exclude_none=True)
-    return {"format": format_name, "version": VERSION, **fields}
+    @property
+    def frame(self) -> dict[str, Any]:
+        """What every document of the kind begins with."""
+        return {"format": f"scenario-arena/{self.what}", "version": VERSION}
+
+    def to_document(self, value: Value) -> dict[str, Any]:
+        """Return the document that describes a value.
+
+        Raises:
+            InvalidDocument: The value breaks a rule of the format, so nobody could read it again.
+        """
+        document = self.frame | self.dump(value)
+        self.from_document(document)
+        return document
+
+    def dump(self, value: Value) -> dict[str, Any]:
+        """Return the document without its frame, and without reading it again."""
+        parts: dict[str, Any] = self.shape.dump_python(
+            value, mode="json", by_alias=True, exclude_none=True
+        )
+        return parts
+
+    def from_document(self, document: object) -> Value:
+        """Return the value that a document describes: what `json.loads` gives, or a dict like it.
+
+        Raises:
+            InvalidDocument: With one problem a fault, each with its path inside the document.
+        """
+        if not isinstance(document, dict):
+            text = f"expected an object, got {type(document).__name__}"
+            raise InvalidDocument(self.what, [("", text)])
+        wanted, given = self.frame["format"], document.get("format")
+        if given != wanted:
+            text = f"expected {wanted!r}, got {_shown(given)}"
+            raise InvalidDocument(self.what, [("format", text)])
+        version = document.get("version")
+        if type(version) is not int or version != VERSION:
+            text = f"version {_shown(version)} is not known; this program reads version {VERSION}"
+            raise InvalidDocument(self.what, [("version", text)])
+        parts = {name: part for name, part in document.items() if name not in self.frame}
+        return self.from_parts(parts)
+
+    def from_parts(self, parts: object) -> Value:
+        """Return the value of a document without its frame; as `from_document`."""
+        try:
+            value = self.shape.validate_python(parts)
+        except ValidationError as fault:
+            raise InvalidDocument(self.what, problems_of(fault)) from None
+        problems = list(self.problems(value))
+        if problems:
+            raise InvalidDocument(self.what, problems)
+        return value
 
 
 def problems_of(fault: ValidationError) -> list[tuple[str, str]]:

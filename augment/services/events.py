@@ -8,7 +8,16 @@ from django.contrib.auth.models import User
 from django.db import transaction
 from django.utils import timezone
 
-from augment.models import BaseScene, Contestant, Event, Scenario
+from augment.models import (
+    Augmentation,
+    BaseScene,
+    Contestant,
+    Endpoint,
+    EndpointModel,
+    Event,
+    GenerationJob,
+    Scenario,
+)
 
 
 @transaction.atomic
@@ -41,31 +50,51 @@ def log_event(
     )
 
 
+_KINDS = {
+    Augmentation: "augmentation",
+    BaseScene: "scene",
+    Contestant: "contestant",
+    Endpoint: "endpoint",
+    EndpointModel: "model",
+    GenerationJob: "job",
+    Scenario: "scenario",
+}
+Logged = (
+    Augmentation | BaseScene | Contestant | Endpoint | EndpointModel | GenerationJob | Scenario
+)
 Retirable = TypeVar("Retirable", Contestant, Scenario, BaseScene)
-_KINDS = {Contestant: "contestant", Scenario: "scenario", BaseScene: "scene"}
+
+
+def log_change(
+    row: Logged,
+    verb: str,
+    actor: User | None = None,
+    *,
+    before: dict[str, Any] | None = None,
+    after: dict[str, Any] | None = None,
+) -> Event:
+    """Append one line about a row of augment; as `log_event`."""
+    return log_event(
+        actor=actor,
+        verb=verb,
+        object_kind=_KINDS[type(row)],
+        object_code=row.code,
+        before=before,
+        after=after,
+    )
 
 
 @transaction.atomic
-def retire(row: Retirable, *, actor: User | None = None) -> Retirable:
-    """Let forms and `all` leave it out; a retired one stays as it is."""
-    return _set(row, is_retired=True, actor=actor)
-
-
-@transaction.atomic
-def take_back(row: Retirable, *, actor: User | None = None) -> Retirable:
-    """Let it be chosen again."""
-    return _set(row, is_retired=False, actor=actor)
-
-
-def _set(row: Retirable, *, is_retired: bool, actor: User | None) -> Retirable:
+def retire(row: Retirable, *, actor: User | None = None, is_retired: bool = True) -> Retirable:
+    """Let forms and `all` leave a row out, or offer it again; else it stays as it is."""
     rows = type(row)._default_manager.filter(pk=row.pk, retired_at__isnull=is_retired)
     if rows.update(retired_at=timezone.now() if is_retired else None):
-        log_event(
-            actor=actor,
-            verb="retire" if is_retired else "take back",
-            object_kind=_KINDS[type(row)],
-            object_code=row.code,
-            after={"slug": row.slug},
-        )
+        verb = "retire" if is_retired else "take back"
+        log_change(row, verb, actor, after={"slug": row.slug})
     row.refresh_from_db()
     return row
+
+
+def take_back(row: Retirable, *, actor: User | None = None) -> Retirable:
+    """Let it be chosen again."""
+    return retire(row, actor=actor, is_retired=False)

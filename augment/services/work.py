@@ -1,9 +1,9 @@
-"""How workers work: a row is taken, kept by a heartbeat, brought to an outcome, or given back.
+"""Leases on rows of work: taken, kept by a heartbeat, settled with an outcome, or given back.
 
 In: the key of a `Work` row, by a message that may come twice or never. Out: its outcome. One
 conditional UPDATE decides who works on a row, never a message. A lease without a heartbeat is
-taken back, so that the row waits again. What time it is says the database, so that workers whose
-clocks differ judge a lease alike.
+taken back, so that the row waits again. All times are the database's, so that workers whose clocks
+differ judge a lease alike.
 """
 
 from __future__ import annotations
@@ -74,11 +74,11 @@ class Lease(Generic[Row]):
         return self.kind.rows.filter(pk=self.pk, claim=self.token)
 
     def renew(self, *, now: Moment = DATABASE_TIME) -> bool:
-        """Say that the holder is alive; False when the lease is lost."""
+        """Record a heartbeat; False when the lease is lost."""
         return bool(self.row.update(heartbeat_at=now))
 
     def is_held(self, *, lock: bool = False) -> bool:
-        """Whether the row still carries the token; locked, it does until the transaction ends."""
+        """Return whether the row still carries the token; `lock` keeps it for the transaction."""
         if lock:
             return self.row.select_for_update().values_list("pk").first() is not None
         return self.row.exists()
@@ -92,7 +92,7 @@ class Lease(Generic[Row]):
         """Write what is known before the outcome.
 
         Raises:
-            LeaseLost: The row is somebody else's now.
+            LeaseLost: Another worker has the row now.
         """
         if not self.row.update(**columns):
             raise LeaseLost
@@ -121,12 +121,12 @@ class Lease(Generic[Row]):
 
     @contextmanager
     def kept_alive(self) -> Iterator[None]:
-        """Beat until the block is left, or until the lease is lost."""
+        """Send heartbeats until the block is left, or until the lease is lost."""
         with repeating(self._beat, every_s=settings.HEARTBEAT_S, name="heartbeat"):
             yield
 
     def _beat(self) -> bool:
-        """One beat; a database that can't take it now gets the next one."""
+        """Renew once; a database that can't take it now gets the next heartbeat."""
         try:
             is_ours = self.renew()
         except Error as error:
@@ -166,16 +166,16 @@ class WorkKind(ABC, Generic[Row]):
 
         Raises:
             AugmentError: Why the row fails.
-            LeaseLost: The row is somebody else's now.
+            LeaseLost: Another worker has the row now.
             WorkerStopping, BudgetSpent: Nothing more is done now; the row waits again.
         """
 
     def waiting(self) -> QuerySet[Row]:
-        """The rows that may be taken."""
+        """Return the rows that may be taken."""
         return self.rows.filter(state__in=self.model.UNDER_WAY, claim=None)
 
     def sendable(self) -> QuerySet[Row]:
-        """The rows that workers are told of."""
+        """Return the waiting rows for which messages are sent."""
         return self.waiting()
 
     def begun(self, pk: int, worker: str, now: Moment) -> None:
@@ -188,7 +188,7 @@ class WorkKind(ABC, Generic[Row]):
         """Follow up a try, whose outcome is committed if there is one."""
 
     def outcome_of_loss(self, row: Row) -> Settlement | None:
-        """What becomes of a row that has lost its worker; None where it waits again."""
+        """Return the outcome of a row that has lost its worker; None where it waits again."""
         if row.lost + 1 < self.lost_limit:
             return None
         if self.lost_limit == 1:
@@ -197,7 +197,7 @@ class WorkKind(ABC, Generic[Row]):
         return Settlement(state=FAILED, reason=f"{lost}; look for the cause, then retry.")
 
     def tidy(self, now: Moment) -> None:
-        """Bring in order what else a lost worker may leave behind."""
+        """Clean up what else a lost worker may leave behind."""
 
     # --- What all kinds share ---
 
@@ -253,7 +253,7 @@ class WorkKind(ABC, Generic[Row]):
     def find_unsent(
         self, *, older_than: timedelta, now: Moment = DATABASE_TIME, only: Q | None = None
     ) -> list[int]:
-        """Waiting rows without a message, or with one that old."""
+        """Return waiting rows without a message, or with one that old."""
         is_lost = Q(sent_at=None) | Q(sent_at__lte=now - older_than)
         unsent = self.sendable().filter(is_lost, only or Q())
         return list(unsent.order_by("pk").values_list("pk", flat=True))
@@ -263,7 +263,7 @@ class WorkKind(ABC, Generic[Row]):
         change_all(self.rows.filter(pk__in=list(pks)), sent_at=now)
 
     def _silent(self, now: Moment) -> QuerySet[Row]:
-        """Rows whose holders have not been heard for too long."""
+        """Return rows whose holders have not been heard for too long."""
         since = now - timedelta(seconds=settings.STALE_AFTER_S)
         return self.rows.filter(claim__isnull=False, heartbeat_at__lt=since)
 
@@ -288,18 +288,18 @@ KINDS: dict[str, WorkKind[Any]] = {}
 
 
 def register(*kinds: WorkKind[Any]) -> None:
-    """Let workers take these kinds, and bring back what is lost of them."""
+    """Let workers take these kinds, and recover what is lost of them."""
     KINDS.update({kind.name: kind for kind in kinds})
 
 
 @contextmanager
 def outcome_on_crash(held: Lease[Any]) -> Iterator[None]:
-    """Leave no row hanging when the work on it breaks.
+    """Settle or release the row when the work on it breaks.
 
-    An error with a sentence fails the row with it, one that nobody foresaw with its class and
-    text. A worker that is told to stop (WorkerStopping, SystemExit, KeyboardInterrupt) gives the
-    row back, and so does one whose job has no room for the next call. A lost lease ends quietly:
-    the new holder brings the outcome.
+    An error with a sentence fails the row with it, an unforeseen one with its class and text. A
+    worker that shuts down (WorkerStopping, SystemExit, KeyboardInterrupt) gives the row back, and
+    so does one whose job has no room for the next call. A lost lease ends quietly: the new holder
+    brings the outcome.
     """
     try:
         yield
@@ -323,11 +323,11 @@ def outcome_on_crash(held: Lease[Any]) -> Iterator[None]:
 
 @transaction.atomic
 def change_all(rows: QuerySet[Any], **changes: Any) -> int:
-    """Write the same into many rows; how many there were.
+    """Write the same columns into many rows; returns how many there were.
 
-    Held in the order of their numbers, so that of two who change the same rows none waits for the
-    other in a circle: an UPDATE takes them as they lie. Who also changes their job does that
-    afterwards, as those do who settle a single row.
+    Rows are locked in the order of their keys, so that two writers of the same rows never
+    deadlock: a plain UPDATE takes them as they lie. A caller that also changes their job does so
+    afterwards, as one that settles a single row does.
     """
     held = rows.order_by("pk").select_for_update(no_key=True)
     list(held.values_list("pk", flat=True))

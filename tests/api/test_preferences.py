@@ -8,7 +8,7 @@ import pytest
 from django.contrib.auth.models import User
 from django.test import Client
 
-from arena.queries.voting.keys import voting_preferences
+from arena.voting.queries.keys import voting_preferences
 from tests.study_rows import expert
 
 pytestmark = [pytest.mark.django_db, pytest.mark.urls("tests.api.urls")]

@@ -14,8 +14,8 @@ from django.urls import reverse
 from arena.api.urls import urlpatterns
 from arena.models import Snapshot
 from arena.people.services import make_first_link_token
-from arena.services.early_looks import open_early
-from arena.services.ratings import rate
+from arena.results.services.ratings import open_early
+from arena.results.services.ratings import rate_now as rate
 from arena.studies.services.opening import close_study
 from augment.models import Contestant, Event, GenerationJob
 from tests.api.asking import error_of

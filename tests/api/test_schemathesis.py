@@ -25,8 +25,8 @@ from schemathesis.specs.openapi import checks
 
 from arena.api.reference import make_document
 from arena.models import Snapshot
-from arena.services.early_looks import open_early
-from arena.services.ratings import rate
+from arena.results.services.ratings import open_early
+from arena.results.services.ratings import rate_now as rate
 from arena.studies import api
 from augment.models import Endpoint, EndpointModel, Probe, SceneUpload, UploadMoment
 from augment.services.endpoints.known_endpoints import ensure_endpoint

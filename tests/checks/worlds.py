@@ -24,6 +24,7 @@ from augment.scene.entities import (
     TrafficAgent,
     without_traffic,
 )
+from tests.scenes import pose_in_parent
 
 W = TypeVar("W", Lane, LaneConnector)
 
@@ -76,7 +77,7 @@ def moved_scene(scene: Scene, frame: Pose) -> Scene:
 
 
 def moved_agent(agent: TrafficAgent, frame: Pose) -> TrafficAgent:
-    pose = frame.pose_to_parent(agent.pose)
+    pose = pose_in_parent(frame, agent.pose)
     walk_to_m = None if agent.walk_to_m is None else _moved_points([agent.walk_to_m], frame)[0]
     return replace(
         agent, x_m=pose.x_m, y_m=pose.y_m, heading_rad=pose.heading_rad, walk_to_m=walk_to_m

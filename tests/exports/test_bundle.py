@@ -13,14 +13,13 @@ import pytest
 from django.core.management import CommandError, call_command
 from pyarrow import parquet
 
-from arena.exports.bundle import MANIFEST, bundle, bundle_files
 from arena.exports.formats import format_named
-from arena.exports.tables import leaderboard_table
-from arena.exports.votes import VOTE_FORMATS, vote_table
-from arena.exports.writers import FORMATS
 from arena.models import Snapshot, Study
-from arena.queries.votes.sets import Filters
-from arena.services.ratings import rate
+from arena.results.exports.tables import leaderboard_table
+from arena.results.exports.votes import VOTE_FORMATS, vote_table
+from arena.results.exports.writers import FORMATS, MANIFEST, bundle, bundle_files
+from arena.results.queries.votes import Filters
+from arena.results.services.ratings import rate_now as rate
 from arena.studies.services.opening import close_study
 from augment.errors import UnknownName
 from augment.models import Event

@@ -10,8 +10,8 @@ import json
 import pytest
 from pyarrow import parquet
 
-from arena.exports.tables import LeaderboardTable, leaderboard_table
-from arena.exports.writers import FORMATS, plain_text
+from arena.results.exports.tables import LeaderboardTable, leaderboard_table
+from arena.results.exports.writers import FORMATS, plain_text
 from arena.services.cells import csv_text
 from tests.results.old import OLD, stored
 

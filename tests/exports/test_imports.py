@@ -7,11 +7,11 @@ from pathlib import Path
 import pytest
 from django.core.management import CommandError, call_command
 
-from arena.exports.tables import leaderboard_table
-from arena.exports.votes import VOTE_FORMATS, vote_table
 from arena.models import ImportedVote, Study, VoteFile
-from arena.services.ratings import rate
-from arena.services.vote_imports import import_votes
+from arena.results.exports.tables import leaderboard_table
+from arena.results.exports.votes import VOTE_FORMATS, vote_table
+from arena.results.services.ratings import rate_now as rate
+from arena.results.services.vote_files import import_votes
 from augment.models import Event
 
 pytestmark = pytest.mark.django_db

@@ -12,10 +12,10 @@ import pytest
 from django.core.management import call_command
 from pyarrow import parquet
 
-from arena.exports.tables import NOT_RANKED, leaderboard_table
-from arena.exports.writers import FORMATS
 from arena.models import Snapshot, Study
-from arena.services.ratings import rate
+from arena.results.exports.tables import NOT_RANKED, leaderboard_table
+from arena.results.exports.writers import FORMATS
+from arena.results.services.ratings import rate_now as rate
 
 pytestmark = pytest.mark.django_db
 

@@ -12,18 +12,17 @@ from django.contrib.auth.models import User
 from hypothesis import given
 from hypothesis import strategies as st
 
-from arena.exports.bundle import bundle
 from arena.models import Snapshot, Study
 from arena.pairing.order import MAIN
 from arena.people.links import mark_author
-from arena.queries.votes.judged import Entrant, Judged
-from arena.queries.votes.sets import Filters, VoteSet
 from arena.rating.leaderboard import rate as rate_votes
 from arena.rating.snapshot_document import OwnVotes
-from arena.services.own_votes import OTHER_ROUNDS, with_and_without
-from arena.services.ratings import rate
-from arena.services.snapshots import votes_of
-from arena.services.vote_arrays import vote_arrays
+from arena.results.exports.writers import bundle
+from arena.results.queries.votes import Entrant, Filters, Judged, VoteSet
+from arena.results.services.analysis import vote_arrays
+from arena.results.services.ratings import rate_now as rate
+from arena.results.services.ratings import votes_of
+from arena.results.services.trust import OTHER_ROUNDS, with_and_without
 from augment.models import Event
 from tests.full_study import Size, full_study
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import pytest
 
-from arena.exports.charts.heat_map import heat_map
-from arena.exports.tables import Row
 from arena.rating.comparisons import Estimate
 from arena.rating.lines import whole_percent
 from arena.rating.snapshot_document import PairRecord
+from arena.results.exports.charts import heat_map
+from arena.results.exports.tables import Row
 from arena.templatetags.results import estimate_percent, percent
 
 

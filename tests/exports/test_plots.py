@@ -7,41 +7,42 @@ from itertools import combinations
 
 import pytest
 
-from arena.exports.charts.badges import badge_places
-from arena.exports.charts.drawing import SIMULATED
-from arena.exports.charts.heat_map import heat_map
-from arena.exports.charts.plot_axes import axes, curve_points, interval_ticks
-from arena.exports.charts.plots import ELO, VOTES, Given, Plot
-from arena.exports.charts.scatter import scatter_chart
-from arena.exports.tables import Row
 from arena.rating.snapshot_document import PairRecord
+from arena.results.exports.charts import heat_map
+from arena.results.exports.drawing import SIMULATED, interval_ticks
+from arena.results.exports.plots import (
+    ELO,
+    VOTES,
+    Plot,
+    Point,
+    axis_ticks,
+    badge_places,
+    scatter_chart,
+)
+from arena.results.exports.tables import Row
 
 
-def plot(points: list[Given], **changes: object) -> Plot:
+def plot(points: list[Point], **changes: object) -> Plot:
     return Plot(across=VOTES, up=ELO, points=points, **changes)  # type: ignore[arg-type]
 
 
 def test_between_two_marks_of_a_logarithmic_axis_every_digit_has_one() -> None:
-    given = [Given(number=n, name="x", x=x, y=1.0) for n, x in enumerate((2500.0, 4000.0))]
-    across, _ = axes(plot(given, is_log=True))
+    given = [Point(number=n, name="x", x=x, y=1.0) for n, x in enumerate((2500.0, 4000.0))]
+    across, _ = axis_ticks(plot(given, is_log=True))
     assert [f"{mark:g}" for mark in across] == ["2000", "3000", "4000", "5000"]
 
 
 def test_no_number_covers_another_where_points_lie_on_each_other() -> None:
     points = [(270.0, 200.0 + n % 3) for n in range(30)]
-    places = badge_places(points, radius=10.0, box=(80.0, 500.0, 14.0, 340.0))
+    places = badge_places(points, radius=10.0, size=(500.0, 340.0))
     gaps = [math.dist(place, other) for place, other in combinations(places, 2)]
     assert min(gaps) >= 20.0
-    assert all(80.0 <= x <= 500.0 and 14.0 <= y <= 340.0 for x, y in places)
+    assert all(0.0 <= x <= 500.0 and 0.0 <= y <= 340.0 for x, y in places)
 
 
-def test_the_curve_stays_inside_of_axes_that_begin_at_zero() -> None:
-    given = [Given(number=1, name="a", x=100.0, y=20.0)]
-    falling = plot(given, from_zero=True, falls=200.0)
-    across, up = axes(falling)
+def test_axes_of_what_falls_with_votes_begin_at_zero() -> None:
+    across, up = axis_ticks(plot([Point(number=1, name="a", x=100.0, y=20.0)], from_zero=True))
     assert across[0] == up[0] == 0.0
-    assert curve_points(falling)
-    assert all(0.0 < x <= across[-1] and y <= up[-1] for x, y in curve_points(falling))
 
 
 def test_round_marks_enclose_every_interval() -> None:
@@ -53,7 +54,7 @@ def test_round_marks_enclose_every_interval() -> None:
 
 def test_a_number_stays_on_its_point_where_there_is_room() -> None:
     points = [(10.0, 10.0), (40.0, 10.0), (41.0, 10.0)]
-    places = badge_places(points, radius=10.0, box=(0.0, 100.0, 0.0, 100.0))
+    places = badge_places(points, radius=10.0, size=(100.0, 100.0))
     assert places[:2] == points[:2]
     assert math.dist(places[2], points[2]) < 25.0
 
@@ -79,7 +80,7 @@ def test_the_heat_map_mirrors_scores_and_marks_what_is_few() -> None:
 @pytest.mark.parametrize("is_simulated", [True, False])
 def test_the_key_of_a_file_has_the_colour_of_its_points(is_simulated: bool) -> None:
     given = [
-        Given(number=n, name="x", x=x, y=1.0, group="utility", is_simulated=is_simulated)
+        Point(number=n, name="x", x=x, y=1.0, group="utility", is_simulated=is_simulated)
         for n, x in enumerate((1.0, 2.0), start=1)
     ]
     drawing = scatter_chart(plot(given), file_format="svg").decode()

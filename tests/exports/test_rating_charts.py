@@ -8,12 +8,11 @@ from dataclasses import replace
 
 import pytest
 
-from arena.exports.charts.intervals import interval_chart
-from arena.exports.charts.rating import chart_bytes, charts
-from arena.exports.tables import leaderboard_table
 from arena.models import Snapshot
 from arena.rating.snapshot_document import DisplacementSummary, ScenarioCost
-from arena.services.ratings import rate
+from arena.results.exports.charts import chart_bytes, charts, interval_chart
+from arena.results.exports.tables import leaderboard_table
+from arena.results.services.ratings import rate_now as rate
 from tests.full_study import Size, full_study
 
 pytestmark = pytest.mark.django_db

@@ -9,7 +9,7 @@ from django.urls import reverse
 from django.utils import timezone
 
 from arena.models import Snapshot
-from arena.services.ratings import RATINGS, is_big, plan_snapshot
+from arena.results.services.ratings import RATINGS, is_big, plan_snapshot
 from arena.studies.services.opening import close_study
 from augment.models import Event
 from tests.study_rows import a_study, vote

@@ -7,9 +7,9 @@ import pytest
 from arena.errors import NotYours, StudyStillOpen
 from arena.models import Snapshot, Study, Vote
 from arena.people.services import create_person
-from arena.queries.studies.results import ResultsAccess, latest_snapshot, results_access
-from arena.services.early_looks import open_early
-from arena.services.ratings import rate
+from arena.results.queries.access import ResultsAccess, latest_snapshot, results_access
+from arena.results.services.ratings import open_early
+from arena.results.services.ratings import rate_now as rate
 from arena.services.simulation import simulate_votes
 from arena.studies.services.opening import close_study
 from augment.errors import Conflict

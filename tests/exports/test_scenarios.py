@@ -19,7 +19,7 @@ from django.urls import reverse
 
 from arena.jobs.exports.files import SCENARIO_FILES
 from arena.models import ScenarioFile
-from arena.services.written_files import keep_file
+from arena.results.services.written_files import MadeFile, keep_file
 from augment.formats.writers import WRITERS
 from augment.models import Augmentation, BaseScene, Contestant, GenerationJob
 from augment.scene.codec import modification_to_document, scene_from_document, scene_to_document
@@ -181,7 +181,7 @@ def test_a_zip_that_a_newer_one_overtook_leaves_no_file(
         for row in (fast, slow):
             lease = held[row]
             assert lease is not None
-            keep_file(row, lease, name="a.zip", content=ContentFile(b"zip"))
+            keep_file(row, lease, MadeFile(name="a.zip", content=ContentFile(b"zip")))
     (left,) = ScenarioFile.objects.all()
     assert (left, left.is_waiting) == (fast, False)
     assert default_storage.exists(left.stored)

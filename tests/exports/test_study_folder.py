@@ -23,10 +23,10 @@ from django.core.management import CommandError, call_command
 from django.utils import timezone
 from pytest_django import Settings
 
-from arena.exports.study_folder.closure import TRAVELLING, close_over
 from arena.models import Person, Study, Vote
-from arena.services.ratings import rate
-from arena.services.stored_rows import as_line, columns_of, find_filled_tables, label_of
+from arena.results.exports.closure import TRAVELLING, close_over
+from arena.results.services.ratings import rate_now as rate
+from arena.results.services.stored_rows import as_line, columns_of, find_filled_tables, label_of
 from arena.studies.services.opening import close_study
 from augment.models import Augmentation, Contestant, Endpoint, GenerationJob, Scenario, Simulation
 from tests.study_rows import a_study, hang, matchups_of, scenario, vote, write_changes

@@ -9,13 +9,12 @@ from datetime import datetime
 import pytest
 from pyarrow import parquet
 
-from arena.exports.votes import VOTE_FORMATS, vote_table
 from arena.models import Study, Vote
-from arena.queries.votes.judged import last_vote_of
-from arena.queries.votes.sets import Filters, vote_set
-from arena.services.ratings import rate
-from arena.services.snapshots import votes_of
-from arena.services.vote_rows import COLUMNS, digest_of, vote_rows, votes_csv
+from arena.results.exports.votes import VOTE_FORMATS, vote_table
+from arena.results.queries.votes import Filters, last_vote_of, vote_set
+from arena.results.services.ratings import rate_now as rate
+from arena.results.services.ratings import votes_of
+from arena.results.services.vote_files import COLUMNS, digest_of, vote_rows, votes_csv
 from arena.studies.services.opening import close_study
 from augment.errors import Conflict
 from augment.models import Contestant, Scenario

@@ -7,9 +7,15 @@ from dataclasses import replace
 
 import pytest
 
-from arena.exports.latex import escape, latex
-from arena.exports.tables import EARLY_LOOK, SIMULATED_TABLE, LeaderboardTable, Row, for_experts
-from arena.exports.writers import FORMATS, csv_bytes, json_bytes
+from arena.rating.lines import escape
+from arena.results.exports.tables import (
+    EARLY_LOOK,
+    SIMULATED_TABLE,
+    LeaderboardTable,
+    Row,
+    for_experts,
+)
+from arena.results.exports.writers import FORMATS, csv_bytes, json_bytes, latex
 
 PAPER = (
     ("interPlan", "", 1, 1042, 9, 11, 1960),

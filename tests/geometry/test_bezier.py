@@ -12,6 +12,7 @@ from augment.geometry.bezier import CubicBezier, FloatArray, fit, fit_error
 from augment.geometry.frames import Pose
 from augment.geometry.polyline import Polyline
 from tests.scenes import curve as curved_scene
+from tests.scenes import pose_in_parent
 
 KAPPA = 4.0 / 3.0 * (math.sqrt(2.0) - 1.0)
 QUARTER = CubicBezier([(10, 0), (10, 10 * KAPPA), (10 * KAPPA, 10), (0, 10)])
@@ -61,14 +62,6 @@ def test_a_curve_begins_and_ends_in_its_end_points(curve: CubicBezier) -> None:
     assert (end.x_m, end.y_m) == pytest.approx(tuple(curve.control_m[3]), abs=1e-6)
 
 
-@given(curve=curves(), t=st.floats(0.01, 0.99))
-def test_the_halves_of_a_split_curve_are_the_curve(curve: CubicBezier, t: float) -> None:
-    first, second = curve.split(t)
-    shares = np.linspace(0.0, 1.0, 7)
-    assert first.points(shares) == pytest.approx(curve.points(shares * t), abs=1e-9)
-    assert second.points(shares) == pytest.approx(curve.points(t + shares * (1 - t)), abs=1e-9)
-
-
 @given(curve=lane_like())
 def test_arc_length_is_that_of_a_dense_line(curve: CubicBezier) -> None:
     assert curve.length_m == pytest.approx(dense_length(curve), abs=1e-5)
@@ -105,7 +98,7 @@ def test_a_moved_and_turned_curve_has_moved_and_turned_poses(
     moved = CubicBezier(pose.to_parent(curve.control_m))
     assert moved.length_m == pytest.approx(curve.length_m, abs=1e-8)
     there = moved.pose_at(share * moved.length_m, 1.5)
-    wanted = pose.pose_to_parent(curve.pose_at(share * curve.length_m, 1.5))
+    wanted = pose_in_parent(pose, curve.pose_at(share * curve.length_m, 1.5))
     assert (there.x_m, there.y_m) == pytest.approx((wanted.x_m, wanted.y_m), abs=1e-6)
     assert math.remainder(there.heading_rad - wanted.heading_rad, math.tau) == pytest.approx(
         0.0, abs=1e-6

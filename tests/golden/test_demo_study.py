@@ -22,12 +22,12 @@ from django.core.files.storage import default_storage
 from django.utils import timezone
 from pytest_django import Settings
 
-from arena.exports.study_folder.writing import MANIFEST, write_study
 from arena.jobs.exports.displacement import displacement_table
 from arena.jobs.exports.displacement_files import FORMATS as DISPLACEMENT
 from arena.management.demo import JOB, RATED, SIMULATED_EXPERTS, SIMULATED_STUDY, vote_and_rate
 from arena.models import Person, Study
 from arena.models.people import fresh_token
+from arena.results.exports.study_folder import MANIFEST, write_study
 from augment.models import Augmentation, GenerationJob
 from augment.scene.codec import modification_to_document
 from augment.scene.entities import Modification, ScenarioType

@@ -12,11 +12,11 @@ from tests.house.source import ROOT
 
 VOTER_MODULES = (
     *("arena/api/errors.py", "arena/models/votes.py", "arena/templatetags/shell.py"),
-    *("arena/queries/voting/descriptions.py", "arena/queries/voting/measures.py"),
-    *("arena/queries/voting/keys.py", "arena/people/services.py", "arena/people/links.py"),
+    *("arena/voting/queries/showings.py", "arena/voting/queries/showings.py"),
+    *("arena/voting/queries/keys.py", "arena/people/services.py", "arena/people/links.py"),
     *("arena/people/pages.py", "arena/voting/forms.py", "arena/voting/screen.py"),
     *("arena/studies/pages/experts.py", "arena/studies/services/taking_part.py"),
-    *("arena/web/voting/practice.py", "arena/web/voting/pages.py"),
+    *("arena/voting/pages.py", "arena/voting/pages.py"),
 )
 """Modules whose messages stand on pages that voters are shown."""
 

@@ -19,7 +19,7 @@ HEAVY = {
     "pandas": ("augment.formats", "arena.exports"),
     "pyarrow": ("augment.formats", "arena.exports", "arena.rating.votes_file"),
     "scenariogeneration": ("augment.formats",),
-    "matplotlib": ("arena.exports",),
+    "matplotlib": ("arena.exports", "arena.results.exports"),
     "scipy.interpolate": ("augment.fake_llm",),
     "scipy.optimize": ("augment.metrics",),
     "scipy.signal": ("augment.simulation",),
@@ -29,7 +29,14 @@ HEAVY = {
 }
 READS_SETTINGS = (
     "arena.config",
-    *("arena.services", "arena.tasks", "arena.apps", "arena.management", "arena.serving"),
+    *(
+        "arena.services",
+        "arena.voting.services",
+        "arena.tasks",
+        "arena.apps",
+        "arena.management",
+        "arena.serving",
+    ),
     *("augment.services", "augment.tasks", "augment.apps", "augment.management"),
 )
 MOST_LINES = {

@@ -11,10 +11,11 @@ from decimal import Decimal
 from augment.errors import ModelFault
 from augment.llm.client import ChatClient, Sending, watch_nothing
 from augment.llm.messages import Reply, Request
-from augment.models import Contestant, Endpoint, EndpointModel, GenerationJob
-from augment.services.running import jobs
+from augment.models import Augmentation, Contestant, Endpoint, EndpointModel, GenerationJob
+from augment.services.running import jobs, runner
 from augment.services.running.budget import NO_CAPS, Caps
-from tests.jobs.rows import INSTRUCTION, add_model, add_scenario
+from tests.jobs.rows import INSTRUCTION, add_model, add_scenario, only_row
+from tests.llm.scripted import ScriptedClient
 from tests.variants.playing import GOOD
 
 MODEL = "llama3.1"
@@ -43,14 +44,14 @@ class Model:
     """Answers every request the same way, from any thread, and remembers them all.
 
     Args:
-        answer: What it answers, or the fault that it breaks with.
+        answer: What it answers, or what it breaks with.
         looking_on: Is called while a call is in flight.
         waiting: Is called before it, while the call waits for its place.
     """
 
     def __init__(
         self,
-        answer: Answer | ModelFault | None = None,
+        answer: Answer | BaseException | None = None,
         *,
         looking_on: Callable[[], None] = lambda: None,
         waiting: Callable[[], None] = lambda: None,
@@ -70,7 +71,7 @@ class Model:
         with self._lock:
             self.requests.append(request)
         self._looking_on()
-        if isinstance(self._answer, ModelFault):
+        if isinstance(self._answer, BaseException):
             raise self._answer
         return self._answer(request)
 
@@ -112,3 +113,31 @@ def llama_job(
     return jobs.launch(
         name="Round 1", contestants=["llama"], scenarios=slugs, caps=caps, is_fresh=is_fresh
     )
+
+
+class Wire:
+    """Endpoints that all answer from one script, and what they were asked for."""
+
+    def __init__(self, *answers: str | Reply | ModelFault) -> None:
+        self.client: ChatClient = ScriptedClient(answers)
+        self.opened: list[str] = []
+
+    def __call__(self, endpoint: Endpoint) -> AbstractContextManager[ChatClient]:
+        self.opened.append(endpoint.label)
+        return self._session()
+
+    @contextmanager
+    def _session(self) -> Iterator[ChatClient]:
+        yield self.client
+
+
+def ran(
+    work: Augmentation | GenerationJob,
+    connect: Callable[[Endpoint], AbstractContextManager[ChatClient]] | None = None,
+) -> Augmentation:
+    """Run a row, or the only one of a job; both are read anew."""
+    row = work if isinstance(work, Augmentation) else only_row(work)
+    assert runner.work_on(augmentation_pk=row.pk, worker="w", connect=connect or Wire())
+    row.refresh_from_db()
+    work.refresh_from_db()
+    return row

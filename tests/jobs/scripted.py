@@ -28,26 +28,33 @@ Bodies = list[dict[str, Any]]
 
 
 class Scripted(JsonServer):
-    """Says the same few things again and again, and keeps what it was sent."""
+    """Says the same few things again and again, refuses some parameters, keeps what it got."""
 
-    def __init__(self) -> None:
+    def __init__(
+        self,
+        *script: str,
+        refuses: tuple[str, ...] = (),
+        usage: dict[str, int | None] | None = None,
+    ) -> None:
         super().__init__()
-        self.refuses: set[str] = set()
-        self.script = [CAR]
+        self.refuses = set(refuses)
+        self.script = list(script or [CAR])
+        self.usage = usage
         self.bodies: Bodies = []
 
     def answer(self, body: dict[str, Any]) -> tuple[int, dict[str, Any]]:
         for name in sorted(self.refuses & body.keys()):
-            return 400, {
-                "error": {"message": "no", "code": "unsupported_parameter", "param": name}
-            }
+            refused = {"code": "unsupported_parameter", "param": name}
+            return 400, {"error": {"message": f"Unsupported parameter: {name!r}."} | refused}
         said = self.script[len(self.bodies) % len(self.script)]
         if said == CAR:  # another one in each round, so that no review is asked for twice
             said = car(20.0 + len(self.bodies), id="Agent9")
         self.bodies.append(body)
-        choice = {"finish_reason": "stop", "message": {"role": "assistant", "content": said}}
+        message = {"role": "assistant", "content": said}
+        choice = {"index": 0, "finish_reason": "stop", "message": message}
         made = {"id": "1", "object": "chat.completion", "created": 0, "model": body["model"]}
-        return 200, made | {"choices": [{"index": 0} | choice]}
+        usage = {} if self.usage is None else {"usage": self.usage}
+        return 200, made | {"choices": [choice]} | usage
 
 
 def add(server: Scripted, slug: str, variant: str = "otm", **options: object) -> Contestant:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from datetime import timedelta
 from decimal import Decimal
 
@@ -25,7 +26,7 @@ from augment.services.running import budget, jobs, runner
 from augment.services.running.budget import Caps, Room, costs_of
 from augment.services.running.estimates import estimate
 from augment.services.running.runner import AUGMENTATIONS, Held
-from tests.jobs.models import Model, add_llama, after_a_second_look, llama_job, reply
+from tests.jobs.models import Model, add_llama, after_a_second_look, llama_job, ran, reply
 from tests.jobs.rows import NOON, STALE, add_kind, add_scenario, launch, leased, only_row
 from tests.variants.playing import GOOD
 
@@ -36,17 +37,9 @@ ONE_USD = Price(prompt_usd=Decimal(1), completion_usd=Decimal(1))
 WORST = WorstCase(prompt_tokens=600, completion_tokens=400)
 
 
-def ran(job: GenerationJob, model: Model | None = None) -> Augmentation:
-    row = only_row(job)
-    runner.work_on(augmentation_pk=row.pk, worker="w", connect=model or Model())
-    row.refresh_from_db()
-    job.refresh_from_db()
-    return row
-
-
 def test_a_call_turns_its_reservation_into_what_it_used() -> None:
     job = llama_job(price="2")
-    assert ran(job).state == ROW.DONE
+    assert ran(job, Model()).state == ROW.DONE
     call = ModelCall.objects.get()
     assert call.spent_tokens == 3020 < call.reserved_tokens
     assert call.reserved_usd == 2 * Decimal(call.reserved_tokens) / 1_000_000
@@ -361,3 +354,59 @@ def test_after_a_run_it_is_what_was_used() -> None:
     assert (line.seen, line.tokens_in, line.tokens_out) == (1, 2 * 2900, 2 * 120)
     assert line.calls == (2, 2, 4)
     assert line.usd == Decimal("0.00604")
+
+
+DONE = Augmentation.State.DONE
+
+
+def again(*, is_fresh: bool = False) -> GenerationJob:
+    return jobs.launch(
+        name="Again", contestants=["llama"], scenarios=["street-1"], is_fresh=is_fresh
+    )
+
+
+def test_the_same_request_is_answered_once_and_the_copy_costs_nothing() -> None:
+    model = Model()
+    first = ran(llama_job(price="1"), model)
+    job = again()
+    second = ran(job, model)
+    assert (second.state, second.modification) == (DONE, first.modification)
+    assert len(model.requests) == 1
+    source, copy = ModelCall.objects.order_by("pk")
+    assert (copy.served_from, copy.answer, copy.request) == (source, source.answer, source.request)
+    assert (copy.cost_nano_usd, copy.spent_tokens, copy.latency_s) == (0, 0, None)
+    assert (copy.model_returned, copy.is_cached) == ("llama3.1-2407", True)
+    job.refresh_from_db()
+    assert (job.spent_calls, job.spent_nano_usd) == (0, 0)
+
+
+def test_a_fault_is_no_answer() -> None:
+    broken = Model(ModelFault("no", retryable=False, status=500))
+    job = llama_job()
+    ran(job, broken)
+    jobs.retry_failed(job)
+    model = Model()
+    assert ran(job, model).state == DONE
+    assert len(model.requests) == 1
+
+
+def test_a_refusal_is_an_answer_and_stays_one() -> None:
+    model = Model(lambda request: Reply(text="", refusal="I would rather not."))
+    ran(llama_job(), model)
+    row = ran(again(), model)
+    assert (row.state, row.reason) == (Augmentation.State.REFUSED, "I would rather not.")
+    assert len(model.requests) == 1
+
+
+def test_an_answer_to_a_cut_prompt_is_kept_and_paid_for_but_never_served() -> None:
+    cut = Model(lambda request: replace(reply(), prompt_tokens=12))
+    job = llama_job(price="1")
+    assert "silently cut" in ran(job, cut).reason
+    call = ModelCall.objects.get()
+    assert (call.answer, call.prompt_tokens) == (GOOD, 12)
+    assert "silently cut" in call.fault
+    job.refresh_from_db()
+    assert job.spent_tokens > 0
+    whole = Model()
+    assert ran(again(), whole).state == DONE
+    assert len(whole.requests) == 1

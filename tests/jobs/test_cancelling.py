@@ -16,9 +16,8 @@ from augment.models import Augmentation, CallLease, Endpoint, GenerationJob, Mod
 from augment.services.endpoints.client import Queue, place_at
 from augment.services.running import budget, jobs, runner
 from augment.services.running.runner import AUGMENTATIONS
-from tests.jobs.models import llama_job, reply
+from tests.jobs.models import Wire, llama_job, ran, reply
 from tests.jobs.rows import only_row
-from tests.jobs.running import Wire, ran
 from tests.llm.raw_server import drip, head, speaking
 from tests.variants.playing import GOOD
 

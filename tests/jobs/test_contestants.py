@@ -1,18 +1,36 @@
 from __future__ import annotations
 
+import io
+from collections.abc import Iterator
+from contextlib import AbstractContextManager, contextmanager
+from decimal import Decimal
 from io import StringIO
 from typing import Any
 
 import pytest
 from django.core.management import CommandError, call_command
 
-from augment.errors import Conflict, InvalidDocument
-from augment.models import Augmentation, Contestant, Endpoint, EndpointModel, Event
+from augment.errors import Conflict, InvalidDocument, UnknownName
+from augment.fake_llm.server import FakeServer, running
+from augment.llm.client import ChatClient
+from augment.llm.openai_wire import OpenAIWire
+from augment.models import (
+    Augmentation,
+    Contestant,
+    Endpoint,
+    EndpointModel,
+    Event,
+    GenerationJob,
+    ModelCall,
+)
 from augment.services.endpoints import contestants, known_endpoints
 from augment.services.endpoints.known_endpoints import ensure_endpoint, may_hold_key, move_of
 from augment.services.running import jobs, runner
+from augment.services.running.budget import Caps
 from augment.services.running.choosing import find_obstacle, keys_missing
-from tests.jobs.models import add_llama, llama_job
+from augment.variants.respondents import ModelRole
+from tests.intents import intents
+from tests.jobs.models import add_llama, llama_job, ran
 from tests.jobs.rows import add_scenario, only_row
 from tests.llm.recorder import recorder
 
@@ -57,11 +75,6 @@ def test_a_model_on_a_real_endpoint_is_a_language_model() -> None:
     assert (event.verb, event.object_code) == ("add", str(made.code))
     assert event.after is not None
     assert event.after["endpoint"] == "local"
-
-
-def test_a_model_on_a_simulated_endpoint_is_simulated() -> None:
-    local(is_simulated=True)
-    assert add().is_simulated
 
 
 def test_the_same_contestant_twice_is_one() -> None:
@@ -115,19 +128,6 @@ def test_a_contestant_that_is_refused_leaves_no_endpoint_behind() -> None:
     with pytest.raises(CommandError, match="Unknown variant"):
         call_command("add_contestant", "fake", *facts)
     assert not Endpoint.objects.exists()
-
-
-def test_a_contestant_brings_its_model_which_is_unknown() -> None:
-    ensure_endpoint(label="local", base_url=LOCAL)
-    for variant in ("otm", "otm"):
-        contestants.add_contestant(
-            slug="llama", variant=variant, endpoint="local", model="llama3.1"
-        )
-    known = EndpointModel.objects.get()
-    assert (known.endpoint.label, known.model, known.model_class) == ("local", "llama3.1", "")
-    abilities = (known.native_tools, known.vision, known.json_schema, known.temperature)
-    assert abilities == (None, None, None, None)
-    assert (known.price_in_usd, known.price_out_usd) == (None, None)
 
 
 @pytest.mark.parametrize(
@@ -261,3 +261,137 @@ def test_a_key_goes_to_another_host_only_when_told_twice_and_is_logged() -> None
         {"server": OLD},
         {"server": NEW, "key_variable": "MY_API_KEY"},
     )
+
+
+@pytest.fixture(scope="module")
+def server() -> Iterator[FakeServer]:
+    with running(intents=intents) as serving:
+        yield serving
+
+
+@contextmanager
+def wire(endpoint: Endpoint) -> Iterator[ChatClient]:
+    with OpenAIWire(base_url=endpoint.base_url, api_key=None) as client:
+        yield client
+
+
+def opened(endpoint: Endpoint) -> AbstractContextManager[ChatClient]:
+    return wire(endpoint)
+
+
+def add_roles(variant: str, **roles: tuple[str | None, str]) -> Contestant:
+    ensure_endpoint(label="here", base_url="http://127.0.0.1:1/v1")
+    ensure_endpoint(label="there", base_url="http://127.0.0.1:2/v1")
+    return contestants.add_contestant(
+        slug="one",
+        variant=variant,
+        endpoint="here",
+        model="text-model",
+        roles={ModelRole(role): seat for role, seat in roles.items()},
+    )
+
+
+def sees(model: str, endpoint: str, *, vision: bool | None) -> None:
+    EndpointModel.objects.update_or_create(
+        endpoint=Endpoint.objects.get(label=endpoint), model=model, defaults={"vision": vision}
+    )
+
+
+def test_roles_are_stored_by_label_and_model() -> None:
+    made = add_roles("vqa", viewer=("there", "eyes"), engineer=(None, "boss"))
+    assert made.roles == {
+        "viewer": {"endpoint": "there", "model": "eyes"},
+        "engineer": {"endpoint": "here", "model": "boss"},
+    }
+    assert made.name == "text-model vQA engineer boss viewer eyes"
+    assert EndpointModel.objects.filter(endpoint__label="there", model="eyes").exists()
+
+
+def test_a_role_that_nobody_plays_is_refused() -> None:
+    with pytest.raises(InvalidDocument, match=r"roles.viewer: tqa has reviewer"):
+        add_roles("tqa", viewer=("there", "eyes"))
+    with pytest.raises(InvalidDocument, match="otm has no role besides the modifier"):
+        add_roles("otm", reviewer=(None, "boss"))
+    with pytest.raises(InvalidDocument, match=r"roles.modifier"):
+        add_roles("vqa", modifier=(None, "boss"))
+    with pytest.raises(UnknownName, match="Unknown endpoint 'nowhere'"):
+        add_roles("vqa", viewer=("nowhere", "eyes"))
+
+
+def test_a_simulated_reviewer_makes_a_simulated_contestant() -> None:
+    ensure_endpoint(label="stand-in", base_url="http://127.0.0.1:3/v1", is_simulated=True)
+    assert add_roles("tqa", reviewer=("stand-in", "fake-good")).is_simulated
+
+
+def test_visual_qa_with_a_viewer_known_to_be_blind_is_refused_at_launch() -> None:
+    add_roles("vqa")
+    add_scenario("street-1")
+    sees("text-model", "here", vision=False)
+    with pytest.raises(Conflict, match="one: its viewer text-model at here sees text alone"):
+        jobs.launch(name="J", contestants=["one"], scenarios=["street-1"])
+
+
+def test_visual_qa_waits_until_the_viewer_is_probed_or_somebody_tells() -> None:
+    add_roles("vqa", viewer=("there", "eyes"))
+    add_scenario("street-1")
+    sees("text-model", "here", vision=True)
+    with pytest.raises(Conflict) as raised:
+        jobs.launch(name="J", contestants=["one"], scenarios=["street-1"])
+    obstacle = find_obstacle(Contestant.objects.get())
+    assert "viewer eyes at there sees pictures" in obstacle
+    assert f"one: {obstacle}" in str(raised.value)
+    assert not GenerationJob.objects.exists()
+    out = io.StringIO()
+    call_command("probe_endpoint", "there", "--model", "eyes", "--sees", "yes", stdout=out)
+    assert "as you say" in out.getvalue()
+    assert Event.objects.get(verb="tell").after == {
+        "endpoint": "there",
+        "model": "eyes",
+        "vision": True,
+    }
+    assert find_obstacle(Contestant.objects.get()) == ""
+    jobs.launch(name="J", contestants=["one"], scenarios=["street-1"])
+
+
+def test_a_cap_in_money_needs_the_price_of_every_role() -> None:
+    add_roles("tqa", reviewer=("there", "boss"))
+    add_scenario("street-1")
+    EndpointModel.objects.filter(model="text-model").update(price_in_usd=1, price_out_usd=2)
+    with pytest.raises(Conflict, match="boss at there"):
+        jobs.launch(
+            name="J", contestants=["one"], scenarios=["street-1"], caps=Caps(usd=Decimal(1))
+        )
+
+
+def test_each_role_is_asked_at_its_own_endpoint(server: FakeServer) -> None:
+    with running(intents=intents) as other:
+        ensure_endpoint(label="a", base_url=server.url, is_simulated=True)
+        ensure_endpoint(label="b", base_url=other.url, is_simulated=True)
+        contestants.add_contestant(
+            slug="two",
+            variant="fc+vqa",
+            endpoint="a",
+            model="fake-qa-low",
+            roles={
+                ModelRole.VIEWER: ("b", "fake-careless"),
+                ModelRole.ENGINEER: ("b", "fake-good"),
+            },
+        )
+        add_scenario("street-1")
+        EndpointModel.objects.filter(model="fake-qa-low").update(native_tools=True)
+        EndpointModel.objects.filter(model="fake-careless").update(vision=True)
+        job = jobs.launch(name="J", contestants=["two"], scenarios=["street-1"])
+        row = only_row(job)
+        ran(row, opened)
+    assert row.state == Augmentation.State.DONE, row.reason
+    asked = [
+        (call.role[0], call.request["model"]) for call in ModelCall.objects.order_by("number")
+    ]
+    low, boss, eyes = ("m", "fake-qa-low"), ("e", "fake-good"), ("v", "fake-careless")
+    assert asked == [low, low, boss, eyes, boss] * 2
+    first = ModelCall.objects.get(number=1)
+    assert first.request["tools"][0]["function"]["name"] == "pose_on_lane"
+    assert first.extras is not None
+    assert first.extras["tool_calls"][0]["name"] == "pose_on_lane"
+    kinds = list(row.attempts.get().notes.values_list("kind", flat=True))
+    assert kinds == ["tool_call", "round", "review"] * 2 + ["kept"]

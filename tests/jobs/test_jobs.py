@@ -10,12 +10,12 @@ from django.test.utils import CaptureQueriesContext
 from arena.services.retrying import retry_cause as retry_unless_shown
 from augment.errors import Conflict, UnknownName
 from augment.models import Augmentation, Contestant, Event, GenerationJob, ModelCall
-from augment.services.running import jobs, runner
+from augment.services.running import jobs
 from augment.services.running.budget import Caps
 from augment.services.running.progress import cause_of, count_rows, failure_groups
 from augment.services.running.runner import AUGMENTATIONS
-from tests.jobs.models import Model, after_a_second_look, llama_job, reply
-from tests.jobs.rows import NOON, add_kind, add_scenario, done, failed, launch, leased, only_row
+from tests.jobs.models import Model, after_a_second_look, llama_job, ran, reply
+from tests.jobs.rows import NOON, add_kind, add_scenario, done, failed, launch, leased
 from tests.variants.playing import GOOD
 
 pytestmark = pytest.mark.django_db
@@ -137,9 +137,7 @@ def test_all_calls_of_what_is_in_flight_are_made_though_the_job_is_paused_betwee
             jobs.pause(GenerationJob.objects.get())
 
     model = Model(after_a_second_look, looking_on=pause_once)
-    row = only_row(llama_job(caps=Caps(calls=9)))
-    assert runner.work_on(augmentation_pk=row.pk, connect=model)
-    row.refresh_from_db()
+    row = ran(llama_job(caps=Caps(calls=9)), model)
     assert (row.state, len(model.requests)) == (State.DONE, 2)
     assert GenerationJob.objects.get().state == Job.FINISHED, "nothing is left to resume"
 
@@ -177,16 +175,13 @@ def test_an_unreadable_answer_is_asked_for_anew_and_not_served_again() -> None:
     said = ["Sorry?", "Sorry, what?", GOOD]
     model = Model(lambda request: reply(said.pop(0)))
     job = llama_job()
-    row = only_row(job)
-    runner.work_on(augmentation_pk=row.pk, connect=model)
-    row.refresh_from_db()
+    row = ran(job, model)
     assert row.state == State.UNREADABLE
     (group,) = failure_groups(job)
     jobs.retry_cause(job, key=group.key)
     row.refresh_from_db()
     assert (row.image, row.state) == ("", State.QUEUED)
-    runner.work_on(augmentation_pk=row.pk, connect=model)
-    row.refresh_from_db()
+    ran(row, model)
     assert (row.state, len(model.requests)) == (State.DONE, 3)
     assert not ModelCall.objects.exclude(served_from=None).exists()
     assert list(row.attempts.values_list("outcome", flat=True)) == ["unreadable", "done"]

@@ -1,19 +1,26 @@
 from __future__ import annotations
 
 import hashlib
+import os
+import subprocess
 import threading
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
-from django.core.files.base import ContentFile
+from django.conf import LazySettings
 from django.core.files.storage import default_storage
 from pytest_django import Settings
 
+from augment.models import Augmentation, ModelCall
 from augment.scene.entities import Modification
+from augment.services.running import jobs
 from augment.services.scenarios.pictures import camera_of, original_picture, picture_of, store
 from augment.services.scenarios.scenes import scene_of
+from tests.jobs.models import Wire, llama_job, ran
 from tests.jobs.rows import add_scenario
+from tests.variants.playing import GOOD
 
 NAME = f"bev/{hashlib.sha256(b'png').hexdigest()}.png"
 WORKERS = 4
@@ -22,12 +29,6 @@ WORKERS = 4
 def read(name: str) -> bytes:
     with default_storage.open(name) as file:
         return bytes(file.read())
-
-
-def test_a_picture_that_was_cut_off_is_written_again() -> None:
-    default_storage.save(NAME, ContentFile(b"p"))
-    assert store(b"png") == NAME
-    assert read(NAME) == b"png"
 
 
 def test_workers_with_the_same_picture_never_meet_half_of_it(
@@ -58,3 +59,75 @@ def test_the_original_picture_is_drawn_once_and_remembered() -> None:
     assert scenario.original_image == name
     assert name == picture_of(scene_of(scenario), Modification(), camera_of(scenario))
     assert original_picture(scenario) == name
+
+
+pytestmark = pytest.mark.django_db
+State = Augmentation.State
+BYTES = 256 * 1024
+LEFT = 4 * 1024
+"""Room for the beginning of a picture."""
+
+
+@pytest.fixture
+def disk(settings: LazySettings, tmp_path: Path) -> Iterator[Path]:
+    """The folder of the pictures, on a disk of its own."""
+    folder = tmp_path / "media"
+    folder.mkdir()
+    mounted = subprocess.run(
+        ["mount", "-t", "tmpfs", "-o", f"size={BYTES}", "arena", str(folder)],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    if mounted.returncode:
+        reason = f"no disk can be mounted here: {mounted.stderr.strip()}"
+        if os.environ.get("CI"):
+            pytest.fail(f"{reason}, and in CI nothing is skipped")
+        pytest.skip(reason)
+    settings.MEDIA_ROOT = folder
+    try:
+        yield folder
+    finally:
+        subprocess.run(["umount", str(folder)], check=True)
+
+
+def test_a_full_disk_fails_the_row_and_a_retry_asks_nobody_again(disk: Path) -> None:
+    row = llama_job().augmentations.select_related("scenario__base_scene").get()
+    original_picture(row.scenario)
+    filler = _fill(disk)
+    before = _files(disk)
+
+    ran(row, Wire(GOOD))
+    assert row.state == State.FAILED
+    assert "No space left on device" in row.reason
+    assert row.modification is not None, "what was answered is kept"
+    assert _files(disk) == before, "no half of a picture"
+    assert ModelCall.objects.count() == 1
+
+    filler.unlink()
+    jobs.retry_failed(row.job)
+    ran(row, Wire())
+    assert row.state == State.DONE
+    assert (disk / row.image).read_bytes().endswith(b"IEND\xaeB`\x82")
+    assert ModelCall.objects.count() == 1, "nothing was paid twice"
+
+
+def _fill(disk: Path) -> Path:
+    """Write until there is no more room, then leave a little."""
+    filler = disk / "filler"
+    with filler.open("wb", buffering=0) as file:
+        written = 0
+        try:
+            while True:
+                written += file.write(b"x" * LEFT)
+        except OSError:
+            file.truncate(written - LEFT)
+    return filler
+
+
+def _files(disk: Path) -> dict[str, int]:
+    return {
+        str(path.relative_to(disk)): path.stat().st_size
+        for path in disk.rglob("*")
+        if path.is_file()
+    }

@@ -1,17 +1,20 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator
 from datetime import timedelta
 from typing import Any
 
 import pytest
+from celery.exceptions import Reject
+from django.conf import settings
 from django.core.files.storage import default_storage
 from django.utils import timezone
 
-from augment.errors import Conflict, LeaseLost
-from augment.llm.client import Sending, watch_nothing
-from augment.llm.messages import Reply, Request
-from augment.models import Augmentation, Contestant, Endpoint, GenerationJob, ModelCall
+from augment import tasks
+from augment.errors import Conflict, LeaseLost, WorkerStopping
+from augment.llm.messages import Reply
+from augment.models import Augmentation, Contestant, GenerationJob, ModelCall
 from augment.scene.codec import (
     intent_to_document,
     modification_from_document,
@@ -20,49 +23,16 @@ from augment.scene.codec import (
 from augment.scene.entities import Modification
 from augment.scene.intent import Intent
 from augment.services.endpoints import contestants
-from augment.services.running import jobs, runner
+from augment.services.endpoints.client import Queue, place_at
+from augment.services.running import jobs, runner, workers
 from augment.services.running.runner import AUGMENTATIONS
 from tests.intents import parked
-from tests.jobs.rows import (
-    INSTRUCTION,
-    TWO_CONES,
-    add_kind,
-    add_model,
-    add_scenario,
-    launch,
-    only_row,
-)
-from tests.jobs.running import Wire, ran
+from tests.jobs.models import Model, Wire, llama_job, ran, reply
+from tests.jobs.rows import INSTRUCTION, TWO_CONES, add_kind, add_scenario, launch, only_row
 from tests.variants.playing import GOOD
 
 pytestmark = pytest.mark.django_db
 State = Augmentation.State
-
-
-class Stumbling:
-    """A client that breaks in a way that nobody foresaw, after doing something."""
-
-    def __init__(self, error: BaseException) -> None:
-        self.error = error
-
-    def fitted(self, request: Request) -> Request:
-        return request
-
-    def complete(self, request: Request, *, sending: Sending = watch_nothing) -> Reply:
-        sending()
-        raise self.error
-
-
-def model_job(*, key_variable: str = "", is_simulated: bool = False) -> Augmentation:
-    endpoint = Endpoint.objects.create(
-        label="local",
-        base_url="http://127.0.0.1:9/v1",
-        key_variable=key_variable,
-        is_simulated=is_simulated,
-    )
-    add_model("llama", endpoint=endpoint, model="llama3.1")
-    add_scenario("street")
-    return only_row(jobs.launch(name="R", contestants=["llama"], scenarios=["street"]))
 
 
 def test_the_reference_runs_to_its_picture_and_the_job_is_finished() -> None:
@@ -97,7 +67,7 @@ def test_a_model_is_asked_and_every_call_is_kept() -> None:
         latency_s=1.5,
     )
     wire = Wire(reply)
-    row = ran(model_job(), wire)
+    row = ran(only_row(llama_job()), wire)
     assert (row.state, wire.opened) == (State.DONE, ["local"])
     assert row.notes == "One road, two lanes.\n\nA parked car ahead."
     call = ModelCall.objects.get()
@@ -112,7 +82,7 @@ def test_a_model_is_asked_and_every_call_is_kept() -> None:
 
 
 def test_an_answer_that_nobody_can_read_is_an_outcome_with_the_unchanged_picture() -> None:
-    row = ran(model_job(), Wire("Sorry?", "Pardon?"))
+    row = ran(only_row(llama_job()), Wire("Sorry?", "Pardon?"))
     assert row.state == State.UNREADABLE
     assert row.reason
     assert row.modification is None
@@ -123,7 +93,7 @@ def test_an_answer_that_nobody_can_read_is_an_outcome_with_the_unchanged_picture
 
 
 def test_an_attempt_that_was_lost_before_drawing_is_only_drawn_again() -> None:
-    row = model_job()
+    row = only_row(llama_job())
     now = timezone.now()
     held = AUGMENTATIONS.take(row.pk, now=now - timedelta(minutes=1))
     assert held is not None
@@ -137,22 +107,19 @@ def test_an_attempt_that_was_lost_before_drawing_is_only_drawn_again() -> None:
 
 
 def test_a_worker_whose_claim_was_taken_asks_no_model_and_writes_nothing() -> None:
-    row = model_job()
+    row = only_row(llama_job())
     held = AUGMENTATIONS.take(row.pk, now=timezone.now() - timedelta(minutes=1))
     assert held is not None
     AUGMENTATIONS.take_back_lost(now=timezone.now())
     with pytest.raises(LeaseLost):
-        runner.run(row, held=held, connect=Wire(GOOD))
+        runner.Augmentations(Wire(GOOD)).run(row, held)
     assert not ModelCall.objects.exists()
 
 
 def test_what_nobody_foresaw_fails_the_row_and_is_logged(caplog: pytest.LogCaptureFixture) -> None:
-    row = model_job()
-    wire = Wire()
-    wire.client = Stumbling(ZeroDivisionError("division by zero"))
-    runner.work_on(augmentation_pk=row.pk, connect=wire)
+    row = only_row(llama_job())
+    row = ran(row, Model(ZeroDivisionError("division by zero")))
     assert "Traceback" in caplog.text
-    row.refresh_from_db()
     assert row.state == State.FAILED
     assert row.reason == "unexpected: ZeroDivisionError: division by zero"
     assert row.attempts.get().outcome == "failed"
@@ -206,3 +173,78 @@ def test_simulated_errors_of_an_earlier_version_run_no_more() -> None:
     add_scenario("street")
     with pytest.raises(Conflict, match="A job can't run someone"):
         jobs.launch(name="R", contestants=["someone"], scenarios=["street"])
+
+
+@pytest.fixture(autouse=True)
+def _going_on() -> Iterator[None]:
+    workers.withdraw_stop()
+    yield
+    workers.withdraw_stop()
+
+
+def only(job: GenerationJob) -> tuple[Augmentation, list[ModelCall]]:
+    row = only_row(job)
+    calls = ModelCall.objects.filter(attempt__augmentation=row).order_by("pk")
+    return row, list(calls)
+
+
+def test_no_row_is_claimed_any_more_and_its_message_goes_back() -> None:
+    row = only_row(launch())
+    workers.request_stop()
+    with pytest.raises(Reject) as caught:
+        tasks.work.run("augmentation", row.pk)
+    assert caught.value.requeue
+    row.refresh_from_db()
+    assert row.state == State.QUEUED
+    assert not row.attempts.exists()
+
+
+def test_where_nothing_was_sent_the_row_goes_back_unpaid() -> None:
+    job = llama_job()
+    assert runner.work_on(
+        augmentation_pk=only_row(job).pk, connect=Model(waiting=workers.request_stop)
+    )
+    row, calls = only(job)
+    assert (row.state, row.sent_at, row.claim) == (State.QUEUED, None, None)
+    assert [(call.sent_at, call.spent_tokens) for call in calls] == [(None, 0)]
+    job.refresh_from_db()
+    assert (job.spent_calls, job.reserved_calls, job.reserved_tokens) == (0, 0, 0)
+    assert row.attempts.get().outcome == "released"
+
+
+def test_an_answer_before_the_stop_is_not_asked_for_again() -> None:
+    """It can't be read, so the model is asked once more: by whoever takes the row next."""
+    job = llama_job()
+    unreadable = Model(lambda _: reply("no answer at all"), looking_on=workers.request_stop)
+    assert runner.work_on(augmentation_pk=only_row(job).pk, connect=unreadable)
+    row, calls = only(job)
+    assert row.state == State.QUEUED
+    assert len(calls) == 1
+    workers.withdraw_stop()
+    assert runner.work_on(augmentation_pk=row.pk, connect=Wire(GOOD))
+    row, calls = only(job)
+    assert row.state == State.DONE
+    assert [call.served_from_id is not None for call in calls] == [False, True, False]
+    job.refresh_from_db()
+    assert job.spent_calls == 2
+
+
+def test_who_waits_for_a_place_gives_up_the_wait() -> None:
+    endpoint = llama_job().contestants.get().endpoint
+    assert endpoint is not None
+    endpoint.max_concurrency = 1
+    endpoint.save()
+    looks: list[float] = []
+
+    def sleep(seconds: float) -> None:
+        looks.append(seconds)
+        workers.request_stop()
+
+    queue = Queue(longest_s=600.0, still_wanted=workers.insist_on_going_on, sleep=sleep)
+    with (
+        place_at(endpoint, Queue(longest_s=settings.LLM_QUEUE_S)),
+        pytest.raises(WorkerStopping),
+        place_at(endpoint, queue),
+    ):
+        pytest.fail("two have one place")
+    assert len(looks) == 1

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from arena.services.ratings import WHILE_WAITING
+from arena.results.services.ratings import WHILE_WAITING
 from tests.processes import machine
 
 pytestmark = [pytest.mark.redis, pytest.mark.slow, pytest.mark.timeout(600)]

@@ -77,5 +77,5 @@ def test_a_reference_that_can_not_be_read_or_does_not_fit_is_refused(tmp_path: P
     assert "Agent2 is in the scene already" in refused(reference=file, keep_traffic=True)
     file = reference(tmp_path, CHANGE.replace('"x_m": 9.0', '"x_m": Infinity'))
     assert "add[0].x_m" in refused(reference=file)
-    assert "expected an object" in refused(reference=reference(tmp_path, "null"))
+    assert "holds null" in refused(reference=reference(tmp_path, "null"))
     assert "No such file" in refused(reference=tmp_path / "gone.json")

@@ -13,7 +13,7 @@ from django.urls import reverse
 from arena.models import Matchup, Snapshot, Standing, Study, Vote
 from arena.people.services import create_person
 from arena.rating.snapshot_document import Results
-from arena.services.ratings import rate
+from arena.results.services.ratings import rate_now as rate
 from arena.studies.services.opening import close_study
 from augment.models import Contestant
 from tests.full_study import Size, contestants, draw_votes, pictures, scenarios

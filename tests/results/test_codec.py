@@ -11,7 +11,6 @@ import pytest
 from django.core import serializers
 from django.urls import reverse
 
-from arena.exports import bundle
 from arena.models import Snapshot
 from arena.rating.snapshot_document import (
     VERSION,
@@ -20,7 +19,8 @@ from arena.rating.snapshot_document import (
     read_text,
     results_document,
 )
-from arena.web.results.tabs import TABS
+from arena.results.exports import writers
+from arena.results.pages.tabs import TABS
 from augment.errors import InvalidDocument
 from tests.results.old import OLD, stored
 from tests.web.cast import people, signed_in
@@ -97,14 +97,14 @@ def test_what_can_not_be_read_is_refused_with_its_place(
 def test_an_old_rating_opens_on_every_tab_and_exports_the_same_bytes() -> None:
     snapshot = stored(OLD["snapshot"]["results"])
     staff = signed_in(people()["analyst"])
-    for tab in TABS:
+    for tab in TABS.values():
         page = staff.get(reverse("results-tab", args=[snapshot.study.code, tab.name]))
         assert page.status_code == 200, tab.name
     results = snapshot.results
     files = {
-        "pairs.csv": bundle._pairs(results),
-        "types.csv": bundle._types(results),
-        "raters.csv": _without_last(bundle._raters(results), b"checks_skipped,aids"),
+        "pairs.csv": writers._pairs_csv(results),
+        "types.csv": writers._types_csv(results),
+        "raters.csv": _without_last(writers._raters_csv(results), b"checks_skipped,aids"),
     }
     found = {name: hashlib.sha256(content).hexdigest() for name, content in files.items()}
     assert found == {name: OLD["files"][name] for name in files}
@@ -114,7 +114,7 @@ def test_an_old_rating_opens_on_every_tab_and_exports_the_same_bytes() -> None:
 def test_a_rating_that_kept_its_standings_alone_opens_on_every_tab() -> None:
     snapshot = stored({})
     staff = signed_in(people()["analyst"])
-    for tab in TABS:
+    for tab in TABS.values():
         page = staff.get(reverse("results-tab", args=[snapshot.study.code, tab.name]))
         said = "keeps the table alone" in page.content.decode()
         assert said is (tab.name != "log"), tab.name  # the log is no part of a rating

@@ -15,7 +15,8 @@ WINDING = Polyline([(x, 12.0 * math.sin(x / 18.0)) for x in np.linspace(0.0, 200
 
 def test_a_straight_lane_is_one_piece() -> None:
     lane = bezier_lane(scene().lanes[0].centerline)
-    (control,) = lane.control_m
+    (piece,) = lane.pieces
+    control = piece.curve.control_m
     assert control[[0, 3]].tolist() == [[-50.0, 0.0], [100.0, 0.0]]
     assert lane.length_m == 150.0
     assert lane.error.position_m < 1e-9

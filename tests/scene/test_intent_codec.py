@@ -7,8 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from augment.checks.lanes_across import resolve_anchors
 from augment.errors import InvalidDocument
-from augment.scene.codec import INTENT_FORMAT, intent_from_document, intent_to_document
+from augment.scene.codec import INTENT, intent_from_document, intent_to_document
 from augment.scene.intent import (
     Bearing,
     Body,
@@ -30,7 +31,6 @@ from augment.scene.intent import (
     Spot,
     VehicleRequest,
     WalkRequest,
-    resolve_anchors,
 )
 from augment.scene.intent_statements import list_statements
 from tests.fixtures.shelf import SLUGS, entry
@@ -109,7 +109,7 @@ INTENTS = st.builds(Intent, requests=st.lists(REQUESTS, min_size=1, max_size=3).
 
 
 def document(*requests: dict[str, Any], **parts: Any) -> dict[str, Any]:
-    frame = {"format": INTENT_FORMAT, "version": 1}
+    frame = INTENT.frame
     return frame | {"requests": [{"kind": "vehicles"} | one for one in requests]} | parts
 
 

@@ -11,7 +11,7 @@ from django.core.files.base import ContentFile
 from django.core.files.storage import default_storage
 from django.core.management import call_command
 
-from arena.services.ratings import rate
+from arena.results.services.ratings import rate_now as rate
 from arena.studies.services.opening import close_study
 from augment.services.events import log_event
 from tests.study_rows import a_study, matchups_of, vote, write_changes

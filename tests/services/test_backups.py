@@ -21,7 +21,7 @@ from django.db.migrations.recorder import MigrationRecorder
 
 from arena.management.backups import take_backup
 from arena.models import Vote
-from arena.services.stored_rows import applied_migrations, frozen_rows
+from arena.results.services.stored_rows import applied_migrations, frozen_rows
 from augment.models import Event
 from tests.house.source import ROOT
 from tests.services.backup_rows import (

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import json
 import shutil
+from collections import Counter
 from collections.abc import Callable
 from functools import partial
 from io import StringIO
@@ -17,7 +18,7 @@ from augment.models import Augmentation, BaseScene, Contestant, Event, Generatio
 from augment.scene.codec import CatalogueEntry, entry_to_document, scene_to_document
 from augment.scene.entities import Modification, ScenarioType
 from augment.services.running.choosing import resolve_scenarios
-from augment.services.scenarios.catalogue import CatalogueReport, load_catalogue
+from augment.services.scenarios.catalogue import CatalogueReport, CatalogueStep, load_catalogue
 from augment.services.scenarios.scene_imports import import_scene
 from augment.services.scenarios.scenes import add_scenario, reference_of
 from tests.fixtures.shelf import HARD
@@ -62,13 +63,10 @@ def augment(scenario: Scenario) -> None:
 
 
 def report(*, scenes: tuple[int, int, int], scenarios: tuple[int, int, int]) -> CatalogueReport:
+    steps = (CatalogueStep.ADDED, CatalogueStep.CHANGED, CatalogueStep.UNCHANGED)
     return CatalogueReport(
-        scenes_added=scenes[0],
-        scenes_changed=scenes[1],
-        scenes_unchanged=scenes[2],
-        scenarios_added=scenarios[0],
-        scenarios_changed=scenarios[1],
-        scenarios_unchanged=scenarios[2],
+        scenes=Counter(dict(zip(steps, scenes, strict=True))),
+        scenarios=Counter(dict(zip(steps, scenarios, strict=True))),
     )
 
 

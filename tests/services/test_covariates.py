@@ -9,14 +9,14 @@ import pytest
 from django.core.management import CommandError, call_command
 from django.urls import reverse
 
-from arena.exports.bundle import bundle_files
-from arena.exports.tables import leaderboard_table
 from arena.models import Study
-from arena.queries.votes.sets import Filters, vote_set
 from arena.rating.leaderboard import rate as rate_votes
-from arena.services import ratings
-from arena.services.covariates import COVARIATES, with_covariates
-from arena.services.vote_arrays import vote_arrays
+from arena.results.exports.tables import leaderboard_table
+from arena.results.exports.writers import bundle_files
+from arena.results.queries.votes import Filters, vote_set
+from arena.results.services import ratings
+from arena.results.services.analysis import vote_arrays
+from arena.results.services.covariates import COVARIATES, with_covariates
 from augment.errors import Conflict, UnknownName
 from augment.models import Augmentation
 from tests.full_study import Size, full_study
@@ -40,7 +40,7 @@ def study() -> Study:
 
 
 def test_the_adjusted_table_stands_with_its_effects_and_the_table_as_voted(study: Study) -> None:
-    snapshot = ratings.rate(study=study, seed=2, rounds=300, covariates=["objects", "side"])
+    snapshot = ratings.rate_now(study=study, seed=2, rounds=300, covariates=["objects", "side"])
     assert snapshot.covariates == ["side", "objects"]
     votes = vote_set(study, filters=Filters(), last=snapshot.last_vote)
     plain = vote_arrays(votes.entrants, votes.counted).comparisons
@@ -78,9 +78,9 @@ def test_the_adjusted_table_stands_with_its_effects_and_the_table_as_voted(study
 
 def test_what_can_not_be_adjusted_for_is_refused(study: Study) -> None:
     with pytest.raises(UnknownName, match="side, objects, vehicles"):
-        ratings.rate(study=study, covariates=["length"])
+        ratings.rate_now(study=study, covariates=["length"])
     with pytest.raises(Conflict, match="Only Bradley-Terry with intervals in closed form"):
-        ratings.rate(study=study, covariates=["side"], method="davidson")
+        ratings.rate_now(study=study, covariates=["side"], method="davidson")
     with pytest.raises(CommandError, match="invalid choice"):
         call_command("rate", str(study.code), "--adjust", "length")
     assert not study.snapshots.exists()

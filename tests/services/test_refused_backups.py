@@ -20,7 +20,7 @@ from django.core.management import CommandError, call_command
 
 from arena.management.backups import MANIFEST, read_manifest, take_backup, zip_members
 from arena.models import Vote
-from arena.services.stored_rows import as_line, columns_of
+from arena.results.services.stored_rows import as_line, columns_of
 from augment.models import GenerationJob, Scenario, Simulation
 from augment.services.judging.simulations import DRIVES
 from augment.services.running.runner import AUGMENTATIONS

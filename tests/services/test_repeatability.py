@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import pytest
 
-from arena.exports.samples import sheet_of
+from arena.results.exports.sheets import find_cells
 from augment.errors import UnknownName
 from augment.models import Augmentation, GenerationJob
 from augment.scene.codec import modification_to_document
@@ -46,10 +46,10 @@ def test_a_job_has_a_row_for_every_sample() -> None:
     made = job()
     assert made.augmentations.count() == 8
     chosen = {"scenarios": ["street"], "contestants": ["b", "a"]}
-    (row,) = sheet_of(made, sample=2, **chosen).rows
-    assert [cell.sample for cell in row.cells if cell] == [2, 2]
+    cells = find_cells(made, sample=2, **chosen)
+    assert [cells["street", slug].sample for slug in ("b", "a")] == [2, 2]
     with pytest.raises(UnknownName, match="sample of this job '3'"):
-        sheet_of(made, sample=3, **chosen)
+        find_cells(made, sample=3, **chosen)
 
 
 def test_what_varies_between_samples() -> None:

@@ -16,7 +16,7 @@ from pytest_django import Settings
 
 from arena import tasks
 from arena.models import ScenarioFile, StudyFile
-from arena.services.ratings import plan_snapshot
+from arena.results.services.ratings import plan_snapshot
 from arena.studies.services.opening import close_study
 from augment.errors import BudgetSpent, Conflict, LeaseLost, WorkerStopping
 from augment.models import Event, SceneUpload, Simulation, UploadMoment, Work

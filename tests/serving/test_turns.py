@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from django.db import connection, transaction
 
-from arena.services.turns import SUFFIX, in_turn
+from arena.voting.services.turns import SUFFIX, in_turn
 
 pytestmark = pytest.mark.django_db(transaction=True)
 LONG_S = 60.0

@@ -6,9 +6,8 @@ import pytest
 
 from arena.models import Study
 from arena.pairing.plan import plan
-from arena.queries.votes.judged import last_vote_of
-from arena.queries.votes.sets import Filters, vote_set
-from arena.services.ratings import rate
+from arena.results.queries.votes import Filters, last_vote_of, vote_set
+from arena.results.services.ratings import rate_now as rate
 from arena.studies.services.opening import close_study
 from arena.studies.services.planning import rules_of
 from augment.models import Augmentation

@@ -11,12 +11,11 @@ import pytest
 from django.urls import reverse
 
 from arena.errors import NothingToPlan
-from arena.exports.bundle import bundle_files
-from arena.exports.tables import leaderboard_table
-from arena.exports.writers import FORMATS, plain_text
 from arena.models import Study
 from arena.rating.snapshot_document import PairP
-from arena.services.ratings import rate
+from arena.results.exports.tables import leaderboard_table
+from arena.results.exports.writers import FORMATS, bundle_files, plain_text
+from arena.results.services.ratings import rate_now as rate
 from arena.studies.services.opening import (
     close_study,
     preregistration_bytes,

@@ -11,11 +11,11 @@ from django.contrib.auth.models import User
 from arena.errors import NotYours
 from arena.models import Study, Vote
 from arena.pairing.order import MAIN
-from arena.queries.voting.ballots import tallies, voting_progress
 from arena.studies.queries import of_expert, of_study
 from arena.studies.services.experts import Complaint, report
 from arena.studies.services.planning import next_pairs, plan_batch
 from arena.studies.services.taking_part import hand_over
+from arena.voting.queries.ballots import tallies, voting_progress
 from augment.errors import Conflict, UnknownName
 from augment.models import Event
 from tests.opening import open_study

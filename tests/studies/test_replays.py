@@ -10,9 +10,8 @@ from django.contrib.auth.models import User
 
 from arena.errors import InvalidVote, NotYours
 from arena.models import Matchup, Study, Vote
-from arena.queries.voting.replays import drives_of_pair
-from arena.services.decisions import Decision, decision_of
-from arena.services.votes import cast_vote
+from arena.voting.queries.showings import drives_of_pair
+from arena.voting.services.casting import Decision, cast_vote, decision_of
 from augment.models import Augmentation
 from augment.simulation.trace import blind_trace
 from tests.drives import drive_pictures

@@ -10,7 +10,7 @@ from django.urls import reverse
 from django.utils import timezone
 
 from arena.models import Matchup, Study
-from arena.services.shown_pictures import draw_sample
+from arena.voting.services.shown_pictures import draw_sample
 from augment.errors import Conflict
 from augment.models import Augmentation, Contestant, GenerationJob, Scenario
 from tests.jobs.scripted import Scripted, add, run

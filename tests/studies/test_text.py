@@ -6,10 +6,9 @@ import pytest
 from django.utils.translation import override
 
 from arena.models import Study
-from arena.queries.voting.descriptions import describe_in_words
-from arena.queries.voting.showings import as_shown
 from arena.studies.services.planning import plan_batch
 from arena.studies.services.taking_part import hand_over
+from arena.voting.queries.showings import as_shown, describe_in_words
 from augment.models import Augmentation
 from tests.described import a_described_study, draw_changes, said_of, with_text
 from tests.study_rows import cast_of, matchups_of, vote

@@ -6,10 +6,10 @@ import pytest
 
 from arena.errors import NothingToPlan
 from arena.models import Matchup, Study
-from arena.queries.voting.showings import VIEW_OF_OLD, view_shown
 from arena.scenarios.services import redraw_pictures
-from arena.services.frames import find_frames
 from arena.studies.services.planning import pictures_of, planned_so_far
+from arena.voting.queries.showings import VIEW_OF_OLD, view_shown
+from arena.voting.services.shown_pictures import find_frames
 from augment.models import Augmentation, Scenario
 from augment.scene.codec import modification_to_document
 from augment.scene.entities import Modification

@@ -8,11 +8,9 @@ from django.db import IntegrityError, transaction
 
 from arena.errors import AlreadyDecided, InvalidVote, NotYours, StudyNotOpen, TooFast
 from arena.models import EarlyLook, Vote
-from arena.queries.voting.ballots import current_votes, recent_votes
-from arena.queries.voting.path import upcoming
-from arena.services.decisions import decision_of
-from arena.services.votes import PACE_WINDOW, cast_vote, receive_vote
 from arena.studies.services.opening import close_study
+from arena.voting.queries.ballots import current_votes, recent_votes, upcoming
+from arena.voting.services.casting import PACE_WINDOW, cast_vote, decision_of, receive_vote
 from augment.errors import Conflict
 from tests.study_rows import a_study, expert, matchups_of, vote
 

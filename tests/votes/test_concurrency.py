@@ -12,8 +12,7 @@ from pytest_django import Settings
 
 from arena.errors import AlreadyDecided, TooFast
 from arena.models import Matchup, Vote
-from arena.services.decisions import decision_of
-from arena.services.votes import PACE_WINDOW, receive_vote
+from arena.voting.services.casting import PACE_WINDOW, decision_of, receive_vote
 from augment.models import Event
 from tests.study_rows import a_study, vote
 

@@ -15,10 +15,9 @@ from django.db import connection
 
 from arena.errors import NothingToPlan, NotYours
 from arena.models import Matchup, Report, Study, Vote
-from arena.services.decisions import decision_of
-from arena.services.votes import receive_vote
 from arena.studies.services.experts import Complaint, report
 from arena.studies.services.taking_part import hand_over
+from arena.voting.services.casting import decision_of, receive_vote
 from augment.models import Event
 from tests.study_rows import a_study
 

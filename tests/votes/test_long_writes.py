@@ -14,11 +14,10 @@ from pytest_django import Settings
 
 from arena.errors import VotesUnreadable
 from arena.models import ImportedVote, Matchup, Snapshot, Study, Vote, VoteFile
-from arena.services import ratings, snapshots, vote_imports
-from arena.services.decisions import decision_of
-from arena.services.vote_imports import DEAD_AFTER, import_votes
-from arena.services.votes import receive_vote
+from arena.results.services import ratings, vote_files
+from arena.results.services.vote_files import DEAD_AFTER, import_votes
 from arena.studies.services.opening import close_study
+from arena.voting.services.casting import decision_of, receive_vote
 from augment.errors import Conflict
 from augment.models import Event
 from tests.opening import open_study
@@ -57,7 +56,7 @@ def store(matchup: Matchup) -> None:
 
 def between_batches(monkeypatch: pytest.MonkeyPatch, act: Callable[[], None]) -> None:
     """Rows are written two at a time, and this happens before the third one is read."""
-    plain = vote_imports._rows
+    plain = vote_files._rows
 
     def rows(*given: Any) -> Iterator[Any]:
         for number, row in enumerate(plain(*given)):
@@ -65,8 +64,8 @@ def between_batches(monkeypatch: pytest.MonkeyPatch, act: Callable[[], None]) ->
                 act()
             yield row
 
-    monkeypatch.setattr(vote_imports, "AT_ONCE", 2)
-    monkeypatch.setattr(vote_imports, "_rows", rows)
+    monkeypatch.setattr(vote_files, "AT_ONCE", 2)
+    monkeypatch.setattr(vote_files, "_rows", rows)
 
 
 def nothing_is_left() -> bool:
@@ -121,7 +120,7 @@ def half_written(*, ago: timedelta) -> VoteFile:
 def test_the_next_import_removes_what_a_killed_one_left(
     file: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(vote_imports, "AT_ONCE", 2)
+    monkeypatch.setattr(vote_files, "AT_ONCE", 2)
     dead, alive = half_written(ago=2 * DEAD_AFTER), half_written(ago=DEAD_AFTER / 2)
     found = import_votes(path=file, name="Elsewhere")
     assert not VoteFile.objects.filter(pk=dead.pk).exists()
@@ -134,7 +133,7 @@ def test_an_import_that_was_taken_for_dead_says_so_and_leaves_nothing(
 ) -> None:
     def act() -> None:
         VoteFile.objects.update(written_at="2020-01-01T00:00:00Z")
-        assert vote_imports.remove_dead() == 1
+        assert vote_files.remove_dead() == 1
 
     between_batches(monkeypatch, act)
     with pytest.raises(Conflict, match=r"votes\.csv stood still for more than 10 minutes"):
@@ -154,7 +153,7 @@ def test_votes_come_in_while_a_rating_is_computed(monkeypatch: pytest.MonkeyPatc
         scenarios=["place-0", "place-1", "place-2"],
         experts=["eva"],
     )
-    plain = snapshots.compute
+    plain = ratings.compute
 
     def compute(*given: Any) -> Any:
         store(matchups_of(other, "eva")[0])
@@ -162,6 +161,6 @@ def test_votes_come_in_while_a_rating_is_computed(monkeypatch: pytest.MonkeyPatc
         return plain(*given)
 
     monkeypatch.setattr(ratings, "compute", compute)
-    snapshot = ratings.rate(study=close_study(study=over), rounds=10)
+    snapshot = ratings.rate_now(study=close_study(study=over), rounds=10)
     assert (snapshot.state, snapshot.votes_counted) == (Snapshot.State.READY, 6)
     assert Vote.objects.filter(matchup__study=other).count() == 1

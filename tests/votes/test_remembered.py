@@ -11,12 +11,12 @@ from django.test.utils import CaptureQueriesContext
 from django.utils import timezone
 
 from arena.models import Study, Vote
-from arena.queries.votes.evidence import read_evidence
-from arena.queries.votes.lists import vote_page
-from arena.queries.votes.search import VoteSearch
-from arena.queries.voting.ballots import tallies
-from arena.services.ratings import rate
+from arena.results.queries.evidence import vote_page
+from arena.results.queries.scores import read_evidence
+from arena.results.queries.search import VoteSearch
+from arena.results.services.ratings import rate_now as rate
 from arena.studies.queries import coverage, expert_lines
+from arena.voting.queries.ballots import tallies
 from tests import study_rows
 from tests.mixed_study import mixed_study
 

@@ -8,10 +8,10 @@ import pytest
 from django.db.models import F
 
 from arena.models import Snapshot, Study, Vote
-from arena.queries.votes.lists import each_vote, vote_page, votes_behind
-from arena.queries.votes.search import EVERY, LEFT_OUT, VoteSearch
-from arena.queries.votes.sets import Filters
-from arena.services.ratings import rate
+from arena.results.queries.evidence import each_vote, vote_page
+from arena.results.queries.search import EVERY, LEFT_OUT, VoteSearch, find_votes
+from arena.results.queries.votes import Filters
+from arena.results.services.ratings import rate_now as rate
 from augment.scene.entities import ScenarioType
 from tests.mixed_study import mixed_study
 
@@ -50,9 +50,7 @@ def test_the_database_gives_the_reasons_of_the_rating(
     study.allow_simulated = allow_simulated
     study.save()
     snapshot = rated(study, **CHOICES[choice])
-    marks = Counter(
-        votes_behind(snapshot, VoteSearch(mark=EVERY)).values_list(F("mark"), flat=True)
-    )
+    marks = Counter(find_votes(snapshot, VoteSearch(mark=EVERY)).values_list(F("mark"), flat=True))
     for vote in each_vote(snapshot, VoteSearch(mark=EVERY)):
         if vote.code is None and vote.mark != "automatic":
             marks[vote.mark] += 1
@@ -116,7 +114,7 @@ def test_every_number_of_standings_pairs_and_raters_is_a_search(study: Study) ->
 def test_pages_hold_every_vote_once_and_automatic_ties_at_the_end(
     study: Study, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("arena.queries.votes.lists.PER_PAGE", 7)
+    monkeypatch.setattr("arena.results.queries.evidence.PER_PAGE", 7)
     study.allow_simulated = True
     study.save()
     snapshot = rated(study)

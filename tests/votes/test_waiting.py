@@ -19,9 +19,8 @@ from pytest_django import Settings
 
 from arena.errors import DatabaseBusy
 from arena.models import Matchup, Vote
-from arena.services import turns
-from arena.services.decisions import decision_of
-from arena.services.votes import receive_vote
+from arena.voting.services import turns
+from arena.voting.services.casting import decision_of, receive_vote
 from tests.api.asking import body_for, error_of, post, signed_in
 from tests.held_lock import kept_busy
 from tests.house.source import ROOT

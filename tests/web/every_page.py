@@ -8,9 +8,9 @@ from django.contrib.auth.models import User
 from django.urls import reverse
 
 from arena.models import Vote
-from arena.queries.votes.sets import Filters
-from arena.services.ratings import rate
-from arena.web.results.tabs import TABS
+from arena.results.pages.tabs import TABS
+from arena.results.queries.votes import Filters
+from arena.results.services.ratings import rate_now as rate
 from tests.mixed_study import mixed_study
 from tests.web.addresses import address
 from tests.web.cast import people, signed_in, world
@@ -43,7 +43,9 @@ def pages_of_a_rated_study() -> list[ShownPage]:
     study.save()
     rate(study=study, rounds=100, filters=Filters())
     code = [study.code]
-    named = {f"tab {tab.name}": reverse("results-tab", args=[*code, tab.name]) for tab in TABS}
+    named = {
+        f"tab {tab.name}": reverse("results-tab", args=[*code, tab.name]) for tab in TABS.values()
+    }
     named |= {
         name: reverse(name, args=code) for name in ("study", "preregistration", "results-votes")
     }

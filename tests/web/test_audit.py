@@ -17,7 +17,7 @@ from django.urls import reverse
 from django.utils import timezone
 
 from arena.models import EarlyLook, Snapshot, Study
-from arena.services.ratings import rate
+from arena.results.services.ratings import rate_now as rate
 from arena.studies.services.opening import close_study
 from augment.models import Event
 from augment.services.events import log_event
@@ -90,7 +90,7 @@ def test_it_is_exported_as_csv_and_as_json_lines() -> None:
 GIVES_RESULTS = re.compile(
     r"\b(leaderboard_table|bundle|chart_bytes|vote_table|vote_list_csv|snapshot_to_export"
     r"|write_study|ask_for_study_file|unrated_votes|plan_snapshot|answer_hypotheses|known_of)\("
-    r"|services\.ratings import .*\brate\b"
+    r"|services\.ratings import .*\brate_now\b"
 )
 IS_DOOR = re.compile(
     r"arena/(web|api|admin|management|templatetags|site)/|arena/\w+/(api|pages)\b"
@@ -101,12 +101,10 @@ DOORS = {
     "arena/management/commands/plan_study.py": "reads closed studies alone",
     "arena/management/commands/rate.py": "--early, logged",
     "arena/management/demo.py": "rates a study that it has closed",
-    "arena/management/exporting/studies.py": "--early, logged",
+    "arena/management/exporting.py": "--early, logged",
     "arena/studies/pages/planning.py": "reads what the reader may read",
-    "arena/web/results/rating.py": "gives none: the page that asked leads to the gate",
-    "arena/web/results/pages.py": "the gate",
-    "arena/web/results/files.py": "behind the gate",
-    "arena/web/results/evidence.py": "behind the gate",
+    "arena/results/pages/ratings.py": "the gate",
+    "arena/results/pages/evidence.py": "behind the gate",
     "arena/studies/pages/studies.py": "asks results_access; what shows results needs it in full",
 }
 """Every module of pages, API, admin and commands that makes something of results, and why nobody

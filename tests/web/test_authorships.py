@@ -12,7 +12,7 @@ from django.urls import reverse
 
 from arena.models import Authorship, Snapshot, Study
 from arena.people.links import mark_author
-from arena.services.ratings import rate
+from arena.results.services.ratings import rate_now as rate
 from augment.models import Event
 from tests.full_study import Size, full_study
 from tests.study_rows import a_study, matchups_of, vote

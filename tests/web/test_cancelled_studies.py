@@ -9,8 +9,8 @@ from django.urls import reverse
 
 from arena.errors import NoSnapshot, StudyNotOpen
 from arena.models import Study, Vote
-from arena.queries.studies.results import ResultsAccess, results_access, snapshot_to_export
-from arena.services.ratings import rate
+from arena.results.queries.access import ResultsAccess, results_access, snapshot_to_export
+from arena.results.services.ratings import rate_now as rate
 from arena.studies.services.opening import cancel_study, close_study
 from augment.errors import Conflict
 from augment.models import Event

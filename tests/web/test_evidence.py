@@ -12,10 +12,10 @@ from django.test import Client
 from django.urls import reverse
 
 from arena.models import FaultLabel, LabellingRound, LabelTask, Snapshot, Study, Vote
-from arena.queries.votes.evidence import VoteScore, read_evidence
-from arena.queries.votes.lists import neighbours, vote_page
-from arena.queries.votes.search import VoteSearch
-from arena.services.ratings import rate
+from arena.results.queries.evidence import neighbours, vote_page
+from arena.results.queries.scores import VoteScore, read_evidence
+from arena.results.queries.search import VoteSearch
+from arena.results.services.ratings import rate_now as rate
 from arena.studies.services.opening import close_study
 from augment.models import Augmentation
 from augment.services.scenarios.pictures import store

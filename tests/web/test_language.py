@@ -7,7 +7,7 @@ from django.test import Client
 from django.urls import reverse
 
 from arena.models import Person
-from arena.services.ratings import rate
+from arena.results.services.ratings import rate_now as rate
 from arena.studies.services.opening import close_study
 from tests.study_rows import a_study, vote
 from tests.web.cast import people, signed_in

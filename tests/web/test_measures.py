@@ -10,7 +10,7 @@ from django.urls import reverse
 
 from arena.errors import InvalidVote
 from arena.models import Matchup, Study
-from arena.queries.voting.showings import view_shown
+from arena.voting.queries.showings import view_shown
 from augment.models import Scenario
 from augment.scene.codec import intent_to_document
 from tests.intents import LEFT_EDGE, parked, towards

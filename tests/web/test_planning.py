@@ -10,7 +10,7 @@ from django.urls import reverse
 
 from arena.models import Study
 from arena.rating.planning import prospect
-from arena.services.ratings import rate
+from arena.results.services.ratings import rate_now as rate
 from arena.studies.services.outlook import StudyEstimate, known_of
 from tests import study_rows
 from tests.web.cast import people, signed_in

@@ -9,8 +9,8 @@ from arena.errors import InvalidPreference
 from arena.models import Snapshot
 from arena.people.links import invite
 from arena.people.services import keep_voting
-from arena.queries.votes.sets import Filters
-from arena.services.ratings import RATINGS, plan_snapshot
+from arena.results.queries.votes import Filters
+from arena.results.services.ratings import RATINGS, plan_snapshot
 from arena.studies.services.taking_part import hand_over
 from augment.models import Event
 from augment.services.running import budget, jobs

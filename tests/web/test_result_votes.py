@@ -13,9 +13,9 @@ from django.test import Client
 from django.urls import reverse
 
 from arena.models import Matchup, Snapshot, Study, Vote
-from arena.queries.votes.sets import Filters
-from arena.services.ratings import rate
-from arena.web.results.tabs import TABS
+from arena.results.pages.tabs import TABS
+from arena.results.queries.votes import Filters
+from arena.results.services.ratings import rate_now as rate
 from augment.services.scenarios.pictures import store
 from tests.mixed_study import mixed_study
 from tests.study_rows import hang
@@ -75,7 +75,7 @@ def test_every_number_leads_to_as_many_votes(
 ) -> None:
     rate(study=study, rounds=10, filters=filters)
     promised: dict[str, int | None] = {}
-    for tab in TABS:
+    for tab in TABS.values():
         shown = analyst.get(reverse("results-tab", args=[study.code, tab.name]))
         promised |= links_of(shown.content.decode())
     assert len(promised) > 50

@@ -9,9 +9,9 @@ from django.urls import reverse
 from pytest_django import DjangoAssertNumQueries
 
 from arena.models import EarlyLook, Matchup, Study
-from arena.services.ratings import rate
+from arena.results.pages.tabs import TABS
+from arena.results.services.ratings import rate_now as rate
 from arena.studies.services.opening import close_study
-from arena.web.results.tabs import TABS
 from augment.scene.entities import ScenarioType
 from tests import study_rows
 from tests.full_study import Size, full_study
@@ -43,7 +43,7 @@ def analyst() -> Client:
 def test_every_tab_reads_the_snapshot_with_few_queries(
     study: Study, analyst: Client, django_assert_max_num_queries: DjangoAssertNumQueries
 ) -> None:
-    for tab in TABS:
+    for tab in TABS.values():
         page(analyst, study, tab.name)  # templates are compiled once
         with django_assert_max_num_queries(12):
             page(analyst, study, tab.name)
@@ -78,7 +78,7 @@ def test_experts_read_the_table_but_nothing_about_each_other(study: Study) -> No
     assert "Raters" not in shown
     assert "Export" not in shown
     assert "?rating=" not in page(expert, study, "pairs")
-    for tab in TABS:
+    for tab in TABS.values():
         status = expert.get(reverse("results-tab", args=[study.code, tab.name])).status_code
         assert status == (403 if tab.staff else 200), tab.name
     for name, form in (("results-export", "zip"), ("results-votes-export", "csv")):

@@ -8,10 +8,10 @@ import pytest
 from django.contrib.auth.models import User
 from django.urls import reverse
 
-from arena.queries.voting.ballots import tallies, voting_progress
 from arena.site.queries import take_inventory
 from arena.studies import queries
 from arena.studies.queries import coverage
+from arena.voting.queries.ballots import tallies, voting_progress
 from tests import study_rows
 from tests.web.ballots import ballot, page
 from tests.web.cast import people, signed_in, world

@@ -14,9 +14,9 @@ from django.test import Client
 from django.urls import reverse
 from pytest_django import Settings
 
-from arena.exports.study_files import STUDY_FILES
 from arena.models import EarlyLook, Study, StudyFile
-from arena.services.ratings import rate
+from arena.results.exports.study_files import STUDY_FILES
+from arena.results.services.ratings import rate_now as rate
 from arena.studies.services.opening import cancel_study, close_study
 from augment.models import Augmentation, Event, GenerationJob
 from augment.scene.codec import modification_to_document

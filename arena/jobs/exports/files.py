@@ -14,11 +14,11 @@ from django.core.files.base import ContentFile
 from django.core.files.storage import default_storage
 from django.utils.text import slugify
 
+from arena.exports.files import zip_bytes
 from arena.exports.formats import Format, formats
-from arena.exports.written_files import FileWork, MadeFile
-from arena.exports.zips import zip_bytes
 from arena.models import ScenarioFile
-from arena.services.vote_rows import digest_of
+from arena.results.services.vote_files import digest_of
+from arena.results.services.written_files import FileWork, MadeFile
 from augment.models import Augmentation, GenerationJob
 from augment.services.judging.scenario_export import Exported, export_job
 from augment.services.running.calls import IMAGES

@@ -12,8 +12,7 @@ from enum import Enum
 from typing import Any
 from uuid import UUID
 
-from arena.exports.formats import Format, formats
-from arena.exports.parquet import NUMBER, TEXT, WHOLE, YES_NO, parquet_bytes
+from arena.exports.formats import NUMBER, TEXT, WHOLE, YES_NO, Format, formats, parquet_bytes
 from arena.services.cells import csv_text
 from augment.models import GenerationJob
 from augment.services.judging.analyses import JobAnalysis, augmentation_lines, repeatability

@@ -23,10 +23,10 @@ from arena.jobs.pages.jobs import crumbs_of
 from arena.jobs.services import close_labelling, open_labelling, save_label
 from arena.models import FaultLabel, LabellingRound
 from arena.people.queries import by_pseudonym, experts, role_of
-from arena.queries.voting.showings import original_beside
 from arena.site.access import ADMIN, EXPERT, STAFF, allow_only, user_of
 from arena.site.acts import Confirmation, ask, is_sure, refusals_in, refusals_told, wants_to_change
 from arena.site.forms import offer
+from arena.voting.queries.showings import original_beside
 from augment.models import GenerationJob
 from augment.services.judging.findings import FaultClass
 

@@ -9,8 +9,8 @@ from django.core.management.base import CommandError, CommandParser
 
 from arena.errors import ArenaError
 from arena.exports.files import write_whole
-from arena.exports.study_folder.writing import write_study
 from arena.management.exporting import KINDS, ExportedFile, add_kinds
+from arena.results.exports.study_folder import write_study
 from arena.studies.queries import study_named
 from augment.errors import AugmentError
 from augment.services.terminal import TerminalCommand

@@ -5,27 +5,26 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from django.core.management.base import CommandParser
-
-from arena.services.vote_imports import import_votes
+from arena.results.services.vote_files import import_votes
 from augment.services.terminal import TerminalCommand
 
 
 class Command(TerminalCommand):
-    """The door to arena.services.vote_imports.import_votes."""
+    """The door to arena.results.services.vote_files.import_votes."""
 
     help = (
         "Import votes from a CSV file with the columns model_a, model_b, winner (model_a, "
         "model_b, tie or tie (bothbad)), and maybe judge and item."
     )
 
-    def add_arguments(self, parser: CommandParser) -> None:
-        """Which file, and what its study is called."""
-        parser.add_argument("file", type=Path)
-        parser.add_argument("--name", help="of the study; that of the file without its ending")
-        parser.add_argument(
-            "--simulated", action="store_true", help="the votes are made up; everything says so"
-        )
+    arguments = {
+        "file": {"type": Path},
+        "--name": {"help": "of the study; that of the file without its ending"},
+        "--simulated": {
+            "action": "store_true",
+            "help": "the votes are made up; everything says so",
+        },
+    }
 
     def handle(self, *args: Any, **options: Any) -> None:
         """Import the file and say what it held."""

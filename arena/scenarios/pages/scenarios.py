@@ -16,14 +16,13 @@ from arena.scenarios import queries, services
 from arena.site.access import ADMIN, STAFF, allow_only, user_of
 from arena.site.acts import Confirmation, ask, is_sure, looks_again, refusals_told, send_later
 from arena.site.forms import read_json
-from arena.site.listing import read_listing, read_page, said_choices
-from arena.site.queries import Narrowing, find_scenarios, group_by_type
+from arena.site.listing import read_listing, read_page
 from augment.errors import Conflict
 from augment.models import BaseScene, EndpointModel, Scenario
 from augment.services.endpoints.contestants import ensure_builtin
 from augment.services.events import retire, take_back
 from augment.services.running.intent_readings import plan_reading
-from augment.services.scenarios.catalogue import load_own_catalogue
+from augment.services.scenarios.catalogue import CatalogueStep, load_catalogue
 from augment.services.scenarios.editing import (
     accept_reading,
     enter_intent,
@@ -46,21 +45,14 @@ JSON_STYLE = {"indent": 2, "ensure_ascii": False}
 def scenarios_page(request: HttpRequest) -> HttpResponse:
     """List scenarios of a set by type, with the reference where it was drawn."""
     chosen = queries.set_asked(request.GET.get("set"))
-    choices = {
-        "type": ("Type", said_choices(type_choices())),
-        "offered": ("In forms", [("retired", "retired")]),
-    }
+    choices = {"type": ("Type", type_choices()), "offered": ("In forms", [("retired", "retired")])}
     listing = read_listing(request, choices, keep=("set",))
-    wanted = Narrowing(
-        search=listing.search,
-        kind=listing.chosen("type"),
-        part=chosen,
-        is_retired=listing.chosen("offered") == "retired",
-    )
-    page = read_page(request, find_scenarios(wanted), size=SCENARIOS_AT_ONCE)
+    found = queries.listed_scenarios(chosen, is_retired=bool(listing.chosen("offered")))
+    found = listing.narrow(found, "slug", "instruction", "base_scene__slug", by=["type"])
+    page = read_page(request, found, size=SCENARIOS_AT_ONCE)
     rows = list(page.object_list)
     context = {
-        "groups": group_by_type(rows),
+        "groups": queries.group_by_type(rows),
         "sets": queries.set_choices(chosen),
         "references": queries.reference_pictures(rows),
         "page": page,
@@ -74,7 +66,7 @@ def scenarios_page(request: HttpRequest) -> HttpResponse:
 def load_scenarios(request: HttpRequest) -> HttpResponse:
     """Load one set of the catalogue, all of it or nothing, and the built-in contestants."""
     with refusals_told(request):
-        report = load_own_catalogue(
+        report = load_catalogue(
             sets=[request.POST.get("set", "")],
             with_paraphrases="wordings" in request.POST,
             actor=user_of(request),
@@ -82,8 +74,9 @@ def load_scenarios(request: HttpRequest) -> HttpResponse:
         ensure_builtin()
         messages.success(
             request,
-            f"Scenarios: {report.scenarios_added} added, {report.scenarios_changed} changed, "
-            f"{report.scenarios_unchanged} as they were.",
+            "Scenarios: {added} added, {changed} changed, {unchanged} as they were.".format(
+                **{step.value: report.scenarios[step] for step in CatalogueStep}
+            ),
         )
         if report.kept:
             names = ", ".join(report.kept)

@@ -20,9 +20,9 @@ from django.views.decorators.http import require_http_methods, require_POST
 from arena import tasks
 from arena.models import Study, StudyDraft
 from arena.people.queries import by_pseudonym, experts
+from arena.results.services.vote_files import ImportedVotes, import_votes
 from arena.scenarios import queries
 from arena.scenarios.services import was_too_large
-from arena.services.vote_imports import ImportedVotes, import_votes
 from arena.site.access import ADMIN, allow_only, user_of
 from arena.site.acts import Confirmation, ask, is_sure, refusals_in, refusals_told, wants_to_change
 from arena.site.queries import usual_checks

@@ -19,11 +19,15 @@ from django.views.decorators.http import require_http_methods, require_POST, req
 from arena import tasks
 from arena.models import Report, Study, StudyFile
 from arena.people.queries import by_pseudonym, experts
-from arena.queries.studies.results import ResultsAccess, latest_snapshot, results_access
-from arena.queries.votes.judged import is_imported
-from arena.queries.voting.ballots import tallies
-from arena.queries.voting.showings import view_shown
-from arena.services.study_files import SHOWS_RESULTS, ask_for_study_file, study_files_of, why_not
+from arena.results.pages.rating_form import rate_or_send
+from arena.results.queries.access import ResultsAccess, latest_snapshot, results_access
+from arena.results.queries.votes import is_imported
+from arena.results.services.written_files import (
+    SHOWS_RESULTS,
+    ask_for_study_file,
+    study_files_of,
+    why_not,
+)
 from arena.site.access import ADMIN, STAFF, allow_only, user_of
 from arena.site.acts import (
     WHY,
@@ -36,7 +40,7 @@ from arena.site.acts import (
     tell_errors,
     wants_to_change,
 )
-from arena.site.listing import read_listing, read_page, said_choices
+from arena.site.listing import read_listing, read_page
 from arena.studies import queries
 from arena.studies.forms import HandOverForm
 from arena.studies.services.opening import (
@@ -47,7 +51,8 @@ from arena.studies.services.opening import (
 )
 from arena.studies.services.plan import PLAN_INPUTS, hypotheses_of, plan_of
 from arena.studies.services.taking_part import hand_over
-from arena.web.results.rating import rate_or_send
+from arena.voting.queries.ballots import tallies
+from arena.voting.queries.showings import view_shown
 from augment.services.inputs import InputKind
 
 STUDIES_AT_ONCE = 25
@@ -60,12 +65,11 @@ DRAFT = "draft"
 @require_safe
 def studies_page(request: HttpRequest) -> HttpResponse:
     """Studies with their bars, page by page; before the first ones the drafts."""
-    states = [(DRAFT, "Draft"), *said_choices(Study.State.choices)]
+    states = [(DRAFT, "Draft"), *Study.State.choices]
     listing = read_listing(request, {"state": ("State", states)})
-    state = listing.chosen("state")
-    rows = Study.objects.filter(name__icontains=listing.search)
-    page = read_page(request, rows.filter(state=state) if state else rows, size=STUDIES_AT_ONCE)
-    shows_drafts = page.number == 1 and state in ("", DRAFT)
+    rows = listing.narrow(Study.objects.all(), "name", by=["state"])
+    page = read_page(request, rows, size=STUDIES_AT_ONCE)
+    shows_drafts = page.number == 1 and listing.chosen("state") in ("", DRAFT)
     context = {
         "studies": queries.of_studies(list(page.object_list)),
         "drafts": list(queries.find_drafts(listing.search)) if shows_drafts else [],

@@ -16,9 +16,9 @@ from django.db.models import QuerySet
 
 from arena.errors import InvalidVote, NothingToPlan, NotYours, StudyNotOpen
 from arena.models import Matchup, PracticePair, Report, Study, Vote
-from arena.queries.voting.ballots import matchup_of
-from arena.services.decisions import LONGEST_COMMENT
 from arena.studies.services.pictures import latest_pairs
+from arena.voting.queries.ballots import matchup_of
+from arena.voting.services.casting import LONGEST_COMMENT
 from augment.errors import Conflict
 from augment.models import Scenario
 from augment.services.texts import make_storable

@@ -31,14 +31,17 @@ from arena.pairing.rules import (
 )
 from arena.people.queries import experts as expert_accounts
 from arena.rating.snapshot_document import VERSION as RESULTS_VERSION
-from arena.services.frames import Cells
-from arena.services.replays import replays_of
-from arena.services.shown_pictures import SampleRule, StudyPictures, choose_pictures
-from arena.services.vote_rows import VERSION as VOTES_VERSION
+from arena.results.services.vote_files import VERSION as VOTES_VERSION
 from arena.studies.services.experts import require_practice_pictures
-from arena.studies.services.pictures import check_pictures, require_checks, windows_of
+from arena.studies.services.pictures import Cells, check_pictures, require_checks, windows_of
 from arena.studies.services.plan import SWITCH_COLUMNS, StudyPlan, log_study, read_hypotheses
 from arena.studies.services.planning import store
+from arena.voting.services.shown_pictures import (
+    SampleRule,
+    StudyPictures,
+    choose_pictures,
+    replays_of,
+)
 from augment.errors import Conflict, UnknownName
 from augment.models import Contestant, Scenario
 from augment.services.endpoints.treatments import options_of

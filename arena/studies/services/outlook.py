@@ -10,10 +10,10 @@ from django.contrib.auth.models import User
 from django.db.models import Count, Max, Min
 
 from arena.models import Snapshot, Study, Vote
-from arena.queries.studies.results import ResultsAccess, latest_snapshot, results_access
 from arena.rating.planning import Question, StudyDesign, estimate_effects
-from arena.services.snapshots import votes_of
-from arena.services.vote_arrays import vote_arrays
+from arena.results.queries.access import ResultsAccess, latest_snapshot, results_access
+from arena.results.services.analysis import vote_arrays
+from arena.results.services.ratings import votes_of
 from augment.services.inputs import InputKind, input_field, inputs_of
 
 POINTS = "Elo points"

@@ -11,12 +11,17 @@ from django.db.models import F, QuerySet
 from arena.errors import NothingToPlan
 from arena.pairing.plan import Check, Entry, PlanRules
 from arena.pairing.rules import place_of, scenario_of
-from arena.services.frames import MOST_NAMED, Cells
 from augment.models import Augmentation, Contestant, Scenario
 from augment.services.scenarios.pictures import window_of
 
 Pair = tuple[Augmentation, Augmentation]
 """A right picture and a broken one of the same scenario."""
+
+Cells = dict[tuple[str, str], Augmentation]
+"""By place (a scenario, or one sample of it) and contestant, the augmentation that is shown."""
+
+MOST_NAMED = 8
+"""So many missing pictures are named, the others counted."""
 
 
 def find_showable(scenarios: Iterable[Scenario]) -> QuerySet[Augmentation]:

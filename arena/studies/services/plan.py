@@ -13,7 +13,7 @@ from django.contrib.auth.models import User
 from arena.errors import NothingToPlan
 from arena.models import Snapshot, Study
 from arena.pairing.rules import MOST_ADAPTIVE, MOST_CHECKS, MOST_OVERLAP, MOST_REPEATS
-from arena.services.shown_pictures import SampleRule
+from arena.voting.services.shown_pictures import SampleRule
 from augment.services.events import log_event
 from augment.services.inputs import InputKind, input_field, inputs_of
 

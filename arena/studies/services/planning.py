@@ -27,11 +27,8 @@ from arena.pairing.later import (
 from arena.pairing.order import FloatArray
 from arena.pairing.plan import Check, Entry, PlannedMatchup, PlanRules
 from arena.pairing.rules import Grid, place_of, scenario_of
-from arena.queries.voting.path import upcoming
-from arena.queries.voting.showings import LEGEND
-from arena.services.frames import Cells, ScenarioFrame, find_frames, frames_shown, sides_of
-from arena.services.vote_writes import mark_served
 from arena.studies.services.pictures import (
+    Cells,
     check_pictures,
     find_showable,
     windows_of,
@@ -39,6 +36,10 @@ from arena.studies.services.pictures import (
     without_lost_checks,
 )
 from arena.studies.services.plan import log_study
+from arena.voting.queries.ballots import upcoming
+from arena.voting.queries.showings import LEGEND
+from arena.voting.services.casting import mark_served
+from arena.voting.services.shown_pictures import ScenarioFrame, find_frames, frames_shown, sides_of
 from augment.models import Augmentation, Scenario
 from augment.services.scenarios.pictures import descriptions, legend_of_scene, legends_of_changes
 

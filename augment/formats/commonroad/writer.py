@@ -6,7 +6,7 @@ Frame: the ego frame of t0. Sources: the published schema of 2020a and its docum
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any, Final
 from xml.etree import ElementTree as ET
 
@@ -21,6 +21,7 @@ from augment.formats.writing import (
     Written,
     appears_later,
     bounds_of,
+    group_connectors,
     has_gaps,
     report_motion,
     write_each,
@@ -33,7 +34,6 @@ from augment.scene.entities import (
     Lane,
     LaneConnector,
     Scene,
-    TrafficAgent,
     TrafficLight,
     TrafficSide,
     TurnType,
@@ -41,284 +41,11 @@ from augment.scene.entities import (
 from augment.scene.lane_graph import AnyLane, LaneGraph
 from augment.scene.motion import Movement
 
-DECIMALS = 9
-
-
-class Ids:
-    """Whole numbers from 1 on, one for each name."""
-
-    def __init__(self) -> None:
-        self.by_name: dict[str, int] = {}
-        self._last = 0
-
-    def of(self, name: str) -> int:
-        """The number of that name; a new one when it is first asked for."""
-        if name not in self.by_name:
-            self.by_name[name] = self.fresh()
-        return self.by_name[name]
-
-    def fresh(self) -> int:
-        """A number for something that has no name of ours."""
-        self._last += 1
-        return self._last
-
-
-def add(parent: ET.Element, name: str, text: str | None = None, **attributes: Any) -> ET.Element:
-    """A new child at the end."""
-    made = ET.SubElement(parent, name, attributes)
-    made.text = text
-    return made
-
-
-def number(value: float) -> str:
-    """A decimal: the schema knows no exponents."""
-    text = f"{value:.{DECIMALS}f}".rstrip("0")
-    return f"{text}0" if text.endswith(".") else text
-
-
-def text_of(root: ET.Element, *, comment: str) -> bytes:
-    """The whole file."""
-    safe = escape_controls(comment).replace("--", "- -")
-    body = ET.tostring(root, encoding="unicode")
-    return f"<?xml version='1.0' encoding='UTF-8'?>\n<!-- {safe} -->\n{body}\n".encode()
-
-
-SPEED_SIGN = "274"
-_SAME_M = 0.01
-_SIDES = {
-    TurnType.RIGHT: "successorsRight",
-    TurnType.STRAIGHT: "successorsStraight",
-    TurnType.LEFT: "successorsLeft",
-    TurnType.U_TURN: "successorsLeft",
-}
-_SIDE_ORDER = ("successorsRight", "successorsStraight", "successorsLeft")
-_COLOURS = {
-    TrafficLight.GREEN: "green",
-    TrafficLight.YELLOW: "yellow",
-    TrafficLight.RED: "red",
-    TrafficLight.UNKNOWN: "inactive",
-}
-
-
-def write_lanes(root: ET.Element, cell: Cell, ids: Ids, report: LossReport) -> None:
-    """Lanelets, then traffic signs, lights and intersections, as the schema orders them."""
-    scene = cell.after
-    graph = LaneGraph(scene)
-    ways: list[AnyLane] = [*scene.lanes, *scene.connectors]
-    for way in ways:
-        ids.of(way.id)
-    signs = {
-        limit: ids.fresh()
-        for limit in sorted({w.speed_limit_mps for w in ways if w.speed_limit_mps is not None})
-    }
-    lights = {
-        connector.id: ids.fresh()
-        for connector in scene.connectors
-        if connector.traffic_light is not TrafficLight.NONE
-    }
-    off = {}
-    for way in ways:
-        off[way.id] = _add_lanelet(root, way, graph, ids)
-        _add_marks(root[-1], way, signs, lights)
-    _report_off(off, report)
-    _report_widths(ways, report)
-    crossings = [area for area in scene.areas if _is_quad(area)]
-    for area in crossings:
-        _add_crosswalk(root, area, ids)
-    for limit, sign in signs.items():
-        _add_sign(root, limit, sign)
-    for connector in scene.connectors:
-        if connector.id in lights:
-            _add_light(root, connector, lights[connector.id], steps=len(cell.motion.times_s))
-    _add_intersections(root, scene, ids)
-    _report(scene, crossings, report)
-
-
-# Private
-
-
-def _add_lanelet(root: ET.Element, way: AnyLane, graph: LaneGraph, ids: Ids) -> float:
-    """Returns how far the centreline is from the middle of the edges, in metres."""
-    left, right = _paired_bounds(way)
-    lanelet = add(root, "lanelet", id=str(ids.of(way.id)))
-    for name, points in (("leftBound", left), ("rightBound", right)):
-        bound = add(lanelet, name)
-        for x_m, y_m in points:
-            _add_point(bound, "point", float(x_m), float(y_m))
-    for name in graph.predecessors(way.id):
-        add(lanelet, "predecessor", ref=str(ids.of(name)))
-    for name in graph.successors(way.id):
-        add(lanelet, "successor", ref=str(ids.of(name)))
-    if isinstance(way, Lane):
-        if way.left_neighbor is not None:
-            add(lanelet, "adjacentLeft", ref=str(ids.of(way.left_neighbor)), drivingDir="same")
-        if way.right_neighbor is not None:
-            add(lanelet, "adjacentRight", ref=str(ids.of(way.right_neighbor)), drivingDir="same")
-    return _off_middle_m(way.centerline, (left + right) / 2.0)
-
-
-def _report_off(off_m: dict[str, float], report: LossReport) -> None:
-    far = {name: distance for name, distance in off_m.items() if distance > _SAME_M}
-    if far:
-        names = ", ".join(f"{name} by {distance:.2f} m" for name, distance in far.items())
-        report.lose(
-            f"centrelines that are off the middle of the edges, which alone go out: {names}"
-        )
-
-
-def _report_widths(ways: Sequence[AnyLane], report: LossReport) -> None:
-    apart_m = {
-        way.id: abs(width_between(way.centerline, *bounds_of(way)) - way.width_m) for way in ways
-    }
-    far = [f"{name} by {apart:.2f} m" for name, apart in apart_m.items() if apart > _SAME_M]
-    if far:
-        names = ", ".join(far)
-        report.lose(f"widths that are not the distance of the edges, which alone go out: {names}")
-
-
-def _add_marks(
-    lanelet: ET.Element, way: AnyLane, signs: dict[float, int], lights: dict[str, int]
-) -> None:
-    add(lanelet, "laneletType", "intersection" if isinstance(way, LaneConnector) else "urban")
-    add(lanelet, "userOneWay", "vehicle")
-    if way.speed_limit_mps is not None:
-        add(lanelet, "trafficSignRef", ref=str(signs[way.speed_limit_mps]))
-    if way.id in lights:
-        add(lanelet, "trafficLightRef", ref=str(lights[way.id]))
-
-
-def _paired_bounds(way: AnyLane) -> tuple[FloatArray, FloatArray]:
-    """Both edges with equally many points, opposite to each other; no point of either is lost."""
-    left, right = bounds_of(way)
-    if len(left.points_m) == len(right.points_m):
-        middle = (left.points_m + right.points_m) / 2.0
-        are_opposite = _off_middle_m(way.centerline, middle) <= _SAME_M
-        if are_opposite or not (way.left_boundary or way.right_boundary):
-            return left.points_m, right.points_m
-    shares = np.unique(
-        np.concatenate([_shares(left), _shares(right), _shares(way.centerline)]).round(9)
-    )
-    return _points_at(left, shares), _points_at(right, shares)
-
-
-def _shares(line: Polyline) -> FloatArray:
-    return line.stations_m / line.length_m
-
-
-def _points_at(line: Polyline, shares: FloatArray) -> FloatArray:
-    return line.points_at(shares * line.length_m)
-
-
-def _off_middle_m(centerline: Polyline, middle: FloatArray) -> float:
-    return max(centerline.project(float(x), float(y)).distance_m for x, y in middle)
-
-
-def _add_point(parent: ET.Element, name: str, x_m: float, y_m: float) -> None:
-    point = add(parent, name)
-    add(point, "x", number(x_m))
-    add(point, "y", number(y_m))
-
-
-def _is_quad(area: Area) -> bool:
-    """Whether an area is a crosswalk between two straight edges, which a lanelet can be."""
-    return area.kind is AreaKind.CROSSWALK and len(area.boundary_m) == 4
-
-
-def _add_crosswalk(root: ET.Element, area: Area, ids: Ids) -> None:
-    """The two longer edges are the bounds, in one direction."""
-    a, b, c, d = (np.array(point) for point in area.boundary_m)
-    if np.hypot(*(b - a)) + np.hypot(*(d - c)) >= np.hypot(*(c - b)) + np.hypot(*(a - d)):
-        first, second = (a, b), (d, c)
-    else:
-        first, second = (b, c), (a, d)
-    along, across = first[1] - first[0], second[0] - first[0]
-    is_left = along[0] * across[1] - along[1] * across[0] < 0.0
-    left, right = (first, second) if is_left else (second, first)
-    lanelet = add(root, "lanelet", id=str(ids.of(area.id)))
-    for name, points in (("leftBound", left), ("rightBound", right)):
-        bound = add(lanelet, name)
-        for point in points:
-            _add_point(bound, "point", float(point[0]), float(point[1]))
-    add(lanelet, "laneletType", "crosswalk")
-    add(lanelet, "userBidirectional", "pedestrian")
-
-
-def _add_sign(root: ET.Element, limit_mps: float, sign: int) -> None:
-    made = add(root, "trafficSign", id=str(sign))
-    element = add(made, "trafficSignElement")
-    add(element, "trafficSignID", SPEED_SIGN)
-    add(element, "additionalValue", number(limit_mps))
-    add(made, "virtual", "true")
-
-
-def _add_light(root: ET.Element, connector: LaneConnector, light: int, *, steps: int) -> None:
-    """The state of t0 for as long as the scenario goes on."""
-    made = add(root, "trafficLight", id=str(light))
-    element = add(add(made, "cycle"), "cycleElement")
-    add(element, "duration", str(steps))
-    add(element, "color", _COLOURS[connector.traffic_light])
-    x_m, y_m = connector.centerline.points_m[0]
-    _add_point(add(made, "position"), "point", float(x_m), float(y_m))
-
-
-def _add_intersections(root: ET.Element, scene: Scene, ids: Ids) -> None:
-    """Connectors that share a lane at either end belong to one intersection."""
-    for group in _grouped(
-        [connector for connector in scene.connectors if connector.from_lane is not None]
-    ):
-        by_lane: dict[str, list[LaneConnector]] = defaultdict(list)
-        for one in group:
-            by_lane[str(one.from_lane)].append(one)
-        made = add(root, "intersection", id=str(ids.fresh()))
-        for lane, connectors in by_lane.items():
-            incoming = add(made, "incoming", id=str(ids.fresh()))
-            add(incoming, "incomingLanelet", ref=str(ids.of(lane)))
-            for side in _SIDE_ORDER:
-                for connector in connectors:
-                    if _SIDES[connector.turn_type] == side:
-                        add(incoming, side, ref=str(ids.of(connector.id)))
-
-
-def _grouped(connectors: Sequence[LaneConnector]) -> list[list[LaneConnector]]:
-    groups: list[tuple[set[str], list[LaneConnector]]] = []
-    for connector in connectors:
-        ends = {f"from {connector.from_lane}", f"to {connector.to_lane or connector.id}"}
-        joined, others = [connector], []
-        for names, members in groups:
-            if names & ends:
-                ends |= names
-                joined = [*members, *joined]
-            else:
-                others.append((names, members))
-        groups = [*others, (ends, joined)]
-    return [members for _, members in groups]
-
-
-def _report(scene: Scene, crossings: Sequence[Area], report: LossReport) -> None:
-    written = {area.id for area in crossings}
-    for kind in AreaKind:
-        names = [a.id for a in scene.areas if a.kind is kind and a.id not in written]
-        report.lose_of(names, f"left out: a {kind} area of this shape can't be a lanelet")
-    names = [
-        connector.id for connector in scene.connectors if connector.turn_type is TurnType.U_TURN
-    ]
-    report.lose_of(names, "a U-turn becomes a turn to the left")
-    names = [connector.id for connector in scene.connectors if connector.from_lane is None]
-    report.lose_of(names, "its turn type is not said: no lane leads into it")
-    names = [
-        connector.id
-        for connector in scene.connectors
-        if connector.traffic_light is TrafficLight.UNKNOWN
-    ]
-    report.lose_of(names, "a light of unknown state becomes one that is off")
-    if any(connector.traffic_light is not TrafficLight.NONE for connector in scene.connectors):
-        report.lose("lights stay as they are at t0; how they go on is not known")
-
-
 VERSION: Final = "2020a"
 GOAL_RADIUS_M: Final = 2.0
 MOVES_M: Final = 1.0
-
+SPEED_SIGN = "274"
+_SAME_M = 0.01
 _STATIC = {
     AgentType.TRAFFIC_CONE: "constructionZone",
     AgentType.CONSTRUCTION_SIGN: "constructionZone",
@@ -331,6 +58,23 @@ _DYNAMIC = {
     AgentType.BICYCLE: "bicycle",
     AgentType.PEDESTRIAN: "pedestrian",
 }
+_BECOMES = {
+    AgentType.TRAFFIC_CONE: "a cone becomes a constructionZone, as barriers may be",
+    AgentType.CONSTRUCTION_SIGN: "a sign becomes a constructionZone, as cones do",
+    AgentType.BARRIER: "a barrier becomes a roadBoundary, which readers take for scenery",
+    AgentType.GENERIC_OBJECT: "becomes an obstacle of unknown type",
+}
+_SIDES = {
+    "successorsRight": (TurnType.RIGHT,),
+    "successorsStraight": (TurnType.STRAIGHT,),
+    "successorsLeft": (TurnType.LEFT, TurnType.U_TURN),
+}
+_COLOURS = {
+    TrafficLight.GREEN: "green",
+    TrafficLight.YELLOW: "yellow",
+    TrafficLight.RED: "red",
+    TrafficLight.UNKNOWN: "inactive",
+}
 
 
 def write(cells: Sequence[Cell]) -> Written:
@@ -341,143 +85,296 @@ def write(cells: Sequence[Cell]) -> Written:
 # Private
 
 
+class _Ids:
+    """Whole numbers from 1 on, one for each name."""
+
+    def __init__(self) -> None:
+        self.by_name: dict[str, int] = {}
+        self._last = 0
+
+    def of(self, name: str) -> str:
+        """The number of that name; a new one when it is first asked for."""
+        if name not in self.by_name:
+            self.by_name[name] = int(self.fresh())
+        return str(self.by_name[name])
+
+    def fresh(self) -> str:
+        """A number for something that has no name of ours."""
+        self._last += 1
+        return str(self._last)
+
+
+def _add(parent: ET.Element, path: str, text: object = None, **attributes: Any) -> ET.Element:
+    """Add a new child, or one below others that are new too: "time/exact"."""
+    for name in path.split("/"):
+        parent = ET.SubElement(parent, name)
+    parent.attrib.update(attributes)
+    parent.text = _number(text) if isinstance(text, float) else None if text is None else str(text)
+    return parent
+
+
+def _number(value: float) -> str:
+    """A decimal: the schema knows no exponents."""
+    text = f"{value:.9f}".rstrip("0")
+    return f"{text}0" if text.endswith(".") else text
+
+
+def _add_point(parent: ET.Element, path: str, point: Iterable[float]) -> None:
+    place = _add(parent, path)
+    for name, value in zip("xy", point, strict=False):
+        _add(place, name, float(value))
+
+
 def _write_one(cell: Cell, report: LossReport) -> dict[str, bytes]:
     scene = cell.after
     if not (scene.lanes or scene.connectors):
         raise CannotExpress("CommonRoad needs at least one lane, and this scene has none")
+    # A map's name in a benchmark id has letters and digits alone.
+    words = [part.capitalize() for part in cell.stem.split("-") if part.isascii()]
     root = ET.Element(
         "commonRoad",
-        timeStepSize=number(cell.motion.step_s),
+        timeStepSize=_number(cell.motion.step_s),
         commonRoadVersion=VERSION,
         author="Scenario Arena",
         affiliation="",
         source=scene.provenance,
-        benchmarkID=f"ZAM_{_word(cell.stem)}-1_1_T-1",
+        benchmarkID=f"ZAM_{''.join(words) or 'Scene'}-1_1_T-1",
         date=cell.made_on.isoformat(),
     )
-    _add_location(root, cell)
-    add(root, "scenarioTags")
-    ids = Ids()
-    write_lanes(root, cell, ids, report)
-    statics = [other for other in cell.motion.others if _is_static(other)]
-    for static in statics:
-        _add_static(root, static, ids, report)
-    for other in cell.motion.others:
-        if other not in statics:
-            _add_dynamic(root, other, ids, report)
+    _add_location(root, scene)
+    _add(root, "scenarioTags")
+    ids = _Ids()
+    _write_map(root, cell, ids, report)
+    for movement in sorted(cell.motion.others, key=lambda one: not _is_static(one)):
+        _add_obstacle(root, movement, ids, report)
     _add_problem(root, cell, ids)
-    _report_writer(cell, report)
+    _report(cell, report)
     ET.indent(root)
     names = ", ".join(f"{name} is {number}" for name, number in ids.by_name.items())
-    return {f"{cell.stem}.xml": text_of(root, comment=f"Our names and the ids here: {names}")}
+    comment = escape_controls(f"Our names and the ids here: {names}").replace("--", "- -")
+    body = ET.tostring(root, encoding="unicode")
+    text = f"<?xml version='1.0' encoding='UTF-8'?>\n<!-- {comment} -->\n{body}\n"
+    return {f"{cell.stem}.xml": text.encode()}
 
 
-def _word(stem: str) -> str:
-    """A map's name in a benchmark id has letters and digits alone."""
-    return "".join(part.capitalize() for part in stem.split("-") if part.isascii()) or "Scene"
+def _add_location(root: ET.Element, scene: Scene) -> None:
+    location, pose = _add(root, "location"), scene.origin.pose
+    _add(location, "geoNameId", "-999")
+    _add(location, "gpsLatitude", "999")
+    _add(location, "gpsLongitude", "999")
+    transformation = _add(location, "geoTransformation")
+    _add(transformation, "geoReference", scene.origin.frame)
+    more = _add(transformation, "additionalTransformation")
+    _add(more, "xTranslation", pose.x_m)
+    _add(more, "yTranslation", pose.y_m)
+    _add(more, "zRotation", pose.heading_rad)
+    _add(more, "scaling", 1.0)
 
 
-def _add_location(root: ET.Element, cell: Cell) -> None:
-    pose = cell.after.origin.pose
-    location = add(root, "location")
-    add(location, "geoNameId", "-999")
-    add(location, "gpsLatitude", "999")
-    add(location, "gpsLongitude", "999")
-    transformation = add(location, "geoTransformation")
-    add(transformation, "geoReference", cell.after.origin.frame)
-    more = add(transformation, "additionalTransformation")
-    add(more, "xTranslation", number(pose.x_m))
-    add(more, "yTranslation", number(pose.y_m))
-    add(more, "zRotation", number(pose.heading_rad))
-    add(more, "scaling", "1.0")
+# The map: lanelets, then traffic signs, lights and intersections, as the schema orders them
+
+
+def _write_map(root: ET.Element, cell: Cell, ids: _Ids, report: LossReport) -> None:
+    scene = cell.after
+    graph = LaneGraph(scene)
+    ways: list[AnyLane] = [*scene.lanes, *scene.connectors]
+    for way in ways:
+        ids.of(way.id)
+    limits = sorted({way.speed_limit_mps for way in ways if way.speed_limit_mps is not None})
+    signs = {limit: ids.fresh() for limit in limits}
+    lit = [one for one in scene.connectors if one.traffic_light is not TrafficLight.NONE]
+    lights = {connector.id: ids.fresh() for connector in lit}
+    off_m, apart_m = {}, {}
+    for way in ways:
+        left, right = _paired_bounds(way)
+        lanelet = _add_lanelet(root, ids.of(way.id), left, right)
+        _add_joints(lanelet, way, graph, ids)
+        _add(lanelet, "laneletType", "intersection" if isinstance(way, LaneConnector) else "urban")
+        _add(lanelet, "userOneWay", "vehicle")
+        if way.speed_limit_mps is not None:
+            _add(lanelet, "trafficSignRef", ref=signs[way.speed_limit_mps])
+        if way.id in lights:
+            _add(lanelet, "trafficLightRef", ref=lights[way.id])
+        off_m[way.id] = _off_middle_m(way.centerline, (left + right) / 2.0)
+        apart_m[way.id] = abs(width_between(way.centerline, *bounds_of(way)) - way.width_m)
+    for distances, text in (
+        (off_m, "centrelines that are off the middle of the edges, which alone go out"),
+        (apart_m, "widths that are not the distance of the edges, which alone go out"),
+    ):
+        far = [f"{name} by {away:.2f} m" for name, away in distances.items() if away > _SAME_M]
+        if far:
+            report.lose(f"{text}: {', '.join(far)}")
+    quads = [one for one in scene.areas if one.kind is AreaKind.CROSSWALK]
+    quads = [one for one in quads if len(one.boundary_m) == 4]
+    for area in quads:
+        lanelet = _add_lanelet(root, ids.of(area.id), *_crosswalk_bounds(area))
+        _add(lanelet, "laneletType", "crosswalk")
+        _add(lanelet, "userBidirectional", "pedestrian")
+    for limit, sign in signs.items():
+        made = _add(root, "trafficSign", id=sign)
+        element = _add(made, "trafficSignElement")
+        _add(element, "trafficSignID", SPEED_SIGN)
+        _add(element, "additionalValue", float(limit))
+        _add(made, "virtual", "true")
+    for connector in lit:  # the state of t0 for as long as the scenario goes on
+        made = _add(root, "trafficLight", id=lights[connector.id])
+        element = _add(made, "cycle/cycleElement")
+        _add(element, "duration", len(cell.motion.times_s))
+        _add(element, "color", _COLOURS[connector.traffic_light])
+        _add_point(made, "position/point", connector.centerline.points_m[0])
+    _add_intersections(root, scene, ids)
+    _report_map(scene, quads, report)
+
+
+def _add_lanelet(root: ET.Element, number: str, left: FloatArray, right: FloatArray) -> ET.Element:
+    lanelet = _add(root, "lanelet", id=number)
+    for name, points in (("leftBound", left), ("rightBound", right)):
+        bound = _add(lanelet, name)
+        for point in points:
+            _add_point(bound, "point", point)
+    return lanelet
+
+
+def _add_joints(lanelet: ET.Element, way: AnyLane, graph: LaneGraph, ids: _Ids) -> None:
+    for name in graph.predecessors(way.id):
+        _add(lanelet, "predecessor", ref=ids.of(name))
+    for name in graph.successors(way.id):
+        _add(lanelet, "successor", ref=ids.of(name))
+    if isinstance(way, Lane):
+        beside = {"adjacentLeft": way.left_neighbor, "adjacentRight": way.right_neighbor}
+        for side, neighbor in beside.items():
+            if neighbor is not None:
+                _add(lanelet, side, ref=ids.of(neighbor), drivingDir="same")
+
+
+def _paired_bounds(way: AnyLane) -> tuple[FloatArray, FloatArray]:
+    """Both edges with equally many points, opposite to each other; no point of either is lost."""
+    left, right = bounds_of(way)
+    if len(left.points_m) == len(right.points_m):
+        off_m = _off_middle_m(way.centerline, (left.points_m + right.points_m) / 2.0)
+        if off_m <= _SAME_M or not (way.left_boundary or way.right_boundary):
+            return left.points_m, right.points_m
+    lines = (left, right, way.centerline)
+    shares = np.concatenate([line.stations_m / line.length_m for line in lines]).round(9)
+    left_m, right_m = (side.points_at(np.unique(shares) * side.length_m) for side in (left, right))
+    return left_m, right_m
+
+
+def _off_middle_m(centerline: Polyline, middle: FloatArray) -> float:
+    return max(centerline.project(float(x), float(y)).distance_m for x, y in middle)
+
+
+def _crosswalk_bounds(area: Area) -> tuple[FloatArray, FloatArray]:
+    """The two longer edges, in one direction."""
+    a, b, c, d = np.array(area.boundary_m)
+    first, second = np.array([a, b]), np.array([d, c])
+    if np.hypot(*(b - a)) + np.hypot(*(d - c)) < np.hypot(*(c - b)) + np.hypot(*(a - d)):
+        first, second = np.array([b, c]), np.array([a, d])
+    along, across = first[1] - first[0], second[0] - first[0]
+    is_left = along[0] * across[1] - along[1] * across[0] < 0.0
+    return (first, second) if is_left else (second, first)
+
+
+def _add_intersections(root: ET.Element, scene: Scene, ids: _Ids) -> None:
+    """Connectors that share a lane at either end belong to one intersection."""
+    entered = [connector for connector in scene.connectors if connector.from_lane is not None]
+    for group in group_connectors(entered):
+        by_lane: dict[str, list[LaneConnector]] = defaultdict(list)
+        for connector in group:
+            by_lane[str(connector.from_lane)].append(connector)
+        intersection = _add(root, "intersection", id=ids.fresh())
+        for lane, connectors in by_lane.items():
+            incoming = _add(intersection, "incoming", id=ids.fresh())
+            _add(incoming, "incomingLanelet", ref=ids.of(lane))
+            for side, turns in _SIDES.items():
+                for connector in connectors:
+                    if connector.turn_type in turns:
+                        _add(incoming, side, ref=ids.of(connector.id))
+
+
+def _report_map(scene: Scene, quads: Sequence[Area], report: LossReport) -> None:
+    for kind in AreaKind:
+        names = [one.id for one in scene.areas if one.kind is kind and one not in quads]
+        report.lose_of(names, f"left out: a {kind} area of this shape can't be a lanelet")
+    connectors = scene.connectors
+    names = [one.id for one in connectors if one.turn_type is TurnType.U_TURN]
+    report.lose_of(names, "a U-turn becomes a turn to the left")
+    names = [one.id for one in connectors if one.from_lane is None]
+    report.lose_of(names, "its turn type is not said: no lane leads into it")
+    names = [one.id for one in connectors if one.traffic_light is TrafficLight.UNKNOWN]
+    report.lose_of(names, "a light of unknown state becomes one that is off")
+    if any(one.traffic_light is not TrafficLight.NONE for one in connectors):
+        report.lose("lights stay as they are at t0; how they go on is not known")
+
+
+# Obstacles and the planning problem
 
 
 def _is_static(movement: Movement) -> bool:
     """What never moves; people, buses and bicycles that stand keep their types as dynamic ones."""
-    if movement.agent.type in _STATIC:
-        return True
-    return movement.agent.type is AgentType.VEHICLE and movement.stands
+    kind = movement.agent.type
+    return kind in _STATIC or (kind is AgentType.VEHICLE and movement.stands)
 
 
-def _moves(movement: Movement) -> bool:
-    """Whether it goes a metre or more from where it is first seen."""
-    seen = movement.states[movement.is_present, :2]
-    return bool(np.hypot(*(seen - seen[0]).T).max() >= MOVES_M)
-
-
-def _add_static(root: ET.Element, movement: Movement, ids: Ids, report: LossReport) -> None:
-    agent, first = movement.agent, int(movement.is_present.argmax())
-    if first > 0:
+def _add_obstacle(root: ET.Element, movement: Movement, ids: _Ids, report: LossReport) -> None:
+    agent, present, states = movement.agent, movement.is_present, movement.states
+    is_static, first = _is_static(movement), int(movement.is_present.argmax())
+    if is_static and first > 0:
         report.lose(f"{agent.id} is first seen {first} steps after t0; it stands there from t0 on")
-    obstacle = add(root, "staticObstacle", id=str(ids.of(agent.id)))
-    add(obstacle, "type", _STATIC.get(agent.type, "parkedVehicle"))
-    _add_box(obstacle, agent)
-    _add_state(obstacle, "initialState", movement.states[first], 0, has_speed=False)
-
-
-def _add_dynamic(root: ET.Element, movement: Movement, ids: Ids, report: LossReport) -> None:
-    agent = movement.agent
-    if appears_later(movement):
-        report.lose(
-            f"{agent.id} is left out: it appears after t0, and all obstacles are there from t0 on",
-            changes_scene=True,
-        )
+    elif appears_later(movement):
+        text = "is left out: it appears after t0, and all obstacles are there from t0 on"
+        report.lose(f"{agent.id} {text}", changes_scene=True)
+        return
+    kind = _STATIC.get(agent.type, "parkedVehicle") if is_static else _DYNAMIC[agent.type]
+    tag = "staticObstacle" if is_static else "dynamicObstacle"
+    obstacle = _add(root, tag, id=ids.of(agent.id))
+    _add(obstacle, "type", kind)
+    box = _add(obstacle, "shape/rectangle")
+    _add(box, "length", float(agent.length_m))
+    _add(box, "width", float(agent.width_m))
+    _add_state(obstacle, "initialState", states[first], 0, has_speed=not is_static)
+    if is_static:
         return
     if has_gaps(movement):
         report.lose(f"{agent.id} goes and comes back; it ends where it goes first")
-    obstacle = add(root, "dynamicObstacle", id=str(ids.of(agent.id)))
-    add(obstacle, "type", _DYNAMIC[agent.type])
-    _add_box(obstacle, agent)
-    _add_state(obstacle, "initialState", movement.states[0], 0)
-    present = movement.is_present
     last = len(present) if present.all() else int((~present).argmax())
-    trajectory = add(obstacle, "trajectory")
+    trajectory = _add(obstacle, "trajectory")
     for step in range(1, last):
-        _add_state(trajectory, "state", movement.states[step], step)
+        _add_state(trajectory, "state", states[step], step)
     if last == 1:
         report.lose(f"{agent.id} was seen at t0 alone; a trajectory needs a step more, standing")
-        _add_state(trajectory, "state", movement.states[0], 1)
-
-
-def _add_box(obstacle: ET.Element, agent: TrafficAgent) -> None:
-    rectangle = add(add(obstacle, "shape"), "rectangle")
-    add(rectangle, "length", number(agent.length_m))
-    add(rectangle, "width", number(agent.width_m))
+        _add_state(trajectory, "state", states[0], 1)
 
 
 def _add_state(
     parent: ET.Element, name: str, state: FloatArray, step: int, *, has_speed: bool = True
 ) -> ET.Element:
-    made = add(parent, name)
-    point = add(add(made, "position"), "point")
-    add(point, "x", number(float(state[0])))
-    add(point, "y", number(float(state[1])))
-    add(add(made, "orientation"), "exact", number(float(state[2])))
-    add(add(made, "time"), "exact", str(step))
+    made = _add(parent, name)
+    _add_point(made, "position/point", state)
+    _add(made, "orientation/exact", float(state[2]))
+    _add(made, "time/exact", step)
     if has_speed:
-        add(add(made, "velocity"), "exact", number(float(state[3])))
+        _add(made, "velocity/exact", float(state[3]))
     return made
 
 
-def _add_problem(root: ET.Element, cell: Cell, ids: Ids) -> None:
+def _add_problem(root: ET.Element, cell: Cell, ids: _Ids) -> None:
     """The ego: where it starts, and where its motion ends as the goal."""
     states = cell.motion.ego.states
-    problem = add(root, "planningProblem", id=str(ids.of(cell.after.ego.id)))
+    problem = _add(root, "planningProblem", id=ids.of(cell.after.ego.id))
     start = _add_state(problem, "initialState", states[0], 0)
-    add(add(start, "yawRate"), "exact", "0.0")
-    add(add(start, "slipAngle"), "exact", "0.0")
-    goal = add(problem, "goalState")
-    circle = add(add(goal, "position"), "circle")
-    add(circle, "radius", number(GOAL_RADIUS_M))
-    centre = add(circle, "center")
-    add(centre, "x", number(float(states[-1, 0])))
-    add(centre, "y", number(float(states[-1, 1])))
-    time = add(goal, "time")
-    add(time, "intervalStart", "0")
-    add(time, "intervalEnd", str(len(states) - 1))
+    _add(start, "yawRate/exact", 0.0)
+    _add(start, "slipAngle/exact", 0.0)
+    goal = _add(problem, "goalState")
+    circle = _add(goal, "position/circle")
+    _add(circle, "radius", GOAL_RADIUS_M)
+    _add_point(circle, "center", states[-1])
+    time = _add(goal, "time")
+    _add(time, "intervalStart", 0)
+    _add(time, "intervalEnd", len(states) - 1)
 
 
-def _report_writer(cell: Cell, report: LossReport) -> None:
+def _report(cell: Cell, report: LossReport) -> None:
     scene, ego = cell.after, cell.after.ego
     report_motion(cell, report)
     report.lose(
@@ -485,17 +382,17 @@ def _report_writer(cell: Cell, report: LossReport) -> None:
         f"{ego.width_m:g} m is not"
     )
     report.lose("names become numbers; a comment in the file has both")
-    for kind, said in (
-        (AgentType.TRAFFIC_CONE, "a cone becomes a constructionZone, as barriers may be"),
-        (AgentType.CONSTRUCTION_SIGN, "a sign becomes a constructionZone, as cones do"),
-        (AgentType.BARRIER, "a barrier becomes a roadBoundary, which readers take for scenery"),
-        (AgentType.GENERIC_OBJECT, "becomes an obstacle of unknown type"),
-    ):
+    for kind, text in _BECOMES.items():
         names = [other.agent.id for other in cell.motion.others if other.agent.type is kind]
-        report.lose_of(names, said)
+        report.lose_of(names, text)
     names = [agent.id for agent in scene.agents if agent.walk_to_m is not None]
     report.lose_of(names, "the walk is written as motion alone, not as its end point")
-    fast = [other.agent.id for other in cell.motion.others if _is_static(other) and _moves(other)]
-    report.lose_of(fast, "moves, but things of this type can only stand there", changes_scene=True)
+    moving = []
+    for other in filter(_is_static, cell.motion.others):
+        seen = other.states[other.is_present, :2]
+        if np.hypot(*(seen - seen[0]).T).max() >= MOVES_M:
+            moving.append(other.agent.id)
+    text = "moves, but things of this type can only stand there"
+    report.lose_of(moving, text, changes_scene=True)
     if scene.traffic_side is TrafficSide.LEFT:
         report.lose("that people drive on the left is not said")

@@ -14,7 +14,7 @@ from xml.etree import ElementTree as ET
 import numpy as np
 import shapely
 
-from augment.formats.writing import CannotExpress, Cell, LossReport, bounds_of
+from augment.formats.writing import CannotExpress, Cell, LossReport, bounds_of, group_connectors
 from augment.geometry.frames import difference
 from augment.geometry.polyline import FloatArray, Polyline
 from augment.scene.entities import Lane, LaneConnector, Scene, TrafficLight, TrafficSide
@@ -278,7 +278,8 @@ class _Network:
             for connector in scene.connectors
             if self._is_connecting(connector)
         }
-        self.junctions = self._grouped()
+        groups = group_connectors(self.inside.values())
+        self.junctions = dict(enumerate(groups, start=_FIRST_JUNCTION))
         self.of_road = {
             one.id: junction for junction, group in self.junctions.items() for one in group
         }
@@ -299,18 +300,6 @@ class _Network:
         gap = np.hypot(*(end.points_m[-1] - start.points_m[0]))
         turn = float(directions(end.points_m)[-1] @ directions(start.points_m)[0])
         return bool(gap <= _JOINED_M) and turn >= _JOINED_COS
-
-    def _grouped(self) -> dict[int, list[LaneConnector]]:
-        groups: list[tuple[set[str], list[LaneConnector]]] = []
-        for one in self.inside.values():
-            ends, members, others = {f"<{one.from_lane}", f">{one.to_lane}"}, [one], []
-            for names, group in groups:
-                if names & ends:
-                    ends, members = ends | names, [*group, *members]
-                else:
-                    others.append((names, group))
-            groups = [*others, (ends, members)]
-        return {_FIRST_JUNCTION + n: group for n, (_, group) in enumerate(groups)}
 
     def _joins(
         self, ways: Sequence[AnyLane]

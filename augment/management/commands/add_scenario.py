@@ -8,11 +8,18 @@ from typing import Any
 
 from django.core.management.base import CommandError
 
-from augment.formats.documents import read_json
+from augment.errors import InvalidDocument
 from augment.models.scenes import GOALS
-from augment.scene.codec import modification_from_document, modification_to_document
 from augment.scene.entities import ScenarioType, TrafficDensity
-from augment.services.scenarios.bulk import NEEDED, OPTIONAL, add_scenarios, read_rows
+from augment.services.scenarios.bulk import (
+    NEEDED,
+    OPTIONAL,
+    PARTS,
+    WHAT,
+    add_rows,
+    read_part,
+    read_rows,
+)
 from augment.services.scenarios.scenes import add_scenario, read_circumstances
 from augment.services.terminal import TerminalCommand
 
@@ -69,14 +76,13 @@ class Command(TerminalCommand):
         missing = [f"--{name}" for name in NEEDED if options[name] is None]
         if missing:
             raise CommandError(f"{', '.join(missing)} is needed, or --file FILE instead of all.")
+        names = ("scene", "type", "type_label", "instruction", "slug")
+        given = {name: options[name] for name in names}
+        for name, what in PARTS.items():
+            file = options[name]
+            given[name] = None if file is None else read_part(file, what)
         scenario = add_scenario(
-            scene=options["scene"],
-            type=options["type"],
-            type_label=options["type_label"],
-            instruction=options["instruction"],
-            slug=options["slug"],
-            reference=_reference(options["reference"]),
-            intent=_intent(options["intent"]),
+            **given,
             keep_traffic=options["keep_traffic"],
             circumstances=read_circumstances(options["density"] or "", options["goal"] or ""),
         )
@@ -90,18 +96,14 @@ class Command(TerminalCommand):
         given = [f"--{name.replace('_', '-')}" for name in (*NEEDED, *OPTIONAL) if options[name]]
         if given:
             raise CommandError(f"--file says all of it; it goes without {', '.join(given)}.")
-        made = add_scenarios(read_rows(options["file"]), folder=options["file"].parent)
-        for scenario in made:
-            self.stdout.write(f"Added scenario {scenario.slug}.")
-        self.stdout.write(f"{len(made)} scenarios.")
-
-
-def _reference(file: Path | None) -> dict[str, Any] | None:
-    if file is None:
-        return None
-    document = read_json(file, what="modification")
-    return modification_to_document(modification_from_document(document))
-
-
-def _intent(file: Path | None) -> object:
-    return None if file is None else read_json(file, what="intent")
+        report = add_rows(read_rows(options["file"]), folder=options["file"].parent)
+        problems = [
+            (f"row {row.number}.{path}" if path else f"row {row.number}", text)
+            for row in report.faults
+            for path, text in row.problems
+        ]
+        if problems:
+            raise InvalidDocument(WHAT, problems)
+        for row in report.rows:
+            self.stdout.write(f"Added scenario {row.slug}.")
+        self.stdout.write(f"{len(report.rows)} scenarios.")

@@ -8,11 +8,7 @@ from typing import Any
 from django.core.management.base import CommandError
 
 from augment.management.arguments import add_folder_argument, add_set_argument, sets_of
-from augment.services.scenarios.catalogue_check import (
-    CatalogueCheck,
-    ScenarioCheck,
-    check_catalogue,
-)
+from augment.services.scenarios.catalogue_check import check_catalogue
 from augment.services.terminal import TerminalCommand
 
 
@@ -34,21 +30,11 @@ class Command(TerminalCommand):
         checked = check_catalogue(folder=options["folder"], sets=sets_of(options))
         width = max((len(scenario.slug) for scenario in checked.scenarios), default=8)
         self.stdout.write(f"{'scenario':{width}}  statements  {'way past':14}  result")
-        for scenario in checked.scenarios:
-            self.stdout.write(_line(scenario, width))
-        reasons = _reasons(checked)
-        if reasons:
-            raise CommandError("\n".join(reasons))
+        for one in checked.scenarios:
+            result = f"{len(one.reasons)} reasons" if one.reasons else "good"
+            line = f"{one.slug:{width}}  {one.statements:>10}  {one.way_past:14}  {result}"
+            self.stdout.write(line)
+        reasons = [f"{one.slug}: {text}" for one in checked.scenarios for text in one.reasons]
+        if reasons or checked.reasons:
+            raise CommandError("\n".join([*reasons, *checked.reasons]))
         self.stdout.write(f"{len(checked.scenarios)} scenarios are as their intents ask for.")
-
-
-def _line(one: ScenarioCheck, width: int) -> str:
-    result = f"{len(one.reasons)} reasons" if one.reasons else "good"
-    return f"{one.slug:{width}}  {one.statements:>10}  {one.way_past:14}  {result}"
-
-
-def _reasons(found: CatalogueCheck) -> list[str]:
-    own = [
-        f"{scenario.slug}: {reason}" for scenario in found.scenarios for reason in scenario.reasons
-    ]
-    return [*own, *found.reasons]

@@ -6,7 +6,7 @@ from argparse import ArgumentParser
 from typing import Any
 
 from augment.management.arguments import add_folder_argument, add_set_argument, sets_of
-from augment.services.scenarios.catalogue import load_catalogue
+from augment.services.scenarios.catalogue import CatalogueStep, load_catalogue
 from augment.services.terminal import TerminalCommand
 
 
@@ -35,11 +35,9 @@ class Command(TerminalCommand):
             sets=sets_of(options),
             with_paraphrases=options["paraphrases"],
         )
-        for kind in ("scenes", "scenarios"):
-            added, changed, unchanged = (
-                getattr(report, f"{kind}_{step}") for step in ("added", "changed", "unchanged")
-            )
-            self.stdout.write(f"{kind}: {added} added, {changed} changed, {unchanged} unchanged")
+        for kind, counts in (("scenes", report.scenes), ("scenarios", report.scenarios)):
+            steps = ", ".join(f"{counts[step]} {step}" for step in list(CatalogueStep)[:3])
+            self.stdout.write(f"{kind}: {steps}")
         if report.kept:
             self.stdout.write(
                 "kept as stored, because they or their scene were augmented, although the "

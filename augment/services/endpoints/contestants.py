@@ -21,7 +21,7 @@ from augment.services.endpoints.treatments import (
     other_prompts,
     respondents_of,
 )
-from augment.services.events import log_event
+from augment.services.events import log_change
 from augment.services.scenarios.prompts import Preview, preview_prompt
 from augment.services.scenarios.scenes import check_slug
 from augment.services.texts import one_line
@@ -112,9 +112,8 @@ def add_contestant(
     check_roles(recipe, roles or {})
     chosen = options or ContestantOptions()
     check_options(recipe, chosen)
-    own = Respondent(
-        endpoint=find_endpoint(endpoint, actor), model=one_line("model", model, what="contestant")
-    )
+    model = one_line("model", model, what="contestant")
+    own = Respondent(endpoint=find_endpoint(endpoint, actor), model=model)
     others = _reviewers(roles or {}, own, actor)
     for respondent in (own, *others.values()):
         model_at(endpoint=respondent.endpoint, model=respondent.model)
@@ -122,11 +121,10 @@ def add_contestant(
     columns = _columns(title, recipe.slug, own, others, chosen)
     contestant, made = Contestant.objects.get_or_create(slug=slug, defaults=columns)
     if made:
-        log_event(
-            actor=actor,
-            verb="add",
-            object_kind="contestant",
-            object_code=contestant.code,
+        log_change(
+            contestant,
+            "add",
+            actor,
             after=columns | {"slug": slug, "endpoint": own.endpoint.label},
         )
     same = [field for field in columns if field != "name" or name is not None]

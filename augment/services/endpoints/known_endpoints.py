@@ -25,7 +25,7 @@ from augment.errors import Conflict, InvalidDocument, KeyMissing, KeyNotAllowed,
 from augment.llm.addresses import check_base_url
 from augment.models import Endpoint, EndpointModel
 from augment.services.endpoints.known_models import facts_of, model_at
-from augment.services.events import log_event
+from augment.services.events import log_change
 from augment.services.inputs import InputKind, check_bounds, input_field
 from augment.services.scenarios.scenes import check_slug
 from augment.services.texts import one_line
@@ -113,9 +113,7 @@ def add_endpoint(
         )
     columns = check_facts(facts)
     row = Endpoint.objects.create(label=label, is_simulated=is_simulated, **columns)
-    log_event(
-        actor=actor, verb="add", object_kind="endpoint", object_code=row.code, after=facts_of(row)
-    )
+    log_change(row, "add", actor, after=facts_of(row))
     return row
 
 
@@ -142,7 +140,9 @@ def change_endpoint(
         setattr(row, name, value)
     row.save(update_fields=list(wanted))
     _log_change(row, before, actor)
-    log_move(move, endpoint=row, actor=actor)
+    if move is not None:
+        after = {"server": move[1], "key_variable": row.key_variable}
+        log_change(row, "move key", actor, before={"server": move[0]}, after=after)
     return row
 
 
@@ -342,19 +342,6 @@ def move_of(*, endpoint: Endpoint, base_url: str, key_variable: str) -> tuple[st
     return (before, after) if has_key and before != after else None
 
 
-def log_move(move: tuple[str, str] | None, *, endpoint: Endpoint, actor: User | None) -> None:
-    """Log that a key goes elsewhere from now on; nothing where it does not."""
-    if move is not None:
-        log_event(
-            actor=actor,
-            verb="move key",
-            object_kind="endpoint",
-            object_code=endpoint.code,
-            before={"server": move[0]},
-            after={"server": move[1], "key_variable": endpoint.key_variable},
-        )
-
-
 # --- Private -----------------------------------------------------------------------------------
 
 
@@ -369,11 +356,4 @@ def _server(base_url: str) -> str:
 def _log_change(endpoint: Endpoint, before: dict[str, Any], actor: User | None) -> None:
     after = facts_of(endpoint)
     if after != before:
-        log_event(
-            actor=actor,
-            verb="change",
-            object_kind="endpoint",
-            object_code=endpoint.code,
-            before=before,
-            after=after,
-        )
+        log_change(endpoint, "change", actor, before=before, after=after)

@@ -25,7 +25,7 @@ from django.utils import timezone
 from augment.llm.client import ModelProfile
 from augment.llm.costs import NANO_USD, Price
 from augment.models import Augmentation, Endpoint, EndpointModel, ModelCall
-from augment.services.events import log_event
+from augment.services.events import log_change
 
 AUGMENTATION = "attempt__augmentation"
 CONTESTANT = "attempt__augmentation__contestant"
@@ -115,12 +115,8 @@ def remember_refusal(*, endpoint: Endpoint, model: str, parameter: str) -> Model
         row.temperature, row.json_schema = after.temperature, after.json_schema
         row.refused_parameters = sorted(after.refused)
         row.save(update_fields=["temperature", "json_schema", "refused_parameters"])
-        log_event(
-            actor=None,
-            verb="learn",
-            object_kind="model",
-            object_code=row.code,
-            after={"endpoint": endpoint.label, "model": model, "refuses": parameter},
+        log_change(
+            row, "learn", after={"endpoint": endpoint.label, "model": model, "refuses": parameter}
         )
     return after
 
@@ -131,11 +127,10 @@ def tell_sight(*, endpoint: Endpoint, model: str, sees: bool, actor: User | None
     row = model_at(endpoint=endpoint, model=model)
     before, row.vision = row.vision, sees
     row.save(update_fields=["vision"])
-    log_event(
-        actor=actor,
-        verb="tell",
-        object_kind="model",
-        object_code=row.code,
+    log_change(
+        row,
+        "tell",
+        actor,
         before={"vision": before},
         after={"endpoint": endpoint.label, "model": model, "vision": sees},
     )

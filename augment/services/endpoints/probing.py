@@ -24,7 +24,7 @@ from augment.llm.questions import Ability, ProbeQuestion, questions_for
 from augment.models import Endpoint, EndpointModel, Probe
 from augment.services.endpoints.client import Queue, place_at, wire_to
 from augment.services.endpoints.known_models import model_at, price_of
-from augment.services.events import log_event
+from augment.services.events import log_change
 from augment.services.texts import make_document_storable
 from augment.services.work import Lease, Settlement, WorkKind
 
@@ -268,10 +268,9 @@ def _store(row: EndpointModel, report: ProbeReport, actor: User | None) -> None:
     if report.has(Ability.ANSWERS):
         changes["refused_parameters"] = report.refused
     EndpointModel.objects.filter(pk=row.pk).update(**changes)
-    log_event(
-        actor=actor,
-        verb="probe",
-        object_kind="model",
-        object_code=row.code,
+    log_change(
+        row,
+        "probe",
+        actor,
         after={"model": row.model, "calls": report.calls, "cost_usd": report.cost_usd} | abilities,
     )

@@ -21,7 +21,7 @@ from augment.llm.messages import LengthName
 from augment.models import Augmentation, Contestant, Endpoint, EndpointModel, ModelCall
 from augment.prompts.fill import prompt_version
 from augment.services.endpoints.known_models import price_of, profile_of, profiles_at
-from augment.services.events import log_event
+from augment.services.events import log_change
 from augment.variants.options import (
     NAMES,
     ContestantOptions,
@@ -144,13 +144,7 @@ def treatment_of(contestant: Contestant, respondents: Mapping[ModelRole, Respond
         row.sends = stored = before | new
         row.frozen_options = frozen = row.frozen_options or _completed(row).to_document()
         row.save(update_fields=["sends", "frozen_options"])
-        log_event(
-            actor=None,
-            verb="fix",
-            object_kind="contestant",
-            object_code=row.code,
-            after={"slug": row.slug, "sends": new, "options": frozen},
-        )
+        log_change(row, "fix", after={"slug": row.slug, "sends": new, "options": frozen})
     options = options_from_document(frozen)
     if (unlike := other_prompts(contestant.slug, options)) is not None:
         raise Conflict(unlike)

@@ -25,7 +25,7 @@ from augment.llm.messages import Reply
 from augment.models import Contestant, GenerationJob, ModelCall
 from augment.services.clock import Moment
 from augment.services.endpoints.treatments import list_unpriced_models
-from augment.services.events import log_event
+from augment.services.events import log_change
 
 State = GenerationJob.State
 
@@ -148,11 +148,9 @@ def reserve(*, job_pk: int, worst: WorstCase, price: Price | None) -> Room:
     alone = _within_caps(worst, nano_usd, with_reserved=False)
     if jobs.filter(state=State.RUNNING).exclude(alone).update(state=State.STOPPED_AT_CAP):
         job = jobs.get()
-        log_event(
-            actor=None,
-            verb="stop",
-            object_kind="job",
-            object_code=job.code,
+        log_change(
+            job,
+            "stop",
             before={"state": State.RUNNING.value},
             after={"state": State.STOPPED_AT_CAP.value, "cap": limit_of(job)},
         )
@@ -295,14 +293,7 @@ def raise_cap(job: GenerationJob, *, caps: Caps, actor: User | None = None) -> G
             raise Conflict(f"The new cap must be higher than the one of {before}.")
         setattr(job, name, value)
     job.save(update_fields=list(columns))
-    log_event(
-        actor=actor,
-        verb="raise cap",
-        object_kind="job",
-        object_code=job.code,
-        before={"cap": before},
-        after={"cap": limit_of(job)},
-    )
+    log_change(job, "raise cap", actor, before={"cap": before}, after={"cap": limit_of(job)})
     return job
 
 

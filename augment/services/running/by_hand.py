@@ -13,7 +13,7 @@ from augment.errors import Conflict
 from augment.models import Augmentation, Contestant, GenerationJob
 from augment.scene.codec import modification_from_document
 from augment.scene.entities import Modification
-from augment.services.events import log_event
+from augment.services.events import log_change
 from augment.services.scenarios.editing import edit_to_document, read_edit
 from augment.services.scenarios.scenes import check_slug
 from augment.services.texts import LONGEST_NOTES, check_prose, one_line
@@ -75,14 +75,7 @@ def keep_correction(
         made_by_id=actor_pk,
     )
     made = {"augmentation": str(row.code), "contestant": slug, "modification": row.modification}
-    log_event(
-        actor=actor,
-        verb="correct",
-        object_kind="augmentation",
-        object_code=original.code,
-        before={"modification": before},
-        after=made,
-    )
+    log_change(original, "correct", actor, before={"modification": before}, after=made)
     return row
 
 

@@ -61,38 +61,27 @@ class ContestantEstimate:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class JobEstimate:
-    """A job before it is launched: a line for each contestant that asks models, and all rows."""
+    """A job before it is launched: a line for each contestant that asks models, and all rows.
+
+    Attributes:
+        asking_rows: Augmentations that ask a language model.
+        answered: Augmentations whose answers are there already.
+        calls: At least, as expected, at most.
+        tokens_in, tokens_out: As expected.
+        usd, usd_most: As expected, and at most rounded up to cents, of the lines with prices.
+    """
 
     rows: int
     scenarios: int
     contestants: int
     lines: tuple[ContestantEstimate, ...]
-
-    @property
-    def answered(self) -> int:
-        """Augmentations whose answers are there already."""
-        return sum(line.answered for line in self.lines)
-
-    @property
-    def asking_rows(self) -> int:
-        """Augmentations that ask a language model."""
-        return sum(line.rows for line in self.lines)
-
-    @property
-    def calls(self) -> tuple[int, int, int]:
-        """At least, as expected, at most."""
-        least, usual, most = (sum(line.calls[n] for line in self.lines) for n in range(3))
-        return least, usual, most
-
-    @property
-    def tokens_in(self) -> int:
-        """As expected."""
-        return sum(line.tokens_in for line in self.lines)
-
-    @property
-    def tokens_out(self) -> int:
-        """As expected."""
-        return sum(line.tokens_out for line in self.lines)
+    asking_rows: int
+    answered: int
+    calls: tuple[int, ...]
+    tokens_in: int
+    tokens_out: int
+    usd: Decimal
+    usd_most: Decimal
 
     @property
     def unpriced(self) -> tuple[ContestantEstimate, ...]:
@@ -103,17 +92,6 @@ class JobEstimate:
     def unpriced_names(self) -> str:
         """Whose they are, as a list in a sentence."""
         return ", ".join(line.name for line in self.unpriced)
-
-    @property
-    def usd(self) -> Decimal:
-        """As expected, of the lines with prices."""
-        return sum((line.usd or Decimal(0) for line in self.lines), Decimal(0))
-
-    @property
-    def usd_most(self) -> Decimal:
-        """At most, of the lines with prices, rounded up to cents."""
-        most = sum((line.usd_most or Decimal(0) for line in self.lines), Decimal(0))
-        return most.quantize(Decimal("0.01"), rounding=ROUND_UP)
 
     @property
     def guessed(self) -> tuple[ContestantEstimate, ...]:
@@ -159,11 +137,20 @@ def estimate_rows(
     answered: Counter[int] = Counter()
     if not is_fresh:
         answered = _count_answered(asking, scenarios, samples)
+    lines = tuple(_line(row, rows, answered[row.pk], prompts) for row in asking)
+    usd_most = sum((line.usd_most or Decimal(0) for line in lines), Decimal(0))
     return JobEstimate(
         rows=len(who) * rows,
         scenarios=len(pks),
         contestants=len(who),
-        lines=tuple(_line(row, rows, answered[row.pk], prompts) for row in asking),
+        lines=lines,
+        asking_rows=len(asking) * rows,
+        answered=answered.total(),
+        calls=tuple(sum(line.calls[place] for line in lines) for place in range(3)),
+        tokens_in=sum(line.tokens_in for line in lines),
+        tokens_out=sum(line.tokens_out for line in lines),
+        usd=sum((line.usd or Decimal(0) for line in lines), Decimal(0)),
+        usd_most=usd_most.quantize(Decimal("0.01"), rounding=ROUND_UP),
     )
 
 

@@ -24,7 +24,7 @@ from augment.scene.codec import intent_to_document
 from augment.services.clock import DATABASE_TIME
 from augment.services.endpoints.client import EndpointClient, Queue, wire_to
 from augment.services.endpoints.known_models import price_of
-from augment.services.events import log_event
+from augment.services.events import log_change
 from augment.services.running import budget
 from augment.services.running.budget import Caps
 from augment.services.running.calls import CallTranscript, find_earlier_answer, sentence_of
@@ -144,11 +144,10 @@ class Readings(WorkKind[IntentReading]):
     def over(self, row: IntentReading, outcome: Settlement | None) -> None:
         """Log who was asked, and whether it was of use."""
         row.refresh_from_db(fields=["state"])
-        log_event(
-            actor=row.asked_by,
-            verb="read intent",
-            object_kind="scenario",
-            object_code=row.scenario.code,
+        log_change(
+            row.scenario,
+            "read intent",
+            row.asked_by,
             after={"model": row.model, "endpoint": row.endpoint.label, "state": row.state},
         )
 

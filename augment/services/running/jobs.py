@@ -14,7 +14,7 @@ from augment.errors import Conflict, UnknownName
 from augment.models import Augmentation, Contestant, GenerationJob, Scenario
 from augment.services.clock import DATABASE_TIME, Moment, database_now
 from augment.services.endpoints.treatments import loosen_unanswered
-from augment.services.events import log_event
+from augment.services.events import log_change
 from augment.services.running.budget import (
     NO_CAPS,
     Caps,
@@ -308,9 +308,7 @@ def _log(
     before: dict[str, Any] | None = None,
 ) -> None:
     """Log a change that is written, and read the job anew."""
-    log_event(
-        actor=actor, verb=verb, object_kind="job", object_code=job.code, before=before, after=after
-    )
+    log_change(job, verb, actor, before=before, after=after)
     job.refresh_from_db()
 
 

@@ -95,8 +95,35 @@ class Augmentations(WorkKind[Augmentation]):
         return super().waiting().exclude(job__in=CLOSED)
 
     def run(self, row: Augmentation, held: Held) -> Settlement:
-        """Ask, keep, draw."""
-        return run(row, held=held, connect=self._connect)
+        """Ask, keep, draw. Every foreseen fault is a failed outcome with a sentence."""
+        try:
+            scene = scene_of(row.scenario)
+            unchanged = original_picture(row.scenario)
+            answer = _stored_answer(row) or _ask(row, scene, held, self._connect)
+            if answer.state == State.FAILED:
+                return Settlement(state=State.FAILED, reason=answer.reason)
+            if answer.modification is None:
+                return Settlement(
+                    state=answer.state, reason=answer.reason, columns={"image": unchanged}
+                )
+            columns = _columns(answer, answer.modification)
+            held.note(**columns)  # a second try only has to draw
+            image = picture_of(scene, answer.modification, camera_of(row.scenario))
+            return Settlement(state=answer.state, columns=columns | {"image": image})
+        except JobCancelled as cancelled:
+            return Settlement(state=State.CANCELLED, reason=str(cancelled))
+        except (Unwanted, BudgetSpent):
+            raise
+        except ModelFault as fault:
+            reason = sentence_of(fault)
+        except InvalidModification as error:
+            reason = f"The modification does not fit the scene: {error}"
+        except AugmentError as error:
+            reason = str(error)
+        except OperationalError as error:
+            # What was answered is in its rows: a second try pays for none of it.
+            reason = str(DatabaseLocked(str(error)))
+        return Settlement(state=State.FAILED, reason=reason)
 
     def begun(self, pk: int, worker: str, now: Moment) -> None:
         """Open the next attempt."""
@@ -138,43 +165,6 @@ AUGMENTATIONS = Augmentations()
 def work_on(*, augmentation_pk: int, worker: str = "", connect: Connect | None = None) -> bool:
     """Lease a row, run it and write its outcome. Returns whether it could be leased."""
     return Augmentations(connect).perform(augmentation_pk, worker=worker)
-
-
-def run(row: Augmentation, *, held: Held, connect: Connect | None = None) -> Settlement:
-    """Return how the row ends. Every foreseen fault is a failed outcome with a sentence.
-
-    Raises:
-        LeaseLost, WorkerStopping: The row was taken back meanwhile, or this worker stops.
-        BudgetSpent: The job has no room for the next call.
-    """
-    try:
-        scene = scene_of(row.scenario)
-        unchanged = original_picture(row.scenario)
-        answer = _stored_answer(row) or _ask(row, scene, held, connect)
-        if answer.state == State.FAILED:
-            return Settlement(state=State.FAILED, reason=answer.reason)
-        if answer.modification is None:
-            return Settlement(
-                state=answer.state, reason=answer.reason, columns={"image": unchanged}
-            )
-        columns = _columns(answer, answer.modification)
-        held.note(**columns)  # a second try only has to draw
-        image = picture_of(scene, answer.modification, camera_of(row.scenario))
-        return Settlement(state=answer.state, columns=columns | {"image": image})
-    except JobCancelled as cancelled:
-        return Settlement(state=State.CANCELLED, reason=str(cancelled))
-    except (Unwanted, BudgetSpent):
-        raise
-    except ModelFault as fault:
-        reason = sentence_of(fault)
-    except InvalidModification as error:
-        reason = f"The modification does not fit the scene: {error}"
-    except AugmentError as error:
-        reason = str(error)
-    except OperationalError as error:
-        # What was answered is in its rows: a second try pays for none of it.
-        reason = str(DatabaseLocked(str(error)))
-    return Settlement(state=State.FAILED, reason=reason)
 
 
 def open_wire(

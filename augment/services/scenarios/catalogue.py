@@ -37,188 +37,78 @@ from augment.services.scenarios.scenes import (
     content_hash,
 )
 
-Read = TypeVar("Read")
+SOURCE = "authored"
 Problems = list[tuple[str, str]]
+Read = TypeVar("Read")
+
+
+# Files
 
 
 def folder_of(folder: Path, one: CatalogueSet) -> Path:
-    """Where the files of a set lie within a catalogue's folder."""
+    """Return where the files of a set lie within a catalogue's folder."""
     return folder if one is CatalogueSet.PAPER else folder / one.value
 
 
 def read_catalogue(folder: Path) -> tuple[dict[str, Scene], list[CatalogueEntry]]:
-    """The scenes by name and the scenarios of a folder, each fitting its scene.
+    """Return the scenes by name and the scenarios of a folder, each fitting its scene.
+
+    A folder holds `scenes/<name>.json` and `scenarios/<slug>.json`.
 
     Raises:
         InvalidDocument: The folder holds no catalogue, or files break their format or do not
             fit together; every problem names its file and the path inside it.
     """
     problems: Problems = []
-    scenes = {
-        name: scene
-        for name, scene in _read_files(folder / "scenes", "scene", scene_from_document, problems)
-        if _is_named(f"scenes/{name}.json", "name", name, scene.name, problems)
-    }
-    entries = [
-        entry
-        for name, entry in _read_files(
-            folder / "scenarios", "scenario", entry_from_document, problems
-        )
-        if _is_named(f"scenarios/{name}.json", "slug", name, entry.slug, problems)
-    ]
+    scenes = _read_files(folder / "scenes", scene_from_document, "name", problems)
+    entries = _read_files(folder / "scenarios", entry_from_document, "slug", problems)
     if not (scenes or entries or problems):
         problems.append((str(folder), "holds no scenes/*.json and no scenarios/*.json"))
-    for entry in entries:
-        _check_fits(entry, scenes, problems)
+    for entry in entries.values():
+        at, scene = f"scenarios/{entry.slug}.json", scenes.get(entry.scene)
+        if scene is None:
+            known = ", ".join(scenes) or "none"
+            text = f"{entry.scene!r} is not in the folder; known: {known}"
+            problems.append((f"{at}: scene", text))
+            continue
+        try:
+            shown = scene if entry.keep_traffic else without_traffic(scene)
+            check_reference(shown, entry.reference)
+        except InvalidModification as fault:
+            problems.append((f"{at}: reference", str(fault)))
+        except InvalidDocument as fault:
+            problems += [(f"{at}: reference.{path}", text) for path, text in fault.problems]
     if problems:
         raise InvalidDocument("catalogue", problems)
-    return scenes, entries
-
-
-# Private
+    return scenes, list(entries.values())
 
 
 def _read_files(
-    folder: Path, what: str, parse: Callable[[object], Read], problems: Problems
-) -> list[tuple[str, Read]]:
+    folder: Path, parse: Callable[[object], Read], key: str, problems: Problems
+) -> dict[str, Read]:
     """What the files of a folder hold, by their names; what can't be read becomes problems."""
-    found = []
+    found = {}
     for file in sorted(folder.glob("*.json")):
+        at = f"{folder.name}/{file.name}"
         try:
-            found.append((file.stem, parse(read_json(file, what=what))))
+            made = parse(read_json(file, what=folder.name.removesuffix("s")))
+            name = getattr(made, key)
+            check_slug(name, what="catalogue", key=key)
         except InvalidDocument as fault:
-            at = f"{folder.name}/{file.name}"
             problems += [(f"{at}: {path}" if path else at, text) for path, text in fault.problems]
+            continue
+        if name != file.stem:
+            text = f"expected {file.stem!r} as the file is called, got {name!r}"
+            problems.append((f"{at}: {key}", text))
+        else:
+            found[name] = made
     return found
 
 
-def _is_named(at: str, key: str, name: str, given: str, problems: Problems) -> bool:
-    try:
-        check_slug(given, what="catalogue")
-    except InvalidDocument as fault:
-        problems += [(f"{at}: {key}", text) for _, text in fault.problems]
-        return False
-    if given != name:
-        problems.append(
-            (f"{at}: {key}", f"expected {name!r} as the file is called, got {given!r}")
-        )
-        return False
-    return True
+# Rows
 
 
-def _check_fits(entry: CatalogueEntry, scenes: dict[str, Scene], problems: Problems) -> None:
-    at = f"scenarios/{entry.slug}.json"
-    scene = scenes.get(entry.scene)
-    if scene is None:
-        known = ", ".join(scenes) or "none"
-        problems.append((f"{at}: scene", f"{entry.scene!r} is not in the folder; known: {known}"))
-        return
-    try:
-        check_reference(scene if entry.keep_traffic else without_traffic(scene), entry.reference)
-    except InvalidModification as fault:
-        problems.append((f"{at}: reference", str(fault)))
-    except InvalidDocument as fault:
-        problems += [(f"{at}: reference.{path}", text) for path, text in fault.problems]
-
-
-SOURCE = "authored"
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class CatalogueReport:
-    """How many rows a loading added, changed and found as they should be.
-
-    Attributes:
-        kept: Scenarios whose file has changed and that stay as they were stored, because
-            something was made from them or from their scene.
-    """
-
-    scenes_added: int
-    scenes_changed: int
-    scenes_unchanged: int
-    scenarios_added: int
-    scenarios_changed: int
-    scenarios_unchanged: int
-    kept: tuple[str, ...] = ()
-
-
-@transaction.atomic
-def load_catalogue(
-    *,
-    folder: Path,
-    actor: User | None = None,
-    sets: Sequence[CatalogueSet] = (CatalogueSet.PAPER,),
-    with_paraphrases: bool = False,
-) -> CatalogueReport:
-    """Bring the rows in line with the files, all of them or none.
-
-    Rows whose file is gone stay. So does a scenario of which augmentations were made, and a scene
-    with all its scenarios once something was made on it: the stored version is what they were
-    made from. The report names them.
-
-    Args:
-        folder: Holds `scenes` and `scenarios`, and those of the hard set in `hard`.
-        actor: Who did it.
-        sets: Which parts of it.
-        with_paraphrases: Whether every paraphrase becomes a scenario of its own beside the one
-            that it says in other words, with the same intent and reference.
-
-    Raises:
-        InvalidDocument: The folder holds no catalogue, or files break their format or do not
-            fit together; every problem names its file and the path inside it.
-        Conflict: A slug belongs to a row from elsewhere.
-    """
-    read = {one: read_catalogue(folder_of(folder, one)) for one in sets}
-    scene_steps = {
-        name: _store_scene(scene, actor)
-        for scenes, _ in read.values()
-        for name, scene in scenes.items()
-    }
-    scenario_steps: dict[str, _Step] = {}
-    for one, (_, entries) in read.items():
-        for entry in entries:
-            is_kept = scene_steps[entry.scene] is _Step.KEPT
-            step = _Step.KEPT if is_kept else _store_scenario(entry, one, actor)
-            scenario_steps[entry.slug] = step
-            if with_paraphrases and step is not _Step.KEPT:
-                scenario_steps |= _store_paraphrases(entry, one, actor)
-    of_scenes, of_scenarios = Counter(scene_steps.values()), Counter(scenario_steps.values())
-    return CatalogueReport(
-        scenes_added=of_scenes[_Step.ADDED],
-        scenes_changed=of_scenes[_Step.CHANGED],
-        scenes_unchanged=of_scenes[_Step.UNCHANGED],
-        scenarios_added=of_scenarios[_Step.ADDED],
-        scenarios_changed=of_scenarios[_Step.CHANGED],
-        scenarios_unchanged=of_scenarios[_Step.UNCHANGED],
-        kept=tuple(slug for slug, step in scenario_steps.items() if step is _Step.KEPT),
-    )
-
-
-def load_own_catalogue(
-    *, sets: Sequence[str], with_paraphrases: bool = False, actor: User
-) -> CatalogueReport:
-    """What comes with the project, by the names of its sets; see `load_catalogue`.
-
-    Raises:
-        UnknownName: There is no such set.
-    """
-    known = [one.value for one in CatalogueSet]
-    for name in sets:
-        if name not in known:
-            raise UnknownName("set", name, known)
-    folder = settings.BASE_DIR / "fixtures"
-    return load_catalogue(
-        folder=folder,
-        actor=actor,
-        sets=[CatalogueSet(one) for one in sets],
-        with_paraphrases=with_paraphrases,
-    )
-
-
-# Private
-
-
-class _Step(StrEnum):
+class CatalogueStep(StrEnum):
     """What became of a file; `KEPT` where the stored version is another one and in use."""
 
     ADDED = "added"
@@ -227,63 +117,111 @@ class _Step(StrEnum):
     KEPT = "kept"
 
 
-def _store_scene(scene: Scene, actor: User | None) -> _Step:
-    document = scene_to_document(scene)
-    row, is_new = BaseScene.objects.get_or_create(
-        slug=scene.name,
-        defaults={
-            "document": document,
-            "source": SOURCE,
-            "provenance": scene.provenance,
-            "content_hash": content_hash(document),
-        },
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CatalogueReport:
+    """How many scenes and scenarios a loading added, changed and found as they should be.
+
+    Attributes:
+        kept: Scenarios whose file has changed and that stay as they were stored, because
+            something was made from them or from their scene.
+    """
+
+    scenes: Counter[CatalogueStep]
+    scenarios: Counter[CatalogueStep]
+    kept: tuple[str, ...] = ()
+
+
+@transaction.atomic
+def load_catalogue(
+    *,
+    folder: Path | None = None,
+    actor: User | None = None,
+    sets: Sequence[str] = (CatalogueSet.PAPER,),
+    with_paraphrases: bool = False,
+) -> CatalogueReport:
+    """Bring the rows in line with the files, all of them or none; twice changes nothing.
+
+    Rows whose file is gone stay. So does a scenario of which augmentations were made, and a scene
+    with all its scenarios once something was made on it: the stored version is what they were
+    made from. The report names them.
+
+    Args:
+        folder: Holds `scenes` and `scenarios`, and those of the hard set in `hard`; None for what
+            comes with the project.
+        actor: Who did it.
+        sets: Which parts of it.
+        with_paraphrases: Whether every paraphrase becomes a scenario of its own beside the one
+            that it says in other words, with the same intent and reference.
+
+    Raises:
+        UnknownName: There is no such set.
+        InvalidDocument: The folder holds no catalogue, or files break their format or do not
+            fit together; every problem names its file and the path inside it.
+        Conflict: A slug belongs to a row from elsewhere.
+    """
+    for name in sets:
+        if name not in list(CatalogueSet):
+            raise UnknownName("set", name, list(CatalogueSet))
+    scene_steps: dict[str, CatalogueStep] = {}
+    steps: dict[str, CatalogueStep] = {}
+    for which in map(CatalogueSet, sets):
+        place = folder or settings.BASE_DIR / "fixtures"
+        scenes, entries = read_catalogue(folder_of(place, which))
+        scene_steps |= {name: _store_scene(scene, actor) for name, scene in scenes.items()}
+        for entry in entries:
+            if scene_steps[entry.scene] is CatalogueStep.KEPT:
+                steps[entry.slug] = CatalogueStep.KEPT
+                continue
+            steps[entry.slug] = _store_scenario(entry, which, None, actor)
+            if not with_paraphrases or steps[entry.slug] is CatalogueStep.KEPT:
+                continue
+            original = Scenario.objects.get(slug=entry.slug)
+            for number, wording in enumerate(entry.paraphrases, start=1):
+                slug, text = f"{entry.slug}-p{number}", wording.text
+                said = replace(entry, slug=slug, instruction=text, language=wording.language)
+                steps[slug] = _store_scenario(said, which, original, actor)
+    return CatalogueReport(
+        scenes=Counter(scene_steps.values()),
+        scenarios=Counter(steps.values()),
+        kept=tuple(slug for slug, step in steps.items() if step is CatalogueStep.KEPT),
     )
-    if is_new:
-        _log(actor, "add", "scene", row, slug=row.slug, source=SOURCE)
-        return _Step.ADDED
+
+
+def _store_scene(scene: Scene, actor: User | None) -> CatalogueStep:
+    document = scene_to_document(scene)
+    wanted = {
+        "document": document,
+        "provenance": scene.provenance,
+        "content_hash": content_hash(document),
+    }
+    row, is_new = BaseScene.objects.get_or_create(
+        slug=scene.name, defaults=wanted | {"source": SOURCE}
+    )
     if row.source != SOURCE:
         raise Conflict(
             f"There is a scene called {row.slug!r} already, from the source {row.source!r}; "
             "the catalogue does not replace it."
         )
-    if row.document == document:
-        return _Step.UNCHANGED
-    is_augmented = Augmentation.objects.filter(scenario__base_scene=row).exists()
-    if is_augmented or row.scenarios.filter(catalogue_set="").exists():
-        return _Step.KEPT
-    row.document, row.provenance = document, scene.provenance
-    row.content_hash = content_hash(document)
-    row.save(update_fields=["document", "provenance", "content_hash"])
-    row.scenarios.update(original_image="")
-    _log(actor, "change", "scene", row, slug=row.slug, source=SOURCE)
-    return _Step.CHANGED
-
-
-def _store_paraphrases(
-    entry: CatalogueEntry, which: CatalogueSet, actor: User | None
-) -> dict[str, _Step]:
-    original = Scenario.objects.get(slug=entry.slug)
-    wordings = [
-        replace(
-            entry,
-            slug=f"{entry.slug}-p{number}",
-            instruction=wording.text,
-            language=wording.language,
-        )
-        for number, wording in enumerate(entry.paraphrases, start=1)
-    ]
-    return {one.slug: _store_scenario(one, which, actor, original) for one in wordings}
+    if not is_new and row.document == document:
+        return CatalogueStep.UNCHANGED
+    if not is_new:
+        is_augmented = Augmentation.objects.filter(scenario__base_scene=row).exists()
+        if is_augmented or row.scenarios.filter(catalogue_set="").exists():
+            return CatalogueStep.KEPT
+        BaseScene.objects.filter(pk=row.pk).update(**wanted)
+        row.scenarios.update(original_image="")
+    verb = "add" if is_new else "change"
+    _log(actor, verb, "scene", row, slug=row.slug, source=SOURCE)
+    return CatalogueStep.ADDED if is_new else CatalogueStep.CHANGED
 
 
 def _store_scenario(
-    entry: CatalogueEntry,
-    which: CatalogueSet,
-    actor: User | None,
-    original: Scenario | None = None,
-) -> _Step:
+    entry: CatalogueEntry, which: CatalogueSet, original: Scenario | None, actor: User | None
+) -> CatalogueStep:
     row = Scenario.objects.filter(slug=entry.slug).select_related("base_scene").first()
     reference = modification_to_document(entry.reference)
     intent = None if entry.intent is None else intent_to_document(entry.intent)
+    own = {"catalogue_set": which.value, "language": entry.language, "paraphrase_of": original}
     if row is None:
         row = add_scenario(
             scene=entry.scene,
@@ -296,41 +234,33 @@ def _store_scenario(
             keep_traffic=entry.keep_traffic,
             actor=actor,
         )
-        row.catalogue_set, row.language = which.value, entry.language
-        row.paraphrase_of = original
-        row.save(update_fields=["catalogue_set", "language", "paraphrase_of"])
-        return _Step.ADDED
+        Scenario.objects.filter(pk=row.pk).update(**own)
+        return CatalogueStep.ADDED
     if not row.in_catalogue:
         raise Conflict(
             f"There is a scenario called {row.slug!r} already that is not the catalogue's; "
             "the catalogue does not replace it."
         )
-    wanted = {
+    wanted = own | {
         "base_scene": BaseScene.objects.get(slug=entry.scene),
         "type": entry.type.value,
         "instruction": entry.instruction.strip(),
         "reference": reference,
         "keep_traffic": entry.keep_traffic,
-        "catalogue_set": which.value,
-        "language": entry.language,
-        "paraphrase_of": original,
         "intent": intent,
         "intent_origin": "" if intent is None else IntentOrigin.AUTHORED.value,
     }
     changed = sorted(name for name, value in wanted.items() if getattr(row, name) != value)
     if not changed:
-        return _Step.UNCHANGED
+        return CatalogueStep.UNCHANGED
     # An intent where there was none changes nothing that anybody was shown or asked.
-    is_new_to_readers = row.intent is not None or set(changed) - {"intent", "intent_origin"}
-    if is_new_to_readers and row.augmentations.exists():
-        return _Step.KEPT
-    for name, value in wanted.items():
-        setattr(row, name, value)
-    if set(changed) - {"intent", "intent_origin"}:
-        row.original_image = ""
-    row.save(update_fields=[*wanted, "original_image"])
+    seen = set(changed) - {"intent", "intent_origin"}
+    if (row.intent is not None or seen) and row.augmentations.exists():
+        return CatalogueStep.KEPT
+    image = {"original_image": ""} if seen else {}
+    Scenario.objects.filter(pk=row.pk).update(**wanted, **image)
     _log(actor, "change", "scenario", row, slug=row.slug, changed=changed)
-    return _Step.CHANGED
+    return CatalogueStep.CHANGED
 
 
 def _log(

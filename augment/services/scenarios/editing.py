@@ -34,7 +34,7 @@ from augment.scene.entities import (
 from augment.scene.intent import IntentOrigin
 from augment.scene.intent_statements import list_statements
 from augment.scene.lane_graph import LaneGraph
-from augment.services.events import log_event
+from augment.services.events import log_change
 from augment.services.scenarios.scenes import (
     check_reference,
     intent_of,
@@ -208,13 +208,8 @@ def _set(row: Scenario, document: dict[str, object] | None, actor: User | None) 
     before = row.reference
     row.reference = document
     row.save(update_fields=["reference"])
-    log_event(
-        actor=actor,
-        verb="set reference",
-        object_kind="scenario",
-        object_code=row.code,
-        before={"reference": before},
-        after={"reference": document},
+    log_change(
+        row, "set reference", actor, before={"reference": before}, after={"reference": document}
     )
     return row
 
@@ -297,12 +292,7 @@ def _set_intents(
     before = {"intent": row.intent, "origin": row.intent_origin or None}
     row.intent, row.intent_origin = document, origin
     row.save(update_fields=["intent", "intent_origin"])
-    log_event(
-        actor=actor,
-        verb="set intent",
-        object_kind="scenario",
-        object_code=row.code,
-        before=before,
-        after={"intent": document, "origin": origin.value},
+    log_change(
+        row, "set intent", actor, before=before, after={"intent": document, "origin": origin.value}
     )
     return row

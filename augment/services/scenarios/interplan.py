@@ -131,7 +131,7 @@ class StepKind(StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class Step:
+class ImportStep:
     """What was looked at, kept or skipped, and the sentence that says so."""
 
     kind: StepKind
@@ -144,7 +144,7 @@ def import_interplan(
     data: Path | None = None,
     instructions: Path | None = None,
     actor: User | None = None,
-) -> Iterator[Step]:
+) -> Iterator[ImportStep]:
     """Keep every special scenario whose base token lies in a log, one by one.
 
     Args:
@@ -165,10 +165,10 @@ def import_interplan(
     wanted = {token: one for token, one in by_token.items() if one.special_scenario}
     sentences = {} if instructions is None else _sentences(instructions, wanted)
     for text in file.left_out:
-        yield Step(StepKind.LEFT_OUT, f"Left out: {text}.")
+        yield ImportStep(StepKind.LEFT_OUT, f"Left out: {text}.")
     for token in by_token.keys() - wanted.keys():
         text = f"Left out: base token {token}, which has no special scenario."
-        yield Step(StepKind.LEFT_OUT, text)
+        yield ImportStep(StepKind.LEFT_OUT, text)
     logs: dict[str, Path] = {}
     paths = sorted((data or folder).rglob("*.db"))
     for number, path in enumerate(paths, start=1):
@@ -179,7 +179,7 @@ def import_interplan(
         except InvalidDocument as fault:
             found = str(fault)
         logs = dict.fromkeys(tokens, path) | logs
-        yield Step(StepKind.LOG, f"Log {number} of {len(paths)}, {path.name}: {found}")
+        yield ImportStep(StepKind.LOG, f"Log {number} of {len(paths)}, {path.name}: {found}")
     for token, details in wanted.items():
         if token in logs:
             yield from _keep_token(token, file, logs[token], sentences, actor)
@@ -208,14 +208,14 @@ def _modification_file_in(folder: Path) -> Path:
     return files[0]
 
 
-def _skip_all(token: str, details: Details, reason: str) -> Iterator[Step]:
+def _skip_all(token: str, details: Details, reason: str) -> Iterator[ImportStep]:
     for index in details.special_scenario or {}:
-        yield Step(StepKind.SKIPPED, f"{token}-s{index}: skipped. {reason}")
+        yield ImportStep(StepKind.SKIPPED, f"{token}-s{index}: skipped. {reason}")
 
 
 def _keep_token(
     token: str, file: File, log: Path, sentences: Mapping[str, str], actor: User | None
-) -> Iterator[Step]:
+) -> Iterator[ImportStep]:
     details = file.modification_details_dictionary[token]
     try:
         recorded = UntrustedInput(path=log, format=NuPlan.name)
@@ -234,7 +234,7 @@ def _keep_token(
             kept = _documents(file, token, str(index), entry)
             yield _keep_entry(row, scene, entry, details, kept, sentences.get(name), actor)
         except AugmentError as fault:
-            yield Step(StepKind.SKIPPED, f"{name}: skipped. {fault}")
+            yield ImportStep(StepKind.SKIPPED, f"{name}: skipped. {fault}")
 
 
 def _documents(file: File, token: str, index: str, entry: SpecialScenario) -> dict[str, Any]:
@@ -265,12 +265,12 @@ def _keep_entry(
     kept: dict[str, Any],
     sentence: str | None,
     actor: User | None,
-) -> Step:
+) -> ImportStep:
     token, slug = row.source_item, f"{row.slug}-s{kept['index']}"
     read = read_entry(token, kept["index"], entry, scene)
     left_out = f"; left out: {', '.join(read.left_out)}" if read.left_out else ""
     if Scenario.objects.filter(slug=slug, base_scene=row, type=read.type.value).exists():
-        return Step(StepKind.OLD, f"{read.id}: {slug} was there already{left_out}")
+        return ImportStep(StepKind.OLD, f"{read.id}: {slug} was there already{left_out}")
     density, goal = options_of(entry.config)
     added = read.modification.added
     traffic = traffic_of(entry, details, scene, seed=token, clear_of=added)
@@ -295,7 +295,7 @@ def _keep_entry(
         ),
         actor=actor,
     )
-    return Step(StepKind.NEW, f"{read.id}: {slug}{left_out}")
+    return ImportStep(StepKind.NEW, f"{read.id}: {slug}{left_out}")
 
 
 def _sentences(file: Path, wanted: Mapping[str, Details]) -> dict[str, str]:

@@ -31,7 +31,7 @@ from augment.scene.codec import (
     scene_from_document,
 )
 from augment.scene.entities import Modification, Scene, without_traffic
-from augment.services.events import log_event
+from augment.services.events import log_change
 from augment.services.scenarios.scenes import content_hash, reference_of, scene_key, scene_of
 
 FOLDER = "bev"
@@ -398,11 +398,7 @@ def _keep(
         )
         for scenario, document, image in drawn
     )
-    log_event(
-        actor=actor,
-        verb="draw checks",
-        object_kind="job",
-        object_code=job.code,
-        after={"scenarios": [scenario.slug for scenario, _, _ in drawn]},
+    log_change(
+        job, "draw checks", actor, after={"scenarios": [scenario.slug for scenario, _, _ in drawn]}
     )
     return rows

@@ -16,7 +16,7 @@ from augment.formats.reading import Moment, Reading
 from augment.models import BaseScene
 from augment.scene.codec import recording_to_document, scene_to_document
 from augment.scene.recording import Note, SceneNoteKind, notes_from_document, notes_to_document
-from augment.services.events import log_event
+from augment.services.events import log_change
 from augment.services.scenarios.scenes import SLUG_LENGTH, check_slug, content_hash
 from augment.simulation.planning import FALLBACK_LIMIT_MPS
 from augment.simulation.traffic import FALLBACK_MPS
@@ -181,7 +181,7 @@ def _keep(
     after = {"slug": slug, "source": source, "path": path.name, "frame": reading.moment.frame}
     if reading.moment.item is not None:
         after["item"] = reading.moment.item
-    log_event(actor=actor, verb="import", object_kind="scene", object_code=row.code, after=after)
+    log_change(row, "import", actor, after=after)
     return row
 
 

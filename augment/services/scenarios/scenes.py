@@ -39,7 +39,7 @@ from augment.scene.entities import ScenarioType as ScenarioType
 from augment.scene.entities import in_type_order as in_type_order
 from augment.scene.intent import Intent, IntentOrigin
 from augment.scene.lane_graph import LaneGraph
-from augment.services.events import log_event
+from augment.services.events import log_change
 from augment.services.texts import check_prose, one_line
 
 LONGEST_TYPE = 40
@@ -288,11 +288,10 @@ def change_circumstances(scenario: Scenario, given: Circumstances, *, keep_traff
 
 
 def _log_addition(scenario: Scenario, actor: User | None) -> None:
-    log_event(
-        actor=actor,
-        verb="add",
-        object_kind="scenario",
-        object_code=scenario.code,
+    log_change(
+        scenario,
+        "add",
+        actor,
         after={
             "slug": scenario.slug,
             "scene": scenario.base_scene.slug,
@@ -414,7 +413,7 @@ def check_reference(scene: Scene, modification: Modification) -> None:
         raise InvalidDocument("modification", problems)
 
 
-def check_slug(slug: str, *, what: str) -> None:
+def check_slug(slug: str, *, what: str, key: str = "slug") -> None:
     """Whether a slug can be stored.
 
     Raises:
@@ -422,7 +421,7 @@ def check_slug(slug: str, *, what: str) -> None:
     """
     if len(slug) > SLUG_LENGTH or not re.fullmatch(r"[a-z0-9]+(-[a-z0-9]+)*", slug):
         rule = f"lower-case letters, digits and single hyphens, at most {SLUG_LENGTH}"
-        raise InvalidDocument(what, [("slug", f"{slug!r} must be {rule}")])
+        raise InvalidDocument(what, [(key, f"{slug!r} must be {rule}")])
 
 
 # Private

@@ -8,6 +8,7 @@ import shutil
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +20,7 @@ from django.db import transaction
 
 from augment.errors import AugmentError, Conflict, InvalidDocument
 from augment.formats.apart import UntrustedInput
-from augment.formats.readers import READERS, RecordingPart, Timeline, reader_of
+from augment.formats.readers import READERS, RecordingPart, reader_of
 from augment.formats.reading import Reading
 from augment.models import SceneUpload, UploadMoment
 from augment.render.bev import draw
@@ -33,16 +34,25 @@ from augment.services.scenarios.scenes import check_slug
 from augment.services.work import Lease, Settlement, WorkKind
 
 State = SceneUpload.State
-
-FOLDER = "uploads"
-
+MomentState = UploadMoment.State
+FOLDER, PREVIEWS = "uploads", "previews"
 FORMATS = {reader.name: reader.title for reader in READERS.values()}
 """By name, what can be read."""
 
 
 def most_megabytes() -> int:
-    """How large a file may be."""
+    """Return how large a file may be."""
     return int(settings.UPLOAD_MB)
+
+
+def plain_name(name: str) -> str:
+    """Return a file's name without folders, in letters that every system takes."""
+    last = re.split(r"[/\\]", name)[-1]
+    plain = re.sub(r"[^A-Za-z0-9._-]+", "-", last).strip(".-") or "file"
+    return plain if len(plain) <= 100 else plain[:60] + plain[-40:]
+
+
+# Files
 
 
 def keep_upload(
@@ -95,7 +105,7 @@ def remove_upload(row: SceneUpload, actor: User | None = None) -> None:
     _log(row, "remove upload", actor)
     row.delete()
     for name in filter(None, names):
-        transaction.on_commit(lambda name=name: default_storage.delete(name))  # type: ignore[misc]
+        transaction.on_commit(partial(default_storage.delete, name))
 
 
 def read_again(row: SceneUpload) -> None:
@@ -108,24 +118,9 @@ def read_again(row: SceneUpload) -> None:
         raise Conflict(f"“{row.name}” did not fail.")
 
 
-class Uploads(WorkKind[SceneUpload]):
-    """Recordings that were sent: what each is, and what it holds."""
-
-    model = SceneUpload
-
-    def run(self, row: SceneUpload, held: Lease[SceneUpload]) -> Settlement:
-        """Look into the file."""
-        with open_upload(row) as source:
-            name, timeline = source.look()
-        return Settlement(state=State.READ, columns={"format": name, **_columns(timeline)})
-
-
-UPLOADS = Uploads()
-
-
 @contextmanager
 def open_upload(row: SceneUpload) -> Iterator[UntrustedInput]:
-    """The file on this machine; gone afterwards.
+    """Open the file on this machine; it is gone afterwards.
 
     Raises:
         Conflict: The file was removed.
@@ -140,39 +135,37 @@ def open_upload(row: SceneUpload) -> Iterator[UntrustedInput]:
         yield UntrustedInput(path=path, format=row.asked_format or None)
 
 
-def plain_name(name: str) -> str:
-    """A file's name without folders, in letters that every system takes."""
-    last = re.split(r"[/\\]", name)[-1]
-    plain = re.sub(r"[^A-Za-z0-9._-]+", "-", last).strip(".-") or "file"
-    return plain if len(plain) <= 100 else plain[:60] + plain[-40:]
+class Uploads(WorkKind[SceneUpload]):
+    """Recordings that were sent: what each is, and what it holds."""
+
+    model = SceneUpload
+
+    def run(self, row: SceneUpload, held: Lease[SceneUpload]) -> Settlement:
+        """Look into the file."""
+        with open_upload(row) as source:
+            name, found = source.look()
+        if not any(track.stops for track in found.tracks):
+            raise InvalidDocument("recording", [("", "holds no moment with an ego")])
+        tracks = [_document(track) for track in found.tracks]
+        columns = {"format": name, "tracks": tracks, "is_cut": found.is_cut}
+        return Settlement(state=State.READ, columns=columns)
 
 
-# --- Private -----------------------------------------------------------------------------------
-
-
-def _columns(found: Timeline) -> dict[str, Any]:
-    if not any(track.stops for track in found.tracks):
-        raise InvalidDocument("recording", [("", "holds no moment with an ego")])
-    return {"tracks": [_document(track) for track in found.tracks], "is_cut": found.is_cut}
+UPLOADS = Uploads()
 
 
 def _document(track: RecordingPart) -> dict[str, Any]:
-    return {
-        "name": track.name,
-        "is_seen": track.is_seen,
-        "stops": [
-            {
-                "item": stop.moment.item or "",
-                "frame": stop.moment.frame,
-                "time_s": None if stop.moment.time_s is None else round(stop.moment.time_s, 2),
-                "place_m": None
-                if stop.place_m is None
-                else [round(value, 2) for value in stop.place_m],
-            }
-            for stop in track.stops
-        ],
-        "roads_m": track.roads_m,
-    }
+    stops = [
+        {
+            "item": stop.moment.item or "",
+            "frame": stop.moment.frame,
+            "time_s": None if stop.moment.time_s is None else round(stop.moment.time_s, 2),
+            "place_m": stop.place_m and [round(value, 2) for value in stop.place_m],
+        }
+        for stop in track.stops
+    ]
+    seen = {"name": track.name, "is_seen": track.is_seen, "roads_m": track.roads_m}
+    return seen | {"stops": stops}
 
 
 def _log(row: SceneUpload, verb: str, actor: User | None, **after: Any) -> None:
@@ -185,14 +178,13 @@ def _log(row: SceneUpload, verb: str, actor: User | None, **after: Any) -> None:
     )
 
 
-MomentState = UploadMoment.State
-PREVIEWS = "previews"
+# Moments
 
 
 def ask_for_moment(
     upload: SceneUpload, *, item: str, frame: int, actor: User | None = None
 ) -> tuple[UploadMoment, bool]:
-    """The row of a moment that the upload offers, and whether a worker has still to draw it.
+    """Return the row of a moment that the upload offers, and whether it has still to be drawn.
 
     Raises:
         Conflict: The upload offers no such moment.
@@ -216,10 +208,8 @@ def ask_to_keep(row: UploadMoment, *, slug: str, actor: User | None = None) -> N
     """
     check_slug(slug, what="scene")
     drawn = UploadMoment.objects.filter(pk=row.pk, state=MomentState.DRAWN)
-    asked = drawn.update(
-        state=MomentState.KEEPING, slug=slug, reason="", asked_by=actor, sent_at=None
-    )
-    if not asked:
+    asked = {"state": MomentState.KEEPING, "slug": slug, "reason": "", "sent_at": None}
+    if not drawn.update(**asked, asked_by=actor):
         raise Conflict("This moment can't be kept now: look at its state.")
 
 
@@ -231,53 +221,43 @@ class Moments(WorkKind[UploadMoment]):
 
     def run(self, row: UploadMoment, held: Lease[UploadMoment]) -> Settlement:
         """Draw it, or keep it; what can't be kept stays drawn."""
-        if row.state == MomentState.QUEUED:
-            return _drawn(row)
+        is_new = row.state == MomentState.QUEUED
         try:
-            return _kept(row)
+            with open_upload(row.upload) as file:
+                source, reading = file.read(
+                    item=row.item or None, frame=row.frame, name="preview" if is_new else row.slug
+                )
+            if is_new:
+                picture = f"{PREVIEWS}/{row.code}.png"
+                scene = reading.scene
+                store_as(picture, draw(scene, Modification(), camera_for(scene, None)))
+                columns = {"picture": picture, "report": _report(reading)}
+                return Settlement(state=MomentState.DRAWN, columns=columns)
+            path = Path(row.upload.name)
+            kept, _ = keep_reading(reading, source=source, path=path, actor=row.asked_by)
         except AugmentError as error:
+            if is_new:
+                raise
             return Settlement(state=MomentState.DRAWN, reason=str(error))
+        return Settlement(state=MomentState.KEPT, columns={"scene": kept})
 
 
 MOMENTS = Moments()
 
 
 def sentences_of(row: UploadMoment) -> list[str]:
-    """What the source left open at this moment."""
+    """Return what the source left open at this moment."""
     return [said_of(note) for note in notes_from_document((row.report or {}).get("notes", []))]
-
-
-# --- Private -----------------------------------------------------------------------------------
-
-
-def _drawn(row: UploadMoment) -> Settlement:
-    _, reading = _read(row, "preview")
-    picture = f"{PREVIEWS}/{row.code}.png"
-    store_as(picture, draw(reading.scene, Modification(), camera_for(reading.scene, None)))
-    columns = {"picture": picture, "report": _report(reading)}
-    return Settlement(state=MomentState.DRAWN, columns=columns)
-
-
-def _kept(row: UploadMoment) -> Settlement:
-    source, reading = _read(row, row.slug)
-    path = Path(row.upload.name)
-    scene, _ = keep_reading(reading, source=source, path=path, actor=row.asked_by)
-    return Settlement(state=MomentState.KEPT, columns={"scene": scene})
-
-
-def _read(row: UploadMoment, name: str) -> tuple[str, Reading]:
-    with open_upload(row.upload) as file:
-        return file.read(item=row.item or None, frame=row.frame, name=name)
 
 
 def _report(reading: Reading) -> dict[str, Any]:
     scene, recording = reading.scene, reading.recording
-    return {
-        "agents": len(scene.agents),
-        "lanes": len(scene.lanes),
-        "connectors": len(scene.connectors),
-        "areas": len(scene.areas),
+    counts = {name: len(getattr(scene, name)) for name in _COUNTED}
+    return counts | {
         "recorded_s": 0.0 if recording is None else round(float(recording.times_s[-1]), 1),
         "provenance": scene.provenance,
         "notes": notes_to_document(reading.notes),
     }
+
+
+_COUNTED = ("agents", "lanes", "connectors", "areas")

@@ -1,0 +1,354 @@
+"""What a job is measured by: drives, displacement, analyses, and its files."""
+
+from __future__ import annotations
+
+import uuid
+from typing import Any
+
+from django.contrib import messages
+from django.core.files.storage import default_storage
+from django.db import transaction
+from django.http import (
+    FileResponse,
+    Http404,
+    HttpRequest,
+    HttpResponse,
+    HttpResponseBase,
+    StreamingHttpResponse,
+)
+from django.shortcuts import get_object_or_404, redirect, render
+from django.urls import reverse
+from django.utils.text import slugify
+from django.views.decorators.http import require_POST, require_safe
+
+from arena import tasks
+from arena.exports.files import CONTENT_TYPE
+from arena.exports.formats import download
+from arena.jobs.exports import displacement_files
+from arena.jobs.exports import driving as driving_exports
+from arena.jobs.exports.displacement import DisplacementTable, displacement_table
+from arena.jobs.exports.driving import SCORE_LABELS, DrivingTable, driving_table
+from arena.jobs.exports.files import TRANSCRIPT_FORMATS, transcript_lines
+from arena.jobs.exports.registry import JOB_TABLES
+from arena.jobs.exports.tables import TABLE_FORMATS
+from arena.jobs.queries import (
+    DRIVES,
+    Part,
+    analysis_of,
+    before_of,
+    drive_cells,
+    shown_augmentations,
+)
+from arena.jobs.services import ask_for_file
+from arena.models import ScenarioFile, Snapshot
+from arena.results.exports.tables import LeaderboardTable
+from arena.site.access import ADMIN, STAFF, allow_only, user_of
+from arena.site.acts import refusals_told, send_later
+from arena.site.listing import choice_asked, page_asked
+from augment.errors import UnknownName
+from augment.models import GenerationJob, Simulation
+from augment.services.judging import simulations
+from augment.services.judging.displacement import By, types_named
+from augment.services.judging.driving_scores import (
+    least_clearance_m,
+    options_driven,
+    scores_of_augmentations,
+)
+from augment.services.judging.scenario_export import FORMATS
+from augment.services.judging.simulations import FILES, NUPLAN, SCORES, Options, drive_file
+from augment.tasks import enqueue_simulations
+
+PDM_CLOSED = Options().planner
+OFFSETS = {"paper": "Up to 4 m (paper)", "original": "Up to 1 m (original)"}
+"""What the names of the lateral offsets mean."""
+
+PLANNERS = {PDM_CLOSED: "PDM-Closed", "idm": "IDM"}
+
+
+@allow_only(ADMIN)
+@require_POST
+def simulate_job(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
+    """Have the job's results driven by the workers."""
+    job = get_object_or_404(GenerationJob, code=code)
+    planner = request.POST.get("planner", PDM_CLOSED)
+    options = Options(
+        planner=planner,
+        offsets=request.POST.get("offsets", "paper") if planner == PDM_CLOSED else "paper",
+        is_reactive=request.POST.get("reactive") == "on",
+    )
+    score = request.POST.get("score", NUPLAN)
+    with refusals_told(request), transaction.atomic():
+        if score not in SCORES:
+            raise UnknownName("score", score, list(SCORES))
+        waiting = simulations.plan_job(job=job, options=options)
+        send_later(request, lambda _pk: enqueue_simulations(waiting), job.pk)
+        drives = "drive is" if len(waiting) == 1 else "drives are"
+        messages.success(request, f"{len(waiting)} {drives} queued.")
+    shown = f"?score={score}#driving" if score in SCORES else "#driving"
+    return redirect(reverse("job", args=[code]) + shown)
+
+
+@allow_only(*STAFF)
+@require_safe
+def drives_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
+    """Show the drives of a job in a grid, page by page."""
+    job = get_object_or_404(GenerationJob, code=code)
+    score = score_asked(request)
+    known = options_driven(job)
+    way = _way_asked(request, known)
+    part = Part(
+        view=DRIVES,
+        row=page_asked(request, "row"),
+        column=page_asked(request, "column"),
+        sample=page_asked(request, "sample"),
+    )
+    cells = drive_cells(job, known[way] if known else Options(), part)
+    lines = [
+        {
+            "scenario": row.scenario,
+            "scenes": [
+                _cell(found.get(row.scenario.pk), score)
+                for found in (cells.before, cells.reference)
+            ],
+            "cells": [
+                _cell(cells.by_augmentation.get(sample[0].pk) if sample else None, score)
+                for sample in row.cells
+            ],
+        }
+        for row in cells.grid.rows
+    ]
+    context = {"job": job, "lines": lines, "grid": cells.grid, "score": score}
+    driven = {"labels": SCORE_LABELS, "driven": way}
+    return render(request, "drives/list.html", context | driven)
+
+
+@allow_only(*STAFF)
+@require_safe
+def drive_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
+    """Show one drive, beside the same scene before the change."""
+    row = _driven(code)
+    before = before_of(row)
+    metrics, old = _metrics(row), {one["name"]: one["value"] for one in _metrics(before)}
+    context = {
+        "drive": row,
+        "before": before,
+        "files": FILES if row.state == Simulation.State.DONE else (),
+        "metrics": [metric | {"before": old.get(metric["name"])} for metric in metrics],
+        "labels": SCORE_LABELS,
+    }
+    return render(request, "drives/drive.html", context)
+
+
+@allow_only(*STAFF)
+@require_safe
+def drive_trace(request: HttpRequest, code: uuid.UUID, form: str) -> HttpResponseBase:
+    """Answer with the drive as JSON for the page, or as a moving picture or a strip of stills."""
+    row = _driven(code)
+    if row.state != Simulation.State.DONE or form not in FILES:
+        raise Http404
+    content = drive_file(row, form, before=None if form == "json" else before_of(row))
+    answer = HttpResponse(content, content_type=FILES[form])
+    answer["Cache-Control"] = "private, max-age=3600"
+    if form != "json":
+        answer["Content-Disposition"] = f'attachment; filename="{row.scenario.slug}.{form}"'
+    return answer
+
+
+def driving_section(request: HttpRequest, job: GenerationJob) -> dict[str, object]:
+    """Return the context of the driving part of a job's page."""
+    table = driving_asked(request, job)
+    known = options_driven(job)
+    chosen = _way_asked(request, known)
+    ways = [
+        {
+            "planner": PLANNERS.get(one.planner, one.planner),
+            "offsets": OFFSETS[one.offsets] if one.planner == PDM_CLOSED else "",
+            "is_reactive": one.is_reactive,
+            "is_shown": number == chosen,
+        }
+        for number, one in enumerate(known)
+    ]
+    choices = {"planner": PLANNERS.items(), "offsets": OFFSETS.items()}
+    asked = {"ways": ways, "driven": chosen, "choices": choices, "asked": table.scores.options}
+    return {"table": table, "forms": driving_exports.FORMATS, **asked, **_shown(table)}
+
+
+def driving(snapshot: Snapshot, table: LeaderboardTable) -> dict[str, Any]:
+    """Return the context of a study's tab: the drives of the augmentations that it shows."""
+    if not Simulation.objects.exists():
+        return {"drivings": []}
+    ids = shown_augmentations(snapshot.study)
+    found = [
+        DrivingTable(
+            title=snapshot.study.name,
+            scores=scores_of_augmentations(ids, options=Options(), score=score),
+        )
+        for score in SCORES
+    ]
+    return {"drivings": [{"table": one, **_shown(one)} for one in found if one.lines]}
+
+
+def driving_asked(request: HttpRequest, job: GenerationJob) -> DrivingTable:
+    """Return the table that the address asks for; of the last way of driving unless it says so."""
+    known = options_driven(job)
+    options = known[_way_asked(request, known)] if known else None
+    return driving_table(
+        job, options=options, score=score_asked(request), with_paper="paper" in request.GET
+    )
+
+
+def _shown(table: DrivingTable) -> dict[str, Any]:
+    return {
+        "lines": [
+            {"line": line, "types": [line.by_type[kind] for kind, _ in table.types]}
+            for line in table.lines
+        ],
+        "labels": SCORE_LABELS,
+        "score": table.scores.score,
+    }
+
+
+def score_asked(request: HttpRequest) -> str:
+    """Return the score that the address names, nuPlan's unless it names one."""
+    wanted = request.GET.get("score", NUPLAN)
+    return wanted if wanted in SCORES else NUPLAN
+
+
+def _way_asked(request: HttpRequest, known: list[Options]) -> int:
+    numbers = [str(number) for number in range(len(known))]
+    return int(choice_asked(request, "driven", numbers) or 0)
+
+
+def _driven(code: uuid.UUID) -> Simulation:
+    rows = Simulation.objects.select_related("scenario", "augmentation__contestant")
+    return get_object_or_404(rows, code=code)
+
+
+def _cell(row: Simulation | None, score: str) -> dict[str, Any] | None:
+    if row is None:
+        return None
+    return {
+        "row": row,
+        "value": getattr(row, SCORES[score]),
+        "clearance_m": least_clearance_m(row),
+    }
+
+
+def _metrics(row: Simulation | None) -> list[dict[str, Any]]:
+    """Return the parts of nuPlan's score."""
+    return [] if row is None or row.document is None else row.document["metrics"][NUPLAN]
+
+
+# --- Displacement, analyses and files -----------------------------------------------------------
+
+BY_OBJECT = "object"
+"""How the table with one row an object is asked for, beside the groupings."""
+
+GROUPINGS = {By.CONTESTANT: "Contestant", By.TYPE: "Scenario type", By.VARIANT: "Variant"}
+
+
+@allow_only(*STAFF)
+@require_safe
+def export_table(request: HttpRequest, code: uuid.UUID, name: str, form: str) -> HttpResponseBase:
+    """Answer with a table as a file, with the options that its part of the page has."""
+    job = get_object_or_404(GenerationJob, code=code)
+    stem = slugify(job.name) or "job"
+    if name == "displacement" and request.GET.get("by") == BY_OBJECT:
+        name = "displacement-objects"
+    if name == "displacement":
+        table = displacement_asked(request, job)
+        stem += f"-displacement-by-{table.by}" + "-all-types" * _asks_for_all_types(request)
+        return download(displacement_files.FORMATS, form, stem, lambda: table)
+    if name == "driving":
+        stem += f"-driving-{score_asked(request)}"
+        return download(driving_exports.FORMATS, form, stem, lambda: driving_asked(request, job))
+    if name not in JOB_TABLES:
+        raise Http404
+    known = JOB_TABLES[name]
+    return download(known.formats, form, f"{stem}-{name}", lambda: known.make(job))
+
+
+@allow_only(*STAFF)
+@require_safe
+def export_analysis(
+    request: HttpRequest, code: uuid.UUID, part: str, form: str
+) -> HttpResponseBase:
+    """Answer with one part of the analyses as a file."""
+    return export_table(request, code=code, name=f"analyses-{part}", form=form)
+
+
+@allow_only(*STAFF)
+@require_safe
+def export_transcripts(request: HttpRequest, code: uuid.UUID) -> StreamingHttpResponse:
+    """Answer with a line of JSON for each augmentation, sent while the rest is read."""
+    job = get_object_or_404(GenerationJob, code=code)
+    name = f"{slugify(job.name) or 'job'}-transcripts.jsonl"
+    return StreamingHttpResponse(
+        transcript_lines(job),
+        content_type=TRANSCRIPT_FORMATS["jsonl"].content_type,
+        headers={"Content-Disposition": f'attachment; filename="{name}"'},
+    )
+
+
+@allow_only(*STAFF)
+@require_safe
+def analyses_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
+    """Show all three parts, on a page of their own: the bootstrap may take seconds."""
+    job = get_object_or_404(GenerationJob, code=code)
+    context = {"job": job, "analysis": analysis_of(job), "forms": list(TABLE_FORMATS)}
+    return render(request, "jobs/analyses.html", context)
+
+
+@allow_only(*STAFF)
+@require_POST
+def ask_for_scenarios(request: HttpRequest, code: uuid.UUID, form: str) -> HttpResponse:
+    """Leave a zip of all scenarios of a job to a worker; twice does no harm."""
+    job = get_object_or_404(GenerationJob, code=code)
+    if form not in FORMATS:
+        raise Http404
+    with refusals_told(request), transaction.atomic():
+        row = ask_for_file(job=job, file_format=form, actor=user_of(request))
+        send_later(request, tasks.send_scenario_file, row.pk)
+        messages.success(request, "A worker writes the file; it is offered here when ready.")
+    return redirect(reverse("job", args=[code]) + "#scenario-files")
+
+
+@allow_only(*STAFF)
+@require_safe
+def download_scenarios(request: HttpRequest, code: uuid.UUID) -> FileResponse:
+    """Answer with a zip that is ready."""
+    row = get_object_or_404(ScenarioFile, code=code, state=ScenarioFile.State.READY)
+    try:
+        content = default_storage.open(row.stored)
+    except FileNotFoundError:
+        raise Http404 from None
+    return FileResponse(content, as_attachment=True, filename=row.name, content_type=CONTENT_TYPE)
+
+
+def displacement_asked(request: HttpRequest, job: GenerationJob) -> DisplacementTable:
+    """Return the displacement table that an address asks for: by contestant, unless it says so."""
+    by = request.GET.get("by", By.CONTESTANT)
+    return displacement_table(
+        job,
+        by=By(by) if by in set(By) else By.CONTESTANT,
+        types=types_named(["all"]) if _asks_for_all_types(request) else None,
+    )
+
+
+def displacement_section(request: HttpRequest, job: GenerationJob) -> dict[str, object]:
+    """Return the context of the displacement part of a job's page."""
+    table, is_all = displacement_asked(request, job), _asks_for_all_types(request)
+    return {
+        "table": table,
+        "by": table.by,
+        "labels": GROUPINGS,
+        "forms": displacement_files.FORMATS,
+        "object_forms": TABLE_FORMATS,
+        "query": f"by={table.by}" + "&types=all" * is_all,
+        "has_choice": table.by is By.VARIANT,
+        "is_all": is_all,
+    }
+
+
+def _asks_for_all_types(request: HttpRequest) -> bool:
+    return request.GET.get("types") == "all"

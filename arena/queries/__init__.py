@@ -1,1 +1,0 @@
-"""Reads of arena, one subject a file; who may see what is decided here."""

@@ -1,1 +1,0 @@
-"""Studies with their plans, voters and results."""

@@ -1,1 +1,0 @@
-"""Votes of a rating: which count, lists of them, and what they say of the pictures."""

@@ -1,0 +1,1 @@
+"""Ratings and studies as tables, charts and files."""

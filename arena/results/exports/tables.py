@@ -1,0 +1,298 @@
+"""A snapshot as a table, and its columns: what every writer, chart and page shows of it.
+
+In: a snapshot. Out: its lines in order with all that must be said with them, and the value of each
+column with its name wherever it stands.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, replace
+from typing import Any
+
+from django.db.models import F
+
+from arena.exports.formats import NUMBER, TEXT, WHOLE, YES_NO
+from arena.models import Snapshot, Standing
+from arena.models.ratings import stored_values
+from arena.rating.lines import Line, notes_by_reason
+from arena.rating.rules import METHOD_TEXTS, UNIT_TEXTS, Intervals
+from arena.results.queries.votes import LeftOut
+from arena.studies.services.opening import preregistration_sha256
+from arena.studies.services.plan import Answered, answer_hypotheses
+
+SIMULATED = " (simulated)"
+SIMULATED_TABLE = "Simulated: votes or contestants of this table are made by the machine."
+EARLY_LOOK = "Early look: the study was still open."
+NOT_RANKED = "Not enough votes to rank: no contestant can be told from any other."
+APART = -1
+"""The part of those who are rated with nobody."""
+
+
+def shown_name(name: str, is_simulated: bool) -> str:
+    """The name, with "(simulated)" where that is so."""
+    return f"{name}{SIMULATED}" if is_simulated else name
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Row(Line):
+    """One contestant's line, and who that is; `name` is what people know.
+
+    Attributes:
+        variant: The recipe's name as it ends the contestant's name, empty without.
+        options: How it asked, a JSON object with sorted names; empty for who asks no model.
+    """
+
+    slug: str
+    kind: str
+    simulated: bool
+    variant: str = ""
+    options: str = ""
+
+    @property
+    def model(self) -> str:
+        """The name, with "(simulated)" where that is so."""
+        return shown_name(self.name, self.simulated)
+
+    @property
+    def score_text(self) -> str:
+        """The mean score of a vote, a dash without votes."""
+        return f"{self.score_percent} %" if self.votes else "–"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LeaderboardTable:
+    """A snapshot's lines in order, and all that must be said with them.
+
+    Attributes:
+        reasons: Why ratings or intervals are missing, none if none is.
+        early: The study was still open.
+        notes: What else the method has to say about these votes.
+        left_out: Votes that do not count, by reason.
+        covariates: What the ratings are adjusted for.
+        preregistration: The SHA-256 of the file that was frozen at the opening, empty without.
+        hypotheses: What was expected, and what the rating says of it.
+    """
+
+    study: str
+    rows: tuple[Row, ...]
+    method: str
+    rounds: int
+    unit: str
+    intervals: str = "resamples"
+    seed: int
+    degenerate_rounds: int
+    votes: int
+    left_out: dict[str, int]
+    votes_sha256: str
+    experts: int = 0
+    scenarios: int = 0
+    reasons: tuple[str, ...] = ()
+    simulated: bool
+    early: bool
+    notes: tuple[str, ...] = ()
+    covariates: tuple[str, ...] = ()
+    preregistration: str = ""
+    hypotheses: tuple[Answered, ...] = ()
+
+    @property
+    def status(self) -> str:
+        """The reasons in one line, empty if nothing is missing."""
+        return " ".join(self.reasons)
+
+    @property
+    def method_text(self) -> str:
+        """How the numbers came about, in one line."""
+        adjusted = f", adjusted for {', '.join(self.covariates)}" if self.covariates else ""
+        unit = UNIT_TEXTS[self.unit]
+        intervals = (
+            f"in closed form, clustered by {unit}"
+            if self.is_closed_form
+            else f"by {self.rounds} resamples of {unit}"
+        )
+        method = METHOD_TEXTS[self.method]
+        return f"{method}{adjusted}, 95 % intervals {intervals}, seed {self.seed}"
+
+    @property
+    def notes_on_method(self) -> dict[str, Any]:
+        """How intervals were found and what is adjusted for, for documents.
+
+        Older ratings had no word for resamples.
+        """
+        notes: dict[str, Any] = {"intervals": self.intervals} if self.is_closed_form else {}
+        return notes | ({"covariates": list(self.covariates)} if self.covariates else {})
+
+    @property
+    def is_closed_form(self) -> bool:
+        """Whether intervals come from a formula and not from resampled rounds."""
+        return self.intervals == Intervals.CLOSED_FORM.value
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Sentences that no reader may miss, for files."""
+        marks = ((SIMULATED_TABLE, self.simulated), (EARLY_LOOK, self.early))
+        said = [mark for mark, so in marks if so]
+        return (*said, *((self.status,) if self.status else ()), *self.notes)
+
+    @property
+    def frozen_text(self) -> str:
+        """What was frozen before the first vote, in one line; empty without."""
+        return f"preregistered: sha256 {self.preregistration}" if self.preregistration else ""
+
+    @property
+    def missing(self) -> list[str]:
+        """What is missing in which lines and why, for files."""
+        return notes_by_reason((row.model, row.note) for row in self.rows)
+
+    @property
+    def has_parts(self) -> bool:
+        """Whether there are groups that can't be compared with each other."""
+        return len({row.part for row in self.rows if row.rating is not None}) > 1
+
+
+def leaderboard_table(snapshot: Snapshot) -> LeaderboardTable:
+    """The table of a snapshot, best first; one query."""
+    lines = snapshot.standings.select_related("contestant")
+    standings = list(lines.order_by(F("rating").desc(nulls_last=True), "slug"))
+    board, adjustment = snapshot.results.board, snapshot.results.adjustment
+    reasons = (snapshot.reason,) if board.reasons is None else board.reasons
+    last = len(standings)
+    standings.sort(key=lambda standing: board.parts.get(standing.slug, last))
+    if board.order:
+        standings.sort(key=lambda standing: board.order.index(standing.slug))
+    rows = [
+        _row(standing, board.parts.get(standing.slug, APART) if board.parts else 0)
+        for standing in standings
+    ]
+    ranks = [row.rank for row in rows if row.rank is not None]
+    if len(rows) > 1 and len(ranks) != 1 and set(ranks) <= {1}:
+        rows = [replace(row, rank=None, rank_best=None, rank_worst=None) for row in rows]
+        reasons = (*reasons, NOT_RANKED)
+    return LeaderboardTable(
+        study=snapshot.study.name,
+        rows=tuple(rows),
+        method=snapshot.method,
+        rounds=snapshot.rounds,
+        unit=snapshot.resampling_unit,
+        intervals=snapshot.intervals,
+        seed=snapshot.seed,
+        degenerate_rounds=snapshot.degenerate_rounds,
+        votes=snapshot.votes_counted,
+        left_out=dict(sorted(snapshot.votes_left_out.items())),
+        votes_sha256=snapshot.votes_sha256,
+        experts=board.experts,
+        scenarios=board.scenarios,
+        reasons=tuple(filter(None, reasons)),
+        simulated=snapshot.includes_simulated,
+        early=snapshot.is_early,
+        notes=tuple(filter(None, board.warnings)),
+        covariates=tuple(effect.name for effect in adjustment.effects) if adjustment else (),
+        preregistration=preregistration_sha256(snapshot.study),
+        hypotheses=answer_hypotheses(snapshot),
+    )
+
+
+def for_experts(table: LeaderboardTable) -> LeaderboardTable:
+    """The same table without a word of authors: what is left out for that was not asked for."""
+    left_out = dict(table.left_out)
+    own = left_out.pop(LeftOut.OWN.value, 0)
+    if own:
+        left_out[LeftOut.FILTERED.value] = left_out.get(LeftOut.FILTERED.value, 0) + own
+    return replace(table, left_out=left_out)
+
+
+def _row(standing: Standing, part: int) -> Row:
+    name, variant, who = standing.name, standing.variant, standing.contestant
+    last_word = name.rpartition(" ")[2]
+    fixed = who.frozen_options if who else None
+    return Row(
+        name=name,
+        variant=last_word if variant and last_word.lower() == variant.lower() else "",
+        slug=standing.slug,
+        kind=standing.kind,
+        simulated=standing.is_simulated,
+        part=part,
+        options=json.dumps(fixed, sort_keys=True) if fixed else "",
+        **stored_values(standing),
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Column:
+    """A column, and where it stands: nowhere where the name for a place is empty.
+
+    A new column is an entry at the end of COLUMNS, so that what reads files by position goes on;
+    one that is stored needs a field of `arena.rating.lines.Line` and, with a migration, of
+    `Standing`.
+
+    Attributes:
+        field: Of a contestant's row; of the whole table with `of_table`.
+        name: In CSV and Parquet; `kind` is what Parquet holds.
+        key: In JSON.
+        printed: Its head in LaTeX and in the terminal.
+        page: Its head on the page.
+        text_field: What is printed, in LaTeX, in the terminal and on the page.
+        identifies: Says whose line it is, which stands first in JSON and where it is printed.
+    """
+
+    field: str
+    name: str = ""
+    kind: str = TEXT
+    key: str = ""
+    printed: str = ""
+    page: str = ""
+    text_field: str = ""
+    identifies: bool = False
+    of_table: bool = False
+
+    def value_of(self, table: LeaderboardTable, row: Row) -> object:
+        """What stands in files."""
+        return getattr(table if self.of_table else row, self.field)
+
+    def text(self, row: Row) -> str:
+        """What is printed."""
+        return str(getattr(row, self.text_field or self.field))
+
+
+def _column(name: str, kind: str = TEXT, **more: Any) -> Column:
+    """A column that is called in JSON, and in the row unless said otherwise, as in files."""
+    return Column(**{"field": name, "name": name, "kind": kind, "key": name} | more)
+
+
+def _column_of_table(name: str, kind: str = TEXT, field: str = "") -> Column:
+    return Column(field=field or name, name=name, kind=kind, of_table=True)
+
+
+COLUMNS = (
+    _column("rank", WHOLE, printed="Rank", page="Rank", text_field="rank_text"),
+    _column("model", printed="Model", page="Contestant", identifies=True),
+    _column("elo", NUMBER, field="rating", key="rating", printed="Elo", page="Elo",
+            text_field="elo_text"),
+    _column("lower", NUMBER),
+    _column("upper", NUMBER),
+    Column(field="interval_text", printed="95% CI", page="95 % CI"),
+    _column("votes", WHOLE, printed="Votes", page="Votes"),
+    Column(field="score_text", page="Score"),
+    _column("wins", WHOLE, page="Won"),
+    _column("ties", WHOLE, page="Tied"),
+    _column("losses", WHOLE, page="Lost"),
+    _column("slug", identifies=True),
+    _column("kind", identifies=True),
+    _column("simulated", YES_NO, identifies=True),
+    _column("note"),
+    _column_of_table("study"),
+    _column_of_table("method", field="method_text"),
+    _column_of_table("study_simulated", YES_NO, "simulated"),
+    _column_of_table("early", YES_NO),
+    _column("rank_best", WHOLE),
+    _column("rank_worst", WHOLE),
+    _column_of_table("preregistration"),
+    Column(field="ranks_text", printed="95% ranks"),
+    _column("options"),
+)  # fmt: skip
+
+IN_FILES = tuple(column for column in COLUMNS if column.name)
+ON_PAGE = tuple(column for column in COLUMNS if column.page)
+_WHOSE_FIRST = sorted(COLUMNS, key=lambda column: not column.identifies)
+IN_JSON = tuple(column for column in _WHOSE_FIRST if column.key)
+PRINTED = tuple(column for column in _WHOSE_FIRST if column.printed)

@@ -1,0 +1,96 @@
+"""Votes as files: those of a rating in the column form of Chatbot Arena, and a list of any."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+from arena.exports.formats import TEXT, WHOLE, YES_NO, Format, formats, parquet_bytes
+from arena.models import Snapshot, Study
+from arena.results.queries.evidence import ListedVote, each_vote
+from arena.results.queries.search import VoteSearch
+from arena.results.queries.votes import RATED, Filters, current_votes, last_vote_of
+from arena.results.services.ratings import votes_of, votes_version_of
+from arena.results.services.vote_files import (
+    BOTH_BAD,
+    COLUMNS,
+    VERSION,
+    WINNERS,
+    Row,
+    vote_columns,
+    vote_rows,
+    votes_csv,
+)
+from arena.services.cells import csv_parts
+
+_KINDS = {"ms_visible": WHOLE, "simulated": YES_NO, "position": WHOLE}
+
+LIST_COLUMNS = (*COLUMNS, "mark", "reason", "vote")
+"""Those of the rating's own file, then why a vote does not count ("counted" where it does), why it
+was skipped, and the code in its address."""
+
+
+class VoteTable(NamedTuple):
+    """Votes in the order in which they came, and the version of the columns to write."""
+
+    version: int
+    rows: list[Row]
+
+
+def vote_table(snapshot: Snapshot) -> VoteTable:
+    """The votes that the rating is made of.
+
+    Raises:
+        Conflict: They are not what they were.
+    """
+    rows = vote_rows(votes_of(snapshot).counted, snapshot.results.judges)
+    return VoteTable(version=votes_version_of(snapshot), rows=list(rows))
+
+
+def unrated_votes(study: Study) -> VoteTable:
+    """The votes of a study that nobody rates, repeats and checks by their kind; no skips."""
+    current = current_votes(study, Filters(), last_vote_of(study))
+    decided = [vote for vote in current if vote.outcome in RATED]
+    names = {vote.judge: vote.judge_name for vote in decided}
+    return VoteTable(version=VERSION, rows=list(vote_rows(decided, names)))
+
+
+def parquet_of(table: VoteTable) -> bytes:
+    """The columns of the CSV file, typed; nothing is guarded, as no spreadsheet reads it."""
+    names = vote_columns(table.version)
+    rows = (row[: len(names)] for row in table.rows)
+    return parquet_bytes({name: _KINDS.get(name, TEXT) for name in names}, rows)
+
+
+VOTE_FORMATS: dict[str, Format[VoteTable]] = formats(
+    csv=lambda table: votes_csv(table.rows, table.version), parquet=parquet_of
+)
+
+
+def vote_list_csv(snapshot: Snapshot, search: VoteSearch) -> Iterator[bytes]:
+    """All votes that are looked for, some lines at a time; names are pseudonyms."""
+    return csv_parts(LIST_COLUMNS, map(_list_row, each_vote(snapshot, search)))
+
+
+def _list_row(vote: ListedVote) -> tuple[object, ...]:
+    return (
+        vote.left.slug,
+        vote.right.slug,
+        BOTH_BAD if vote.both_miss else WINNERS.get(vote.outcome),
+        vote.judge,
+        vote.scenario,
+        vote.type,
+        vote.kind,
+        vote.outcome if vote.outcome in ("left", "right") else None,
+        vote.ms_visible,
+        vote.is_simulated,
+        vote.at and vote.at.isoformat(timespec="milliseconds"),
+        vote.position,
+        vote.aids,
+        vote.comment,
+        vote.left.augmentation,
+        vote.right.augmentation,
+        vote.mark,
+        vote.reason,
+        vote.code,
+    )

@@ -1,0 +1,203 @@
+"""The evidence of a rating: votes with their pictures, as a grid, a file, or one at a time."""
+
+from __future__ import annotations
+
+import uuid
+from collections.abc import Mapping
+from typing import Any
+from urllib.parse import urlencode
+
+from django import forms
+from django.http import Http404, HttpRequest, HttpResponse, HttpResponseBase, StreamingHttpResponse
+from django.shortcuts import get_object_or_404, render
+from django.utils.text import slugify
+from django.views.decorators.http import require_safe
+
+from arena.models import ImportedVote, Matchup, Snapshot, Study
+from arena.models.votes import AID_LABELS
+from arena.people.queries import natural_order
+from arena.results.exports.tables import shown_name
+from arena.results.exports.votes import vote_list_csv
+from arena.results.pages.ratings import get_readable_study, get_snapshot
+from arena.results.queries.evidence import neighbours, vote_in, vote_page
+from arena.results.queries.search import MARKS, ORDERS, OUTCOMES, PARTS, VoteSearch
+from arena.results.queries.votes import AUTOMATIC, COUNTED, is_imported
+from arena.site.access import STAFF, allow_only
+from arena.site.listing import page_asked
+from arena.voting.queries.showings import describe_in_words, picture_of_side
+from arena.web.pictures import sized_picture_response
+from augment.services.running.jobs import HIGHEST_SAMPLES
+from augment.services.scenarios.scenes import type_choices
+
+_ALL = ("", "all")
+
+
+class VoteSearchForm(forms.Form):
+    """The filters of a list of votes, as they stand in the address."""
+
+    contestant = forms.ChoiceField(label="Contestant", required=False)
+    opponent = forms.ChoiceField(label="Against", required=False)
+    outcome = forms.ChoiceField(label="Outcome", required=False, choices=[_ALL, *OUTCOMES.items()])
+    type = forms.ChoiceField(
+        label="Scenario type", required=False, choices=lambda: [_ALL, *type_choices()]
+    )
+    scenario = forms.CharField(label="Scenario", required=False, max_length=200)
+    sample = forms.IntegerField(
+        label="Sample", required=False, min_value=1, max_value=HIGHEST_SAMPLES
+    )
+    expert = forms.ChoiceField(label="Expert", required=False)
+    mark = forms.ChoiceField(label="Counts", required=False, choices=[*MARKS.items()])
+    part = forms.ChoiceField(label="Only", required=False, choices=[_ALL, *PARTS.items()])
+    aid = forms.ChoiceField(
+        label="Looked with", required=False, choices=[_ALL, *AID_LABELS.items()]
+    )
+    comment = forms.CharField(label="Words in the comment", required=False, max_length=200)
+    order = forms.ChoiceField(
+        label="Begin with", required=False, choices=[("", "First votes"), *ORDERS.items()]
+    )
+
+    def __init__(self, query: Mapping[str, str], *, snapshot: Snapshot) -> None:
+        """Offer what the rating has."""
+        data = {name: query.get(name, "") for name in self.base_fields}
+        super().__init__(data | {"mark": data["mark"] or COUNTED})
+        self._study = snapshot.study
+        lines = snapshot.standings.order_by("name")
+        shown = [(line.slug, shown_name(line.name, line.is_simulated)) for line in lines]
+        fields: dict[str, Any] = self.fields
+        fields["contestant"].choices = fields["opponent"].choices = [_ALL, *shown]
+        fields["expert"].choices = [_ALL, *_experts(snapshot)]
+        if not self._study.shows_all_samples:
+            del fields["sample"]
+        if is_imported(self._study):
+            for name in ("type", "part", "aid", "comment", "order"):
+                del fields[name]
+
+    def clean_scenario(self) -> str:
+        """A scenario that occurs, be it in attention checks alone."""
+        slug: str = self.cleaned_data["scenario"].strip()
+        study = self._study
+        occurs = not slug or (
+            ImportedVote.objects.filter(file__study=study, item=slug).exists()
+            if is_imported(study)
+            else study.matchups.filter(scenario__slug=slug).exists()
+            or study.scenarios.filter(slug=slug).exists()
+        )
+        if not occurs:
+            raise forms.ValidationError(
+                "There is no scenario “%(name)s” in this study.", params={"name": slug}
+            )
+        return slug
+
+    def clean_sample(self) -> str:
+        """As an address has it."""
+        return str(self.cleaned_data["sample"] or "")
+
+    def clean(self) -> dict[str, Any]:
+        """Refuse what says nothing."""
+        cleaned: dict[str, Any] = super().clean() or {}
+        contestant, outcome = cleaned.get("contestant"), cleaned.get("outcome")
+        if contestant and contestant == cleaned.get("opponent"):
+            self.add_error("opponent", "Choose somebody else: nobody meets themselves.")
+        if outcome in ("won", "lost") and not contestant:
+            self.add_error("outcome", "Choose the contestant who won or lost.")
+        return cleaned
+
+    def search(self) -> VoteSearch:
+        """What is looked for; everything that counts where the form is not valid."""
+        return VoteSearch.of_query(self.cleaned_data) if self.is_valid() else VoteSearch()
+
+
+@allow_only(*STAFF)
+@require_safe
+def votes_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
+    """One page of the votes that the address looks for, with their pictures."""
+    snapshot, form, context = _asked(request, code)
+    if not form.is_valid():
+        return render(request, "results/votes.html", context, status=422)
+    context["page"] = vote_page(snapshot, form.search(), page_asked(request))
+    return render(request, "results/votes.html", context)
+
+
+@allow_only(*STAFF)
+@require_safe
+def votes_file(request: HttpRequest, code: uuid.UUID) -> HttpResponseBase:
+    """All votes that the address looks for, as CSV."""
+    snapshot, form, context = _asked(request, code)
+    if not form.is_valid():
+        return render(request, "results/votes.html", context, status=422)
+    name = f"{slugify(snapshot.study.name) or 'study'}-votes-list.csv"
+    return StreamingHttpResponse(
+        vote_list_csv(snapshot, form.search()),
+        content_type="text/csv; charset=utf-8",
+        headers={"Content-Disposition": f'attachment; filename="{name}"'},
+    )
+
+
+@allow_only(*STAFF)
+@require_safe
+def single_vote_page(request: HttpRequest, code: uuid.UUID, vote: uuid.UUID) -> HttpResponse:
+    """One vote: the pair as it was shown, what was decided how, and who drew what."""
+    snapshot, form, context = _asked(request, code)
+    single = vote_in(snapshot, vote)
+    if single is None:
+        raise Http404
+    matchup = single.vote.matchup
+    context |= {
+        "found": single,
+        "vote": single.vote,
+        "matchup": matchup,
+        "described": [describe_in_words(side) for side in matchup.descriptions or ()],
+        "beside": neighbours(snapshot, form.search(), single.vote),
+    }
+    return render(request, "results/vote.html", context)
+
+
+@allow_only(*STAFF)
+@require_safe
+def shown_picture(
+    request: HttpRequest, code: uuid.UUID, matchup: uuid.UUID, side: str
+) -> HttpResponseBase:
+    """A picture as an expert of the study was shown it: left, right, or before the change."""
+    study = get_readable_study(request, code)
+    rows = Matchup.objects.select_related("left", "right").only(
+        "left_image", "right_image", "original_image", "left__image", "right__image"
+    )
+    shown = get_object_or_404(rows, study=study, code=matchup)
+    if side not in ("left", "right", "original"):
+        raise Http404
+    return sized_picture_response(request, picture_of_side(shown, side))
+
+
+# --- Private -----------------------------------------------------------------------------------
+
+
+def _asked(
+    request: HttpRequest, code: uuid.UUID
+) -> tuple[Snapshot, VoteSearchForm, dict[str, Any]]:
+    """The rating, what is looked for, and what the templates of both pages need of them."""
+    study: Study = get_readable_study(request, code)
+    snapshot = get_snapshot(request, study)
+    form = VoteSearchForm(request.GET.dict(), snapshot=snapshot)
+    query = {"rating": str(snapshot.code), **form.search().as_query()}
+    context = {
+        "study": study,
+        "snapshot": snapshot,
+        "form": form,
+        "search": form.search() if form.is_valid() else None,
+        "query": urlencode(query),
+        "imported": is_imported(study),
+        "is_staff": True,
+    }
+    return snapshot, form, context
+
+
+def _experts(snapshot: Snapshot) -> list[tuple[str, str]]:
+    """Pseudonyms as the rating kept them, and of the study's experts without a counted vote."""
+    names = {
+        str(code): name
+        for code, name in snapshot.study.experts.values_list("person__code", "person__pseudonym")
+    } | snapshot.results.judges
+    if AUTOMATIC in names:
+        names[AUTOMATIC] = "nobody: never shown"
+    names.pop("", None)
+    return sorted(names.items(), key=lambda item: natural_order(item[1]))

@@ -1,0 +1,265 @@
+"""Which votes of a rating somebody looks for: what stands in an address, and the rows it finds."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, fields
+from typing import Any
+
+from django.db.models import Exists, OuterRef, Q, QuerySet
+
+from arena.models import ImportedVote, Snapshot, Vote
+from arena.pairing.order import CHECK, REPEAT
+from arena.rating.reliability import FAST_MS
+from arena.results.queries.votes import (
+    AUTOMATIC,
+    AUTOMATIC_TIE,
+    COUNTED,
+    RATED,
+    Filters,
+    Judged,
+    LeftOut,
+    marked_lines,
+    marked_votes,
+    own_votes,
+    users_of,
+)
+from augment.models import Contestant
+
+EVERY, LEFT_OUT = "all", "left_out"
+"""Marks of several: everything, and all that does not count."""
+
+OUTCOMES = {
+    "won": "The contestant won",
+    "tied": "Tied",
+    "lost": "The contestant lost",
+    "left": "A is better",
+    "equal": "Equal",
+    "right": "B is better",
+    "decided": "A or B is better",
+    "both_miss": "Equal, both miss the instruction",
+    "skip": "Skipped",
+}
+PARTS = {
+    "commented": "With a comment",
+    "fast": "Under 1 s",
+    "own": "By authors on their own contestants",
+    "repeats": "Hidden repeats of counted votes",
+    "alike": "Hidden repeats answered alike",
+    "checks": "Attention checks answered",
+    "passed": "Attention checks passed",
+    "checks_skipped": "Attention checks skipped",
+    "shared": "On what others judged as well",
+}
+ORDERS = {
+    "disputed": "Most disputed",
+    "lost": "Most often beaten",
+    "faults": "Most faults",
+    "scenario": "Scenarios by name",
+}
+MARKS = {
+    COUNTED: "Counted",
+    EVERY: "All",
+    LEFT_OUT: "Left out",
+    "superseded": "Left out: changed later",
+    "check": "Left out: attention checks",
+    "repeat": "Left out: hidden repeats",
+    "skip": "Left out: skipped",
+    "simulated": "Left out: simulated",
+    "filtered": "Left out: not asked for",
+    "own": "Left out: by authors on their own contestants",
+    AUTOMATIC_TIE: "Not shown: nobody can tell the pictures apart",
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class VoteSearch:
+    """What is looked for; empty is all.
+
+    Attributes:
+        contestant, opponent: Slugs of who was shown.
+        scenario: A slug, and `type` the type of scenarios.
+        sample: Its number, in a study that shows every sample on its own.
+        expert: The code of a judge.
+        outcome: Of OUTCOMES; won, tied and lost are seen from the contestant.
+        part: Of PARTS: what a number of the results stands for.
+        mark: Of MARKS.
+        comment: Words in the expert's comment.
+        aid: What the expert looked with.
+        order: Of ORDERS: what comes first; empty is the order in which the votes were given.
+    """
+
+    contestant: str = ""
+    opponent: str = ""
+    scenario: str = ""
+    sample: str = ""
+    type: str = ""
+    expert: str = ""
+    outcome: str = ""
+    part: str = ""
+    mark: str = COUNTED
+    comment: str = ""
+    aid: str = ""
+    order: str = ""
+
+    def as_query(self) -> dict[str, str]:
+        """What an address says of it: nothing of what is left as it is."""
+        values = {name: getattr(self, name) for name in _DEFAULTS}
+        return {name: text for name, text in values.items() if text != _DEFAULTS[name]}
+
+    @classmethod
+    def of_query(cls, query: Mapping[str, str]) -> VoteSearch:
+        """What `as_query` wrote; other words of the address are somebody else's."""
+        return cls(**{name: query[name] for name in _DEFAULTS if query.get(name)})
+
+
+def find_votes(snapshot: Snapshot, search: VoteSearch) -> QuerySet[Vote]:
+    """The rows of a study of matchups, each with its `mark`; no order."""
+    rows: QuerySet[Vote] = _by_mark(marked_votes(snapshot), search.mark)
+    if search.expert == AUTOMATIC:
+        return rows.none()
+    if search.expert:
+        rows = rows.filter(expert__in=users_of([search.expert]).values())
+    words = {
+        "matchup__scenario__slug": search.scenario,
+        "matchup__right__sample": search.sample,  # both sides show the same one
+        "matchup__scenario__type": search.type,
+        "comment__icontains": search.comment,
+        "aids__contains": search.aid,  # no aid's name is part of another's
+    }
+    rows = rows.filter(**{path: word for path, word in words.items() if word})
+    if search.outcome == "both_miss":
+        rows = rows.filter(both_miss=True)
+    left, right = "shown_left__contestant__slug", "shown_right__contestant__slug"
+    rows = rows.filter(_shows(search, left, right, _VOTE_OUTCOMES))
+    return _PARTS[search.part](rows, snapshot) if search.part else rows
+
+
+def find_lines(snapshot: Snapshot, search: VoteSearch) -> QuerySet[ImportedVote]:
+    """The lines of a study's file that are looked for, in their order, each with its `mark`.
+
+    A file has no types, times, comments and skips, so nothing is found by these.
+    """
+    filters = Filters.of_document(snapshot.filters)
+    lines = marked_lines(snapshot.study, filters, snapshot.last_vote)
+    rows: QuerySet[ImportedVote] = _by_mark(lines, search.mark)
+    if search.type or search.part or search.comment:
+        return rows.none()
+    words = {"judge": search.expert, "item": search.scenario}
+    rows = rows.filter(**{name: word for name, word in words.items() if word})
+    return rows.filter(_shows(search, "first", "second", _LINE_OUTCOMES)).order_by("line")
+
+
+def is_found(tie: Judged, search: VoteSearch) -> bool:
+    """Whether a tie on a pair that nobody can tell apart is looked for."""
+    if search.comment or search.part or search.aid or search.sample:
+        return False
+    marks = {EVERY: True, LEFT_OUT: tie.mark not in (COUNTED, AUTOMATIC_TIE)}
+    return (
+        search.expert in ("", AUTOMATIC)
+        and search.outcome in ("", "tied", "equal")
+        and {search.contestant, search.opponent} <= {"", tie.left, tie.right}
+        and search.scenario in ("", tie.item)
+        and search.type in ("", tie.type)
+        and marks.get(search.mark, search.mark == tie.mark)
+    )
+
+
+# --- Private -----------------------------------------------------------------------------------
+
+_DEFAULTS: dict[str, str] = {field.name: str(field.default) for field in fields(VoteSearch)}
+
+_VOTE_OUTCOMES: dict[str, list[str]] = {
+    "left": ["left"],
+    "right": ["right"],
+    "equal": ["equal"],
+    "tied": ["equal"],
+    "decided": ["left", "right"],
+    "skip": ["skip"],
+}
+_FILE = ImportedVote.Outcome
+_LINE_OUTCOMES: dict[str, list[str]] = {
+    "left": [_FILE.FIRST],
+    "right": [_FILE.SECOND],
+    "equal": [_FILE.TIE, _FILE.BOTH_BAD],
+    "tied": [_FILE.TIE, _FILE.BOTH_BAD],
+    "decided": [_FILE.FIRST, _FILE.SECOND],
+    "both_miss": [_FILE.BOTH_BAD],
+    "skip": [],
+}
+
+
+def _by_mark(rows: QuerySet[Any], mark: str) -> QuerySet[Any]:
+    if mark == LEFT_OUT:
+        return rows.exclude(Q(mark=COUNTED))
+    return rows if mark == EVERY else rows.filter(Q(mark=mark))
+
+
+def _shows(search: VoteSearch, left: str, right: str, outcomes: Mapping[str, list[str]]) -> Q:
+    """Who was shown, on either side, and how it came out as seen from the contestant.
+
+    Args:
+        search: What is looked for.
+        left: The column with who was shown on the left.
+        right: The same of the right.
+        outcomes: The values of the column `outcome` by what is looked for.
+    """
+    wanted = {"won": ("left", "right"), "lost": ("right", "left")}
+    on_left, on_right = wanted.get(search.outcome, (search.outcome, search.outcome))
+    shown = Q(pk=None)
+    for own, other, outcome in ((left, right, on_left), (right, left, on_right)):
+        side = Q(pk__isnull=False)
+        if search.contestant:
+            side &= Q(**{own: search.contestant})
+        if search.opponent:
+            side &= Q(**{other: search.opponent})
+        if outcome in outcomes:
+            side &= Q(outcome__in=outcomes[outcome])
+        shown |= side
+    return shown
+
+
+def _first_votes(snapshot: Snapshot) -> QuerySet[Vote]:
+    """The vote that counts on what a hidden repeat shows again."""
+    return marked_votes(snapshot).filter(Q(mark=COUNTED), matchup=OuterRef("matchup__repeat_of"))
+
+
+def _repeats(rows: QuerySet[Vote], snapshot: Snapshot) -> QuerySet[Vote]:
+    decided = rows.filter(matchup__kind=REPEAT, outcome__in=RATED)
+    current = decided.exclude(Q(mark=LeftOut.SUPERSEDED.value))
+    return current.filter(Exists(_first_votes(snapshot)))
+
+
+def _alike(rows: QuerySet[Vote], snapshot: Snapshot) -> QuerySet[Vote]:
+    first = _first_votes(snapshot)
+    tied, won = first.filter(winner=None), first.filter(winner=OuterRef("winner"))
+    return _repeats(rows, snapshot).filter(
+        (Q(winner=None) & Exists(tied)) | (Q(winner__isnull=False) & Exists(won))
+    )
+
+
+def _shared(rows: QuerySet[Vote], snapshot: Snapshot) -> QuerySet[Vote]:
+    """Votes on what another expert's vote that counts is on as well."""
+    others = marked_votes(snapshot).filter(
+        Q(mark=COUNTED), matchup__scenario=OuterRef("matchup__scenario")
+    )
+    others = others.exclude(expert=OuterRef("expert"))
+    left, right = "shown_left__contestant", "shown_right__contestant"
+    alike = others.filter(**{left: OuterRef(left), right: OuterRef(right)})
+    turned = others.filter(**{left: OuterRef(right), right: OuterRef(left)})
+    return rows.filter(Exists(alike) | Exists(turned))
+
+
+_PARTS: dict[str, Callable[[QuerySet[Vote], Snapshot], QuerySet[Vote]]] = {
+    "commented": lambda rows, _: rows.exclude(comment=""),
+    "fast": lambda rows, _: rows.filter(ms_visible__lt=FAST_MS),
+    "own": lambda rows, rating: rows.filter(own_votes(Filters.of_document(rating.filters))),
+    "repeats": _repeats,
+    "alike": _alike,
+    "checks": lambda rows, _: rows.filter(matchup__kind=CHECK, outcome__in=RATED),
+    "shared": _shared,
+    "passed": lambda rows, _: rows.filter(
+        matchup__kind=CHECK, winner__contestant__kind=Contestant.Kind.REFERENCE
+    ),
+    "checks_skipped": lambda rows, _: rows.filter(matchup__kind=CHECK, outcome="skip"),
+}

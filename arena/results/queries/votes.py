@@ -1,0 +1,431 @@
+"""The votes of a study as a rating reads them: which count, which do not and why, who competes.
+
+Votes of a study and votes of a file look alike from here on.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Collection, Iterable, Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from enum import StrEnum
+from typing import Any, NamedTuple, TypeVar, cast
+
+from django.db.models import Case, F, Max, Model, Q, QuerySet, Value, When
+from django.db.models.fields import CharField
+
+from arena.models import ImportedVote, Person, Snapshot, Study, Vote
+from arena.pairing.order import CHECK, MAIN, REPEAT
+from arena.pairing.rules import Entry, draw_ties, grid_of, scenario_of
+from augment.errors import UnknownName
+from augment.models import Contestant
+from augment.services.scenarios.scenes import ScenarioType
+
+Row = TypeVar("Row", bound=Model)
+
+AUTOMATIC = "automatic"
+"""A kind beside those of matchups: a tie on a pair that nobody can tell apart nor was shown."""
+
+IMPORTED = "imported"
+"""The kind of a contestant that is known by its name alone."""
+
+RATED = (Vote.Outcome.LEFT.value, Vote.Outcome.EQUAL.value, Vote.Outcome.RIGHT.value)
+"""Outcomes that say something; a skip does not."""
+
+IMPORTED_OUTCOMES = dict(
+    zip(
+        (ImportedVote.Outcome.FIRST.value, ImportedVote.Outcome.TIE.value,
+         ImportedVote.Outcome.SECOND.value, ImportedVote.Outcome.BOTH_BAD.value),
+        (*RATED, Vote.Outcome.EQUAL.value),
+        strict=True,
+    )
+)  # fmt: skip
+
+KINDS = (MAIN, REPEAT)
+"""What may be rated: planned showings, and on demand the hidden repeats of them."""
+
+COUNTED, AUTOMATIC_TIE = "counted", "automatic"
+"""Marks beside the reasons of `LeftOut`: what counts, and pairs that nobody can tell apart where
+the rating does not count them."""
+
+
+class LeftOut(StrEnum):
+    """Why a vote is no part of a rating. The first reason that fits is the one that is said."""
+
+    SUPERSEDED = "superseded"
+    CHECK = "check"
+    REPEAT = "repeat"
+    SKIP = "skip"
+    SIMULATED = "simulated"
+    FILTERED = "filtered"
+    OWN = "own"
+
+
+class Judged(NamedTuple):
+    """One current vote.
+
+    Attributes:
+        judge: A lasting code, and `judge_name` the pseudonym.
+        item: The scenario's slug, and `type` its type.
+        left, right: Slugs of contestants.
+        outcome: left, equal, right or skip.
+        mark: Why it does not count, or COUNTED.
+        matchup: Its row, and `repeat_of` the row of the matchup that it shows again.
+        at: When it was given, in UTC as ISO 8601; empty where nobody knows, as in all below.
+        position: Of the matchup in the expert's own order, from 1.
+        aids: What the expert looked with, joined by blanks.
+        left_code, right_code: The augmentations that were shown.
+    """
+
+    judge: str
+    judge_name: str
+    item: str
+    type: str
+    kind: str
+    left: str
+    right: str
+    outcome: str
+    both_miss: bool
+    is_simulated: bool
+    mark: str = COUNTED
+    ms_visible: int | None = None
+    matchup: int | None = None
+    repeat_of: int | None = None
+    at: str = ""
+    position: int | None = None
+    aids: str = ""
+    comment: str = ""
+    left_code: str = ""
+    right_code: str = ""
+
+    @property
+    def winner(self) -> str | None:
+        """The slug of who won, None without a winner."""
+        sides = {Vote.Outcome.LEFT.value: self.left, Vote.Outcome.RIGHT.value: self.right}
+        return sides.get(self.outcome)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Entrant:
+    """Who competes; `contestant` is None for names from a file."""
+
+    slug: str
+    name: str
+    variant: str = ""
+    kind: str = IMPORTED
+    is_simulated: bool = False
+    contestant: Contestant | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Filters:
+    """Which votes are asked for.
+
+    Attributes:
+        types: Of scenarios; empty is all.
+        experts: Codes of judges; empty is all.
+        kinds: Of matchups.
+        leave_out_settled: Whether pairs that nobody was shown, because nobody can tell them
+            apart, do not count as ties.
+        leave_out_own: Whether votes of authors on their own contestants do not count.
+        authors: Who was marked author of what when the votes were frozen, codes of judges with
+            slugs of contestants. They are known also where their votes count.
+    """
+
+    types: tuple[str, ...] = ()
+    experts: tuple[str, ...] = ()
+    kinds: tuple[str, ...] = (MAIN,)
+    leave_out_settled: bool = False
+    leave_out_own: bool = False
+    authors: frozenset[tuple[str, str]] = frozenset()
+
+    def is_own(self, judge: str, left: str, right: str) -> bool:
+        """Whether a judge is marked author of one of the two."""
+        return (judge, left) in self.authors or (judge, right) in self.authors
+
+    def as_document(self) -> dict[str, Any]:
+        """As a snapshot keeps it."""
+        return {
+            "types": list(self.types),
+            "experts": list(self.experts),
+            "kinds": list(self.kinds),
+            "leave_out_settled": self.leave_out_settled,
+            "leave_out_own": self.leave_out_own,
+            "authors": [list(pair) for pair in sorted(self.authors)],
+        }
+
+    @classmethod
+    def of_document(cls, document: dict[str, Any]) -> Filters:
+        """What `as_document` wrote; older snapshots left settled pairs out."""
+        return cls(
+            types=tuple(document.get("types", ())),
+            experts=tuple(document.get("experts", ())),
+            kinds=tuple(document.get("kinds", (MAIN,))),
+            leave_out_settled=bool(document.get("leave_out_settled", True)),
+            leave_out_own=bool(document.get("leave_out_own", False)),
+            authors=frozenset((judge, slug) for judge, slug in document.get("authors", ())),
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class VoteSet:
+    """What is rated, in the order in which it was decided.
+
+    Attributes:
+        entrants: By slug.
+        counted: The votes that count.
+        with_own: The same and, where they are left out for that alone, those of authors on their
+            own contestants.
+        repeats: Decided hidden repeats, whether they count or not.
+        checks: Votes on attention checks, and `references` who should win them.
+        left_out: How many votes do not count, by reason.
+    """
+
+    entrants: tuple[Entrant, ...]
+    counted: tuple[Judged, ...]
+    with_own: tuple[Judged, ...]
+    repeats: tuple[Judged, ...]
+    checks: tuple[Judged, ...]
+    references: frozenset[str]
+    left_out: dict[str, int]
+
+
+def is_imported(study: Study) -> bool:
+    """Whether the votes came from a file."""
+    return hasattr(study, "vote_file")
+
+
+def last_vote_of(study: Study) -> int | None:
+    """The row of the newest vote, so that later ones can be told apart."""
+    votes: QuerySet[Any] = (
+        ImportedVote.objects.filter(file__study=study)
+        if is_imported(study)
+        else Vote.objects.filter(matchup__study=study)
+    )
+    last: int | None = votes.aggregate(last=Max("pk"))["last"]
+    return last
+
+
+def vote_set(study: Study, *, filters: Filters, last: int | None) -> VoteSet:
+    """The votes of a study up to a row, see `last_vote_of`; None for none at all.
+
+    Raises:
+        UnknownName: A filter names a type, a judge or a kind that does not occur.
+    """
+    votes = current_votes(study, filters, last)
+    given = len(votes)
+    if not filters.leave_out_settled:
+        votes += settled_ties(study, votes, filters)
+    _check_names(filters, votes)
+    left_out = Counter(vote.mark for vote in votes if vote.mark != COUNTED)
+    if not is_imported(study):
+        everything = Vote.objects.filter(matchup__study=study, pk__lte=last or 0).count()
+        left_out[LeftOut.SUPERSEDED.value] = everything - given
+    checks = tuple(vote for vote in votes if vote.mark == LeftOut.CHECK)
+    references = Contestant.objects.filter(kind=Contestant.Kind.REFERENCE)
+    return VoteSet(
+        entrants=_entrants(study, votes),
+        counted=tuple(vote for vote in votes if vote.mark == COUNTED),
+        with_own=tuple(vote for vote in votes if vote.mark in (COUNTED, LeftOut.OWN)),
+        repeats=tuple(vote for vote in votes if vote.kind == REPEAT and vote.outcome in RATED),
+        checks=checks,
+        references=frozenset(references.values_list("slug", flat=True) if checks else ()),
+        left_out={reason: number for reason, number in sorted(left_out.items()) if number},
+    )
+
+
+def current_votes(study: Study, filters: Filters, last: int | None) -> list[Judged]:
+    """The votes that were current at a row, oldest first, with their marks."""
+    if is_imported(study):
+        lines = marked_lines(study, filters, last).order_by("line")
+        names = ("first", "second", "outcome", "judge", "item", F("mark"))
+        return [
+            Judged(
+                judge=judge, judge_name=judge, item=item, type="", kind=MAIN, left=first,
+                right=second, outcome=IMPORTED_OUTCOMES[outcome],
+                both_miss=outcome == ImportedVote.Outcome.BOTH_BAD,
+                is_simulated=study.allow_simulated, mark=mark,
+            )
+            for first, second, outcome, judge, item, mark in lines.values_list(*names)
+        ]  # fmt: skip
+    rows: QuerySet[Any] = _mark_votes(study, filters, last)
+    rows = rows.exclude(Q(mark=LeftOut.SUPERSEDED.value)).order_by("pk").values_list(
+        "expert__person__code", "expert__person__pseudonym", "matchup__scenario__slug",
+        "matchup__scenario__type", "matchup__kind", "shown_left__contestant__slug",
+        "shown_right__contestant__slug", "outcome", "both_miss", "is_simulated", F("mark"),
+        "ms_visible", "matchup", "matchup__repeat_of", "at", "matchup__position", "aids",
+        "comment", "shown_left__code", "shown_right__code",
+    )  # fmt: skip
+    return [
+        vote._replace(
+            judge=str(vote.judge),
+            at=cast("datetime", vote.at).astimezone(UTC).isoformat(timespec="milliseconds"),
+            left_code=str(vote.left_code),
+            right_code=str(vote.right_code),
+        )
+        for vote in (Judged(*row) for row in rows)
+    ]
+
+
+def settled_ties(study: Study, votes: Iterable[Judged], filters: Filters) -> list[Judged]:
+    """Ties on the pairs that the study settled without showing; see arena.pairing.rules.
+
+    Args:
+        study: A study; one of votes from elsewhere has no such pairs.
+        votes: Its current votes, which say how often a pair is judged, and by whom.
+        filters: Which of the ties count.
+    """
+    settled = [(place, one, other) for place, one, other in study.rules.get("identical", ())]
+    if not settled:
+        return []
+    by_judge: dict[str, list[Judged]] = {}
+    for vote in votes:
+        if vote.kind == MAIN and vote.outcome in RATED:
+            by_judge.setdefault(vote.judge, []).append(vote)
+    types = dict(study.scenarios.values_list("slug", "type"))
+    entries = tuple(Entry(**entry) for entry in study.rules["entries"])
+    alike = tuple((place, one, other) for place, one, other in study.rules.get("alike", ()))
+    drawn = draw_ties(
+        settled,
+        {judge: len(own) for judge, own in by_judge.items()},
+        showable=int(grid_of(entries, alike).showable.sum()),
+        seed=study.seed,
+    )
+    simulated = {row.slug for row in study.contestants.all() if row.is_simulated}
+    ties = []
+    for (place, left, right), judge in drawn:
+        item, first = scenario_of(place), by_judge[judge][0]
+        tie = Judged(
+            judge=judge, judge_name=first.judge_name, item=item, type=types[item], kind=AUTOMATIC,
+            left=left, right=right, outcome=Vote.Outcome.EQUAL.value, both_miss=False,
+            is_simulated=first.is_simulated,
+        )  # fmt: skip
+        is_made_up = tie.is_simulated or not simulated.isdisjoint((left, right))
+        if is_made_up and not study.allow_simulated:
+            tie = tie._replace(mark=LeftOut.SIMULATED.value)
+        elif not _is_asked_for(tie, filters):
+            tie = tie._replace(mark=LeftOut.FILTERED.value)
+        ties.append(tie._replace(mark=AUTOMATIC_TIE) if filters.leave_out_settled else tie)
+    return ties
+
+
+def is_own_vote(vote: Judged, filters: Filters) -> bool:
+    """Whether an author voted on a contestant of their own; settled ties are nobody's votes."""
+    return vote.kind != AUTOMATIC and filters.is_own(vote.judge, vote.left, vote.right)
+
+
+def marked_votes(snapshot: Snapshot) -> QuerySet[Vote]:
+    """All votes up to a rating with their `mark`: the first reason that fits, or COUNTED.
+
+    At most three queries beside its own: who is simulated, who was asked for, who is author.
+    """
+    filters = Filters.of_document(snapshot.filters)
+    return _mark_votes(snapshot.study, filters, snapshot.last_vote)
+
+
+def counted_votes(snapshot: Snapshot) -> QuerySet[Vote]:
+    """The rows that the rating is made of, without those of pairs that nobody was shown."""
+    return marked_votes(snapshot).filter(Q(mark=COUNTED))
+
+
+def marked_lines(study: Study, filters: Filters, last: int | None) -> QuerySet[ImportedVote]:
+    """The votes of a study's file up to a row, each with its `mark`."""
+    is_other = Q()
+    if filters.types or MAIN not in filters.kinds:
+        is_other = Q(pk__isnull=False)
+    elif filters.experts:
+        is_other = ~Q(judge__in=filters.experts)
+    reasons = [(LeftOut.FILTERED, is_other)] if is_other else []
+    return _with_mark(ImportedVote.objects.filter(file__study=study, pk__lte=last or 0), reasons)
+
+
+def own_votes(filters: Filters) -> Q:
+    """Votes of authors on their own contestants; one query."""
+    users = users_of({judge for judge, _ in filters.authors})
+    own = Q(pk=None)
+    for judge, slug in sorted(filters.authors):
+        shown = Q(shown_left__contestant__slug=slug) | Q(shown_right__contestant__slug=slug)
+        own |= Q(expert=users.get(judge)) & shown
+    return own
+
+
+def users_of(codes: Collection[str]) -> dict[str, int]:
+    """Accounts by the codes of their people, whatever else is among the codes; one query."""
+    people = Person.objects.values_list("code", "user_id")
+    return {str(code): user for code, user in people if str(code) in codes}
+
+
+# --- Private -----------------------------------------------------------------------------------
+
+
+def _entrants(study: Study, votes: Iterable[Judged]) -> tuple[Entrant, ...]:
+    """Who competes, by slug: a study's contestants, or who occurs in the votes of a file."""
+    if is_imported(study):
+        names = {name for vote in votes for name in (vote.left, vote.right)}
+        return tuple(Entrant(slug=name, name=name) for name in sorted(names))
+    return tuple(
+        Entrant(
+            slug=row.slug, name=row.name, variant=row.variant, kind=row.kind,
+            is_simulated=row.is_simulated, contestant=row,
+        )
+        for row in study.contestants.order_by("slug")
+    )  # fmt: skip
+
+
+def _check_names(filters: Filters, votes: Sequence[Judged]) -> None:
+    judges = {vote.judge for vote in votes}
+    types = {*(one.value for one in ScenarioType), *(vote.type for vote in votes)}
+    for what, names, known in (
+        ("kind of vote", filters.kinds, list(KINDS)),
+        ("scenario type", filters.types, sorted(types)),
+        ("expert", filters.experts, sorted(judges)),
+    ):
+        for name in names:
+            if name not in known:
+                raise UnknownName(what, name, known)
+
+
+def _is_asked_for(tie: Judged, filters: Filters) -> bool:
+    return (
+        MAIN in filters.kinds
+        and (not filters.types or tie.type in filters.types)
+        and (not filters.experts or tie.judge in filters.experts)
+    )
+
+
+def _mark_votes(study: Study, filters: Filters, last: int | None) -> QuerySet[Vote]:
+    reasons = [
+        (LeftOut.SUPERSEDED, Q(superseded_by__pk__lte=last or 0)),
+        (LeftOut.CHECK, Q(matchup__kind=CHECK)),
+    ]
+    if REPEAT not in filters.kinds:
+        reasons.append((LeftOut.REPEAT, Q(matchup__kind=REPEAT)))
+    reasons.append((LeftOut.SKIP, ~Q(outcome__in=RATED)))
+    if not study.allow_simulated:
+        reasons.append((LeftOut.SIMULATED, Q(is_simulated=True)))
+        simulated = study.contestants.filter(kind=Contestant.Kind.SIMULATED)
+        for pk in simulated.values_list("pk", flat=True):
+            shown = Q(shown_left__contestant=pk) | Q(shown_right__contestant=pk)
+            reasons.append((LeftOut.SIMULATED, shown))
+    if filters.types:
+        reasons.append((LeftOut.FILTERED, ~Q(matchup__scenario__type__in=filters.types)))
+    if filters.experts:
+        users = list(users_of(filters.experts).values())
+        reasons.append((LeftOut.FILTERED, ~Q(expert__in=users)))
+    if MAIN not in filters.kinds:
+        reasons.append((LeftOut.FILTERED, Q(matchup__kind=MAIN)))
+    if filters.leave_out_own and filters.authors:
+        reasons.append((LeftOut.OWN, own_votes(filters)))
+    rows = Vote.objects.filter(matchup__study=study, pk__lte=last or 0)
+    return _with_mark(rows, reasons)
+
+
+def _with_mark(rows: QuerySet[Row], reasons: Sequence[tuple[LeftOut, Q]]) -> QuerySet[Row]:
+    """Annotate why rows do not count; the first reason that holds is said."""
+    mark = Case(
+        *(When(holds, then=Value(reason.value)) for reason, holds in reasons),
+        default=Value(COUNTED),
+        output_field=CharField(),
+    )
+    return cast("QuerySet[Row]", rows.order_by().annotate(mark=mark))

@@ -1,0 +1,1 @@
+"""Rating a study and storing what comes out."""

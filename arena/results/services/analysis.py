@@ -1,0 +1,228 @@
+"""Votes as arrays, and a rating by pairs, scenario types, displacement and cost."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import numpy as np
+from django.db.models import Count
+
+from arena.jobs.queries import model_classes, shown_augmentations, spent_on
+from arena.models import Matchup, Study, Vote
+from arena.rating.comparisons import (
+    LOSS,
+    TIE,
+    WIN,
+    Comparisons,
+    FloatArray,
+    IntArray,
+    count_wins,
+    select_votes,
+)
+from arena.rating.leaderboard import Leaderboard, rate
+from arena.rating.snapshot_document import (
+    DisplacementSummary,
+    PairRecord,
+    ScenarioCost,
+    TypeRating,
+    TypeStanding,
+)
+from arena.results.queries.votes import Entrant, Filters, Judged, is_imported
+from augment.services.judging.displacement import of_rows, summarise
+from augment.services.scenarios.scenes import in_type_order, type_label
+
+SCORES = {
+    Vote.Outcome.LEFT.value: WIN,
+    Vote.Outcome.EQUAL.value: TIE,
+    Vote.Outcome.RIGHT.value: LOSS,
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class VoteArrays:
+    """V votes as numbers.
+
+    Attributes:
+        comparisons: `first` was shown on the left.
+        judges, items, types: Names by their numbers.
+        type_of: (V,) the type of each vote's scenario.
+        ms: (V,) how long each pair was on screen, not a number where unknown.
+    """
+
+    comparisons: Comparisons
+    judges: tuple[str, ...]
+    items: tuple[str, ...]
+    types: tuple[str, ...]
+    type_of: IntArray
+    ms: FloatArray
+
+
+def vote_arrays(entrants: Sequence[Entrant], votes: Sequence[Judged]) -> VoteArrays:
+    """Number everything, in the order in which it occurs.
+
+    Args:
+        entrants: The contestants, also those without votes.
+        votes: Each compares two of them.
+    """
+    number = {entrant.slug: index for index, entrant in enumerate(entrants)}
+    judges: dict[str, int] = {}
+    items: dict[str, int] = {}
+    types: dict[str, int] = {}
+    whole = partial(np.array, dtype=np.int64)
+    type_of = whole([types.setdefault(vote.type, len(types)) for vote in votes])
+    comparisons = Comparisons(
+        names=tuple(entrant.slug for entrant in entrants),
+        shown=tuple(entrant.name for entrant in entrants),
+        first=whole([number[vote.left] for vote in votes]),
+        second=whole([number[vote.right] for vote in votes]),
+        score=np.array([SCORES[vote.outcome] for vote in votes], dtype=np.float64),
+        expert=whole([judges.setdefault(vote.judge, len(judges)) for vote in votes]),
+        scenario=whole([items.setdefault(vote.item, len(items)) for vote in votes]),
+    )
+    return VoteArrays(
+        comparisons=comparisons,
+        judges=tuple(judges),
+        items=tuple(items),
+        types=tuple(types),
+        type_of=type_of,
+        ms=np.array(
+            [np.nan if vote.ms_visible is None else vote.ms_visible for vote in votes],
+            dtype=np.float64,
+        ),
+    )
+
+
+FEW_VOTES = 30
+"""Below so many votes of a contestant a part of the table says that they are too few."""
+
+TYPE_ROUNDS = 2000
+
+
+def pairs(
+    comparisons: Comparisons, votes: Sequence[Judged], planned: Counter[frozenset[str]]
+) -> tuple[PairRecord, ...]:
+    """Wins, ties, losses of every pair that met or should have, from the first one's view."""
+    wins, ties = count_wins(comparisons)
+    names = comparisons.names
+    missed = Counter(frozenset((vote.left, vote.right)) for vote in votes if vote.both_miss)
+    return tuple(
+        PairRecord(
+            a=one,
+            b=names[j],
+            wins=int(wins[i, j]),
+            ties=int(ties[i, j]),
+            losses=int(wins[j, i]),
+            both_miss=missed[frozenset((one, names[j]))],
+            planned=planned[frozenset((one, names[j]))] if planned else None,
+        )
+        for i, one in enumerate(names)
+        for j in range(i + 1, len(names))
+        if wins[i, j] or wins[j, i] or ties[i, j] or planned[frozenset((one, names[j]))]
+    )
+
+
+def planned_pairs(study: Study, filters: Filters) -> Counter[frozenset[str]]:
+    """How often each pair was to be judged, by the same filters; nothing for votes of a file."""
+    if is_imported(study):
+        return Counter()
+    rows = study.matchups.filter(kind__in=[Matchup.Kind(kind).value for kind in filters.kinds])
+    if filters.types:
+        rows = rows.filter(scenario__type__in=filters.types)
+    if filters.experts:
+        rows = rows.filter(expert__person__code__in=filters.experts)
+    planned: Counter[frozenset[str]] = Counter()
+    who = "expert__person__code", "left__contestant__slug", "right__contestant__slug"
+    for judge, left, right, number in rows.order_by().values_list(*who).annotate(n=Count("pk")):
+        if not (filters.leave_out_own and filters.is_own(str(judge), left, right)):
+            planned[frozenset((left, right))] += number
+    return planned
+
+
+def by_type(arrays: VoteArrays, board: Leaderboard) -> tuple[TypeRating, ...]:
+    """The rating of every scenario type on its own, as the board's, in the catalogue's order.
+
+    Args:
+        arrays: The votes that count.
+        board: Their rating.
+    """
+    known = in_type_order(name for name in arrays.types if name)
+    return tuple(_rate_type(arrays, name, board) for name in known)
+
+
+def _rate_type(arrays: VoteArrays, name: str, whole: Leaderboard) -> TypeRating:
+    votes = select_votes(arrays.comparisons, arrays.type_of == arrays.types.index(name))
+    board = rate(
+        votes,
+        method=whole.method,
+        rounds=min(whole.rounds, TYPE_ROUNDS),
+        unit=whole.unit,
+        intervals=whole.intervals,
+        seed=whole.seed,
+        details=False,
+    )
+    return TypeRating(
+        type=name,
+        label=type_label(name),
+        votes=len(votes),
+        scenarios=board.scenarios,
+        status=board.explanation,
+        reasons=board.reasons,
+        lines=tuple(
+            TypeStanding(
+                slug=line.name,
+                rating=line.rating,
+                lower=line.lower,
+                upper=line.upper,
+                rank=line.rank,
+                note=line.note or None,
+                votes=line.votes,
+                few=line.votes < FEW_VOTES,
+            )
+            for line in board.standings
+        ),
+    )
+
+
+def displacement(study: Study) -> tuple[DisplacementSummary, ...]:
+    """How far each contestant's shown augmentations are from the references."""
+    by_slug: dict[str, list[Any]] = {}
+    for row in of_rows(shown_augmentations(study)):
+        if row.displacement is not None:
+            by_slug.setdefault(row.row.contestant.slug, []).append(row.displacement)
+    totals = ((slug, summarise(found)) for slug, found in sorted(by_slug.items()))
+    return tuple(
+        DisplacementSummary(
+            slug=slug,
+            median_m=None if total.box is None else total.box.median_m,
+            mean_m=None if total.box is None else total.box.mean_m,
+            n=total.n,
+            missing=total.missing,
+            surplus=total.surplus,
+            augmentations=total.augmentations,
+        )
+        for slug, total in totals
+    )
+
+
+def cost(study: Study, entrants: Sequence[Entrant]) -> tuple[ScenarioCost, ...]:
+    """What each contestant that asks a language model takes per scenario."""
+    rows = [entrant.contestant for entrant in entrants if entrant.contestant is not None]
+    spent = spent_on(shown_augmentations(study))
+    classes = model_classes(rows)
+    return tuple(
+        ScenarioCost(
+            slug=row.slug,
+            model=row.model,
+            model_class=classes.get(row.pk, ""),
+            augmentations=found.augmentations,
+            calls=found.calls / found.augmentations,
+            tokens=None if found.tokens is None else found.tokens / found.augmentations,
+            usd=None if found.nano_usd is None else found.nano_usd / found.augmentations / 1e9,
+        )
+        for row in rows
+        if (found := spent.get(row.pk)) is not None
+    )

@@ -1,0 +1,169 @@
+"""What a rating can adjust for, as columns beside its votes: the side, and how much was shown."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from arena.models import Study, Vote
+from arena.pairing.order import MAIN
+from arena.pairing.rules import scenario_of
+from arena.rating.comparisons import Comparisons, FloatArray
+from arena.rating.leaderboard import Leaderboard
+from arena.rating.lines import whole_percent
+from arena.rating.snapshot_document import Adjustment, BothRanks, CovariateEffect, LargestMove
+from arena.results.queries.votes import AUTOMATIC, Judged, VoteSet
+from augment.models import Augmentation
+
+SIDE, OBJECTS, VEHICLES = "side", "objects", "vehicles"
+COVARIATES = (SIDE, OBJECTS, VEHICLES)
+"""Being on the left; by how many more objects, or vehicles, a picture marks as added or moved."""
+WITHOUT_PICTURES = (SIDE,)
+"""What is known of votes from a file."""
+
+_VEHICLES = {"VEHICLE", "BUS"}
+"""Of the types that a modification's document knows."""
+_AT_ONCE = 500
+
+
+def with_covariates(
+    comparisons: Comparisons, votes: Sequence[Judged], names: Sequence[str]
+) -> Comparisons:
+    """The same votes with what to adjust for, seen from the left.
+
+    Args:
+        comparisons: Of these votes, a row each.
+        votes: In the same order.
+        names: Of COVARIATES.
+    """
+    if not names:
+        return comparisons
+    columns: dict[str, FloatArray] = {SIDE: np.ones(len(votes))}
+    if set(names) - {SIDE}:
+        counts = _counts({code for vote in votes for code in (vote.left_code, vote.right_code)})
+        nothing = (0, 0)
+        both = np.array(
+            [
+                np.subtract(
+                    counts.get(vote.left_code, nothing), counts.get(vote.right_code, nothing)
+                )
+                for vote in votes
+            ],
+            dtype=np.float64,
+        ).reshape(-1, 2)
+        columns |= {OBJECTS: both[:, 0], VEHICLES: both[:, 1]}
+    return replace(comparisons, covariates=np.column_stack([columns[name] for name in names]))
+
+
+def adjustment(names: Sequence[str], board: Leaderboard, plain: Leaderboard) -> Adjustment | None:
+    """What adjusting changes; None where nobody asked for it.
+
+    Args:
+        names: What was adjusted for.
+        board: With it.
+        plain: Without it.
+    """
+    if not names:
+        return None
+    lines = both_ranks(board, plain)
+    return Adjustment(
+        effects=tuple(
+            CovariateEffect(name=name, points=one.points, p_value=one.p_value)
+            for name, one in zip(names, board.coefficients, strict=False)
+        ),
+        lines=lines,
+        largest=largest_move(lines),
+    )
+
+
+def both_ranks(with_it: Leaderboard, without: Leaderboard) -> tuple[BothRanks, ...]:
+    """The ranks and ratings of everybody in two versions of a rating."""
+    return tuple(
+        BothRanks(
+            slug=first.name,
+            rank_with=first.rank,
+            rating_with=first.rating,
+            rank_without=second.rank,
+            rating_without=second.rating,
+        )
+        for first, second in zip(with_it.lines, without.lines, strict=True)
+    )
+
+
+def largest_move(lines: Sequence[BothRanks]) -> LargestMove | None:
+    """By how many ranks somebody moves; None where nobody has a rank in both versions."""
+    moves = {
+        line.slug: abs(line.rank_with - line.rank_without)
+        for line in lines
+        if line.rank_with is not None and line.rank_without is not None
+    }
+    if not moves:
+        return None
+    places = max(moves.values())
+    who = [slug for slug, moved in moves.items() if moved == places] if places else []
+    return LargestMove(places=places, slugs=tuple(who))
+
+
+# --- Private -----------------------------------------------------------------------------------
+
+
+def _counts(codes: set[str]) -> dict[str, tuple[int, int]]:
+    """Objects and vehicles that an augmentation adds or moves, by its code."""
+    found: dict[str, tuple[int, int]] = {}
+    known = sorted(code for code in codes if code)
+    for first in range(0, len(known), _AT_ONCE):
+        rows = Augmentation.objects.filter(code__in=known[first : first + _AT_ONCE])
+        for code, document in rows.values_list("code", "modification"):
+            found[str(code)] = _of_document(document)
+    return found
+
+
+def _of_document(document: dict[str, Any] | None) -> tuple[int, int]:
+    """An empty modification changes nothing."""
+    changed = [*(document or {}).get("add", []), *(document or {}).get("move", [])]
+    return len(changed), sum(agent["type"] in _VEHICLES for agent in changed)
+
+
+def settled_remark(study: Study, votes: VoteSet, *, left_out: bool) -> str:
+    """Return what the table estimates where pairs were settled, empty where none was.
+
+    Args:
+        study: What was planned.
+        votes: That count.
+        left_out: Whether settled pairs are left out.
+    """
+    settled = len(study.rules.get("identical", ()))
+    if not settled:
+        return ""
+    ties = sum(vote.kind == AUTOMATIC for vote in votes.counted)
+    said = (
+        f"The table says how contestants compare where their pictures differ: {settled} pairs "
+        "that nobody can tell apart were not shown and are left out."
+        if left_out
+        else f"The table says how contestants compare over all pairs of pictures: {settled} "
+        f"pairs that nobody can tell apart were not shown and count as {ties} ties, as many a "
+        "pair as others have votes on average."
+    )
+    return f"{said} {_on_those_shown(study, votes)}".strip()
+
+
+def _on_those_shown(study: Study, votes: VoteSet) -> str:
+    """The tie share of alike pairs that experts were shown all the same."""
+    shown = {
+        (scenario_of(place), frozenset((one, other)))
+        for place, one, other in study.rules.get("alike_shown", ())
+    }
+    given = [
+        vote.outcome == Vote.Outcome.EQUAL
+        for vote in votes.counted
+        if vote.kind == MAIN and (vote.item, frozenset((vote.left, vote.right))) in shown
+    ]
+    if not given:
+        return ""
+    return (
+        f"Of {len(given)} votes on {len(shown)} such pairs that were shown all the same, "
+        f"{sum(given)} are ties ({whole_percent(sum(given) / len(given))} %)."
+    )

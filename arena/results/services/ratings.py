@@ -1,0 +1,415 @@
+"""Rating a study: which votes, which method, which seed, now or by a worker, and what is kept."""
+
+from __future__ import annotations
+
+import platform
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from enum import StrEnum
+from typing import TypedDict, TypeVar, Unpack
+
+import numpy
+import scipy
+from django.contrib.auth.models import User
+from django.db import transaction
+from django.utils import timezone
+
+from arena.errors import StudyStillOpen
+from arena.models import EarlyLook, ImportedVote, Snapshot, Standing, Study, Vote
+from arena.models.ratings import stored_values
+from arena.rating.comparisons import Comparisons
+from arena.rating.leaderboard import Leaderboard, Method, rate
+from arena.rating.rules import Intervals, TooManyContestants, Unit, default_intervals, unit_for
+from arena.rating.snapshot_document import VERSION as RESULTS_VERSION
+from arena.rating.snapshot_document import Results
+from arena.results.queries.access import votes_in
+from arena.results.queries.votes import (
+    AUTOMATIC,
+    Entrant,
+    Filters,
+    VoteSet,
+    is_imported,
+    last_vote_of,
+    vote_set,
+)
+from arena.results.services import analysis
+from arena.results.services.analysis import VoteArrays, vote_arrays
+from arena.results.services.covariates import (
+    COVARIATES,
+    WITHOUT_PICTURES,
+    adjustment,
+    settled_remark,
+    with_covariates,
+)
+from arena.results.services.trust import board_remarks, precision, trust, with_and_without
+from arena.results.services.vote_files import VERSION as VOTES_VERSION
+from arena.results.services.vote_files import digest_of, vote_rows, votes_csv
+from arena.studies.queries import authors_of
+from arena.voting.services.turns import in_turn
+from augment.errors import Conflict, LeaseLost, UnknownName
+from augment.services.clock import Moment
+from augment.services.events import log_event
+from augment.services.work import Lease, WorkKind
+
+DEFAULT_ROUNDS = 10_000
+MOST_ROUNDS = 100_000
+WHILE_WAITING = 20_000
+"""Up to so many votes a person waits for the page; more are a worker's job."""
+
+Word = TypeVar("Word", bound=StrEnum)
+
+
+class Choices(TypedDict, total=False):
+    """How to rate; `plan_snapshot` says what each means and what holds where it is left out."""
+
+    method: str
+    rounds: int
+    seed: int
+    unit: str | None
+    intervals: str | None
+    covariates: Sequence[str]
+    filters: Filters | None
+    early: bool
+    actor: User | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Computed:
+    """What came out beside that which the snapshot itself has: its lines."""
+
+    board: Leaderboard
+    entrants: tuple[Entrant, ...]
+
+
+# --- Doors -------------------------------------------------------------------------------------
+
+
+def rate_now(*, study: Study, **choices: Unpack[Choices]) -> Snapshot:
+    """Rate the contestants of a study by its current votes and keep the result for good.
+
+    The same votes, filters, method, unit, rounds and seed give the same snapshot. Choices and
+    errors are those of `plan_snapshot`; after an error nothing is kept. Nothing is written before
+    all is computed, so that votes come in meanwhile.
+    """
+    snapshot = _planned(study=study, **choices)
+    computed = compute(snapshot, lambda percent: None)
+    with in_turn(), transaction.atomic():
+        snapshot.save()
+        _log(snapshot)
+        return keep(snapshot, computed)
+
+
+@transaction.atomic
+def plan_snapshot(*, study: Study, **choices: Unpack[Choices]) -> Snapshot:
+    """Freeze what is to be rated, for a worker to compute.
+
+    Args:
+        study: Closed, unless `early`.
+        method: "bt" (Bradley-Terry), "davidson" (its tie model) or "elo" (online).
+        rounds: Of the bootstrap.
+        seed: Of its draws, 0 or more.
+        unit: What the bootstrap draws: "vote", "scenario", "expert" or "two-way"; None for
+            two-way where the votes name experts and scenarios, else votes.
+        intervals: "closed" or "resamples"; None for the closed form, but resamples of single
+            votes and for online Elo.
+        covariates: What to adjust for: "side", "objects", "vehicles".
+        filters: Which votes count; None for all main ones. Who is author of what is added to them
+            here, so that later marks do not change the rating.
+        early: Rate a study that is still open; the snapshot and the log say so.
+        actor: Who rates, for the log.
+
+    Raises:
+        StudyStillOpen: The study is open and nobody asked to look early.
+        UnknownName: There is no such method, unit or kind of intervals, or a filter names what
+            does not occur.
+        Conflict: Rounds or seed are out of range, online Elo is asked for another unit, or
+            covariates for another method than Bradley-Terry in closed form.
+    """
+    snapshot = _planned(study=study, **choices)
+    snapshot.save()
+    _log(snapshot)
+    return snapshot
+
+
+class PlannedRatings(WorkKind[Snapshot]):
+    """Planned ratings of many votes."""
+
+    model = Snapshot
+    related = ("study", "made_by")
+
+    def run(self, row: Snapshot, held: Lease[Snapshot]) -> None:
+        """Compute it, saying how far it is, and keep it with its lines."""
+        try:
+            computed = compute(row, lambda percent: held.note(progress=percent))
+        except ArithmeticError as error:
+            raise Conflict(str(error)) from error
+        with transaction.atomic():
+            if not held.is_held(lock=True):
+                raise LeaseLost
+            keep(row, computed)
+
+    def ended(self, pk: int, end: str, reason: str, now: Moment) -> None:
+        """Say in the log why there is no rating."""
+        row = self.rows.select_related(*self.related).get(pk=pk)
+        if row.state == Snapshot.State.FAILED:
+            after = {"snapshot": str(row.code), "why": row.reason}
+            _log_act(row.study, row.made_by, "rating failed", after)
+
+
+RATINGS = PlannedRatings()
+
+
+def is_big(study: Study) -> bool:
+    """Whether rating takes longer than a person should wait for a page."""
+    if is_imported(study):
+        return ImportedVote.objects.filter(file__study=study).count() > WHILE_WAITING
+    return Vote.objects.filter(matchup__study=study).count() > WHILE_WAITING
+
+
+@transaction.atomic
+def open_early(*, study: Study, actor: User) -> None:
+    """Open the results of an open study to somebody, who no longer votes in it from then on.
+
+    Raises:
+        Conflict: The study is not open: there is nothing to open early.
+    """
+    if study.state != Study.State.OPEN:
+        raise Conflict(f"The study '{study.name}' is {study.state}: nothing is opened early.")
+    _, is_new = EarlyLook.objects.get_or_create(study=study, user=actor)
+    if is_new:
+        after = {"what": "results", "ends_voting": votes_in(actor, study)}
+        _log_act(study, actor, "look early", after)
+
+
+def log_early_look(*, study: Study, actor: User | None, what: str) -> None:
+    """Write to the log that somebody looked at results of an open study on purpose."""
+    _log_act(study, actor, "look early", {"what": what})
+
+
+# --- Computing and keeping ---------------------------------------------------------------------
+
+
+def compute(snapshot: Snapshot, report: Callable[[int], None]) -> Computed:
+    """Rate the votes that a planned snapshot names, into the snapshot; nothing is stored.
+
+    Args:
+        snapshot: A planned one, stored or not.
+        report: Is told how far it is, in percent.
+    """
+    report(5)
+    votes = _vote_set(snapshot)
+    arrays = vote_arrays(votes.entrants, votes.counted)
+    report(20)
+    plain = board = _rate(snapshot, arrays.comparisons)
+    if names := snapshot.covariates:
+        board = _rate(snapshot, with_covariates(arrays.comparisons, votes.counted, names))
+    report(60)
+    snapshot.results = results = _results(snapshot, votes, arrays, board, plain)
+    report(90)
+    snapshot.votes_sha256 = digest_of(votes_csv(vote_rows(votes.counted, results.judges)))
+    snapshot.votes_counted = len(votes.counted)
+    snapshot.votes_left_out = votes.left_out
+    snapshot.versions = {
+        "python": platform.python_version(),
+        "numpy": numpy.__version__,
+        "scipy": scipy.__version__,
+        "results": RESULTS_VERSION,
+        "votes": VOTES_VERSION,
+    }
+    snapshot.reason = board.explanation
+    snapshot.degenerate_rounds = board.degenerate_rounds
+    # Whether something in the table is simulated, be it a line without votes.
+    snapshot.includes_simulated = any(one.is_simulated for one in votes.entrants + votes.counted)
+    return Computed(board=board, entrants=votes.entrants)
+
+
+@transaction.atomic
+def keep(snapshot: Snapshot, computed: Computed) -> Snapshot:
+    """Store what was computed."""
+    snapshot.state = Snapshot.State.READY
+    snapshot.progress = 100
+    snapshot.claim = snapshot.heartbeat_at = None
+    snapshot.finished_at = timezone.now()
+    snapshot.save()
+    Standing.objects.bulk_create(
+        Standing(
+            snapshot=snapshot,
+            contestant=entrant.contestant,
+            slug=entrant.slug,
+            name=entrant.name,
+            variant=entrant.variant,
+            kind=entrant.kind,
+            is_simulated=entrant.is_simulated,
+            **stored_values(line),
+        )
+        for entrant, line in zip(computed.entrants, computed.board.lines, strict=True)
+    )
+    return snapshot
+
+
+def votes_of(snapshot: Snapshot) -> VoteSet:
+    """The votes that a snapshot is made of, read again.
+
+    Raises:
+        Conflict: They are not what they were: somebody changed rows by hand.
+    """
+    votes = _vote_set(snapshot)
+    rows = vote_rows(votes.counted, snapshot.results.judges)
+    if digest_of(votes_csv(rows, votes_version_of(snapshot))) != snapshot.votes_sha256:
+        raise Conflict(
+            f"The votes of '{snapshot.study.name}' are not those of this rating any more. "
+            "Rate again."
+        )
+    return votes
+
+
+def votes_version_of(snapshot: Snapshot) -> int:
+    """The version of the columns that its file of votes has; older ones had no word for it."""
+    return int(snapshot.versions.get("votes", 1))
+
+
+# --- Private -----------------------------------------------------------------------------------
+
+
+def _planned(
+    *,
+    study: Study,
+    method: str = "bt",
+    rounds: int = DEFAULT_ROUNDS,
+    seed: int = 0,
+    unit: str | None = None,
+    intervals: str | None = None,
+    covariates: Sequence[str] = (),
+    filters: Filters | None = None,
+    early: bool = False,
+    actor: User | None = None,
+) -> Snapshot:
+    if study.state == Study.State.CANCELLED:
+        raise Conflict(f"The study '{study.name}' was cancelled: it is not rated.")
+    is_early = study.state == Study.State.OPEN
+    if is_early and not early:
+        raise StudyStillOpen(study.name)
+    if not 1 <= rounds <= MOST_ROUNDS:
+        raise Conflict(f"Bootstrap rounds go from 1 to {MOST_ROUNDS}, not {rounds}.")
+    if not 0 <= seed < 2**63:
+        raise Conflict(f"A seed goes from 0 to 2^63 - 1, not {seed}.")
+    chosen = _read_word(Method, method, "method")
+    drawn = _read_word(Unit, unit or _default_unit(study, chosen), "resampling unit")
+    if chosen is Method.ELO and drawn is not Unit.VOTE:
+        raise Conflict(f"Online Elo resamples single votes only; '{drawn.value}' needs bt.")
+    known = WITHOUT_PICTURES if is_imported(study) else COVARIATES
+    for name in covariates:
+        if name not in known:
+            raise UnknownName("covariate", name, list(known))
+    return Snapshot(
+        study=study,
+        state=Snapshot.State.QUEUED,
+        progress=0,
+        method=chosen,
+        rounds=rounds,
+        resampling_unit=drawn,
+        intervals=_intervals(intervals, chosen, drawn, is_adjusted=bool(covariates)),
+        covariates=[name for name in known if name in covariates],
+        seed=seed,
+        filters=replace(filters or Filters(), authors=authors_of(study)).as_document(),
+        last_vote=last_vote_of(study),
+        votes_counted=0,
+        is_early=is_early,
+        made_by=actor,
+    )
+
+
+def _read_word(words: type[Word], name: str, what: str) -> Word:
+    if name not in list(words):
+        raise UnknownName(what, name, [word.value for word in words])
+    return words(name)
+
+
+def _intervals(name: str | None, method: Method, unit: Unit, *, is_adjusted: bool) -> Intervals:
+    if is_adjusted:
+        if method is not Method.BRADLEY_TERRY or name == Intervals.RESAMPLES:
+            raise Conflict(
+                "Only Bradley-Terry with intervals in closed form can be adjusted for what "
+                "was shown."
+            )
+        return Intervals.CLOSED_FORM
+    if name is None:
+        return default_intervals(method, unit)
+    chosen = _read_word(Intervals, name, "kind of intervals")
+    if method is Method.ELO and chosen is not Intervals.RESAMPLES:
+        raise Conflict("Online Elo has no intervals in closed form, only resamples.")
+    return chosen
+
+
+def _default_unit(study: Study, method: Method) -> Unit:
+    if method is Method.ELO:
+        return Unit.VOTE
+    if not is_imported(study):
+        return Unit.TWO_WAY
+    votes = ImportedVote.objects.filter(file__study=study)
+    judges, items = (not votes.filter(**{name: ""}).exists() for name in ("judge", "item"))
+    return unit_for(judges=judges, items=items)
+
+
+def _log(snapshot: Snapshot) -> None:
+    # Each mark of an author has a line of its own already.
+    filters = {name: value for name, value in snapshot.filters.items() if name != "authors"}
+    after = {"snapshot": str(snapshot.code), "method": snapshot.method, "filters": filters}
+    verb = "rate early" if snapshot.is_early else "rate"
+    _log_act(snapshot.study, snapshot.made_by, verb, after)
+
+
+def _log_act(study: Study, actor: User | None, verb: str, after: Mapping[str, object]) -> None:
+    log_event(
+        actor=actor, verb=verb, object_kind="study", object_code=study.code, after=dict(after)
+    )
+
+
+def _vote_set(snapshot: Snapshot) -> VoteSet:
+    filters = Filters.of_document(snapshot.filters)
+    return vote_set(snapshot.study, filters=filters, last=snapshot.last_vote)
+
+
+def _rate(snapshot: Snapshot, comparisons: Comparisons) -> Leaderboard:
+    try:
+        return rate(
+            comparisons,
+            method=Method(snapshot.method),
+            rounds=snapshot.rounds,
+            unit=Unit(snapshot.resampling_unit),
+            intervals=Intervals(snapshot.intervals),
+            seed=snapshot.seed,
+        )
+    except TooManyContestants as error:
+        raise Conflict(f"{snapshot.study.name!r}: {error}") from error
+
+
+def _results(
+    snapshot: Snapshot, votes: VoteSet, arrays: VoteArrays, board: Leaderboard, plain: Leaderboard
+) -> Results:
+    study, seed = snapshot.study, snapshot.seed
+    from_file = is_imported(study)
+    filters = Filters.of_document(snapshot.filters)
+    planned = analysis.planned_pairs(study, filters)
+    planned.update(
+        frozenset((vote.left, vote.right)) for vote in votes.counted if vote.kind == AUTOMATIC
+    )
+    remark = settled_remark(study, votes, left_out=filters.leave_out_settled)
+    return Results(
+        version=RESULTS_VERSION,
+        board=board_remarks(board, *filter(None, [remark])),
+        trust=trust(arrays, votes, plain, seed=seed),
+        claims=precision(arrays, board, seed=seed),
+        own_votes=with_and_without(votes, filters, board, snapshot.covariates),
+        adjustment=adjustment(snapshot.covariates, board, plain),
+        pairs=analysis.pairs(arrays.comparisons, votes.counted, planned),
+        types=analysis.by_type(arrays, board),
+        displacement=() if from_file else analysis.displacement(study),
+        cost=() if from_file else analysis.cost(study, votes.entrants),
+        models={
+            entrant.slug: entrant.contestant.model
+            for entrant in votes.entrants
+            if entrant.contestant is not None
+        },
+        judges={vote.judge: vote.judge_name for vote in votes.counted},
+    )

@@ -1,0 +1,159 @@
+"""Files that workers write and pages offer: asked for once, made, and kept with their content."""
+
+from __future__ import annotations
+
+import hashlib
+from abc import abstractmethod
+from contextlib import AbstractContextManager
+from dataclasses import dataclass
+from functools import partial
+from pathlib import PurePath
+from typing import TypeVar
+
+from django.contrib.auth.models import User
+from django.core.files import File
+from django.core.files.storage import default_storage
+from django.db import transaction
+
+from arena.models import ScenarioFile, Snapshot, Study, StudyFile
+from arena.models.files import WrittenFile
+from arena.results.queries.votes import is_imported
+from augment.errors import Conflict, UnknownName
+from augment.services.events import log_event
+from augment.services.work import Lease, Settlement, WorkKind
+
+Row = TypeVar("Row", bound=WrittenFile)
+Kind = StudyFile.Kind
+
+FOLDERS = (ScenarioFile.FOLDER, StudyFile.FOLDER)
+"""Where the contents lie, among the pictures; a backup leaves them out."""
+
+SHOWS_RESULTS = (Kind.STUDY, Kind.CONTACT_SHEET)
+"""Kinds for those alone who may read the study's results."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MadeFile:
+    """What is to be stored.
+
+    Attributes:
+        name: What it is called for people.
+        warnings: What whoever passes it on has to know.
+        marked: Whether data that must not be used commercially is in it.
+    """
+
+    name: str
+    content: File[bytes]
+    warnings: tuple[str, ...] = ()
+    marked: bool = False
+
+
+class FileWork(WorkKind[Row]):
+    """The work of writing one kind of file."""
+
+    @abstractmethod
+    def made(self, row: Row) -> AbstractContextManager[MadeFile]:
+        """The file of a row, while it is open."""
+
+    def run(self, row: Row, held: Lease[Row]) -> None:
+        """Make it and keep it."""
+        with self.made(row) as made:
+            keep_file(row, held, made)
+
+
+def waiting_row(row: Row) -> Row | None:
+    """One like this that a worker has, or will have; None where there is none."""
+    return row.alike().filter(state__in=row.UNDER_WAY).first()
+
+
+def keep_file(row: Row, held: Lease[Row], made: MadeFile) -> None:
+    """Store the content and remove older files of the same owner and kind.
+
+    The content itself goes where a newer file was faster and has removed the row.
+    """
+    stored = f"{row.FOLDER}/{row.code}{PurePath(made.name).suffix}"
+    if default_storage.exists(stored):  # a worker that died left it
+        default_storage.delete(stored)
+    made.content.seek(0)
+    digest = hashlib.sha256()
+    for piece in made.content.chunks(1 << 20):
+        digest.update(piece)
+    size_bytes = made.content.tell()
+    made.content.seek(0)
+    kept = default_storage.save(stored, made.content)
+    columns = {
+        "name": made.name,
+        "stored": kept,
+        "size_bytes": size_bytes,
+        "digest": digest.hexdigest(),
+        "warnings": list(made.warnings),
+        "is_non_commercial": made.marked,
+    }
+    with transaction.atomic():
+        if not held.settle(Settlement(state=WrittenFile.State.READY, columns=columns)):
+            transaction.on_commit(partial(default_storage.delete, kept))
+            return
+        # Locked, so that none is kept between the reading of its name and its removal.
+        older = row.alike().filter(pk__lt=row.pk).order_by("pk").select_for_update()
+        gone = dict(older.values_list("pk", "stored"))
+        row.alike().filter(pk__in=gone).delete()
+        for name in filter(None, gone.values()):
+            transaction.on_commit(partial(default_storage.delete, name))
+
+
+# --- Files of a study --------------------------------------------------------------------------
+
+
+def why_not(study: Study, kind: str) -> str:
+    """A sentence where there can be no such file now, empty where there can.
+
+    Whether somebody may read the study's results is asked elsewhere.
+
+    Raises:
+        UnknownName: There is no such kind.
+    """
+    if kind not in Kind.values:
+        raise UnknownName("file of a study", kind, list(Kind.values))
+    is_cancelled = study.state == Study.State.CANCELLED
+    if kind == Kind.STUDY:
+        if study.state == Study.State.OPEN:
+            return "It is written once the study is closed: what still changes is no whole."
+        if is_cancelled:
+            return "A cancelled study is not written as a whole; its votes can be exported."
+    elif is_imported(study):
+        return "Votes from a file have no pictures."
+    elif kind == Kind.CONTACT_SHEET:
+        if is_cancelled:
+            return "The study was cancelled: it has no results."
+        if not study.snapshots.filter(state=Snapshot.State.READY).exists():
+            return "Rate the study first: the sheet has the votes of a rating."
+    return ""
+
+
+@transaction.atomic
+def ask_for_study_file(*, study: Study, kind: str, actor: User | None = None) -> StudyFile:
+    """Return a row for a worker to write; one that waits already is asked for once more.
+
+    Raises:
+        UnknownName: There is no such kind.
+        Conflict: There can be no such file now.
+    """
+    if reason := why_not(study, kind):
+        raise Conflict(reason)
+    row = StudyFile(study=study, kind=kind, asked_by=actor)
+    if (waiting := waiting_row(row)) is not None:
+        return waiting
+    row.save()
+    log_event(
+        actor=actor,
+        verb="ask for a file",
+        object_kind="study",
+        object_code=study.code,
+        after={"file": kind},
+    )
+    return row
+
+
+def study_files_of(study: Study) -> dict[str, StudyFile]:
+    """The newest row of each kind."""
+    return {row.kind: row for row in study.files.order_by("pk")}

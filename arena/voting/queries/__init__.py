@@ -1,0 +1,1 @@
+"""Pairs, pictures and progress of one expert."""

@@ -1,0 +1,1 @@
+"""Casting votes, and choosing the pictures that a study shows."""

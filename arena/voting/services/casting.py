@@ -1,0 +1,289 @@
+"""Casting votes: stored once however often they arrive, and never changed.
+
+In: an expert and a `Decision` about a matchup. Out: a `Vote` row, the same one for the same
+decision sent again; or an error that says why nothing was stored.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from datetime import timedelta
+from uuid import UUID
+
+from django.conf import settings
+from django.contrib.auth.models import User
+from django.db import IntegrityError, transaction
+from django.db.models import Q
+from django.utils import timezone
+
+from arena.errors import AlreadyDecided, InvalidVote, StudyNotOpen, TooFast
+from arena.models import AIDS, Matchup, Study, Vote
+from arena.voting.queries.ballots import VotingState, hold_matchup, upcoming, voting_state
+from arena.voting.services.turns import in_turn
+from augment.errors import Conflict
+from augment.models import Event
+from augment.services.events import log_event
+from augment.services.texts import make_storable
+
+LONGEST_COMMENT = 1000
+PACE_WINDOW = timedelta(seconds=5)
+FLAG_AGAIN_AFTER = timedelta(minutes=1)
+"""An account that goes on voting too fast is written to the log this often, not for every try."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Decision:
+    """What an expert decided, as it came in; its parts go together."""
+
+    key: UUID
+    matchup: UUID
+    outcome: Vote.Outcome
+    both_miss: bool
+    reason: str
+    comment: str
+    aids: str
+    supersedes: UUID | None
+    ms_visible: int | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Received:
+    """What came of a vote.
+
+    Attributes:
+        state: The study and the expert's progress after it.
+        coming: What is planned for the expert next, marked as served; nothing where the study
+            has closed.
+    """
+
+    vote: Vote
+    state: VotingState
+    coming: tuple[Matchup, ...]
+
+
+def decision_of(
+    *,
+    matchup_code: UUID | str,
+    key: UUID | str,
+    outcome: str,
+    both_miss: bool = False,
+    reason: str = "",
+    comment: str = "",
+    aids: Iterable[str] = (),
+    supersedes: UUID | str | None = None,
+    ms_visible: int | None = None,
+) -> Decision:
+    """Read what came in.
+
+    Args:
+        matchup_code: What was decided; one of the expert's own matchups.
+        key: Made by the browser, one per decision.
+        outcome: "left", "equal", "right" or "skip"; the side is kept apart from who won.
+        both_miss: With "equal": both miss the instruction. Counts as a tie.
+        reason: With "skip": why, one of Vote.SkipReason.
+        comment: Whatever the expert wants to add.
+        aids: What was used to look, out of AIDS.
+        supersedes: The key of the matchup's current vote, to change it.
+        ms_visible: How long the pair was on screen.
+
+    Raises:
+        ValueError: The outcome is none of the four.
+        InvalidVote: Parts do not go together, or are unknown.
+    """
+    chosen, used = Vote.Outcome(outcome), set(aids)
+    wrong = {}
+    if both_miss and chosen != Vote.Outcome.EQUAL:
+        wrong["both_miss"] = "Both can only miss the instruction where they are equal."
+    if chosen == Vote.Outcome.SKIP and reason not in Vote.SkipReason.values:
+        wrong["reason"] = f"A skip needs one of: {', '.join(Vote.SkipReason.values)}."
+    if chosen != Vote.Outcome.SKIP and reason:
+        wrong["reason"] = "Only a skip has a reason."
+    if len(comment) > LONGEST_COMMENT:
+        wrong["comment"] = f"A comment has at most {LONGEST_COMMENT} characters."
+    if unknown := sorted(used - set(AIDS)):
+        wrong["aids"] = f"Unknown: {', '.join(unknown)}. Known: {', '.join(AIDS)}."
+    if wrong:
+        raise InvalidVote(wrong)
+    return Decision(
+        key=UUID(str(key)),
+        matchup=UUID(str(matchup_code)),
+        outcome=chosen,
+        both_miss=both_miss,
+        reason=reason,
+        comment=make_storable(comment.strip()),
+        aids=" ".join(aid for aid in AIDS if aid in used),
+        supersedes=None if supersedes is None else UUID(str(supersedes)),
+        ms_visible=ms_visible,
+    )
+
+
+def cast_vote(*, expert: User, decision: Decision) -> Vote:
+    """Store what an expert decided; the same key and content again is the same vote.
+
+    For callers of our own, without a limit on the pace; browsers come in by `receive_vote`.
+
+    Raises:
+        NotYours: The matchup is somebody else's or does not exist.
+        StudyNotOpen: The study takes no votes.
+        AlreadyDecided: The matchup has a vote that `supersedes` does not name.
+        Conflict: The key belongs to another vote, or `supersedes` names none of this matchup's.
+        InvalidVote: The study does not allow it.
+    """
+    return _store(expert, decision, None).vote
+
+
+def receive_vote(*, expert: User, decision: Decision, ahead: int = 0) -> Received:
+    """Store what an expert's browser sent, at a pace that a person can keep.
+
+    The limit (ARENA_VOTES_PER_S over five seconds) counts stored votes, so it holds for any
+    number of web processes. An account that breaks it is flagged in the log.
+
+    Args:
+        expert: Whose vote it is.
+        decision: What was decided.
+        ahead: How many matchups to look ahead, at most.
+
+    Raises:
+        TooFast: The account votes faster than that; nothing was stored.
+        DatabaseBusy: It could not be written within ARENA_VOTE_WAIT_S; nothing was stored.
+        ArenaError: As in `cast_vote`.
+        Conflict: As in `cast_vote`.
+    """
+    try:
+        return _store(expert, decision, ahead)
+    except TooFast:
+        _flag(expert)
+        raise
+
+
+def mark_served(*, matchups: Sequence[Matchup]) -> None:
+    """Remember when matchups went out to their expert for the first time; within a transaction.
+
+    Those that somebody holds are left out: they are being decided or handed over, and whoever
+    holds one may wait for a row of ours.
+    """
+    fresh = [matchup.pk for matchup in matchups if matchup.served_at is None]
+    if fresh:
+        rows = Matchup.objects.filter(pk__in=fresh, served_at=None)
+        free = rows.select_for_update(skip_locked=True).values_list("pk", flat=True)
+        Matchup.objects.filter(pk__in=list(free)).update(served_at=timezone.now())
+
+
+# --- Private -----------------------------------------------------------------------------------
+
+
+def _store(expert: User, decision: Decision, ahead: int | None) -> Received:
+    """Store in turn; without a number of matchups to look ahead the pace has no limit."""
+    with in_turn(within_s=None if ahead is None else settings.VOTE_WAIT_S):
+        try:
+            return _write(expert, decision, ahead)
+        except IntegrityError:
+            # Another request stored the same key or decided the same matchup in between. That
+            # one counts; looked at again, this one is its replay or too late.
+            return _write(expert, decision, ahead)
+
+
+@transaction.atomic
+def _write(expert: User, decision: Decision, ahead: int | None) -> Received:
+    matchup = hold_matchup(expert=expert, code=decision.matchup)
+    known = list(
+        Vote.objects.filter(Q(key=decision.key) | Q(matchup_id=matchup.pk))
+        .select_related("supersedes", "superseded_by")
+        .order_by("pk")
+    )
+    vote = next((vote for vote in known if vote.key == decision.key), None)
+    is_new = vote is None
+    if vote is not None:
+        _check_replay(vote, matchup, decision)
+    else:
+        _check_open(matchup.study)
+        vote = _insert(matchup, expert, decision, _superseded(known, decision.supersedes))
+    # Read after the lock, so that a study closed while we waited is seen as closed.
+    since = timezone.now() - PACE_WINDOW
+    state = voting_state(study_pk=matchup.study_id, expert=expert, since=since)
+    if is_new:
+        _check_allowed(decision, state, is_paced=ahead is not None)
+    coming: list[Matchup] = []
+    if ahead and state.study.state == Study.State.OPEN:
+        coming = upcoming(study=state.study, expert=expert, n=ahead)
+        mark_served(matchups=coming)
+    return Received(vote=vote, state=state, coming=tuple(coming))
+
+
+def _insert(matchup: Matchup, expert: User, decision: Decision, old: Vote | None) -> Vote:
+    winners = {Vote.Outcome.LEFT: matchup.left_id, Vote.Outcome.RIGHT: matchup.right_id}
+    vote = Vote(
+        key=decision.key,
+        matchup_id=matchup.pk,
+        expert=expert,
+        shown_left_id=matchup.left_id,
+        shown_right_id=matchup.right_id,
+        outcome=decision.outcome,
+        winner_id=winners.get(decision.outcome),
+        both_miss=decision.both_miss,
+        reason=decision.reason,
+        comment=decision.comment,
+        aids=decision.aids,
+        supersedes=old,
+        is_simulated=matchup.by_machine,  # type: ignore[attr-defined]
+        ms_visible=decision.ms_visible,
+    )
+    vote.save(force_insert=True)
+    return vote
+
+
+def _superseded(known: list[Vote], supersedes: UUID | None) -> Vote | None:
+    """The vote that the new one replaces, None for a first vote."""
+    if not known:
+        if supersedes is not None:
+            raise Conflict("There is no vote yet that this one could supersede.")
+        return None
+    current = next(vote for vote in reversed(known) if not hasattr(vote, "superseded_by"))
+    if supersedes != current.key:
+        raise AlreadyDecided(current.outcome)
+    return current
+
+
+def _check_replay(vote: Vote, matchup: Matchup, decision: Decision) -> None:
+    if vote.matchup_id != matchup.pk:
+        raise Conflict("This key belongs to another vote; make a new key for every decision.")
+    old = None if vote.supersedes is None else vote.supersedes.key
+    stored = (vote.outcome, vote.both_miss, vote.reason, old)
+    if stored != (decision.outcome, decision.both_miss, decision.reason, decision.supersedes):
+        raise AlreadyDecided(vote.outcome)
+
+
+def _check_open(study: Study) -> None:
+    if study.state != Study.State.OPEN:
+        raise StudyNotOpen(f"The study {study.name!r} takes no votes: it is {study.state}.")
+
+
+def _check_allowed(decision: Decision, state: VotingState, *, is_paced: bool) -> None:
+    """Whether the study takes the vote that was just written; raising takes it back."""
+    study, used = state.study, decision.aids.split()
+    _check_open(study)
+    if decision.both_miss and not study.allow_both_miss:
+        raise InvalidVote({"both_miss": "This study does not ask whether both miss."})
+    for aid, is_allowed, what in (
+        ("text", study.allow_text, "text description"),
+        ("replay", study.allow_replay, "drives to play"),
+        ("measures", study.allow_measures, "measures"),
+    ):
+        if aid in used and not is_allowed:
+            raise InvalidVote({"aids": f"This study has no {what}."})
+    if is_paced and state.just_now > settings.VOTES_PER_S * PACE_WINDOW.total_seconds():
+        raise TooFast(math.ceil(PACE_WINDOW.total_seconds() / 2))
+
+
+def _flag(expert: User) -> None:
+    flags = Event.objects.filter(actor=expert, verb="vote too fast")
+    if not flags.filter(at__gt=timezone.now() - FLAG_AGAIN_AFTER).exists():
+        log_event(
+            actor=expert,
+            verb="vote too fast",
+            object_kind="person",
+            object_code=expert.person.code,
+            after={"votes_per_s": settings.VOTES_PER_S, "over_s": PACE_WINDOW.total_seconds()},
+        )

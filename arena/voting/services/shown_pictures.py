@@ -1,0 +1,326 @@
+"""What all showings of a scenario share: one window for both sides, and the scene before."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections import defaultdict
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Any
+
+from django.db.models import F, Min, Q
+
+from arena.errors import NothingToPlan
+from arena.models import Matchup, Study
+from arena.pairing.plan import PlannedMatchup
+from arena.pairing.rules import place_of, scenario_of
+from arena.studies.services.pictures import MOST_NAMED, Cells, find_showable, refuse_missing
+from arena.voting.queries.showings import VIEW_OF_OLD
+from augment.errors import Conflict
+from augment.models import Augmentation, Contestant, GenerationJob, Scenario, Simulation
+from augment.services.judging.simulations import Options
+from augment.services.scenarios.pictures import camera_of, view_of, window_of
+
+
+@dataclass(frozen=True, slots=True)
+class ScenarioFrame:
+    """What all showings of a scenario share: where metres lie, the scene before any change."""
+
+    view: dict[str, Any]
+    original_image: str
+
+
+FramesShown = dict[tuple[str, str], ScenarioFrame]
+"""By scenario and window, what a study's showings have already."""
+
+
+def find_frames(
+    planned: Sequence[PlannedMatchup],
+    cells: Cells,
+    places: dict[str, Scenario],
+    shown_before: FramesShown,
+) -> dict[str, ScenarioFrame]:
+    """By scenario; both sides of every pair are drawn in one window, or nothing is planned.
+
+    Args:
+        planned: What is to be shown.
+        cells: The pictures.
+        places: The scenarios by slug.
+        shown_before: Of the study; what is known so is not worked out from the scene again.
+
+    Raises:
+        NothingToPlan: Some are of an earlier version, or of before the reference was changed; or
+            nobody knows any more where metres lie in them.
+    """
+    shown: dict[str, dict[str, Augmentation]] = {}
+    for one in planned:
+        for cell in sides_of(one, cells):
+            shown.setdefault(one.scenario, {})[window_of(cell.image)] = cell
+    mixed = [scenario_of(name) for name, windows in sorted(shown.items()) if len(windows) > 1]
+    if mixed:
+        raise _other_windows(mixed)
+    return {
+        name: shown_before.get((scenario_of(name), next(iter(windows))))
+        or _frame(places[scenario_of(name)], *windows.popitem())
+        for name, windows in shown.items()
+    }
+
+
+def frames_shown(study: Study, scenarios: Iterable[str]) -> FramesShown:
+    """Those of the first showing of each scenario; without the scene before, it is none.
+
+    To read a scene takes longer than all else that planning for one more expert does.
+    """
+    first = (
+        study.matchups.filter(scenario__slug__in=set(scenarios), view__isnull=False)
+        .order_by()
+        .values("scenario")
+        .annotate(first=Min("pk"))
+    )
+    rows = Matchup.objects.filter(pk__in=[row["first"] for row in first])
+    names = ("scenario__slug", "left_image", "view", "original_image")
+    return {
+        (slug, window_of(image)): ScenarioFrame(view, original)
+        for slug, image, view, original in rows.values_list(*names)
+        if original and view
+    }
+
+
+def _frame(place: Scenario, window: str, cell: Augmentation) -> ScenarioFrame:
+    """As the pictures need it, whatever version drew them: today's window, or one shown before.
+
+    Raises:
+        NothingToPlan: Nobody knows any more where metres lie in such a picture.
+    """
+    if window in place.windows:
+        noted = place.windows[window]
+        return ScenarioFrame(noted["view"], noted["image"])
+    original = place.original_image if window_of(place.original_image) == window else ""
+    camera = camera_of(place)
+    if window == camera.key:
+        return ScenarioFrame(view_of(camera), original)
+    shows = Q(left_image=cell.image) | Q(right_image=cell.image)
+    earlier = Matchup.objects.filter(shows, scenario=place, view__isnull=False)
+    before = earlier.order_by("pk").first()
+    if before is not None and before.view is not None:
+        return ScenarioFrame(before.view, before.original_image)
+    if window:
+        raise _other_windows([place.slug])
+    return ScenarioFrame(VIEW_OF_OLD, original)
+
+
+def _other_windows(scenarios: list[str]) -> NothingToPlan:
+    return NothingToPlan(
+        f"The pictures of {', '.join(scenarios[:MOST_NAMED])} show different windows, so "
+        "they can’t stand side by side. They are drawn anew when the program starts; restart "
+        "it, or choose other scenarios."
+    )
+
+
+def sides_of(one: PlannedMatchup, cells: Cells) -> tuple[Augmentation, Augmentation]:
+    """What is shown on the left and on the right."""
+    return cells[one.scenario, one.left], cells[one.scenario, one.right]
+
+
+class SampleRule(StrEnum):
+    """Which samples of a cell take part.
+
+    ONE: one of each scenario, by the study's seed (`draw_sample`). ALL: every one, each against
+    the same sample of the others.
+    """
+
+    ONE = "one"
+    ALL = "all"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StudyPictures:
+    """The pictures of a study.
+
+    Attributes:
+        cells: By place and contestant; a place is a scenario, or one sample of it.
+        jobs: Those that the pictures come from, by their age.
+        options: By contestant, with which its pictures were made; only of those who ask models.
+    """
+
+    cells: Cells
+    jobs: tuple[GenerationJob, ...]
+    options: dict[str, dict[str, Any]]
+
+
+def choose_pictures(
+    contestants: list[Contestant],
+    scenarios: list[Scenario],
+    *,
+    seed: int,
+    rule: SampleRule = SampleRule.ONE,
+    jobs: Sequence[GenerationJob] = (),
+) -> StudyPictures:
+    """The augmentation that finished last of each scenario, contestant and sample that is shown.
+
+    Args:
+        contestants: Who takes part.
+        scenarios: On what.
+        seed: Of the study.
+        rule: Which samples are shown.
+        jobs: Whose augmentations count; none for those of every job.
+
+    Raises:
+        NothingToPlan: Pictures are missing; the text names them.
+        Conflict: A contestant's pictures were made with different options.
+    """
+    found = find_showable(scenarios).filter(contestant__in=contestants)
+    if jobs:
+        found = found.filter(job__in=jobs)
+    rows = found.select_related("scenario", "contestant", "job")
+    latest: defaultdict[tuple[str, str], dict[int, Augmentation]] = defaultdict(dict)
+    for row in rows.order_by(F("finished_at").asc(nulls_first=True), "pk"):
+        latest[row.scenario.slug, row.contestant.slug][row.sample] = row
+    cells = _one(latest, seed) if rule is SampleRule.ONE else _all(latest, contestants)
+    refuse_missing(contestants, scenarios, latest)
+    _refuse_mixed(cells)
+    used = {row.job_id: row.job for row in cells.values()}
+    return StudyPictures(
+        cells=cells,
+        jobs=tuple(used[pk] for pk in sorted(used)),
+        options={
+            row.contestant.slug: row.options for row in cells.values() if row.options is not None
+        },
+    )
+
+
+def draw_sample(seed: int, scenario: str, samples: int) -> int:
+    """Which of so many samples of a scenario a study shows, from 0.
+
+    The first eight bytes of the SHA-256 of "seed/scenario", modulo the number of samples: the same
+    for every contestant that has as many.
+    """
+    digest = hashlib.sha256(f"{seed}/{scenario}".encode()).digest()
+    return int.from_bytes(digest[:8], "big") % samples
+
+
+# --- Private -----------------------------------------------------------------------------------
+
+_Latest = dict[tuple[str, str], dict[int, Augmentation]]
+
+
+def _one(latest: _Latest, seed: int) -> Cells:
+    return {
+        (scenario, contestant): found[sorted(found)[draw_sample(seed, scenario, len(found))]]
+        for (scenario, contestant), found in latest.items()
+    }
+
+
+def _all(latest: _Latest, contestants: list[Contestant]) -> Cells:
+    """Every sample of a scenario, each as a place of its own that everybody has a picture of."""
+    most: defaultdict[str, set[int]] = defaultdict(set)
+    for (scenario, _), found in latest.items():
+        most[scenario] |= found.keys()
+    missing = [
+        f"{who.slug} on {scenario}, sample {sample}"
+        for who in contestants
+        for scenario, samples in sorted(most.items())
+        for sample in sorted(samples - latest.get((scenario, who.slug), {}).keys())
+        if (scenario, who.slug) in latest
+    ]
+    if missing:
+        raise NothingToPlan(
+            "All samples are to be shown, and there is no picture of "
+            f"{', '.join(missing[:8])}. Generate them, or show one sample of each scenario."
+        )
+    return {
+        (place_of(scenario, sample), contestant): row
+        for (scenario, contestant), found in latest.items()
+        for sample, row in found.items()
+    }
+
+
+def _refuse_mixed(cells: Cells) -> None:
+    by_contestant: defaultdict[str, dict[str, list[Augmentation]]] = defaultdict(dict)
+    for row in cells.values():
+        key = json.dumps(row.options, sort_keys=True)
+        by_contestant[row.contestant.slug].setdefault(key, []).append(row)
+    for slug, sets in sorted(by_contestant.items()):
+        if len(sets) > 1:
+            raise Conflict(_mixed(slug, sets))
+
+
+def _mixed(slug: str, sets: dict[str, list[Augmentation]]) -> str:
+    documents = [json.loads(key) or {} for key in sets]
+    names = sorted({name for one in documents for name in one})
+    differing = [
+        name for name in names if len({json.dumps(one.get(name)) for one in documents}) > 1
+    ]
+    jobs = sorted({row.job.name for rows in sets.values() for row in rows})
+    options = ", ".join(differing) or "unknown"
+    return (
+        f"The pictures of {slug} were made with different options ({options}), in the jobs "
+        f"{', '.join(jobs)}. Name the jobs whose augmentations the study is to show, or run it "
+        "anew."
+    )
+
+
+Way = tuple[str, str, bool]
+"""Planner, offsets, whether recorded traffic reacts."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Replays:
+    """How the drives were driven that a study plays, and of which scenarios, by slug."""
+
+    planner: str
+    offsets: str
+    is_reactive: bool
+    scenarios: list[str]
+
+
+def replays_of(cells: Cells) -> Replays:
+    """The scenarios of which every picture that takes part was driven in one and the same way.
+
+    A pair with a drive on one side alone would tell who was driven, and so who made it; so would
+    a missing one where only attention checks lack it. Of several ways the one with most scenarios
+    is taken, then the usual one.
+
+    Raises:
+        NothingToPlan: There is no such scenario; the text names what was not driven.
+    """
+    wanted: defaultdict[str, set[int]] = defaultdict(set)
+    for (scenario, _), cell in cells.items():
+        wanted[scenario_of(scenario)].add(cell.pk)
+    driven = _driven({cell.pk for cell in cells.values()})
+    usual: Way = (Options().planner, Options().offsets, Options().is_reactive)
+    whole = {
+        way: sorted(slug for slug, pictures in wanted.items() if pictures <= found)
+        for way, found in driven.items()
+    }
+    best = max(whole, key=lambda way: (len(whole[way]), way == usual, way), default=usual)
+    if not whole.get(best):
+        raise _nothing_driven(cells, driven.get(best, set()))
+    planner, offsets, is_reactive = best
+    return Replays(
+        planner=planner, offsets=offsets, is_reactive=is_reactive, scenarios=whole[best]
+    )
+
+
+# Private
+
+
+def _driven(pictures: set[int]) -> dict[Way, set[int]]:
+    """Keys of the augmentations that were driven, by how."""
+    found: defaultdict[Way, set[int]] = defaultdict(set)
+    rows = Simulation.objects.filter(augmentation__in=pictures, state=Simulation.State.DONE)
+    for row in rows.only("augmentation", "planner", "offsets", "is_reactive"):
+        found[row.planner, row.offsets, row.is_reactive].add(row.augmentation_id or 0)
+    return dict(found)
+
+
+def _nothing_driven(cells: Cells, driven: set[int]) -> NothingToPlan:
+    missing = sorted(names for names, cell in cells.items() if cell.pk not in driven)
+    named = ", ".join(f"{who} on {where}" for where, who in missing[:MOST_NAMED])
+    return NothingToPlan(
+        "No scenario can be played: each needs a drive of every picture that takes part. "
+        f"Not driven: {named}; {len(missing)} in all. Simulate their jobs first, or open the "
+        "study without drives."
+    )
