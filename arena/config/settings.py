@@ -86,7 +86,7 @@ AXES_RESET_ON_SUCCESS = True
 AXES_DISABLE_ACCESS_LOG = True
 AXES_VERBOSE = False
 AXES_CLIENT_IP_CALLABLE = "arena.config.login.client_address"
-AXES_LOCKOUT_CALLABLE = "arena.site.faults.answer_locked"
+AXES_LOCKOUT_CALLABLE = "arena.config.faults.answer_locked"
 
 # --- What it is made of ------------------------------------------------------------------------
 

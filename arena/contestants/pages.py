@@ -13,7 +13,7 @@ from django import forms
 from django.contrib import messages
 from django.core.exceptions import PermissionDenied
 from django.db import transaction
-from django.db.models import Count
+from django.db.models import Count, Q
 from django.http import HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, redirect, render
 from django.utils.text import capfirst
@@ -24,8 +24,7 @@ from arena.people.queries import role_of
 from arena.scenarios.queries import by_type
 from arena.site.access import ADMIN, STAFF, allow_only, user_of
 from arena.site.acts import refusals_in, refusals_told, send_later
-from arena.site.listing import read_listing, read_page, said_choices
-from arena.site.queries import Narrowing, find_contestants
+from arena.site.listing import read_listing, read_page
 from augment.errors import AugmentError, InvalidDocument
 from augment.models import Augmentation, Contestant, Endpoint, EndpointModel, GenerationJob, Probe
 from augment.services.endpoints import known_endpoints
@@ -240,14 +239,19 @@ def contestants_page(request: HttpRequest) -> HttpResponse:
     """List contestants page by page, those who are retired at the end."""
     kinds = [one for one in Contestant.Kind.choices if one[0] != Contestant.Kind.CHECK]
     choices = {
-        "kind": ("Kind", said_choices(kinds)),
+        "kind": ("Kind", kinds),
         "offered": ("In forms", [("active", "offered"), ("retired", "retired")]),
     }
     listing = read_listing(request, choices)
-    wanted = Narrowing(
-        search=listing.search, kind=listing.chosen("kind"), part=listing.chosen("offered")
+    found = Contestant.objects.exclude(kind=Contestant.Kind.CHECK).select_related("endpoint")
+    found = listing.narrow(
+        found, "name", "slug", "variant", "model", "endpoint__label", by=["kind"]
     )
-    page = read_page(request, find_contestants(wanted), size=CONTESTANTS_AT_ONCE)
+    if offered := listing.chosen("offered"):
+        found = found.filter(retired_at__isnull=offered == "active")
+    found = found.alias(is_retired=Q(retired_at__isnull=False))
+    found = found.order_by("is_retired", "name", "pk")
+    page = read_page(request, found, size=CONTESTANTS_AT_ONCE)
     made = Augmentation.objects.filter(contestant__in=list(page.object_list)).order_by()
     numbers = dict(made.values_list("contestant").annotate(number=Count("pk")))
     rows = [{"row": row, "made": numbers.get(row.pk, 0)} for row in page.object_list]

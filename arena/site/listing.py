@@ -1,4 +1,4 @@
-"""What the address of a list asks for: a page, a word to look for."""
+"""Lists in pages: a word to look for, filters, and which page the address asks for."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TypeVar
 
 from django.core.paginator import Page, Paginator
-from django.db.models import Model, QuerySet
+from django.db.models import Model, Q, QuerySet
 from django.http import HttpRequest
 
 LONGEST_SEARCH = 80
@@ -16,29 +16,26 @@ Row = TypeVar("Row", bound=Model)
 
 
 def page_asked(request: HttpRequest, name: str = "page") -> int:
-    """The number of a page, 1 where the address says none that there can be."""
-    said = request.GET.get(name, "1")
-    return int(said) if said.isascii() and said.isdigit() and len(said) < 9 and int(said) else 1
+    """Return the number of a page, 1 where the address names none that there can be."""
+    given = request.GET.get(name, "1")
+    return (
+        int(given) if given.isascii() and given.isdigit() and len(given) < 9 and int(given) else 1
+    )
 
 
 def search_asked(request: HttpRequest) -> str:
-    """What somebody looks for; empty for everything."""
+    """Return what somebody looks for; empty for everything."""
     return request.GET.get("q", "").replace("\0", "").strip()[:LONGEST_SEARCH]
 
 
 def choice_asked(request: HttpRequest, name: str, allowed: list[str]) -> str:
-    """What a filter is set to; empty where it is not, or to what there is not."""
-    said = request.GET.get(name, "")
-    return said if said in allowed else ""
-
-
-def said_choices(choices: Sequence[tuple[str, str]]) -> list[tuple[str, str]]:
-    """The choices of a column with their words in the language of whoever reads them."""
-    return [(str(value), str(label)) for value, label in choices]
+    """Return what a filter is set to; empty for what there is not."""
+    given = request.GET.get(name, "")
+    return given if given in allowed else ""
 
 
 def read_page(request: HttpRequest, rows: QuerySet[Row], *, size: int) -> Page[Row]:
-    """The page of rows that the address asks for; beyond the last one it is the last one."""
+    """Return the page of rows that the address asks for; beyond the last one it is the last."""
     return Paginator(rows, size).get_page(page_asked(request))
 
 
@@ -66,21 +63,35 @@ class Listing:
 
     @property
     def is_narrowed(self) -> bool:
-        """Whether the list may leave something out."""
+        """Return whether the list may leave something out."""
         return bool(self.search or any(choice.chosen for choice in self.choices))
 
     def chosen(self, name: str) -> str:
-        """What a filter is set to."""
+        """Return what a filter is set to."""
         return next((choice.chosen for choice in self.choices if choice.name == name), "")
+
+    def narrow(self, rows: QuerySet[Row], *columns: str, by: Sequence[str]) -> QuerySet[Row]:
+        """Return the rows that the form asks for.
+
+        Args:
+            rows: Of the list.
+            columns: Where the word is looked for, whatever its case.
+            by: Filters that are columns of the rows.
+        """
+        matches = Q()
+        for column in columns:
+            matches |= Q(**{f"{column}__icontains": self.search})
+        chosen = {name: self.chosen(name) for name in by if self.chosen(name)}
+        return rows.filter(matches if self.search else Q(), **chosen)
 
 
 def read_listing(
     request: HttpRequest,
-    choices: Mapping[str, tuple[str, Sequence[tuple[str, str]]]],
+    choices: Mapping[str, tuple[str, Sequence[tuple[str, object]]]],
     *,
     keep: Sequence[str] = (),
 ) -> Listing:
-    """What the address asks a list for.
+    """Return what the address asks a list for.
 
     Args:
         request: With the address.
@@ -93,8 +104,8 @@ def read_listing(
             ListChoice(
                 name=name,
                 label=label,
-                options=tuple((value, str(said)) for value, said in options),
-                chosen=choice_asked(request, name, [value for value, _said in options]),
+                options=tuple((str(value), str(text)) for value, text in options),
+                chosen=choice_asked(request, name, [str(value) for value, _text in options]),
             )
             for name, (label, options) in choices.items()
         ),

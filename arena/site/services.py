@@ -1,4 +1,6 @@
-"""What language models were asked and answered is removed once it is old; the numbers stay.
+"""Rows of all rooms: old transcripts removed, restored rows checked, unfinished work ended.
+
+What language models were asked and answered is removed once it is old; the numbers stay.
 
 A call keeps who was asked in which role, tokens, money and times; its messages and its answer go,
 and the images that no other call names. Modifications, pictures and votes are not touched. What
@@ -9,10 +11,9 @@ words. Nothing of a job that is not over goes, and nothing that an unfinished st
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from datetime import datetime, timedelta
-from typing import Any
 from uuid import uuid4
 
 from django.apps import apps
@@ -63,7 +64,7 @@ class TextLoss:
 
 
 def read_age(text: str) -> timedelta:
-    """An age as it is entered: 180d or 26w.
+    """Read an age as it is entered: 180d or 26w.
 
     Raises:
         InvalidDocument: It is none, or below a day.
@@ -77,7 +78,7 @@ def read_age(text: str) -> timedelta:
 
 
 def foresee_losses(*, before: datetime) -> list[TextLoss]:
-    """What would go, job by job, the oldest first; two queries and one for each job.
+    """Count what would go, job by job, the oldest first.
 
     Args:
         before: Calls that began earlier are old.
@@ -112,7 +113,10 @@ def remove_old(
         calls = _removable(before).filter(whose)
         keys = list(calls.order_by("pk").values_list("pk", flat=True))
         images = images_named_by(keys)
-        _log(loss, before, actor)
+        kind, code = ("reading", "all") if loss.job is None else ("job", loss.job.code)
+        names = ("calls", "answers", "transcripts", "characters")
+        counts = {"older_than": before.isoformat()} | {n: getattr(loss, n) for n in names}
+        log_event(actor=actor, verb="prune", object_kind=kind, object_code=code, after=counts)
         for start in range(0, len(keys), BATCH):
             _empty(keys[start : start + BATCH], before=before, now=now)
             yield loss, min(start + BATCH, len(keys))
@@ -123,7 +127,7 @@ def remove_old(
 
 
 def _removable(before: datetime) -> QuerySet[ModelCall]:
-    """Old calls with their words, of jobs that are over, which no unfinished study shows."""
+    """Return old calls with their words that no open job and no unfinished study needs."""
     unfinished = Matchup.objects.exclude(study__state=Study.State.CLOSED).order_by()
     shown = Augmentation.objects.filter(
         Q(pk__in=unfinished.values("left")) | Q(pk__in=unfinished.values("right"))
@@ -145,20 +149,14 @@ def _loss(job: GenerationJob | None, calls: QuerySet[ModelCall]) -> TextLoss:
         calls=Count("pk"),
         answers=Count("pk", filter=Q(answer__isnull=False)),
         transcripts=Count("attempt__augmentation", distinct=True),
-        characters=Sum(long),
+        characters=Coalesce(Sum(long), 0),
     )
-    return TextLoss(
-        job=job,
-        calls=found["calls"],
-        answers=found["answers"],
-        transcripts=found["transcripts"],
-        characters=found["characters"] or 0,
-    )
+    return TextLoss(job=job, **found)
 
 
 @transaction.atomic
 def _empty(keys: list[int], *, before: datetime, now: datetime) -> None:
-    """The messages and the answers of a batch; held, so that no job is resumed in between."""
+    """Remove messages and answers of a batch, locked so that no job is resumed meanwhile."""
     rows = list(ModelCall.objects.select_for_update().filter(pk__in=keys).order_by("pk"))
     if _removable(before).filter(pk__in=keys).count() != len(keys):
         raise Conflict(
@@ -173,34 +171,58 @@ def _empty(keys: list[int], *, before: datetime, now: datetime) -> None:
     ModelCall.objects.bulk_update(rows, columns)
 
 
-def _log(loss: TextLoss, before: datetime, actor: User | None) -> None:
-    after: dict[str, Any] = {
-        "older_than": before.isoformat(),
-        "calls": loss.calls,
-        "answers": loss.answers,
-        "transcripts": loss.transcripts,
-        "characters": loss.characters,
-    }
-    kind, code = ("reading", "all") if loss.job is None else ("job", str(loss.job.code))
-    log_event(actor=actor, verb="prune", object_kind=kind, object_code=code, after=after)
-
+# --- Rules of rows that a backup or a study's folder brings -------------------------------------
 
 REFUSALS = (AugmentError, ArenaError, ValidationError, ValueError, KeyError, TypeError)
 """What a rule raises."""
 
 
 def check_row(row: models.Model) -> None:
-    """Refuse a row that no form and no door of the API would have stored.
+    """Refuse a row that no form and no operation of the API would have stored.
 
     Raises:
         One of REFUSALS: With the column and what is allowed.
     """
-    if rule := _RULES.get(type(row)):
-        rule(row)
+    match row:
+        case Study():
+            one_line("name", row.name, what="study")
+            check_seed(row.seed)
+            if row.rules:  # those of imported votes have none
+                rules_of(row)
+        case Matchup():
+            for name in ("original_image", "left_image", "right_image"):
+                check_picture_name(name, getattr(row, name))
+        case Vote():
+            decision_of(
+                matchup_code=uuid4(),
+                key=row.key,
+                outcome=row.outcome,
+                both_miss=row.both_miss,
+                reason=row.reason,
+                comment=row.comment,
+                aids=row.aids.split(),
+            )
+        case Report():
+            check_complaint(_complaint_of(row))
+        case Snapshot():
+            check_seed(row.seed)
+            Method(row.method)
+            Unit(row.resampling_unit)
+            Intervals(row.intervals)
+        case FaultLabel() if len(row.note) > NOTE_LENGTH:
+            raise ValueError(f"note: at most {NOTE_LENGTH} characters are allowed")
+        case _ if rule := row_rules.RULES.get(type(row)):
+            rule(row)
+
+
+def _complaint_of(row: Report) -> Complaint:
+    mark = None if row.mark_x is None or row.mark_y is None else (row.mark_x, row.mark_y)
+    side = row.side or Report.Side.BOTH  # reports from before it was asked name none
+    return Complaint(reason=row.reason, side=side, mark=mark, comment=row.comment)
 
 
 def check_votes() -> None:
-    """Hold stored pairs and votes against each other.
+    """Compare stored pairs and votes with each other.
 
     Raises:
         ArenaError: A vote is not on what its expert was shown, or a pair is not of its scenario.
@@ -218,61 +240,7 @@ def check_votes() -> None:
         )
 
 
-# --- Private -----------------------------------------------------------------------------------
-
-
-def _check_study(row: Study) -> None:
-    one_line("name", row.name, what="study")
-    check_seed(row.seed)
-    if row.rules:  # those of imported votes have none
-        rules_of(row)
-
-
-def _check_matchup(row: Matchup) -> None:
-    for name in ("original_image", "left_image", "right_image"):
-        check_picture_name(name, getattr(row, name))
-
-
-def _check_vote(row: Vote) -> None:
-    decision_of(
-        matchup_code=uuid4(),
-        key=row.key,
-        outcome=row.outcome,
-        both_miss=row.both_miss,
-        reason=row.reason,
-        comment=row.comment,
-        aids=row.aids.split(),
-    )
-
-
-def _check_report(row: Report) -> None:
-    mark = None if row.mark_x is None or row.mark_y is None else (row.mark_x, row.mark_y)
-    side = row.side or Report.Side.BOTH  # those from before it was asked name none
-    check_complaint(Complaint(reason=row.reason, side=side, mark=mark, comment=row.comment))
-
-
-def _check_label(row: FaultLabel) -> None:
-    if len(row.note) > NOTE_LENGTH:
-        raise ValueError(f"note: at most {NOTE_LENGTH} characters are allowed")
-
-
-def _check_snapshot(row: Snapshot) -> None:
-    check_seed(row.seed)
-    Method(row.method)
-    Unit(row.resampling_unit)
-    Intervals(row.intervals)
-
-
-_RULES: Mapping[type[models.Model], Callable[[Any], None]] = {
-    **row_rules.RULES,
-    FaultLabel: _check_label,
-    Matchup: _check_matchup,
-    Report: _check_report,
-    Snapshot: _check_snapshot,
-    Study: _check_study,
-    Vote: _check_vote,
-}
-
+# --- Unfinished work ----------------------------------------------------------------------------
 
 _WHY = "It was under way when the backup was taken. Start it again."
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from django.test import RequestFactory
 
-from arena.site.faults import answer_broken
+from arena.config.faults import answer_broken
 from tests.web.cast import people, signed_in
 
 

@@ -11,23 +11,14 @@ from django.shortcuts import get_object_or_404, redirect, render
 from django.urls import reverse
 from django.views.decorators.http import require_http_methods, require_POST, require_safe
 
-from arena.jobs.pages.driving import driving_section
-from arena.jobs.pages.exports import displacement_section
+from arena.jobs.pages.measures import displacement_section, driving_section
 from arena.jobs.queries import MARKS, VIEWS, Part, grid_part
 from arena.jobs.services import files_of
 from arena.services.retrying import retry_cause as retry_one_cause
 from arena.site.access import ADMIN, STAFF, allow_only, user_of
 from arena.site.acts import Confirmation, ask, is_sure, refusals_told, send_later
 from arena.site.forms import CapsForm
-from arena.site.listing import (
-    choice_asked,
-    page_asked,
-    read_listing,
-    read_page,
-    said_choices,
-    search_asked,
-)
-from arena.site.queries import MINE, Narrowing, find_jobs
+from arena.site.listing import choice_asked, page_asked, read_listing, read_page, search_asked
 from augment.models import Augmentation, GenerationJob
 from augment.services.judging.analyses import repeatability
 from augment.services.judging.scenario_export import FORMATS
@@ -49,14 +40,15 @@ _ASK_TO_MEASURE = frozenset({"measures", "by", "types", "checks"})
 def jobs_page(request: HttpRequest) -> HttpResponse:
     """List jobs with their bars, page by page."""
     choices = {
-        "state": ("State", said_choices(GenerationJob.State.choices)),
-        "by": ("Started by", [(MINE, "me")]),
+        "state": ("State", GenerationJob.State.choices),
+        "by": ("Started by", [("mine", "me")]),
     }
     listing = read_listing(request, choices)
-    wanted = Narrowing(
-        search=listing.search, kind=listing.chosen("state"), part=listing.chosen("by")
-    )
-    page = read_page(request, find_jobs(wanted, user=user_of(request)), size=JOBS_AT_ONCE)
+    rows = GenerationJob.objects.select_related("launched_by__person")
+    rows = listing.narrow(rows, "name", by=["state"]).order_by("-created_at", "-pk")
+    if listing.chosen("by"):
+        rows = rows.filter(launched_by=user_of(request))
+    page = read_page(request, rows, size=JOBS_AT_ONCE)
     counted = progress.count_each(list(page.object_list))
     context: dict[str, object] = {"jobs": counted, "page": page, "listing": listing}
     if any(counts.is_moving for counts in counted):

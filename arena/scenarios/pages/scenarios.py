@@ -16,8 +16,7 @@ from arena.scenarios import queries, services
 from arena.site.access import ADMIN, STAFF, allow_only, user_of
 from arena.site.acts import Confirmation, ask, is_sure, looks_again, refusals_told, send_later
 from arena.site.forms import read_json
-from arena.site.listing import read_listing, read_page, said_choices
-from arena.site.queries import Narrowing, find_scenarios, group_by_type
+from arena.site.listing import read_listing, read_page
 from augment.errors import Conflict
 from augment.models import BaseScene, EndpointModel, Scenario
 from augment.services.endpoints.contestants import ensure_builtin
@@ -46,21 +45,14 @@ JSON_STYLE = {"indent": 2, "ensure_ascii": False}
 def scenarios_page(request: HttpRequest) -> HttpResponse:
     """List scenarios of a set by type, with the reference where it was drawn."""
     chosen = queries.set_asked(request.GET.get("set"))
-    choices = {
-        "type": ("Type", said_choices(type_choices())),
-        "offered": ("In forms", [("retired", "retired")]),
-    }
+    choices = {"type": ("Type", type_choices()), "offered": ("In forms", [("retired", "retired")])}
     listing = read_listing(request, choices, keep=("set",))
-    wanted = Narrowing(
-        search=listing.search,
-        kind=listing.chosen("type"),
-        part=chosen,
-        is_retired=listing.chosen("offered") == "retired",
-    )
-    page = read_page(request, find_scenarios(wanted), size=SCENARIOS_AT_ONCE)
+    found = queries.listed_scenarios(chosen, is_retired=bool(listing.chosen("offered")))
+    found = listing.narrow(found, "slug", "instruction", "base_scene__slug", by=["type"])
+    page = read_page(request, found, size=SCENARIOS_AT_ONCE)
     rows = list(page.object_list)
     context = {
-        "groups": group_by_type(rows),
+        "groups": queries.group_by_type(rows),
         "sets": queries.set_choices(chosen),
         "references": queries.reference_pictures(rows),
         "page": page,

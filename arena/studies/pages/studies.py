@@ -40,7 +40,7 @@ from arena.site.acts import (
     tell_errors,
     wants_to_change,
 )
-from arena.site.listing import read_listing, read_page, said_choices
+from arena.site.listing import read_listing, read_page
 from arena.studies import queries
 from arena.studies.forms import HandOverForm
 from arena.studies.services.opening import (
@@ -65,12 +65,11 @@ DRAFT = "draft"
 @require_safe
 def studies_page(request: HttpRequest) -> HttpResponse:
     """Studies with their bars, page by page; before the first ones the drafts."""
-    states = [(DRAFT, "Draft"), *said_choices(Study.State.choices)]
+    states = [(DRAFT, "Draft"), *Study.State.choices]
     listing = read_listing(request, {"state": ("State", states)})
-    state = listing.chosen("state")
-    rows = Study.objects.filter(name__icontains=listing.search)
-    page = read_page(request, rows.filter(state=state) if state else rows, size=STUDIES_AT_ONCE)
-    shows_drafts = page.number == 1 and state in ("", DRAFT)
+    rows = listing.narrow(Study.objects.all(), "name", by=["state"])
+    page = read_page(request, rows, size=STUDIES_AT_ONCE)
+    shows_drafts = page.number == 1 and listing.chosen("state") in ("", DRAFT)
     context = {
         "studies": queries.of_studies(list(page.object_list)),
         "drafts": list(queries.find_drafts(listing.search)) if shows_drafts else [],
