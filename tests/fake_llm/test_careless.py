@@ -15,9 +15,10 @@ from augment.scene.entities import Modification, Scene, TrafficAgent, TurnType
 from augment.scene.intent import Intent
 from augment.variants.pipeline import Outcome, run
 from augment.variants.recipes import find_recipe
-from augment.variants.respondents import MemoryTranscript, RespondentClient
+from augment.variants.respondents import RespondentClient
 from tests.fixtures.shelf import SLUGS, entry, shown_scene
 from tests.scenes import curve, pedestrian, scene, vehicle
+from tests.variants.memory import MemoryTranscript
 
 
 def outcome(
