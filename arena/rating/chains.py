@@ -23,9 +23,8 @@ from arena.rating.comparisons import (
     IntArray,
     PairCounts,
     count_pairs,
-    renumber_codes,
+    restrict_to,
     select_votes,
-    split_votes,
 )
 from arena.rating.lines import Line
 from arena.rating.models import ELO_PER_LOGIT, Meetings, fit
@@ -223,7 +222,13 @@ def diagnose(
         chains = replace(chains, part_of=chains.group_of, between=apart)
     parts = chains.parts()
     if len(parts) > 1:
-        explanation = [_who_is_apart(names, groups)] if len(groups) > 1 else []
+        explanation = []
+        if len(groups) > 1:
+            explanation.append(
+                "These groups were never compared with each other: "
+                f"{_list_groups(names, groups)}. Each is rated by itself; ratings across them "
+                "have no meaning."
+            )
         if not bounded_anyway:
             explanation += _who_is_unbounded(names, chains)
         return Diagnosis(
@@ -244,14 +249,6 @@ def diagnose(
             chains=chains,
         )
     return Diagnosis(status=Status.RATED, chains=chains)
-
-
-def _who_is_apart(names: tuple[str, ...], groups: tuple[tuple[int, ...], ...]) -> str:
-    listed = _joined([_listed(names, group) for group in groups])
-    return (
-        f"These groups were never compared with each other: {listed}. Each is rated by itself; "
-        "ratings across them have no meaning."
-    )
 
 
 def _notes(parts: tuple[tuple[int, ...], ...], chains: Chains) -> tuple[str, ...]:
@@ -281,27 +278,21 @@ def _who_is_unbounded(names: tuple[str, ...], chains: Chains) -> list[str]:
     is_unbeaten = has_rest & (chains.between.sum(axis=0) == 1)
     is_scoreless = has_rest & (chains.between.sum(axis=1) == 1)
     unbeaten, scoreless = (
-        [_listed(names, members[part]) for part in np.flatnonzero(which).tolist()]
+        _list_groups(names, [members[part] for part in np.flatnonzero(which).tolist()])
         for which in (is_unbeaten, is_scoreless)
     )
     sentences = []
     if unbeaten:
-        sentences.append(
-            f"Nobody else scored against {_joined(unbeaten)}: there is no upper limit."
-        )
+        sentences.append(f"Nobody else scored against {unbeaten}: there is no upper limit.")
     if scoreless:
-        sentences.append(
-            f"{_joined(scoreless)} scored against nobody else: there is no lower limit."
-        )
+        sentences.append(f"{scoreless} scored against nobody else: there is no lower limit.")
     return sentences
 
 
-def _joined(groups: Sequence[str]) -> str:
-    return "; ".join(few_of(groups))
-
-
-def _listed(names: tuple[str, ...], group: Sequence[int]) -> str:
-    return ", ".join(few_of([names[index] for index in group]))
+def _list_groups(names: tuple[str, ...], groups: Sequence[Sequence[int]]) -> str:
+    return "; ".join(
+        few_of([", ".join(few_of([names[index] for index in group])) for group in groups])
+    )
 
 
 # --- Contestants above or below others without any limit -----------------------------------------
@@ -327,11 +318,10 @@ def find_levels(votes: Comparisons, chains: Chains, unit: Unit) -> FloatArray:
     levels = np.zeros(len(votes.names))
     groups = chains.groups()
     if len(groups) < len(chains.sizes):
-        for group, inside in zip(groups, split_votes(votes, groups), strict=True):
-            members = list(group)
+        for members in map(list, groups):
             part_of = chains.part_of[members]
             if (part_of != part_of[0]).any():
-                levels[members] = _levels_of_group(inside, part_of, unit)
+                levels[members] = _levels_of_group(restrict_to(votes, members), part_of, unit)
     return levels
 
 
@@ -463,7 +453,7 @@ def _independent_votes(
     """
     fewest: FloatArray = np.full(meetings, np.inf)
     for kind in unit.kinds:
-        occurring, place = renumber_codes(getattr(votes, kind))
+        occurring, place = np.unique(getattr(votes, kind), return_inverse=True)
         met = np.unique(of_row * len(occurring) + place)
         different = np.bincount(met // len(occurring), minlength=meetings)
         fewest = np.where(different > 1, np.minimum(fewest, different), fewest)
