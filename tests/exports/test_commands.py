@@ -7,10 +7,8 @@ from pathlib import Path
 
 import pytest
 from django.core.management import CommandError, call_command
-from django.test import Client
 
 from arena.models import Study
-from arena.people.services import create_person
 from augment.models import Event
 from tests.exports.test_ratings import voted_study
 from tests.study_rows import a_study, cast_of
@@ -68,21 +66,3 @@ def test_an_open_study_is_exported_only_on_purpose_and_that_is_logged(tmp_path: 
     assert looks.count() == 2
     with (tmp_path / "x.csv").open(newline="") as file:
         assert {row["early"] for row in csv.DictReader(file)} == {"yes"}
-
-
-# --- People ------------------------------------------------------------------------------------
-
-
-def test_votes_and_ratings_can_only_be_read_in_the_admin() -> None:
-    study = voted_study()
-    run("rate", study.name)
-    client = Client()
-    client.force_login(create_person(username="adi", password="a password", role="admin"))
-    for model in ("vote", "snapshot", "study", "matchup", "person"):
-        assert client.get(f"/admin/arena/{model}/").status_code == 200
-        assert client.get(f"/admin/arena/{model}/add/").status_code == 403
-    votes = study.matchups.first()
-    assert votes is not None
-    page = client.get(f"/admin/arena/vote/{votes.votes.get().pk}/change/")
-    assert page.status_code == 200
-    assert b'type="submit"' not in page.content.split(b"</nav>")[-1].split(b"logout-form")[0]
