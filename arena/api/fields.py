@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import uuid
 from collections.abc import Mapping
 from math import isfinite
 from typing import IO, Any
@@ -56,25 +55,50 @@ class StrictSerializer(serializers.Serializer[Any]):
         return super().run_validation(data)
 
 
-class WholeNumberField(serializers.IntegerField):
-    """A JSON integer; strings, fractions and booleans are refused."""
+class _OfType:
+    """Refuse JSON values of other types, which DRF would convert: "5", true and 5.0 for 5."""
 
-    def to_internal_value(self, data: Any) -> int:
-        """Return the number."""
-        if isinstance(data, bool) or not isinstance(data, int):
-            self.fail("invalid")
-        return super().to_internal_value(data)
+    json_types: tuple[type, ...] = ()
+
+    def to_internal_value(self, data: Any) -> Any:
+        if type(data) not in self.json_types:
+            self.fail("invalid", input=data, value=data)  # type: ignore[attr-defined]
+        return super().to_internal_value(data)  # type: ignore[misc]
 
 
-class NumberField(serializers.FloatField):
-    """A finite JSON number; strings and booleans are refused."""
+class WholeNumberField(_OfType, serializers.IntegerField):
+    """A JSON integer."""
+
+    json_types = (int,)
+
+
+class FlagField(_OfType, serializers.BooleanField):
+    """A JSON boolean."""
+
+    json_types = (bool,)
+
+
+class TextField(_OfType, serializers.CharField):
+    """A JSON string."""
+
+    json_types = (str,)
+
+
+class CodeField(_OfType, serializers.UUIDField):
+    """A UUID as a JSON string."""
+
+    json_types = (str,)
+
+
+class NumberField(_OfType, serializers.FloatField):
+    """A finite JSON number."""
+
+    json_types = (int, float)
 
     def to_internal_value(self, data: Any) -> float:
         """Return the number."""
-        if isinstance(data, bool) or not isinstance(data, int | float):
-            self.fail("invalid")
         try:
-            number = float(data)
+            number = float(super().to_internal_value(data))
         except OverflowError:  # a whole number with hundreds of digits
             self.fail("invalid")
         if not isfinite(number):
@@ -87,36 +111,6 @@ class ShareField(NumberField):
 
     def __init__(self, **kwargs: Any) -> None:
         super().__init__(min_value=0, max_value=1, **kwargs)
-
-
-class CodeField(serializers.UUIDField):
-    """A UUID as a JSON string; numbers are refused."""
-
-    def to_internal_value(self, data: Any) -> uuid.UUID:
-        """Return the UUID."""
-        if not isinstance(data, str):
-            self.fail("invalid", value=data)
-        return super().to_internal_value(data)
-
-
-class FlagField(serializers.BooleanField):
-    """A JSON boolean; strings and numbers are refused."""
-
-    def to_internal_value(self, data: Any) -> bool:
-        """Return the flag."""
-        if not isinstance(data, bool):
-            self.fail("invalid", input=data)
-        return data
-
-
-class TextField(serializers.CharField):
-    """A JSON string; numbers are refused."""
-
-    def to_internal_value(self, data: Any) -> str:
-        """Return the text."""
-        if not isinstance(data, str):
-            self.fail("invalid")
-        return super().to_internal_value(data)
 
 
 LONGEST_NAME = 150

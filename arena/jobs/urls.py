@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from django.urls import URLPattern, path
 
-from arena.jobs.pages import driving, exports, jobs, labelling, launching
+from arena.jobs.pages import jobs, labelling, launching, measures
 
 urlpatterns: list[URLPattern] = [
     path("jobs/", jobs.jobs_page, name="jobs"),
@@ -17,45 +17,47 @@ urlpatterns: list[URLPattern] = [
     path("jobs/<uuid:code>/resume/", jobs.resume_job, name="job-resume"),
     path(
         "jobs/<uuid:code>/displacement.<slug:form>",
-        exports.export_table,
+        measures.export_table,
         {"name": "displacement"},
         name="displacement-export",
     ),
-    path("jobs/<uuid:code>/analyses/", exports.analyses_page, name="analyses"),
+    path("jobs/<uuid:code>/analyses/", measures.analyses_page, name="analyses"),
     path(
         "jobs/<uuid:code>/analyses-<slug:part>.<slug:form>",
-        exports.export_analysis,
+        measures.export_analysis,
         name="analyses-export",
     ),
     path(
-        "jobs/<uuid:code>/transcripts.jsonl", exports.export_transcripts, name="transcripts-export"
+        "jobs/<uuid:code>/transcripts.jsonl",
+        measures.export_transcripts,
+        name="transcripts-export",
     ),
     path(
         "jobs/<uuid:code>/tool-calls.<slug:form>",
-        exports.export_table,
+        measures.export_table,
         {"name": "tool-calls"},
         name="tool-calls-export",
     ),
     path(
         "jobs/<uuid:code>/scenarios-<slug:form>/",
-        exports.ask_for_scenarios,
+        measures.ask_for_scenarios,
         name="scenarios-write",
     ),
-    path("scenarios-<uuid:code>.zip", exports.download_scenarios, name="scenarios-export"),
-    path("jobs/<uuid:code>/simulate/", driving.simulate_job, name="job-simulate"),
-    path("jobs/<uuid:code>/drives/", driving.drives_page, name="drives"),
+    path("scenarios-<uuid:code>.zip", measures.download_scenarios, name="scenarios-export"),
+    path("jobs/<uuid:code>/simulate/", measures.simulate_job, name="job-simulate"),
+    path("jobs/<uuid:code>/drives/", measures.drives_page, name="drives"),
     path(
         "jobs/<uuid:code>/driving.<slug:form>",
-        exports.export_table,
+        measures.export_table,
         {"name": "driving"},
         name="driving-export",
     ),
-    path("drives/<uuid:code>/", driving.drive_page, name="drive"),
-    path("drives/<uuid:code>.<slug:form>", driving.drive_trace, name="drive-file"),
+    path("drives/<uuid:code>/", measures.drive_page, name="drive"),
+    path("drives/<uuid:code>.<slug:form>", measures.drive_trace, name="drive-file"),
     path("jobs/<uuid:code>/faults/", labelling.faults_page, name="faults"),
     path(
         "jobs/<uuid:code>/faults.<slug:form>",
-        exports.export_table,
+        measures.export_table,
         {"name": "faults"},
         name="faults-export",
     ),

@@ -28,7 +28,6 @@ from arena.rating.comparisons import (
     FloatArray,
     IntArray,
     PairCounts,
-    renumber_codes,
     tally,
 )
 from arena.rating.models import Meetings
@@ -133,7 +132,7 @@ def _cluster_draws(
 
     found = []
     for kind in unit.kinds:
-        codes, of_row = renumber_codes(getattr(votes, kind))
+        codes, of_row = np.unique(getattr(votes, kind), return_inverse=True)
         found.append((drawing(len(codes), np.random.default_rng(children[kind])), of_row))
     return found
 

@@ -23,9 +23,8 @@ from arena.rating.comparisons import (
     IntArray,
     PairCounts,
     count_pairs,
-    renumber_codes,
+    restrict_to,
     select_votes,
-    split_votes,
 )
 from arena.rating.lines import Line
 from arena.rating.models import ELO_PER_LOGIT, Meetings, fit
@@ -327,11 +326,10 @@ def find_levels(votes: Comparisons, chains: Chains, unit: Unit) -> FloatArray:
     levels = np.zeros(len(votes.names))
     groups = chains.groups()
     if len(groups) < len(chains.sizes):
-        for group, inside in zip(groups, split_votes(votes, groups), strict=True):
-            members = list(group)
+        for members in map(list, groups):
             part_of = chains.part_of[members]
             if (part_of != part_of[0]).any():
-                levels[members] = _levels_of_group(inside, part_of, unit)
+                levels[members] = _levels_of_group(restrict_to(votes, members), part_of, unit)
     return levels
 
 
@@ -463,7 +461,7 @@ def _independent_votes(
     """
     fewest: FloatArray = np.full(meetings, np.inf)
     for kind in unit.kinds:
-        occurring, place = renumber_codes(getattr(votes, kind))
+        occurring, place = np.unique(getattr(votes, kind), return_inverse=True)
         met = np.unique(of_row * len(occurring) + place)
         different = np.bincount(met // len(occurring), minlength=meetings)
         fewest = np.where(different > 1, np.minimum(fewest, different), fewest)

@@ -9,7 +9,7 @@ from 0; `names` gives the contestants' names.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, fields, replace
 
 import numpy as np
@@ -128,36 +128,26 @@ def as_arrays(names: Sequence[str], votes: Iterable[Comparison]) -> Comparisons:
     if len(number) < len(names):
         raise ValueError("a contestant is named twice")
     votes = list(votes)
-    experts = _numbered(vote.expert for vote in votes)
-    scenarios = _numbered(vote.scenario for vote in votes)
+    experts = {name: n for n, name in enumerate(sorted({vote.expert for vote in votes}))}
+    scenarios = {name: n for n, name in enumerate(sorted({vote.scenario for vote in votes}))}
     rows = []
     for count, vote in enumerate(votes, start=1):
-        for name in (vote.first, vote.second):
-            if name not in number:
-                raise ValueError(f"vote {count}: {name!r} is none of {', '.join(names)}")
+        ends = vote.first, vote.second
+        if strange := [name for name in ends if name not in number]:
+            raise ValueError(f"vote {count}: {strange[0]!r} is none of {', '.join(names)}")
         if vote.first == vote.second:
             raise ValueError(f"vote {count}: {vote.first!r} is compared with itself")
         if vote.score not in (WIN, TIE, LOSS):
             raise ValueError(f"vote {count}: a score is 1, 0.5 or 0, not {vote.score!r}")
-        rows.append(
-            (
-                number[vote.first],
-                number[vote.second],
-                experts[vote.expert],
-                scenarios[vote.scenario],
-                vote.score,
-            )
-        )
-    table = np.array(rows, dtype=np.float64).reshape(-1, 5)
-    first, second, expert, scenario = table[:, :4].T.astype(np.int64)
+        rows.append((*map(number.get, ends), experts[vote.expert], scenarios[vote.scenario]))
+    first, second, expert, scenario = np.array(rows, dtype=np.int64).reshape(-1, 4).T.copy()
     return Comparisons(
         names=tuple(names),
         first=first,
         second=second,
         expert=expert,
         scenario=scenario,
-        score=table[:, 4].copy(),
-        count=np.ones(len(table), dtype=np.int64),
+        score=np.array([vote.score for vote in votes], dtype=np.float64),
     )
 
 
@@ -186,39 +176,11 @@ def restrict_to(votes: Comparisons, members: Sequence[int]) -> Comparisons:
     )
 
 
-def split_votes(votes: Comparisons, groups: Sequence[Sequence[int]]) -> Iterator[Comparisons]:
-    """What `restrict_to` gives for each of the groups, which have nobody in common.
-
-    The rows are gone through once, however many groups there are.
-    """
-    if len(groups) == 1:
-        yield restrict_to(votes, groups[0])
-        return
-    group_of = np.full(len(votes.names), -1, dtype=np.int64)
-    number = np.zeros(len(votes.names), dtype=np.int64)
-    for index, members in enumerate(groups):
-        group_of[list(members)] = index
-        number[list(members)] = np.arange(len(members))
-    of_first = group_of[votes.first]
-    rows = np.flatnonzero((of_first >= 0) & (of_first == group_of[votes.second]))
-    rows = rows[np.argsort(of_first[rows], kind="stable")]
-    ends = np.cumsum(np.bincount(of_first[rows], minlength=len(groups)))[:-1]
-    for members, inside in zip(groups, np.split(rows, ends), strict=False):
-        some = select_votes(votes, inside)
-        yield replace(
-            some,
-            names=tuple(votes.names[member] for member in members),
-            shown=tuple(votes.shown[member] for member in members),
-            first=number[some.first],
-            second=number[some.second],
-        )
-
-
 def count_pairs(votes: Comparisons) -> PairCounts:
     """Count wins, ties and losses of every pair that met."""
     contestants = len(votes.names)
     low, high = np.minimum(votes.first, votes.second), np.maximum(votes.first, votes.second)
-    met, pair_of = renumber_codes(low * contestants + high)
+    met, pair_of = np.unique(low * contestants + high, return_inverse=True)
     outcome_of = (2.0 - 2.0 * votes.score).astype(np.int64)
     outcome_of = np.where(votes.first == low, outcome_of, 2 - outcome_of)
     place = pair_of * 3 + outcome_of
@@ -232,19 +194,6 @@ def count_pairs(votes: Comparisons) -> PairCounts:
     )
 
 
-def renumber_codes(codes: IntArray) -> tuple[IntArray, IntArray]:
-    """The different codes, in order, and (R,) the place of each row's code among them.
-
-    What `np.unique` gives, without sorting where the codes (R,), from 0, are not far apart.
-    """
-    below = int(codes.max(initial=-1)) + 1
-    if below > 10 * len(codes) + 10_000:
-        return np.unique(codes, return_inverse=True)
-    occurs = np.zeros(below, dtype=bool)
-    occurs[codes] = True
-    return np.flatnonzero(occurs), (np.cumsum(occurs) - 1)[codes]
-
-
 def tally(votes: Comparisons) -> IntArray:
     """(C, 3) wins, ties and losses of each contestant."""
     size = 3 * len(votes.names)
@@ -254,48 +203,17 @@ def tally(votes: Comparisons) -> IntArray:
     return counted.reshape(-1, 3).astype(np.int64)
 
 
-def _numbered(names: Iterable[str]) -> dict[str, int]:
-    return {name: number for number, name in enumerate(sorted(set(names)))}
-
-
-# --- Who scored what against whom ----------------------------------------------------------------
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class WinRates:
-    """Counts of every ordered pair; the diagonal is zero.
-
-    Attributes:
-        wins: (C, C) how often the row's contestant beat the column's.
-        ties: (C, C), symmetric.
-    """
-
-    wins: IntArray
-    ties: IntArray
-
-    @property
-    def votes(self) -> IntArray:
-        """(C, C) comparisons of each pair."""
-        return np.asarray(self.wins + self.wins.T + self.ties)
-
-    @property
-    def scores(self) -> FloatArray:
-        """(C, C) the row's mean score against the column, ties half; NaN without votes."""
-        votes = self.votes
-        with np.errstate(invalid="ignore", divide="ignore"):
-            return np.asarray(np.where(votes > 0, (self.wins + 0.5 * self.ties) / votes, np.nan))
-
-
-def win_rates(votes: Comparisons) -> WinRates:
-    """Count every pair."""
-    contestants = len(votes.names)
+def count_wins(votes: Comparisons) -> tuple[IntArray, IntArray]:
+    """(C, C) how often the row's contestant beat the column's, and (C, C) their ties."""
     counts = count_pairs(votes)
-    wins = np.zeros((contestants, contestants), dtype=np.int64)
-    ties = np.zeros_like(wins)
+    wins, ties = np.zeros((2, len(votes.names), len(votes.names)), dtype=np.int64)
     wins[counts.low, counts.high] = counts.outcomes[:, 0]
     wins[counts.high, counts.low] = counts.outcomes[:, 2]
     ties[counts.low, counts.high] = ties[counts.high, counts.low] = counts.outcomes[:, 1]
-    return WinRates(wins=wins, ties=ties)
+    return wins, ties
+
+
+# --- Numbers with intervals ----------------------------------------------------------------------
 
 
 LEVEL = 0.95

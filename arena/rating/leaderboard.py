@@ -30,15 +30,7 @@ from arena.rating.chains import (
     ranks_across,
     standing_order,
 )
-from arena.rating.comparisons import (
-    Comparisons,
-    FloatArray,
-    count_pairs,
-    renumber_codes,
-    restrict_to,
-    split_votes,
-    tally,
-)
+from arena.rating.comparisons import Comparisons, FloatArray, count_pairs, restrict_to, tally
 from arena.rating.lines import Line
 from arena.rating.logistic import Coefficient
 from arena.rating.parts import Rated, rate_part
@@ -201,7 +193,7 @@ def _rate(votes: Comparisons, rules: Rules) -> Leaderboard:
         (part for part in chains.parts() if len(part) > 1),
         key=lambda part: (chains.group_of[part[0]], above[part[0]], part),
     )
-    rated = [rate_part(inside, rules, diagnosis.status) for inside in split_votes(counting, parts)]
+    rated = [rate_part(restrict_to(counting, part), rules, diagnosis.status) for part in parts]
     lines = _blank_lines(votes.names, counted.tolist(), present, diagnosis)
     for number, (part, found) in enumerate(zip(parts, rated, strict=True)):
         _fill(lines, [present[member] for member in part], number, found)
@@ -223,8 +215,8 @@ def _rate(votes: Comparisons, rules: Rules) -> Leaderboard:
         rounds=rules.rounds,
         seed=rules.seed,
         votes=votes.votes,
-        experts=len(renumber_codes(votes.expert)[0]),
-        scenarios=len(renumber_codes(votes.scenario)[0]),
+        experts=len(np.unique(votes.expert)),
+        scenarios=len(np.unique(votes.scenario)),
         tie_share=float(counted[:, 1].sum() / counted.sum()) if len(votes) else None,
         tie_strength=whole.tie_strength,
         degenerate_rounds=max((found.degenerate for found in rated), default=0),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from arena.rating.chains import few_of
-from arena.rating.comparisons import Comparisons, FloatArray, IntArray, renumber_codes
+from arena.rating.comparisons import Comparisons, FloatArray, IntArray
 from arena.rating.rules import Intervals, Rules, Unit
 from arena.rating.sandwich import FEW_CLUSTERS
 
@@ -106,7 +106,7 @@ def warnings(votes: Comparisons, *, rules: Rules, rounds: int, degenerate: int) 
 
 
 def _clusters(votes: Comparisons, unit: Unit) -> dict[str, int]:
-    return {kind: len(renumber_codes(getattr(votes, kind))[0]) for kind in unit.kinds}
+    return {kind: len(np.unique(getattr(votes, kind))) for kind in unit.kinds}
 
 
 # --- Notes of single lines -----------------------------------------------------------------------

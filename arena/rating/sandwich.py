@@ -22,15 +22,7 @@ from typing import Self
 
 import numpy as np
 
-from arena.rating.comparisons import (
-    TIE,
-    BoolArray,
-    Comparisons,
-    FloatArray,
-    IntArray,
-    renumber_codes,
-    t_quantile,
-)
+from arena.rating.comparisons import TIE, BoolArray, Comparisons, FloatArray, IntArray, t_quantile
 from arena.rating.models import ELO_PER_LOGIT, Meetings, chances, inverse_curvature
 from arena.rating.rules import Unit
 
@@ -102,7 +94,7 @@ class Pulls:
         size = len(self.votes.names)
         amount = np.tile(self.information * self.votes.count, 2)
         place = np.concatenate([self.votes.first, self.votes.second]) * clusters
-        met, where = renumber_codes(place + np.tile(cluster_of, 2))
+        met, where = np.unique(place + np.tile(cluster_of, 2), return_inverse=True)
         given = np.bincount(where, weights=amount)
         total = np.bincount(met // clusters, weights=given, minlength=size)
         shares = given / total[met // clusters]
@@ -161,13 +153,13 @@ def plain_covariance(pulls: Pulls, unit: Unit, *, keep_variances: bool = False) 
         unit: What hangs together.
         keep_variances: Though negative directions are cut off.
     """
-    kinds = [renumber_codes(getattr(pulls.votes, kind)) for kind in unit.kinds]
+    kinds = [np.unique(getattr(pulls.votes, kind), return_inverse=True) for kind in unit.kinds]
     if not kinds:
         return without_negative_parts(pulls.by_row())
     clusters = [(len(codes), of_row, 1.0) for codes, of_row in kinds]
     if len(kinds) > 1:
         (_, expert_of), (scenarios, scenario_of) = kinds
-        cells, cell_of = renumber_codes(expert_of * len(scenarios) + scenario_of)
+        cells, cell_of = np.unique(expert_of * len(scenarios) + scenario_of, return_inverse=True)
         clusters.append((len(cells), cell_of, -1.0))
     squares = [
         sign * pulls.by_cluster(of_row, number) * number / max(1, number - 1)
@@ -281,7 +273,7 @@ def spread_of(pulls: Pulls, unit: Unit, reference: BoolArray | None = None) -> S
     base = pulls.by_row()
     single = base.diagonal()
     if len(kinds) > 1:
-        cells, cell_of = renumber_codes(kinds[0][1] * kinds[1][0] + kinds[1][1])
+        cells, cell_of = np.unique(kinds[0][1] * kinds[1][0] + kinds[1][1], return_inverse=True)
         base = pulls.by_cluster(cell_of, len(cells))
     components = tuple(
         _component(pulls, base, single, clusters, of_row, reference) for clusters, of_row in kinds
@@ -317,7 +309,7 @@ def satterthwaite(variance: FloatArray, components: tuple[Component, ...]) -> Fl
 
 def clusters_of(votes: Comparisons, unit: Unit) -> list[tuple[int, IntArray]]:
     """The number of clusters of each kind that the unit names, from two on, and (R,) whose."""
-    kinds = [renumber_codes(getattr(votes, kind)) for kind in unit.kinds]
+    kinds = [np.unique(getattr(votes, kind), return_inverse=True) for kind in unit.kinds]
     return [(len(codes), of_row) for codes, of_row in kinds if len(codes) > 1]
 
 

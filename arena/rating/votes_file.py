@@ -12,7 +12,7 @@ import math
 from array import array
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TextIO
@@ -88,18 +88,21 @@ def open_votes(path: Path) -> Iterator[TextTable]:
     Raises:
         VotesFileUnreadable: It has not, or can't be read at all.
     """
-    try:
-        opened = _open_table(path)
-        table = opened.__enter__()
-    except (StopIteration, RuntimeError):
-        raise VotesFileUnreadable(f"line 1: the file is empty; {_columns_text()}") from None
-    except (csv.Error, ValueError) as error:
-        raise VotesFileUnreadable(f"line 1: {error}; {_columns_text()}") from error
-    try:
-        _check_header(table.header)
+    allowed = f"needed are {', '.join(NEEDED)}, allowed besides {' and '.join(OPTIONAL)}"
+    with ExitStack() as stack:
+        try:
+            table = stack.enter_context(_open_table(path))
+        except (StopIteration, RuntimeError):
+            raise VotesFileUnreadable(f"line 1: the file is empty; {allowed}") from None
+        except (csv.Error, ValueError) as error:
+            raise VotesFileUnreadable(f"line 1: {error}; {allowed}") from error
+        for name in NEEDED:
+            if name not in table.header:
+                raise VotesFileUnreadable(f"line 1: there is no column {name!r}; {allowed}")
+        for name in (*NEEDED, *OPTIONAL):
+            if table.header.count(name) > 1:
+                raise VotesFileUnreadable(f"line 1: the column {name!r} is there twice")
         yield table
-    finally:
-        opened.__exit__(None, None, None)
 
 
 def read_votes(
@@ -184,7 +187,8 @@ def _votes_in(path: Path, wanted: Sequence[str]) -> Iterator[tuple[int, Row]]:
             if row is None:
                 return
             if row:
-                row = _fit_row(row, width)
+                while len(row) > width and not row[-1].strip():
+                    row = row[:-1]
                 cells = [row[place].strip() for place in places] if len(row) == width else []
                 if wrong := _wrong(len(row), width, dict(zip(wanted, cells, strict=False))):
                     raise VotesFileUnreadable(f"line {before + 1}: {wrong}")
@@ -270,25 +274,12 @@ def _repeats(rows: IntArray) -> int:
     return len(keys) - len(np.unique(keys, axis=0))
 
 
-def _check_header(header: Sequence[str]) -> None:
-    for name in NEEDED:
-        if name not in header:
-            raise VotesFileUnreadable(f"line 1: there is no column {name!r}; {_columns_text()}")
-    twice = [name for name in (*NEEDED, *OPTIONAL) if header.count(name) > 1]
-    if twice:
-        raise VotesFileUnreadable(f"line 1: the column {twice[0]!r} is there twice")
-
-
-def _columns_text() -> str:
-    return f"needed are {', '.join(NEEDED)}, allowed besides {' and '.join(OPTIONAL)}"
-
-
 # --- Kinds of files ------------------------------------------------------------------------------
 
 
 @contextmanager
 def _open_table(path: Path) -> Iterator[TextTable]:
-    """Open a file; the separator is the one that finds most of the known columns."""
+    """Open a file by what its first bytes say that it is."""
     with path.open("rb") as file:
         start = file.read(_FIRST_BYTES)
     if start.startswith(_PARQUET):
@@ -301,14 +292,7 @@ def _open_table(path: Path) -> Iterator[TextTable]:
         if beginning.lstrip().startswith("{"):
             yield _json_lines(lines)
         else:
-            yield _separated(lines, _separator(beginning, (*NEEDED, *OPTIONAL)))
-
-
-def _fit_row(row: Row, width: int) -> Row:
-    """Return the row without empty cells behind its last column."""
-    while len(row) > width and not row[-1].strip():
-        row = row[:-1]
-    return row
+            yield _separated(lines, beginning)
 
 
 def _encoding(start: bytes) -> str:
@@ -319,16 +303,14 @@ def _encoding(start: bytes) -> str:
     return "utf-16-be" if start[:1] == b"\0" else "utf-8-sig"
 
 
-def _separator(beginning: str, wanted: Sequence[str]) -> str:
-    def found(separator: str) -> int:
+def _separated(lines: TextIO, beginning: str) -> TextTable:
+    """A row a line; the separator is the one that finds most of the known columns."""
+
+    def count_known(separator: str) -> int:
         first = next(csv.reader(beginning.splitlines(keepends=True), delimiter=separator), [])
-        return len({cell.strip() for cell in first} & set(wanted))
+        return len({cell.strip() for cell in first} & {*NEEDED, *OPTIONAL})
 
-    return max(SEPARATORS, key=found)
-
-
-def _separated(lines: TextIO, separator: str) -> TextTable:
-    reader = csv.reader(lines, strict=True, delimiter=separator)
+    reader = csv.reader(lines, strict=True, delimiter=max(SEPARATORS, key=count_known))
     header = [name.strip() for name in next(reader)]
     while header and not header[-1]:
         header.pop()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from django.urls import URLPattern, path
 
-from arena.scenarios.pages import augmentations, editing, forms, scenarios, uploads
+from arena.scenarios.pages import augmentations, forms, scenarios, uploads
 
 urlpatterns: list[URLPattern] = [
     path("scenes/", uploads.scenes_page, name="scenes"),
@@ -27,9 +27,11 @@ urlpatterns: list[URLPattern] = [
         name="prompt-image",
     ),
     path("scenarios/<uuid:code>/", scenarios.scenario_page, name="scenario"),
-    path("scenarios/<uuid:code>/reference/", editing.reference_page, name="reference-edit"),
-    path("scenarios/<uuid:code>/reference/drop/", editing.drop, name="reference-drop"),
-    path("scenarios/<uuid:code>/check/", editing.check, name="edit-check"),
+    path("scenarios/<uuid:code>/reference/", forms.reference_page, name="reference-edit"),
+    path(
+        "scenarios/<uuid:code>/reference/drop/", forms.drop_reference_page, name="reference-drop"
+    ),
+    path("scenarios/<uuid:code>/check/", forms.check_change, name="edit-check"),
     path(
         "scenarios/<uuid:code>/delete/",
         scenarios.delete,
@@ -62,7 +64,7 @@ urlpatterns: list[URLPattern] = [
         name="contestant-prompts",
     ),
     path("augmentations/<uuid:code>/", augmentations.augmentation_page, name="augmentation"),
-    path("augmentations/<uuid:code>/correct/", editing.correct_page, name="correct"),
+    path("augmentations/<uuid:code>/correct/", forms.correct_page, name="correct"),
     path("augmentations/<uuid:code>/transcript.json", augmentations.transcript, name="transcript"),
     path("asked/<slug:digest>.png", augmentations.asked_image, name="asked-image"),
 ]

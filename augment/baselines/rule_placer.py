@@ -25,7 +25,13 @@ from augment.baselines.placed_vehicles import (
 from augment.baselines.placing_ground import PlacingGround
 from augment.checks import Ground, Severity
 from augment.checks.asked_places import LANES
-from augment.checks.lanes_across import LanesAcross, find_picked, list_absent, resolve_landmarks
+from augment.checks.lanes_across import (
+    LanesAcross,
+    find_picked,
+    list_absent,
+    resolve_anchors,
+    resolve_landmarks,
+)
 from augment.checks.registry import check_against_intent
 from augment.errors import CannotPlace
 from augment.geometry.frames import overlap
@@ -45,7 +51,6 @@ from augment.scene.intent import (
     Shape,
     VehicleRequest,
     WalkRequest,
-    resolve_anchors,
 )
 
 _SHIFT_STEP_M = 0.25

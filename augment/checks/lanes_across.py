@@ -32,10 +32,10 @@ from augment.scene.intent import (
     MapPlace,
     Pick,
     Relation,
+    Request,
     Side,
     Sight,
     Spot,
-    from_ego,
 )
 
 _SAME_LANE_M = 1.0
@@ -160,6 +160,42 @@ def resolve_landmarks(intent: Intent, lanes: LanesAcross) -> Intent:
             replace(request, spot=_resolved(request.spot, lanes)) for request in intent.requests
         ),
         moves=tuple(replace(move, spot=_resolved(move.spot, lanes)) for move in intent.moves),
+    )
+
+
+def resolve_anchors(intent: Intent) -> Intent:
+    """The intent with every distance from the ego: anchors' distances are added up.
+
+    The anchor's own spot must come before it; its distance is open where the anchor's is.
+    """
+    spots: dict[str, Spot] = {}
+    resolved: list[Request] = []
+    for request in intent.requests:
+        spot = request.spot
+        if spot.anchor is not None:
+            spot = from_ego(spot, spots[spot.anchor])
+        spots[request.name] = spot
+        resolved.append(replace(request, spot=spot))
+    return replace(intent, requests=tuple(resolved))
+
+
+def from_ego(spot: Spot, anchor: Spot) -> Spot:
+    """A spot that counts from another, counted from the ego; open where either is."""
+    own, base = spot.span_m, anchor.span_m
+    if own is None or base is None or not math.isfinite(sum((*own, *base))):
+        return replace(spot, anchor=None, distance=None, relation=None)
+    low_m, high_m = own[0] + base[0], own[1] + base[1]
+    is_ahead = low_m + high_m >= 0.0
+    is_approximate = any(one.distance and one.distance.is_approximate for one in (spot, anchor))
+    return replace(
+        spot,
+        anchor=None,
+        relation=Relation.AHEAD if is_ahead else Relation.BEHIND,
+        distance=Length(
+            low_m=low_m if is_ahead else -high_m,
+            high_m=high_m if is_ahead else -low_m,
+            is_approximate=is_approximate,
+        ),
     )
 
 

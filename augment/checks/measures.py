@@ -12,10 +12,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from augment.checks.ground import Ground
-from augment.checks.lanes_across import LanesAcross, resolve_landmarks
+from augment.checks.lanes_across import LanesAcross, resolve_anchors, resolve_landmarks
 from augment.geometry.frames import difference
 from augment.scene.entities import Point
-from augment.scene.intent import Intent, LaneChoice, Spot, WalkRequest, resolve_anchors
+from augment.scene.intent import Intent, LaneChoice, Spot, WalkRequest
 
 RING_STEP_M = 10.0
 _BESIDE_M = 1.0

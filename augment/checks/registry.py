@@ -28,7 +28,12 @@ from augment.checks.asked_things import (
 from augment.checks.bodies import duplicate, overlap, size, speed, walk_blocked, walk_crossing
 from augment.checks.finding import Finding, FindingKind, Severity
 from augment.checks.ground import Ground
-from augment.checks.lanes_across import LanesAcross, find_picked, resolve_landmarks
+from augment.checks.lanes_across import (
+    LanesAcross,
+    find_picked,
+    resolve_anchors,
+    resolve_landmarks,
+)
 from augment.checks.parties import USUAL, Asked, AskedCheck, Party, Tolerances, match_to_requests
 from augment.checks.places import (
     degrees,
@@ -43,7 +48,7 @@ from augment.checks.places import (
 )
 from augment.checks.situation import ChangedScene, Check
 from augment.scene.entities import Modification, Scene
-from augment.scene.intent import Intent, VehicleRequest, resolve_anchors
+from augment.scene.intent import Intent, VehicleRequest
 
 CHECKS: tuple[Check, ...] = (
     *(ego_offset, lane_distance, lane, lane_named, heading, degrees, walk_heading),

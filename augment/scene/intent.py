@@ -3,13 +3,13 @@
 Distances run along the ego's lane, from centre to centre, in metres. Left and right are those of
 the ego's direction of travel. Kerb and centre line are named as such here and become left or
 right on the map, because people do not drive on one side everywhere. What may be said, and what
-contradicts itself, is checked when a document is read (`intent_codec`).
+contradicts itself, is checked when a document is read (`codec`).
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from enum import StrEnum
 from typing import Annotated, Literal, Self, TypeVar
 
@@ -480,39 +480,3 @@ class Intent:
 def _check_turn(turned: VehicleRequest | Move) -> None:
     if turned.turn_deg and turned.facing is None:
         raise ValueError("turn_deg needs a facing that it is counted from")
-
-
-def resolve_anchors(intent: Intent) -> Intent:
-    """The intent with every distance from the ego: anchors' distances are added up.
-
-    The anchor's own spot must come before it; its distance is open where the anchor's is.
-    """
-    spots: dict[str, Spot] = {}
-    resolved: list[Request] = []
-    for request in intent.requests:
-        spot = request.spot
-        if spot.anchor is not None:
-            spot = from_ego(spot, spots[spot.anchor])
-        spots[request.name] = spot
-        resolved.append(replace(request, spot=spot))
-    return replace(intent, requests=tuple(resolved))
-
-
-def from_ego(spot: Spot, anchor: Spot) -> Spot:
-    """A spot that counts from another, counted from the ego; open where either is."""
-    own, base = spot.span_m, anchor.span_m
-    if own is None or base is None or not math.isfinite(sum((*own, *base))):
-        return replace(spot, anchor=None, distance=None, relation=None)
-    low_m, high_m = own[0] + base[0], own[1] + base[1]
-    is_ahead = low_m + high_m >= 0.0
-    is_approximate = any(one.distance and one.distance.is_approximate for one in (spot, anchor))
-    return replace(
-        spot,
-        anchor=None,
-        relation=Relation.AHEAD if is_ahead else Relation.BEHIND,
-        distance=Length(
-            low_m=low_m if is_ahead else -high_m,
-            high_m=high_m if is_ahead else -low_m,
-            is_approximate=is_approximate,
-        ),
-    )

@@ -5,11 +5,28 @@ from __future__ import annotations
 import itertools
 import math
 from dataclasses import replace
+from functools import cache
+from pathlib import Path
 
+import numpy as np
 import pytest
 
+from augment.baselines.rule_placer import Placement, place
+from augment.checks import Ground, Severity
+from augment.checks.registry import check_against_intent
+from augment.errors import CannotPlace
+from augment.geometry.frames import difference, overlap
 from augment.geometry.polyline import Polyline
-from augment.scene.entities import AgentType, Lane, Scene, TrafficSide
+from augment.scene.entities import (
+    AgentType,
+    Lane,
+    ScenarioType,
+    Scene,
+    TrafficAgent,
+    TrafficSide,
+    apply,
+    without_traffic,
+)
 from augment.scene.intent import (
     Body,
     Intent,
@@ -25,7 +42,8 @@ from augment.scene.intent import (
     VehicleRequest,
     WalkRequest,
 )
-from tests.baselines.placing import added, refusal
+from augment.scene.lane_graph import LaneGraph
+from tests.fixtures.shelf import SLUGS, entry, measure_agent, shown_scene
 from tests.intents import (
     LEFT_EDGE,
     PAPER,
@@ -38,7 +56,20 @@ from tests.intents import (
     towards,
     walk,
 )
+from tests.recorded import recorded
 from tests.scenes import curve, junction, scene, vehicle
+
+
+def added(shown: Scene, intent: Intent, *, seed: int = 0) -> tuple[TrafficAgent, ...]:
+    modification = place(shown, intent, seed=seed).modification
+    apply(shown, modification)  # raises where the ids don't fit
+    return modification.added
+
+
+def refusal(shown: Scene, intent: Intent) -> str:
+    with pytest.raises(CannotPlace) as refused:
+        place(shown, intent)
+    return refused.value.reason
 
 
 def three_lanes(side: TrafficSide = TrafficSide.LEFT) -> Scene:
@@ -182,3 +213,136 @@ def test_a_distance_from_another_object_runs_from_where_that_one_is() -> None:
     )
     _, crossing = added(scene(), Intent(requests=(bus, walker)))
     assert crossing.x_m == 26.0
+
+
+@pytest.mark.parametrize(
+    ("side", "start", "end", "heading_rad"),
+    [
+        (Side.RIGHT, (18.0, -2.25), (18.0, 5.75), math.pi / 2),
+        (Side.LEFT, (18.0, 5.75), (18.0, -2.25), -math.pi / 2),
+    ],
+)
+def test_a_pedestrian_crosses_from_edge_to_edge(
+    side: Side, start: tuple[float, float], end: tuple[float, float], heading_rad: float
+) -> None:
+    (walker,) = added(scene(), walk(18.0, side))
+    assert walker.type is AgentType.PEDESTRIAN
+    assert walker.walk_to_m is not None
+    assert (walker.x_m, walker.y_m) == pytest.approx(start, abs=0.26)
+    assert walker.walk_to_m == pytest.approx(end, abs=0.26)
+    assert walker.heading_rad == pytest.approx(heading_rad, abs=1e-4)
+    assert walker.speed_mps == pytest.approx(math.dist(start, end) / 15.0, abs=0.03)
+
+
+def test_a_taper_closes_the_lane_and_a_worker_stands_behind_it() -> None:
+    *line, worker = added(
+        scene(), cones(20.0, 6, Shape.TAPER, spacing=metres(2.5), start=Side.LEFT, has_worker=True)
+    )
+    gaps = [math.dist((a.x_m, a.y_m), (b.x_m, b.y_m)) for a, b in itertools.pairwise(line)]
+    assert gaps == pytest.approx([2.5] * 5, abs=0.01)
+    assert (line[0].x_m, line[0].y_m, line[-1].y_m) == (20.0, 1.5, -1.5)
+    assert worker.type is AgentType.PEDESTRIAN
+    assert worker.walk_to_m is None
+    assert 0.8 < min(math.dist((worker.x_m, worker.y_m), (c.x_m, c.y_m)) for c in line) < 4.0
+
+
+def test_a_line_of_cones_follows_a_curved_boundary() -> None:
+    line = added(curve(40.0), cones(20.0, 4, Shape.LINE, lateral=towards(LEFT_EDGE)))
+    radii = [math.hypot(c.x_m - 10.0, c.y_m - 40.0) for c in line]
+    assert radii == pytest.approx([38.5] * 4, abs=0.02)
+
+
+@pytest.mark.parametrize(("count", "apart_m"), [(3, 1.5), (8, 2.5), (7, 2.0)])
+def test_a_ring_stays_in_its_lane_and_closes(count: int, apart_m: float) -> None:
+    ring = added(scene(), cones(25.0, count, Shape.RING, spacing=metres(apart_m)))
+    assert max(abs(c.y_m) for c in ring) <= 1.75
+    points = np.array([(c.x_m, c.y_m) for c in ring])
+    gaps = np.hypot(*(points - np.roll(points, 1, axis=0)).T)
+    assert gaps == pytest.approx(apart_m, abs=0.51)
+
+
+@pytest.mark.parametrize("count", [2, 3, 4])
+def test_crashed_cars_touch_at_most_and_leave_little_room(count: int) -> None:
+    cars = added(scene(), crash(25.0, count))
+    boxes = [car.box for car in cars]
+    assert len(cars) == count
+    assert cars[0].x_m == 25.0
+    for i, first in enumerate(boxes):
+        assert all(overlap(first, second).depth_m == 0.0 for second in boxes[i + 1 :])
+    for a, b in itertools.pairwise(cars):
+        assert 3.3 < math.dist((a.x_m, a.y_m), (b.x_m, b.y_m)) < 6.0
+
+
+def of_type(agents: tuple[TrafficAgent, ...], kind: AgentType) -> list[TrafficAgent]:
+    return [agent for agent in agents if agent.type is kind]
+
+
+@cache
+def placed(slug: str) -> Placement:
+    """What the rule placer makes of a scenario, worked out once."""
+    return place(shown_scene(slug), entry(slug).intent)
+
+
+def test_every_scenario_of_the_catalogue_is_placed() -> None:
+    assert [slug for slug in SLUGS if placed(slug).modification.is_empty] == []
+
+
+@pytest.mark.parametrize("slug", SLUGS)
+def test_the_checks_find_nothing_in_a_placement(slug: str) -> None:
+    scene = shown_scene(slug)
+    found = check_against_intent(Ground.of(scene), placed(slug).modification, entry(slug).intent)
+    assert [one.sentence() for one in found if one.severity is not Severity.FACT] == []
+
+
+@pytest.mark.parametrize("slug", SLUGS)
+def test_what_is_asked_for_is_placed_beside_its_reference(slug: str) -> None:
+    reference = entry(slug).reference
+    assert reference is not None
+    placement = placed(slug)
+    apply(shown_scene(slug), placement.modification)
+    made = placement.modification.added
+    assert [agent.type for agent in made] == [agent.type for agent in reference.added]
+    for kind in {agent.type for agent in made} - {AgentType.PEDESTRIAN}:
+        pairs = zip(of_type(made, kind), of_type(reference.added, kind), strict=True)
+        for number, (agent, wanted) in enumerate(pairs):
+            if number > 0 and entry(slug).type is ScenarioType.ACCIDENT_SITE:
+                continue  # the intent leaves open where the others stand
+            here, there = measure_agent(slug, agent), measure_agent(slug, wanted)
+            assert here.ahead_m == pytest.approx(there.ahead_m, abs=1.5)
+            assert here.left_m == pytest.approx(there.left_m, abs=1.5)
+
+
+@pytest.mark.parametrize("slug", [slug for slug in SLUGS if slug.startswith("jaywalker")])
+def test_walks_begin_and_end_beside_those_of_the_reference(slug: str) -> None:
+    reference = entry(slug).reference
+    assert reference is not None
+    pairs = zip(
+        of_type(placed(slug).modification.added, AgentType.PEDESTRIAN),
+        of_type(reference.added, AgentType.PEDESTRIAN),
+        strict=True,
+    )
+    for walker, wanted in pairs:
+        assert walker.walk_to_m is not None
+        assert wanted.walk_to_m is not None
+        assert (walker.x_m, walker.y_m) == pytest.approx((wanted.x_m, wanted.y_m), abs=1.5)
+        assert walker.walk_to_m == pytest.approx(wanted.walk_to_m, abs=2.0)
+
+
+@pytest.mark.realdata
+@pytest.mark.parametrize("frame", [0, 30, 60])
+def test_the_papers_vehicle_stands_on_the_egos_lane(realdata: Path, frame: int) -> None:
+    scene = without_traffic(recorded(realdata, frame)[0])
+    modification = place(scene, PAPER).modification
+    (car,) = modification.added
+    assert apply(scene, modification).agents == (car,)
+    graph = LaneGraph(scene)
+    own = scene.ego.lane_id or graph.under(0.0, 0.0, 0.0)
+    assert own is not None
+    start_m = graph.lane(own).centerline.project(0.0, 0.0).s_m
+    asked = graph.along(own, start_m, 21.4)
+    assert asked is not None
+    seen = asked.pose.pose_to_local(car.pose)
+    assert seen.x_m == pytest.approx(0.0, abs=0.01)
+    assert 0.0 <= seen.y_m <= 1.5
+    assert abs(difference(car.heading_rad, asked.pose.heading_rad)) < 1e-4
+    assert car.lane_id == asked.lane_id

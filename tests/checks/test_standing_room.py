@@ -8,9 +8,11 @@ from dataclasses import replace
 import pytest
 
 from augment.checks import FindingKind, Severity
+from augment.checks.finding import FaultClass
 from augment.checks.ground import Surface
 from augment.geometry.frames import Pose, corners
-from augment.scene.entities import AgentType, Area, AreaKind, TrafficAgent
+from augment.metrics.fault_guess import first_guess
+from augment.scene.entities import AgentType, Area, AreaKind, Scene, TrafficAgent
 from tests.checks.worlds import found_in, of_kind, severities
 from tests.scenes import EGO, cone, junction, pedestrian, scene, vehicle
 
@@ -205,3 +207,134 @@ def test_speeds(
 def test_nothing_is_held_against_a_well_parked_car() -> None:
     car = replace(vehicle("Agent2", 21.5, -0.7, math.radians(2.0)), lane_id="Lane1")
     assert severities(found_in(scene(), car)) == set()
+
+
+EDGE_M = 4.0
+"""The road reaches from -4 to 4 m, a walkway of 2 m beside it on either side."""
+FACT, DOUBTFUL, WRONG = Severity.FACT, Severity.DOUBTFUL, Severity.WRONG
+
+
+def road() -> Scene:
+    strips = (
+        (AreaKind.DRIVABLE, -4.0, 4.0),
+        (AreaKind.WALKWAY, 4.0, 6.0),
+        (AreaKind.WALKWAY, -6.0, -4.0),
+    )
+    return scene(
+        lanes=scene().lanes[:1],
+        areas=tuple(
+            Area(
+                id=f"Area{number}",
+                kind=kind,
+                boundary_m=((-50.0, low), (100.0, low), (100.0, high), (-50.0, high)),
+            )
+            for number, (kind, low, high) in enumerate(strips, start=1)
+        ),
+    )
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0], ids=["left", "right"])
+@pytest.mark.parametrize("kind", [AgentType.VEHICLE, AgentType.BUS])
+@pytest.mark.parametrize(
+    ("outside_percent", "severity"),
+    [
+        (0.0, None),
+        (1.9, None),
+        (2.1, FACT),
+        (14.9, FACT),
+        (15.1, DOUBTFUL),
+        (29.0, DOUBTFUL),
+        (49.9, DOUBTFUL),
+        (50.1, WRONG),
+        (100.0, WRONG),
+    ],
+)
+def test_a_vehicle_on_the_kerb_counts_by_the_share_of_its_box(
+    side: float, kind: AgentType, outside_percent: float, severity: Severity | None
+) -> None:
+    """A box 2 m wide along the road: the share outside is what its far edge is past the road's."""
+    share = outside_percent / 100.0
+    car = replace(vehicle("Agent2", 30.0, side * (EDGE_M - 1.0 + 2.0 * share)), type=kind)
+    found = of_kind(found_in(road(), car), FindingKind.OFF_ROAD)
+    assert [one.severity for one in found] == ([] if severity is None else [severity])
+    if found:
+        assert found[0].measured["outside_share"] == pytest.approx(share, abs=1e-6)
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0], ids=["left", "right"])
+@pytest.mark.parametrize(
+    ("off_m", "severity"),
+    [(-1.0, None), (0.99, None), (1.01, DOUBTFUL), (2.99, DOUBTFUL), (3.01, WRONG)],
+)
+def test_a_cone_counts_by_how_far_its_centre_is_off_the_road(
+    side: float, off_m: float, severity: Severity | None
+) -> None:
+    found = of_kind(
+        found_in(road(), cone("Agent2", 30.0, side * (EDGE_M + off_m))), FindingKind.OFF_ROAD
+    )
+    assert [one.severity for one in found] == ([] if severity is None else [severity])
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0], ids=["left", "right"])
+@pytest.mark.parametrize(
+    ("off_m", "severity"),
+    [
+        (-0.01, None),
+        (0.01, FACT),
+        (1.99, FACT),
+        (2.01, DOUBTFUL),
+        (9.99, DOUBTFUL),
+        (10.01, WRONG),
+    ],
+)
+def test_who_walks_counts_by_how_far_he_is_off_all_that_the_map_shows(
+    side: float, off_m: float, severity: Severity | None
+) -> None:
+    walker = pedestrian("Agent2", 30.0, side * (6.0 + off_m))
+    found = of_kind(found_in(road(), walker), FindingKind.OFF_ROAD)
+    assert [one.severity for one in found] == ([] if severity is None else [severity])
+
+
+WALKER = pedestrian("Agent2", 30.0, -4.0, (30.0, 6.0))
+PARKED = vehicle("Agent3", 31.0, -1.0)
+
+
+@pytest.mark.parametrize(
+    ("other", "inside_m"),
+    [
+        (PARKED, 2.0),
+        (vehicle("Agent3", 32.3, -1.0), 2.0),
+        (vehicle("Agent3", 32.5, -1.0), None),  # he walks past its bumper
+        (vehicle("Agent3", 30.0, -1.0, math.radians(45.0)), 2.0 * math.sqrt(2.0)),
+        # The corner of a box turned by 45 degrees, 0.02 and 0.07 m past his way.
+        (vehicle("Agent3", 32.38, -1.0, math.radians(45.0)), None),
+        (vehicle("Agent3", 32.33, -1.0, math.radians(45.0)), 0.148),
+        (replace(PARKED, speed_mps=3.0), None),  # it will be gone
+        (cone("Agent3", 30.2, 3.0), 0.5),
+        (pedestrian("Agent3", 30.0, 2.0), None),
+        (vehicle("Agent3", 30.0, 8.0), None),  # beyond where he stops
+        (vehicle("Agent3", 30.0, -6.0), None),  # behind him
+    ],
+)
+def test_a_walk_leads_through_nothing_that_stands(
+    other: TrafficAgent, inside_m: float | None
+) -> None:
+    found = of_kind(found_in(scene(agents=(other,)), WALKER), FindingKind.WALK_BLOCKED)
+    assert [one.severity for one in found] == [Severity.DOUBTFUL] * (inside_m is not None)
+    for one in found:
+        assert one.agents == ("Agent2", "Agent3")
+        assert one.measured["inside_m"] == pytest.approx(inside_m, abs=0.001)
+        assert one.sentence() == f"The walk of Agent2 leads {inside_m:.1f} m through Agent3."
+
+
+def test_what_is_added_stands_in_the_way_as_well() -> None:
+    bus = replace(PARKED, type=AgentType.BUS)
+    assert of_kind(found_in(scene(), bus, WALKER), FindingKind.WALK_BLOCKED)
+
+
+def test_a_blocked_walk_is_a_fault_of_logic_unless_it_follows_from_a_heading() -> None:
+    blocked = found_in(scene(agents=(PARKED,)), WALKER)
+    assert first_guess(blocked) == {FaultClass.LOGIC}
+    backwards = replace(WALKER, heading_rad=-math.pi / 2.0)
+    turned = found_in(scene(agents=(PARKED,)), backwards)
+    assert first_guess(turned) == {FaultClass.HEADING}

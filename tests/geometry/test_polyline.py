@@ -5,7 +5,9 @@ import math
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from shapely import Polygon
 
+from augment.geometry.frames import APART, Box, Pose, overlap
 from augment.geometry.polyline import Polyline
 from tests.scenes import curve
 
@@ -48,3 +50,76 @@ def test_projecting_a_position_gives_it_back(s: float, d: float) -> None:
 def test_what_is_no_line_is_refused(points: list[object]) -> None:
     with pytest.raises(ValueError, match="a line needs"):
         Polyline(points)  # type: ignore[arg-type]
+
+
+def box(x: float, y: float, heading: float = 0.0, length: float = 4.0, width: float = 2.0) -> Box:
+    return Box(pose=Pose(x_m=x, y_m=y, heading_rad=heading), length_m=length, width_m=width)
+
+
+boxes = st.builds(
+    box,
+    x=st.floats(-6.0, 6.0),
+    y=st.floats(-6.0, 6.0),
+    heading=st.floats(-math.pi, math.pi),
+    length=st.floats(0.2, 8.0),
+    width=st.floats(0.2, 8.0),
+)
+
+
+def test_half_a_box_in_another() -> None:
+    found = overlap(box(0.0, 0.0), box(2.0, 0.0))
+    assert found.area_m2 == pytest.approx(4.0)
+    assert found.share_of_first == found.share_of_second == pytest.approx(0.5)
+    assert found.depth_m == pytest.approx(2.0)
+
+
+def test_a_small_box_inside_a_large_one_is_covered_whole() -> None:
+    found = overlap(box(0.0, 0.0, length=10.0, width=10.0), box(1.0, 1.0, 0.7, 0.5, 0.5))
+    assert found.share_of_second == pytest.approx(1.0)
+    assert found.share_of_first == pytest.approx(0.0025)
+
+
+def test_boxes_that_touch_do_not_overlap() -> None:
+    assert overlap(box(0.0, 0.0), box(4.0, 0.0)) == APART
+    assert overlap(box(0.0, 0.0), box(4.0, 2.0)) == APART
+
+
+def test_corners_near_each_other_are_parted_by_a_turned_side() -> None:
+    # The boxes' upright frames meet; the side of the turned one lies between them.
+    assert overlap(box(0.0, 0.0, length=2.0), box(1.9, 1.9, math.pi / 4, 2.0, 2.0)) == APART
+
+
+@given(boxes, boxes)
+def test_the_shared_area_is_that_of_the_polygons(first: Box, second: Box) -> None:
+    expected = Polygon(first.corners_m).intersection(Polygon(second.corners_m)).area
+    found = overlap(first, second)
+    assert found.area_m2 == pytest.approx(expected, abs=1e-9)
+    assert 0.0 <= found.share_of_first <= 1.0
+
+
+@given(boxes, boxes)
+def test_either_order_gives_the_same(first: Box, second: Box) -> None:
+    one, other = overlap(first, second), overlap(second, first)
+    assert one.depth_m == pytest.approx(other.depth_m, abs=1e-9)
+    assert one.area_m2 == pytest.approx(other.area_m2, abs=1e-9)
+
+
+@given(boxes, boxes)
+def test_a_push_a_little_longer_than_the_depth_parts_them_somewhere(
+    first: Box, second: Box
+) -> None:
+    depth = overlap(first, second).depth_m + 1e-6
+    directions = [
+        b.pose.heading_rad + turn * math.pi / 2 for b in (first, second) for turn in range(4)
+    ]
+    pushed = [
+        box(
+            second.pose.x_m + depth * math.cos(angle),
+            second.pose.y_m + depth * math.sin(angle),
+            second.pose.heading_rad,
+            second.length_m,
+            second.width_m,
+        )
+        for angle in directions
+    ]
+    assert any(overlap(first, moved) == APART for moved in pushed)

@@ -4,11 +4,21 @@ import itertools
 import math
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from augment.metrics.displacement import CLASS_OF, Displacement, displacement
+from augment.metrics.displacement import (
+    CLASS_OF,
+    Displacement,
+    Match,
+    ObjectClass,
+    are_alike,
+    box_of,
+    displacement,
+    summarise,
+)
 from augment.scene.entities import AgentType, Modification, TrafficAgent
 from tests.scenes import cone, pedestrian, vehicle
 
@@ -180,3 +190,84 @@ def test_every_object_is_matched_or_counted_once(
     found = displacement(generated, reference)
     assert len(found.matches) + len(found.missing) == len(reference.added)
     assert len(found.matches) + len(found.surplus) == len(generated.added)
+
+
+CAR = vehicle("New1", 20.0, 0.0)
+WALKER = pedestrian("New2", 10.0, -4.0, (10.0, 4.0))
+
+
+@pytest.mark.parametrize(
+    ("changed", "alike"),
+    [
+        (CAR, True),
+        (replace(CAR, id="New9"), True),
+        (replace(CAR, x_m=20.15), True),
+        (replace(CAR, x_m=20.16), False),
+        (replace(CAR, x_m=20.12, y_m=0.12), False),
+        (replace(CAR, heading_rad=math.radians(2.0)), True),
+        (replace(CAR, heading_rad=math.radians(-2.1)), False),
+        (replace(CAR, heading_rad=math.pi), False),
+        (replace(CAR, length_m=5.0), False),
+        (replace(CAR, speed_mps=0.2), False),
+        (replace(CAR, type=AgentType.BUS), False),
+    ],
+)
+def test_one_object_against_the_tolerance(changed: object, alike: bool) -> None:
+    one, other = Modification(added=(CAR,)), Modification(added=(changed,))  # type: ignore[arg-type]
+    assert are_alike(one, other) is alike
+    assert are_alike(other, one) is alike
+
+
+def test_every_object_is_matched_once() -> None:
+    row = [cone(f"New{n}", 10.0 + 0.14 * n, 0.0) for n in range(3)]
+    assert are_alike(Modification(added=tuple(row)), Modification(added=tuple(reversed(row))))
+    assert not are_alike(Modification(added=tuple(row)), Modification(added=tuple(row[:2])))
+    doubled = Modification(added=(row[0], replace(row[0], id="New8"), row[2]))
+    apart = Modification(added=(row[0], replace(row[2], id="New8"), row[2]))
+    assert not are_alike(doubled, apart)
+    assert are_alike(Modification(), Modification())
+
+
+def test_walks_cones_and_what_is_gone() -> None:
+    far = replace(WALKER, walk_to_m=(10.0, 4.2))
+    assert not are_alike(Modification(added=(WALKER,)), Modification(added=(far,)))
+    turned = replace(cone("New1", 5.0, 0.0), heading_rad=1.0)
+    assert are_alike(Modification(added=(cone("New1", 5.0, 0.0),)), Modification(added=(turned,)))
+    assert not are_alike(Modification(removed=("Agent2",)), Modification())
+    assert not are_alike(Modification(moved=(CAR,)), Modification(added=(CAR,)))
+
+
+def of(*distances_m: float, missing: int = 0, surplus: int = 0) -> Displacement:
+    return Displacement(
+        matches=tuple(
+            Match(reference="r", generated="g", object_class=ObjectClass.VEHICLE, distance_m=one)
+            for one in distances_m
+        ),
+        missing=("r",) * missing,
+        surplus=("g",) * surplus,
+    )
+
+
+def test_quartiles_whiskers_and_outliers_of_a_row_of_numbers() -> None:
+    box = box_of([5.0, 1.0, 3.0, 2.0, 4.0, 30.0, 6.0])
+    assert (box.q1_m, box.median_m, box.q3_m) == (2.5, 4.0, 5.5)
+    assert (box.low_m, box.high_m) == (1.0, 6.0)
+    assert box.outliers_m == (30.0,)
+    assert box.mean_m == pytest.approx(51.0 / 7.0)
+
+
+def test_objects_of_all_augmentations_count_once_each() -> None:
+    found = summarise([of(1.0, 3.0), of(2.0, surplus=2), of(missing=4)])
+    assert (found.augmentations, found.n, found.missing, found.surplus) == (3, 3, 4, 2)
+    assert found.box is not None
+    assert found.box.median_m == 2.0
+
+
+@given(values=st.lists(st.floats(0.0, 1e3), min_size=1, max_size=40))
+def test_a_box_is_in_order_and_loses_no_value(values: list[float]) -> None:
+    box = box_of(values)
+    numbers = [box.low_m, box.q1_m, box.median_m, box.q3_m, box.high_m]
+    assert numbers == sorted(numbers)
+    inside = [one for one in values if box.low_m <= one <= box.high_m]
+    assert len(inside) + len(box.outliers_m) == len(values)
+    assert box.median_m == pytest.approx(float(np.median(values)))

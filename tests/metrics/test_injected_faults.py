@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 import inspect
+import math
 
 import pytest
 
+from augment.checks import findings
 from augment.checks.finding import FaultClass
 from augment.checks.registry import check_against_intent
+from augment.metrics.fault_guess import first_guess
+from augment.scene.entities import Modification, TrafficAgent
 from bench.faults import FaultKind
 from bench.injected_faults import Tally, measure, shifted_share
+from tests.scenes import scene, vehicle
 
 COUNT = 150
 
@@ -43,3 +48,20 @@ def test_a_shift_is_called_a_fault_beyond_the_tolerance_and_not_before() -> None
 def test_the_checks_are_given_neither_reference_nor_label() -> None:
     given = ["ground", "modification", "intent", "tolerances"]
     assert list(inspect.signature(check_against_intent).parameters) == given
+
+
+@pytest.mark.parametrize(
+    ("placed", "classes"),
+    [
+        ((vehicle("Agent2", 20.0, 0.0),), set()),
+        ((vehicle("Agent2", 20.0, 30.0),), {FaultClass.POSITION}),
+        ((vehicle("Agent2", 20.0, 0.0, math.pi / 2),), {FaultClass.HEADING}),
+        ((vehicle("Agent2", 20.0, 0.0), vehicle("Agent3", 20.1, 0.0)), {FaultClass.LOGIC}),
+    ],
+    ids=["parked well", "in the field", "across the lane", "on top of each other"],
+)
+def test_each_class_is_guessed_from_what_was_measured(
+    placed: tuple[TrafficAgent, ...], classes: set[FaultClass]
+) -> None:
+    found = findings(scene(), Modification(added=placed))
+    assert first_guess(found) == classes

@@ -6,15 +6,7 @@ import numpy as np
 import pytest
 
 from arena.rating.chains import Chains, chains_among
-from arena.rating.comparisons import (
-    BoolArray,
-    Comparisons,
-    IntArray,
-    PairCounts,
-    count_pairs,
-    restrict_to,
-    split_votes,
-)
+from arena.rating.comparisons import BoolArray, Comparisons, IntArray, PairCounts, count_pairs
 from arena.rating.leaderboard import rate
 from tests.rating.votes import named, simulated, versus
 
@@ -103,13 +95,3 @@ def test_each_of_two_crowds_is_rated_by_itself_and_the_unbeaten_one_is_bounded()
     assert {line.part for line in board.lines[:60]}.isdisjoint(
         line.part for line in board.lines[60:120]
     )
-
-
-def test_votes_of_groups_are_told_apart_in_one_go() -> None:
-    votes = simulated([1000.0] * 8, 300, 4)
-    groups = ((5, 1, 2), (0, 7), (3,))
-    for members, found in zip(groups, split_votes(votes, groups), strict=True):
-        wanted = restrict_to(votes, members)
-        assert found.names == wanted.names
-        for column in ("first", "second", "score", "expert", "scenario", "count"):
-            assert getattr(found, column).tolist() == getattr(wanted, column).tolist()

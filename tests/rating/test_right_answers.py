@@ -10,12 +10,10 @@ import pytest
 from arena.rating import models
 from arena.rating.comparisons import Comparisons, FloatArray
 from arena.rating.leaderboard import Method
-from arena.rating.ranking import ranks
 from tests.rating.votes import by_votes, fit, named, simulated, versus
 
 HERE = Path(__file__).parent
 TABLES = sorted((HERE / "tables").glob("*.json"))
-PAPER = json.loads((HERE / "paper_table.json").read_text())["rows"]
 
 
 def fitted(votes: Comparisons) -> FloatArray:
@@ -57,21 +55,6 @@ def test_a_hundred_points_are_64_percent() -> None:
     votes = named(versus("a", "b", 64, 0, 36))
     high, low = fitted(votes)
     assert high - low == pytest.approx(100, abs=0.1)
-
-
-def test_the_papers_ranks_follow_from_its_printed_intervals() -> None:
-    elo, minus, plus = (np.array([row[column] for row in PAPER]) for column in (2, 3, 4))
-    assert ranks(elo - minus, elo + plus).tolist() == [row[1] for row in PAPER]
-
-
-def test_paper_mode_on_the_papers_ratings_gives_intervals_of_its_size() -> None:
-    """Vote resampling, a tie share of about 0.6: half-widths of about 9 to 16 points."""
-    votes = simulated([row[2] for row in PAPER], 5760, 1, ties=0.6)
-    board = by_votes(votes, rounds=1000, seed=1)
-    widths = [(line.upper or 0) - (line.lower or 0) for line in board.lines]
-    assert 8.5 < np.mean(widths) / 2 < 12.5
-    for line, row in zip(board.lines, PAPER, strict=True):
-        assert line.rating == pytest.approx(row[2], abs=20)
 
 
 def test_one_elo_vote_moves_half_of_k() -> None:

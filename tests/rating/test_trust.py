@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import statsmodels.api as sm
 
-from arena.rating.comparisons import Comparison, Comparisons, count_pairs, win_rates
+from arena.rating.comparisons import Comparison, Comparisons, count_pairs, count_wins
 from arena.rating.influence import (
     count_cycles,
     fewest_votes_to_change_first,
@@ -175,12 +175,11 @@ def test_a_design_effect_is_one_where_votes_are_independent(
 # --- Pairs -------------------------------------------------------------------------------------
 
 
-def test_win_rates_count_both_ways() -> None:
-    found = win_rates(named(versus("a", "b", 3, 1, 2) + versus("b", "a", 1, 0, 0), "a", "b", "c"))
-    assert found.wins.tolist() == [[0, 3, 0], [3, 0, 0], [0, 0, 0]]
-    assert found.votes[0, 1] == found.votes[1, 0] == 7
-    assert found.scores[0, 1] == pytest.approx(0.5)
-    assert np.isnan(found.scores[0, 2])
+def test_wins_and_ties_count_both_ways() -> None:
+    votes = named(versus("a", "b", 3, 1, 2) + versus("b", "a", 1, 0, 0), "a", "b", "c")
+    wins, ties = count_wins(votes)
+    assert wins.tolist() == [[0, 3, 0], [3, 0, 0], [0, 0, 0]]
+    assert ties.tolist() == [[0, 1, 0], [1, 0, 0], [0, 0, 0]]
 
 
 # --- Cycles ------------------------------------------------------------------------------------

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from augment.checks.lanes_across import resolve_anchors
 from augment.errors import InvalidDocument
 from augment.scene.codec import INTENT, intent_from_document, intent_to_document
 from augment.scene.intent import (
@@ -30,7 +31,6 @@ from augment.scene.intent import (
     Spot,
     VehicleRequest,
     WalkRequest,
-    resolve_anchors,
 )
 from augment.scene.intent_statements import list_statements
 from tests.fixtures.shelf import SLUGS, entry

@@ -8,10 +8,11 @@ import pytest
 
 from augment.errors import UnknownName
 from augment.geometry.polyline import Polyline
-from augment.scene.entities import Lane, LaneConnector, Scene, TurnType
-from augment.scene.lane_graph import LaneGraph
+from augment.scene.ego_route import EgoRoute
+from augment.scene.entities import Lane, LaneConnector, Scene, TrafficSide, TurnType
+from augment.scene.lane_graph import LaneGraph, traffic_side_of, turn_type_of
 from augment.variants.pose_tool import PoseTool
-from tests.scenes import junction, scene
+from tests.scenes import EGO, curve, junction, scene
 
 
 def test_the_lane_under_a_point_fits_its_heading() -> None:
@@ -166,3 +167,108 @@ def test_back_over_a_merge_goes_the_straightest_way_not_the_first(
     assert (place.pose.x_m, place.pose.y_m) == pytest.approx((-30.0, 0.0))
     called = PoseTool(world).pose_on_lane("Lane3", "lane", -30.0, 0.5)
     assert (called.pose.x_m, called.pose.y_m) == pytest.approx((-30.0, 0.5), abs=0.01)
+
+
+def arc(turn_rad: float) -> Polyline:
+    angles = np.linspace(0.0, abs(turn_rad), 30)
+    side = math.copysign(1.0, turn_rad)
+    return Polyline(np.column_stack([np.sin(angles), side * (1.0 - np.cos(angles))]))
+
+
+@pytest.mark.parametrize(
+    ("turn_deg", "turn_type"),
+    [
+        (10, TurnType.STRAIGHT),
+        (-25, TurnType.STRAIGHT),
+        (35, TurnType.LEFT),
+        (140, TurnType.LEFT),
+        (-90, TurnType.RIGHT),
+        (170, TurnType.U_TURN),
+        (-200, TurnType.U_TURN),
+    ],
+)
+def test_a_line_turns_as_far_as_its_bends_together(turn_deg: float, turn_type: TurnType) -> None:
+    assert turn_type_of(arc(math.radians(turn_deg))) is turn_type
+
+
+def test_people_drive_where_oncoming_lanes_are_on_the_other_side() -> None:
+    lanes = scene().lanes
+    assert traffic_side_of(lanes) is TrafficSide.RIGHT
+    mirrored = [
+        replace(lane, centerline=Polyline(lane.centerline.points_m * np.array([1.0, -1.0])))
+        for lane in lanes
+    ]
+    assert traffic_side_of(mirrored) is TrafficSide.LEFT
+
+
+def test_a_one_way_street_does_not_tell() -> None:
+    assert traffic_side_of(curve().lanes) is None
+
+
+def route_of(where: Scene) -> EgoRoute:
+    route = EgoRoute.of(where)
+    assert route is not None
+    return route
+
+
+def straight_lane(
+    name: str, start_m: float, end_m: float, *successors: str, y_m: float = 0.0
+) -> Lane:
+    line = Polyline([(start_m, y_m), (end_m, y_m)])
+    return Lane(id=name, centerline=line, width_m=3.5, successors=successors)
+
+
+@pytest.mark.parametrize("ahead_m", [-5.0, 0.0, 12.5, 40.0])
+@pytest.mark.parametrize("left_m", [-2.0, 0.0, 1.5])
+def test_a_position_is_located_where_it_was_asked_for(ahead_m: float, left_m: float) -> None:
+    route = route_of(curve())
+    place = route.locate(*route.position(ahead_m, left_m))
+    assert (place.ahead_m, place.left_m) == pytest.approx((ahead_m, left_m), abs=0.05)
+
+
+def test_a_route_goes_back_and_on_over_what_joins_the_ego_s_lane() -> None:
+    lanes = (
+        straight_lane("Before", -60.0, -10.0, "Own"),
+        straight_lane("Own", -10.0, 30.0, "After"),
+        straight_lane("After", 30.0, 80.0),
+    )
+    route = route_of(scene(ego=EGO, lanes=lanes, agents=(), connectors=(), areas=()))
+    assert route.lane_ids == ("Before", "Own", "After")
+    assert route.ends_m == (-10.0, 30.0, 80.0)
+    assert route.locate(-40.0, 1.0).ahead_m == pytest.approx(-40.0)
+    assert route.position(-40.0, 1.0) == pytest.approx((-40.0, 1.0))
+
+
+def test_the_lane_that_the_ego_names_counts_before_the_one_under_it() -> None:
+    lanes = (straight_lane("Under", -10.0, 80.0), straight_lane("Named", -10.0, 80.0, y_m=1.0))
+    here = scene(ego=replace(EGO, lane_id="Named"), lanes=lanes, agents=(), areas=())
+    assert route_of(here).lane_id == "Named"
+    gone = replace(here, ego=replace(here.ego, lane_id="Elsewhere"))
+    assert route_of(gone).lane_id == "Under"
+
+
+def test_an_ego_off_every_lane_has_no_route() -> None:
+    assert EgoRoute.of(scene(ego=replace(EGO, y_m=40.0, lane_id=None))) is None
+
+
+def test_where_lanes_part_the_route_goes_straight_on() -> None:
+    assert route_of(junction()).lane_ids == ("Lane1", "Connector1", "Lane2")
+    assert route_of(junction()).heading_at(60.0) == pytest.approx(0.0)
+
+
+def test_a_corridor_holds_the_lanes_that_begin_within_its_length() -> None:
+    lanes = (straight_lane("Own", -10.0, 30.0, "After"), straight_lane("After", 30.0, 80.0))
+    wide = (lanes[0], replace(lanes[1], width_m=4.5))
+    route = route_of(scene(ego=EGO, lanes=wide, agents=(), areas=()))
+    for length_m, end_m, width_m in ((30.0, 30.0, 3.5), (30.1, 80.0, 4.0)):
+        corridor = route.corridor(length_m)
+        assert corridor is not None
+        assert corridor[0].points_m[[0, -1], 0].tolist() == pytest.approx([0.0, end_m])
+        assert corridor[1] == pytest.approx(width_m)
+
+
+def test_there_is_no_corridor_where_the_lanes_end_at_the_ego() -> None:
+    lanes = (straight_lane("Own", -10.0, 0.5),)
+    route = route_of(scene(ego=EGO, lanes=lanes, agents=(), areas=()))
+    assert route.corridor(150.0) is None
+    assert math.isclose(route.ends_m[-1], 0.5)

@@ -7,6 +7,7 @@ import math
 import subprocess
 import sys
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,17 +17,36 @@ from hypothesis import strategies as st
 from augment.errors import CannotDrive
 from augment.geometry.frames import Pose
 from augment.geometry.polyline import Polyline
-from augment.scene.entities import Lane, Modification, Scene, TrafficAgent
+from augment.scene.entities import (
+    AgentType,
+    Lane,
+    Modification,
+    Point,
+    Scene,
+    SceneOptions,
+    TrafficAgent,
+    TurnType,
+)
+from augment.scene.lane_graph import LaneGraph
 from augment.simulation.drive import ExpertKind, expert_of, run
-from augment.simulation.pdm_closed import PdmClosed
+from augment.simulation.metrics import collisions, progress_ratio
+from augment.simulation.pdm_closed import ORIGINAL_OFFSETS_M, PdmClosed
 from augment.simulation.planners import IdmPlanner
 from augment.simulation.planning import Plan, Situation
-from augment.simulation.road import Road
+from augment.simulation.road import Road, find_route
 from augment.simulation.score import score_drive
 from augment.simulation.states import EgoBody, X, Y
 from augment.simulation.traffic import DriveSetting
+from bench.recording_lengths import (
+    LENGTHS_S,
+    ConstantSpeed,
+    cut,
+    half_speed_drives,
+    recorded_street,
+)
 from tests.properties import examples
-from tests.scenes import pedestrian, vehicle
+from tests.recorded import recorded
+from tests.scenes import junction, pedestrian, vehicle
 from tests.simulation.worlds import street
 
 
@@ -161,3 +181,119 @@ def test_an_ego_off_every_lane_can_not_be_driven() -> None:
     lost = replace(street(), ego=replace(street().ego, y_m=-30.0))
     with pytest.raises(CannotDrive, match="no lane"):
         run(DriveSetting(scene=lost), Straight())
+
+
+@pytest.mark.parametrize(
+    ("goal", "goal_m", "route"),
+    [
+        (None, None, ("Lane1", "Connector1", "Lane2")),
+        (TurnType.STRAIGHT, None, ("Lane1", "Connector1", "Lane2")),
+        (TurnType.LEFT, None, ("Lane1", "Connector2", "Lane3")),
+        (TurnType.LEFT, (27.0, 40.0), ("Lane1", "Connector2", "Lane3")),
+        (TurnType.STRAIGHT, (27.0, 40.0), ("Lane1", "Connector2", "Lane3")),
+        (TurnType.RIGHT, None, ("Lane1", "Connector1", "Lane2")),
+    ],
+)
+def test_a_drive_takes_the_way_to_the_goal_where_there_is_one(
+    goal: TurnType | None, goal_m: Point | None, route: tuple[str, ...]
+) -> None:
+    scene = replace(junction(), options=SceneOptions(goal=goal, goal_m=goal_m))
+    assert find_route(scene, LaneGraph(scene), None) == route
+
+
+def test_half_the_experts_speed_scores_alike_however_long_was_recorded() -> None:
+    drives = list(half_speed_drives(*recorded_street()))
+    assert [one.recorded_s for one in drives] == list(LENGTHS_S)
+    assert [one.expert.progress_m for one in drives] == pytest.approx([120.0] * len(drives))
+    ratios = [progress_ratio(one.drive, one.expert) for one in drives]
+    assert ratios == pytest.approx([ratios[-1]] * len(drives), abs=1e-6)
+    assert 0.5 < ratios[-1] < 0.55
+    assert [one.score for one in drives] == pytest.approx([drives[-1].score] * len(drives))
+    assert [one.drive.outlasts_recording for one in drives] == [True, True, True, False]
+
+
+@pytest.mark.parametrize("reactive", [False, True])
+def test_who_stands_stays_and_who_moves_goes_on_along_its_lane(reactive: bool) -> None:
+    scene, recording = recorded_street()
+    setting = DriveSetting(scene=scene, recording=cut(recording, 3.0), reactive=reactive)
+    drive = run(setting, ConstantSpeed(4.0))
+    before, last = drive.objects[30], drive.objects[-1]
+    assert set(last.ids) == set(before.ids) == {"Agent2", "Agent3"}
+    parked, ahead = (last.boxes[last.ids.index(name)] for name in ("Agent3", "Agent2"))
+    assert parked[:2].tolist() == [60.0, -3.2]
+    assert ahead[0] > 40.0 + 8.0 * 15.0 - 1.0, "it goes on at its speed or the limit"
+    steps = [row.boxes[row.ids.index("Agent2"), 0] for row in drive.objects]
+    assert ((np.diff(steps) > 0.0) & (np.diff(steps) < 1.1)).all(), "without a jump"
+
+
+def test_a_parked_cars_noise_is_no_motion() -> None:
+    scene, recording = recorded_street()
+    recording.tracks[1].states[:, 3] = 0.05
+    drive = run(DriveSetting(scene=scene, recording=cut(recording, 3.0)), ConstantSpeed(4.0))
+    last = drive.objects[-1]
+    assert last.boxes[last.ids.index("Agent3"), 0] == 60.0
+    assert last.speeds_mps[last.ids.index("Agent3")] == 0.0
+
+
+def test_a_recording_of_one_moment_measures_by_an_idm_drive() -> None:
+    scene, recording = recorded_street()
+    setting = DriveSetting(scene=scene, recording=cut(recording, 0.0))
+    expert = expert_of(setting, Road(scene))
+    assert expert.kind is ExpertKind.IDM
+    assert len(run(setting, ConstantSpeed(4.0), steps=5).objects[-1]) == 2
+
+
+def test_an_expert_who_stops_or_meets_the_end_of_the_map_goes_no_further() -> None:
+    scene, recording = recorded_street()
+    stopped = recording.ego.copy()
+    stopped[20:] = stopped[20]
+    setting = DriveSetting(scene=scene, recording=cut(replace(recording, ego=stopped), 6.0))
+    assert expert_of(setting, Road(scene)).progress_m == pytest.approx(16.0)
+    short = replace(scene, lanes=tuple(replace(lane) for lane in scene.lanes))
+    road = Road(short)
+    road.end_m = float(road.centreline.beside(np.array([[50.0, 0.0]]))[0][0])
+    setting = DriveSetting(scene=short, recording=cut(recording, 3.0))
+    assert expert_of(setting, road).progress_m < 50.0
+
+
+@pytest.mark.realdata
+def test_the_recorded_scene_is_driven_with_replayed_and_with_reactive_traffic(
+    realdata: Path,
+) -> None:
+    scene, recording = recorded(realdata)
+    road = Road(scene, recording)
+    setting = DriveSetting(scene=scene, recording=recording)
+    # The recorded ego turns left after 65 m; the straightest route would go on.
+    ends = recording.ego[~np.isnan(recording.ego).any(axis=1)][[-1], :2]
+    assert abs(road.centreline.beside(ends)[1][0]) < 2.0
+    expert = expert_of(setting, road)
+    assert expert.kind is ExpertKind.RECORDED
+    assert 60.0 < expert.progress_m < 80.0
+    replayed, reactive = (
+        run(one, PdmClosed(ORIGINAL_OFFSETS_M), road=road, steps=15)
+        for one in (setting, replace(setting, reactive=True))
+    )
+    names = [set(drive.objects[-1].ids) for drive in (replayed, reactive)]
+    assert names[1] < names[0], "who comes into sight later stays away from a reactive drive"
+    assert not collisions(replayed)
+
+
+@pytest.mark.realdata
+def test_a_car_parked_in_the_ego_s_lane_changes_the_drive(realdata: Path) -> None:
+    scene, recording = recorded(realdata)
+    road = Road(scene, recording)
+    start_m = float(road.centreline.beside(np.zeros((1, 2)))[0][0])
+    x_m, y_m, heading_rad = (
+        float(v) for v in road.centreline.poses(np.array([start_m + 30.0]))[0]
+    )
+    parked = TrafficAgent(
+        id="Added1", type=AgentType.VEHICLE, x_m=x_m, y_m=y_m, heading_rad=heading_rad,
+        width_m=2.0, length_m=4.8,
+    )  # fmt: skip
+    setting = DriveSetting(
+        scene=scene, recording=recording, modification=Modification(added=(parked,))
+    )
+    drive = run(setting, PdmClosed(), road=road, steps=25)
+    beside = np.abs(road.centreline.beside(drive.boxes[:, :2])[1])
+    assert beside.max() > 0.8, "it goes to the side"
+    assert not collisions(drive)

@@ -3,25 +3,31 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import replace
+from types import ModuleType
 
 import numpy as np
 import pytest
 
-from augment.scene.entities import Area, AreaKind, Modification, TrafficAgent
-from augment.simulation.drive import run
+from augment.scene.entities import Area, AreaKind, Modification, TrafficAgent, without_traffic
+from augment.simulation.drive import Drive, run
 from augment.simulation.pdm_closed import (
     ORIGINAL_OFFSETS_M,
     PAPER_OFFSETS_M,
+    PROPOSAL_IDM,
     PdmClosed,
     brake,
     must_brake,
 )
-from augment.simulation.planning import Plan, Situation, foresee
+from augment.simulation.planners import PLANNER_IDM, planner_named
+from augment.simulation.planning import Idm, Plan, Situation, foresee
 from augment.simulation.proposal_scores import ProposalScores, score_proposals
 from augment.simulation.road import Road
-from augment.simulation.states import FloatArray, Objects, start_state
-from augment.simulation.traffic import DriveSetting, objects_of
+from augment.simulation.states import FloatArray, Kind, Objects, join_objects, start_state
+from augment.simulation.traffic import TRAFFIC_IDM, DriveSetting, LaneDrivers, objects_of
+from tests.fixtures.shelf import entry, shown_scene
+from tests.house.source import ROOT
 from tests.scenes import cone, pedestrian, vehicle
 from tests.simulation.worlds import BODY, states_along, street
 
@@ -197,3 +203,98 @@ def test_one_walker_who_steps_out_late_makes_a_slow_ego_brake(
     drive = run(setting, PdmClosed(offsets), steps=20)
     assert any(plan.braking for plan in drive.plans) == brakes
     assert (drive.states[-1, 3] < 0.5 * speed) == brakes
+
+
+def test_the_published_vector() -> None:
+    driver = Idm(
+        min_gap_m=2.0,
+        headway_s=1.5,
+        max_acceleration_mps2=0.73,
+        max_deceleration_mps2=1.67,
+        exponent=4.0,
+    )
+    # Ego at 5 m with 3 m/s; the leader's front at 15 m, 5 m long, 2 m/s.
+    found = driver.acceleration(np.array(3.0), np.array(30.0), np.array(5.0), np.array(2.0))
+    assert found == pytest.approx(-1.073366, abs=1e-6)
+
+
+def steady_gap_m(driver: Idm, speed_mps: float) -> float:
+    """Behind a leader of the same speed where 10 m/s are wished, by the closed form."""
+    wished = driver.min_gap_m + driver.headway_s * speed_mps
+    return wished / math.sqrt(1.0 - (speed_mps / 10.0) ** driver.exponent)
+
+
+@pytest.mark.parametrize("driver", [PROPOSAL_IDM, TRAFFIC_IDM, PLANNER_IDM])
+@pytest.mark.parametrize("speed", [1.0, 5.0, 9.0])
+def test_nothing_changes_at_the_steady_gap(driver: Idm, speed: float) -> None:
+    gap = steady_gap_m(driver, speed)
+    same = np.array(speed)
+    assert driver.acceleration(same, np.array(10.0), np.array(gap), same) == pytest.approx(0.0)
+
+
+def test_a_free_road_pulls_with_all_that_is_left() -> None:
+    free = np.array(np.inf)
+    for speed, pull in [(0.0, 1.0), (5.0, 1.0 - 0.5**4), (10.0, 0.0)]:
+        found = TRAFFIC_IDM.clipped(np.array(speed), np.array(10.0), free, np.array(0.0))
+        assert found == pytest.approx(pull)
+
+
+def test_a_leader_that_runs_away_does_not_brake_anybody() -> None:
+    found = TRAFFIC_IDM.acceleration(np.array(5.0), np.array(1e9), np.array(10.0), np.array(100.0))
+    assert found == pytest.approx(1.0 - (1.0 / 10.0) ** 2)
+
+
+def test_traffic_settles_at_the_steady_gap_and_its_sweep() -> None:
+    # A leader that holds 5 m/s; the follower's limit is 10 m/s.
+    road = Road(street(3000.0))
+    follower = replace(vehicle("Agent2", 0.0, 0.0), speed_mps=5.0)
+    drivers = LaneDrivers([follower], road)
+    leader_m = 30.0
+    for _ in range(700):
+        leader = Objects(
+            ids=("Agent3",),
+            kinds=np.array([Kind.VEHICLE], dtype=np.int64),
+            boxes=np.array([[leader_m, 0.0, 0.0, 4.8, 2.0]]),
+            speeds_mps=np.array([5.0]),
+        )
+        drivers.step(join_objects([drivers.objects(), leader]))
+        leader_m += 0.5
+    gap = leader_m - 2.4 - (drivers.objects().boxes[0, 0] + 2.4)
+    # 4.6.5: the gap is measured from the sweep's end, so it grows by the swept way.
+    wanted = steady_gap_m(TRAFFIC_IDM, 5.0) + 1.5 * 5.0
+    assert gap == pytest.approx(wanted, abs=0.05)
+
+
+SLUG = "nudge-mill-junction"
+STEPS = 55
+
+
+def advance_m(drive: Drive) -> float:
+    """How far the ego came along its route."""
+    stations, _ = drive.road.centreline.beside(drive.boxes[[0, -1], :2])
+    return float(stations[1] - stations[0])
+
+
+def test_offsets_to_4_m_pass_a_parked_car_at_which_the_original_ones_wait() -> None:
+    scene, parked = without_traffic(shown_scene(SLUG)), entry(SLUG).reference
+    assert parked is not None
+    road, setting = Road(scene), DriveSetting(scene=scene, modification=parked)
+    wide, narrow = (
+        run(setting, PdmClosed(offsets), road=road, steps=STEPS)
+        for offsets in (PAPER_OFFSETS_M, ORIGINAL_OFFSETS_M)
+    )
+    assert advance_m(narrow) < parked.added[0].x_m < advance_m(wide)
+    assert narrow.states[-1, 3] < 0.5
+
+
+def test_the_documented_planner_drives(monkeypatch: pytest.MonkeyPatch) -> None:
+    page = (ROOT / "docs" / "simulation.md").read_text()
+    found = re.search(r"```python\n(.*?)```", page, re.S)
+    assert found is not None
+    module = ModuleType("my_planners")
+    exec(compile(found.group(1), "my_planners", "exec"), module.__dict__)
+    monkeypatch.setitem(__import__("sys").modules, "my_planners", module)
+    name = "my_planners.AlongTheCentreline"
+    planner = planner_named(name, allowed=[name])
+    drive = run(DriveSetting(scene=street()), planner, steps=10)
+    assert drive.boxes[-1, 0] == pytest.approx(8.0, abs=0.01)

@@ -19,7 +19,7 @@ from augment.metrics.displacement import displacement
 from augment.variants.pipeline import Outcome, OutcomeStatus, run
 from augment.variants.recipes import RECIPES, Tools, find_recipe
 from augment.variants.respondents import MemoryTranscript, RespondentClient
-from tests.baselines.test_rule_placer_catalogue import placed
+from tests.baselines.test_rule_placer import placed
 from tests.fixtures.shelf import SLUGS, entry, shown_scene
 from tests.intents import intents
 

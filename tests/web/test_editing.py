@@ -26,9 +26,9 @@ CAR = json.dumps(modification_to_document(Modification(added=(vehicle("Added1", 
 def analyst(monkeypatch: pytest.MonkeyPatch) -> Client:
     """Signed in; what is sent to a worker is done at once."""
     monkeypatch.setattr("arena.scenarios.pages.uploads.enqueue_scene", draw_scene)
-    monkeypatch.setattr("arena.scenarios.pages.editing.enqueue_scenario", draw_scenario)
+    monkeypatch.setattr("arena.scenarios.pages.forms.enqueue_scenario", draw_scenario)
     monkeypatch.setattr("arena.scenarios.pages.scenarios.enqueue_scenario", draw_scenario)
-    monkeypatch.setattr("arena.scenarios.pages.editing.enqueue_job", run_job)
+    monkeypatch.setattr("arena.scenarios.pages.forms.enqueue_job", run_job)
     monkeypatch.setattr("arena.site.acts.transaction.on_commit", lambda done: done())
     return signed_in(people()["analyst"])
 

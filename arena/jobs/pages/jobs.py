@@ -11,8 +11,7 @@ from django.shortcuts import get_object_or_404, redirect, render
 from django.urls import reverse
 from django.views.decorators.http import require_http_methods, require_POST, require_safe
 
-from arena.jobs.pages.driving import driving_section
-from arena.jobs.pages.exports import displacement_section
+from arena.jobs.pages.measures import displacement_section, driving_section
 from arena.jobs.queries import MARKS, VIEWS, Part, grid_part
 from arena.jobs.services import files_of
 from arena.services.retrying import retry_cause as retry_one_cause

@@ -7,7 +7,7 @@ import secrets
 import sys
 from typing import Any
 
-from django.core.management.base import CommandError, CommandParser
+from django.core.management.base import CommandError
 
 from arena.people.services import create_person
 from augment.services.terminal import TerminalCommand
@@ -21,11 +21,11 @@ class Command(TerminalCommand):
         "printed once."
     )
 
-    def add_arguments(self, parser: CommandParser) -> None:
-        """Declare the options."""
-        parser.add_argument("username")
-        parser.add_argument("--role", required=True, help="expert, analyst or admin")
-        parser.add_argument("--pseudonym", help="what others see; a numbered one by default")
+    arguments = {
+        "username": {},
+        "--role": {"required": True, "help": "expert, analyst or admin"},
+        "--pseudonym": {"help": "what others see; a numbered one by default"},
+    }
 
     def handle(self, *args: Any, **options: Any) -> None:
         """Make the account."""

@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from django.core.management.base import CommandParser
 from django.utils import timezone
 
 from arena.management.backups import take_backup
@@ -18,9 +17,7 @@ class Command(TerminalCommand):
     failure = "No backup was made."
     help = "Write everything that this installation knows into one file, while it runs."
 
-    def add_arguments(self, parser: CommandParser) -> None:
-        """Declare the options."""
-        parser.add_argument("file", type=Path, help="for example arena-2026-11-22.zip")
+    arguments = {"file": {"type": Path, "help": "for example arena-2026-11-22.zip"}}
 
     def handle(self, *args: Any, **options: Any) -> None:
         """Take it."""

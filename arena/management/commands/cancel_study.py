@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from django.core.management.base import CommandError, CommandParser
+from django.core.management.base import CommandError
 
 from arena.studies.queries import study_named
 from arena.studies.services.opening import cancel_study
@@ -16,11 +16,11 @@ class Command(TerminalCommand):
 
     help = "Cancel an open study for good: no more votes, never any results; its votes stay."
 
-    def add_arguments(self, parser: CommandParser) -> None:
-        """Which study, and that this is meant."""
-        parser.add_argument("study", help="its name or its code")
-        parser.add_argument("--sure", metavar="NAME", required=True, help="its name once more")
-        parser.add_argument("--why", default="", help="a reason, for the log")
+    arguments = {
+        "study": {"help": "its name or its code"},
+        "--sure": {"metavar": "NAME", "required": True, "help": "its name once more"},
+        "--why": {"default": "", "help": "a reason, for the log"},
+    }
 
     def handle(self, *args: Any, **options: Any) -> None:
         """Cancel the study and say so."""

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-from django.core.management.base import CommandParser
-
 from arena.studies.queries import study_named
 from arena.studies.services.opening import close_study
 from augment.services.terminal import TerminalCommand
@@ -16,9 +14,7 @@ class Command(TerminalCommand):
 
     help = "Close a study: it takes no more votes, and its results may be seen."
 
-    def add_arguments(self, parser: CommandParser) -> None:
-        """Which study."""
-        parser.add_argument("study", help="its name or its code")
+    arguments = {"study": {"help": "its name or its code"}}
 
     def handle(self, *args: Any, **options: Any) -> None:
         """Close the study and say so."""

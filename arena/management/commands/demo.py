@@ -10,7 +10,7 @@ from typing import Any
 
 from django.conf import settings
 from django.core.management import call_command
-from django.core.management.base import CommandError, CommandParser
+from django.core.management.base import CommandError
 
 from arena.management import demo
 from arena.management.arguments import at_least
@@ -31,24 +31,22 @@ class Command(TerminalCommand):
         "vote, rate, export the table, and serve the result."
     )
 
-    def add_arguments(self, parser: CommandParser) -> None:
-        """Declare the options."""
-        parser.add_argument("--host", default="127.0.0.1", help="address to listen on")
-        parser.add_argument("--port", type=int, default=8000, help="port to listen on")
-        parser.add_argument("--no-serve", action="store_true", help="stop before serving")
-        parser.add_argument(
-            "--per-type",
-            type=at_least(1),
-            metavar="N",
-            help="only N scenarios of each type; default: all",
-        )
-        parser.add_argument(
-            "--driven",
-            type=at_least(0),
-            metavar="N",
-            default=demo.DRIVEN_PER_TYPE,
-            help="drive N scenarios of each type; default: %(default)s",
-        )
+    arguments = {
+        "--host": {"default": "127.0.0.1", "help": "address to listen on"},
+        "--port": {"type": int, "default": 8000, "help": "port to listen on"},
+        "--no-serve": {"action": "store_true", "help": "stop before serving"},
+        "--per-type": {
+            "type": at_least(1),
+            "metavar": "N",
+            "help": "only N scenarios of each type; default: all",
+        },
+        "--driven": {
+            "type": at_least(0),
+            "metavar": "N",
+            "default": demo.DRIVEN_PER_TYPE,
+            "help": "drive N scenarios of each type; default: %(default)s",
+        },
+    }
 
     def handle(self, *args: Any, **options: Any) -> None:
         """Run the demo; a fault of any step ends it with a sentence."""

@@ -6,7 +6,7 @@ import json
 from dataclasses import asdict
 from typing import Any
 
-from django.core.management.base import CommandError, CommandParser
+from django.core.management.base import CommandError
 
 from arena.management.doctor import Ailment, Level, examine
 from augment.services.terminal import TerminalCommand
@@ -18,9 +18,7 @@ class Command(TerminalCommand):
     help = "Say what is wrong with this installation, and what to do. Ends with 1 where it is bad."
     requires_system_checks: list[str] = []
 
-    def add_arguments(self, parser: CommandParser) -> None:
-        """Declare the options."""
-        parser.add_argument("--json", action="store_true", help="for programs")
+    arguments = {"--json": {"action": "store_true", "help": "for programs"}}
 
     def handle(self, *args: Any, **options: Any) -> None:
         """Examine and tell."""

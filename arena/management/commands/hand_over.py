@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-from django.core.management.base import CommandParser
-
 from arena.studies.queries import study_named
 from arena.studies.services.taking_part import hand_over
 from augment.services.terminal import TerminalCommand
@@ -16,11 +14,11 @@ class Command(TerminalCommand):
 
     help = "Hand an expert's remaining pairs over to others, re-planned in one go."
 
-    def add_arguments(self, parser: CommandParser) -> None:
-        """Whose pairs, and who takes them."""
-        parser.add_argument("study", help="its name or its code")
-        parser.add_argument("expert", metavar="USERNAME", help="whose pairs are handed over")
-        parser.add_argument("--to", nargs="+", required=True, metavar="USERNAME")
+    arguments = {
+        "study": {"help": "its name or its code"},
+        "expert": {"metavar": "USERNAME", "help": "whose pairs are handed over"},
+        "--to": {"nargs": "+", "required": True, "metavar": "USERNAME"},
+    }
 
     def handle(self, *args: Any, **options: Any) -> None:
         """Hand over and say who got how many."""

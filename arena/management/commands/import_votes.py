@@ -5,8 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from django.core.management.base import CommandParser
-
 from arena.results.services.vote_files import import_votes
 from augment.services.terminal import TerminalCommand
 
@@ -19,13 +17,14 @@ class Command(TerminalCommand):
         "model_b, tie or tie (bothbad)), and maybe judge and item."
     )
 
-    def add_arguments(self, parser: CommandParser) -> None:
-        """Which file, and what its study is called."""
-        parser.add_argument("file", type=Path)
-        parser.add_argument("--name", help="of the study; that of the file without its ending")
-        parser.add_argument(
-            "--simulated", action="store_true", help="the votes are made up; everything says so"
-        )
+    arguments = {
+        "file": {"type": Path},
+        "--name": {"help": "of the study; that of the file without its ending"},
+        "--simulated": {
+            "action": "store_true",
+            "help": "the votes are made up; everything says so",
+        },
+    }
 
     def handle(self, *args: Any, **options: Any) -> None:
         """Import the file and say what it held."""

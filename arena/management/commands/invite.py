@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-from django.core.management.base import CommandParser
 from django.urls import reverse
 from django.utils import timezone
 
@@ -24,15 +23,14 @@ class Command(TerminalCommand):
         "A link for a named expert replaces the one before."
     )
 
-    def add_arguments(self, parser: CommandParser) -> None:
-        """Which study, whom, and where the pages are served."""
-        parser.add_argument("study", help="name or code")
-        parser.add_argument("--experts", nargs="+", metavar="USERNAME", help="all by default")
-        parser.add_argument(
-            "--address",
-            help="of the pages, as experts reach it; by default that of the running server, else "
-            f"{Web().address}",
-        )
+    arguments = {
+        "study": {"help": "name or code"},
+        "--experts": {"nargs": "+", "metavar": "USERNAME", "help": "all by default"},
+        "--address": {
+            "help": "of the pages, as experts reach it; by default that of the running "
+            f"server, else {Web().address}"
+        },
+    }
 
     def handle(self, *args: Any, **options: Any) -> None:
         """Make the links and print them."""

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any
 
 from django.contrib.auth.models import User
-from django.core.management.base import CommandParser
 
 from arena.models import Study
 from arena.people.links import mark_author, take_back_author
@@ -19,14 +18,12 @@ class Command(TerminalCommand):
 
     help = "Mark an expert of a study as author of a contestant; experts see nothing of it."
 
-    def add_arguments(self, parser: CommandParser) -> None:
-        """Who made what, in which study."""
-        parser.add_argument("study", help="its name or its code")
-        parser.add_argument("expert", metavar="USERNAME")
-        parser.add_argument("contestant", metavar="SLUG")
-        parser.add_argument(
-            "--take-back", action="store_true", help="forget it again; the log keeps both"
-        )
+    arguments = {
+        "study": {"help": "its name or its code"},
+        "expert": {"metavar": "USERNAME"},
+        "contestant": {"metavar": "SLUG"},
+        "--take-back": {"action": "store_true", "help": "forget it again; the log keeps both"},
+    }
 
     def handle(self, *args: Any, **options: Any) -> None:
         """Mark or take back, and say so."""

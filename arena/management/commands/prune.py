@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-from django.core.management.base import CommandParser
 from django.utils import timezone
 
 from arena.site.services import TextLoss, foresee_losses, read_age, remove_old
@@ -21,12 +20,10 @@ class Command(TerminalCommand):
 
     help = "Say which requests and answers of models are that old; with --yes remove them."
 
-    def add_arguments(self, parser: CommandParser) -> None:
-        """Declare the options."""
-        parser.add_argument("--older-than", required=True, metavar="AGE", help="180d or 26w")
-        parser.add_argument(
-            "--yes", action="store_true", help="remove them; without it nothing is changed"
-        )
+    arguments = {
+        "--older-than": {"required": True, "metavar": "AGE", "help": "180d or 26w"},
+        "--yes": {"action": "store_true", "help": "remove them; without it nothing is changed"},
+    }
 
     def handle(self, *args: Any, **options: Any) -> None:
         """Foresee, and remove where that is wanted."""

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-from django.core.management.base import CommandParser
-
 from arena.rating.rules import Intervals, Unit
 from arena.results.exports.tables import leaderboard_table
 from arena.results.exports.writers import plain_text
@@ -18,43 +16,37 @@ from augment.services.terminal import TerminalCommand
 
 
 class Command(TerminalCommand):
-    """The door to arena.results.services.ratings.rate_now."""
+    """The door to arena.results.services.ratings.rate."""
 
     help = "Rate the contestants of a study by its votes and keep the result."
 
-    def add_arguments(self, parser: CommandParser) -> None:
-        """Which study, and how."""
-        parser.add_argument("study", help="its name or its code")
-        parser.add_argument("--method", default="bt", help="bt (Bradley-Terry), davidson or elo")
-        parser.add_argument("--rounds", type=int, default=DEFAULT_ROUNDS, help="of the bootstrap")
-        parser.add_argument("--seed", type=int, default=0)
-        parser.add_argument(
-            "--resample",
-            choices=[unit.value for unit in Unit],
-            help="what is resampled: vote (the paper's), scenario, expert or two-way; two-way "
+    arguments = {
+        "study": {"help": "its name or its code"},
+        "--method": {"default": "bt", "help": "bt (Bradley-Terry), davidson or elo"},
+        "--rounds": {"type": int, "default": DEFAULT_ROUNDS, "help": "of the bootstrap"},
+        "--seed": {"type": int, "default": 0},
+        "--resample": {
+            "choices": [unit.value for unit in Unit],
+            "help": "what is resampled: vote (the paper's), scenario, expert or two-way; two-way "
             "where votes name experts and scenarios, unless given",
-        )
-        parser.add_argument(
-            "--intervals",
-            choices=[interval.value for interval in Intervals],
-            help="closed (form, the default where votes hang together) or resamples",
-        )
-        parser.add_argument(
-            "--adjust",
-            nargs="+",
-            default=[],
-            choices=COVARIATES,
-            metavar="WHAT",
-            help="rate contestants as if alike in: side, objects, vehicles",
-        )
-        parser.add_argument(
-            "--leave-out-own",
-            action="store_true",
-            help="votes of authors on their own contestants do not count",
-        )
-        parser.add_argument(
-            "--early", action="store_true", help="rate an open study; this is logged"
-        )
+        },
+        "--intervals": {
+            "choices": [interval.value for interval in Intervals],
+            "help": "closed (form, the default where votes hang together) or resamples",
+        },
+        "--adjust": {
+            "nargs": "+",
+            "default": [],
+            "choices": COVARIATES,
+            "metavar": "WHAT",
+            "help": "rate contestants as if alike in: side, objects, vehicles",
+        },
+        "--leave-out-own": {
+            "action": "store_true",
+            "help": "votes of authors on their own contestants do not count",
+        },
+        "--early": {"action": "store_true", "help": "rate an open study; this is logged"},
+    }
 
     def handle(self, *args: Any, **options: Any) -> None:
         """Rate, then print the table."""

@@ -5,8 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from django.core.management.base import CommandParser
-
 from arena.management.backups import restore_backup
 from augment.services.terminal import TerminalCommand
 
@@ -20,9 +18,7 @@ class Command(TerminalCommand):
         "an empty PostgreSQL database, whichever DATABASE_URL names."
     )
 
-    def add_arguments(self, parser: CommandParser) -> None:
-        """Declare the options."""
-        parser.add_argument("file", type=Path)
+    arguments = {"file": {"type": Path}}
 
     def handle(self, *args: Any, **options: Any) -> None:
         """Restore it."""

@@ -6,7 +6,7 @@ from typing import Any
 
 from django.conf import settings
 from django.core.management import call_command
-from django.core.management.base import CommandError, CommandParser
+from django.core.management.base import CommandError
 
 from arena.management.arguments import at_least
 from arena.management.demo import login_lines
@@ -28,16 +28,12 @@ class Command(TerminalCommand):
         "worker and the web server. One Ctrl-C stops all of it."
     )
 
-    def add_arguments(self, parser: CommandParser) -> None:
-        """Declare the options."""
-        parser.add_argument("--host", default="127.0.0.1", help="address to listen on")
-        parser.add_argument("--port", type=int, default=8000, help="port to listen on")
-        parser.add_argument(
-            "--web-workers", type=at_least(1), default=2, help="web server processes"
-        )
-        parser.add_argument(
-            "--concurrency", type=at_least(1), default=4, help="augmentations at once"
-        )
+    arguments = {
+        "--host": {"default": "127.0.0.1", "help": "address to listen on"},
+        "--port": {"type": int, "default": 8000, "help": "port to listen on"},
+        "--web-workers": {"type": at_least(1), "default": 2, "help": "web server processes"},
+        "--concurrency": {"type": at_least(1), "default": 4, "help": "augmentations at once"},
+    }
 
     def handle(self, *args: Any, **options: Any) -> None:
         """Run until somebody asks to stop."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from statistics import median_high
 from typing import Any
 
-from arena.jobs.pages.driving import driving
+from arena.jobs.pages.measures import driving
 from arena.models import Snapshot
 from arena.models.votes import AIDS
 from arena.people.queries import natural_order

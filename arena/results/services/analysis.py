@@ -20,8 +20,8 @@ from arena.rating.comparisons import (
     Comparisons,
     FloatArray,
     IntArray,
+    count_wins,
     select_votes,
-    win_rates,
 )
 from arena.rating.leaderboard import Leaderboard, rate
 from arena.rating.snapshot_document import (
@@ -106,22 +106,22 @@ def pairs(
     comparisons: Comparisons, votes: Sequence[Judged], planned: Counter[frozenset[str]]
 ) -> tuple[PairRecord, ...]:
     """Wins, ties, losses of every pair that met or should have, from the first one's view."""
-    found = win_rates(comparisons)
+    wins, ties = count_wins(comparisons)
     names = comparisons.names
     missed = Counter(frozenset((vote.left, vote.right)) for vote in votes if vote.both_miss)
     return tuple(
         PairRecord(
             a=one,
             b=names[j],
-            wins=int(found.wins[i, j]),
-            ties=int(found.ties[i, j]),
-            losses=int(found.wins[j, i]),
+            wins=int(wins[i, j]),
+            ties=int(ties[i, j]),
+            losses=int(wins[j, i]),
             both_miss=missed[frozenset((one, names[j]))],
             planned=planned[frozenset((one, names[j]))] if planned else None,
         )
         for i, one in enumerate(names)
         for j in range(i + 1, len(names))
-        if found.votes[i, j] or planned[frozenset((one, names[j]))]
+        if wins[i, j] or wins[j, i] or ties[i, j] or planned[frozenset((one, names[j]))]
     )
 
 

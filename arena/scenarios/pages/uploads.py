@@ -5,6 +5,7 @@ from __future__ import annotations
 import uuid
 
 from django.contrib import messages
+from django.db.models import Count
 from django.http import HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, redirect, render
 from django.urls import reverse
@@ -21,14 +22,19 @@ from augment.services.scenarios.pictures import SceneView, is_drawn, scene_pictu
 from augment.services.scenarios.scene_imports import notes_of
 from augment.tasks import enqueue_moment, enqueue_scene, enqueue_upload
 
+UPLOADS_SHOWN = 20
+PARTS = ("agents", "lanes", "connectors", "areas")
+
 
 @allow_only(*STAFF)
 @require_safe
 def scenes_page(request: HttpRequest) -> HttpResponse:
     """List every scene, the files that were sent, and the form to send another."""
+    scenes = BaseScene.objects.defer("document", "recording", "notes")
+    sent = SceneUpload.objects.defer("tracks").select_related("uploaded_by")
     context = {
-        "scenes": queries.scene_rows(),
-        "uploads": queries.upload_rows(),
+        "scenes": scenes.annotate(number=Count("scenarios")).order_by("-created_at", "slug"),
+        "uploads": sent[:UPLOADS_SHOWN],
         "formats": uploads.FORMATS.items(),
         "most_megabytes": uploads.most_megabytes(),
     }
@@ -42,7 +48,8 @@ def scene_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     row = get_object_or_404(BaseScene, code=code)
     context = {
         "scene": row,
-        "counts": queries.counts_of(row),
+        "counts": {name: len(row.document.get(name, ())) for name in PARTS},
+        "recorded_s": row.recording["times_s"][-1] if row.recording else 0.0,
         "notes": notes_of(row),
         "scenarios": row.scenarios.only("base_scene", "code", "slug", "instruction"),
         **look_at(request, row, SceneView.KEPT),
