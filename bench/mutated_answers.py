@@ -25,9 +25,10 @@ from augment.llm.client import Patience, Sending, watch_nothing
 from augment.llm.messages import Reply, Request
 from augment.variants.pipeline import Outcome, run
 from augment.variants.recipes import RECIPES
-from augment.variants.respondents import MemoryTranscript, RespondentClient
+from augment.variants.respondents import RespondentClient
 from tests.fixtures.shelf import SLUGS, entry, shown_scene
 from tests.intents import intents
+from tests.variants.memory import MemoryTranscript
 
 COUNT = 10_000
 SEED = 20_261_121

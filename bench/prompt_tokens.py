@@ -32,7 +32,7 @@ from bench.environments import BENCH, python_of
 from bench.report import PAGE, table, write_block
 from tests.fixtures.shelf import HARD_SLUGS, SLUGS, entry, shown_scene, whole_scene
 from tests.intents import intents
-from tests.variants.pose_accuracy import recorded_scenes
+from tests.variants.test_pose_accuracy import recorded_scenes
 
 VOCABULARY = "o200k_base"
 WISH = "Add a parked car 21.4 m ahead of the ego, 0.5 m left of the lane centre."

@@ -123,51 +123,37 @@ def _matchups(
     flips: BoolArray,
     rng: np.random.Generator,
 ) -> list[PlannedMatchup]:
-    """One expert's order as showings."""
+    """One expert's order as showings; checks have the broken picture on either side in turn."""
     repeats = sum(slot.kind == REPEAT for slot in order)
+    turned: dict[int, bool] = {}
+    waiting = list(flips)
+    checks = {check.scenario: (check.good, check.broken) for check in rules.checks}
+    broken_left = bool(rng.random() < 0.5) if rules.checks else False
     made = []
-    for index, (slot, sides) in enumerate(
-        zip(order, _sides(rules, grid, order, flips, rng), strict=True)
-    ):
+    for index, slot in enumerate(order):
         if slot.kind == CHECK:
+            sides, flip = checks[grid.scenarios[slot.scenario]], broken_left
+            broken_left = not broken_left
             chance = 1.0 / len(rules.checks)
-        elif slot.kind == REPEAT:
-            chance = repeats / (len(order) - repeats)
         else:
+            sides = grid.pairs[slot.pair]
+            # A repeat is always later than what it repeats.
+            flip = not turned[slot.of] if slot.of is not None else bool(waiting.pop(0))
             chance = float(probability[slot.pair, slot.scenario])
+            if slot.kind == REPEAT:
+                chance = repeats / (len(order) - repeats)
+        turned[index] = flip
+        left, right = sides[::-1] if flip else sides
         made.append(
             PlannedMatchup(
                 expert=expert,
                 position=index + 1,
                 scenario=grid.scenarios[slot.scenario],
-                left=sides[0],
-                right=sides[1],
+                left=left,
+                right=right,
                 draw_probability=chance,
                 kind=slot.kind,
                 repeats=None if slot.of is None else slot.of + 1,
             )
         )
-    return made
-
-
-def _sides(
-    rules: PlanRules, grid: Grid, order: list[Slot], flips: BoolArray, rng: np.random.Generator
-) -> list[tuple[str, str]]:
-    """Left and right of every showing; checks have the broken picture on either side in turn."""
-    turned: dict[int, bool] = {}
-    waiting = list(flips)
-    checks = {check.scenario: check for check in rules.checks}
-    broken_left = bool(rng.random() < 0.5) if rules.checks else False
-    made = []
-    for index, slot in enumerate(order):
-        if slot.kind == CHECK:
-            given = checks[grid.scenarios[slot.scenario]]
-            made.append((given.broken, given.good) if broken_left else (given.good, given.broken))
-            broken_left = not broken_left
-            continue
-        # A repeat is always later than what it repeats.
-        flip = not turned[slot.of] if slot.of is not None else bool(waiting.pop(0))
-        turned[index] = flip
-        first, second = grid.pairs[slot.pair]
-        made.append((second, first) if flip else (first, second))
     return made

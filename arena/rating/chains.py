@@ -222,7 +222,13 @@ def diagnose(
         chains = replace(chains, part_of=chains.group_of, between=apart)
     parts = chains.parts()
     if len(parts) > 1:
-        explanation = [_who_is_apart(names, groups)] if len(groups) > 1 else []
+        explanation = []
+        if len(groups) > 1:
+            explanation.append(
+                "These groups were never compared with each other: "
+                f"{_list_groups(names, groups)}. Each is rated by itself; ratings across them "
+                "have no meaning."
+            )
         if not bounded_anyway:
             explanation += _who_is_unbounded(names, chains)
         return Diagnosis(
@@ -243,14 +249,6 @@ def diagnose(
             chains=chains,
         )
     return Diagnosis(status=Status.RATED, chains=chains)
-
-
-def _who_is_apart(names: tuple[str, ...], groups: tuple[tuple[int, ...], ...]) -> str:
-    listed = _joined([_listed(names, group) for group in groups])
-    return (
-        f"These groups were never compared with each other: {listed}. Each is rated by itself; "
-        "ratings across them have no meaning."
-    )
 
 
 def _notes(parts: tuple[tuple[int, ...], ...], chains: Chains) -> tuple[str, ...]:
@@ -280,27 +278,21 @@ def _who_is_unbounded(names: tuple[str, ...], chains: Chains) -> list[str]:
     is_unbeaten = has_rest & (chains.between.sum(axis=0) == 1)
     is_scoreless = has_rest & (chains.between.sum(axis=1) == 1)
     unbeaten, scoreless = (
-        [_listed(names, members[part]) for part in np.flatnonzero(which).tolist()]
+        _list_groups(names, [members[part] for part in np.flatnonzero(which).tolist()])
         for which in (is_unbeaten, is_scoreless)
     )
     sentences = []
     if unbeaten:
-        sentences.append(
-            f"Nobody else scored against {_joined(unbeaten)}: there is no upper limit."
-        )
+        sentences.append(f"Nobody else scored against {unbeaten}: there is no upper limit.")
     if scoreless:
-        sentences.append(
-            f"{_joined(scoreless)} scored against nobody else: there is no lower limit."
-        )
+        sentences.append(f"{scoreless} scored against nobody else: there is no lower limit.")
     return sentences
 
 
-def _joined(groups: Sequence[str]) -> str:
-    return "; ".join(few_of(groups))
-
-
-def _listed(names: tuple[str, ...], group: Sequence[int]) -> str:
-    return ", ".join(few_of([names[index] for index in group]))
+def _list_groups(names: tuple[str, ...], groups: Sequence[Sequence[int]]) -> str:
+    return "; ".join(
+        few_of([", ".join(few_of([names[index] for index in group])) for group in groups])
+    )
 
 
 # --- Contestants above or below others without any limit -----------------------------------------

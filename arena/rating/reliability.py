@@ -16,6 +16,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
+from functools import partial
 
 import numpy as np
 
@@ -89,13 +90,17 @@ def agreement(votes: Comparisons, *, rounds: int, seed: int) -> Agreement:
     drawn = rng.multinomial(len(found), chance, size=rounds) @ sums
     whole = sums.sum(axis=0)[None]
     several = len(np.unique(scenario[is_shared])) > 1
+    alpha, alpha_interval = (
+        _estimate(partial(_alpha, metric=metric), whole, drawn, several)
+        for metric in DifferenceMetric
+    )
     return Agreement(
-        alpha=_estimate(_alpha, DifferenceMetric.NOMINAL, whole, drawn, several),
-        alpha_interval=_estimate(_alpha, DifferenceMetric.INTERVAL, whole, drawn, several),
-        percent=_estimate(_percent, DifferenceMetric.NOMINAL, whole, drawn, several),
+        alpha=alpha,
+        alpha_interval=alpha_interval,
+        percent=_estimate(_percent, whole, drawn, several),
         units=int(is_shared.sum()),
         judgements=int(table[is_shared].sum()),
-        ac1=_estimate(_ac1, DifferenceMetric.NOMINAL, whole, drawn, several),
+        ac1=_estimate(_ac1, whole, drawn, several),
     )
 
 
@@ -138,13 +143,9 @@ def _shares(table: IntArray) -> FloatArray:
     return np.hstack([table / total, np.ones((len(table), 1)), equal, total > 1])
 
 
-def _ac1(sums: FloatArray, _: DifferenceMetric) -> FloatArray:
-    """(B,) of sums as `agreement` makes them."""
-    return _ac1_of(sums[:, VALUES * VALUES :])
-
-
-def _ac1_of(sums: FloatArray) -> FloatArray:
-    """(B,) of sums (B, K + 3) of what units share; not a number where none was judged twice."""
+def _ac1(sums: FloatArray) -> FloatArray:
+    """(B,) of sums as `agreement` makes them; not a number where no unit was judged twice."""
+    sums = sums[:, VALUES * VALUES :]
     values = sums[:, :-3] / sums[:, -3:-2]
     with np.errstate(invalid="ignore"):
         seen = sums[:, -2] / sums[:, -1]
@@ -170,23 +171,22 @@ def _alpha(sums: FloatArray, metric: DifferenceMetric) -> FloatArray:
         return np.asarray(1.0 - (n - 1.0) * observed / expected)
 
 
-def _percent(sums: FloatArray, _: DifferenceMetric) -> FloatArray:
+def _percent(sums: FloatArray) -> FloatArray:
     pairs = sums[:, : VALUES * VALUES]
     with np.errstate(invalid="ignore"):
         return np.asarray(pairs[:, :: VALUES + 1].sum(axis=1) / pairs.sum(axis=1))
 
 
 def _estimate(
-    measure: Callable[[FloatArray, DifferenceMetric], FloatArray],
-    metric: DifferenceMetric,
+    measure: Callable[[FloatArray], FloatArray],
     whole: FloatArray,
     drawn: FloatArray,
     several: bool,
 ) -> Estimate:
-    value = float(measure(whole, metric)[0])
+    value = float(measure(whole)[0])
     if np.isnan(value):
         return Estimate(value=None)
-    rounds = measure(drawn, metric)
+    rounds = measure(drawn)
     rounds = rounds[~np.isnan(rounds)]
     if not several or not len(rounds):
         return Estimate(value=value)

@@ -31,7 +31,7 @@ from arena.site.language import use_english
 from arena.site.listing import read_page
 from arena.site.queries import MACHINE, actors, acts, distinct, read_gauges, take_inventory
 from arena.studies import queries as studies
-from arena.templatetags.results import verb_label
+from arena.templatetags.results import label_of
 from augment.errors import UnknownName
 from augment.models import Event, GenerationJob
 from augment.services.running.progress import count_each
@@ -195,7 +195,10 @@ class AuditForm(forms.Form):
         people = [(str(user.person.code), user.person.pseudonym) for user in actors()]
         offered = {
             "actor": [("", "anybody"), (MACHINE, "the machine"), *people],
-            "verb": [("", "anything"), *((verb, verb_label(verb)) for verb in distinct("verb"))],
+            "verb": [
+                ("", "anything"),
+                *((verb, label_of("verb_label", verb)) for verb in distinct("verb")),
+            ],
             "kind": [("", "anything"), *((kind, kind) for kind in distinct("object_kind"))],
         }
         for name, choices in offered.items():

@@ -14,7 +14,7 @@ from django.utils.html import format_html
 from django.utils.safestring import SafeString
 
 from arena.results.queries.search import VoteSearch
-from arena.templatetags.results import left_out, method_label
+from arena.templatetags.results import label_of
 from augment.models import Event
 from augment.services.scenarios.scenes import type_label
 
@@ -104,7 +104,7 @@ def _text(key: str, value: Any, names: Mapping[str, str]) -> str:
         case "matchups" if isinstance(value, list):  # older lines name each
             return str(len(value))
         case "method":
-            return method_label(value)
+            return label_of("method_label", value)
         case "snapshot":
             return str(value)[:8]
         case "sha256":
@@ -142,5 +142,5 @@ def _filters(value: Mapping[str, Any]) -> str:
     if value.get("leave_out_settled"):
         texts.append("pairs that nobody can tell apart are left out")
     if value.get("leave_out_own"):
-        texts.append(f"left out: {left_out('own')}")
+        texts.append(f"left out: {label_of('left_out', 'own')}")
     return "; ".join(texts) or "all"

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import math
 import uuid
-from typing import cast
+from collections.abc import Callable
+from functools import wraps
+from typing import Any
 
 from django.contrib import messages
 from django.contrib.auth.models import User
@@ -17,7 +19,7 @@ from django.views.decorators.http import require_http_methods, require_POST, req
 
 from arena.errors import AlreadyDecided, InvalidVote, NotYours, StudyNotOpen, TooFast
 from arena.models import PracticePair, Study
-from arena.site.access import ADMIN, EXPERT, allow_only
+from arena.site.access import ADMIN, EXPERT, allow_only, user_of
 from arena.studies.queries import voting_study
 from arena.studies.services.experts import (
     answer_practice,
@@ -46,8 +48,24 @@ from augment.services.judging.findings import (
     check_augmentation,
 )
 
+View = Callable[..., HttpResponseBase]
+
+
+def strangers_find_nothing(view: View) -> View:
+    """Answer 404 for what is somebody else's, as for what does not exist."""
+
+    @wraps(view)
+    def answer(*args: Any, **named: Any) -> HttpResponseBase:
+        try:
+            return view(*args, **named)
+        except NotYours as error:
+            raise Http404 from error
+
+    return answer
+
 
 @allow_only(EXPERT)
+@strangers_find_nothing
 @never_cache
 @require_http_methods(["GET", "HEAD", "POST"])
 def vote_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
@@ -59,26 +77,28 @@ def vote_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     study = _study_of(request, code)
     if request.method == "POST":
         return _save(request, study)
-    if is_due(study, cast(User, request.user)):
+    if is_due(study, user_of(request)):
         return redirect("vote-practice", code=study.code)
     return _show(request, study)
 
 
 @allow_only(EXPERT)
+@strangers_find_nothing
 @require_safe
 def help_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """How to vote, for those without a script; with one it is a panel of the voting page."""
     study = _study_of(request, code)
-    return render(request, "vote/help.html", over_context(study, cast(User, request.user)))
+    return render(request, "vote/help.html", over_context(study, user_of(request)))
 
 
 @allow_only(EXPERT)
+@strangers_find_nothing
 @never_cache
 @require_safe
 def skipped_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """The pairs that the expert skipped: each can be looked at again and voted on."""
     study = _study_of(request, code)
-    expert = cast(User, request.user)
+    expert = user_of(request)
     context = over_context(study, expert)
     context["skips"] = skipped_pairs(study=study, expert=expert)
     return render(request, "vote/skipped.html", context)
@@ -86,6 +106,7 @@ def skipped_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
 
 @require_POST
 @allow_only(EXPERT)
+@strangers_find_nothing
 def report_pair(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Keep what is wrong with a pair, then show it again."""
     study = _study_of(request, code)
@@ -94,15 +115,9 @@ def report_pair(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         messages.error(request, _("That could not be read; nothing was reported."))
         return redirect("vote", code=study.code)
     given = form.cleaned_data
+    matchup, key = given["matchup"], given["key"]
     try:
-        report(
-            expert=cast(User, request.user),
-            matchup_code=given["matchup"],
-            key=given["key"],
-            said=form.said(),
-        )
-    except NotYours as error:
-        raise Http404 from error
+        report(expert=user_of(request), matchup_code=matchup, key=key, said=form.said())
     except StudyNotOpen:
         pass  # the page that follows says that the study is closed
     else:
@@ -111,34 +126,27 @@ def report_pair(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
 
 
 @allow_only(EXPERT, ADMIN)
+@strangers_find_nothing
 @require_safe
 def matchup_image(request: HttpRequest, token: str) -> HttpResponseBase:
     """One side of a matchup, by a token that says nothing."""
-    try:
-        name = picture_shown(user=cast(User, request.user), token=token)
-    except NotYours as error:
-        raise Http404 from error
-    return picture_response(name)
+    return picture_response(picture_shown(user=user_of(request), token=token))
 
 
 @allow_only(EXPERT, ADMIN)
+@strangers_find_nothing
 @require_safe
 def replay(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """How a planner drove both scenes of a pair, for the script that plays it."""
-    try:
-        drives = drives_of_pair(user=cast(User, request.user), code=code)
-    except NotYours as error:
-        raise Http404 from error
-    if drives is None:
-        raise Http404
-    return JsonResponse(drives, headers={"Cache-Control": "private, no-store"})
+    return _json(drives_of_pair(user=user_of(request), code=code))
 
 
 @allow_only(EXPERT, ADMIN)
+@strangers_find_nothing
 @require_safe
 def measures(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Lines and rings over a pair, or with x and y (pixels) how far the lane's edges are there."""
-    user, place = cast(User, request.user), request.GET
+    user, place = user_of(request), request.GET
     try:
         if place.keys() & {"x", "y"}:
             x_px, y_px = (float(place.get(name, "")) for name in ("x", "y"))
@@ -148,13 +156,9 @@ def measures(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
             answer = None if found is None else {"words": _edges(found[0])}
         else:
             answer = measures_of_pair(user=user, code=code)
-    except NotYours as error:
-        raise Http404 from error
     except ValueError:
         return JsonResponse({"problem": _("x and y are pixels of the picture.")}, status=422)
-    if answer is None:
-        raise Http404
-    return JsonResponse(answer, headers={"Cache-Control": "private, no-store"})
+    return _json(answer)
 
 
 # Private
@@ -169,17 +173,19 @@ def _edges(edges: LaneEdges | None) -> str:
     }
 
 
+def _json(answer: dict[str, Any] | None) -> JsonResponse:
+    if answer is None:
+        raise Http404
+    return JsonResponse(answer, headers={"Cache-Control": "private, no-store"})
+
+
 def _study_of(request: HttpRequest, code: uuid.UUID) -> Study:
-    try:
-        study = voting_study(expert=cast(User, request.user), code=code)
-    except NotYours as error:
-        raise Http404 from error
-    return study
+    return voting_study(expert=user_of(request), code=code)
 
 
 def _show(request: HttpRequest, study: Study, status: int = 200) -> HttpResponse:
     """A pair, or why there is none."""
-    expert = cast(User, request.user)
+    expert = user_of(request)
     if study.state != Study.State.OPEN:
         return render(request, "vote/closed.html", over_context(study, expert))
     context = vote_context(study, expert, change=request.GET.get("change", ""))
@@ -193,9 +199,7 @@ def _save(request: HttpRequest, study: Study) -> HttpResponse:
     try:
         if not form.is_valid():
             raise InvalidVote({"outcome": "It is none of the answers."})
-        receive_vote(expert=cast(User, request.user), decision=form.decision())
-    except NotYours as error:
-        raise Http404 from error
+        receive_vote(expert=user_of(request), decision=form.decision())
     except InvalidVote:
         messages.error(request, _("That was not one of the answers; nothing was saved."))
         return _show(request, study, status=422)
@@ -213,15 +217,13 @@ MOST_REASONS = 3
 
 
 @allow_only(EXPERT)
+@strangers_find_nothing
 @never_cache
 @require_http_methods(["GET", "HEAD", "POST"])
 def practice_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """The next pair to practise on, or with `pair` what was right of one that was answered."""
-    expert = cast(User, request.user)
-    try:
-        study = voting_study(expert=expert, code=code)
-    except NotYours as error:
-        raise Http404 from error
+    expert = user_of(request)
+    study = _study_of(request, code)
     if request.method == "POST":
         return _answer(request, study, expert)
     pairs = practice_pairs(study, expert)

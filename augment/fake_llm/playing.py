@@ -83,7 +83,9 @@ class Character:
             return _describe_picture(request), ()
         try:
             if heard.role is ModelRole.READER:
-                return _read_intent(intents(instruction_in(request.messages))), ()
+                intent = intents(instruction_in(request.messages))
+                known = intent and _fenced("From my list:", intent_to_parts(intent))
+                return known or UNKNOWN, ()
             task = task_of(request.messages, intents)
         except NothingSeen:
             return SEES_NOTHING, ()
@@ -238,11 +240,6 @@ def _fields(agent: TrafficAgent) -> dict[str, object]:
 
 def _fenced(words: str, block: object) -> str:
     return f"{words}\n```json\n{json.dumps(block)}\n```\n"
-
-
-def _read_intent(intent: Intent | None) -> str:
-    """Write the intent from the list, as a reader would; nothing is read."""
-    return UNKNOWN if intent is None else _fenced("From my list:", intent_to_parts(intent))
 
 
 def _describe_picture(request: ChatRequest) -> str:

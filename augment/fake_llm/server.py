@@ -14,6 +14,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from typing import Any
 
 from augment.fake_llm import careless, playing
 from augment.fake_llm.sight import Intents, knows_nothing
@@ -89,20 +90,13 @@ class FakeServer(ThreadingHTTPServer):
 
 
 @contextmanager
-def running(
-    host: str = "127.0.0.1",
-    port: int = 0,
-    *,
-    latency_s: float = 0.0,
-    slow_s: float = 30.0,
-    intents: Intents = knows_nothing,
-) -> Iterator[FakeServer]:
-    """Serve in the background until the block ends.
+def running(host: str = "127.0.0.1", port: int = 0, **settings: Any) -> Iterator[FakeServer]:
+    """Run a `FakeServer` with those settings in the background until the block ends.
 
     Raises:
         OSError: The address is taken or is none of this computer's.
     """
-    server = FakeServer(host, port, latency_s=latency_s, slow_s=slow_s, intents=intents)
+    server = FakeServer(host, port, **settings)
     thread = threading.Thread(target=server.serve_forever, args=(0.05,), daemon=True)
     thread.start()
     try:
@@ -198,7 +192,7 @@ def _probed(request: ChatRequest) -> tuple[str, Calls] | None:
         as_object = request.response_format is not None
         return (json.dumps({"sum": total}) if as_object else f"That makes {total}."), ()
     if (match := re.search(r"double the number (\d+)", text)) and request.tools:
-        name = request.tools[0].function.name
+        name = request.tools[0]["function"]["name"]
         return "", ((name, json.dumps({"number": int(match[1])})),)
     if message.images and text.startswith("Name the colour of the left half"):
         return "The left half is green, the right half is yellow.", ()
@@ -209,10 +203,6 @@ def _probed(request: ChatRequest) -> tuple[str, Calls] | None:
 
 
 _good = _as(playing.GOOD)
-
-
-def _good_text(request: ChatRequest, server: FakeServer) -> str:
-    return playing.GOOD.answer(request, server.intents)[0]
 
 
 def _no_vision(request: ChatRequest, server: FakeServer) -> Response:
@@ -231,30 +221,27 @@ def _cuts_context(request: ChatRequest, server: FakeServer) -> Response:
     return as_json(json.loads(cut.body) | {"usage": usage(WINDOW_TOKENS, 9)})
 
 
-def _slow(request: ChatRequest, server: FakeServer) -> Response:
-    return replace(_good(request, server), wait_s=server.slow_s)
+def _good_but(change: Callable[[Response, FakeServer], Response]) -> Behaviour:
+    """Answer well and then spoil the response."""
+    return lambda request, server: change(_good(request, server), server)
 
 
-def _500_then_ok(request: ChatRequest, server: FakeServer) -> Response:
-    return (_500 if server.is_first(request) else _good)(request, server)
-
-
-def _broken_json(request: ChatRequest, server: FakeServer) -> Response:
-    whole = _good(request, server)
+def _halved(whole: Response, server: FakeServer) -> Response:
     return replace(whole, body=whole.body[: len(whole.body) // 2])
 
 
-def _dropped(request: ChatRequest, server: FakeServer) -> Response:
-    whole = _good(request, server)
+def _dropped(whole: Response, server: FakeServer) -> Response:
     return replace(whole, cut_at=len(whole.body) // 2)
 
 
-def _no_usage(request: ChatRequest, server: FakeServer) -> Response:
-    return as_json(completion(request, _good_text(request, server), with_usage=False))
+def _without_usage(whole: Response, server: FakeServer) -> Response:
+    document = json.loads(whole.body)
+    del document["usage"]
+    return as_json(document)
 
 
 def _cut_off(request: ChatRequest, server: FakeServer) -> Response:
-    text = _good_text(request, server)
+    text, _ = playing.GOOD.answer(request, server.intents)
     middle = text.find("```json") + len("```json") + 40
     return as_json(completion(request, text[:middle], finish_reason="length"))
 
@@ -307,7 +294,9 @@ MODELS: dict[str, Behaviour] = {
     "fake-no-vision": _no_vision,
     "fake-cuts-context": _cuts_context,
     "fake-500": _500,
-    "fake-500-then-ok": _500_then_ok,
+    "fake-500-then-ok": lambda request, server: (_500 if server.is_first(request) else _good)(
+        request, server
+    ),
     "fake-429": _too_many("1"),
     "fake-429-long": _too_many("600"),
     "fake-quota": _always(
@@ -320,12 +309,12 @@ MODELS: dict[str, Behaviour] = {
     "fake-html": _always(
         Response(body=b"<html><body>Sign in</body></html>", content_type="text/html")
     ),
-    "fake-slow": _slow,
-    "fake-broken-json": _broken_json,
-    "fake-dropped": _dropped,
+    "fake-slow": _good_but(lambda whole, server: replace(whole, wait_s=server.slow_s)),
+    "fake-broken-json": _good_but(_halved),
+    "fake-dropped": _good_but(_dropped),
     "fake-no-choices": _complete("", {"choices": []}),
     "fake-null-choices": _complete("", {"choices": None}),
-    "fake-no-usage": _no_usage,
+    "fake-no-usage": _good_but(_without_usage),
     "fake-refuse": _complete(None, refusal="I can't help with that."),
     "fake-filtered": _complete(None, finish_reason="content_filter"),
     "fake-prose": _complete(

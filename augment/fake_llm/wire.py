@@ -85,28 +85,12 @@ class ImagePart(_Strict):
 Part = Annotated[TextPart | ImagePart, Field(discriminator="type")]
 
 
-class CalledFunction(_Strict):
-    """A function with its arguments, a JSON text."""
-
-    name: str
-    arguments: str
-
-
-class CalledTool(_Strict):
-    """A call that an assistant made; what this server hung on it has to come back."""
-
-    id: Annotated[str, Field(min_length=1)]
-    type: Literal["function"]
-    function: CalledFunction
-    extra_content: dict[str, dict[str, str]]
-
-
 class SpokenMessage(_Strict):
     """One turn of the conversation."""
 
     role: Literal["system", "developer", "user", "assistant", "tool"]
     content: str | Annotated[list[Part], Field(min_length=1)] | None
-    tool_calls: Annotated[list[CalledTool], Field(min_length=1)] | None = None
+    tool_calls: Annotated[list[dict[str, Any]], Field(min_length=1)] | None = None
     tool_call_id: str | None = None
 
     @property
@@ -124,21 +108,6 @@ class SpokenMessage(_Strict):
         return [part.image_url for part in parts if isinstance(part, ImagePart)]
 
 
-class OfferedFunction(_Strict):
-    """A function that may be called."""
-
-    name: Annotated[str, Field(pattern=r"^[a-zA-Z0-9_-]{1,64}$")]
-    description: str
-    parameters: dict[str, object]
-
-
-class OfferedTool(_Strict):
-    """A tool that may be called."""
-
-    type: Literal["function"]
-    function: OfferedFunction
-
-
 class ChatRequest(_Strict):
     """The body of a POST to /v1/chat/completions."""
 
@@ -148,7 +117,7 @@ class ChatRequest(_Strict):
     max_tokens: Annotated[int, Field(ge=1)] | None = None
     temperature: Annotated[float, Field(ge=0.0, le=2.0)] | None = None
     seed: int | None = None
-    tools: Annotated[list[OfferedTool], Field(min_length=1)] | None = None
+    tools: Annotated[list[dict[str, Any]], Field(min_length=1)] | None = None
     tool_choice: Literal["auto", "none"] | None = None
     response_format: dict[str, object] | None = None
     stream: Literal[False] = False
@@ -276,7 +245,7 @@ def _check_turns(request: ChatRequest) -> None:
             or (message.role != "user" and isinstance(message.content, list)),
             "role": bool(open_calls) and not is_tool,
             "tool_calls": bool(calls and message.role != "assistant")
-            or any(call.extra_content != _signature(call.id) for call in calls),
+            or any(call.get("extra_content") != _signature(call.get("id", "")) for call in calls),
             "tool_call_id": is_tool != (message.tool_call_id is not None)
             or (is_tool and message.tool_call_id not in open_calls),
         }
@@ -285,7 +254,7 @@ def _check_turns(request: ChatRequest) -> None:
                 raise BadRequest(f"{name} of message {index} is wrong", f"messages.{index}.{name}")
         if is_tool:
             open_calls.remove(str(message.tool_call_id))
-        open_calls += [call.id for call in calls]
+        open_calls += [call["id"] for call in calls]
     if open_calls:
         raise BadRequest(f"the call {open_calls[0]!r} is not answered", "messages")
 

@@ -13,7 +13,7 @@ import struct
 import tempfile
 import zipfile
 import zlib
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path, PurePosixPath
 from typing import Any
@@ -40,136 +40,6 @@ _UNREADABLE = (
     *(zipfile.BadZipFile, zlib.error, EOFError, struct.error),
     *(NotImplementedError, UnicodeDecodeError),  # zipfile's faults for odd flags and names
 )
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ZipBounds:
-    """What a zip may hold at most."""
-
-    entries: int = 20_000
-    bytes: int = 2_000_000_000
-
-
-USUAL_BOUNDS = ZipBounds()
-
-
-def is_zip(path: Path) -> bool:
-    """Whether a file begins as a zip with entries does; its name says nothing."""
-    with path.open("rb") as file:
-        return file.read(4) == b"PK\x03\x04"
-
-
-def unpack_zip(path: Path, into: Path, *, bounds: ZipBounds = USUAL_BOUNDS) -> None:
-    """Write the files of a zip into an empty folder.
-
-    Args:
-        path: The zip.
-        into: Where to; it exists. After an error half of them may lie there.
-        bounds: What it may hold at most.
-
-    Raises:
-        InvalidDocument: It is no zip, is encrypted, leads out of the folder, holds links or other
-            special files, a name twice, a file in a file, or more than the bounds allow.
-    """
-    try:
-        with zipfile.ZipFile(path) as packed:
-            listed = packed.infolist()
-            entries = [one for one in listed if not (one.is_dir() or _is_of_the_system(one))]
-            _check_all(entries, bounds)
-            for entry in entries:
-                _unpack(packed, entry, into / entry.filename)
-    except _UNREADABLE as fault:
-        raise InvalidDocument(WHAT, [("", f"is broken: {fault}")]) from None
-
-
-def find_input(folder: Path, readers: list[Reader]) -> tuple[Reader, Path]:
-    """What in an unpacked folder one of the readers takes, and which.
-
-    The folder itself comes first, then what lies in it, level by level.
-
-    Raises:
-        InvalidDocument: Nothing in it is in one of the formats, or several things are.
-    """
-    level = [folder]
-    while level:
-        found = [(r, path) for path in sorted(level) for r in readers if r.recognises(path)]
-        if len(found) == 1:
-            return found[0]
-        if found:
-            names = ", ".join(
-                f"{path.relative_to(folder).as_posix()} ({reader.name})"
-                for reader, path in found[:5]
-            )
-            text = f"holds {len(found)} recordings, one is needed: {names}"
-            raise InvalidDocument(WHAT, [("", text)])
-        level = [below for path in level if path.is_dir() for below in path.iterdir()]
-    known = ", ".join(f"{reader.name}: {reader.title}" for reader in readers)
-    raise InvalidDocument(WHAT, [("", f"nothing in it is {known}")])
-
-
-# Private
-
-
-def _unpack(packed: zipfile.ZipFile, entry: zipfile.ZipInfo, place: Path) -> None:
-    try:
-        place.parent.mkdir(parents=True, exist_ok=True)
-        with packed.open(entry) as source, place.open("xb") as file:
-            shutil.copyfileobj(source, file)  # no more than the entry says
-    except (FileExistsError, NotADirectoryError):
-        raise InvalidDocument(
-            WHAT, [(_shown(entry), "is there twice, or lies in a file")]
-        ) from None
-    except OSError as fault:
-        raise InvalidDocument(
-            WHAT, [(_shown(entry), f"can't be unpacked: {fault.strerror}")]
-        ) from None
-
-
-def _check_all(entries: list[zipfile.ZipInfo], bounds: ZipBounds) -> None:
-    """Do nothing where all may be unpacked.
-
-    Raises:
-        InvalidDocument: There are too many, or one of them may not.
-    """
-    total = sum(entry.file_size for entry in entries)
-    if len(entries) > bounds.entries:
-        raise InvalidDocument(WHAT, [("", f"holds more than {bounds.entries} entries")])
-    if total > bounds.bytes:
-        text = f"unpacks to {total} bytes, at most {bounds.bytes} are read"
-        raise InvalidDocument(WHAT, [("", text)])
-    if not entries:
-        raise InvalidDocument(WHAT, [("", "holds no file")])
-    problems = [(_shown(entry), problem) for entry in entries if (problem := _problem(entry))]
-    if problems:
-        raise InvalidDocument(WHAT, problems[:1])
-
-
-def _problem(entry: zipfile.ZipInfo) -> str:
-    """What keeps an entry from being unpacked, empty for nothing."""
-    name, place = entry.filename, PurePosixPath(entry.filename)
-    if place.is_absolute() or ".." in place.parts or not place.parts:
-        return "is no name within the folder"
-    if "\\" in name or ":" in name or not name.isprintable() or len(place.parts) > _DEEPEST:
-        return "is no name within the folder"
-    if entry.flag_bits & 0x1:
-        return "is encrypted"
-    if stat.S_IFMT(entry.external_attr >> 16) not in (0, stat.S_IFREG, stat.S_IFDIR):
-        return "is a link or a special file"
-    if entry.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
-        return "is packed in another way than the usual one"
-    return ""
-
-
-def _is_of_the_system(entry: zipfile.ZipInfo) -> bool:
-    """What file managers add and nobody meant."""
-    place = PurePosixPath(entry.filename)
-    return "__MACOSX" in place.parts or place.name in (".DS_Store", "Thumbs.db")
-
-
-def _shown(entry: zipfile.ZipInfo) -> str:
-    return repr(entry.filename[:80])
-
-
 _MOMENT, _MOMENTS = TypeAdapter(Moment), TypeAdapter(list[Moment])
 _TIMELINE, _TOKENS = TypeAdapter(Timeline), TypeAdapter(tuple[str, ...])
 
@@ -202,8 +72,7 @@ class UntrustedInput:
         Raises:
             UnknownName, InvalidDocument: As above.
         """
-        _, moments = self._ask("moments", every_s=every_s)
-        return _MOMENTS.validate_python(moments)
+        return _MOMENTS.validate_python(self._ask("moments", every_s=every_s)[1])
 
     def read(self, *, item: str | None, frame: int | None, name: str) -> tuple[str, Reading]:
         """Return the format's name, and the scene at one moment; see `Reader.read`.
@@ -226,8 +95,7 @@ class UntrustedInput:
         Raises:
             UnknownName, InvalidDocument: As above.
         """
-        _, tokens = self._ask("tokens", wanted=list(wanted))
-        return _TOKENS.validate_python(tokens)
+        return _TOKENS.validate_python(self._ask("tokens", wanted=list(wanted))[1])
 
     def _ask(self, what: str, **more: Any) -> tuple[str, Any]:
         if self.format is not None:
@@ -241,13 +109,13 @@ class UntrustedInput:
         return reader_of(source).name, found
 
 
-# The other side: what runs in the process.
+# The other side: what runs in the process
 
 
 def _answer(request: dict[str, Any]) -> tuple[str, Any]:
     path, name, folder = Path(request["path"]), request["format"], Path(request["folder"])
     # Names without a place on this machine, as they are said in reasons.
-    if path.is_file() and is_zip(path):
+    if path.is_file() and _is_zip(path):
         (folder / path.stem).mkdir()
         unpack_zip(path, folder / path.stem)
         os.chdir(folder)
@@ -257,19 +125,18 @@ def _answer(request: dict[str, Any]) -> tuple[str, Any]:
         os.chdir(path.parent)
         path = Path(path.name)
         reader = reader_of(name) if name else recognise(path)
-    return reader.name, _ANSWERS[request["what"]](reader, path, **request["more"])
+    return reader.name, _ask_reader(reader, path, request["what"], request["more"])
 
 
-def _look(reader: Reader, path: Path) -> Any:
-    return _TIMELINE.dump_python(timeline_of(reader, path), mode="json")
-
-
-def _moments(reader: Reader, path: Path, every_s: float) -> Any:
-    return [asdict(moment) for moment in reader.moments(path, every_s=every_s)]
-
-
-def _read(reader: Reader, path: Path, item: str | None, frame: int | None, name: str) -> Any:
-    found = reader.read(path, item=item, frame=frame, name=name)
+def _ask_reader(reader: Reader, path: Path, what: str, more: dict[str, Any]) -> Any:
+    """What a reader answers, as plain JSON."""
+    if what == "look":
+        return _TIMELINE.dump_python(timeline_of(reader, path), mode="json")
+    if what == "moments":
+        return [asdict(moment) for moment in reader.moments(path, **more)]
+    if what == "tokens":
+        return tokens_in(path, more["wanted"])
+    found = reader.read(path, **more)
     return {
         "scene": scene_to_document(found.scene),
         "recording": None if found.recording is None else recording_to_document(found.recording),
@@ -278,16 +145,119 @@ def _read(reader: Reader, path: Path, item: str | None, frame: int | None, name:
     }
 
 
-def _tokens(_: Reader, path: Path, wanted: list[str]) -> Any:
-    return tokens_in(path, wanted)
+# Zips, which are believed in nothing: all entries are looked at before anything is written
 
 
-_ANSWERS: dict[str, Callable[..., Any]] = {
-    "look": _look,
-    "moments": _moments,
-    "read": _read,
-    "tokens": _tokens,
-}
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ZipBounds:
+    """What a zip may hold at most."""
+
+    entries: int = 20_000
+    bytes: int = 2_000_000_000
+
+
+USUAL_BOUNDS = ZipBounds()
+
+
+def _is_zip(path: Path) -> bool:
+    """Whether a file begins as a zip with entries does; its name says nothing."""
+    with path.open("rb") as file:
+        return file.read(4) == b"PK\x03\x04"
+
+
+def unpack_zip(path: Path, into: Path, *, bounds: ZipBounds = USUAL_BOUNDS) -> None:
+    """Write the files of a zip into an empty folder.
+
+    Args:
+        path: The zip.
+        into: Where to; it exists. After an error half of them may lie there.
+        bounds: What it may hold at most.
+
+    Raises:
+        InvalidDocument: It is no zip, is encrypted, leads out of the folder, holds links or other
+            special files, a name twice, a file in a file, or more than the bounds allow.
+    """
+    place = ""
+    try:
+        with zipfile.ZipFile(path) as packed:
+            entries = [one for one in packed.infolist() if not one.is_dir() and _is_meant(one)]
+            _check_all(entries, bounds)
+            for entry in entries:
+                place, file = repr(entry.filename[:80]), into / entry.filename
+                file.parent.mkdir(parents=True, exist_ok=True)
+                with packed.open(entry) as source, file.open("xb") as written:
+                    shutil.copyfileobj(source, written)  # no more than the entry says
+        return
+    except _UNREADABLE as fault:
+        place, problem = "", f"is broken: {fault}"
+    except (FileExistsError, NotADirectoryError):
+        problem = "is there twice, or lies in a file"
+    except OSError as fault:
+        problem = f"can't be unpacked: {fault.strerror}"
+    raise InvalidDocument(WHAT, [(place, problem)])
+
+
+def _is_meant(entry: zipfile.ZipInfo) -> bool:
+    """Whether it is not what file managers add and nobody meant."""
+    place = PurePosixPath(entry.filename)
+    return "__MACOSX" not in place.parts and place.name not in (".DS_Store", "Thumbs.db")
+
+
+def _check_all(entries: list[zipfile.ZipInfo], bounds: ZipBounds) -> None:
+    """Raise InvalidDocument where there are too many, or one of them may not be unpacked."""
+    total = sum(entry.file_size for entry in entries)
+    problem = ""
+    if len(entries) > bounds.entries:
+        problem = f"holds more than {bounds.entries} entries"
+    elif total > bounds.bytes:
+        problem = f"unpacks to {total} bytes, at most {bounds.bytes} are read"
+    elif not entries:
+        problem = "holds no file"
+    if problem:
+        raise InvalidDocument(WHAT, [("", problem)])
+    for entry in entries:
+        problem = _problem(entry)
+        if problem:
+            raise InvalidDocument(WHAT, [(repr(entry.filename[:80]), problem)])
+
+
+def _problem(entry: zipfile.ZipInfo) -> str:
+    """What keeps an entry from being unpacked, empty for nothing."""
+    name, place = entry.filename, PurePosixPath(entry.filename)
+    if place.is_absolute() or ".." in place.parts or not place.parts:
+        return "is no name within the folder"
+    if "\\" in name or ":" in name or not name.isprintable() or len(place.parts) > _DEEPEST:
+        return "is no name within the folder"
+    if entry.flag_bits & 0x1:
+        return "is encrypted"
+    if stat.S_IFMT(entry.external_attr >> 16) not in (0, stat.S_IFREG, stat.S_IFDIR):
+        return "is a link or a special file"
+    if entry.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
+        return "is packed in another way than the usual one"
+    return ""
+
+
+def find_input(folder: Path, readers: list[Reader]) -> tuple[Reader, Path]:
+    """Return what in an unpacked folder one of the readers takes, and which.
+
+    The folder itself comes first, then what lies in it, level by level.
+
+    Raises:
+        InvalidDocument: Nothing in it is in one of the formats, or several things are.
+    """
+    level = [folder]
+    while level:
+        found = [(r, path) for path in sorted(level) for r in readers if r.recognises(path)]
+        if len(found) == 1:
+            return found[0]
+        if found:
+            names = [f"{path.relative_to(folder).as_posix()} ({r.name})" for r, path in found[:5]]
+            text = f"holds {len(found)} recordings, one is needed: {', '.join(names)}"
+            raise InvalidDocument(WHAT, [("", text)])
+        level = [below for path in level if path.is_dir() for below in path.iterdir()]
+    known = ", ".join(f"{reader.name}: {reader.title}" for reader in readers)
+    raise InvalidDocument(WHAT, [("", f"nothing in it is {known}")])
+
 
 if __name__ == "__main__":
     sandbox.serve(_answer)

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import itertools
 import time
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -132,59 +131,49 @@ class Timeline:
 
 
 def timeline_of(reader: Reader, path: Path, *, every_s: float = EVERY_S) -> Timeline:
-    """The moments of a recording that lie so far apart, with maps as far as the bounds reach.
+    """Return the moments of a recording that far apart, with maps as far as the bounds reach.
 
     Raises:
         InvalidDocument: The input breaks its format.
     """
     moments = list(itertools.islice(reader.moments(path, every_s=every_s), MOST_STOPS + 1))
-    tracks = [_track(name, stops) for name, stops in _parts(moments[:MOST_STOPS])]
+    is_cut, moments = len(moments) > MOST_STOPS, moments[:MOST_STOPS]
+    # Where each moment has an item of its own and a time, the items name frames of one recording.
+    items = {moment.item for moment in moments}
+    is_one = len(items) == len(moments) and all(one.time_s is not None for one in moments)
+    tracks: dict[str, RecordingPart] = {}
+    for moment in moments:
+        name = "" if is_one else moment.item or ""
+        track = tracks.setdefault(name, RecordingPart(name=name, stops=[]))
+        track.stops.append(Stop(moment=moment))
     until_s = time.process_time() + LOOKS_S
-    for track in tracks:
+    for track in tracks.values():
         _look(track, reader, path, until_s)
-    return Timeline(tracks=tuple(tracks), is_cut=len(moments) > MOST_STOPS)
+    return Timeline(tracks=tuple(tracks.values()), is_cut=is_cut)
 
 
 # Private
 
 
-def _parts(moments: list[Moment]) -> Iterator[tuple[str, list[Moment]]]:
-    """The moments by their part, in their order.
-
-    Where each moment has an item of its own and a time, the items name frames of one recording.
-    """
-    items = [moment.item for moment in moments]
-    if len(set(items)) == len(items) and all(one.time_s is not None for one in moments):
-        yield "", moments
-        return
-    groups: dict[str, list[Moment]] = {}
-    for moment in moments:
-        groups.setdefault(moment.item or "", []).append(moment)
-    yield from groups.items()
-
-
-def _track(name: str, moments: list[Moment]) -> RecordingPart:
-    return RecordingPart(name=name, stops=[Stop(moment=moment) for moment in moments])
-
-
 def _look(track: RecordingPart, reader: Reader, path: Path, until_s: float) -> None:
     """Find the ego's places by reading the first moment that has none, again and again."""
     frame: Pose | None = None
-    looks = 0
-    for index in range(len(track.stops)):
-        if looks >= _LOOKS_OF_A_TRACK or time.process_time() > until_s:
+    for _ in range(_LOOKS_OF_A_TRACK):
+        unseen = [index for index, stop in enumerate(track.stops) if stop.place_m is None]
+        if not unseen or time.process_time() > until_s:
             return
-        if track.stops[index].place_m is not None:
-            continue
-        moment = track.stops[index].moment
+        moment = track.stops[unseen[0]].moment
         reading = reader.read(path, item=moment.item, frame=moment.frame, name="look")
-        looks += 1
         here = reading.scene.origin.pose
         track.is_seen = True
         frame = frame or here
         seen = frame.pose_to_local(here)
-        _fill_in(track, index, reading, seen)
-        _add_roads(track, reading, seen)
+        _fill_in(track, unseen[0], reading, seen)
+        ways: list[AnyLane] = [*reading.scene.lanes, *reading.scene.connectors]
+        for way in ways[: _MOST_ROADS - len(track.roads_m)]:
+            every_m = max(_ROAD_POINT_EVERY_M, way.centerline.length_m / 60.0)
+            points_m = seen.to_parent(way.centerline.resampled(every_m).points_m)
+            track.roads_m.append([(round(x, 1), round(y, 1)) for x, y in points_m.tolist()])
 
 
 def _fill_in(track: RecordingPart, first: int, reading: Reading, seen: Pose) -> None:
@@ -199,20 +188,8 @@ def _fill_in(track: RecordingPart, first: int, reading: Reading, seen: Pose) -> 
         later = track.stops[index].moment
         if later.time_s is None:
             continue
-        after_s = later.time_s - moment.time_s
-        nearest = int(np.argmin(np.abs(recording.times_s - after_s)))
+        away_s = np.abs(recording.times_s - (later.time_s - moment.time_s))
+        nearest = int(np.argmin(away_s))
         x_m, y_m = places_m[nearest].tolist()
-        if (
-            abs(float(recording.times_s[nearest]) - after_s) < 0.06
-            and np.isfinite([x_m, y_m]).all()
-        ):
+        if away_s[nearest] < 0.06 and np.isfinite([x_m, y_m]).all():
             track.stops[index] = Stop(moment=later, place_m=(x_m, y_m))
-
-
-def _add_roads(track: RecordingPart, reading: Reading, seen: Pose) -> None:
-    ways: list[AnyLane] = [*reading.scene.lanes, *reading.scene.connectors]
-    for way in ways[: _MOST_ROADS - len(track.roads_m)]:
-        line = way.centerline
-        every_m = max(_ROAD_POINT_EVERY_M, line.length_m / 60.0)
-        points_m = seen.to_parent(line.resampled(every_m).points_m)
-        track.roads_m.append([(round(x, 1), round(y, 1)) for x, y in points_m.tolist()])

@@ -115,6 +115,8 @@ class ModelProfile:
         """
         self._check(request)
         effort = request.reasoning_effort or self.reasoning_effort or None
+        taken = [name for name in LengthName if name not in self.refused]
+        name = request.length_name if request.length_name in taken else taken[0]
         limits = [request.max_tokens]
         if self.max_output_tokens is not None:
             limits.append(self.max_output_tokens)
@@ -125,7 +127,7 @@ class ModelProfile:
             seed=None if "seed" in self.refused else request.seed,
             reasoning_effort=None if "reasoning_effort" in self.refused else effort,
             answer_schema=None if self.json_schema is False else request.answer_schema,
-            length_name=self._length_name(request.length_name),
+            length_name=name,
         )
 
     def without(self, parameter: str) -> ModelProfile:
@@ -146,7 +148,3 @@ class ModelProfile:
             lacks = "takes no limit of the answer's length, so that its cost has no bound"
         if lacks:
             raise ModelFault(f"{request.model} at this endpoint {lacks}", retryable=False)
-
-    def _length_name(self, wanted: LengthName) -> LengthName:
-        left = [name for name in LengthName if name not in self.refused]
-        return wanted if wanted in left or not left else left[0]

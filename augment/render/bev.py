@@ -11,7 +11,7 @@ marks at what the checks found for analysts, neither ever for a vote.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
@@ -339,20 +339,18 @@ def _draw_mark_of_fault(
 
 def _free_spot(ground: Canvas, anchor: Spot, taken: list[Box], boxes: list[Box]) -> Spot:
     """Return the nearest spot round the anchor that covers no number and no agent, if it can."""
+    turns = [-math.pi / 2.0 + 2.0 * math.pi * step / 12.0 for step in range(12)]
+    spots = [
+        (anchor[0] + radius * math.cos(turn), anchor[1] + radius * math.sin(turn))
+        for radius in (1.2 * _RADIUS_PX * ring for ring in range(1, 14))
+        for turn in turns
+    ]
     for blocked in (taken + boxes, taken):
-        for spot in _spots_around(anchor):
+        for spot in spots:
             box = box_around(spot, _RADIUS_PX, _RADIUS_PX)
             if within(ground, box) and not any(overlap(box, one, _GAP_PX) for one in blocked):
                 return spot
     return anchor
-
-
-def _spots_around(anchor: Spot) -> Iterator[Spot]:
-    for ring in range(1, 14):
-        for step in range(12):
-            angle = -math.pi / 2.0 + 2.0 * math.pi * step / 12.0
-            radius = 1.2 * _RADIUS_PX * ring
-            yield anchor[0] + radius * math.cos(angle), anchor[1] + radius * math.sin(angle)
 
 
 def _inside(ground: Canvas, at_px: Spot) -> Spot:

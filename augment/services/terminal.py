@@ -7,11 +7,11 @@ its way out, whoever wrote the command.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from django.core.management.base import BaseCommand, CommandError, OutputWrapper
+from django.core.management.base import BaseCommand, CommandError, CommandParser, OutputWrapper
 
 from augment.errors import AugmentError
 from augment.escaping import escape_controls
@@ -38,7 +38,21 @@ class TerminalOutput(OutputWrapper):
 
 
 class TerminalCommand(BaseCommand):
-    """A command whose output is safe to look at, and whose foreseen errors are one sentence."""
+    """A command whose output is safe to look at, and whose foreseen errors are one sentence.
+
+    Attributes:
+        arguments: What argparse's `add_argument` takes, by the argument's name or flag.
+        failure: What that sentence begins with, such as "Nothing was restored."; a command that
+            sets it reports errors of the file system as well.
+    """
+
+    arguments: Mapping[str, Mapping[str, Any]] = {}
+    failure = ""
+
+    def add_arguments(self, parser: CommandParser) -> None:
+        """Add the arguments that the class lists."""
+        for name, options in self.arguments.items():
+            parser.add_argument(name, **options)
 
     # Django sets both again when it is called with streams of its own.
 
@@ -62,10 +76,11 @@ class TerminalCommand(BaseCommand):
 
     def execute(self, *args: Any, **options: Any) -> str | None:
         """Run the command; an AugmentError ends it as a CommandError with the same sentence."""
+        foreseen = (AugmentError, OSError) if self.failure else AugmentError
         try:
             return super().execute(*args, **options)
-        except AugmentError as error:
-            raise CommandError(str(error)) from error
+        except foreseen as error:
+            raise CommandError(f"{self.failure} {error}".lstrip()) from error
 
     def write_file(self, path: Path, content: bytes) -> None:
         """Write a file that somebody named; a CommandError says why it can't be written."""

@@ -41,13 +41,8 @@ from augment.scene.bezier_lanes import BezierLane, LanePiece
 from augment.scene.entities import LENGTH_WIDTH_M, AgentType, Scene, TrafficAgent
 
 LANE_START = "lane"
-"""The start that means the beginning of the lane; any other start is an agent's id."""
-
-FURTHEST_M = 1000.0
-WIDEST_M = 30.0
+FURTHEST_M, WIDEST_M = 1000.0, 30.0
 MOST_PLACES = 16
-"""So many distances may be asked for in one call."""
-
 OBJECT_TYPES = tuple(kind for kind in AgentType if kind is not AgentType.EGO_VEHICLE)
 
 # Control points this near to those of a piece are that piece: the prompt rounds to 0.01 m.
@@ -91,20 +86,15 @@ class RoadSide:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PoseOnLane:
-    """One place.
+    """One place, with what lies around it; `along_m` is counted on the last lane of the route.
 
     Attributes:
         lane: The short id of the shown lane or connector under the place, None where there is
             none. Of several the one that the place was counted on.
-        along_m: On the last lane of the route, from where its shown part begins.
-        remaining_m: To the end of that lane.
-        width_m: Of that lane, None on a curve of the model's own.
+        width_m: None on a curve of the model's own.
         left, right: The sides of the road, from the centre of that lane there.
-        next_lanes: What follows at its end, straightest first.
-        route: The lanes from the start to the place, in the order they were passed.
         taken_by: Short ids of those in whose place an object there would stand.
-        nearest_free_m: The distance of the nearest free place, None where there is none near or
-            the place itself is free.
+        nearest_free_m: The distance of the nearest free place, None where there is none near.
         start_lateral_m: How far left of the lane the starting agent is, None without one.
     """
 

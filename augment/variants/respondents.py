@@ -1,7 +1,4 @@
-"""Who plays which role, how a role is asked until its answer can be read, and the record of it.
-
-A service keeps the transcript in rows; tests and one-off runs keep it in memory.
-"""
+"""Who plays which role, how a role is asked until its answer can be read, and the record of it."""
 
 from __future__ import annotations
 
@@ -81,63 +78,6 @@ class Transcript(Protocol):
     def note(self, kind: NoteKind, document: dict[str, object]) -> None:
         """Keep what happened since the last call: ready for JSON, shown as it is."""
         ...
-
-
-@dataclass(slots=True, kw_only=True)
-class RecordedCall:
-    """One attempt: a request, and either its reply or its fault (neither while under way)."""
-
-    number: int
-    role: ModelRole
-    request: Request
-    prompt_version: str
-    reply: Reply | None = None
-    fault: ModelFault | None = None
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class RecordedNote:
-    """What happened after that call (0 before the first)."""
-
-    after_call: int
-    kind: NoteKind
-    document: dict[str, object]
-
-
-@dataclass(slots=True)
-class MemoryTranscript:
-    """A transcript that lives as long as its run; calls are numbered from 1."""
-
-    calls: list[RecordedCall] = field(default_factory=list)
-    notes: list[RecordedNote] = field(default_factory=list)
-
-    def known(self, role: ModelRole, request: Request, prompt_version: str) -> Reply | None:
-        """Return None: every request is sent."""
-        return None
-
-    def asked(self, role: ModelRole, request: Request, prompt_version: str) -> int:
-        """Record a request; returns its number."""
-        number = len(self.calls) + 1
-        self.calls.append(
-            RecordedCall(number=number, role=role, request=request, prompt_version=prompt_version)
-        )
-        return number
-
-    def sending(self, number: int) -> None:
-        """Do nothing: whoever keeps this record is alive to see the end of the call."""
-
-    def answered(self, number: int, reply: Reply, fault: ModelFault | None = None) -> None:
-        """Record the answer to that call."""
-        self.calls[number - 1].reply = reply
-        self.calls[number - 1].fault = fault
-
-    def broke(self, number: int, fault: ModelFault) -> None:
-        """Record the fault of that call."""
-        self.calls[number - 1].fault = fault
-
-    def note(self, kind: NoteKind, document: dict[str, object]) -> None:
-        """Record a note behind the last call."""
-        self.notes.append(RecordedNote(after_call=len(self.calls), kind=kind, document=document))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -8,38 +8,10 @@ from dataclasses import replace
 import pytest
 
 from augment.fake_llm.careless import MISTAKES, bend, dice, is_unreadable, lay_straight, misread
-from augment.fake_llm.server import FakeServer
-from augment.llm.client import Patience
-from augment.llm.openai_wire import OpenAIWire
 from augment.scene.entities import Modification, Scene, TrafficAgent, TurnType
 from augment.scene.intent import Intent
-from augment.variants.pipeline import Outcome, run
-from augment.variants.recipes import find_recipe
-from augment.variants.respondents import MemoryTranscript, RespondentClient
 from tests.fixtures.shelf import SLUGS, entry, shown_scene
 from tests.scenes import curve, pedestrian, scene, vehicle
-
-
-def outcome(
-    server: FakeServer,
-    model: str,
-    scene: Scene,
-    instruction: str,
-    *,
-    transcript: MemoryTranscript | None = None,
-    key: str | None = None,
-    timeout_s: float = 60.0,
-) -> Outcome:
-    with OpenAIWire(base_url=server.url, api_key=key, timeout_s=timeout_s) as client:
-        return run(
-            find_recipe("otm"),
-            scene=scene,
-            instruction=instruction,
-            modifier=RespondentClient(client=client, model=model),
-            transcript=transcript or MemoryTranscript(),
-            patience=Patience(sleep=lambda _: None, rng=random.Random(0)),
-        )
-
 
 PARKED = replace(vehicle("Agent2", 21.4, 0.6), lane_id="Lane1")
 ROUND_THE_BEND = replace(vehicle("Agent2", 10.0 + 40.0 * math.sin(0.7), 9.4, 0.7), lane_id="Lane1")
@@ -84,24 +56,6 @@ def test_a_mistake_is_what_its_name_says() -> None:
 def test_about_one_answer_in_ten_can_not_be_read() -> None:
     fallen = Counter(is_unreadable(dice(f"prompt {n}")) for n in range(2000))
     assert 0.07 < fallen[True] / 2000 < 0.13
-
-
-def test_it_answers_most_wishes_wrongly_and_always_the_same(server: FakeServer) -> None:
-    wishes = [
-        f"Add a parked vehicle {17.0 + n / 2.0} m ahead of the ego in its lane." for n in range(40)
-    ]
-    made = [outcome(server, "fake-careless", curve(), wish) for wish in wishes]
-    right = [outcome(server, "fake-good", curve(), wish) for wish in wishes]
-    assert made[:3] == [outcome(server, "fake-careless", curve(), wish) for wish in wishes[:3]]
-    assert {outcome.status.value for outcome in made} == {"done", "unreadable"}
-    errors_m = [
-        math.dist((a.x_m, a.y_m), (b.x_m, b.y_m))
-        for wrong, good in zip(made, right, strict=True)
-        if wrong.modification and good.modification
-        for a, b in zip(wrong.modification.added, good.modification.added, strict=True)
-    ]
-    assert len(errors_m) >= 24
-    assert sum(error > 2.0 for error in errors_m) >= len(errors_m) / 3
 
 
 def intent_of(slug: str) -> Intent:

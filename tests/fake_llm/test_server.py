@@ -53,14 +53,6 @@ def test_it_answers_a_conversation_and_the_same_one_the_same(server: FakeServer)
     assert set(answer) == {"id", "object", "created", "model", "choices", "usage"}
 
 
-def test_a_bad_request_is_a_400_that_names_the_field(server: FakeServer) -> None:
-    status, answer = chat(server, colour="red")
-    assert status == 400
-    assert isinstance(answer["error"], dict)
-    assert answer["error"]["param"] == "colour"
-    assert answer["error"]["type"] == "invalid_request_error"
-
-
 PICTURE = draw_original(scene(), camera_for(scene(), None))
 PNG = {"type": "image_url", "image_url": {"url": data_url(PICTURE)}}
 

@@ -331,10 +331,6 @@ def nuplan_a_view_without_an_end(root: Path) -> Made:
     )
 
 
-def nuplan_a_huge_value(root: Path) -> Made:
-    return _changed_log(root, "UPDATE log SET logfile = zeroblob(40000000)")
-
-
 def nuplan_a_computed_column(root: Path) -> Made:
     return _changed_log(
         root,

@@ -15,10 +15,11 @@ from augment.llm.openai_wire import OpenAIWire
 from augment.models import Augmentation, CallLease, Endpoint, EndpointModel, Event, ModelCall
 from augment.services.endpoints.client import EndpointClient, Queue
 from augment.services.running import jobs, runner
-from augment.variants.respondents import MemoryTranscript, ModelRole, RespondentClient, Respondents
+from augment.variants.respondents import ModelRole, RespondentClient, Respondents
 from tests.jobs.rows import add_model, add_scenario, only_row
 from tests.jobs.scripted import Scripted
 from tests.llm.json_server import serving
+from tests.variants.memory import MemoryTranscript
 
 pytestmark = pytest.mark.django_db(transaction=True)
 ASKED = Request(

@@ -1,6 +1,5 @@
 from __future__ import annotations
 
-import contextlib
 import json
 import math
 from collections.abc import Callable
@@ -8,8 +7,6 @@ from dataclasses import replace
 from functools import partial
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from augment.errors import ReplyUnreadable
 from augment.prompts.reply import (
@@ -21,7 +18,7 @@ from augment.prompts.reply import (
 )
 from augment.scene.entities import AgentType, TrafficAgent
 from tests.scenes import scene, vehicle
-from tests.variants.playing import GOOD, agent, block, questions, rating, verdict
+from tests.variants.playing import GOOD, agent, block, rating
 
 PARKED = TrafficAgent(
     id="Agent2",
@@ -215,22 +212,6 @@ READERS: list[Callable[[str], object]] = [
     read_verdict,
     partial(read_sight, count=4),
 ]
-PIECES = st.sampled_from(
-    [
-        *'{}[]",: 1\n`\\',
-        "```json\n",
-        '"ratings"',
-        '"feedback"',
-        '"questions"',
-        '"verdict"',
-        "1. ",
-        "2) ",
-        "NaN",
-        rating(2, 2, 2, "a"),
-        questions(),
-        verdict(),
-    ]
-)
 
 
 def test_sections_are_kept_and_the_block_counts() -> None:
@@ -261,10 +242,3 @@ def test_a_viewers_lines_are_read_by_their_numbers(said: str, read: dict[int, st
 def test_a_good_answer_of_another_kind_is_none(reader: Callable[[str], object]) -> None:
     with pytest.raises(ReplyUnreadable):
         reader(json.dumps({"add": [], "move": [], "remove": []}))
-
-
-@given(st.one_of(st.text(), st.lists(PIECES, max_size=30).map("".join)))
-def test_nothing_but_its_own_error_comes_out_of_a_reader(text: str) -> None:
-    for reader in READERS:
-        with contextlib.suppress(ReplyUnreadable):
-            reader(text)

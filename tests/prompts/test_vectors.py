@@ -5,8 +5,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from augment.geometry.polyline import Polyline
@@ -20,7 +18,6 @@ from augment.prompts.extent import (
 )
 from augment.prompts.vectors import (
     DEFAULT_RADIUS_M,
-    control_points,
     lane_curves,
     scene_text,
     scene_vectors,
@@ -29,7 +26,7 @@ from augment.prompts.vectors import (
 from augment.scene.entities import Lane, LaneConnector, TurnType
 from augment.variants.pose_tool import PoseTool
 from tests.fixtures.shelf import HARD_SLUGS, SLUGS, entry, whole_scene
-from tests.scenes import curve, junction, scene, vehicle
+from tests.scenes import junction, scene, vehicle
 
 FloatArray = NDArray[np.float64]
 
@@ -139,28 +136,6 @@ def dense(ring: FloatArray, pieces: int = 20) -> FloatArray:
     return (ring + shares * (np.roll(ring, -1, axis=0) - ring)).reshape(-1, 2)
 
 
-def assert_within(given: FloatArray, kept: FloatArray, tolerance_m: float) -> None:
-    """Neither strays from the other by more than the tolerance."""
-    assert distances_m(dense(given), kept).max() <= tolerance_m + 1e-9
-    assert distances_m(dense(kept), given).max() <= tolerance_m + 1e-9
-    assert {tuple(point) for point in kept} <= {tuple(point) for point in given}
-
-
-@given(
-    st.lists(
-        st.tuples(st.floats(-3.0, 3.0), st.floats(-3.0, 3.0)), min_size=3, max_size=40, unique=True
-    ),
-    st.floats(0.01, 2.0),
-    st.booleans(),
-)
-def test_a_simplified_boundary_strays_nowhere_beyond_the_tolerance(
-    points: list[tuple[float, float]], tolerance_m: float, is_walked: bool
-) -> None:
-    ring = np.array(points)
-    ring = np.cumsum(ring * 0.2, axis=0) if is_walked else ring
-    assert_within(ring, simplify_boundary(ring, tolerance_m), tolerance_m)
-
-
 @pytest.mark.parametrize("slug", sorted({entry(slug).scene for slug in SLUGS}))
 def test_the_areas_of_every_prompt_keep_ten_centimetres(slug: str) -> None:
     shown = whole_scene(slug)
@@ -183,15 +158,6 @@ def test_lanes_and_connectors_are_curves_that_know_their_neighbours() -> None:
     assert curves["Lane1"].after == ("Connector1", "Connector2")
     assert (curves["Lane3"].before, curves["Lane3"].after) == (("Connector2",), ())
     assert curves["Connector1"].width_m == 3.5
-
-
-def test_pieces_of_one_lane_share_the_point_at_their_joint() -> None:
-    bend = curve(12.0)
-    (lane,) = lane_curves(bend, short_names(bend), 80.0).values()
-    pieces = control_points(lane.lane)
-    assert len(pieces) == len(lane.pieces) > 1
-    assert pieces[0][-1] == pieces[1][0]
-    assert {len(piece) for piece in pieces} <= {2, 4}
 
 
 def lane(name: str, *points: tuple[float, float]) -> Lane:

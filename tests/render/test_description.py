@@ -82,10 +82,6 @@ def test_moving_an_agent_is_told_like_taking_it_away_and_adding_another() -> Non
     assert draw(STREET, moved, camera) == draw(STREET, replaced, camera)
 
 
-def test_an_id_that_the_scene_no_longer_has_is_passed_over() -> None:
-    assert describe(STREET, Modification(removed=("Agent99",))) == []
-
-
 # --- Properties --------------------------------------------------------------------------------
 
 METRES = st.floats(-60.0, 60.0)

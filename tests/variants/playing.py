@@ -13,9 +13,10 @@ from augment.scene.entities import Scene
 from augment.scene.intent import Intent
 from augment.variants.pipeline import Outcome, run
 from augment.variants.recipes import find_recipe
-from augment.variants.respondents import MemoryTranscript, ModelRole, RespondentClient
+from augment.variants.respondents import ModelRole, RespondentClient
 from tests.llm.scripted import ScriptedClient
 from tests.scenes import scene
+from tests.variants.memory import MemoryTranscript
 
 
 def agent(**changes: object) -> dict[str, object]:

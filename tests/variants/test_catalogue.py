@@ -18,10 +18,11 @@ from augment.llm.openai_wire import OpenAIWire
 from augment.metrics.displacement import displacement
 from augment.variants.pipeline import Outcome, OutcomeStatus, run
 from augment.variants.recipes import RECIPES, Tools, find_recipe
-from augment.variants.respondents import MemoryTranscript, RespondentClient
+from augment.variants.respondents import RespondentClient
 from tests.baselines.test_rule_placer import placed
 from tests.fixtures.shelf import SLUGS, entry, shown_scene
 from tests.intents import intents
+from tests.variants.memory import MemoryTranscript
 
 CALLS_OF_GOOD = {
     "otm": "m",

@@ -20,9 +20,10 @@ from augment.llm.client import Patience
 from augment.llm.openai_wire import OpenAIWire
 from augment.variants.pipeline import run
 from augment.variants.recipes import GEO, RECIPES, find_recipe
-from augment.variants.respondents import MemoryTranscript, ModelRole, RespondentClient
+from augment.variants.respondents import ModelRole, RespondentClient
 from tests.intents import intents
 from tests.scenes import scene
+from tests.variants.memory import MemoryTranscript
 
 ROOT = Path(__file__).resolve().parents[2]
 WISH = "Add a parked vehicle 21.4 m ahead of the ego in its lane."

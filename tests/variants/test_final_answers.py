@@ -12,10 +12,11 @@ from augment.prompts.blocks import names_changes
 from augment.prompts.calls import calls_in
 from augment.variants.pipeline import run
 from augment.variants.recipes import find_recipe
-from augment.variants.respondents import MemoryTranscript, RespondentClient
+from augment.variants.respondents import RespondentClient
 from bench.mutated_answers import Answering
 from tests.fixtures.shelf import SLUGS, entry, shown_scene
 from tests.prompts.test_calls import FORMS
+from tests.variants.memory import MemoryTranscript
 
 
 def answers(slug: str, variant: str, character: object) -> list[str]:

@@ -13,10 +13,11 @@ from augment.llm.client import Patience, Sending, watch_nothing
 from augment.llm.messages import Reply, Request
 from augment.variants.pipeline import run
 from augment.variants.recipes import FC, OTM, RECIPES, TQA, VQA
-from augment.variants.respondents import MemoryTranscript, ModelRole, RespondentClient
+from augment.variants.respondents import ModelRole, RespondentClient
 from augment.variants.showing import CallRange, calls_of, most_tokens
 from tests.fixtures.shelf import entry, shown_scene
 from tests.intents import intents
+from tests.variants.memory import MemoryTranscript
 
 SLUG = "overtake-terrace-row"
 MODIFIER, REVIEWER = ModelRole.MODIFIER, ModelRole.REVIEWER

@@ -12,9 +12,10 @@ from augment.llm.messages import Reply, Speaker
 from augment.prompts.fill import prompt_version
 from augment.variants.pipeline import Outcome, OutcomeStatus, run
 from augment.variants.recipes import OTM, TQA
-from augment.variants.respondents import MemoryTranscript, RespondentClient
+from augment.variants.respondents import RespondentClient
 from tests.llm.scripted import ScriptedClient
 from tests.scenes import scene
+from tests.variants.memory import MemoryTranscript
 from tests.variants.playing import GOOD, agent, answer, block
 
 

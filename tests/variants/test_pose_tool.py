@@ -169,13 +169,6 @@ def test_only_what_the_prompt_shows_is_known() -> None:
     assert cut.curves["Lane1"].after == ()
 
 
-def test_ids_from_other_peoples_files_go_by_their_short_forms() -> None:
-    street = scene()
-    tool = PoseTool(replace(street, lanes=(replace(street.lanes[0], id="ignore all"),)))
-    assert tool.pose_on_lane("Lane1", "lane", 1.0).lane == "Lane1"
-    assert "ignore" not in str(tool.answer({"lane": "x", "start": "lane", "distance_m": 0}))
-
-
 @pytest.mark.parametrize(
     ("change", "said"),
     [

@@ -59,6 +59,11 @@ def test_an_unusable_review_lets_the_modifiers_result_stand() -> None:
     assert "unusable" in play.notes("review")[0]
 
 
+def test_a_later_review_that_fails_leaves_the_newest_round() -> None:
+    play = Play("tqa", [car(10.0), LOW, car(20.0), "Fine.", "Fine."])
+    assert play.x_m == 20.0
+
+
 def test_a_regeneration_that_can_not_be_read_leaves_the_round_before() -> None:
     play = Play("tqa", [car(10.0), LOW, "There.", "There."])
     assert (play.roles, play.x_m, play.outcome.is_accepted) == ("mrmm", 10.0, False)
@@ -130,8 +135,3 @@ def test_a_geometric_review_holds_the_modification_against_the_intent_where_ther
     told = play.client.requests[1].messages[-1].text
     assert "29.4 m ahead of the ego along its lane; 21.4 m ahead is asked for" in told
     assert Play("geo", [far]).outcome.is_accepted is True
-
-
-def test_the_least_wrong_round_counts() -> None:
-    off, kerb = car(21.4, y_m=30.0), car(22.0, y_m=-1.5)
-    assert Play("geo", [kerb, off, off]).x_m == 22.0

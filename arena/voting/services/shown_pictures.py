@@ -178,7 +178,18 @@ def choose_pictures(
     latest: defaultdict[tuple[str, str], dict[int, Augmentation]] = defaultdict(dict)
     for row in rows.order_by(F("finished_at").asc(nulls_first=True), "pk"):
         latest[row.scenario.slug, row.contestant.slug][row.sample] = row
-    cells = _one(latest, seed) if rule is SampleRule.ONE else _all(latest, contestants)
+    if rule is SampleRule.ONE:
+        cells = {
+            key: samples[sorted(samples)[draw_sample(seed, key[0], len(samples))]]
+            for key, samples in latest.items()
+        }
+    else:
+        _refuse_missing_samples(latest, contestants)
+        cells = {
+            (place_of(scenario, sample), contestant): row
+            for (scenario, contestant), samples in latest.items()
+            for sample, row in samples.items()
+        }
     refuse_missing(contestants, scenarios, latest)
     _refuse_mixed(cells)
     used = {row.job_id: row.job for row in cells.values()}
@@ -199,67 +210,6 @@ def draw_sample(seed: int, scenario: str, samples: int) -> int:
     """
     digest = hashlib.sha256(f"{seed}/{scenario}".encode()).digest()
     return int.from_bytes(digest[:8], "big") % samples
-
-
-# --- Private -----------------------------------------------------------------------------------
-
-_Latest = dict[tuple[str, str], dict[int, Augmentation]]
-
-
-def _one(latest: _Latest, seed: int) -> Cells:
-    return {
-        (scenario, contestant): found[sorted(found)[draw_sample(seed, scenario, len(found))]]
-        for (scenario, contestant), found in latest.items()
-    }
-
-
-def _all(latest: _Latest, contestants: list[Contestant]) -> Cells:
-    """Every sample of a scenario, each as a place of its own that everybody has a picture of."""
-    most: defaultdict[str, set[int]] = defaultdict(set)
-    for (scenario, _), found in latest.items():
-        most[scenario] |= found.keys()
-    missing = [
-        f"{who.slug} on {scenario}, sample {sample}"
-        for who in contestants
-        for scenario, samples in sorted(most.items())
-        for sample in sorted(samples - latest.get((scenario, who.slug), {}).keys())
-        if (scenario, who.slug) in latest
-    ]
-    if missing:
-        raise NothingToPlan(
-            "All samples are to be shown, and there is no picture of "
-            f"{', '.join(missing[:8])}. Generate them, or show one sample of each scenario."
-        )
-    return {
-        (place_of(scenario, sample), contestant): row
-        for (scenario, contestant), found in latest.items()
-        for sample, row in found.items()
-    }
-
-
-def _refuse_mixed(cells: Cells) -> None:
-    by_contestant: defaultdict[str, dict[str, list[Augmentation]]] = defaultdict(dict)
-    for row in cells.values():
-        key = json.dumps(row.options, sort_keys=True)
-        by_contestant[row.contestant.slug].setdefault(key, []).append(row)
-    for slug, sets in sorted(by_contestant.items()):
-        if len(sets) > 1:
-            raise Conflict(_mixed(slug, sets))
-
-
-def _mixed(slug: str, sets: dict[str, list[Augmentation]]) -> str:
-    documents = [json.loads(key) or {} for key in sets]
-    names = sorted({name for one in documents for name in one})
-    differing = [
-        name for name in names if len({json.dumps(one.get(name)) for one in documents}) > 1
-    ]
-    jobs = sorted({row.job.name for rows in sets.values() for row in rows})
-    options = ", ".join(differing) or "unknown"
-    return (
-        f"The pictures of {slug} were made with different options ({options}), in the jobs "
-        f"{', '.join(jobs)}. Name the jobs whose augmentations the study is to show, or run it "
-        "anew."
-    )
 
 
 Way = tuple[str, str, bool]
@@ -286,41 +236,77 @@ def replays_of(cells: Cells) -> Replays:
     Raises:
         NothingToPlan: There is no such scenario; the text names what was not driven.
     """
-    wanted: defaultdict[str, set[int]] = defaultdict(set)
-    for (scenario, _), cell in cells.items():
-        wanted[scenario_of(scenario)].add(cell.pk)
-    driven = _driven({cell.pk for cell in cells.values()})
-    usual: Way = (Options().planner, Options().offsets, Options().is_reactive)
+    pictures: defaultdict[str, set[int]] = defaultdict(set)
+    for (place, _), cell in cells.items():
+        pictures[scenario_of(place)].add(cell.pk)
+    driven: defaultdict[Way, set[int]] = defaultdict(set)
+    drives = Simulation.objects.filter(
+        augmentation__in={cell.pk for cell in cells.values()}, state=Simulation.State.DONE
+    )
+    for planner, offsets, is_reactive, picture in drives.values_list(
+        "planner", "offsets", "is_reactive", "augmentation"
+    ):
+        driven[planner, offsets, is_reactive].add(picture)
     whole = {
-        way: sorted(slug for slug, pictures in wanted.items() if pictures <= found)
-        for way, found in driven.items()
+        way: sorted(slug for slug, shown in pictures.items() if shown <= known)
+        for way, known in driven.items()
     }
+    usual: Way = (Options().planner, Options().offsets, Options().is_reactive)
     best = max(whole, key=lambda way: (len(whole[way]), way == usual, way), default=usual)
     if not whole.get(best):
-        raise _nothing_driven(cells, driven.get(best, set()))
+        missing = sorted(names for names, cell in cells.items() if cell.pk not in driven[best])
+        named = ", ".join(f"{who} on {where}" for where, who in missing[:MOST_NAMED])
+        raise NothingToPlan(
+            "No scenario can be played: each needs a drive of every picture that takes part. "
+            f"Not driven: {named}; {len(missing)} in all. Simulate their jobs first, or open the "
+            "study without drives."
+        )
     planner, offsets, is_reactive = best
     return Replays(
         planner=planner, offsets=offsets, is_reactive=is_reactive, scenarios=whole[best]
     )
 
 
-# Private
+# --- Private -----------------------------------------------------------------------------------
 
 
-def _driven(pictures: set[int]) -> dict[Way, set[int]]:
-    """Keys of the augmentations that were driven, by how."""
-    found: defaultdict[Way, set[int]] = defaultdict(set)
-    rows = Simulation.objects.filter(augmentation__in=pictures, state=Simulation.State.DONE)
-    for row in rows.only("augmentation", "planner", "offsets", "is_reactive"):
-        found[row.planner, row.offsets, row.is_reactive].add(row.augmentation_id or 0)
-    return dict(found)
+def _refuse_missing_samples(
+    latest: dict[tuple[str, str], dict[int, Augmentation]], contestants: list[Contestant]
+) -> None:
+    """Do nothing where everybody has a picture of every sample of a scenario."""
+    wanted: defaultdict[str, set[int]] = defaultdict(set)
+    for (scenario, _), samples in latest.items():
+        wanted[scenario] |= samples.keys()
+    missing = [
+        f"{who.slug} on {scenario}, sample {sample}"
+        for who in contestants
+        for scenario, samples in sorted(wanted.items())
+        if (scenario, who.slug) in latest
+        for sample in sorted(samples - latest[scenario, who.slug].keys())
+    ]
+    if missing:
+        raise NothingToPlan(
+            "All samples are to be shown, and there is no picture of "
+            f"{', '.join(missing[:8])}. Generate them, or show one sample of each scenario."
+        )
 
 
-def _nothing_driven(cells: Cells, driven: set[int]) -> NothingToPlan:
-    missing = sorted(names for names, cell in cells.items() if cell.pk not in driven)
-    named = ", ".join(f"{who} on {where}" for where, who in missing[:MOST_NAMED])
-    return NothingToPlan(
-        "No scenario can be played: each needs a drive of every picture that takes part. "
-        f"Not driven: {named}; {len(missing)} in all. Simulate their jobs first, or open the "
-        "study without drives."
-    )
+def _refuse_mixed(cells: Cells) -> None:
+    by_contestant: defaultdict[str, list[Augmentation]] = defaultdict(list)
+    for row in cells.values():
+        by_contestant[row.contestant.slug].append(row)
+    for slug, rows in sorted(by_contestant.items()):
+        if len({json.dumps(row.options, sort_keys=True) for row in rows}) == 1:
+            continue
+        names = sorted({name for row in rows for name in row.options or {}})
+        differing = [
+            name
+            for name in names
+            if len({json.dumps((row.options or {}).get(name)) for row in rows}) > 1
+        ]
+        raise Conflict(
+            f"The pictures of {slug} were made with different options "
+            f"({', '.join(differing) or 'unknown'}), in the jobs "
+            f"{', '.join(sorted({row.job.name for row in rows}))}. Name the jobs whose "
+            "augmentations the study is to show, or run it anew."
+        )

@@ -23,9 +23,9 @@ from augment.errors import InvalidDocument, InvalidModification
 from augment.metrics.fault_guess import first_guess
 from augment.models import Augmentation, Scenario
 from augment.render.bev import FaultMark, draw_annotated
-from augment.scene.codec import EGO_ID, modification_from_document
+from augment.scene.codec import EGO_ID, modification_from_document, modification_to_document
 from augment.scene.entities import Scene
-from augment.services.scenarios.editing import edit_to_document, editable_scene, read_edit, snap
+from augment.services.scenarios.editing import editable_scene, read_edit, snap
 from augment.services.scenarios.pictures import camera_of, store_as
 from augment.services.scenarios.scenes import intent_of, scene_of
 
@@ -146,7 +146,7 @@ def check_edit(scenario: Scenario, document: object, *, snapped: str = "") -> Ch
     except (InvalidDocument, InvalidModification) as error:
         return Checked(problem=str(error))
     return Checked(
-        modification=edit_to_document(modification),
+        modification=modification_to_document(modification),
         lines=_lines(findings),
         is_against_intent=intent is not None,
     )

@@ -11,10 +11,10 @@ from django.db import transaction
 
 from augment.errors import Conflict
 from augment.models import Augmentation, Contestant, GenerationJob
-from augment.scene.codec import modification_from_document
+from augment.scene.codec import modification_from_document, modification_to_document
 from augment.scene.entities import Modification
 from augment.services.events import log_change
-from augment.services.scenarios.editing import edit_to_document, read_edit
+from augment.services.scenarios.editing import read_edit
 from augment.services.scenarios.scenes import check_slug
 from augment.services.texts import LONGEST_NOTES, check_prose, one_line
 
@@ -69,7 +69,7 @@ def keep_correction(
         job=job,
         scenario=original.scenario,
         contestant=contestant,
-        modification=edit_to_document(modification),
+        modification=modification_to_document(modification),
         notes=notes.strip(),
         corrects=original,
         made_by_id=actor_pk,
@@ -87,7 +87,9 @@ def human_contestants() -> list[Contestant]:
 def starting_document(original: Augmentation) -> dict[str, object]:
     """Return the modification that a correction begins with."""
     stored = original.modification
-    return edit_to_document(modification_from_document(stored) if stored else Modification())
+    return modification_to_document(
+        modification_from_document(stored) if stored else Modification()
+    )
 
 
 def _find_or_add_person(slug: str, name: str) -> Contestant:

@@ -15,7 +15,7 @@ from django.contrib.auth.models import User
 from django.db import transaction
 
 from augment.errors import Conflict, UnknownName
-from augment.geometry.frames import Pose, difference, wrap
+from augment.geometry.frames import difference, wrap
 from augment.models import IntentReading, Scenario
 from augment.render.camera import AROUND_THE_EGO
 from augment.scene.codec import (
@@ -23,14 +23,7 @@ from augment.scene.codec import (
     modification_from_document,
     modification_to_document,
 )
-from augment.scene.entities import (
-    LENGTH_WIDTH_M,
-    AgentType,
-    Modification,
-    Point,
-    Scene,
-    TrafficAgent,
-)
+from augment.scene.entities import LENGTH_WIDTH_M, AgentType, Modification, Scene, TrafficAgent
 from augment.scene.intent import IntentOrigin
 from augment.scene.intent_statements import list_statements
 from augment.scene.lane_graph import LaneGraph
@@ -44,42 +37,39 @@ from augment.services.scenarios.scenes import (
 )
 
 PLACED = tuple(one for one in AgentType if one is not AgentType.EGO_VEHICLE)
-_HALF_TURN_RAD = math.pi
 _SNAP_WITHIN_M = 15.0
 
 
+# Changes by hand
+
+
 def editor_document(scenario: Scenario) -> dict[str, Any]:
-    """The picture's window, who is there before the change, and the classes that can be placed.
+    """Return the picture's window, who is there before the change, and what can be placed.
 
     Raises:
         InvalidDocument: The stored scene can't be read.
     """
     scene = editable_scene(scenario)
     camera = AROUND_THE_EGO
+    names = ("x_min_m", "y_max_m", "px_per_m", "width_px", "height_px")
     return {
-        "camera": {
-            "x_min_m": camera.x_min_m,
-            "y_max_m": camera.y_max_m,
-            "px_per_m": camera.px_per_m,
-            "width_px": camera.width_px,
-            "height_px": camera.height_px,
-        },
+        "camera": {name: getattr(camera, name) for name in names},
         "agents": modification_to_document(Modification(moved=scene.agents))["move"],
         "sizes": {
-            one.value: {"length_m": LENGTH_WIDTH_M[one][0], "width_m": LENGTH_WIDTH_M[one][1]}
+            one.value: dict(zip(("length_m", "width_m"), LENGTH_WIDTH_M[one], strict=True))
             for one in PLACED
         },
     }
 
 
 def read_edit(scenario: Scenario, document: object) -> Modification:
-    """The modification of a document, each of its agents on the lane that lies under it.
+    """Return the modification of a document, each of its agents on the lane under it.
 
     Raises:
         InvalidDocument: It breaks its format.
         InvalidModification: It does not fit the scene.
     """
-    scene, graph = _scene_of(scenario)
+    scene, graph = _read_scene(scenario.pk, scene_key(scenario))
     given = modification_from_document(document)
     placed = replace(
         given,
@@ -91,38 +81,27 @@ def read_edit(scenario: Scenario, document: object) -> Modification:
 
 
 def snap(scenario: Scenario, modification: Modification, agent_id: str) -> Modification:
-    """The modification with one agent on the nearest centreline, facing along it or against it.
+    """Return the modification with one agent on the nearest centreline, along it or against it.
 
     A pedestrian who walks somewhere faces that way from there, along or across the lane.
     Nothing happens to an agent that is not changed, or further than 15 m from every lane.
     """
-    _, graph = _scene_of(scenario)
-    return replace(
-        modification,
-        added=tuple(_snapped(one, graph, agent_id) for one in modification.added),
-        moved=tuple(_snapped(one, graph, agent_id) for one in modification.moved),
-    )
+    _, graph = _read_scene(scenario.pk, scene_key(scenario))
+
+    def snapped(agents: tuple[TrafficAgent, ...]) -> tuple[TrafficAgent, ...]:
+        return tuple(_snapped(one, graph) if one.id == agent_id else one for one in agents)
+
+    added, moved = snapped(modification.added), snapped(modification.moved)
+    return replace(modification, added=added, moved=moved)
 
 
 def editable_scene(scenario: Scenario) -> Scene:
-    """The scene that is changed, read once for as long as several edits follow each other.
+    """Return the scene that is changed, read once for as long as several edits follow each other.
 
     Raises:
         InvalidDocument: The stored scene can't be read.
     """
-    return _scene_of(scenario)[0]
-
-
-def edit_to_document(modification: Modification) -> dict[str, Any]:
-    """The modification as pages and rows have it."""
-    return modification_to_document(modification)
-
-
-# --- Private -----------------------------------------------------------------------------------
-
-
-def _scene_of(scenario: Scenario) -> tuple[Scene, LaneGraph]:
-    return _read_scene(scenario.pk, scene_key(scenario))
+    return _read_scene(scenario.pk, scene_key(scenario))[0]
 
 
 @lru_cache(maxsize=8)
@@ -136,9 +115,7 @@ def _on_its_lane(agent: TrafficAgent, graph: LaneGraph) -> TrafficAgent:
     return replace(agent, lane_id=graph.under(agent.x_m, agent.y_m, agent.heading_rad))
 
 
-def _snapped(agent: TrafficAgent, graph: LaneGraph, agent_id: str) -> TrafficAgent:
-    if agent.id != agent_id:
-        return agent
+def _snapped(agent: TrafficAgent, graph: LaneGraph) -> TrafficAgent:
     lane_id = graph.under(agent.x_m, agent.y_m, agent.heading_rad)
     if lane_id is None:
         nearest = graph.nearest(agent.x_m, agent.y_m)
@@ -147,18 +124,17 @@ def _snapped(agent: TrafficAgent, graph: LaneGraph, agent_id: str) -> TrafficAge
         lane_id = nearest[0]
     line = graph.lane(lane_id).centerline
     pose = line.pose_at(line.project(agent.x_m, agent.y_m).s_m)
-    is_against = abs(difference(pose.heading_rad, agent.heading_rad)) > _HALF_TURN_RAD / 2.0
-    heading = wrap(pose.heading_rad + _HALF_TURN_RAD) if is_against else pose.heading_rad
+    heading_rad = pose.heading_rad
+    if abs(difference(heading_rad, agent.heading_rad)) > math.pi / 2.0:
+        heading_rad = wrap(heading_rad + math.pi)
     if agent.walk_to_m is not None:
-        heading = _towards(agent.walk_to_m, pose, instead=agent.heading_rad)
-    snapped = replace(agent, x_m=pose.x_m, y_m=pose.y_m, heading_rad=heading)
-    return _on_its_lane(snapped, graph)
+        away = (agent.walk_to_m[0] - pose.x_m, agent.walk_to_m[1] - pose.y_m)
+        heading_rad = math.atan2(away[1], away[0]) if any(away) else agent.heading_rad
+    moved = replace(agent, x_m=pose.x_m, y_m=pose.y_m, heading_rad=heading_rad)
+    return _on_its_lane(moved, graph)
 
 
-def _towards(point: Point, pose: Pose, *, instead: float) -> float:
-    """The heading from the pose to the point; `instead` where they are the same."""
-    away = (point[0] - pose.x_m, point[1] - pose.y_m)
-    return math.atan2(away[1], away[0]) if any(away) else instead
+# References
 
 
 @transaction.atomic
@@ -170,8 +146,7 @@ def set_reference(scenario: Scenario, document: object, *, actor: User | None = 
         InvalidModification: It does not fit the scene.
         Conflict: The scenario is the catalogue's, or nothing changes though the wish can be met.
     """
-    row = Scenario.objects.select_for_update(of=("self",)).get(pk=scenario.pk)
-    refuse_catalogue(row)
+    row = _locked(scenario.slug, "reference")
     modification = read_edit(row, document)
     intent = intent_of(row)
     if modification.is_empty and not (intent and intent.unmet):
@@ -179,7 +154,7 @@ def set_reference(scenario: Scenario, document: object, *, actor: User | None = 
             "Nothing is added, moved or removed. An empty reference is for wishes that can't "
             "be met, whose intent says so."
         )
-    return _set(row, modification_to_document(modification), actor)
+    return _set(row, "set reference", actor, reference=modification_to_document(modification))
 
 
 @transaction.atomic
@@ -189,32 +164,13 @@ def drop_reference(scenario: Scenario, *, actor: User | None = None) -> Scenario
     Raises:
         Conflict: The scenario is the catalogue's, or has none.
     """
-    row = Scenario.objects.select_for_update(of=("self",)).get(pk=scenario.pk)
-    refuse_catalogue(row)
+    row = _locked(scenario.slug, "reference")
     if row.reference is None:
         raise Conflict(f"'{row.slug}' has no reference.")
-    return _set(row, None, actor)
+    return _set(row, "set reference", actor, reference=None)
 
 
-def refuse_catalogue(row: Scenario) -> None:
-    """Raise Conflict for a scenario whose files alone change it."""
-    if row.in_catalogue:
-        raise Conflict(
-            f"The reference of '{row.slug}' is the catalogue's own; change it in its file."
-        )
-
-
-def _set(row: Scenario, document: dict[str, object] | None, actor: User | None) -> Scenario:
-    before = row.reference
-    row.reference = document
-    row.save(update_fields=["reference"])
-    log_change(
-        row, "set reference", actor, before={"reference": before}, after={"reference": document}
-    )
-    return row
-
-
-State = IntentReading.State
+# Intents
 
 
 @transaction.atomic
@@ -226,12 +182,10 @@ def enter_intent(*, scenario: str, document: object, actor: User | None = None) 
         InvalidDocument: The document breaks the format, or leaves open what jobs need.
         Conflict: The scenario is the catalogue's, whose intents are authored.
     """
-    row = _scenario(scenario)
-    if row.in_catalogue:
-        raise Conflict(
-            f"The intent of '{row.slug}' is the catalogue's own; change it in its file."
-        )
-    return _set_intents(row, placeable_intent(document), IntentOrigin.ENTERED, actor)
+    row = _locked(scenario, "intent")
+    entered = IntentOrigin.ENTERED
+    intent = placeable_intent(document)
+    return _set(row, "set intent", actor, intent=intent, intent_origin=entered)
 
 
 @transaction.atomic
@@ -243,32 +197,28 @@ def accept_reading(*, scenario: str, actor: User | None = None) -> Scenario:
         InvalidDocument: What was read leaves open what jobs need.
         Conflict: Nothing that was read waits to be accepted, or the scenario is the catalogue's.
     """
-    row = _scenario(scenario)
+    row = _locked(scenario, "intent")
     reading = waiting_reading(row)
     if reading is None:
         raise Conflict(f"No reading of '{row.slug}' waits to be accepted.")
-    if row.in_catalogue:
-        raise Conflict(
-            f"The intent of '{row.slug}' is the catalogue's own; change it in its file."
-        )
-    document = placeable_intent(reading.document)
-    IntentReading.objects.filter(pk=reading.pk).update(state=State.ACCEPTED)
-    return _set_intents(row, document, IntentOrigin.READ, actor)
+    intent = placeable_intent(reading.document)
+    IntentReading.objects.filter(pk=reading.pk).update(state=IntentReading.State.ACCEPTED)
+    return _set(row, "set intent", actor, intent=intent, intent_origin=IntentOrigin.READ)
 
 
 def waiting_reading(scenario: Scenario) -> IntentReading | None:
-    """The last reading, where it was read and nobody has accepted it yet."""
-    last = scenario.readings.select_related("endpoint").first()
-    return last if last is not None and last.state == State.READ else None
+    """Return the last reading, where it was read and nobody has accepted it yet."""
+    last = last_reading(scenario)
+    return last if last is not None and last.state == IntentReading.State.READ else None
 
 
 def last_reading(scenario: Scenario) -> IntentReading | None:
-    """The last reading, whatever became of it."""
+    """Return the last reading, whatever became of it."""
     return scenario.readings.select_related("endpoint").first()
 
 
 def statements_of(document: object) -> tuple[str, ...]:
-    """What an intent document says, as short statements; none where there is no document.
+    """Return what an intent document says, as short statements; none without a document.
 
     Raises:
         InvalidDocument: The document breaks the format.
@@ -276,23 +226,30 @@ def statements_of(document: object) -> tuple[str, ...]:
     return () if document is None else list_statements(intent_from_document(document))
 
 
-# --- Private -----------------------------------------------------------------------------------
+def refuse_catalogue(row: Scenario, part: str = "reference") -> None:
+    """Raise Conflict for a scenario whose files alone change it."""
+    if row.in_catalogue:
+        problem = "is the catalogue's own; change it in its file."
+        raise Conflict(f"The {part} of '{row.slug}' {problem}")
 
 
-def _scenario(slug: str) -> Scenario:
+# Private
+
+
+def _locked(slug: str, part: str) -> Scenario:
+    """The row to change a part of, which the catalogue's files alone do for its scenarios."""
     row = Scenario.objects.select_for_update(of=("self",)).filter(slug=slug).first()
     if row is None:
         raise UnknownName("scenario", slug, list(Scenario.objects.values_list("slug", flat=True)))
+    refuse_catalogue(row, part)
     return row
 
 
-def _set_intents(
-    row: Scenario, document: dict[str, Any], origin: IntentOrigin, actor: User | None
-) -> Scenario:
-    before = {"intent": row.intent, "origin": row.intent_origin or None}
-    row.intent, row.intent_origin = document, origin
-    row.save(update_fields=["intent", "intent_origin"])
-    log_change(
-        row, "set intent", actor, before=before, after={"intent": document, "origin": origin.value}
-    )
+def _set(row: Scenario, verb: str, actor: User | None, **columns: Any) -> Scenario:
+    before = {name.removeprefix("intent_"): getattr(row, name) or None for name in columns}
+    for name, value in columns.items():
+        setattr(row, name, value)
+    row.save(update_fields=list(columns))
+    after = {name.removeprefix("intent_"): value for name, value in columns.items()}
+    log_change(row, verb, actor, before=before, after=after)
     return row

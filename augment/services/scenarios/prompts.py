@@ -40,7 +40,7 @@ def prompt_of(
     images: tuple[bytes, ...] | None = None,
     options: ContestantOptions | None = None,
 ) -> Shown:
-    """The first messages to that role; reviewers judge the scenario's reference.
+    """Return the first messages to that role; reviewers judge the scenario's reference.
 
     Args:
         scenario: A slug.
@@ -90,7 +90,7 @@ class PromptChoice:
 
 
 def list_choices() -> list[PromptChoice]:
-    """Every variant."""
+    """Return every variant."""
     return [
         PromptChoice(
             slug=recipe.slug,
@@ -115,13 +115,12 @@ class Preview:
     version: str = ""
 
     def to_document(self) -> dict[str, Any]:
-        """Messages and tools as the body of the request has them."""
+        """Return messages and tools as the body of the request has them."""
         if self.shown is None:
             return {}
-        document: dict[str, Any] = {"messages": [one.to_document() for one in self.shown.messages]}
-        if self.shown.tools:
-            document["tools"] = [json.loads(tool) for tool in self.shown.tools]
-        return document
+        tools = [json.loads(tool) for tool in self.shown.tools]
+        messages = [one.to_document() for one in self.shown.messages]
+        return {"messages": messages} | ({"tools": tools} if tools else {})
 
 
 def preview_prompt(
@@ -132,14 +131,7 @@ def preview_prompt(
     native_tools: bool = False,
     options: ContestantOptions | None = None,
 ) -> Preview:
-    """What would be sent, without asking or drawing anything.
-
-    Args:
-        scenario: Which.
-        variant: The name of a recipe.
-        role: Whose first messages.
-        native_tools: Whether the modifier calls natively.
-        options: Of whoever asks; without them the variant's own.
+    """Return what would be sent, without asking or drawing anything; see `prompt_of`.
 
     Raises:
         UnknownName: No such variant or role.
@@ -148,26 +140,24 @@ def preview_prompt(
     if role not in list(ModelRole):
         raise UnknownName("role", role, [one.value for one in ModelRole])
     names: tuple[str, ...] = ()
-    images: tuple[bytes, ...] | None = None
     recipe = recipe_with(find_recipe(variant), options or ContestantOptions())
     if role == ModelRole.VIEWER and ModelRole.VIEWER in recipe.roles:
         names = _drawn(scenario, recipe.limits.picture_px)
         if not names:
             return Preview(shown=None)
-        images = tuple(_bytes(name) for name in names)
     shown = prompt_of(
         scenario=scenario.slug,
         variant=variant,
         role=ModelRole(role),
         native_tools=native_tools,
-        images=images,
+        images=tuple(map(_bytes, names)) or None,
         options=options,
     )
     return Preview(shown=shown, images=names, version=prompt_version())
 
 
 def draw_prompts(scenario_pk: int) -> None:
-    """What a worker does: the pictures that viewers are shown of a scenario's reference.
+    """Draw the pictures that viewers are shown of a scenario's reference; a worker's task.
 
     One of each width that a variant or a contestant asks for.
 
@@ -175,26 +165,17 @@ def draw_prompts(scenario_pk: int) -> None:
         InvalidDocument: The stored scene or reference can't be read.
     """
     row = Scenario.objects.select_related("base_scene").get(pk=scenario_pk)
-    for width_px in _widths():
-        if _drawn(row, width_px):
-            continue
-        found = pictures(scene_of(row), reference_of(row) or Modification(), width_px=width_px)
-        names = [store(png, folder=FOLDER) for png in found]
-        listed = ContentFile(json.dumps(names).encode())
-        default_storage.save(_list_name(row, width_px), listed)
-
-
-# --- Private -----------------------------------------------------------------------------------
-
-
-def _widths() -> list[int]:
-    """The widths of pictures that somebody is shown, the narrowest first."""
     seeing = [one for one in RECIPES.values() if ModelRole.VIEWER in one.roles]
-    found = {recipe.limits.picture_px for recipe in seeing}
-    rows = Contestant.objects.exclude(endpoint=None).values_list("options", "frozen_options")
-    for documents in rows:
-        found |= {one["picture_px"] for one in documents if one and one.get("picture_px")}
-    return sorted(found)
+    widths = {recipe.limits.picture_px for recipe in seeing}
+    asked = Contestant.objects.exclude(endpoint=None).values_list("options", "frozen_options")
+    for documents in asked:
+        widths |= {one["picture_px"] for one in documents if one and one.get("picture_px")}
+    for width_px in sorted(widths):
+        if not _drawn(row, width_px):
+            made = pictures(scene_of(row), reference_of(row) or Modification(), width_px=width_px)
+            names = [store(png, folder=FOLDER) for png in made]
+            listed = ContentFile(json.dumps(names).encode())
+            default_storage.save(_list_name(row, width_px), listed)
 
 
 def _list_name(scenario: Scenario, width_px: int) -> str:
@@ -207,9 +188,7 @@ def _list_name(scenario: Scenario, width_px: int) -> str:
 def _drawn(scenario: Scenario, width_px: int) -> tuple[str, ...]:
     """The names of a viewer's pictures, none where they are not drawn yet."""
     name = _list_name(scenario, width_px)
-    if not default_storage.exists(name):
-        return ()
-    return tuple(json.loads(_bytes(name)))
+    return tuple(json.loads(_bytes(name))) if default_storage.exists(name) else ()
 
 
 def _bytes(name: str) -> bytes:
@@ -219,7 +198,7 @@ def _bytes(name: str) -> bytes:
 
 
 class StoredIntents:
-    """The intents of all scenarios, by the texts of their instructions.
+    """The intents of all scenarios, by the texts of their instructions, for the stand-in model.
 
     Asked from the threads of a server: each leaves no connection behind. What was found once is
     remembered; what was not is looked for again, because scenarios and intents come later.
@@ -229,16 +208,13 @@ class StoredIntents:
         self._found: dict[str, Intent] = {}
 
     def __call__(self, instruction: str) -> Intent | None:
-        """The intent of the first scenario with that instruction, None where none has one."""
+        """Return the intent of the first scenario with that instruction, None for none."""
         text = same_text(instruction)
         if text not in self._found:
             try:
-                self._look_again()
+                rows = Scenario.objects.exclude(intent=None).order_by("-pk")
+                for words, document in rows.values_list("instruction", "intent"):
+                    self._found[same_text(words)] = intent_from_document(document)
             finally:
                 connection.close()
         return self._found.get(text)
-
-    def _look_again(self) -> None:
-        rows = Scenario.objects.exclude(intent=None).order_by("-pk")
-        for instruction, document in rows.values_list("instruction", "intent"):
-            self._found[same_text(instruction)] = intent_from_document(document)
