@@ -105,7 +105,6 @@ DOORS = {
     "arena/studies/pages/planning.py": "reads what the reader may read",
     "arena/results/pages/rating_form.py": "gives none: the page that asked leads to the gate",
     "arena/results/pages/ratings.py": "the gate",
-    "arena/results/pages/rating_form.py": "gives none: the page that asked leads to the gate",
     "arena/results/pages/evidence.py": "behind the gate",
     "arena/studies/pages/studies.py": "asks results_access; what shows results needs it in full",
 }
