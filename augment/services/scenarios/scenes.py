@@ -240,21 +240,7 @@ def add_scenario(
         read = intent_to_document(intent_from_document(intent))
         scenario.intent = placeable_intent(intent) if is_entered else read
         scenario.intent_origin = intent_origin
-    try:
-        with transaction.atomic():
-            scenario.save(force_insert=True)
-    except IntegrityError:  # somebody else was faster
-        problem = f"There is a scenario called {scenario.slug!r} already; try again."
-        raise Conflict(problem) from None
-    after = {
-        "slug": scenario.slug,
-        "scene": scenario.base_scene.slug,
-        "type": scenario.type,
-        "has_reference": scenario.reference is not None,
-        "keep_traffic": scenario.keep_traffic,
-        "intent": scenario.intent_origin or None,
-    }
-    log_change(scenario, "add", actor, after=after)
+    _insert(scenario, actor)
     return scenario
 
 
@@ -294,6 +280,24 @@ def change_circumstances(scenario: Scenario, given: Circumstances, *, keep_traff
     scenario.spawned = None
     _set_circumstances(scenario, kept, reference)
     scenario.original_image, scenario.windows = "", {}
+
+
+def _insert(scenario: Scenario, actor: User | None) -> None:
+    try:
+        with transaction.atomic():
+            scenario.save(force_insert=True)
+    except IntegrityError:  # somebody else was faster
+        problem = f"There is a scenario called {scenario.slug!r} already; try again."
+        raise Conflict(problem) from None
+    after = {
+        "slug": scenario.slug,
+        "scene": scenario.base_scene.slug,
+        "type": scenario.type,
+        "has_reference": scenario.reference is not None,
+        "keep_traffic": scenario.keep_traffic,
+        "intent": scenario.intent_origin or None,
+    }
+    log_change(scenario, "add", actor, after=after)
 
 
 def _set_circumstances(
