@@ -63,7 +63,7 @@ class ExportedFile(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True)
-class Kind:
+class ExportKind:
     """A kind of export.
 
     Attributes:
@@ -150,12 +150,12 @@ def _write_contact_sheet(options: Chosen, say: Say) -> ExportedFile:
 # --- Of a job ------------------------------------------------------------------------------------
 
 
-def _plain(table: JobTable, default: str = "csv") -> Kind:
+def _plain(table: JobTable, default: str = "csv") -> ExportKind:
     def write(options: Chosen, say: Say) -> ExportedFile:
         chosen = format_named(table.formats, options["format"])
         return _fill(chosen, table.make(find_job(options["job"])))
 
-    return Kind("job", table.help, write, _format(table.formats, default))
+    return ExportKind("job", table.help, write, _format(table.formats, default))
 
 
 def _write_displacement(options: Chosen, say: Say) -> ExportedFile:
@@ -256,25 +256,25 @@ _STRICT = {"action": "store_true", "help": "write nothing if a scenario would no
 _CONTESTANT = {"help": "the slug of one; all unless given"}
 _DRIVEN = {"help": "as it was simulated with"}
 
-KINDS: dict[str, Kind] = {
-    "leaderboard": Kind(
+KINDS: dict[str, ExportKind] = {
+    "leaderboard": ExportKind(
         "study", "the newest rating of a study", _write_leaderboard,
         _format([*FORMATS, ZIP]) | _OF_RATING,
     ),
-    "votes": Kind(
+    "votes": ExportKind(
         "study", "the votes of the newest rating, with pseudonyms", _write_votes,
         _format(VOTE_FORMATS) | _OF_RATING,
     ),
-    "chart": Kind(
+    "chart": ExportKind(
         "study", "a chart of the newest rating beside the table's", _write_chart,
         {"--chart": {"required": True, "help": "pairs, types, width, displacement, elo-usd, ..."}}
         | _format(CONTENT_TYPES, "svg") | _OF_RATING,
     ),
-    "contact-sheet": Kind(
+    "contact-sheet": ExportKind(
         "study", "every contestant's picture of every scenario with the votes on it, as PDF",
         _write_contact_sheet, _OF_RATING,
     ),
-    "displacement": Kind(
+    "displacement": ExportKind(
         "job", "how far from the references", _write_displacement,
         {
             "--by": {
@@ -290,7 +290,7 @@ KINDS: dict[str, Kind] = {
         }
         | _format(displacement_files.FORMATS),
     ),
-    "samples": Kind(
+    "samples": ExportKind(
         "job", "a sheet of pictures with captions", _write_samples,
         {
             "--scenarios": {"nargs": "+", "required": True, "help": "slugs, top to bottom"},
@@ -299,7 +299,7 @@ KINDS: dict[str, Kind] = {
         }
         | _format([*SHEET_FORMATS, "or what the file's ending says"], None),
     ),
-    "driving": Kind(
+    "driving": ExportKind(
         "job", "mean driving scores of what was simulated", _write_driving,
         {
             "--score": {"default": "nuplan", "help": f"one of {', '.join(SCORES)}"},
@@ -314,16 +314,16 @@ KINDS: dict[str, Kind] = {
     ),
     **{name: _plain(table) for name, table in PLAIN_TABLES.items()},
     "transcripts": _plain(TRANSCRIPTS, "jsonl"),
-    "analyses": Kind(
+    "analyses": ExportKind(
         "job", "pairs of contestants, wordings, refusals", _write_analyses,
         {"--part": {"required": True, "help": f"one of {', '.join(ANALYSES)}"}}
         | _format(TABLE_FORMATS),
     ),
-    "modifications": Kind(
+    "modifications": ExportKind(
         "job", "what a job's contestants made", _write_modifications,
         _format(["interplan"], "interplan") | {"--contestant": _CONTESTANT, "--strict": _STRICT},
     ),
-    "scenarios": Kind(
+    "scenarios": ExportKind(
         "job", "what a job made, in a standard format", _write_scenarios,
         {
             "--format": {

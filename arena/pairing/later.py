@@ -109,11 +109,8 @@ def _find_elsewhere(
 ) -> tuple[str, int]:
     """Return who judges the pair on which other scenario."""
     for name in order:
-        free = [
-            int(column)
-            for column in rng.permutation(np.flatnonzero(grid.showable[wanted.pair]))
-            if (wanted.pair, int(column)) not in known[name]
-        ]
+        columns = rng.permutation(np.flatnonzero(grid.showable[wanted.pair])).tolist()
+        free = [column for column in columns if (wanted.pair, column) not in known[name]]
         if free:
             best = min(free, key=lambda column: counts[wanted.pair, column])
             counts[wanted.pair, best] += 1
@@ -212,10 +209,7 @@ def contestants_of(grid: Grid) -> list[str]:
 def ratings_so_far(scores: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return ratings (C,) and their covariance (C, C) by the votes so far and a prior.
 
-    The prior has a standard deviation of 200 points of the Elo scale.
-
-    Args:
-        scores: (C, C) what the row scored against the column: a win 1, a tie one half.
+    `scores` (C, C) are what the row scored against the column: a win 1, a tie one half.
     """
     votes = scores + scores.T
     prior = np.eye(len(scores)) / PRIOR_SD**2

@@ -31,7 +31,7 @@ def add_cap_arguments(parser: ArgumentParser) -> None:
 
 
 def caps_of(options: dict[str, Any]) -> Caps:
-    """What was given."""
+    """Return the caps that were given."""
     return Caps(usd=options["cap_usd"], calls=options["cap_calls"], tokens=options["cap_tokens"])
 
 
@@ -45,7 +45,7 @@ def add_option_arguments(parser: ArgumentParser) -> None:
 
 
 def options_of_arguments(options: dict[str, Any]) -> ContestantOptions:
-    """The options that were given.
+    """Return the options that were given.
 
     Raises:
         InvalidDocument: One is out of its range.

@@ -9,7 +9,7 @@ Notation: R objects of the reference, G generated ones.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -31,17 +31,8 @@ class ObjectClass(StrEnum):
     GENERIC_OBJECT = "generic object"
 
 
-CLASS_OF = {
-    AgentType.EGO_VEHICLE: ObjectClass.VEHICLE,
-    AgentType.VEHICLE: ObjectClass.VEHICLE,
-    AgentType.BUS: ObjectClass.VEHICLE,
-    AgentType.BICYCLE: ObjectClass.BICYCLE,
-    AgentType.PEDESTRIAN: ObjectClass.PEDESTRIAN,
-    AgentType.TRAFFIC_CONE: ObjectClass.TRAFFIC_CONE,
-    AgentType.BARRIER: ObjectClass.BARRIER,
-    AgentType.CONSTRUCTION_SIGN: ObjectClass.CONSTRUCTION_SIGN,
-    AgentType.GENERIC_OBJECT: ObjectClass.GENERIC_OBJECT,
-}
+_STANDS_FOR = {AgentType.EGO_VEHICLE: ObjectClass.VEHICLE, AgentType.BUS: ObjectClass.VEHICLE}
+CLASS_OF = {kind: _STANDS_FOR.get(kind) or ObjectClass[kind.name] for kind in AgentType}
 
 _EVENNESS_PER_M = 1e-6
 """Of matchings with the same sum the one with the smallest squares counts: 1 m and 1 m rather
@@ -98,8 +89,10 @@ def displacement(generated: Modification | None, reference: Modification) -> Dis
     placed = () if generated is None else generated.changed
     matches: list[Match] = []
     for object_class in ObjectClass:
-        wanted = _of_class(reference.changed, object_class)
-        agents = _of_class(placed, object_class)
+        wanted, agents = (
+            [agent for agent in listed if CLASS_OF[agent.type] is object_class]
+            for listed in (reference.changed, placed)
+        )
         matches += _matched(wanted, agents, object_class)
     taken = {match.reference for match in matches}
     used = {match.generated for match in matches}
@@ -108,13 +101,6 @@ def displacement(generated: Modification | None, reference: Modification) -> Dis
         missing=tuple(agent.id for agent in reference.changed if agent.id not in taken),
         surplus=tuple(agent.id for agent in placed if agent.id not in used),
     )
-
-
-# Private
-
-
-def _of_class(agents: Iterable[TrafficAgent], object_class: ObjectClass) -> list[TrafficAgent]:
-    return [agent for agent in agents if CLASS_OF[agent.type] is object_class]
 
 
 def _matched(

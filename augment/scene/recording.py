@@ -11,12 +11,11 @@ from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, GetCoreSchemaHandler, TypeAdapter, ValidationError
+from pydantic import Field, GetCoreSchemaHandler, TypeAdapter
 from pydantic_core import CoreSchema, core_schema
 
-from augment.errors import InvalidDocument
 from augment.scene.entities import AgentType, TrafficAgent
-from augment.scene.schema import CLOSED, Id, Real, Size, Text, Whole, problems_of
+from augment.scene.schema import CLOSED, Codec, Id, Real, Size, Text, Whole
 
 MOST_TRACKS = 50_000
 
@@ -168,22 +167,5 @@ class Note:
     names: Annotated[tuple[Text, ...], Field(exclude_if=lambda names: not names)] = ()
 
 
-_NOTES = TypeAdapter(tuple[Note, ...])
-
-
-def notes_to_document(notes: tuple[Note, ...]) -> list[dict[str, Any]]:
-    """The notes as a JSON document; fields without a value are left out."""
-    made: list[dict[str, Any]] = _NOTES.dump_python(notes, mode="json", exclude_none=True)
-    return made
-
-
-def notes_from_document(document: object) -> tuple[Note, ...]:
-    """The notes that a JSON document holds.
-
-    Raises:
-        InvalidDocument: With the path and the reason of every fault.
-    """
-    try:
-        return _NOTES.validate_python(document)
-    except ValidationError as fault:
-        raise InvalidDocument("scene notes", problems_of(fault)) from None
+_NOTES = Codec("scene notes", TypeAdapter(tuple[Note, ...]))
+notes_to_document, notes_from_document = _NOTES.dump, _NOTES.from_parts

@@ -110,16 +110,13 @@ class Codec(Generic[Value]):
         Raises:
             InvalidDocument: The value breaks a rule of the format, so nobody could read it again.
         """
-        document = self.frame | self.dump(value)
+        document: dict[str, Any] = self.frame | self.dump(value)
         self.from_document(document)
         return document
 
-    def dump(self, value: Value) -> dict[str, Any]:
+    def dump(self, value: Value) -> Any:
         """Return the document without its frame, and without reading it again."""
-        parts: dict[str, Any] = self.shape.dump_python(
-            value, mode="json", by_alias=True, exclude_none=True
-        )
-        return parts
+        return self.shape.dump_python(value, mode="json", by_alias=True, exclude_none=True)
 
     def from_document(self, document: object) -> Value:
         """Return the value that a document describes: what `json.loads` gives, or a dict like it.

@@ -1,4 +1,4 @@
-"""What time it is for whatever several workers judge: the database's time, never their own.
+"""The time by which several workers judge (the database's, never their own), and heartbeats.
 
 Workers on different machines may be tens of seconds apart. Times that one of them writes and
 another one compares (leases, signs of life, places at an endpoint) are therefore both written and
@@ -26,7 +26,7 @@ DATABASE_TIME = Now()
 
 
 def database_now() -> datetime:
-    """The database's time, aware, to be reckoned with here; a query of its own."""
+    """Return the database's time, aware; a query of its own."""
     text, parameters = Query(None).get_compiler(connection=connection).compile(DATABASE_TIME)
     with connection.cursor() as cursor:
         cursor.execute(f"SELECT {text}", parameters)
@@ -40,7 +40,7 @@ def database_now() -> datetime:
 
 @contextmanager
 def repeating(beat: Callable[[], bool], *, every_s: float, name: str) -> Iterator[None]:
-    """Beat every so many seconds until the block is left, or until a beat says False.
+    """Call `beat` every so many seconds until the block is left, or until it returns False.
 
     The thread has a database connection of its own, which is closed with it.
     """

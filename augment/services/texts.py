@@ -1,4 +1,4 @@
-"""Texts from outside as every database takes them."""
+"""Texts from outside as every database takes them, and names of stored files."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from augment.errors import InvalidDocument
 
 
 def make_storable(text: str) -> str:
-    """The text without what can't be stored: PostgreSQL has no NUL, UTF-8 no half characters."""
+    """Return the text as every database stores it: without NUL and lone surrogates."""
     return text.replace("\0", "\u2400").encode("utf-8", "backslashreplace").decode("utf-8")
 
 
 def make_document_storable(value: Any) -> Any:
-    """The JSON document with each of its texts storable."""
+    """Return the JSON document with each of its texts storable."""
     if isinstance(value, str):
         return make_storable(value)
     if isinstance(value, dict):
@@ -25,14 +25,14 @@ def make_document_storable(value: Any) -> Any:
 
 
 LONGEST_REASON = 2_000
-"""Of why there is no modification, in characters; the whole of what was said is in the calls."""
+"""Characters of a reason for failure; the whole of what was said is in the calls."""
 
 LONGEST_NOTES = 20_000
-"""Of what a contestant said about its own work."""
+"""Characters of a contestant's notes about its own work."""
 
 
 def one_line(field: str, value: str, *, what: str, longest: int = 120) -> str:
-    """A name that people read, without blanks around it.
+    """Return a name that people read, without blanks around it.
 
     Args:
         field: Which name, for the error.
@@ -41,7 +41,7 @@ def one_line(field: str, value: str, *, what: str, longest: int = 120) -> str:
         longest: How many characters its column takes.
 
     Raises:
-        InvalidDocument: It is empty, too long or has line breaks or other signs without a shape.
+        InvalidDocument: It is empty, too long, or has a character that does not print.
     """
     value = value.strip()
     if not value or len(value) > longest or not value.isprintable():
@@ -51,7 +51,7 @@ def one_line(field: str, value: str, *, what: str, longest: int = 120) -> str:
 
 
 def check_prose(field: str, value: str, *, what: str, longest: int) -> None:
-    """Whether a text that may have several lines can be stored and shown.
+    """Refuse a text of several lines that can't be stored and shown.
 
     Raises:
         InvalidDocument: It is empty, too long, or holds NUL or half a character.

@@ -11,7 +11,6 @@ import math
 from dataclasses import dataclass
 from enum import StrEnum
 
-import numpy as np
 import shapely
 
 from augment.scene.entities import Modification, ScenarioType
@@ -35,20 +34,7 @@ from augment.simulation.metrics import (
     time_to_collision,
     ttc_series,
 )
-from augment.simulation.states import (
-    HEADING,
-    SPEED,
-    STEP_S,
-    FloatArray,
-    Objects,
-    corners,
-    meet,
-    radii,
-)
-
-CROSSING_RAD = math.radians(20.0)
-"""Paths that meet at a flatter angle follow each other; they have no encroachment."""
-_CLOSEST_M = 0.1
+from augment.simulation.states import HEADING, corners
 
 
 class ScoreKind(StrEnum):
@@ -114,80 +100,19 @@ def score_drive(
     return Score(kind=kind, value=combine(metrics), metrics=metrics, collisions=met, expert=expert)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Criticality:
-    """Measures of the safety literature; None where nothing of the kind happened.
+def criticality(drive: Drive, met: tuple[Collision, ...]) -> dict[str, float | None]:
+    """Return the smallest time to collision below 3 s, and the least distance between bodies.
 
-    Attributes:
-        least_ttc_s: The shortest time, below 3 s, to a collision if both go on as they do.
-        least_pet_s: The shortest time between one leaving a place and the other entering it,
-            where their ways cross; 0 if they met.
-        most_deceleration_mps2: The hardest constant braking that was needed to match the speed
-            of somebody straight ahead.
-        least_distance_m: Between the bodies; 0 if they met.
+    None where nothing of the kind happened.
     """
-
-    least_ttc_s: float | None
-    least_pet_s: float | None
-    most_deceleration_mps2: float | None
-    least_distance_m: float | None
-
-
-def criticality(drive: Drive, met: tuple[Collision, ...]) -> Criticality:
-    """Measure one drive."""
     ttc_s = float(ttc_series(drive, met, only_relevant=False).min())
-    busy = [moment for moment, objects in enumerate(drive.objects) if len(objects)]
-    needed = [_deceleration(drive, moment) for moment in busy]
-    closest = [_distance(drive.boxes[moment], drive.objects[moment]) for moment in busy]
-    pet_s = min((_encroachment(drive, name) for name in _names(drive)), default=math.inf)
-    return Criticality(
-        least_ttc_s=None if math.isinf(ttc_s) else ttc_s,
-        least_pet_s=None if math.isinf(pet_s) else pet_s,
-        most_deceleration_mps2=max(needed, default=0.0) or None,
-        least_distance_m=min(closest, default=None),
-    )
-
-
-# Private
-
-
-def _deceleration(drive: Drive, moment: int) -> float:
-    """(closing speed)^2 / (2 gap) to whoever is in the strip straight ahead, the largest."""
-    objects, state = drive.objects[moment], drive.states[moment]
-    cos, sin = math.cos(state[HEADING]), math.sin(state[HEADING])
-    rim = corners(objects.boxes) - drive.boxes[moment, :2]
-    along = rim[..., 0] * cos + rim[..., 1] * sin
-    across = rim[..., 1] * cos - rim[..., 0] * sin
-    half = drive.body.width_m / 2.0
-    gap = along.min(axis=1) - drive.body.length_m / 2.0
-    ahead = (gap > 0.0) & (across.min(axis=1) < half) & (across.max(axis=1) > -half)
-    away = objects.speeds_mps * np.cos(objects.boxes[:, 2] - state[HEADING])
-    closing = np.maximum(state[SPEED] - away, 0.0)
-    needed = np.where(ahead, closing**2 / (2.0 * np.maximum(gap, _CLOSEST_M)), 0.0)
-    return float(needed.max())
-
-
-def _distance(box: FloatArray, objects: Objects) -> float:
-    """From the ego's body to the nearest other."""
-    bodies = shapely.polygons(corners(objects.boxes))
-    return float(shapely.distance(bodies, shapely.Polygon(corners(box))).min())
-
-
-def _names(drive: Drive) -> list[str]:
-    return list(dict.fromkeys(name for objects in drive.objects for name in objects.ids))
-
-
-def _encroachment(drive: Drive, name: str) -> float:
-    """The least |time of the ego - time of an object| at one place, over crossing ways."""
-    moments = np.array([t for t, objects in enumerate(drive.objects) if name in objects.ids])
-    rows = [drive.objects[moment] for moment in moments]
-    theirs = np.array([objects.boxes[objects.ids.index(name)] for objects in rows])
-    if np.ptp(theirs[:, :2], axis=0).max() < 1.0:
-        return math.inf
-    reach = radii(drive.boxes[0]) + radii(theirs[0])
-    apart = ((drive.boxes[:, None, :2] - theirs[None, :, :2]) ** 2).sum(axis=-1)
-    turns = np.abs(np.sin(drive.boxes[:, None, 2] - theirs[None, :, 2]))
-    ego, other = np.nonzero((apart <= reach**2) & (turns >= math.sin(CROSSING_RAD)))
-    hit = meet(drive.boxes[ego], theirs[other])
-    lags = np.abs(ego[hit] - moments[other[hit]])
-    return float(lags.min()) * STEP_S if len(lags) else math.inf
+    closest = [
+        float(shapely.distance(bodies, shapely.Polygon(corners(box))).min())
+        for box, objects in zip(drive.boxes, drive.objects, strict=True)
+        if len(objects)
+        for bodies in [shapely.polygons(corners(objects.boxes))]
+    ]
+    return {
+        "least_ttc_s": None if math.isinf(ttc_s) else ttc_s,
+        "least_distance_m": min(closest, default=None),
+    }

@@ -250,19 +250,6 @@ def test_red_lights_count_only_where_asked_for(state: TrafficLight) -> None:
 
 
 def test_criticality_of_a_drive_towards_a_parked_car() -> None:
-    # 8 m/s for 2 s from a bumper gap of 40 m: 24 m remain, 3 s, 64 / 48 m/s2.
+    # 8 m/s for 2 s from a bumper gap of 40 m: 24 m remain, and 3 s, which is the horizon.
     drive = driven(states_along(np.full(21, 8.0)), [vehicle("A", 40.0 + 2.588 + 2.4, 0.0)])
-    found = criticality(drive, ())
-    assert found.least_distance_m == pytest.approx(24.0)
-    assert found.most_deceleration_mps2 == pytest.approx(64.0 / 48.0)
-    assert found.least_ttc_s is None  # 3 s is the horizon
-    assert found.least_pet_s is None
-
-
-def test_post_encroachment_time_of_a_crossing() -> None:
-    # Its path crosses at x = 40 m: its box leaves the ego's lane strip after 1.1485 + 2.4 m.
-    crossing = moving(vehicle("A", 40.0, -8.0, math.pi / 2.0), 4.0)
-    drive = driven(states_along(STEADY), [crossing])
-    found = criticality(drive, ())
-    # Left at (8 + 1.1485 + 2.4) / 4 = 2.887 s, reached at (40 - 1 - 2.588) / 8 = 4.5515 s.
-    assert found.least_pet_s == pytest.approx(4.5515 - 2.887, abs=0.15)
+    assert criticality(drive, ()) == {"least_distance_m": pytest.approx(24.0), "least_ttc_s": None}

@@ -68,7 +68,7 @@ class Exported:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What whoever passes the files on has to know."""
+        """What anyone who passes the files on has to know."""
         bound = [source.scene for source in self.sources if source.is_non_commercial]
         unknown = [source.scene for source in self.sources if source.is_non_commercial is None]
         lines = []
@@ -90,7 +90,7 @@ def export_job(
     motion: str = RECORDED,
     strict: bool = False,
 ) -> Exported:
-    """All that a job made, as scenarios of that format.
+    """Return all that a job made, as scenarios of that format.
 
     Args:
         job: Whose modifications are written, ordered by scenario and contestant.
@@ -124,7 +124,7 @@ def export_rows(
     driven_by: str | None = None,
     strict: bool = False,
 ) -> Exported:
-    """Augmentations as scenarios of that format.
+    """Return augmentations as scenarios of that format.
 
     Args:
         rows: In their order, with scenario, its scene, and contestant.
@@ -173,7 +173,7 @@ def export_rows(
     )
 
 
-# Private
+# --- Private -----------------------------------------------------------------------------------
 
 
 def _rows(job: GenerationJob, contestant: str | None) -> Sequence[Augmentation]:
@@ -187,7 +187,7 @@ def _rows(job: GenerationJob, contestant: str | None) -> Sequence[Augmentation]:
 
 
 def _drives(job: GenerationJob, planner: str) -> dict[int, Simulation]:
-    """The newest finished drive of each augmentation by its key."""
+    """Return the newest finished drive of each augmentation by its key."""
     done = Simulation.objects.filter(augmentation__job=job, state=Simulation.State.DONE)
     drives = {
         row.augmentation_id: row
@@ -233,41 +233,39 @@ def _source(row: BaseScene) -> Source:
 
 
 def _motion(cell: Cell, trace: dict[str, Any]) -> Motion:
-    """What everybody did in a drive; who is in the scene and not in the drive stands."""
+    """Return what everybody did in a drive; agents that are not in the drive stand."""
     steps = int(trace["steps"])
-    times_s = np.asarray(np.arange(steps) * float(trace["step_s"]), dtype=np.float64)
     driven = {one["id"]: one for one in trace["objects"]}
-    others = []
-    for agent in cell.after.agents:
-        one = driven.pop(agent.id, None)
-        others.append(_movement(agent, one, steps))
-    for one in driven.values():
-        x_m, y_m, heading_rad, speed_mps = next(pose for pose in one["poses"] if pose)
+    agents = [(agent, driven.pop(agent.id, None)) for agent in cell.after.agents]
+    for one in driven.values():  # they came later
+        pose = next(pose for pose in one["poses"] if pose)
         later = TrafficAgent(
             id=one["id"],
             type=AgentType(one["type"]),
-            x_m=x_m,
-            y_m=y_m,
-            heading_rad=heading_rad,
-            speed_mps=speed_mps,
+            **dict(zip(("x_m", "y_m", "heading_rad", "speed_mps"), pose, strict=True)),
             width_m=one["width_m"],
             length_m=one["length_m"],
         )
-        others.append(_movement(later, one, steps))
+        agents.append((later, one))
     ego = Movement(
         agent=cell.after.ego,
         source=MotionSource.SIMULATED,
         states=np.array(trace["ego"]["poses"], dtype=np.float64),
     )
-    return Motion(times_s=times_s, ego=ego, others=tuple(others))
+    return Motion(
+        times_s=np.arange(steps, dtype=np.float64) * float(trace["step_s"]),
+        ego=ego,
+        others=tuple(_movement(agent, one, steps) for agent, one in agents),
+    )
 
 
 def _movement(agent: TrafficAgent, one: dict[str, Any] | None, steps: int) -> Movement:
-    """A trace holds one pose alone for who stands, and none for moments before and in gaps."""
-    here = [agent.x_m, agent.y_m, agent.heading_rad, agent.speed_mps]
+    """Return the states of an agent; a trace holds one pose for standing, none for gaps."""
     if one is None or (one["first"] == 0 and len(one["poses"]) == 1):
-        states = np.tile([*here[:3], 0.0], (steps, 1))
-        return Movement(agent=agent, source=MotionSource.STANDING, states=states)
+        here = [agent.x_m, agent.y_m, agent.heading_rad, 0.0]
+        return Movement(
+            agent=agent, source=MotionSource.STANDING, states=np.tile(here, (steps, 1))
+        )
     states = np.full((steps, 4), np.nan)
     for step, pose in enumerate(one["poses"], start=one["first"]):
         if pose is not None:

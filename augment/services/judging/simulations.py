@@ -171,7 +171,7 @@ def document_of(drove: Drive, scores: dict[ScoreKind, Score]) -> dict[str, Any]:
             }
             for collision in score.collisions
         ],
-        "criticality": asdict(criticality(drove, score.collisions)),
+        "criticality": criticality(drove, score.collisions),
         "metrics": {
             kind.value: [
                 {name: getattr(metric, name) for name in ("name", "value", "weight", "parts")}
