@@ -24,7 +24,7 @@ HEAVY = {
     "scipy.optimize": ("augment.metrics",),
     "scipy.signal": ("augment.simulation",),
     "scipy.sparse": ("arena.rating",),
-    "scipy.spatial": ("augment.simulation",),
+    "scipy.spatial": ("augment.formats", "augment.simulation"),
     "scipy.stats": ("arena.rating", "augment.metrics"),
 }
 READS_SETTINGS = (
