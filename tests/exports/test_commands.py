@@ -49,16 +49,6 @@ def test_hypotheses_of_a_repeated_option_are_all_frozen() -> None:
     assert [one["text"] for one in Study.objects.get().rules["hypotheses"]] == lines
 
 
-def test_the_same_snapshot_is_written_byte_for_byte(tmp_path: Path) -> None:
-    run("rate", voted_study().name)
-    for name in ("csv", "json", "latex"):
-        for copy in ("one", "two"):
-            path = tmp_path / f"{name}-{copy}"
-            run("export", "leaderboard", "Round 1", "--format", name, "--out", path)
-        one, two = (tmp_path / f"{name}-{copy}" for copy in ("one", "two"))
-        assert one.read_bytes() == two.read_bytes()
-
-
 def test_a_hyphen_is_standard_output() -> None:
     run("rate", voted_study().name)
     assert run("export", "leaderboard", "Round 1", "--out", "-").startswith("rank,model,elo,")

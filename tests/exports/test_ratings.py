@@ -71,36 +71,12 @@ def test_the_same_votes_and_seed_give_the_same_standings() -> None:
     assert latest_snapshot(study) == other
 
 
-def test_only_current_votes_count() -> None:
-    study = a_study(votes_per_expert=4)
-    first, second, *_ = matchups_of(study, "eva")
-    old = vote(first, "left")
-    vote(first, "right", supersedes=old.key)
-    vote(second, "equal")
-    snapshot = rate(study=close_study(study=study))
-    assert snapshot.votes_counted == 2
-    assert snapshot.votes_left_out == {"superseded": 1}
-
-
 def test_an_open_study_is_rated_only_on_purpose_and_that_is_logged() -> None:
     study = a_study()
     with pytest.raises(StudyStillOpen, match="'Round 1' is still open"):
         rate(study=study)
     assert rate(study=study, early=True).is_early
     assert Event.objects.filter(verb="rate early").exists()
-
-
-def test_simulated_votes_stay_out_of_a_study_that_does_not_allow_them() -> None:
-    study = a_study(votes_per_expert=4)
-    first, second, *_ = matchups_of(study, "eva")
-    vote(first, "left")
-    first.expert.person.is_simulated = True
-    first.expert.person.save()
-    vote(second, "left")
-    snapshot = rate(study=close_study(study=study))
-    assert snapshot.votes_counted == 1
-    assert snapshot.votes_left_out == {"simulated": 1}
-    assert not snapshot.includes_simulated
 
 
 def test_who_may_see_results() -> None:
