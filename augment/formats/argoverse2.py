@@ -282,13 +282,17 @@ def _read_log(folder: Path) -> Log:
 
 def _rigid(columns: Mapping[str, FloatArray]) -> tuple[FloatArray, FloatArray]:
     """Rotations (R, 3, 3) and places (R, 3) of quaternion and translation columns."""
-    from scipy.spatial.transform import Rotation
-
-    try:
-        turn = Rotation.from_quat(np.column_stack([columns[name] for name in _QUATERNION]))
-    except ValueError:
-        raise InvalidDocument(WHAT, [("qw", "has a quaternion of length 0")]) from None
-    return turn.as_matrix(), np.column_stack([columns[name] for name in _PLACE])
+    quaternion = np.column_stack([columns[name] for name in _QUATERNION])
+    length = np.linalg.norm(quaternion, axis=1)
+    if (length < 1e-6).any():
+        raise InvalidDocument(WHAT, [("qw", "has a quaternion of length 0")])
+    x, y, z, w = (quaternion / length[:, None]).T
+    rows = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+    ]
+    return np.moveaxis(np.array(rows), 2, 0), np.column_stack([columns[one] for one in _PLACE])
 
 
 def _log_tracks(

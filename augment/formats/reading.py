@@ -225,23 +225,11 @@ def reading_at(
             without a shape.
     """
     origin = log.ego_pose(frame)
-    for row in (log.ego, *(track.states for track in log.tracks)):
-        if (np.abs(row) > FURTHEST_M).any():
-            raise InvalidDocument(log.what, [("", f"has a number over {FURTHEST_M:.0e}")])
     road = road_around(city, origin)
     tracks = _tracks(log, frame, origin)
     scene = Scene(
         name=name,
-        ego=TrafficAgent(
-            id="Agent1",
-            type=AgentType.EGO_VEHICLE,
-            x_m=0.0,
-            y_m=0.0,
-            heading_rad=0.0,
-            width_m=round(log.ego_width_m, 3),
-            length_m=round(log.ego_length_m, 3),
-            speed_mps=round(float(log.ego[frame, 3]), 3),
-        ),
+        ego=_ego(log, frame),
         traffic_side=road.traffic_side,
         origin=Origin.at(origin, frame=world),
         provenance=provenance,
@@ -250,13 +238,8 @@ def reading_at(
         connectors=road.connectors,
         areas=road.areas,
     )
-    graph = LaneGraph(scene)
     return Reading(
-        scene=replace(
-            scene,
-            ego=replace(scene.ego, lane_id=graph.under(0.0, 0.0, 0.0)),
-            agents=tuple(_on_lane(agent, graph) for agent in scene.agents),
-        ),
+        scene=_on_lanes(scene),
         recording=Recording(
             times_s=np.round(log.times_s[frame:] - log.times_s[frame], 6),
             ego=_local(log.ego[frame:], origin),
@@ -275,6 +258,9 @@ def _tracks(log: Log, frame: int, origin: Pose) -> tuple[Track, ...]:
 
     Within one step the nearest comes first.
     """
+    for states in (log.ego, *(track.states for track in log.tracks)):
+        if (np.abs(states) > FURTHEST_M).any():
+            raise InvalidDocument(log.what, [("", f"has a number over {FURTHEST_M:.0e}")])
     met = []
     ego = log.ego[frame:, :2]
     # Where the ego's way is not known, near is near to where it was.
@@ -317,6 +303,19 @@ def _is_near(track: Track) -> bool:
     return bool(np.hypot(*track.states[0, :2]) <= RADIUS_M)
 
 
+def _ego(log: Log, frame: int) -> TrafficAgent:
+    return TrafficAgent(
+        id="Agent1",
+        type=AgentType.EGO_VEHICLE,
+        x_m=0.0,
+        y_m=0.0,
+        heading_rad=0.0,
+        width_m=round(log.ego_width_m, 3),
+        length_m=round(log.ego_length_m, 3),
+        speed_mps=round(float(log.ego[frame, 3]), 3),
+    )
+
+
 def _agent(track: Track) -> TrafficAgent:
     x_m, y_m, heading_rad, speed_mps = track.states[0].tolist()
     return TrafficAgent(
@@ -331,10 +330,15 @@ def _agent(track: Track) -> TrafficAgent:
     )
 
 
-def _on_lane(agent: TrafficAgent, graph: LaneGraph) -> TrafficAgent:
-    """The agent with the lane under it; only of what drives does the heading count."""
-    heading_rad = agent.heading_rad if agent.type in _HEADED else None
-    return replace(agent, lane_id=graph.under(agent.x_m, agent.y_m, heading_rad))
+def _on_lanes(scene: Scene) -> Scene:
+    """Everyone with the lane under them; only of what drives does the heading count."""
+    graph = LaneGraph(scene)
+
+    def place(agent: TrafficAgent, heading_rad: float | None) -> TrafficAgent:
+        return replace(agent, lane_id=graph.under(agent.x_m, agent.y_m, heading_rad))
+
+    agents = [place(one, one.heading_rad if one.type in _HEADED else None) for one in scene.agents]
+    return replace(scene, ego=place(scene.ego, 0.0), agents=tuple(agents))
 
 
 def _own_notes(log: Log, frame: int, road: MapExtract, licence: str | None) -> Iterator[Note]:

@@ -103,8 +103,8 @@ DOORS = {
     "arena/management/demo.py": "rates a study that it has closed",
     "arena/management/exporting.py": "--early, logged",
     "arena/studies/pages/planning.py": "reads what the reader may read",
-    "arena/results/pages/ratings.py": "the gate",
     "arena/results/pages/rating_form.py": "gives none: the page that asked leads to the gate",
+    "arena/results/pages/ratings.py": "the gate",
     "arena/results/pages/evidence.py": "behind the gate",
     "arena/studies/pages/studies.py": "asks results_access; what shows results needs it in full",
 }

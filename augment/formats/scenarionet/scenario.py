@@ -337,8 +337,7 @@ def _city(description: dict[str, Any], frame: int, place_name: str) -> RoadMap:
     is_left = told == "left" or place_name.lower().startswith(LEFT_HAND)
     notes = []
     if meaningless:
-        limit_mps = round(MEANINGLESS_KMH / 3.6, 1)
-        kind = SceneNoteKind.SPEED_LIMITS_IGNORED
+        kind, limit_mps = SceneNoteKind.SPEED_LIMITS_IGNORED, round(MEANINGLESS_KMH / 3.6, 1)
         notes.append(Note(kind=kind, number=len(meaningless), value=limit_mps))
     kinds = {kind for kind, _ in areas}
     return RoadMap(

@@ -182,10 +182,6 @@ def placeable_intent(document: object) -> dict[str, Any]:
     return intent_to_document(intent)
 
 
-def _stored_intent(document: object) -> dict[str, Any]:
-    return intent_to_document(intent_from_document(document))
-
-
 @transaction.atomic
 def add_scenario(
     *,
@@ -224,26 +220,27 @@ def add_scenario(
         Conflict: The slug is taken, the type has another label, or traffic is to be kept and
             spawned.
     """
-    base_scene = _base_scene(scene)
+    base_scene = BaseScene.objects.filter(slug=scene).first()
+    if base_scene is None:
+        raise UnknownName("scene", scene, list(BaseScene.objects.values_list("slug", flat=True)))
     if base_scene.retired_at is not None:
         raise Conflict(f"The scene “{base_scene.slug}” is retired; offer it again first.")
+    if slug is not None:
+        check_slug(slug, what="scenario")
+        if Scenario.objects.filter(slug=slug).exists():
+            raise Conflict(f"There is a scenario called {slug!r} already; choose another slug.")
     scenario = Scenario(
-        slug=_untaken_slug(base_scene, type, slug),
-        base_scene=base_scene,
-        keep_traffic=keep_traffic,
+        slug=slug or _free_slug(base_scene, type), base_scene=base_scene, keep_traffic=keep_traffic
     )
     set_wording(scenario, instruction, type, type_label)
     _set_circumstances(scenario, circumstances or Circumstances(), reference)
-    if reference is not None:
-        _set_reference(scenario, reference)
     if intent is not None:
         # The catalogue leaves some open on purpose: the rule placer refuses them, models do not.
         is_entered = intent_origin is IntentOrigin.ENTERED
-        read = placeable_intent if is_entered else _stored_intent
-        scenario.intent = read(intent)
+        read = intent_to_document(intent_from_document(intent))
+        scenario.intent = placeable_intent(intent) if is_entered else read
         scenario.intent_origin = intent_origin
-    _insert(scenario)
-    _log_addition(scenario, actor)
+    _insert(scenario, actor)
     return scenario
 
 
@@ -282,31 +279,32 @@ def change_circumstances(scenario: Scenario, given: Circumstances, *, keep_traff
     )
     scenario.spawned = None
     _set_circumstances(scenario, kept, reference)
-    if reference is not None:
-        _set_reference(scenario, reference)
     scenario.original_image, scenario.windows = "", {}
 
 
-def _log_addition(scenario: Scenario, actor: User | None) -> None:
-    log_change(
-        scenario,
-        "add",
-        actor,
-        after={
-            "slug": scenario.slug,
-            "scene": scenario.base_scene.slug,
-            "type": scenario.type,
-            "has_reference": scenario.reference is not None,
-            "keep_traffic": scenario.keep_traffic,
-            "intent": scenario.intent_origin or None,
-        },
-    )
+def _insert(scenario: Scenario, actor: User | None) -> None:
+    try:
+        with transaction.atomic():
+            scenario.save(force_insert=True)
+    except IntegrityError:  # somebody else was faster
+        problem = f"There is a scenario called {scenario.slug!r} already; try again."
+        raise Conflict(problem) from None
+    after = {
+        "slug": scenario.slug,
+        "scene": scenario.base_scene.slug,
+        "type": scenario.type,
+        "has_reference": scenario.reference is not None,
+        "keep_traffic": scenario.keep_traffic,
+        "intent": scenario.intent_origin or None,
+    }
+    log_change(scenario, "add", actor, after=after)
 
 
 def _set_circumstances(
     scenario: Scenario, given: Circumstances, reference: dict[str, Any] | None
 ) -> None:
-    """Keep them; spawned traffic then stays as it is whatever becomes of the reference."""
+    """Keep them and the reference; spawned traffic stays whatever becomes of the reference."""
+    change = None if reference is None else modification_from_document(reference)
     scenario.traffic_density, scenario.goal = given.density.value, given.goal or ""
     scenario.interplan = given.interplan
     scenario.instruction_is_generated = given.instruction_is_generated
@@ -319,26 +317,13 @@ def _set_circumstances(
             without_traffic(scene_from_document(base.document)),
             density,
             seed=base.slug,
-            clear_of=() if reference is None else modification_from_document(reference).added,
+            clear_of=() if change is None else change.added,
         )
     if traffic:
         scenario.spawned = modification_to_document(Modification(added=tuple(traffic)))
-
-
-def _set_reference(scenario: Scenario, reference: dict[str, Any]) -> None:
-    modification = modification_from_document(reference)
-    check_reference(scene_of(scenario), modification)
-    scenario.reference = modification_to_document(modification)
-
-
-def _insert(scenario: Scenario) -> None:
-    try:
-        with transaction.atomic():
-            scenario.save(force_insert=True)
-    except IntegrityError:  # somebody else was faster
-        raise Conflict(
-            f"There is a scenario called {scenario.slug!r} already; try again."
-        ) from None
+    if change is not None:
+        check_reference(scene_of(scenario), change)
+        scenario.reference = modification_to_document(change)
 
 
 def scene_of(scenario: Scenario) -> Scene:
@@ -425,23 +410,6 @@ def check_slug(slug: str, *, what: str, key: str = "slug") -> None:
 
 
 # Private
-
-
-def _base_scene(slug: str) -> BaseScene:
-    try:
-        return BaseScene.objects.get(slug=slug)
-    except BaseScene.DoesNotExist:
-        known = list(BaseScene.objects.values_list("slug", flat=True))
-        raise UnknownName("scene", slug, known) from None
-
-
-def _untaken_slug(base_scene: BaseScene, name: str, slug: str | None) -> str:
-    if slug is None:
-        return _free_slug(base_scene, name)
-    check_slug(slug, what="scenario")
-    if Scenario.objects.filter(slug=slug).exists():
-        raise Conflict(f"There is a scenario called {slug!r} already; choose another slug.")
-    return slug
 
 
 def _free_slug(base_scene: BaseScene, name: str) -> str:
