@@ -57,13 +57,18 @@ class Crowd:
 
 CROWDS = (
     Crowd(like="LLMFAO", votes=8931, contestants=59, experts=124, scenarios=13),
-    Crowd(like="LLMFAO, as a file, by the command", votes=8931, contestants=59, experts=124,
-          scenarios=13, from_file=True),
+    Crowd(
+        like="LLMFAO, as a file, by the command",
+        votes=8931,
+        contestants=59,
+        experts=124,
+        scenarios=13,
+        from_file=True,
+    ),
     Crowd(like="football", votes=49_520, contestants=316, experts=40, scenarios=40),
     Crowd(like="", votes=200_000, contestants=1000, experts=2000, scenarios=500),
-    Crowd(like="a public arena", votes=2_000_000, contestants=150, experts=50_000,
-          scenarios=2000),
-)  # fmt: skip
+    Crowd(like="a public arena", votes=2_000_000, contestants=150, experts=50_000, scenarios=2000),
+)
 
 
 def drawn(crowd: Crowd, seed: int = 1) -> Comparisons:
@@ -144,13 +149,15 @@ def main() -> None:
         ended = subprocess.run(command, cwd=ROOT, check=True, capture_output=True, text=True)
         found, crowd = json.loads(ended.stdout), CROWDS[number]
         counts = (crowd.votes, crowd.contestants, crowd.experts, crowd.scenarios)
-        rows.append([
-            ", ".join(f"{one:,}" for one in counts),
-            crowd.like,
-            f"{found['processor_s']:.2g} s",
-            f"{found['clock_s']:.2g} s",
-            f"{found['memory_mb']:.0f} MB",
-        ])  # fmt: skip
+        rows.append(
+            [
+                ", ".join(f"{one:,}" for one in counts),
+                crowd.like,
+                f"{found['processor_s']:.2g} s",
+                f"{found['clock_s']:.2g} s",
+                f"{found['memory_mb']:.0f} MB",
+            ]
+        )
         print(rows[-1], flush=True)
     text = section(rows, before)
     if asked.write:

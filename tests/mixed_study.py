@@ -41,9 +41,12 @@ def _vote_of(study: Study, username: str) -> None:
         comment = "The car stands on the kerb." if number % 5 == 0 else ""
         aids = ["zoom"] if number % 2 else []
         given = vote(
-            matchup, OUTCOMES[number % 4], comment=comment, aids=aids,
+            matchup,
+            OUTCOMES[number % 4],
+            comment=comment,
+            aids=aids,
             ms_visible=400 if number % 6 == 0 else 2500,
-        )  # fmt: skip
+        )
         if number == 2:
             vote(matchup, "left", supersedes=given.key)
     skipped = shown_again(matchups[3])
@@ -66,6 +69,13 @@ def _checks(study: Study) -> None:
 def _check(study: Study, username: str, left: Augmentation, right: Augmentation) -> Matchup:
     last = matchups_of(study, username)[-1]
     return Matchup.objects.create(
-        study=study, expert=last.expert, position=last.position + 1, scenario=left.scenario,
-        left=left, right=right, view=last.view, kind=Matchup.Kind.CHECK, draw_probability=1.0,
-    )  # fmt: skip
+        study=study,
+        expert=last.expert,
+        position=last.position + 1,
+        scenario=left.scenario,
+        left=left,
+        right=right,
+        view=last.view,
+        kind=Matchup.Kind.CHECK,
+        draw_probability=1.0,
+    )

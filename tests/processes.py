@@ -20,7 +20,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-from arena.serving.stack import find_redis_server, redis_answers
+from arena.serving.probes import find_redis_server, redis_answers
 
 ROOT = Path(__file__).resolve().parents[1]
 SOCKET = "redis.sock"

@@ -258,24 +258,35 @@ _DRIVEN = {"help": "as it was simulated with"}
 
 KINDS: dict[str, ExportKind] = {
     "leaderboard": ExportKind(
-        "study", "the newest rating of a study", _write_leaderboard,
+        "study",
+        "the newest rating of a study",
+        _write_leaderboard,
         _format([*FORMATS, ZIP]) | _OF_RATING,
     ),
     "votes": ExportKind(
-        "study", "the votes of the newest rating, with pseudonyms", _write_votes,
+        "study",
+        "the votes of the newest rating, with pseudonyms",
+        _write_votes,
         _format(VOTE_FORMATS) | _OF_RATING,
     ),
     "chart": ExportKind(
-        "study", "a chart of the newest rating beside the table's", _write_chart,
+        "study",
+        "a chart of the newest rating beside the table's",
+        _write_chart,
         {"--chart": {"required": True, "help": "pairs, types, width, displacement, elo-usd, ..."}}
-        | _format(CONTENT_TYPES, "svg") | _OF_RATING,
+        | _format(CONTENT_TYPES, "svg")
+        | _OF_RATING,
     ),
     "contact-sheet": ExportKind(
-        "study", "every contestant's picture of every scenario with the votes on it, as PDF",
-        _write_contact_sheet, _OF_RATING,
+        "study",
+        "every contestant's picture of every scenario with the votes on it, as PDF",
+        _write_contact_sheet,
+        _OF_RATING,
     ),
     "displacement": ExportKind(
-        "job", "how far from the references", _write_displacement,
+        "job",
+        "how far from the references",
+        _write_displacement,
         {
             "--by": {
                 "default": "type",
@@ -291,7 +302,9 @@ KINDS: dict[str, ExportKind] = {
         | _format(displacement_files.FORMATS),
     ),
     "samples": ExportKind(
-        "job", "a sheet of pictures with captions", _write_samples,
+        "job",
+        "a sheet of pictures with captions",
+        _write_samples,
         {
             "--scenarios": {"nargs": "+", "required": True, "help": "slugs, top to bottom"},
             "--contestants": {"nargs": "+", "required": True, "help": "left to right"},
@@ -300,31 +313,37 @@ KINDS: dict[str, ExportKind] = {
         | _format([*SHEET_FORMATS, "or what the file's ending says"], None),
     ),
     "driving": ExportKind(
-        "job", "mean driving scores of what was simulated", _write_driving,
+        "job",
+        "mean driving scores of what was simulated",
+        _write_driving,
         {
             "--score": {"default": "nuplan", "help": f"one of {', '.join(SCORES)}"},
             "--planner": {"default": "pdm-closed"} | _DRIVEN,
             "--offsets": {"default": "paper"} | _DRIVEN,
             "--reactive": {"action": "store_true"} | _DRIVEN,
-            "--with-paper": {
-                "action": "store_true", "help": "add the paper's rows below a rule"
-            },
+            "--with-paper": {"action": "store_true", "help": "add the paper's rows below a rule"},
         }
         | _format(driving.FORMATS),
     ),
     **{name: _plain(table) for name, table in PLAIN_TABLES.items()},
     "transcripts": _plain(TRANSCRIPTS, "jsonl"),
     "analyses": ExportKind(
-        "job", "pairs of contestants, wordings, refusals", _write_analyses,
+        "job",
+        "pairs of contestants, wordings, refusals",
+        _write_analyses,
         {"--part": {"required": True, "help": f"one of {', '.join(ANALYSES)}"}}
         | _format(TABLE_FORMATS),
     ),
     "modifications": ExportKind(
-        "job", "what a job's contestants made", _write_modifications,
+        "job",
+        "what a job's contestants made",
+        _write_modifications,
         _format(["interplan"], "interplan") | {"--contestant": _CONTESTANT, "--strict": _STRICT},
     ),
     "scenarios": ExportKind(
-        "job", "what a job made, in a standard format", _write_scenarios,
+        "job",
+        "what a job made, in a standard format",
+        _write_scenarios,
         {
             "--format": {
                 "required": True,
@@ -339,4 +358,4 @@ KINDS: dict[str, ExportKind] = {
             "--strict": _STRICT,
         },
     ),
-}  # fmt: skip
+}

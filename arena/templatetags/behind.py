@@ -48,8 +48,10 @@ def behind(
         return str(said)
     return format_html(
         '<a class="behind" href="{}" data-votes="{}">{}</a>',
-        votes_url(context, **search), number, said,
-    )  # fmt: skip
+        votes_url(context, **search),
+        number,
+        said,
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

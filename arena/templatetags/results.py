@@ -19,8 +19,13 @@ register = template.Library()
 
 _LABELS: dict[str, dict[str, str]] = {
     "form_label": {
-        "csv": "CSV", "json": "JSON", "parquet": "Parquet", "latex": "LaTeX", "svg": "SVG",
-        "pdf": "PDF", "png": "PNG",
+        "csv": "CSV",
+        "json": "JSON",
+        "parquet": "Parquet",
+        "latex": "LaTeX",
+        "svg": "SVG",
+        "pdf": "PDF",
+        "png": "PNG",
     },
     "left_out": {
         "superseded": "changed later",
@@ -69,7 +74,7 @@ _LABELS: dict[str, dict[str, str]] = {
         "lane_changes_to_goal": "Lane changes to the goal",
         "ego_passed_obstacles": "Obstacles passed",
     },
-}  # fmt: skip
+}
 """What words of the stored data are called on pages, by the filter that says so."""
 
 

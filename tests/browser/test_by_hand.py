@@ -97,8 +97,10 @@ def _draw_reference(page: Page) -> None:
     _lies_on_the_ego(page, stage)
     # By a click, 15 m ahead: what the numbers then say is where it was clicked.
     page.get_by_role("button", name="Place by a click").click()
-    at = stage.evaluate("(svg) => { const p = new DOMPoint(15, 0.5).matrixTransform("
-                        "svg.getScreenCTM()); return [p.x, p.y]; }")  # fmt: skip
+    at = stage.evaluate(
+        "(svg) => { const p = new DOMPoint(15, 0.5).matrixTransform("
+        "svg.getScreenCTM()); return [p.x, p.y]; }"
+    )
     page.mouse.click(*at)
     assert float(page.input_value("#n-x")) == pytest.approx(15.0, abs=0.1)
     assert float(page.input_value("#n-y")) == pytest.approx(-0.5, abs=0.1)

@@ -53,9 +53,14 @@ ONCOMING = parked(20.0, lane=LaneChoice.ONCOMING)
 FILE = walk(20.0, Side.LEFT, count=2, is_file=True, behind=(metres(3.0),))
 SLANTED = walk(20.0, Side.LEFT, drift_m=8.0)
 NARROWED = cones(
-    20.0, 3, Shape.TAPER, start=Side.RIGHT, ends_in_middle=True,
-    has_worker=True, post_side=Side.RIGHT,
-)  # fmt: skip
+    20.0,
+    3,
+    Shape.TAPER,
+    start=Side.RIGHT,
+    ends_in_middle=True,
+    has_worker=True,
+    post_side=Side.RIGHT,
+)
 
 ACROSS = (pedestrian("Agent2", 20.0, 6.0, (20.0, -3.0)),)
 CARS = (vehicle("Agent2", 20.0, 0.0), vehicle("Agent3", 24.5, 0.0, math.radians(40.0)))

@@ -100,9 +100,16 @@ def test_pairs_wordings_and_refusals_come_as_files(tmp_path: Path) -> None:
     )
     out = tmp_path / "pairs.json"
     call_command(
-        "export", "analyses", str(job.code), "--part", "pairs", "--format", "json",
-        "--out", str(out),
-    )  # fmt: skip
+        "export",
+        "analyses",
+        str(job.code),
+        "--part",
+        "pairs",
+        "--format",
+        "json",
+        "--out",
+        str(out),
+    )
     assert json.loads(out.read_text())["rows"][0]["scenarios"] == 7
     with pytest.raises(CommandError, match="pairs, wordings, refusals"):
         exported(job, "elephants", tmp_path)

@@ -113,21 +113,33 @@ def judged(draw: st.DrawFn) -> tuple[Judged, ...]:
     cells = draw(
         st.lists(
             st.tuples(
-                st.sampled_from(PAIRS), st.sampled_from(JUDGES), st.sampled_from("12"),
+                st.sampled_from(PAIRS),
+                st.sampled_from(JUDGES),
+                st.sampled_from("12"),
                 st.sampled_from(("left", "equal", "right")),
             ),
             min_size=1,
             max_size=25,
         )
-    )  # fmt: skip
+    )
     return tuple(
         Judged(
-            judge=judge, judge_name=judge, item=item, type="nudge", kind=MAIN, left=left,
-            right=right, outcome=outcome, both_miss=False, is_simulated=False, ms_visible=None,
-            matchup=number, repeat_of=None,
+            judge=judge,
+            judge_name=judge,
+            item=item,
+            type="nudge",
+            kind=MAIN,
+            left=left,
+            right=right,
+            outcome=outcome,
+            both_miss=False,
+            is_simulated=False,
+            ms_visible=None,
+            matchup=number,
+            repeat_of=None,
         )
         for number, ((left, right), judge, item, outcome) in enumerate(cells)
-    )  # fmt: skip
+    )
 
 
 AUTHORS = st.frozensets(st.tuples(st.sampled_from(JUDGES), st.sampled_from(SLUGS)), max_size=4)
@@ -144,9 +156,13 @@ def a_vote_set(votes: tuple[Judged, ...], filters: Filters) -> VoteSet:
             Entrant(slug=s, name=s, variant="", kind="rule", is_simulated=False, contestant=None)
             for s in SLUGS
         ),
-        counted=counted, with_own=votes, repeats=(), checks=(), references=frozenset(),
+        counted=counted,
+        with_own=votes,
+        repeats=(),
+        checks=(),
+        references=frozenset(),
         left_out={},
-    )  # fmt: skip
+    )
 
 
 def compared(votes: tuple[Judged, ...], filters: Filters) -> OwnVotes | None:

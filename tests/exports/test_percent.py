@@ -32,6 +32,18 @@ def test_table_heat_map_and_panels_agree() -> None:
 
 def _row(slug: str, *, wins: int) -> Row:
     return Row(
-        name=slug, variant="", slug=slug, kind="rule", simulated=False, rank=None, rating=None,
-        lower=None, upper=None, votes=40, wins=wins, ties=0, losses=40 - wins, note="",
-    )  # fmt: skip
+        name=slug,
+        variant="",
+        slug=slug,
+        kind="rule",
+        simulated=False,
+        rank=None,
+        rating=None,
+        lower=None,
+        upper=None,
+        votes=40,
+        wins=wins,
+        ties=0,
+        losses=40 - wins,
+        note="",
+    )

@@ -62,9 +62,21 @@ def test_a_number_stays_on_its_point_where_there_is_room() -> None:
 def test_the_heat_map_mirrors_scores_and_marks_what_is_few() -> None:
     def row(slug: str) -> Row:
         return Row(
-            name=slug, variant="", slug=slug, kind="rule", simulated=False, rank=1, rating=1000.0,
-            lower=None, upper=None, votes=1, wins=0, ties=1, losses=0, note="",
-        )  # fmt: skip
+            name=slug,
+            variant="",
+            slug=slug,
+            kind="rule",
+            simulated=False,
+            rank=1,
+            rating=1000.0,
+            lower=None,
+            upper=None,
+            votes=1,
+            wins=0,
+            ties=1,
+            losses=0,
+            note="",
+        )
 
     pair = PairRecord(a="a", b="b", wins=30, ties=10, losses=0, both_miss=0, planned=50)
     first, second, third = heat_map([pair], [row("a"), row("b"), row("c")])

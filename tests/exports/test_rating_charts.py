@@ -30,11 +30,16 @@ def snapshot() -> Snapshot:
     slugs = [line.slug for line in made.standings.order_by("slug")]
     cost = (
         ScenarioCost(
-            slug=slug, model="m", model_class=classes[n % 4], augmentations=5, calls=1.0,
-            tokens=3000.0 + n, usd=0.001 * (n + 1),
+            slug=slug,
+            model="m",
+            model_class=classes[n % 4],
+            augmentations=5,
+            calls=1.0,
+            tokens=3000.0 + n,
+            usd=0.001 * (n + 1),
         )
         for n, slug in enumerate(slugs)
-    )  # fmt: skip
+    )
     far = DisplacementSummary(
         slug="", median_m=0.5, mean_m=1.0, n=5, missing=0, surplus=0, augmentations=5
     )

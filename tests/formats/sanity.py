@@ -13,17 +13,32 @@ from typing import Any
 import numpy as np
 
 FIRST_LEVEL = {
-    "id", "version", "length", "metadata", "tracks", "dynamic_map_states", "map_features",
-}  # fmt: skip
+    "id",
+    "version",
+    "length",
+    "metadata",
+    "tracks",
+    "dynamic_map_states",
+    "map_features",
+}
 METADATA = {"metadrive_processed", "coordinate", "ts"}
 OBJECT_TYPES = {
-    "VEHICLE", "PEDESTRIAN", "CYCLIST", "OTHER", "TRAFFIC_LIGHT", "TRAFFIC_BARRIER",
-    "TRAFFIC_CONE", "TRAFFIC_OBJECT",
-}  # fmt: skip
+    "VEHICLE",
+    "PEDESTRIAN",
+    "CYCLIST",
+    "OTHER",
+    "TRAFFIC_LIGHT",
+    "TRAFFIC_BARRIER",
+    "TRAFFIC_CONE",
+    "TRAFFIC_OBJECT",
+}
 LANES = {
-    "LANE_SURFACE_STREET", "LANE_SURFACE_UNSTRUCTURE", "LANE_UNKNOWN", "LANE_BIKE_LANE",
+    "LANE_SURFACE_STREET",
+    "LANE_SURFACE_UNSTRUCTURE",
+    "LANE_UNKNOWN",
+    "LANE_BIKE_LANE",
     "LANE_FREEWAY",
-}  # fmt: skip
+}
 PLAIN = (int, float, str, bool, np.ndarray, dict, list, tuple, type(None), set)
 OLD_NAMES = {
     ("numpy.core.multiarray", "_reconstruct"): ("numpy._core.multiarray", "_reconstruct"),

@@ -75,15 +75,21 @@ def test_plain_yaml_shows_interplans_keys() -> None:
     text, _ = write([cell(slug), cell("jaywalker-terrace-row")])
     document = yaml.safe_load(text)
     assert list(document) == [
-        "accel_max", "decel_max", "scenario_specifics", "modification_details_dictionary",
-    ]  # fmt: skip
+        "accel_max",
+        "decel_max",
+        "scenario_specifics",
+        "modification_details_dictionary",
+    ]
     by_token = document["modification_details_dictionary"]
     assert list(by_token) == [token_of("mill-junction"), token_of("terrace-row")]
     details = by_token[token_of("mill-junction")]
     assert list(details) == [
-        "extra_agents_to_spawn", "roadblock_locations_to_spawn_agents", "goal",
-        "spawn_in_intersection", "special_scenario",
-    ]  # fmt: skip
+        "extra_agents_to_spawn",
+        "roadblock_locations_to_spawn_agents",
+        "goal",
+        "spawn_in_intersection",
+        "special_scenario",
+    ]
     assert details["goal"] == {"left": None, "right": None, "straight": None}
     zone = details["special_scenario"]["0"]
     assert list(zone) == ["type", "cones", "pedestrian"]

@@ -115,8 +115,10 @@ def test_a_paused_job_starts_nothing_and_what_is_in_flight_keeps_its_result() ->
     job = jobs.pause(job)
     assert job.state == Job.PAUSED
     assert Event.objects.get(verb="pause").after == {
-        "state": "paused", "waiting": 2, "in_flight": 1,
-    }  # fmt: skip
+        "state": "paused",
+        "waiting": 2,
+        "in_flight": 1,
+    }
     assert AUGMENTATIONS.take(second.pk) is None
     assert AUGMENTATIONS.find_unsent(older_than=timedelta(0)) == []
     assert count_rows(job).is_moving, "one is in flight"

@@ -47,22 +47,57 @@ def text(bodies: Bodies) -> str:
 TABLE: list[tuple[str, str, object, Callable[[Bodies], bool], Callable[[Bodies], bool]]] = [
     ("temperature", "tqa", 0.7, every("temperature", 0.7), every("temperature", None)),
     ("seed", "tqa", 41, every("seed", 41), every("seed", None)),
-    ("reasoning_effort", "tqa", "low", every("reasoning_effort", "low"),
-     every("reasoning_effort", None)),
-    ("max_output_tokens", "tqa", 500, every("max_completion_tokens", 500),
-     every("max_completion_tokens", 8192)),
-    ("protocol", "fc", "native", lambda bodies: "tools" in bodies[0],
-     lambda bodies: "tools" not in bodies[0]),
+    (
+        "reasoning_effort",
+        "tqa",
+        "low",
+        every("reasoning_effort", "low"),
+        every("reasoning_effort", None),
+    ),
+    (
+        "max_output_tokens",
+        "tqa",
+        500,
+        every("max_completion_tokens", 500),
+        every("max_completion_tokens", 8192),
+    ),
+    (
+        "protocol",
+        "fc",
+        "native",
+        lambda bodies: "tools" in bodies[0],
+        lambda bodies: "tools" not in bodies[0],
+    ),
     ("rounds", "tqa", 2, lambda bodies: len(bodies) == 4, lambda bodies: len(bodies) == 6),
-    ("accepted_from", "tqa", 3.0, lambda bodies: len(bodies) == 2,
-     lambda bodies: len(bodies) == 6),
-    ("radius_m", "otm", 30.0, lambda bodies: "[60,0]" not in text(bodies),
-     lambda bodies: "[60,0]" in text(bodies)),
-    ("prompt_version", "otm", prompt_version(), lambda bodies: len(bodies) == 1,
-     lambda bodies: len(bodies) == 1),
-    ("picture_px", "vqa", 600, lambda bodies: png_width(bodies) == 600,
-     lambda bodies: png_width(bodies) == 1200),
-]  # fmt: skip
+    (
+        "accepted_from",
+        "tqa",
+        3.0,
+        lambda bodies: len(bodies) == 2,
+        lambda bodies: len(bodies) == 6,
+    ),
+    (
+        "radius_m",
+        "otm",
+        30.0,
+        lambda bodies: "[60,0]" not in text(bodies),
+        lambda bodies: "[60,0]" in text(bodies),
+    ),
+    (
+        "prompt_version",
+        "otm",
+        prompt_version(),
+        lambda bodies: len(bodies) == 1,
+        lambda bodies: len(bodies) == 1,
+    ),
+    (
+        "picture_px",
+        "vqa",
+        600,
+        lambda bodies: png_width(bodies) == 600,
+        lambda bodies: png_width(bodies) == 1200,
+    ),
+]
 
 
 def test_the_table_has_every_option() -> None:

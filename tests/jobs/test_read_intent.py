@@ -97,9 +97,7 @@ def test_a_cap_ends_a_reading_before_the_call_that_would_pass_it() -> None:
 
 def test_a_broken_wire_is_a_failed_reading_with_a_sentence() -> None:
     made = reading(ModelFault("the endpoint answered nonsense", retryable=False, status=400))
-    assert (made.state, made.reason) == (
-        State.FAILED, "HTTP 400: the endpoint answered nonsense",
-    )  # fmt: skip
+    assert (made.state, made.reason) == (State.FAILED, "HTTP 400: the endpoint answered nonsense")
     assert made.calls.get().fault == made.reason
 
 

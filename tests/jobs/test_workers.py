@@ -15,7 +15,7 @@ import redis
 from celery import current_app
 from django.db import OperationalError
 
-from arena.serving.stack import find_redis_server, redis_answers
+from arena.serving.probes import find_redis_server, redis_answers
 from augment import tasks
 from augment.errors import QueueRefused, QueueUnreachable
 from augment.models import Worker

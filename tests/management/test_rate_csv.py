@@ -31,8 +31,10 @@ def test_json_has_standings_best_first(votes: Any) -> None:
     assert ratings == sorted(ratings, reverse=True)
     assert sum(ratings) == pytest.approx(3000, abs=0.01)
     assert {row["model"]: row["votes"] for row in found["standings"]} == {
-        "a": 69, "b": 76, "c": 35,
-    }  # fmt: skip
+        "a": 69,
+        "b": 76,
+        "c": 35,
+    }
     assert found["tie_share"] == pytest.approx(14 / 90, abs=1e-4)
     for row in found["standings"]:
         assert row["lower"] < row["elo"] < row["upper"]

@@ -127,10 +127,13 @@ def test_a_token_in_use_that_expires(
 ) -> None:
     now = timezone.now()
     token = ApiToken.objects.create(
-        owner=admin, name="nightly", role="analyst", token_sha256="0" * 64,
+        owner=admin,
+        name="nightly",
+        role="analyst",
+        token_sha256="0" * 64,
         expires_at=now + timedelta(days=expires),
         last_used_at=None if used is None else now - timedelta(days=used),
-    )  # fmt: skip
+    )
     assert wrong() == ({"token nightly": Level.DOUBTFUL} if is_told else {})
     ApiToken.objects.filter(pk=token.pk).update(revoked_at=now)
     assert wrong() == {}

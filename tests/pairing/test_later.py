@@ -90,11 +90,15 @@ def test_a_pair_that_everybody_has_judged_everywhere_is_refused_by_name() -> Non
     first, second = grid.pairs[0]
     all_of_it = [
         PlannedMatchup(
-            expert="eva", position=n + 1, scenario=scenario, left=first, right=second,
+            expert="eva",
+            position=n + 1,
+            scenario=scenario,
+            left=first,
+            right=second,
             draw_probability=1.0,
         )
         for n, scenario in enumerate(grid.scenarios)
-    ]  # fmt: skip
+    ]
     more = [Wanted(pair=0, scenario=0, chance=1.0)]
     with pytest.raises(NothingToPlan, match=f"{first} against {second} on every scenario"):
         deal(grid, {"eva": all_of_it}, ["eva"], more, np.random.default_rng(1))

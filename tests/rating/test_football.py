@@ -82,9 +82,10 @@ def test_everybody_whom_the_results_determine_has_an_interval(board: Leaderboard
     assert {ends(line) for line in firm_lines(board)} == {(True, True)}
 
 
-@pytest.mark.parametrize(("team", "bounds"), [
-    (300, (False, True)), (301, (False, True)), (302, (True, True)), (303, (True, True)),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("team", "bounds"),
+    [(300, (False, True)), (301, (False, True)), (302, (True, True)), (303, (True, True))],
+)
 def test_a_weak_team_has_a_lower_bound_where_its_points_hardly_ever_go_missing(
     board: Leaderboard, team: int, bounds: tuple[bool, bool]
 ) -> None:

@@ -154,8 +154,11 @@ def test_losers_of_a_lower_group_are_not_first() -> None:
     between = versus("a", "c", 30, 0, 0) + versus("b", "d", 30, 0, 0)
     board = by_votes(named(upper + lower + between))
     assert [(line.name, line.rank) for line in board.standings] == [
-        ("a", 1), ("b", 2), ("c", 3), ("d", 4)
-    ]  # fmt: skip
+        ("a", 1),
+        ("b", 2),
+        ("c", 3),
+        ("d", 4),
+    ]
 
 
 def test_one_lucky_win_over_the_best_takes_nobody_s_rank() -> None:

@@ -23,7 +23,7 @@ from tests.rating.paper import (
     fitting_votes,
     pair_counts,
     simulated_votes,
-)  # fmt: skip
+)
 
 WINNERS = {1.0: "model_a", 0.5: "tie", 0.0: "model_b"}
 

@@ -90,16 +90,24 @@ def test_the_votes_asked_for_are_the_fewest() -> None:
 
 
 @given(
-    st.integers(2, 20), st.integers(2, 20), st.floats(0.0, 400.0), st.floats(0.0, 100.0),
+    st.integers(2, 20),
+    st.integers(2, 20),
+    st.floats(0.0, 400.0),
+    st.floats(0.0, 100.0),
     st.integers(1, 500),
-)  # fmt: skip
+)
 def test_more_votes_never_tell_less(
     contestants: int, experts: int, spread: float, effect: float, votes: int
 ) -> None:
     design = StudyDesign(
-        contestants=contestants, experts=experts, scenarios=20, spread=spread, tie_share=0.1,
-        expert_sd=effect, scenario_sd=effect,
-    )  # fmt: skip
+        contestants=contestants,
+        experts=experts,
+        scenarios=20,
+        spread=spread,
+        tie_share=0.1,
+        expert_sd=effect,
+        scenario_sd=effect,
+    )
     asked = replace(ASKED, design=design)
     fewer, more = prospect(asked, votes), prospect(asked, 2 * votes)
     assert more.half_width <= fewer.half_width * 1.0001

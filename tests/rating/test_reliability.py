@@ -142,9 +142,13 @@ def test_experts_who_differ_widen_the_interval_of_a_share() -> None:
 
 def test_the_panel_counts_pace_ties_sides_and_agreement() -> None:
     votes = judged(
-        ("e", "s1", WIN), ("f", "s1", WIN), ("g", "s1", LOSS),
-        ("e", "s2", TIE), ("f", "s2", TIE), ("e", "s3", WIN),
-    )  # fmt: skip
+        ("e", "s1", WIN),
+        ("f", "s1", WIN),
+        ("g", "s1", LOSS),
+        ("e", "s2", TIE),
+        ("f", "s2", TIE),
+        ("e", "s3", WIN),
+    )
     ms = np.array([900.0, np.nan, np.nan, 1500.0, np.nan, 2000.0])
     first, second, third = raters(votes, ms=ms, without=np.array([[0.5, 0], [0, 0.5], [0, 0]]))
     assert (first.votes, first.median_ms) == (3, 1500.0)

@@ -118,9 +118,12 @@ def _repeat_and_check(study: Study) -> None:
     )
     for first, again in zip(own[:REPEATS], own[-REPEATS:], strict=True):
         Matchup.objects.filter(pk=again.pk).update(
-            kind="repeat", repeat_of=first, left=first.right, right=first.left,
+            kind="repeat",
+            repeat_of=first,
+            left=first.right,
+            right=first.left,
             scenario=first.scenario,
-        )  # fmt: skip
+        )
     with_reference = [
         row.pk
         for row in own[REPEATS:-REPEATS]

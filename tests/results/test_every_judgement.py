@@ -88,9 +88,12 @@ def test_what_the_side_is_worth(shown: Shown) -> None:
     votes = shown.main
     experts = codes([vote.judge for vote in votes])
     found = glm(
-        votes, shown.slugs, np.ones((len(votes), 1)), cov_type="cluster",
+        votes,
+        shown.slugs,
+        np.ones((len(votes), 1)),
+        cov_type="cluster",
         cov_kwds={"groups": experts, "use_correction": False},
-    )  # fmt: skip
+    )
     side, groups = shown.results.trust.side, len(np.unique(experts))
     assert side is not None
     value = found.params[-1] * POINTS

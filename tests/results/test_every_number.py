@@ -37,8 +37,10 @@ def test_counts_of_every_line_and_what_the_page_prints(shown: Shown) -> None:
     for slug, line in shown.lines.items():
         own = [vote.score_of(slug) for vote in shown.main if slug in vote.names]
         assert (line.wins, line.ties, line.losses) == (
-            own.count(1.0), own.count(0.5), own.count(0.0)
-        )  # fmt: skip
+            own.count(1.0),
+            own.count(0.5),
+            own.count(0.0),
+        )
         cells = next(row for row in printed if row[1].startswith(line.name))
         assert line.lower is not None
         assert line.upper is not None
@@ -56,9 +58,8 @@ def test_the_cross_check_is_the_plain_two_way_sandwich(shown: Shown) -> None:
     covariance = 0
     for sign, groups in ((1, experts), (1, items), (-1, experts * 1000 + items)):
         found = glm(
-            votes, slugs, cov_type="cluster",
-            cov_kwds={"groups": groups, "use_correction": False},
-        )  # fmt: skip
+            votes, slugs, cov_type="cluster", cov_kwds={"groups": groups, "use_correction": False}
+        )
         number = len(np.unique(groups))
         covariance = covariance + sign * found.cov_params() * number / (number - 1)
     centred = np.vstack([np.zeros(len(slugs) - 1), np.eye(len(slugs) - 1)])
@@ -208,8 +209,10 @@ def test_pairs_their_scores_and_adjusted_p_values(shown: Shown) -> None:
         both = frozenset((pair.a, pair.b))
         own = [vote.score_of(pair.a) for vote in shown.main if vote.names == both]
         assert (pair.wins, pair.ties, pair.losses) == (
-            own.count(1.0), own.count(0.5), own.count(0.0)
-        )  # fmt: skip
+            own.count(1.0),
+            own.count(0.5),
+            own.count(0.0),
+        )
         assert pair.planned == shown.planned[both]
         # Never surer than a single test of independent votes with as many degrees as experts.
         a, b = slugs.index(pair.a), slugs.index(pair.b)

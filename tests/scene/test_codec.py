@@ -244,8 +244,9 @@ def test_a_list_tells_its_first_fault() -> None:
     with pytest.raises(InvalidDocument) as caught:
         scene_from_document(made)
     assert [place for place, _ in caught.value.problems] == [
-        "lanes[0].centerline_m[0][0]", "lanes[0].centerline_m[0][1]",
-    ]  # fmt: skip
+        "lanes[0].centerline_m[0][0]",
+        "lanes[0].centerline_m[0][1]",
+    ]
 
 
 @pytest.mark.parametrize(("number", "is_read"), [(5_000, True), (5_001, False)])

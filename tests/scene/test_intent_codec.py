@@ -39,8 +39,10 @@ from tests.intents import metres, parked
 METRES = st.floats(0.0, 500.0)
 LENGTHS = st.builds(
     lambda low, more, about: Length(low_m=low, high_m=low + more, is_approximate=about),
-    METRES, METRES, st.booleans(),
-)  # fmt: skip
+    METRES,
+    METRES,
+    st.booleans(),
+)
 LATERALS = st.builds(
     Lateral,
     target=st.sampled_from(LateralTarget),

@@ -96,7 +96,7 @@ OFF_EDGE = "its first cone stands 1.1 m off the lane centre, not at an edge"
         (works()[:-1], ["its roadworks have no sign"]),
         (works()[:3], ["its roadworks have no sign, no barrier, no worker"]),
     ],
-)  # fmt: skip
+)
 def test_roadworks_guard_their_worker(added: list[TrafficAgent], reasons: list[str]) -> None:
     assert [*find_unguarded(staged(WORKS, *added))] == reasons
 

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from arena.serving import stack
-from arena.serving.stack import PortTaken, port_answers, redis_answers, require_free_port
+from arena.serving import probes
+from arena.serving.probes import PortTaken, port_answers, redis_answers, require_free_port
 
 
 def test_a_taken_port_is_named_with_the_next_one() -> None:
@@ -37,4 +37,4 @@ def test_what_speaks_redis_is_found_by_either_name(
     program.write_text("#!/bin/sh\n")
     program.chmod(0o700)
     monkeypatch.setenv("PATH", str(tmp_path))
-    assert stack.find_redis_server() == program
+    assert probes.find_redis_server() == program

@@ -16,7 +16,7 @@ import pytest
 from waitress.adjustments import Adjustments
 
 from arena.serving import web_worker
-from arena.serving.stack import port_answers
+from arena.serving.probes import port_answers
 from arena.serving.web_worker import Connection, make_room
 from tests.processes import Process, wait_until
 from tests.stack import free_port

@@ -287,9 +287,14 @@ def test_a_car_parked_in_the_ego_s_lane_changes_the_drive(realdata: Path) -> Non
         float(v) for v in road.centreline.poses(np.array([start_m + 30.0]))[0]
     )
     parked = TrafficAgent(
-        id="Added1", type=AgentType.VEHICLE, x_m=x_m, y_m=y_m, heading_rad=heading_rad,
-        width_m=2.0, length_m=4.8,
-    )  # fmt: skip
+        id="Added1",
+        type=AgentType.VEHICLE,
+        x_m=x_m,
+        y_m=y_m,
+        heading_rad=heading_rad,
+        width_m=2.0,
+        length_m=4.8,
+    )
     setting = DriveSetting(
         scene=scene, recording=recording, modification=Modification(added=(parked,))
     )

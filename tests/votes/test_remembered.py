@@ -49,9 +49,14 @@ def test_a_vote_that_commits_late_with_a_smaller_number_is_counted() -> None:
     newest = Vote.objects.get()
     assert told(study)[0] == 1
     late = Vote(
-        pk=newest.pk - 1, key=uuid4(), matchup=second,
-        expert=second.expert, shown_left=second.left, shown_right=second.right, outcome="equal",
-    )  # fmt: skip
+        pk=newest.pk - 1,
+        key=uuid4(),
+        matchup=second,
+        expert=second.expert,
+        shown_left=second.left,
+        shown_right=second.right,
+        outcome="equal",
+    )
     late.save(force_insert=True)
     assert told(study)[:2] == (2, 2)
 

@@ -68,9 +68,14 @@ def test_what_comes_after_a_rating_is_none_of_its_votes(study: Study) -> None:
     held = total(before, mark=EVERY)
     first = Vote.objects.order_by("pk")[0]
     Vote.objects.create(
-        key=first.matchup.code, matchup=first.matchup, expert=first.expert, outcome="equal",
-        shown_left=first.shown_left, shown_right=first.shown_right, supersedes=first,
-    )  # fmt: skip
+        key=first.matchup.code,
+        matchup=first.matchup,
+        expert=first.expert,
+        outcome="equal",
+        shown_left=first.shown_left,
+        shown_right=first.shown_right,
+        supersedes=first,
+    )
     assert total(before, mark=EVERY) == held
     assert total(before, mark="superseded") == before.votes_left_out["superseded"] == 2
     assert total(rated(study), mark="superseded") == 3

@@ -42,9 +42,12 @@ def _acts() -> tuple[Client, Study]:
     accounts = people()
     study = close_study(study=study_rows.a_study(), actor=accounts["admin"])
     log_event(
-        actor=accounts["analyst"], verb="import", object_kind="scene", object_code="a-street",
+        actor=accounts["analyst"],
+        verb="import",
+        object_kind="scene",
+        object_code="a-street",
         after={"notes": "=1+1"},
-    )  # fmt: skip
+    )
     return signed_in(accounts["admin"]), study
 
 

@@ -52,8 +52,10 @@ def test_an_endpoint_is_added_with_its_limits_and_shows_no_key(
     shown = post(admin, "endpoint-new", GIVEN)
     row = Endpoint.objects.get()
     assert (row.base_url, row.max_concurrency, row.requests_per_minute) == (
-        "http://127.0.0.1:9/v1", 3, 60,
-    )  # fmt: skip
+        "http://127.0.0.1:9/v1",
+        3,
+        60,
+    )
     assert "“here” is added." in shown
     pages = [shown, admin.get(reverse("endpoints")).content.decode()]
     assert all("HERE_API_KEY" in page and "sk-very-secret" not in page for page in pages)
@@ -106,8 +108,10 @@ def test_a_model_keeps_what_somebody_knows_and_no_half_of_a_price(
     shown = post(admin, "endpoint-model", known, code=model.code)
     assert "a price needs both halves, a date and a source" in shown.lower()
     whole = known | {
-        "price_out_usd": "1.5", "price_as_of": "2026-11-20", "price_source": "our contract",
-    }  # fmt: skip
+        "price_out_usd": "1.5",
+        "price_as_of": "2026-11-20",
+        "price_source": "our contract",
+    }
     assert "Kept." in post(admin, "endpoint-model", whole, code=model.code)
     model.refresh_from_db()
     assert (model.vision, model.native_tools, model.model_class) == (False, None, "open_weight")

@@ -46,8 +46,11 @@ def test_an_expert_labels_by_a_press_and_learns_the_guess_only_afterwards(
     assert answer.headers["Location"] == url
     label = FaultLabel.objects.get()
     assert (label.position, label.heading, label.logic, label.note) == (
-        True, False, False, "far off",
-    )  # fmt: skip
+        True,
+        False,
+        False,
+        "far off",
+    )
     assert "The automatic checks had guessed:" in client.get(url).content.decode()
 
 

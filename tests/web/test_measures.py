@@ -50,9 +50,12 @@ def test_lines_stand_where_the_picture_has_the_metres() -> None:
     assert {y for _, y in beside["points"]} == {round(ego_y - 1.2 * scale, 1)}
     assert ahead["anchor"] != beside["anchor"], "labels go apart"
     assert found["rings"][0] | {"text": None} == {
-        "at": [ego_x, ego_y], "r": round(10.0 * scale, 1), "label": "10 m", "text": None,
+        "at": [ego_x, ego_y],
+        "r": round(10.0 * scale, 1),
+        "label": "10 m",
+        "text": None,
         "anchor": "middle",
-    }  # fmt: skip
+    }
     for one in (*found["lines"], *found["rings"]):
         x, y = one.get("text", one.get("at"))
         assert 0 < x < view["width"]

@@ -50,7 +50,7 @@ def test_impossible_cells_are_disabled_and_say_why_in_the_text(
         f"{variant}|here|{model}"
         for variant in ("vqa", "fc+vqa")
         for model in ("blind", "unknown")
-    }  # fmt: skip
+    }
     assert shown.count("needs vision, and it sees text alone") == 2
     assert shown.count("nobody knows whether it sees pictures: probe it") == 2
     assert "is not one of the available choices" in send(admin, cells=["vqa|here|blind"])
@@ -112,9 +112,13 @@ def test_one_scenario_is_tried_first_and_the_rest_is_remembered(
 def test_a_duplicate_fills_the_form_with_what_the_job_had(admin: Client, models: Endpoint) -> None:
     rows.add_kind("reference")
     job = jobs.launch(
-        name="Old", contestants=["reference"], scenarios=["two"], caps=Caps(tokens=7), samples=2,
+        name="Old",
+        contestants=["reference"],
+        scenarios=["two"],
+        caps=Caps(tokens=7),
+        samples=2,
         is_fresh=True,
-    )  # fmt: skip
+    )
     form = admin.get(f"{reverse('job-new')}?like={job.code}").content.decode()
     for part in (
         'value="Old (2)"',

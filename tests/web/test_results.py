@@ -87,9 +87,13 @@ def test_an_expert_reads_results_only_once_no_open_study_has_the_same_contestant
     url = reverse("results", args=[study.code])
     assert signed_in(eva).get(url).status_code == 200
     second = open_study(
-        name="Round 2", votes_per_expert=3, seed=1, experts=["eva"],
-        contestants=["ann", "bob"], scenarios=["place-0", "place-1", "place-2"],
-    )  # fmt: skip
+        name="Round 2",
+        votes_per_expert=3,
+        seed=1,
+        experts=["eva"],
+        contestants=["ann", "bob"],
+        scenarios=["place-0", "place-1", "place-2"],
+    )
     assert signed_in(eva).get(url).status_code == 403
     assert url not in signed_in(eva).get("/").content.decode()
     close_study(study=second)

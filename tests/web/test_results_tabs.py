@@ -53,9 +53,8 @@ def test_raters_are_pseudonyms_with_repeats_and_checks(analyst: Client) -> None:
     study = study_rows.a_study(votes_per_expert=9)
     first, second, third, *rest = study_rows.matchups_of(study, "eva")
     Matchup.objects.filter(pk=second.pk).update(
-        kind="repeat", repeat_of=first, left=first.right, right=first.left,
-        scenario=first.scenario,
-    )  # fmt: skip
+        kind="repeat", repeat_of=first, left=first.right, right=first.left, scenario=first.scenario
+    )
     Matchup.objects.filter(pk=third.pk).update(kind="check")
     second.refresh_from_db()
     for matchup in (first, second, third, *rest, *study_rows.matchups_of(study, "finn")):
@@ -88,9 +87,13 @@ def test_experts_read_the_table_but_nothing_about_each_other(study: Study) -> No
 def test_a_new_rating_is_asked_for_with_method_and_filters(study: Study, analyst: Client) -> None:
     person = study.experts.order_by("pk")[0].person
     sent = {
-        "method": "bt", "resample": "vote", "rounds": "60", "seed": "9",
-        "types": [ScenarioType.NUDGE.value], "experts": [str(person.code)],
-    }  # fmt: skip
+        "method": "bt",
+        "resample": "vote",
+        "rounds": "60",
+        "seed": "9",
+        "types": [ScenarioType.NUDGE.value],
+        "experts": [str(person.code)],
+    }
     analyst.post(reverse("study-rate", args=[study.code]), sent)
     made = study.snapshots.order_by("-pk")[0]
     assert (made.rounds, made.seed, made.resampling_unit) == (60, 9, "vote")

@@ -58,11 +58,20 @@ def value(answer: Any, name: str) -> str:
 def test_a_draft_keeps_every_field_as_it_stands(admin: Client) -> None:
     study_rows.cast_of()
     sent = {
-        "name": "Round 1", "contestants": ["bob"], "experts": ["finn"], "targets": "ann lots",
-        "scenarios": ["place-0", "place-3"], "votes_per_expert": "", "seed": "77",
-        "repeats": "12.5", "checks": "99", "hypotheses": "ann above",
-        "allow_text": "on", "samples": "all", "keep": "1",
-    }  # fmt: skip
+        "name": "Round 1",
+        "contestants": ["bob"],
+        "experts": ["finn"],
+        "targets": "ann lots",
+        "scenarios": ["place-0", "place-3"],
+        "votes_per_expert": "",
+        "seed": "77",
+        "repeats": "12.5",
+        "checks": "99",
+        "hypotheses": "ann above",
+        "allow_text": "on",
+        "samples": "all",
+        "keep": "1",
+    }
     answer = admin.post(NEW, sent)
     draft = StudyDraft.objects.get()
     assert answer.headers["Location"] == page_of(draft)
@@ -165,10 +174,13 @@ def test_who_is_forgotten_is_forgotten_in_drafts_too(admin: Client) -> None:
 def a_rich_study() -> Study:
     """One that departs from the defaults wherever it can."""
     given = {
-        "repeats": 25, "overlap": 10, "targets": ["ann 20", "bob 15", "cid 13"],
-        "allow_both_miss": True, "allow_measures": False,
+        "repeats": 25,
+        "overlap": 10,
+        "targets": ["ann 20", "bob 15", "cid 13"],
+        "allow_both_miss": True,
+        "allow_measures": False,
         "hypotheses": ["ann above bob", "It is so."],
-    }  # fmt: skip
+    }
     cast = study_rows.cast_of()
     return open_study(name="Round 1", **cast, votes_per_expert=12, seed=4, **given)
 

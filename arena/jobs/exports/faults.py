@@ -19,9 +19,17 @@ from augment.models import GenerationJob
 from augment.services.judging.findings import FaultClass
 
 COLUMNS = (
-    "contestant", "slug", "simulated", "all", "position", "heading", "logic",
-    "augmentations_labelled", "labels", "without_modification",
-)  # fmt: skip
+    "contestant",
+    "slug",
+    "simulated",
+    "all",
+    "position",
+    "heading",
+    "logic",
+    "augmentations_labelled",
+    "labels",
+    "without_modification",
+)
 
 
 NOT_LABELLED = "--"
@@ -147,12 +155,16 @@ def csv_bytes(table: FaultTable) -> bytes:
     """Return one line a contestant; counts are empty where nothing was labelled."""
     rows = (
         (
-            line.shown_name, line.slug, line.is_simulated,
+            line.shown_name,
+            line.slug,
+            line.is_simulated,
             *("" if count == NOT_LABELLED else count for count in line.shown_counts),
-            line.labelled, line.labels, line.without_modification,
+            line.labelled,
+            line.labels,
+            line.without_modification,
         )
         for line in table.lines
-    )  # fmt: skip
+    )
     return csv_text(COLUMNS, rows).encode()
 
 

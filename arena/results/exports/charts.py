@@ -220,10 +220,16 @@ def heat_chart(rows: Sequence[Row], pairs: Sequence[PairRecord], *, file_format:
         axes.set_xticks(range(len(rows)), numbers, fontsize=8)
         for place, row in enumerate(rows):
             axes.annotate(
-                row.model, (0.0, place), (-18.0, 0.0), ("axes fraction", "data"),
-                "offset points", ha="right", va="center", fontsize=8.0,
+                row.model,
+                (0.0, place),
+                (-18.0, 0.0),
+                ("axes fraction", "data"),
+                "offset points",
+                ha="right",
+                va="center",
+                fontsize=8.0,
                 color=SIMULATED if row.simulated else INK,
-            )  # fmt: skip
+            )
         axes.tick_params(length=0, colors=INK)
         axes.spines[:].set_visible(False)
         text = "Score of the row in percent, a tie half a win; votes beneath"

@@ -282,18 +282,39 @@ def _draw_points(axes: Axes, plot: Plot, size_in: Place) -> None:
         x, y = badge[0] / size_in[0], badge[1] / size_in[1]
         if badge != place:
             axes.plot(
-                [place[0] / size_in[0], x], [place[1] / size_in[1], y], color=colour,
-                linewidth=0.7, transform=axes.transAxes, marker="o", markersize=2.5, markevery=[0],
-            )  # fmt: skip
+                [place[0] / size_in[0], x],
+                [place[1] / size_in[1], y],
+                color=colour,
+                linewidth=0.7,
+                transform=axes.transAxes,
+                marker="o",
+                markersize=2.5,
+                markevery=[0],
+            )
         axes.plot(
-            [x], [y], marker=shape, markersize=_RADIUS_IN * 144, color=colour,
-            markeredgecolor="white", markeredgewidth=0.8, transform=axes.transAxes, zorder=5,
+            [x],
+            [y],
+            marker=shape,
+            markersize=_RADIUS_IN * 144,
+            color=colour,
+            markeredgecolor="white",
+            markeredgewidth=0.8,
+            transform=axes.transAxes,
+            zorder=5,
             clip_on=False,
-        )  # fmt: skip
+        )
         axes.text(
-            x, y, str(point.number), transform=axes.transAxes, ha="center",
-            va="center_baseline", fontsize=7, fontweight="bold", color="white", zorder=6,
-        )  # fmt: skip
+            x,
+            y,
+            str(point.number),
+            transform=axes.transAxes,
+            ha="center",
+            va="center_baseline",
+            fontsize=7,
+            fontweight="bold",
+            color="white",
+            zorder=6,
+        )
 
 
 def _draw_bar(axes: Axes, point: Point, colour: str) -> None:
@@ -325,7 +346,12 @@ def _draw_key(axes: Axes, plot: Plot, wide_in: float, step: float) -> None:
             colour = SIMULATED
         y = 1.0 - (line + 0.4) * step
         axes.plot(
-            [left + 0.04 / wide_in], [y], marker=shape, markersize=5, color=colour,
-            transform=axes.transAxes, clip_on=False,
-        )  # fmt: skip
+            [left + 0.04 / wide_in],
+            [y],
+            marker=shape,
+            markersize=5,
+            color=colour,
+            transform=axes.transAxes,
+            clip_on=False,
+        )
         axes.text(left + 0.17 / wide_in, y, word, color=SOFT, **text)

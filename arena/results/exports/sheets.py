@@ -81,10 +81,14 @@ def sample_sheet(
         centred: dict[str, Any] = {"ha": "center", "va": "center"}
         for n, contestant in enumerate(columns[slug] for slug in contestants):
             figure.text(
-                (n + 0.5) / across, 1.0 - 0.55 * head_in / high,
-                shown_name(contestant.name, contestant.is_simulated), fontsize=9,
-                fontweight="bold", color=SIMULATED if contestant.is_simulated else INK, **centred,
-            )  # fmt: skip
+                (n + 0.5) / across,
+                1.0 - 0.55 * head_in / high,
+                shown_name(contestant.name, contestant.is_simulated),
+                fontsize=9,
+                fontweight="bold",
+                color=SIMULATED if contestant.is_simulated else INK,
+                **centred,
+            )
         for line, slug in enumerate(scenarios):
             bottom_in = high - head_in - row_in * line - picture_in
             for n, contestant_slug in enumerate(contestants):
@@ -222,6 +226,13 @@ def _fill_frame(
     axes.imshow(pixels)
     if is_simulated:
         axes.text(
-            0.5, 0.5, "SIMULATED", rotation=25, fontsize=size, fontweight="bold",
-            color=SIMULATED, alpha=0.3, **centred,
-        )  # fmt: skip
+            0.5,
+            0.5,
+            "SIMULATED",
+            rotation=25,
+            fontsize=size,
+            fontweight="bold",
+            color=SIMULATED,
+            alpha=0.3,
+            **centred,
+        )

@@ -50,25 +50,70 @@ ASKED = "asked"
 """Where the pictures lie that reviewers were sent; a request names them by their hash."""
 
 PAIRS = (
-    "matchup", "judge", "position", "kind", "repeat_of", "scenario", "contestant_a",
-    "augmentation_a", "contestant_b", "augmentation_b", "outcome", "both_miss", "skip_reason",
-    "aids", "ms_visible", "comment", "at", "vote", "supersedes", "simulated",
-)  # fmt: skip
+    "matchup",
+    "judge",
+    "position",
+    "kind",
+    "repeat_of",
+    "scenario",
+    "contestant_a",
+    "augmentation_a",
+    "contestant_b",
+    "augmentation_b",
+    "outcome",
+    "both_miss",
+    "skip_reason",
+    "aids",
+    "ms_visible",
+    "comment",
+    "at",
+    "vote",
+    "supersedes",
+    "simulated",
+)
 """One line a vote, superseded ones and skips included, and one for each pair without a vote."""
 
 AUGMENTATIONS = (
-    "augmentation", "job", "scenario", "type", "contestant", "sample", "state", "reason",
-    "picture", "modification_sha256", "finished_at",
-)  # fmt: skip
+    "augmentation",
+    "job",
+    "scenario",
+    "type",
+    "contestant",
+    "sample",
+    "state",
+    "reason",
+    "picture",
+    "modification_sha256",
+    "finished_at",
+)
 
 _CONTESTANT = (
-    "slug", "name", "kind", "variant", "model", "roles", "error_rates", "options",
-    "frozen_options", "sends",
-)  # fmt: skip
+    "slug",
+    "name",
+    "kind",
+    "variant",
+    "model",
+    "roles",
+    "error_rates",
+    "options",
+    "frozen_options",
+    "sends",
+)
 _SCENARIO = (
-    "slug", "type", "type_label", "keep_traffic", "traffic_density", "goal", "spawned",
-    "interplan", "language", "instruction", "reference", "intent", "intent_origin",
-)  # fmt: skip
+    "slug",
+    "type",
+    "type_label",
+    "keep_traffic",
+    "traffic_density",
+    "goal",
+    "spawned",
+    "interplan",
+    "language",
+    "instruction",
+    "reference",
+    "intent",
+    "intent_origin",
+)
 
 _AT_ONCE = 100
 """So many transcripts are held in memory; each may have some hundred thousand characters."""

@@ -266,8 +266,15 @@ def _column_of_table(name: str, kind: str = TEXT, field: str = "") -> Column:
 COLUMNS = (
     _column("rank", WHOLE, printed="Rank", page="Rank", text_field="rank_text"),
     _column("model", printed="Model", page="Contestant", identifies=True),
-    _column("elo", NUMBER, field="rating", key="rating", printed="Elo", page="Elo",
-            text_field="elo_text"),
+    _column(
+        "elo",
+        NUMBER,
+        field="rating",
+        key="rating",
+        printed="Elo",
+        page="Elo",
+        text_field="elo_text",
+    ),
     _column("lower", NUMBER),
     _column("upper", NUMBER),
     Column(field="interval_text", printed="95% CI", page="95 % CI"),
@@ -289,7 +296,7 @@ COLUMNS = (
     _column_of_table("preregistration"),
     Column(field="ranks_text", printed="95% ranks"),
     _column("options"),
-)  # fmt: skip
+)
 
 IN_FILES = tuple(column for column in COLUMNS if column.name)
 ON_PAGE = tuple(column for column in COLUMNS if column.page)

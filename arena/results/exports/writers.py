@@ -314,19 +314,44 @@ def _types_csv(results: Results) -> bytes:
 
 def _raters_csv(results: Results) -> bytes:
     head = (
-        "judge", "votes", "median_ms", "under_1_s", "ties", "left", "agreement", "shared",
-        "favourites", "decided", "repeats", "repeats_same", "checks", "checks_passed", "moves",
-        "checks_skipped", "aids",
-    )  # fmt: skip
+        "judge",
+        "votes",
+        "median_ms",
+        "under_1_s",
+        "ties",
+        "left",
+        "agreement",
+        "shared",
+        "favourites",
+        "decided",
+        "repeats",
+        "repeats_same",
+        "checks",
+        "checks_passed",
+        "moves",
+        "checks_skipped",
+        "aids",
+    )
     rows = (
         [
-            line.name, line.votes, line.median_ms, line.fast, line.ties, line.left.value,
-            line.agreement.value, line.shared, line.favourites.value, line.decided,
-            *line.repeats, *line.checks, line.moves, line.checks_skipped,
+            line.name,
+            line.votes,
+            line.median_ms,
+            line.fast,
+            line.ties,
+            line.left.value,
+            line.agreement.value,
+            line.shared,
+            line.favourites.value,
+            line.decided,
+            *line.repeats,
+            *line.checks,
+            line.moves,
+            line.checks_skipped,
             " ".join(f"{name}={number}" for name, number in line.aids),
         ]
         for line in results.trust.raters
-    )  # fmt: skip
+    )
     return _csv(head, rows)
 
 
@@ -334,9 +359,12 @@ def _hypotheses_csv(answers: Sequence[Answered]) -> bytes:
     head = ("hypothesis", "better", "other", "verdict", "difference", "p_adjusted")
     rows = (
         [
-            answer.hypothesis.text, *(answer.hypothesis.above or ("", "")), answer.verdict or "",
-            answer.difference, answer.p,
+            answer.hypothesis.text,
+            *(answer.hypothesis.above or ("", "")),
+            answer.verdict or "",
+            answer.difference,
+            answer.p,
         ]
         for answer in answers
-    )  # fmt: skip
+    )
     return _csv(head, rows)

@@ -180,15 +180,17 @@ def vote_in(snapshot: Snapshot, code: UUID) -> SingleVote | None:
     rows = find_votes(snapshot, VoteSearch(mark=EVERY)).filter(key=code)
     vote = (
         rows.select_related(
-            "matchup__scenario", "expert__person", "supersedes", "shown_left__contestant",
+            "matchup__scenario",
+            "expert__person",
+            "supersedes",
+            "shown_left__contestant",
             "shown_right__contestant",
         )
         .defer(
-            "matchup__scenario__reference", "shown_left__modification",
-            "shown_right__modification",
+            "matchup__scenario__reference", "shown_left__modification", "shown_right__modification"
         )
         .first()
-    )  # fmt: skip
+    )
     if vote is None:
         return None
     later = Vote.objects.filter(supersedes=vote, pk__lte=snapshot.last_vote or 0)
@@ -336,11 +338,15 @@ def _list_ties(ties: Sequence[Judged], snapshot: Snapshot) -> list[ListedVote]:
     names = dict(snapshot.standings.values_list("slug", "name")) if ties else {}
     return [
         ListedVote(
-            scenario=tie.item, type=tie.type, kind=AUTOMATIC, outcome=tie.outcome, mark=tie.mark,
+            scenario=tie.item,
+            type=tie.type,
+            kind=AUTOMATIC,
+            outcome=tie.outcome,
+            mark=tie.mark,
             sides=(_name_side("left", tie.left, names), _name_side("right", tie.right, names)),
         )
         for tie in ties
-    ]  # fmt: skip
+    ]
 
 
 def _list_line(line: ImportedVote) -> ListedVote:

@@ -35,12 +35,16 @@ RATED = (Vote.Outcome.LEFT.value, Vote.Outcome.EQUAL.value, Vote.Outcome.RIGHT.v
 
 IMPORTED_OUTCOMES = dict(
     zip(
-        (ImportedVote.Outcome.FIRST.value, ImportedVote.Outcome.TIE.value,
-         ImportedVote.Outcome.SECOND.value, ImportedVote.Outcome.BOTH_BAD.value),
+        (
+            ImportedVote.Outcome.FIRST.value,
+            ImportedVote.Outcome.TIE.value,
+            ImportedVote.Outcome.SECOND.value,
+            ImportedVote.Outcome.BOTH_BAD.value,
+        ),
         (*RATED, Vote.Outcome.EQUAL.value),
         strict=True,
     )
-)  # fmt: skip
+)
 
 KINDS = (MAIN, REPEAT)
 """What may be rated: planned showings, and on demand the hidden repeats of them."""
@@ -242,21 +246,47 @@ def current_votes(study: Study, filters: Filters, last: int | None) -> list[Judg
         names = ("first", "second", "outcome", "judge", "item", F("mark"))
         return [
             Judged(
-                judge=judge, judge_name=judge, item=item, type="", kind=MAIN, left=first,
-                right=second, outcome=IMPORTED_OUTCOMES[outcome],
+                judge=judge,
+                judge_name=judge,
+                item=item,
+                type="",
+                kind=MAIN,
+                left=first,
+                right=second,
+                outcome=IMPORTED_OUTCOMES[outcome],
                 both_miss=outcome == ImportedVote.Outcome.BOTH_BAD,
-                is_simulated=study.allow_simulated, mark=mark,
+                is_simulated=study.allow_simulated,
+                mark=mark,
             )
             for first, second, outcome, judge, item, mark in lines.values_list(*names)
-        ]  # fmt: skip
+        ]
     rows: QuerySet[Any] = _mark_votes(study, filters, last)
-    rows = rows.exclude(Q(mark=LeftOut.SUPERSEDED.value)).order_by("pk").values_list(
-        "expert__person__code", "expert__person__pseudonym", "matchup__scenario__slug",
-        "matchup__scenario__type", "matchup__kind", "shown_left__contestant__slug",
-        "shown_right__contestant__slug", "outcome", "both_miss", "is_simulated", F("mark"),
-        "ms_visible", "matchup", "matchup__repeat_of", "at", "matchup__position", "aids",
-        "comment", "shown_left__code", "shown_right__code",
-    )  # fmt: skip
+    rows = (
+        rows.exclude(Q(mark=LeftOut.SUPERSEDED.value))
+        .order_by("pk")
+        .values_list(
+            "expert__person__code",
+            "expert__person__pseudonym",
+            "matchup__scenario__slug",
+            "matchup__scenario__type",
+            "matchup__kind",
+            "shown_left__contestant__slug",
+            "shown_right__contestant__slug",
+            "outcome",
+            "both_miss",
+            "is_simulated",
+            F("mark"),
+            "ms_visible",
+            "matchup",
+            "matchup__repeat_of",
+            "at",
+            "matchup__position",
+            "aids",
+            "comment",
+            "shown_left__code",
+            "shown_right__code",
+        )
+    )
     return [
         vote._replace(
             judge=str(vote.judge),
@@ -297,10 +327,17 @@ def settled_ties(study: Study, votes: Iterable[Judged], filters: Filters) -> lis
     for (place, left, right), judge in drawn:
         item, first = scenario_of(place), by_judge[judge][0]
         tie = Judged(
-            judge=judge, judge_name=first.judge_name, item=item, type=types[item], kind=AUTOMATIC,
-            left=left, right=right, outcome=Vote.Outcome.EQUAL.value, both_miss=False,
+            judge=judge,
+            judge_name=first.judge_name,
+            item=item,
+            type=types[item],
+            kind=AUTOMATIC,
+            left=left,
+            right=right,
+            outcome=Vote.Outcome.EQUAL.value,
+            both_miss=False,
             is_simulated=first.is_simulated,
-        )  # fmt: skip
+        )
         is_made_up = tie.is_simulated or not simulated.isdisjoint((left, right))
         if is_made_up and not study.allow_simulated:
             tie = tie._replace(mark=LeftOut.SIMULATED.value)
@@ -366,11 +403,15 @@ def _entrants(study: Study, votes: Iterable[Judged]) -> tuple[Entrant, ...]:
         return tuple(Entrant(slug=name, name=name) for name in sorted(names))
     return tuple(
         Entrant(
-            slug=row.slug, name=row.name, variant=row.variant, kind=row.kind,
-            is_simulated=row.is_simulated, contestant=row,
+            slug=row.slug,
+            name=row.name,
+            variant=row.variant,
+            kind=row.kind,
+            is_simulated=row.is_simulated,
+            contestant=row,
         )
         for row in study.contestants.order_by("slug")
-    )  # fmt: skip
+    )
 
 
 def _check_names(filters: Filters, votes: Sequence[Judged]) -> None:

@@ -33,9 +33,23 @@ from augment.services.events import log_event
 from augment.services.texts import one_line
 
 COLUMNS = (
-    "model_a", "model_b", "winner", "judge", "item", "type", "kind", "side", "ms_visible",
-    "simulated", "at", "position", "aids", "comment", "augmentation_a", "augmentation_b",
-)  # fmt: skip
+    "model_a",
+    "model_b",
+    "winner",
+    "judge",
+    "item",
+    "type",
+    "kind",
+    "side",
+    "ms_visible",
+    "simulated",
+    "at",
+    "position",
+    "aids",
+    "comment",
+    "augmentation_a",
+    "augmentation_b",
+)
 """The first three are Chatbot Arena's; `model_a` was on the left, `side` is the winner's.
 `augmentation_a` is the code of what `model_a` made."""
 

@@ -231,8 +231,13 @@ _Point = list[float]
 _MARGIN_PX = 24.0
 """Labels stay so far within the picture."""
 
-_MEASURED = ("view", "study__allow_measures", "scenario__intent", "scenario__base_scene",
-             "scenario__keep_traffic")  # fmt: skip
+_MEASURED = (
+    "view",
+    "study__allow_measures",
+    "scenario__intent",
+    "scenario__base_scene",
+    "scenario__keep_traffic",
+)
 
 
 def measures_of_pair(*, user: User, code: UUID) -> dict[str, Any] | None:

@@ -46,9 +46,13 @@ _TYPES = {
     AgentType.GENERIC_OBJECT: "TRAFFIC_OBJECT",
 }
 _SAME_TYPE = {
-    AgentType.VEHICLE, AgentType.BICYCLE, AgentType.PEDESTRIAN, AgentType.TRAFFIC_CONE,
-    AgentType.BARRIER, AgentType.GENERIC_OBJECT,
-}  # fmt: skip
+    AgentType.VEHICLE,
+    AgentType.BICYCLE,
+    AgentType.PEDESTRIAN,
+    AgentType.TRAFFIC_CONE,
+    AgentType.BARRIER,
+    AgentType.GENERIC_OBJECT,
+}
 _LIGHTS = {
     TrafficLight.GREEN: "TRAFFIC_LIGHT_GREEN",
     TrafficLight.YELLOW: "TRAFFIC_LIGHT_YELLOW",
@@ -57,9 +61,11 @@ _LIGHTS = {
 }
 _AREAS = {AreaKind.CROSSWALK: "CROSSWALK", AreaKind.WALKWAY: "ROAD_EDGE_SIDEWALK"}
 _HEIGHTS_M = {
-    AgentType.PEDESTRIAN: 1.789, AgentType.BUS: 3.0, AgentType.TRAFFIC_CONE: 0.5,
+    AgentType.PEDESTRIAN: 1.789,
+    AgentType.BUS: 3.0,
+    AgentType.TRAFFIC_CONE: 0.5,
     AgentType.BARRIER: 1.0,
-}  # fmt: skip
+}
 _HEIGHT_M = 1.777
 _OLD_NAMES = {
     "numpy._core.multiarray _reconstruct": "numpy.core.multiarray _reconstruct",

@@ -110,8 +110,11 @@ def export_job(
     driven_by = None if motion == RECORDED else motion
     return export_rows(
         *(rows, origin, file_format),
-        many=job.samples > 1, drives=drives, driven_by=driven_by, strict=strict,
-    )  # fmt: skip
+        many=job.samples > 1,
+        drives=drives,
+        driven_by=driven_by,
+        strict=strict,
+    )
 
 
 def export_rows(
