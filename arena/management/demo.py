@@ -22,9 +22,9 @@ from arena.people.services import create_person
 from arena.results.exports.tables import leaderboard_table
 from arena.results.exports.writers import FORMATS, plain_text
 from arena.results.services.ratings import rate_now as rate
-from arena.services.simulation import simulate_votes
 from arena.studies.services.opening import close_study, open_study
 from arena.studies.services.plan import StudyPlan
+from arena.voting.services.simulation import simulate_votes
 from augment.models import Augmentation, BaseScene, Contestant, Endpoint, GenerationJob, Scenario
 from augment.services.endpoints.contestants import REFERENCE, add_contestant, ensure_builtin
 from augment.services.endpoints.known_endpoints import ensure_endpoint

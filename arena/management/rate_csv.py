@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from arena.exports.formats import csv_text
 from arena.management.progress_line import ProgressLine
 from arena.rating.leaderboard import Intervals, Leaderboard, Line, Method, Order, rate
 from arena.rating.lines import HEADS as PAPERS_HEADS
@@ -24,7 +25,6 @@ from arena.rating.logistic import Coefficient
 from arena.rating.ranking import Separation
 from arena.rating.rules import METHOD_TEXTS, TooManyContestants, Unit, default_intervals, unit_for
 from arena.rating.votes_file import SIDE, VotesFile, VotesFileUnreadable, columns_of, read_votes
-from arena.services.cells import csv_text
 from augment.escaping import escape_controls
 
 HELP = (

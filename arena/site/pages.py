@@ -16,7 +16,6 @@ from prometheus_client import CollectorRegistry, generate_latest
 from prometheus_client.exposition import CONTENT_TYPE_LATEST
 from prometheus_client.registry import Collector
 
-from arena.exports.audit import AUDIT_FORMATS
 from arena.exports.formats import format_named
 from arena.jobs import queries
 from arena.models import Study
@@ -26,6 +25,7 @@ from arena.people.services import keep_preference
 from arena.results.queries.access import ResultsAccess, results_access
 from arena.serving.readiness import look_at_parts, opens_metrics
 from arena.site.access import ADMIN, allow_only, user_of
+from arena.site.exports import AUDIT_FORMATS
 from arena.site.forms import offer
 from arena.site.language import use_english
 from arena.site.listing import read_page

@@ -20,6 +20,7 @@ from django.views.decorators.http import require_http_methods, require_POST, req
 from arena.errors import AlreadyDecided, InvalidVote, NotYours, StudyNotOpen, TooFast
 from arena.models import PracticePair, Study
 from arena.site.access import ADMIN, EXPERT, allow_only, user_of
+from arena.site.pictures import picture_response
 from arena.studies.queries import voting_study
 from arena.studies.services.experts import (
     answer_practice,
@@ -38,7 +39,6 @@ from arena.voting.queries.showings import (
 )
 from arena.voting.screen import over_context, vote_context
 from arena.voting.services.casting import receive_vote
-from arena.web.pictures import picture_response
 from augment.errors import Conflict
 from augment.services.judging.findings import (
     EGO_ID,

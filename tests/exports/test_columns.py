@@ -10,9 +10,9 @@ import json
 import pytest
 from pyarrow import parquet
 
+from arena.exports.formats import csv_text
 from arena.results.exports.tables import LeaderboardTable, leaderboard_table
 from arena.results.exports.writers import FORMATS, plain_text
-from arena.services.cells import csv_text
 from tests.results.old import OLD, stored
 
 pytestmark = pytest.mark.django_db

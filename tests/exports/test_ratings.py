@@ -10,8 +10,8 @@ from arena.people.services import create_person
 from arena.results.queries.access import ResultsAccess, latest_snapshot, results_access
 from arena.results.services.ratings import open_early
 from arena.results.services.ratings import rate_now as rate
-from arena.services.simulation import simulate_votes
 from arena.studies.services.opening import close_study
+from arena.voting.services.simulation import simulate_votes
 from augment.errors import Conflict
 from augment.models import Augmentation, Event, Scenario
 from augment.scene.codec import modification_to_document

@@ -7,7 +7,7 @@ from django.contrib.auth.models import User
 from django.db import connection
 from django.test.utils import CaptureQueriesContext
 
-from arena.services.retrying import retry_cause as retry_unless_shown
+from arena.jobs.services import retry_cause as retry_unless_shown
 from augment.errors import Conflict, UnknownName
 from augment.models import Augmentation, Contestant, Event, GenerationJob, ModelCall
 from augment.services.running import jobs

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from arena.exports.formats import Format, formats, round_value
+from arena.exports.formats import Format, csv_text, formats, round_value
 from arena.jobs.exports.displacement import SIMULATED_NOTE
 from arena.jobs.exports.tables import json_bytes, read_value
 from arena.rating.lines import escape
 from arena.results.exports.tables import shown_name
-from arena.services.cells import csv_text
 from augment.models import GenerationJob
 from augment.services.judging.driving_scores import (
     CLOSE_M,

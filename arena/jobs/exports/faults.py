@@ -8,13 +8,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from arena.exports.formats import Format, formats
+from arena.exports.formats import Format, csv_text, formats
 from arena.jobs.queries import contestants_of, labels_of
 from arena.models import FaultLabel
 from arena.rating.lines import escape
 from arena.rating.reliability import DifferenceMetric, cohens_kappa, krippendorff_alpha
 from arena.results.exports.tables import shown_name
-from arena.services.cells import csv_text
 from augment.models import GenerationJob
 from augment.services.judging.findings import FaultClass
 

@@ -14,7 +14,7 @@ from django.views.decorators.http import require_http_methods, require_POST, req
 from arena.jobs.pages.measures import displacement_section, driving_section
 from arena.jobs.queries import MARKS, VIEWS, Part, grid_part
 from arena.jobs.services import files_of
-from arena.services.retrying import retry_cause as retry_one_cause
+from arena.jobs.services import retry_cause as retry_one_cause
 from arena.site.access import ADMIN, STAFF, allow_only, user_of
 from arena.site.acts import Confirmation, ask, is_sure, refusals_told, send_later
 from arena.site.forms import CapsForm

@@ -16,6 +16,7 @@ from django.core.files.storage import default_storage
 from django.template.loader import render_to_string
 
 from arena.errors import ArenaError
+from arena.exports.formats import csv_text
 from arena.jobs.exports.tables import object_sheet, sheet_csv
 from arena.models import Matchup, Snapshot, Study, Vote
 from arena.results.exports.closure import Closure, close_over, travelling_rows
@@ -28,7 +29,6 @@ from arena.results.services.stored_rows import (
     frozen_rows,
     label_of,
 )
-from arena.services.cells import csv_text
 from arena.site.services import UNFINISHED
 from arena.studies.services.opening import FILE_NAME, preregistration_bytes, preregistration_sha256
 from augment.models import Augmentation, Contestant, GenerationJob, Scenario

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import NamedTuple
 
-from arena.exports.formats import TEXT, WHOLE, YES_NO, Format, formats, parquet_bytes
+from arena.exports.formats import TEXT, WHOLE, YES_NO, Format, csv_parts, formats, parquet_bytes
 from arena.models import Snapshot, Study
 from arena.results.queries.evidence import ListedVote, each_vote
 from arena.results.queries.search import VoteSearch
@@ -21,7 +21,6 @@ from arena.results.services.vote_files import (
     vote_rows,
     votes_csv,
 )
-from arena.services.cells import csv_parts
 
 _KINDS = {"ms_visible": WHOLE, "simulated": YES_NO, "position": WHOLE}
 

@@ -10,7 +10,7 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 from arena.exports.files import zip_bytes
-from arena.exports.formats import Format, drawings, formats, parquet_bytes, round_value
+from arena.exports.formats import Format, csv_text, drawings, formats, parquet_bytes, round_value
 from arena.models import Snapshot
 from arena.rating.lines import caption_text, escape, latex_table
 from arena.rating.snapshot_document import Results, results_document
@@ -26,7 +26,6 @@ from arena.results.exports.tables import (
 )
 from arena.results.exports.votes import VOTE_FORMATS, vote_table
 from arena.results.services.vote_files import digest_of
-from arena.services.cells import csv_text
 from arena.studies.services.opening import FILE_NAME, preregistration_bytes
 from arena.studies.services.plan import Answered
 

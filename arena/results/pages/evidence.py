@@ -24,8 +24,8 @@ from arena.results.queries.search import MARKS, ORDERS, OUTCOMES, PARTS, VoteSea
 from arena.results.queries.votes import AUTOMATIC, COUNTED, is_imported
 from arena.site.access import STAFF, allow_only
 from arena.site.listing import page_asked
+from arena.site.pictures import sized_picture_response
 from arena.voting.queries.showings import describe_in_words, picture_of_side
-from arena.web.pictures import sized_picture_response
 from augment.services.running.jobs import HIGHEST_SAMPLES
 from augment.services.scenarios.scenes import type_choices
 

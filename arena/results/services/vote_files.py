@@ -17,6 +17,7 @@ from django.db import IntegrityError, transaction
 from django.utils import timezone
 
 from arena.errors import VotesUnreadable
+from arena.exports.formats import csv_text
 from arena.models import ImportedVote, Study, Vote, VoteFile
 from arena.rating.votes_file import (
     OPTIONAL,
@@ -26,7 +27,6 @@ from arena.rating.votes_file import (
     read_votes,
 )
 from arena.results.queries.votes import Judged
-from arena.services.cells import csv_text
 from arena.voting.services.turns import in_turn
 from augment.errors import Conflict
 from augment.services.events import log_event

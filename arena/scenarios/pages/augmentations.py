@@ -17,7 +17,7 @@ from arena.contestants.queries import asking_of
 from arena.scenarios.queries import modification_lines
 from arena.site.access import STAFF, allow_only
 from arena.site.acts import looks_again, send_later
-from arena.web.pictures import picture_response, sized_picture_response
+from arena.site.pictures import picture_response, sized_picture_response
 from augment.errors import AugmentError, UnknownName
 from augment.models import Augmentation, BaseScene, Contestant, Scenario, Simulation, UploadMoment
 from augment.services.endpoints.contestants import asking_contestants, preview_contestant

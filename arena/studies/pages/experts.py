@@ -20,11 +20,11 @@ from django.views.decorators.cache import never_cache
 from django.views.decorators.http import require_http_methods, require_POST, require_safe
 
 from arena.errors import EnrolmentOver, LinkOver, NotYours
+from arena.exports.formats import csv_text
 from arena.models import Authorship, EnrolledVoter, Enrolment, Invitation, Study
 from arena.people import links
 from arena.people.pages import find_account, with_own_language
 from arena.people.queries import by_pseudonym, invitation_by_token, may_be_let_in
-from arena.services.cells import csv_text
 from arena.site.access import ADMIN, BACKEND, GONE, allow_only, keep_secret, user_of
 from arena.site.acts import Confirmation, ask, is_sure, refusals_in, refusals_told, tell_errors
 from arena.site.forms import offer

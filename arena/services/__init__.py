@@ -1,1 +1,0 @@
-"""Writes of arena, one subject a file: keyword-only functions that return rows."""
