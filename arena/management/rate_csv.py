@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from arena.exports.formats import csv_text
+from arena.exports.cells import csv_text
 from arena.management.progress_line import ProgressLine
 from arena.rating.leaderboard import Intervals, Leaderboard, Line, Method, Order, rate
 from arena.rating.lines import HEADS as PAPERS_HEADS

@@ -6,7 +6,7 @@ import json
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 
-from arena.exports.formats import csv_parts
+from arena.exports.cells import csv_parts
 from augment.models import Event
 
 COLUMNS = ("at", "actor", "verb", "object_kind", "object_code", "before", "after")

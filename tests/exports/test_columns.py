@@ -10,7 +10,7 @@ import json
 import pytest
 from pyarrow import parquet
 
-from arena.exports.formats import csv_text
+from arena.exports.cells import csv_text
 from arena.results.exports.tables import LeaderboardTable, leaderboard_table
 from arena.results.exports.writers import FORMATS, plain_text
 from tests.results.old import OLD, stored

@@ -6,6 +6,7 @@ import ast
 import re
 import subprocess
 import sys
+from graphlib import TopologicalSorter
 
 import pytest
 
@@ -239,3 +240,20 @@ def test_every_variable_of_the_settings_is_explained() -> None:
     explained = (ROOT / "docs" / "deploying.md").read_text()
     assert variables
     assert [name for name in sorted(variables) if f"`{name}`" not in explained] == []
+
+
+def test_no_modules_import_each_other_in_a_circle() -> None:
+    names = {name for name, _ in modules()}
+    graph = {
+        name: {
+            target
+            for node in tree.body
+            if isinstance(node, ast.ImportFrom) and node.module
+            for alias in node.names
+            for target in (f"{node.module}.{alias.name}", node.module)
+            if target in names - {name}
+            and (target != node.module or f"{target}.{alias.name}" not in names)
+        }
+        for name, tree in modules()
+    }
+    TopologicalSorter(graph).prepare()  # raises with the circle in it

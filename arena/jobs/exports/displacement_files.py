@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from arena.exports.formats import Format, csv_text, drawings, formats, round_value
+from arena.exports.cells import csv_text
+from arena.exports.formats import Format, drawings, formats, round_value
 from arena.jobs.exports.displacement import SOURCE, DisplacementTable
 from arena.jobs.exports.tables import Value, json_bytes, read_value
 from arena.results.exports.box_plot import box_plot

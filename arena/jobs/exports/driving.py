@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from arena.exports.formats import Format, csv_text, formats, round_value
+from arena.exports.cells import csv_text
+from arena.exports.formats import Format, formats, round_value
 from arena.jobs.exports.displacement import SIMULATED_NOTE
 from arena.jobs.exports.tables import json_bytes, read_value
 from arena.rating.lines import escape

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from arena.exports.formats import Format, csv_text, formats
+from arena.exports.cells import csv_text
+from arena.exports.formats import Format, formats
 from arena.jobs.queries import contestants_of, labels_of
 from arena.models import FaultLabel
 from arena.rating.lines import escape

@@ -12,16 +12,8 @@ from enum import Enum
 from typing import Any
 from uuid import UUID
 
-from arena.exports.formats import (
-    NUMBER,
-    TEXT,
-    WHOLE,
-    YES_NO,
-    Format,
-    csv_text,
-    formats,
-    parquet_bytes,
-)
+from arena.exports.cells import csv_text
+from arena.exports.formats import NUMBER, TEXT, WHOLE, YES_NO, Format, formats, parquet_bytes
 from augment.models import GenerationJob
 from augment.services.judging.analyses import JobAnalysis, augmentation_lines, repeatability
 from augment.services.judging.displacement import objects_of

@@ -16,7 +16,7 @@ from django.core.files.storage import default_storage
 from django.template.loader import render_to_string
 
 from arena.errors import ArenaError
-from arena.exports.formats import csv_text
+from arena.exports.cells import csv_text
 from arena.jobs.exports.tables import object_sheet, sheet_csv
 from arena.models import Matchup, Snapshot, Study, Vote
 from arena.results.exports.closure import Closure, close_over, travelling_rows

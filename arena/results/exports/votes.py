@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import NamedTuple
 
-from arena.exports.formats import TEXT, WHOLE, YES_NO, Format, csv_parts, formats, parquet_bytes
+from arena.exports.cells import csv_parts
+from arena.exports.formats import TEXT, WHOLE, YES_NO, Format, formats, parquet_bytes
 from arena.models import Snapshot, Study
 from arena.results.queries.evidence import ListedVote, each_vote
 from arena.results.queries.search import VoteSearch

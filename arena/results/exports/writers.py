@@ -9,8 +9,9 @@ import json
 from collections.abc import Iterable, Sequence
 from typing import Any
 
+from arena.exports.cells import csv_text
 from arena.exports.files import zip_bytes
-from arena.exports.formats import Format, csv_text, drawings, formats, parquet_bytes, round_value
+from arena.exports.formats import Format, drawings, formats, parquet_bytes, round_value
 from arena.models import Snapshot
 from arena.rating.lines import caption_text, escape, latex_table
 from arena.rating.snapshot_document import Results, results_document

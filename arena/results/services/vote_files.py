@@ -17,7 +17,7 @@ from django.db import IntegrityError, transaction
 from django.utils import timezone
 
 from arena.errors import VotesUnreadable
-from arena.exports.formats import csv_text
+from arena.exports.cells import csv_text
 from arena.models import ImportedVote, Study, Vote, VoteFile
 from arena.rating.votes_file import (
     OPTIONAL,

@@ -20,7 +20,7 @@ from django.views.decorators.cache import never_cache
 from django.views.decorators.http import require_http_methods, require_POST, require_safe
 
 from arena.errors import EnrolmentOver, LinkOver, NotYours
-from arena.exports.formats import csv_text
+from arena.exports.cells import csv_text
 from arena.models import Authorship, EnrolledVoter, Enrolment, Invitation, Study
 from arena.people import links
 from arena.people.pages import find_account, with_own_language
