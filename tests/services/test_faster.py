@@ -1,55 +1,22 @@
-"""Somebody else takes the name between the look and the writing, or does the same at once."""
+"""Two who do the same at once."""
 
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
 
 import pytest
 from django.contrib.auth.models import User
 from django.db import connection
-from django.db.models import Model
-from django.db.models.signals import pre_save
 
 from arena.errors import NothingToPlan
 from arena.jobs.services import open_labelling
 from arena.models import Invitation, LabellingRound
 from arena.people.links import FreshLink, invite
-from augment.errors import Conflict
-from augment.models import GenerationJob
 from tests.exports.test_displacement import a_job
 from tests.study_rows import a_study, expert
 
 THREADS = 4
-
-
-@contextmanager
-def faster(model: type[Model], store: Callable[[], object]) -> Iterator[None]:
-    """Somebody stores their row right before ours of that model."""
-
-    def first(sender: object, **_: object) -> None:
-        store()
-
-    pre_save.connect(first, sender=model)
-    try:
-        yield
-    finally:
-        pre_save.disconnect(first, sender=model)
-
-
-@pytest.mark.django_db
-def test_a_labelling_whose_name_is_just_taken_is_refused() -> None:
-    job = a_job()
-    expert("eva")
-    other = GenerationJob.objects.create(name="another")
-    taken = [LabellingRound(name="Faults", job=other, seed=2)]
-    with (
-        faster(LabellingRound, lambda: LabellingRound.objects.bulk_create(taken)),
-        pytest.raises(Conflict, match="called 'Faults' already"),
-    ):
-        open_labelling(name="Faults", job=job, experts=["eva"], seed=1)
 
 
 @pytest.mark.django_db(transaction=True)

@@ -39,7 +39,7 @@ def test_a_file_that_is_too_large_is_refused(monkeypatch: pytest.MonkeyPatch) ->
     monkeypatch.setattr(setup, "MOST_MB", 0)
     answer = _send(FINE)
     assert answer.status_code == 422
-    assert "more than 0 MB" in answer.content.decode()
+    assert "Send a smaller one" in answer.content.decode()
     assert not Study.objects.exists()
 
 
