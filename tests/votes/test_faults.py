@@ -15,6 +15,7 @@ from arena.jobs.exports.faults import csv_bytes, fault_table, latex
 from arena.jobs.queries import labelling_of, next_task
 from arena.jobs.services import close_labelling, open_labelling, save_label
 from arena.models import FaultLabel, LabellingRound, LabelTask
+from augment.errors import Conflict
 from augment.models import Event, GenerationJob
 from augment.services.judging.findings import FaultClass
 from tests.exports.test_displacement import a_job
@@ -57,6 +58,12 @@ def test_every_expert_gets_every_finished_augmentation_once(job: GenerationJob, 
     tokens = [task.token for task in labelling.tasks.all()]
     tokens += [task.original_token for task in labelling.tasks.all()]
     assert len(set(tokens)) == 8
+
+
+def test_a_name_that_is_taken_is_refused(job: GenerationJob, eva: User) -> None:
+    open_labelling(name="Faults", job=job, experts=[eva.username], seed=1)
+    with pytest.raises(Conflict, match="called 'Faults' already"):
+        open_labelling(name="Faults", job=job, experts=[eva.username], seed=2)
 
 
 def test_a_label_keeps_any_faults_a_note_and_what_the_checks_had_guessed(
