@@ -19,11 +19,9 @@ from pathlib import Path
 FILES = (
     "exports/test_study_folder",
     *("jobs/test_budget", "jobs/test_call_limits", "jobs/test_cancelling", "jobs/test_cap"),
-    *("jobs/test_clocks", "jobs/test_leases", "jobs/test_lock_order"),
-    *("jobs/test_pausing", "jobs/test_workers"),
+    *("jobs/test_leases", "jobs/test_lock_order", "jobs/test_workers"),
     *("services/test_append_only", "services/test_backups", "services/test_costs"),
-    *("services/test_plain_rows", "services/test_refused_backups"),
-    *("services/test_uploads", "services/test_work"),
+    *("services/test_refused_backups", "services/test_uploads", "services/test_work"),
     *("studies/test_enrolments", "studies/test_replanning"),
     *("votes/test_cast_vote", "votes/test_concurrency", "votes/test_handing_over"),
     *("votes/test_long_writes", "votes/test_vote_lists", "votes/test_waiting"),
