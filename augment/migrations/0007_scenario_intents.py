@@ -4,7 +4,9 @@ from django.db import migrations, models
 
 
 class Migration(migrations.Migration):
-    dependencies = [("augment", "0006_what_a_contestant_sends")]
+    dependencies = [
+        ("augment", "0006_what_a_contestant_sends"),
+    ]
 
     operations = [
         migrations.AddField(

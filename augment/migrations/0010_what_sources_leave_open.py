@@ -4,26 +4,20 @@ from django.db import migrations, models
 
 
 class Migration(migrations.Migration):
-    dependencies = [("augment", "0009_intent_readings")]
+
+    dependencies = [
+        ('augment', '0009_intent_readings'),
+    ]
 
     operations = [
         migrations.AddField(
-            model_name="basescene",
-            name="content_hash",
-            field=models.CharField(
-                blank=True,
-                db_index=True,
-                help_text="of what was read from outside; two scenes of one hash are the same",
-                max_length=64,
-            ),
+            model_name='basescene',
+            name='content_hash',
+            field=models.CharField(blank=True, db_index=True, help_text='of what was read from outside; two scenes of one hash are the same', max_length=64),
         ),
         migrations.AddField(
-            model_name="basescene",
-            name="notes",
-            field=models.JSONField(
-                blank=True,
-                default=list,
-                help_text="losses and assumptions, as augment.scene.recording has them",
-            ),
+            model_name='basescene',
+            name='notes',
+            field=models.JSONField(blank=True, default=list, help_text='losses and assumptions, as augment.scene.recording has them'),
         ),
     ]
