@@ -3,8 +3,6 @@
 Those know what an open study may tell, and that accounts keep names which plans hold.
 """
 
-from __future__ import annotations
-
 from django.contrib import admin
 from django.contrib.auth.models import Group, User
 

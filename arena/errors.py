@@ -1,7 +1,5 @@
 """Every error of arena says what its reader should do; it carries data and knows no HTTP."""
 
-from __future__ import annotations
-
 from augment.errors import AugmentError
 
 

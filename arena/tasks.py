@@ -1,7 +1,5 @@
 """What workers do for arena; see augment.tasks."""
 
-from __future__ import annotations
-
 from celery import shared_task
 from django.contrib.auth.models import User
 

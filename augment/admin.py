@@ -1,7 +1,5 @@
 """Django's admin of augment, for rare edits; everything else has pages of its own."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from django.contrib import admin

@@ -1,7 +1,5 @@
 """Every error of augment says what its reader should do; it carries data and knows no HTTP."""
 
-from __future__ import annotations
-
 
 class AugmentError(Exception):
     """The root of augment's own errors: its text is a sentence for the person who caused it."""

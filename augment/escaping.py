@@ -1,7 +1,5 @@
 """Text that came out of files and models, as it may be printed or written into a comment."""
 
-from __future__ import annotations
-
 import unicodedata
 
 

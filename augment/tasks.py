@@ -5,8 +5,6 @@ sends another). Services never enqueue; doors do, by transaction.on_commit. Mess
 a connection that is tried once: where no broker answers, there is a sentence instead of a wait.
 """
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager

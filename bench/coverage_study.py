@@ -6,8 +6,6 @@ Each world is simulated with the paper's nine ratings, for coverage, and with ni
 no pair should be told apart. 400 studies a row take about half an hour of one processor.
 """
 
-from __future__ import annotations
-
 import argparse
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence

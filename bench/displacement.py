@@ -4,8 +4,6 @@ Over the whole catalogue, with the seeds that jobs use, without a database. What
 refuses is missing; the last table counts only the objects of scenarios that all of them place.
 """
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Sequence
 

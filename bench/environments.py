@@ -1,7 +1,5 @@
 """Making a bench's own environment from its lock file, once."""
 
-from __future__ import annotations
-
 import hashlib
 import os
 import subprocess

@@ -4,8 +4,6 @@ A kind applies where it makes a difference that a person would see, measured aga
 before it; where it makes none it gives None. Nothing here looks at the checks.
 """
 
-from __future__ import annotations
-
 import math
 import random
 from collections.abc import Callable

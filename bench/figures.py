@@ -4,8 +4,6 @@ The other measurements write their own section of docs/benchmarks.md and docs/ra
 they take long or need other software.
 """
 
-from __future__ import annotations
-
 import os
 
 import django

@@ -4,8 +4,6 @@
 every kind as often as every other, and COUNT right ones, jittered. Prints tables in Markdown.
 """
 
-from __future__ import annotations
-
 import random
 import sys
 from collections import Counter, defaultdict

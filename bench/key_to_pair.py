@@ -8,8 +8,6 @@ more animation frame has passed. "Painted" is the browser's own account of the s
 Timing, in steps of 8 ms), which includes decoding and drawing.
 """
 
-from __future__ import annotations
-
 import statistics
 import sys
 import tempfile

@@ -8,8 +8,6 @@ exchanged, the answer cut off or swapped for another role's. Whatever comes, the
 outcome whose numbers are finite; anything else is printed and counted.
 """
 
-from __future__ import annotations
-
 import json
 import math
 import random

@@ -9,8 +9,6 @@ modifier's prompt, against the reference, over all objects. `--write` stores bot
 docs/benchmarks.md.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess

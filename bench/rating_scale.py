@@ -9,8 +9,6 @@ included. All votes are simulated; some experts give many more of them than othe
 the table into docs/benchmarks.md.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import resource

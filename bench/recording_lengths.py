@@ -5,8 +5,6 @@ prints a table; with REALDATA_DIR set also for the recorded log. `--write` store
 docs/simulation.md.
 """
 
-from __future__ import annotations
-
 import os
 import sys
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """Writing a benchmark's table into the docs: a section of docs/benchmarks.md, or a block."""
 
-from __future__ import annotations
-
 import os
 import re
 from pathlib import Path

@@ -3,8 +3,6 @@
 Frame: ego frame. Nothing here looks at the checks.
 """
 
-from __future__ import annotations
-
 import math
 import random
 from collections.abc import Callable, Iterable

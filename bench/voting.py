@@ -4,8 +4,6 @@
 pair. Gunicorn runs as `manage.py serve` starts it. The table goes to docs/benchmarks.md.
 """
 
-from __future__ import annotations
-
 import http.client
 import json
 import os

@@ -1,7 +1,5 @@
 """What tests may do and nobody else: empty the tables, and change a row that is append-only."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any

@@ -1,7 +1,5 @@
 """Brokers for tests that send messages: one in memory, and none."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import contextmanager
 

@@ -1,7 +1,5 @@
 """A server of this machine that speaks S3, with an empty bucket in it."""
 
-from __future__ import annotations
-
 import logging
 import os
 from collections.abc import Iterator, Mapping

@@ -1,7 +1,5 @@
 """What every test shares: recorded data by its variable, and no key of anybody's."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterator
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Studies whose experts may read what was changed."""
 
-from __future__ import annotations
-
 from arena.models import Study
 from augment.models import Augmentation
 from augment.scene.codec import modification_to_document

@@ -5,8 +5,6 @@ https://www.sqlite.org/vfs.html). Ours passes everything on and counts the calls
 laid around the library that Python's own sqlite3 uses, so nothing need be compiled or traced.
 """
 
-from __future__ import annotations
-
 import _sqlite3
 import ctypes
 from collections import Counter

@@ -1,7 +1,5 @@
 """Driven rows without a drive of 15 s each: a short one, made once, stands for all."""
 
-from __future__ import annotations
-
 import json
 import zlib
 from collections.abc import Iterable

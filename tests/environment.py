@@ -5,8 +5,6 @@ the tests start inherits it: a home of its own, English, UTC, one thread for lin
 sums depend on how many there are). Fonts are named in tests/browser/fonts.py.
 """
 
-from __future__ import annotations
-
 import atexit
 import os
 import shutil

@@ -5,8 +5,6 @@ effects of scenario and expert on top. Everything that tells how experts vote (p
 repeats, checks) is made up.
 """
 
-from __future__ import annotations
-
 import uuid
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Something long that keeps the database to itself, as an import once did."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
 from typing import Any

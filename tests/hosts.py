@@ -1,7 +1,5 @@
 """Several machines in one: PostgreSQL, Redis over TCP and a bucket; no folder is shared."""
 
-from __future__ import annotations
-
 import logging
 import os
 import secrets

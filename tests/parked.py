@@ -1,7 +1,5 @@
 """Scenarios of one kind for whole rounds: a car parked so far ahead on a street of our own."""
 
-from __future__ import annotations
-
 import json
 import re
 from pathlib import Path

@@ -4,8 +4,6 @@
 uses `fuzz`, which draws new ones, ten times as many.
 """
 
-from __future__ import annotations
-
 from hypothesis import HealthCheck, settings
 
 # Whether a property holds does not depend on how busy the machine is.

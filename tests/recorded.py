@@ -1,7 +1,5 @@
 """The recorded log that several tests read, each of its frames once, and every other source."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path

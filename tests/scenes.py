@@ -1,7 +1,5 @@
 """Small hand-made scenes whose right answers can be seen by eye."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -6,8 +6,6 @@ and opens every page of the table of access with Chromium at 1280 px. What answe
 folder, the demo that is there is used again.
 """
 
-from __future__ import annotations
-
 import io
 import os
 import sys

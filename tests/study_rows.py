@@ -1,7 +1,5 @@
 """Rows for tests of studies: contestants with pictures of scenarios, and the people who vote."""
 
-from __future__ import annotations
-
 import uuid
 from typing import TypedDict
 

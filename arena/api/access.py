@@ -1,7 +1,5 @@
 """Who asks, by a token or a session, and which roles may use a resource."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from django.contrib.auth.models import User

@@ -6,8 +6,6 @@
 `outcome` (the stored one) with a pair that is already decided.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 from django.core.exceptions import PermissionDenied, RequestDataTooBig

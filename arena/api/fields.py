@@ -1,7 +1,5 @@
 """Parsing a request body: known fields only, each of its own type."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from math import isfinite
 from typing import IO, Any

@@ -1,7 +1,5 @@
 """The OpenAPI document, as JSON for programs and as a page for staff."""
 
-from __future__ import annotations
-
 from functools import cache
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Addresses of the API, version 1."""
 
-from __future__ import annotations
-
 from django.urls import URLPattern, path
 
 from arena.api import reference

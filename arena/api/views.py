@@ -1,7 +1,5 @@
 """The base of every resource: roles, parsing, errors, caching, and work left to a worker."""
 
-from __future__ import annotations
-
 import inspect
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cache, partial, wraps

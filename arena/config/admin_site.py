@@ -1,7 +1,5 @@
 """Django's admin, whose filters can't reveal what its rows do not show."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from django.contrib.admin import AdminSite, ModelAdmin

@@ -4,8 +4,6 @@ A message carries the id of the request that sent it, so that the lines of a wor
 by it. Workers log as everything else does: see arena/config/logs.py.
 """
 
-from __future__ import annotations
-
 import os
 from contextlib import ExitStack
 from typing import Any

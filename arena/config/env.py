@@ -1,7 +1,5 @@
 """Typed readers of the environment; a wrong value stops the start with a sentence."""
 
-from __future__ import annotations
-
 import os
 import re
 from collections.abc import Callable

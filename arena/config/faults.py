@@ -1,7 +1,5 @@
 """Errors outside any view: as JSON for programs, as a page for people."""
 
-from __future__ import annotations
-
 from datetime import timedelta
 
 from axes.helpers import get_cool_off

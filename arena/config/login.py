@@ -1,7 +1,5 @@
 """Login limits per account and address, and where a request comes from."""
 
-from __future__ import annotations
-
 from ipaddress import IPv6Address, ip_address, ip_network
 from typing import Any
 

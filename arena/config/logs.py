@@ -1,7 +1,5 @@
 """The log: one id from the request of a browser to the task of a worker, as lines or as JSON."""
 
-from __future__ import annotations
-
 import logging
 import re
 import secrets

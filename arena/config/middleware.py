@@ -1,7 +1,5 @@
 """Middleware: 503 for a busy database, and headers that every answer carries."""
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Callable
 from typing import Any

@@ -1,7 +1,5 @@
 """Files and folders that only their owner reads: votes, sessions and keys are nobody else's."""
 
-from __future__ import annotations
-
 import os
 import stat
 from contextlib import suppress

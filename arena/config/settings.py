@@ -3,8 +3,6 @@
 The defaults let a newcomer run at once: SQLite and files under var/ and media/.
 """
 
-from __future__ import annotations
-
 import hashlib
 import os
 import re

@@ -1,7 +1,5 @@
 """How large a file may be that comes by a form, before any page has looked at it."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from django.conf import settings

@@ -1,7 +1,5 @@
 """Contestants and how they ask."""
 
-from __future__ import annotations
-
 import uuid
 from collections.abc import Sequence
 from functools import partial

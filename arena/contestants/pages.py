@@ -1,7 +1,5 @@
 """Pages of contestants, and of the endpoints and models that they ask."""
 
-from __future__ import annotations
-
 import uuid
 from collections.abc import Iterator
 from contextlib import AbstractContextManager, contextmanager

@@ -1,7 +1,5 @@
 """Contestants and models as pages show them: how one asks, and what a probe saw of the other."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from decimal import Decimal
 from typing import Any

@@ -1,7 +1,5 @@
 """Addresses of the pages of contestants, endpoints and models."""
 
-from __future__ import annotations
-
 from django.urls import URLPattern, path
 
 from arena.contestants import pages

@@ -1,7 +1,5 @@
 """How values stand in a CSV file."""
 
-from __future__ import annotations
-
 import csv
 import io
 from collections.abc import Iterable, Iterator, Sequence

@@ -1,7 +1,5 @@
 """What all writers share: the formats that there are, Parquet files, and rounded numbers."""
 
-from __future__ import annotations
-
 import io
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Generation jobs: estimated, launched and watched."""
 
-from __future__ import annotations
-
 import uuid
 from functools import partial
 from typing import Any

@@ -1,7 +1,5 @@
 """A part of a job's grid: so many scenarios, contestants and samples as one page can hold."""
 
-from __future__ import annotations
-
 import hashlib
 from collections import defaultdict
 from collections.abc import Collection, Hashable

@@ -1,7 +1,5 @@
 """Labelling faults: a round is planned before the first label, and a label is never changed."""
 
-from __future__ import annotations
-
 import random
 from collections.abc import Sequence
 from uuid import UUID

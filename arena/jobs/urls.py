@@ -1,7 +1,5 @@
 """Addresses of the pages of jobs, drives and fault labels."""
 
-from __future__ import annotations
-
 from django.urls import URLPattern, path
 
 from arena.jobs.pages import jobs, labelling, launching, measures

@@ -1,7 +1,5 @@
 """Kinds of arguments that several commands have."""
 
-from __future__ import annotations
-
 from argparse import ArgumentTypeError
 from collections.abc import Callable
 

@@ -12,8 +12,6 @@ secret_key             where the installation keeps its own
 A study's folder has the same shape without a zip and without a key.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 import os

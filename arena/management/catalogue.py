@@ -1,7 +1,5 @@
 """The German texts of voters' pages, compiled to what gettext reads."""
 
-from __future__ import annotations
-
 import polib
 from django.conf import settings
 

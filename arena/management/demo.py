@@ -3,8 +3,6 @@
 Every step can be repeated: what is there already is used again, so a second run changes nothing.
 """
 
-from __future__ import annotations
-
 import socket
 import time
 from collections.abc import Callable

@@ -4,8 +4,6 @@ Each examination looks at one part and says in a sentence what it found. `broken
 people need does not work; `doubtful`: it works, and will surprise somebody.
 """
 
-from __future__ import annotations
-
 import os
 import shutil
 import tempfile

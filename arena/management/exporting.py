@@ -1,7 +1,5 @@
 """What `manage.py export` can write: the arguments of each kind and what writes it."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """One line on a terminal that says how far long work is; nothing where nobody reads along."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import TextIO
 

@@ -3,8 +3,6 @@
 manage.py comes here directly; `call_command("rate_csv")` takes the same way.
 """
 
-from __future__ import annotations
-
 import json
 import sys
 import time

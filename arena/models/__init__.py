@@ -1,7 +1,5 @@
 """Rows of arena: people, tokens, invitations, studies, authors, votes, ratings, fault labels."""
 
-from __future__ import annotations
-
 from arena.models.files import ScenarioFile, StudyFile
 from arena.models.people import ApiToken, Person, fresh_token
 from arena.models.ratings import EarlyLook, ImportedVote, Snapshot, Standing, VoteFile

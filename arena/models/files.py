@@ -1,7 +1,5 @@
 """Files that workers write and pages offer."""
 
-from __future__ import annotations
-
 from typing import Any, ClassVar, Self
 
 from django.conf import settings

@@ -1,7 +1,5 @@
 """People: what an account has beside its login, and the tokens of its programs."""
 
-from __future__ import annotations
-
 import secrets
 import uuid
 from datetime import datetime

@@ -1,7 +1,5 @@
 """Studies and what they show."""
 
-from __future__ import annotations
-
 from django.conf import settings
 from django.db import models
 from django.db.models import F, Q

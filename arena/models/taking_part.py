@@ -1,7 +1,5 @@
 """How people take part in studies: links, enrolments, authorships, practice; and drafts."""
 
-from __future__ import annotations
-
 import hashlib
 import secrets
 from datetime import datetime

@@ -1,7 +1,5 @@
 """What experts decide."""
 
-from __future__ import annotations
-
 from itertools import combinations
 
 from django.conf import settings

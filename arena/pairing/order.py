@@ -1,7 +1,5 @@
 """In which order an expert sees the chosen units, and which side each picture is on."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -18,8 +18,6 @@ A unit is a scenario with a pair of contestants. The plan is made in five steps:
 Notation: E experts, P pairs, S scenarios.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from arena.pairing.order import (

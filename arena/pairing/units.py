@@ -3,8 +3,6 @@
 Notation: E experts, P pairs, S scenarios.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections import deque

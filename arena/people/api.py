@@ -1,7 +1,5 @@
 """Accounts, and the links that let their owners in."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from django.contrib.auth.models import User

@@ -3,8 +3,6 @@
 Marks of authorship stand here too: like a link, each joins one expert to one study.
 """
 
-from __future__ import annotations
-
 import secrets
 from dataclasses import dataclass
 from datetime import timedelta

@@ -1,7 +1,5 @@
 """Pages of accounts: sign-in, the list of people, links to set a password, one's own tokens."""
 
-from __future__ import annotations
-
 import uuid
 from typing import Any
 

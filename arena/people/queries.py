@@ -1,7 +1,5 @@
 """Who somebody is."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Collection
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Accounts: made, let in by a link, paused, given another role; and what each chooses."""
 
-from __future__ import annotations
-
 import uuid
 from collections import Counter
 from collections.abc import Mapping

@@ -11,8 +11,6 @@ other and puts the others above it, below it or nowhere.
 Notation: C contestants, R rows, P pairs, B rounds, which are the last axis.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, fields, replace
 from typing import Self

@@ -7,8 +7,6 @@ of scores), those who met through any chain a group. Strengths exist when everyb
 Notation: C contestants, K parts, P pairs, n sets of votes.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum

@@ -6,8 +6,6 @@ Notation: R rows, C contestants, P pairs that met. Contestants, experts and scen
 from 0; `names` gives the contestants' names.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, fields, replace

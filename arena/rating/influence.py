@@ -4,8 +4,6 @@ Notation: C contestants, P pairs that met, E experts, V votes, B rounds. Strengt
 logarithms of odds; "first" is the contestant with the highest rating.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 
 import numpy as np

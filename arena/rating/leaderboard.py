@@ -12,8 +12,6 @@ with rating, interval and rank, and what must be said with the numbers.
 Votes that were grouped elsewhere go into `Comparisons` directly, with their `count`.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, field, fields, replace
 from typing import Any

@@ -4,8 +4,6 @@ A snapshot stores the fields that `arena.models.Standing` has as well; files, pa
 show them.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 

@@ -7,8 +7,6 @@ Notation: R rows, C contestants, Q columns, K = C + Q parameters. Strengths and 
 logarithms of odds.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

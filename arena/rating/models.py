@@ -12,8 +12,6 @@ Notation: C contestants, P pairs, B rounds, which are the last axis; K parameter
 and the logarithm of v where ties have a parameter of their own.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 

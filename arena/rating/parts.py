@@ -3,8 +3,6 @@
 Notation: C contestants, B rounds.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

@@ -8,8 +8,6 @@ docs/rating.md describes it; everything is on the scale of the rated table, ties
 Notation: C contestants, P pairs. Widths and gaps are Elo points.
 """
 
-from __future__ import annotations
-
 import math
 from bisect import bisect_left
 from collections.abc import Callable

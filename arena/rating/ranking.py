@@ -10,8 +10,6 @@ step-down of Westfall and Young 1993, Romano and Wolf 2005).
 Notation: C contestants, P pairs in the order of np.triu_indices, B rounds, N draws.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any, Self
 

@@ -11,8 +11,6 @@ Notation: B rounds, U units, S scenarios, V votes, E experts, C contestants; the
 three values are low won, tie, high won.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum

@@ -1,7 +1,5 @@
 """What to say with ratings: why intervals are missing, and what to keep in mind."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from arena.rating.chains import few_of

@@ -1,7 +1,5 @@
 """How to rate: method, what hangs together, how intervals are found, how often, by which seed."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum

@@ -15,8 +15,6 @@ Notation: R rows, C contestants, K parameters (C strengths, and what a model has
 clusters. Strengths are logarithms of odds, covariances squared Elo points.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from typing import Self
 

@@ -6,8 +6,6 @@ nobody asked for it, or that the version which rated did not know it yet. Keys o
 are no longer computed are passed over.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import Field, dataclass, field, fields, is_dataclass
 from functools import cache

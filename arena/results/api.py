@@ -1,7 +1,5 @@
 """Ratings of a study with their tables, for staff who may read its results."""
 
-from __future__ import annotations
-
 import uuid
 from collections.abc import Callable
 from dataclasses import fields

@@ -1,7 +1,5 @@
 """Scenarios: what contestants are asked to change."""
 
-from __future__ import annotations
-
 import uuid
 from functools import partial
 from typing import Any

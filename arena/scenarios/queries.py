@@ -1,7 +1,5 @@
 """Scenarios, scenes and recordings as pages show them."""
 
-from __future__ import annotations
-
 import math
 import uuid
 from collections.abc import Sequence

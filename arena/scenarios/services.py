@@ -1,7 +1,5 @@
 """Changes of scenarios and scenes that nothing depends on yet, references, and redrawing."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 

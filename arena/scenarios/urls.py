@@ -1,7 +1,5 @@
 """Addresses of the pages of scenes, scenarios and augmentations."""
 
-from __future__ import annotations
-
 from django.urls import URLPattern, path
 
 from arena.scenarios.pages import augmentations, forms, scenarios, uploads

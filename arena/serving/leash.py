@@ -7,8 +7,6 @@ exec. It is a launcher of its own because a hook between fork and exec is unsafe
 threads. Elsewhere than on Linux the program just runs, and an orderly stop still ends it.
 """
 
-from __future__ import annotations
-
 import ctypes
 import os
 import signal

@@ -6,8 +6,6 @@ is ours beyond doubt: a process with the number and the start that were written 
 carries the secret of that supervisor in its environment.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import secrets

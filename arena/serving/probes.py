@@ -1,7 +1,5 @@
 """Ports, sockets and programs of this computer; imports no models."""
 
-from __future__ import annotations
-
 import shutil
 import socket
 from importlib.util import find_spec

@@ -1,7 +1,5 @@
 """Health checks of the database, the broker and the workers, for load balancers and operators."""
 
-from __future__ import annotations
-
 import secrets
 import threading
 import time

@@ -1,7 +1,5 @@
 """What the product needs on one machine: Redis, a worker, the web server, the stand-in model."""
 
-from __future__ import annotations
-
 import fcntl
 import sys
 from collections.abc import Callable, Iterator

@@ -4,8 +4,6 @@ A program that keeps crashing is restarted after growing delays while the others
 worker does not take the web server down.
 """
 
-from __future__ import annotations
-
 import contextlib
 import os
 import signal

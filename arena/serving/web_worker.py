@@ -6,8 +6,6 @@ holds a connection and no thread. Threads of the worker get requests that are co
 body, and hand over answers that are kept for their reader.
 """
 
-from __future__ import annotations
-
 import logging
 import os
 import resource

@@ -1,7 +1,5 @@
 """Who may open which page, and signing in."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from functools import wraps

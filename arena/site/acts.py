@@ -1,7 +1,5 @@
 """Acts of pages: asking before them, telling what came of them, sending them to a worker."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass

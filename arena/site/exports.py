@@ -1,7 +1,5 @@
 """The log of administrative acts as CSV and as JSON lines, written while it is read."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Forms and fields that several rooms share."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterable
 from dataclasses import dataclass

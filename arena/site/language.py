@@ -1,7 +1,5 @@
 """The language of a page: voters are asked in German or English, all else is English."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

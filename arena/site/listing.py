@@ -1,7 +1,5 @@
 """Lists in pages: a word to look for, filters, and which page the address asks for."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TypeVar

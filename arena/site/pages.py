@@ -1,7 +1,5 @@
 """Home of each role with its first steps, the audit log, and what monitoring asks."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterator
 from typing import Any

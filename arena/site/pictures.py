@@ -1,7 +1,5 @@
 """How a picture goes out: private, and saying nothing about its file."""
 
-from __future__ import annotations
-
 from django.core.files.storage import default_storage
 from django.http import FileResponse, Http404, HttpRequest
 

@@ -1,7 +1,5 @@
 """Reads of the whole site: the log of acts, gauges for monitoring, counts, narrowed lists."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from datetime import datetime, time
 from typing import Any

@@ -8,8 +8,6 @@ goes can't be used again: the same request is asked, and paid, anew, and transcr
 words. Nothing of a job that is not over goes, and nothing that an unfinished study shows.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Addresses of the pages."""
 
-from __future__ import annotations
-
 from django.contrib.auth import views as auth
 from django.urls import URLPattern, path
 

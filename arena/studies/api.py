@@ -1,7 +1,5 @@
 """Studies: opened, closed, and their progress; never who leads."""
 
-from __future__ import annotations
-
 import uuid
 from typing import Any
 

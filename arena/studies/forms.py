@@ -1,7 +1,5 @@
 """Forms of studies, from the fields of their plans."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Reads of studies: which there are, how far their experts are, who takes part, drafts."""
 
-from __future__ import annotations
-
 from collections import Counter, defaultdict
 from collections.abc import Sequence
 from contextlib import suppress

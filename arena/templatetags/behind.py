@@ -1,7 +1,5 @@
 """What is behind the results: links from numbers to votes, and the log of a study in words."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """States as a shape, a colour and a word; numbers and money as people read them; pagers."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from decimal import Decimal

@@ -1,7 +1,5 @@
 """Numbers and names of the results page as a person reads them."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import partial
 

@@ -1,7 +1,5 @@
 """The frame of every page: who looks at it and where they can go."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from django import template

@@ -1,7 +1,5 @@
 """What an expert does: pairs, their pictures, votes, reports and preferences."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The page on which an expert votes. It tells nothing of who made what."""
 
-from __future__ import annotations
-
 import math
 import uuid
 from collections.abc import Callable

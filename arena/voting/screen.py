@@ -1,7 +1,5 @@
 """What the voting page shows and what its script is given."""
 
-from __future__ import annotations
-
 import uuid
 from dataclasses import dataclass
 from typing import Any

@@ -4,8 +4,6 @@ Zones are a taper, a line, a row or a ring of cones, and a worker. s runs along 
 the ego's centre, d to the left of it.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -5,8 +5,6 @@ each is put against the one before it; what it leaves open is chosen so that the
 ground as possible.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Callable, Iterator

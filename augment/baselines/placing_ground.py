@@ -3,8 +3,6 @@
 Frame: ego frame of the scene. d is to the left of a lane's own direction, in metres.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from functools import partial

@@ -8,8 +8,6 @@ model where this has the best code there can be.
 Frame: ego frame; x ahead, y to the left.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

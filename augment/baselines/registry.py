@@ -4,8 +4,6 @@ In: a scene, its intent, a seed. Out: a modification with notes, or why it refus
 entry of PLACERS; slugs are kept in databases, so they stay.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 from functools import partial

@@ -7,8 +7,6 @@ placement gives way a little along the lane or is arranged otherwise, and if not
 refused. So is an intent that leaves open what a placement needs.
 """
 
-from __future__ import annotations
-
 import itertools
 from dataclasses import dataclass, replace
 

@@ -1,7 +1,5 @@
 """How crashed vehicles lie to each other, against what is said, and which of them is which."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Distances, places across the road and gaps against those that were asked for."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Counts, types, motion, headings and walks against those that were asked for."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 from itertools import combinations

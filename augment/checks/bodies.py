@@ -1,7 +1,5 @@
 """Whether boxes share ground, whether sizes and speeds are usual, and where walks lead."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 

@@ -1,7 +1,5 @@
 """A finding: one measured fact about what a modification puts into its scene."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum

@@ -5,8 +5,6 @@ the scene. No change to the scene and nobody's answer is known here, so they are
 drew what.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass

@@ -5,8 +5,6 @@ number comes from. The references of the catalogue are held by a narrower one: t
 measured them.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass

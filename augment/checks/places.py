@@ -1,7 +1,5 @@
 """Where changed agents are, on which ground, and where they look; no intent is asked for."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 

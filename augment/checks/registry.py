@@ -8,8 +8,6 @@ Adding a check is adding one function to `CHECKS`, which never ask what was want
 `ASKED_CHECKS`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import replace
 

@@ -6,8 +6,6 @@ along it, d to its left. Which mistake is made depends on nothing but the prompt
 ego frame.
 """
 
-from __future__ import annotations
-
 import hashlib
 import math
 import random

@@ -5,8 +5,6 @@ that there is a picture and says so: it is a stand-in without eyes.
 Frame: ego frame.
 """
 
-from __future__ import annotations
-
 import json
 import math
 import re

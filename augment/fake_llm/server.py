@@ -5,8 +5,6 @@ review without ratings; three use their function wrongly; each of the others bre
 that real servers do. It also answers the tiny questions of a probe.
 """
 
-from __future__ import annotations
-
 import json
 import re
 import threading

@@ -5,8 +5,6 @@ given such a list. All else comes from the request alone.
 Frame: ego frame.
 """
 
-from __future__ import annotations
-
 import json
 import math
 import re

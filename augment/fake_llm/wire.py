@@ -3,8 +3,6 @@
 Stricter than most servers on purpose: a client that passes here sends nothing odd.
 """
 
-from __future__ import annotations
-
 import base64
 import binascii
 import hashlib

@@ -4,8 +4,6 @@ In: a path, and the name of a format where it is known. Out: what `readers` give
 recording comes here; the readers themselves run in the process alone, which unpacks a zip first.
 """
 
-from __future__ import annotations
-
 import os
 import shutil
 import stat

@@ -9,8 +9,6 @@ City frame, headings of the forward axis seen from above. Bicycle lanes are left
 drives there. The maps have no speed limits, no lights (their state is unknown) and no sidewalks.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from pathlib import Path

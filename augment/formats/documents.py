@@ -6,8 +6,6 @@ binaries of what looks like text: all of it is refused, with its place, before a
 XML with a document type, in which all that is dangerous begins, is refused too.
 """
 
-from __future__ import annotations
-
 import json
 from collections import Counter
 from pathlib import Path

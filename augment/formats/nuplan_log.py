@@ -8,8 +8,6 @@ another of them, counted from 0. Tokens are BLOBs; here they are their hexadecim
 Rows of 20 Hz are taken at 10 Hz.
 """
 
-from __future__ import annotations
-
 import re
 import sqlite3
 from collections.abc import Iterator, Sequence

@@ -6,8 +6,6 @@ geometry is the letters GP, a version, flags, the id of its reference system, an
 well-known binary; what is in longitude and latitude is projected to the zone that `meta` names.
 """
 
-from __future__ import annotations
-
 import math
 import sqlite3
 from collections import Counter

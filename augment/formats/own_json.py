@@ -3,8 +3,6 @@
 Nothing is lost on the way out, and what is read again is the same.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterator, Sequence
 from dataclasses import replace

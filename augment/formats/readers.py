@@ -5,8 +5,6 @@ which gives a `Reading` (reading.py): a `Scene`, a `Recording` and `Note`s on wh
 open. A new format is a class that fits `Reader`, and its entry in READERS.
 """
 
-from __future__ import annotations
-
 import itertools
 import time
 from dataclasses import dataclass, field

@@ -7,8 +7,6 @@ lies under them. Metres are rounded to millimetres, so that documents can be rea
 steps.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path

@@ -4,8 +4,6 @@ Also what maps leave open: the edges and widths of lanes that have lines beside 
 which segments lie in an intersection. P points of a lane.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from statistics import fmean

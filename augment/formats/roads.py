@@ -6,8 +6,6 @@ through an intersection, from one lane to one other over one or more segments, i
 rounded to millimetres.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

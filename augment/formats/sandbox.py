@@ -6,8 +6,6 @@ interpreter (a worker has threads, so it can't be forked) without our settings a
 environment; a timer of the system ends it should whoever asked die.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import resource

@@ -1,7 +1,5 @@
 """Every format that scenarios can be written in, by its name."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial

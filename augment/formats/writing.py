@@ -3,8 +3,6 @@
 Frame of a cell: the ego frame of its scene.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from datetime import date

@@ -4,8 +4,6 @@ Frame: any plane frame in metres. t is the curve's own parameter, 0 to 1; s is t
 from its first control point. N places, 4 control points.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from functools import cached_property

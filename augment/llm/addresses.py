@@ -6,8 +6,6 @@ IPv4 one (mapped, translated, tunnelled) is refused whatever it stands for: no m
 it, and where it leads is decided by whoever translates.
 """
 
-from __future__ import annotations
-
 import socket
 from collections.abc import Callable
 from contextlib import suppress

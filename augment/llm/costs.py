@@ -4,8 +4,6 @@ Money is counted in whole nano-dollars (a price of 2.50 USD per million tokens i
 token) and every sum is rounded up, so that counting never falls short of the bill.
 """
 
-from __future__ import annotations
-
 import json
 import math
 import re

@@ -3,8 +3,6 @@
 Everything that is stored, replayed or shown goes through these values.
 """
 
-from __future__ import annotations
-
 import base64
 import hashlib
 import json

@@ -3,8 +3,6 @@
 None of them can be answered well by chance, or by a server that drops what it does not know.
 """
 
-from __future__ import annotations
-
 import base64
 import json
 from collections.abc import Callable

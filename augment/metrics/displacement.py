@@ -6,8 +6,6 @@ Removed agents have no place and take no part. Any frame, the same for both side
 Notation: R objects of the reference, G generated ones.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

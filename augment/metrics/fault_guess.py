@@ -1,7 +1,5 @@
 """A first guess of the faults that an expert would see, from the checks alone."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 
 from augment.checks.finding import FaultClass, Finding, FindingKind

@@ -4,8 +4,6 @@ Scenarios are the unit: two objects of one scenario are no two observations, and
 samples of one cell. Values in metres.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace

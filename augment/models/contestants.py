@@ -1,7 +1,5 @@
 """Who is rated."""
 
-from __future__ import annotations
-
 import re
 import uuid
 

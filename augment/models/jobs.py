@@ -1,7 +1,5 @@
 """Jobs, their rows, and the tries at each row."""
 
-from __future__ import annotations
-
 import uuid
 from decimal import Decimal
 

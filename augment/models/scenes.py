@@ -1,7 +1,5 @@
 """Scenes and scenarios: what contestants are asked to change."""
 
-from __future__ import annotations
-
 import uuid
 
 from django.conf import settings

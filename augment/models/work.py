@@ -1,7 +1,5 @@
 """What every row has that a worker brings to an outcome."""
 
-from __future__ import annotations
-
 import uuid
 from collections.abc import Iterable, Mapping
 from typing import Any, ClassVar

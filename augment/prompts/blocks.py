@@ -3,8 +3,6 @@
 Whatever the text, nothing but ReplyUnreadable comes out of here, and nothing is evaluated.
 """
 
-from __future__ import annotations
-
 import json
 import re
 from collections.abc import Callable

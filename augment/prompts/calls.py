@@ -11,8 +11,6 @@ Whatever the text, nothing is raised: a call that can't be read is a call with a
 goes back to the model.
 """
 
-from __future__ import annotations
-
 import ast
 import re
 from collections.abc import Iterator

@@ -12,8 +12,6 @@ in the same place the first. Where the map has no lane for the ego only the radi
 Frame: ego frame. N points.
 """
 
-from __future__ import annotations
-
 import heapq
 import math
 from dataclasses import dataclass

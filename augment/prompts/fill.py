@@ -8,8 +8,6 @@ endpoint can reuse the unchanged beginning. Reviewers get the scene as polylines
 modifier got: they have no tool to walk along curves. The texts are package data under `text/`.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 import re

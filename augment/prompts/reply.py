@@ -6,8 +6,6 @@ In: the text of an answer, and the `Scene` that it is about. Out: typed values, 
 Frame: ego frame of the scene.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from dataclasses import dataclass, replace

@@ -10,8 +10,6 @@ into a prompt and what the pose tool answers about both come from `lane_curves`,
 beginning of Lane3" and its control points are the same place in either.
 """
 
-from __future__ import annotations
-
 import json
 import math
 import re

@@ -8,8 +8,6 @@ on the scene, the change and the camera alone. Pictures with ids are for reviewe
 marks at what the checks found for analysts, neither ever for a vote.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

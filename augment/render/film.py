@@ -4,8 +4,6 @@ The window follows the ego and says the time. Drives of one scene lie beneath ea
 on a strip each has a column.
 """
 
-from __future__ import annotations
-
 import io
 from collections.abc import Sequence
 from typing import Any

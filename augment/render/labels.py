@@ -1,7 +1,5 @@
 """What is written into a picture: arrows at its edge, and for analysts names and numbers."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass

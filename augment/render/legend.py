@@ -5,8 +5,6 @@ the changed colour is "changed", be it added or moved; whatever stood there befo
 does is "gone". Ids, sizes and the order of a modification leave no trace, and numbers are rounded.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass

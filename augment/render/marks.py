@@ -4,8 +4,6 @@ Vehicles keep their true boxes; people, cones and signs have a least size in pix
 can be seen in every window.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from functools import partial

@@ -5,8 +5,6 @@ never differ by colour alone; red and blue differ in lightness too. Widths are i
 Nothing is see-through: a picture has few colours, so it is small and quickly drawn.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 Colour = tuple[int, int, int]

@@ -1,7 +1,5 @@
 """The ground of a picture: road, lines, crosswalks, lights, the 5 m grid and the scale bar."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Plane shapes that the pictures are made of; any unit, any frame with y to the left of x."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -5,8 +5,6 @@ Here stand the rules that reach over more than one field: ids, references, real 
 Frame: ego frame of the scene.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, fields, is_dataclass
 from enum import Enum

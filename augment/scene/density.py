@@ -5,8 +5,6 @@ a traffic light, is filled from its far end backwards, at gaps drawn from 10 m u
 widest; so are the roadblocks under further places that a scenario names. Frame: ego frame.
 """
 
-from __future__ import annotations
-
 import math
 import random
 from collections.abc import Iterator, Sequence

@@ -3,8 +3,6 @@
 What is open makes no statement.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator
 
 from augment.scene.entities import TurnType

@@ -4,8 +4,6 @@
 Frame: ego frame of the scene; any one frame for turns and sides.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass

@@ -3,8 +3,6 @@
 Frame: ego frame of t0. T steps.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace

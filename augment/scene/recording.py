@@ -3,8 +3,6 @@
 Frame: the ego frame of t0 (the Scene's frame). T steps.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Annotated, Any

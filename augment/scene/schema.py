@@ -5,8 +5,6 @@ reads and writes it. Values are strict: no text for numbers, no unknown fields, 
 not finite. Names carry their units.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass

@@ -5,8 +5,6 @@ another one compares (leases, signs of life, places at an endpoint) are therefor
 compared by the database; on SQLite that is the clock of its only machine.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from datetime import UTC, datetime

@@ -1,7 +1,5 @@
 """The append-only log: every write of a service leaves a line."""
 
-from __future__ import annotations
-
 from typing import Any, TypeVar
 
 from django.contrib.auth.models import User

@@ -4,8 +4,6 @@
 the options of commands are made of that list: a field that is added is added to all of them.
 """
 
-from __future__ import annotations
-
 from argparse import BooleanOptionalAction
 from collections.abc import Iterable, Mapping
 from dataclasses import MISSING, dataclass, field, fields

@@ -3,8 +3,6 @@
 Each rule is the function by which the form or the API reads the same thing.
 """
 
-from __future__ import annotations
-
 import zlib
 from collections.abc import Callable, Mapping
 from dataclasses import fields

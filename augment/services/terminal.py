@@ -5,8 +5,6 @@ would move the cursor, recolour or rewrite what stands on the screen. So each te
 its way out, whoever wrote the command.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any

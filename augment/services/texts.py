@@ -1,7 +1,5 @@
 """Texts from outside as every database takes them, and names of stored files."""
 
-from __future__ import annotations
-
 import re
 from typing import Any
 

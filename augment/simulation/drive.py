@@ -1,7 +1,5 @@
 """The drive itself: plan, track, let traffic answer, 150 times; and who it is measured by."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from enum import StrEnum

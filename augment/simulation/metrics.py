@@ -1,7 +1,5 @@
 """The parts of a driving score: nuPlan's, and what interPlan's score adds."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 
 import numpy as np

@@ -4,8 +4,6 @@ Proposals are IDM policies of several speeds on parallel paths. P paths, V polic
 number p * V + v. Source: the facts on PDM-Closed in docs/simulation.md.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Planners by name, and anybody's own by the dotted path of its class."""
 
-from __future__ import annotations
-
 import importlib
 import math
 from collections.abc import Callable, Collection

@@ -9,8 +9,6 @@ path that runs so far to the left of it, it lies as much further to the right. P
 of 0.2 s, A objects.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable

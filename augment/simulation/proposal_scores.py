@@ -8,8 +8,6 @@ hold every moment against the same limits. Savitzky-Golay filters are kept as ma
 smoothing is one product for all proposals.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import lru_cache
 

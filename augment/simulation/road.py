@@ -3,8 +3,6 @@
 The route is the recorded one where there is a recording, else the straightest. W ways.
 """
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 from functools import cached_property

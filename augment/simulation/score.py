@@ -5,8 +5,6 @@ configuration and interPlan's aggregator, by the facts in docs/simulation.md, wh
 differs.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from enum import StrEnum

@@ -3,8 +3,6 @@
 Metres to the centimetre, radians to the milliradian. Poses are those of box centres.
 """
 
-from __future__ import annotations
-
 import json
 from enum import StrEnum
 from typing import Any

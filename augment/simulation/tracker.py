@@ -7,8 +7,6 @@ The bicycle moves about the rear axle; its pedals and its wheel lag. Shapes: (T,
 first, because the tracker walks along them.
 """
 
-from __future__ import annotations
-
 import math
 from functools import lru_cache
 

@@ -3,8 +3,6 @@
 D drivers, K pairs of a driver and an object in its way.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property

@@ -4,8 +4,6 @@ None means: left open, so that the default counts, or what is known of the model
 documents, labels and slugs all derive from the fields of `ContestantOptions`.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace

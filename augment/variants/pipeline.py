@@ -10,8 +10,6 @@ An answer that nobody can read and a refusal are outcomes of the model and count
 changes nothing refuses. A broken wire is nobody's outcome and is raised.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace

@@ -12,8 +12,6 @@ there. Everything is computed from the scene before the change.
 Frame: ego frame; s along the shown part of a lane, from where it begins.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass

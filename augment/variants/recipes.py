@@ -5,8 +5,6 @@ combinations were not run there, and the geometric review is our own: it is name
 counted among the four.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 

@@ -1,7 +1,5 @@
 """Who plays which role, how a role is asked until its answer can be read, and the record of it."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field
 from enum import StrEnum

@@ -6,8 +6,6 @@ decides. Geometric, our own: the deterministic checks speak, no model does; wher
 an intent they are held against it as well.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace

@@ -5,8 +5,6 @@ Counted are calls that get an answer. Attempts that break on the wire come on to
 counts them too.
 """
 
-from __future__ import annotations
-
 import json
 import math
 from collections import Counter

@@ -9,8 +9,6 @@ the task: what is tried is a real tokenizer, real stop reasons, a real context w
 nonsense. `--write` puts the table into docs/benchmarks.md.
 """
 
-from __future__ import annotations
-
 import csv
 import io
 import subprocess

@@ -1,7 +1,5 @@
 """Counts tokens in an environment of its own: a JSON list of texts in, a list of numbers out."""
 
-from __future__ import annotations
-
 import importlib
 import json
 import sys

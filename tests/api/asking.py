@@ -1,7 +1,5 @@
 """Asking the API as an expert does, and reading its errors."""
 
-from __future__ import annotations
-
 import uuid
 from typing import Any
 

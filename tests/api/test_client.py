@@ -1,7 +1,5 @@
 """From an empty database to a rated table in LaTeX by the client: the example of the docs."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator
 from pathlib import Path

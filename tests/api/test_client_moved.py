@@ -1,7 +1,5 @@
 """An address that leads elsewhere: nothing is posted half, and nobody else is shown the token."""
 
-from __future__ import annotations
-
 import threading
 from collections.abc import Iterator
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer

@@ -1,7 +1,5 @@
 """The OpenAPI document: valid, whole, the same as what is served, and readable by staff."""
 
-from __future__ import annotations
-
 import json
 
 import pytest

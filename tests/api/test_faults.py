@@ -1,7 +1,5 @@
 """What no resource answers for has the one shape of the wire as well: nobody gets a page there."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

@@ -1,7 +1,5 @@
 """Scenes, scenarios, endpoints and models are made by the wire as on the pages."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from typing import Any

@@ -1,7 +1,5 @@
 """POST /api/v1/preferences: how somebody votes, kept on the account."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

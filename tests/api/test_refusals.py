@@ -1,7 +1,5 @@
 """Requests that the API refuses, all in one shape."""
 
-from __future__ import annotations
-
 import pytest
 from django.contrib.auth.models import Group, User
 from django.test import Client

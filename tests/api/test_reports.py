@@ -1,7 +1,5 @@
 """Reports of pairs in which something is wrong."""
 
-from __future__ import annotations
-
 import uuid
 
 import pytest

@@ -1,7 +1,5 @@
 """Resources are the pages' own: same services, roles and bytes; lists in pages with ETags."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

@@ -4,8 +4,6 @@ Every answer must have a status, a content type and a body that the document kno
 are the same in every run; what one of them changes is taken back before the next.
 """
 
-from __future__ import annotations
-
 from collections import defaultdict
 from collections.abc import Iterator
 from typing import Any

@@ -1,7 +1,5 @@
 """A study is opened by the wire with all that the form of the page has."""
 
-from __future__ import annotations
-
 from dataclasses import asdict
 from typing import Any
 

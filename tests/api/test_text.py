@@ -1,7 +1,5 @@
 """The text description on the wire."""
 
-from __future__ import annotations
-
 import pytest
 
 from arena.models import Study, Vote

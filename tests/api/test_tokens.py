@@ -1,7 +1,5 @@
 """Tokens: made and revoked on a page, kept as a hash, never more than their owner."""
 
-from __future__ import annotations
-
 from datetime import timedelta
 
 import pytest

@@ -1,7 +1,5 @@
 """Asking the API as a program does, by a token."""
 
-from __future__ import annotations
-
 from django.contrib.auth.models import User
 from django.test import Client
 

@@ -1,7 +1,5 @@
 """The wire alone: the pages' view of an image is stood in for."""
 
-from __future__ import annotations
-
 from django.http import HttpRequest, HttpResponse
 from django.urls import include, path
 

@@ -1,7 +1,5 @@
 """Vehicles said in brackets, and what is lost by it."""
 
-from __future__ import annotations
-
 import math
 from collections import defaultdict
 from functools import cache

@@ -1,7 +1,5 @@
 """Where the rule placer puts what an intent asks for."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """A voting booth: pages of one expert, driven as a person would, and the rows that come of it."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from typing import Any
 

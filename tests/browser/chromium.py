@@ -1,7 +1,5 @@
 """A real Chromium for the tests that vote and click."""
 
-from __future__ import annotations
-
 import os
 import shutil
 from collections.abc import Iterator

@@ -3,8 +3,6 @@
 The product runs in this process, so that a test can look into its rows.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import pytest

@@ -3,8 +3,6 @@
 It comes with matplotlib.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import matplotlib

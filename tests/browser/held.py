@@ -1,7 +1,5 @@
 """A page of ours in a browser, its server played by the test: who is answered when."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field

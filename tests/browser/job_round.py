@@ -1,7 +1,5 @@
 """The whole round of a job by its pages: tried, launched, paused, resumed, retried, seen."""
 
-from __future__ import annotations
-
 import threading
 from typing import Any
 

@@ -3,8 +3,6 @@
 The workers are real: what is read, drawn and kept is their work.
 """
 
-from __future__ import annotations
-
 import io
 import json
 import re

@@ -1,7 +1,5 @@
 """X holds B in the place of A, V shows what only one of them has, a zoomed picture has a scale."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import pytest

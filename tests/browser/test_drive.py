@@ -1,7 +1,5 @@
 """The player of drives: it plays in step, jumps to events, and is usable by everybody."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

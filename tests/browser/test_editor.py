@@ -1,7 +1,5 @@
 """The page on which changes are drawn, and what it makes of answers that come late."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterator
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Taking part by a link for everybody, in a browser that nobody has signed in."""
 
-from __future__ import annotations
-
 import pytest
 from django.conf import settings
 from django.test import Client

@@ -1,7 +1,5 @@
 """Every page of the site, once each in one browser: axe, and a phone's width."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import pytest

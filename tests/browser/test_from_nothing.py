@@ -5,8 +5,6 @@ scene is sent, its scenarios are written on a page and by a list, and the job go
 that a job can go.
 """
 
-from __future__ import annotations
-
 import json
 import re
 import threading

@@ -1,7 +1,5 @@
 """In any window and with any fonts an instruction is shown whole, and no picture moves."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """A real browser accepts an invitation: its form must be allowed to say where it comes from."""
 
-from __future__ import annotations
-
 import pytest
 from django.contrib.auth.models import User
 from django.urls import reverse

@@ -1,7 +1,5 @@
 """Measures over both pictures: lines that stay put and stay thin, lane edges under the ruler."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import pytest

@@ -1,7 +1,5 @@
 """Choosing a moment of a recording: the last wish counts, whichever answer comes first."""
 
-from __future__ import annotations
-
 import json
 
 import pytest

@@ -1,7 +1,5 @@
 """The practice round in a browser: with and without a script, on every size of window."""
 
-from __future__ import annotations
-
 import pytest
 from django.contrib.auth.models import User
 from playwright.sync_api import Page, expect

@@ -1,7 +1,5 @@
 """D plays how a planner drove both scenes, under their pictures, and the vote says so."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import pytest

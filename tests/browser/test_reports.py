@@ -1,7 +1,5 @@
 """A report from the voting page: which picture, where in it, and what an admin then sees."""
 
-from __future__ import annotations
-
 import pytest
 from django.urls import reverse
 from playwright.sync_api import Locator, Position, expect

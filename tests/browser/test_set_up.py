@@ -1,7 +1,5 @@
 """What scripts add where a study is set up: objects of an intent without a reload, and copying."""
 
-from __future__ import annotations
-
 import json
 
 import pytest

@@ -1,7 +1,5 @@
 """Pairs that were skipped: listed, opened again, and no votes anywhere on the page."""
 
-from __future__ import annotations
-
 import pytest
 from playwright.sync_api import expect
 

@@ -1,7 +1,5 @@
 """T shows what was changed in words, beside pictures and answers, and the vote says so."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import pytest

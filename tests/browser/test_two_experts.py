@@ -1,7 +1,5 @@
 """Two experts vote at once; every vote is kept once and the export agrees with a count."""
 
-from __future__ import annotations
-
 import csv
 import re
 from collections import Counter

@@ -1,7 +1,5 @@
 """Everything goes by keys alone, and no key votes by accident."""
 
-from __future__ import annotations
-
 import pytest
 from playwright.sync_api import Page, expect
 

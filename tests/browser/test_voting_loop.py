@@ -1,7 +1,5 @@
 """Votes are cast as fast as a person can and kept once, whatever the network does."""
 
-from __future__ import annotations
-
 import pytest
 from playwright.sync_api import Browser, Page, expect
 from pytest_django import Settings

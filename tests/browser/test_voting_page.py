@@ -1,7 +1,5 @@
 """The voting page as it looks: fixed geometry, both themes, phones, and without a script."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

@@ -1,7 +1,5 @@
 """Reloads, other tabs, ended sessions, closed studies: no vote is lost and none is doubled."""
 
-from __future__ import annotations
-
 import pytest
 from django.contrib.sessions.models import Session
 from playwright.sync_api import BrowserContext, Dialog, Page, Route, expect

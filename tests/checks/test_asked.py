@@ -1,7 +1,5 @@
 """What was asked for, in so many words, against what is there: a straight two-way street."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

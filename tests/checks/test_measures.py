@@ -1,7 +1,5 @@
 """Lines and rings that the instruction asks for, and lane edges: by eye, on an arc, by shapely."""
 
-from __future__ import annotations
-
 import json
 import math
 import random

@@ -1,7 +1,5 @@
 """Where an agent is: from the ego, along the lanes, on which lane."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Whatever the modification: no error, true sentences, and the same findings wherever it lies."""
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 from collections.abc import Callable

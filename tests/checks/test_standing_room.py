@@ -1,7 +1,5 @@
 """Off the road, outside the map, on top of each other, of no such size or speed."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Small worlds for the checks: the catalogue's references, and scenes moved as one body."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterable
 from dataclasses import replace

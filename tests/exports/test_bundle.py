@@ -1,7 +1,5 @@
 """A rating as files: everything in one zip, votes for other packages, charts."""
 
-from __future__ import annotations
-
 import csv
 import hashlib
 import io

@@ -1,7 +1,5 @@
 """The columns of a leaderboard: the same in every file, and those of before as they were."""
 
-from __future__ import annotations
-
 import csv
 import hashlib
 import io

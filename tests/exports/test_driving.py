@@ -1,7 +1,5 @@
 """Mean driving scores from the command line."""
 
-from __future__ import annotations
-
 from io import StringIO
 
 import pytest

@@ -1,7 +1,5 @@
 """Votes from elsewhere: kept whole or not at all, then rated and written like any other."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """A job goes out as interPlan's file."""
 
-from __future__ import annotations
-
 from io import StringIO
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """A rating with open intervals and withheld ranks, in every format that a reader can meet."""
 
-from __future__ import annotations
-
 import csv
 import io
 import json

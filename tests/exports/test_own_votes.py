@@ -1,7 +1,5 @@
 """Votes of authors on their own contestants: left out on demand, and always shown both ways."""
 
-from __future__ import annotations
-
 import io
 import json
 import zipfile

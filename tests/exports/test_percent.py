@@ -1,7 +1,5 @@
 """A share is rounded the same wherever it stands: in the table, the heat map and the panels."""
 
-from __future__ import annotations
-
 import pytest
 
 from arena.rating.comparisons import Estimate

@@ -1,7 +1,5 @@
 """Axes, numbers of points and the heat map, checked by hand."""
 
-from __future__ import annotations
-
 import math
 from itertools import combinations
 

@@ -1,7 +1,5 @@
 """Every chart of a rating as a file: the same twice, complete, and for staff alone."""
 
-from __future__ import annotations
-
 import threading
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Big ratings are a worker's job: the task, and what happens without a queue."""
 
-from __future__ import annotations
-
 from datetime import timedelta
 
 import pytest

@@ -1,7 +1,5 @@
 """A job goes out as scenarios in one zip that says what it is."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import zipfile

@@ -1,7 +1,5 @@
 """A study travels whole and without names; what is not whole is not taken in."""
 
-from __future__ import annotations
-
 import csv
 import hashlib
 import json

@@ -1,7 +1,5 @@
 """Every transcript of a job in one call: the same records as one by one."""
 
-from __future__ import annotations
-
 import json
 import zipfile
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Which votes a rating is made of, and what it keeps of them."""
 
-from __future__ import annotations
-
 import csv
 import io
 from datetime import datetime

@@ -5,8 +5,6 @@ sweep 0. Street: two lanes of 4 m; the ego's is under it, the other one comes to
 left. 30 m ahead an intersection of 10 m leads straight on or, over two segments, to the left.
 """
 
-from __future__ import annotations
-
 import json
 import math
 from pathlib import Path

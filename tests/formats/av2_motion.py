@@ -3,8 +3,6 @@
 City frame: the data set's car drives north at 10 m/s and is at (100, 201.42) in step 49.
 """
 
-from __future__ import annotations
-
 import json
 import math
 from pathlib import Path

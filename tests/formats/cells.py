@@ -1,7 +1,5 @@
 """Cells for the writers' tests: a small cast that has one of everything."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

@@ -3,8 +3,6 @@
 Each function writes into an empty folder and says what to read; none takes long or much itself.
 """
 
-from __future__ import annotations
-
 import pickle
 import sqlite3
 import struct

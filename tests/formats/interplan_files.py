@@ -1,7 +1,5 @@
 """A folder as somebody has it who holds interPlan and nuPlan: made, in the published shapes."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any

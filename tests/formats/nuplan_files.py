@@ -5,8 +5,6 @@ The ego's rear axle starts at EAST, NORTH of its city's zone and drives east at 
 Degrees come from metres by the inverse of a local projection, found by bisection.
 """
 
-from __future__ import annotations
-
 import sqlite3
 import struct
 from pathlib import Path

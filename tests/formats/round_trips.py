@@ -3,8 +3,6 @@
 Knows no writer and no reader. Things are found again by where they are, for names may change.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any

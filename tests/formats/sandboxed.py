@@ -1,7 +1,5 @@
 """A module that does in a sandbox what it is asked to."""
 
-from __future__ import annotations
-
 import os
 import signal
 import time

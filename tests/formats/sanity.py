@@ -4,8 +4,6 @@ Re-implemented from the published `ScenarioDescription.sanity_check` (MetaDrive,
 with `check_self_type` and `valid_check` on; nothing of the receiver is installed.
 """
 
-from __future__ import annotations
-
 import io
 import pickle
 from typing import Any

@@ -1,7 +1,5 @@
 """Zips from strangers: unpacked whole within bounds, or refused in a sentence."""
 
-from __future__ import annotations
-
 import stat
 import struct
 import zipfile

@@ -1,7 +1,5 @@
 """Scenarios go out as CommonRoad XML, which commonroad-io loads and its schema allows."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 from typing import Any

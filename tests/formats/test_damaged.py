@@ -1,7 +1,5 @@
 """Whatever is done to the bytes of a good file, it is read or refused in our own words."""
 
-from __future__ import annotations
-
 import shutil
 import sqlite3
 import tempfile

@@ -1,7 +1,5 @@
 """No file says NaN, and an ego that nobody recorded is there at every step of every format."""
 
-from __future__ import annotations
-
 import json
 import re
 from dataclasses import replace

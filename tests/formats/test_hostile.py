@@ -3,8 +3,6 @@
 Each is read as the product does it, so that the memory that it can take is the sandbox's.
 """
 
-from __future__ import annotations
-
 import re
 import resource
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """interPlan's files as somebody with a grudge writes them: each is our own error, with a place."""
 
-from __future__ import annotations
-
 import math
 from functools import cache
 from pathlib import Path

@@ -3,8 +3,6 @@
 References are in test_interplan.py.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import pytest

@@ -1,7 +1,5 @@
 """Which lanes of a map without intersections lie in one, and how wide they are."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Tested against the published schema: nobody may pass on a file of the data set."""
 
-from __future__ import annotations
-
 import sqlite3
 from pathlib import Path
 

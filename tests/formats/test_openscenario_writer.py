@@ -1,7 +1,5 @@
 """Scenarios go out as OpenSCENARIO with an OpenDRIVE map, and ASAM's own checks find no fault."""
 
-from __future__ import annotations
-
 import json
 import math
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Each recorded file, read whole: what is in it, and whether its traffic keeps to its lanes."""
 
-from __future__ import annotations
-
 import math
 from functools import cache
 from pathlib import Path

@@ -1,7 +1,5 @@
 """What every log has in common, however it was read."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Scenes go out and come back the same, to 1 cm and 0.001 rad, or a line says what is not."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import replace
 from pathlib import Path

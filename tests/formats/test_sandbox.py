@@ -1,7 +1,5 @@
 """A process with limits: it answers, refuses, or is ended with the reason."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """Scenarios go out as ScenarioNet's dictionaries, which its receiver takes."""
 
-from __future__ import annotations
-
 import pickletools
 from pathlib import Path
 from typing import Any

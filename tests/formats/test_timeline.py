@@ -1,7 +1,5 @@
 """What a recording offers to choose from: moments with times, on the ego's way."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Small Waymo Open Motion files, written by the published wire format with `struct` alone."""
 
-from __future__ import annotations
-
 import struct
 from pathlib import Path
 

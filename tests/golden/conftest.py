@@ -1,7 +1,5 @@
 """The option by which the golden files are written instead of compared."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from pathlib import Path

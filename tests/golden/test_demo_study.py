@@ -4,8 +4,6 @@ What contestants made is put in by hand, because the demo's own results come fro
 change with the catalogue; plan, votes, rating and files are the demo's.
 """
 
-from __future__ import annotations
-
 import datetime as standard
 import hashlib
 import itertools

@@ -1,7 +1,5 @@
 """Driving scores and their parts, of drives that stop, pass and turn."""
 
-from __future__ import annotations
-
 from augment.scene.entities import Modification, ScenarioType, Scene
 from augment.simulation.drive import expert_of, run
 from augment.simulation.pdm_closed import PdmClosed

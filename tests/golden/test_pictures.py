@@ -1,7 +1,5 @@
 """Every picture that is drawn of a scene, by the hash of its pixels."""
 
-from __future__ import annotations
-
 import hashlib
 
 from augment.render.bev import draw, draw_for_review

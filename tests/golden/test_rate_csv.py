@@ -1,7 +1,5 @@
 """What `rate_csv` prints of one file, by every method."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from arena.management.rate_csv import run

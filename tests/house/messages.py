@@ -1,7 +1,5 @@
 """Messages that voters see, as they are marked in templates and in Python."""
 
-from __future__ import annotations
-
 import ast
 import re
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """The product's own source, parsed once, for the rules that contracts can't say."""
 
-from __future__ import annotations
-
 import ast
 from collections.abc import Iterator
 from functools import cache

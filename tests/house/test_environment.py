@@ -1,7 +1,5 @@
 """Nothing of the machine but what tests/environment.py names reaches the tests."""
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess

@@ -1,7 +1,5 @@
 """docs/features.md lists what the code offers, and what it keeps is there."""
 
-from __future__ import annotations
-
 import ast
 import re
 from argparse import _SubParsersAction

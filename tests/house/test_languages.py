@@ -1,7 +1,5 @@
 """Only the modules whose words voters read know languages."""
 
-from __future__ import annotations
-
 import ast
 
 from tests.house.messages import VOTER_MODULES

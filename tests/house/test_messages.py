@@ -1,7 +1,5 @@
 """Every message that voters see has a German text, and the catalogue holds no other."""
 
-from __future__ import annotations
-
 import re
 
 import polib

@@ -1,7 +1,5 @@
 """Every mutation fits the source: else `make mutants` would say nothing of it."""
 
-from __future__ import annotations
-
 import ast
 
 import pytest

@@ -1,7 +1,5 @@
 """One name, one thing: what the vocabulary in docs/architecture.md holds the product to."""
 
-from __future__ import annotations
-
 import ast
 import re
 from collections import defaultdict

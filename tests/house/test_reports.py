@@ -1,7 +1,5 @@
 """A benchmark's section is replaced as a whole, and what was measured elsewhere says so."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from bench.report import write_section

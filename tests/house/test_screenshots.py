@@ -1,7 +1,5 @@
 """The pictures of the pages in docs/images/pages: none is missing or too heavy."""
 
-from __future__ import annotations
-
 from PIL import Image
 
 from tests.screenshots import FOLDER, SCHEMES, WIDTH

@@ -1,7 +1,5 @@
 """A wrong setting stops the start with a sentence that names the variable."""
 
-from __future__ import annotations
-
 import os
 import sqlite3
 import subprocess

@@ -1,7 +1,5 @@
 """A newcomer's walk: the file to open first of each stage says what comes in and what goes out."""
 
-from __future__ import annotations
-
 import ast
 import re
 

@@ -1,7 +1,5 @@
 """Language models for the tests of jobs: what they answer, and what they were asked."""
 
-from __future__ import annotations
-
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager

@@ -1,7 +1,5 @@
 """Rows for the tests of jobs: a street, a scenario, contestants and a launched job."""
 
-from __future__ import annotations
-
 from datetime import UTC, datetime, timedelta
 from typing import Any
 

@@ -1,7 +1,5 @@
 """A contestant of chosen options at a server that says the same few things again and again."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from augment.models import Augmentation, Contestant

@@ -1,7 +1,5 @@
 """Reserving before a call, settling after it, and what becomes of what nobody saw the end of."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from datetime import timedelta
 from decimal import Decimal

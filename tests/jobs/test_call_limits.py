@@ -1,7 +1,5 @@
 """Places at an endpoint, on the database as it is configured."""
 
-from __future__ import annotations
-
 import threading
 import time
 from collections.abc import Callable

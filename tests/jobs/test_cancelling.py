@@ -1,7 +1,5 @@
 """A cancelled job frees the places of its calls in flight; what was paid for is counted, kept."""
 
-from __future__ import annotations
-
 from datetime import timedelta
 from typing import Any
 

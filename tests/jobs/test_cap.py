@@ -1,7 +1,5 @@
 """Eight workers and a cap that admits about half: never above it, and nothing paid twice."""
 
-from __future__ import annotations
-
 import queue
 from collections import Counter
 from concurrent.futures import ThreadPoolExecutor

@@ -1,7 +1,5 @@
 """The client of an endpoint: over the real wire to a stand-in, with rows behind it."""
 
-from __future__ import annotations
-
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from typing import Any

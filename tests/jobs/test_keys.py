@@ -1,7 +1,5 @@
 """A key that every door is knocked on with is found nowhere afterwards."""
 
-from __future__ import annotations
-
 import json
 import logging
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """Who changes rows and their job takes the rows first, so that nobody waits in a circle."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 

@@ -1,7 +1,5 @@
 """Every option of a contestant: what it says is what is on the wire, and what is not is said."""
 
-from __future__ import annotations
-
 import base64
 import json
 import struct

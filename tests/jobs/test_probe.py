@@ -1,7 +1,5 @@
 """The probe, over the real wire, at servers that can do more or less."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any

@@ -1,7 +1,5 @@
 """A language model reads what an instruction asks for; a person decides whether that counts."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterator
 from contextlib import contextmanager

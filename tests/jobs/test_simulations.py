@@ -1,7 +1,5 @@
 """Drives as rows: planned once, leased once, kept with scores, told apart from failures."""
 
-from __future__ import annotations
-
 import sys
 from datetime import timedelta
 from io import StringIO

@@ -1,7 +1,5 @@
 """The stand-in's list of intents: the scenarios that are stored."""
 
-from __future__ import annotations
-
 import pytest
 
 from augment.models import Scenario

@@ -1,7 +1,5 @@
 """The record of an augmentation, as one document that says everything."""
 
-from __future__ import annotations
-
 import csv
 import io
 import json

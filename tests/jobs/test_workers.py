@@ -1,7 +1,5 @@
 """Signs of life of workers, and what brings lost work back whatever happens."""
 
-from __future__ import annotations
-
 import logging
 import shutil
 import tempfile

@@ -4,8 +4,6 @@
 sizes of pictures. The tests run it on the product, and on a product in which a leak is planted.
 """
 
-from __future__ import annotations
-
 import json
 import re
 import struct

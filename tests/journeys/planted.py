@@ -1,7 +1,5 @@
 """Products with a leak, to prove that the suite finds it: middleware that adds too much."""
 
-from __future__ import annotations
-
 import json
 import zlib
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """More votes than a person should wait for: the page plans the rating, a worker computes."""
 
-from __future__ import annotations
-
 from itertools import cycle, islice
 from pathlib import Path
 

@@ -4,8 +4,6 @@ Channel by channel: addresses, pages, replies, headers, the chunks and sizes of 
 sides and order, results, and what other roles know.
 """
 
-from __future__ import annotations
-
 import re
 import uuid
 from urllib.parse import urlsplit

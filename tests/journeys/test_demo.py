@@ -1,7 +1,5 @@
 """`make demo SERVE=0`: the main job, unattended, on the real parts."""
 
-from __future__ import annotations
-
 import csv
 import json
 import re

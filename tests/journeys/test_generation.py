@@ -1,7 +1,5 @@
 """A generation job on a real Redis and real workers that are killed in the middle of it."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 from threading import Thread

@@ -1,7 +1,5 @@
 """Two machines that share no folder work on one job, and a third sees all of it."""
 
-from __future__ import annotations
-
 import zipfile
 
 import pytest

@@ -1,7 +1,5 @@
 """The main job on a recorded log: import, instruct, generate by real workers, find the car."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

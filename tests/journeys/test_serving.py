@@ -1,7 +1,5 @@
 """`manage.py serve` on a real machine after the worst: it was killed, and its web workers hang."""
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess

@@ -4,8 +4,6 @@ fixtures/upgrade/39907c1.tar.xz is the database and the pictures of that commit'
 two votes in its open study.
 """
 
-from __future__ import annotations
-
 import csv
 import io
 import tarfile

@@ -1,7 +1,5 @@
 """A local server that answers every POST with JSON; what it answers is up to its subclasses."""
 
-from __future__ import annotations
-
 import json
 import threading
 from abc import ABC, abstractmethod

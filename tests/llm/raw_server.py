@@ -1,7 +1,5 @@
 """A server of this computer that says whatever bytes it is told to, and keeps what it is sent."""
 
-from __future__ import annotations
-
 import socket
 import threading
 from collections.abc import Callable, Iterator

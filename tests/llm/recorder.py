@@ -1,7 +1,5 @@
 """A server that keeps the headers it is sent, and answers the same to everybody."""
 
-from __future__ import annotations
-
 from contextlib import AbstractContextManager
 from typing import Any
 

@@ -1,7 +1,5 @@
 """A client that answers from a list: for tests of whatever talks to a language model."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 
 from augment.errors import ModelFault

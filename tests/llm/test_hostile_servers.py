@@ -1,7 +1,5 @@
 """The wire to servers that drip and swell: each ends in a named fault, and in time."""
 
-from __future__ import annotations
-
 import gzip
 import json
 import time

@@ -1,7 +1,5 @@
 """The client against real HTTP on this computer: one row for each fault of the wire."""
 
-from __future__ import annotations
-
 import socket
 import ssl
 import threading

@@ -1,7 +1,5 @@
 """Many scenarios from one file: all of them, or none and every error with its row."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The demo refuses numbers that make no sense before it does anything."""
 
-from __future__ import annotations
-
 import pytest
 from django.core.management import CommandError
 

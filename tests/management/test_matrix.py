@@ -1,7 +1,5 @@
 """A matrix of runs in a file: checked as a whole, estimated, launched, and written back."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """`manage.py prune`: what goes is said first, what is needed stays, and the numbers stay."""
 
-from __future__ import annotations
-
 import json
 from datetime import timedelta
 from io import StringIO

@@ -1,7 +1,5 @@
 """Votes from elsewhere: how they are rated, and what is printed."""
 
-from __future__ import annotations
-
 import csv
 import io
 import re

@@ -1,7 +1,5 @@
 """Votes from elsewhere: which files are taken, and what is said of the others."""
 
-from __future__ import annotations
-
 import json
 import re
 from pathlib import Path

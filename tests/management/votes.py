@@ -1,7 +1,5 @@
 """Votes as they come in files from elsewhere, and what is printed of them."""
 
-from __future__ import annotations
-
 import json
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The checks name what was done wrong on purpose, and nothing where all is right."""
 
-from __future__ import annotations
-
 import inspect
 import math
 

@@ -1,7 +1,5 @@
 """`manage.py doctor` names what is wrong with an installation, and what to do."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from datetime import timedelta
 from pathlib import Path

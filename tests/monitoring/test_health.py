@@ -1,7 +1,5 @@
 """What load balancers and monitoring ask, and what each answer gives away."""
 
-from __future__ import annotations
-
 import socket
 from datetime import timedelta
 

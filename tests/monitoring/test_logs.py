@@ -1,7 +1,5 @@
 """One id leads from the request of a browser to the lines of the worker."""
 
-from __future__ import annotations
-
 import io
 import json
 import logging

@@ -5,8 +5,6 @@ more without a mutation: a mutation is caught where they pass then. The outcomes
 counts are written to docs/benchmarks.md when all mutations ran.
 """
 
-from __future__ import annotations
-
 import argparse
 import os
 import tempfile

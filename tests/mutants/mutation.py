@@ -1,7 +1,5 @@
 """Mutations as they are kept: one table of a TOML file each, the file named for its area."""
 
-from __future__ import annotations
-
 import tomllib
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """A copy of the tree in which tests run, with one file exchanged at a time."""
 
-from __future__ import annotations
-
 import multiprocessing
 import os
 import re

@@ -1,7 +1,5 @@
 """Rules of made-up studies, and what must hold for every plan."""
 
-from __future__ import annotations
-
 from collections import Counter, defaultdict
 
 from arena.pairing.order import CHECK, MAIN, REPEAT

@@ -1,7 +1,5 @@
 """What a newcomer judges: what is planned least, spread over pairs and scenarios, by lot."""
 
-from __future__ import annotations
-
 from collections import Counter
 
 import numpy as np

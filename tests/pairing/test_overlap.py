@@ -1,7 +1,5 @@
 """How many units two experts judge, by the rule and without it."""
 
-from __future__ import annotations
-
 import math
 from collections import Counter, defaultdict
 from dataclasses import replace

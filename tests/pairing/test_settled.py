@@ -1,7 +1,5 @@
 """Pairs that nobody can tell apart: a tenth is shown, the others count as if they had been."""
 
-from __future__ import annotations
-
 from collections import Counter
 
 from arena.pairing.rules import Entry, draw_shown, draw_ties

@@ -1,7 +1,5 @@
 """No text whatever makes the reader raise anything but its own error."""
 
-from __future__ import annotations
-
 import contextlib
 import math
 import random

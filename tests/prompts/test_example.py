@@ -3,8 +3,6 @@
 python -m tests.prompts.test_example writes the scene's lists anew.
 """
 
-from __future__ import annotations
-
 import json
 import math
 import re

@@ -1,7 +1,5 @@
 """The paper's table of ratings, and votes simulated so that they could have led to it."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Intervals that keep what they promise."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

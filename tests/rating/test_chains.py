@@ -1,7 +1,5 @@
 """Who reaches whom by scores, against matrices of all contestants."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Ratings adjusted for what else was shown: by statsmodels, and what they refuse."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

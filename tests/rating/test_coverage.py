@@ -1,7 +1,5 @@
 """A small coverage study; the large one is bench/coverage_study.py."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Davidson's tie model, and what it changes."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Data that determine no rating say so; no number is made up."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

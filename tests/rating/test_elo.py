@@ -1,7 +1,5 @@
 """Online Elo: the plain replay is the paper's formula, and every round is a plain replay."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

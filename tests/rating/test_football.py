@@ -4,8 +4,6 @@ Made up in the shape of football: 316 teams in 16 leagues, each plays in its own
 then in another one. Some teams scored against others hardly ever, or in each of a few matches.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import statsmodels.api as sm

@@ -1,7 +1,5 @@
 """What must not change a rating, and how the counts hang together."""
 
-from __future__ import annotations
-
 from dataclasses import astuple, replace
 
 import numpy as np

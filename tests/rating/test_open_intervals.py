@@ -1,7 +1,5 @@
 """Votes that bound some contestants on one side only, or not at all: the others keep theirs."""
 
-from __future__ import annotations
-
 from itertools import combinations
 
 import numpy as np

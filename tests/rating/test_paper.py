@@ -1,7 +1,5 @@
 """What the paper prints comes out again."""
 
-from __future__ import annotations
-
 import csv
 import re
 from pathlib import Path

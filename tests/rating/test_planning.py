@@ -1,7 +1,5 @@
 """What is foretold of a study, against simulated ones and against what is known by hand."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

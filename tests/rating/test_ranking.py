@@ -1,7 +1,5 @@
 """Ranks, their spread, and all pairs judged at once."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from statsmodels.stats.multitest import multipletests

@@ -1,7 +1,5 @@
 """The closed-form cross-check, against formulas, packages and the bootstrap."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Votes for tests of ratings."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

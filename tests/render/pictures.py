@@ -1,7 +1,5 @@
 """Reading a drawn picture: its pixels by metres, its chunks."""
 
-from __future__ import annotations
-
 import io
 import struct
 from functools import lru_cache

@@ -1,7 +1,5 @@
 """What a picture shows, by named pixels; never whole pictures."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """The window depends on the scenario alone, holds its reference and is mostly road."""
 
-from __future__ import annotations
-
 import statistics
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The text description: right answers, and that it tells no more than the picture."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Colours that can be told apart: by lightness, and by eyes that see no red or no green."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

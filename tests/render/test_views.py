@@ -1,7 +1,5 @@
 """Marks stand where the findings are, and nothing of them is in a picture for a vote."""
 
-from __future__ import annotations
-
 import io
 import math
 from dataclasses import replace

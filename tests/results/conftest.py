@@ -1,7 +1,5 @@
 """One small study for all that checks its numbers."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

@@ -1,7 +1,5 @@
 """A simulated study, rated and stored by the code of version 1, with the hashes of its files."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

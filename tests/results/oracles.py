@@ -1,7 +1,5 @@
 """What the numbers of the results are held against: others' packages and plain loops."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,7 +1,5 @@
 """A small study: raw votes, ratings and pages, for tests that compute every number again."""
 
-from __future__ import annotations
-
 import html
 import re
 from dataclasses import dataclass

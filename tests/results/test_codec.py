@@ -1,7 +1,5 @@
 """Results of a snapshot: of every version read, written as they were, never half understood."""
 
-from __future__ import annotations
-
 import copy
 import hashlib
 import json

@@ -1,7 +1,5 @@
 """The same for agreement, the panel, sides, types and sessions; see test_every_number."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections import Counter, defaultdict

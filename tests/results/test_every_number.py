@@ -5,8 +5,6 @@ our own ratings. Numbers that are drawn at random are held against what they est
 error of the draws.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections import Counter, defaultdict

@@ -1,7 +1,5 @@
 """Who is where after t0: what was recorded, walked, held or stood."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from itertools import pairwise
 

@@ -1,7 +1,5 @@
 """An installation to back up, and what lies in a backup."""
 
-from __future__ import annotations
-
 import uuid
 import zipfile
 from datetime import UTC, datetime

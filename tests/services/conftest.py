@@ -1,7 +1,5 @@
 """A small study and one of its experts, for tests of services."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

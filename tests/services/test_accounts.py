@@ -1,7 +1,5 @@
 """Who is signed in comes with the roles, by one query."""
 
-from __future__ import annotations
-
 import pytest
 from django.contrib.auth.models import Group, User
 from pytest_django import DjangoAssertNumQueries

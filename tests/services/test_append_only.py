@@ -1,7 +1,5 @@
 """What is append-only can't be changed, also by somebody who has the database open."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import pytest

@@ -1,7 +1,5 @@
 """Marking experts as authors of contestants: who may be marked, once, logged, and taken back."""
 
-from __future__ import annotations
-
 import pytest
 from django.contrib.auth.models import User
 from django.core.management import CommandError, call_command

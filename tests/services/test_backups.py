@@ -1,7 +1,5 @@
 """A backup restores into the same installation, to the row and the picture, on any database."""
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess

@@ -4,8 +4,6 @@ The street has lanes of 3.5 m, the ego's in the middle of x; the junction of mil
 between 30.65 m and 53.35 m ahead.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

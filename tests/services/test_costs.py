@@ -1,7 +1,5 @@
 """What a contestant's augmentations took, over attempts that broke and answers from the store."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import pytest

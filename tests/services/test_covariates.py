@@ -1,7 +1,5 @@
 """A rating adjusted for what was shown: kept, shown and refused."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Displacement of stored rows; the street's reference has cones at (20, 0.5) and (25, -0.5)."""
 
-from __future__ import annotations
-
 import pytest
 
 from augment.models import Augmentation, Contestant, GenerationJob, Scenario

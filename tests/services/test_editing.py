@@ -1,7 +1,5 @@
 """Changing a scene by hand: lanes, snapping, what is refused; corrections on their whole way."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import replace

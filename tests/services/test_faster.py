@@ -1,7 +1,5 @@
 """Two who do the same at once."""
 
-from __future__ import annotations
-
 import threading
 from concurrent.futures import ThreadPoolExecutor
 

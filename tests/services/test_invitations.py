@@ -1,7 +1,5 @@
 """Links: one at a time, kept as a hash, ended one by one, and never a way into another account."""
 
-from __future__ import annotations
-
 from datetime import timedelta
 
 import pytest

@@ -1,7 +1,5 @@
 """Backups that were changed, harmed or made elsewhere: each is refused and nothing is kept."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import re

@@ -1,7 +1,5 @@
 """Several samples of a cell: rows, tables, files and the page of the job."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """A recording that comes by a page: kept, read by a worker, drawn, kept as a scene."""
 
-from __future__ import annotations
-
 import zipfile
 from io import BytesIO
 from pathlib import Path

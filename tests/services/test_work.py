@@ -1,7 +1,5 @@
 """The machine that all kinds of work share, over every kind; on PostgreSQL as well."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from datetime import timedelta

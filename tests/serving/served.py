@@ -1,7 +1,5 @@
 """A WSGI application for tests of the worker that serves it; nothing of the product."""
 
-from __future__ import annotations
-
 import os
 import time
 from collections.abc import Callable, Iterable

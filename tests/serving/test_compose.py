@@ -1,7 +1,5 @@
 """compose.yaml and the image hang together; they can't be built everywhere, so they are read."""
 
-from __future__ import annotations
-
 import os
 import re
 import subprocess

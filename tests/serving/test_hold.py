@@ -1,7 +1,5 @@
 """Only one supervisor runs in a folder."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """What a killed supervisor left behind is ended, and nothing else."""
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess

@@ -1,7 +1,5 @@
 """Writers of SQLite queue at a file; PostgreSQL queues them itself."""
 
-from __future__ import annotations
-
 import fcntl
 import threading
 from pathlib import Path

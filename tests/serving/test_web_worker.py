@@ -1,7 +1,5 @@
 """Who sends or reads slowly holds a connection, never a thread: gunicorn with one, for real."""
 
-from __future__ import annotations
-
 import http.client
 import os
 import socket

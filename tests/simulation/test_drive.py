@@ -1,7 +1,5 @@
 """Whole drives: laws that hold for each, the end of the map, and planners of one's own."""
 
-from __future__ import annotations
-
 import hashlib
 import math
 import subprocess

@@ -1,7 +1,5 @@
 """PDM-Closed: what it proposes, how it judges, when it brakes."""
 
-from __future__ import annotations
-
 import math
 import re
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Each metric of the score in a world whose answer can be worked out by hand."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """The tracker and the bicycle, held against closed forms and against the plain matrices."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

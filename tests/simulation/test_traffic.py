@@ -1,7 +1,5 @@
 """Who moves how: walkers, lane drivers, recorded tracks, and what stands."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Long streets and drives made by hand, whose right answers can be seen by eye."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 

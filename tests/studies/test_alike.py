@@ -1,7 +1,5 @@
 """Pairs that nobody can tell apart are settled when the study opens, unless it is to show them."""
 
-from __future__ import annotations
-
 import pytest
 
 from arena.models import Study

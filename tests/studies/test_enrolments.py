@@ -1,7 +1,5 @@
 """A link for everybody: places, consent, quotas, drop-outs, and who may know who somebody is."""
 
-from __future__ import annotations
-
 from datetime import timedelta
 
 import pytest

@@ -1,7 +1,5 @@
 """A pair whose hidden repeat has an answer or a report stays with its expert."""
 
-from __future__ import annotations
-
 import uuid
 
 import pytest

@@ -1,7 +1,5 @@
 """What is frozen at the opening, and what the results answer."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Handing pairs over, and the adaptive part, as rows."""
 
-from __future__ import annotations
-
 import uuid
 from collections import Counter
 

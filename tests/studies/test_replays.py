@@ -1,7 +1,5 @@
 """Which drives a study plays under its pictures, to whom, and how little they tell."""
 
-from __future__ import annotations
-
 import json
 import uuid
 

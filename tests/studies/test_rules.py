@@ -1,7 +1,5 @@
 """Studies with targets, repeats, attention checks and automatic ties, as rows."""
 
-from __future__ import annotations
-
 from collections import Counter
 
 import pytest

@@ -1,7 +1,5 @@
 """Which samples a study shows, of which jobs, and that a contestant has one set of options."""
 
-from __future__ import annotations
-
 import uuid
 
 import pytest

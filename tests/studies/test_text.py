@@ -1,7 +1,5 @@
 """What the text description of a study holds, from its opening on."""
 
-from __future__ import annotations
-
 import pytest
 from django.utils.translation import override
 

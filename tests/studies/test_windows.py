@@ -1,7 +1,5 @@
 """Both pictures of a pair show one window, whatever was drawn when."""
 
-from __future__ import annotations
-
 import pytest
 
 from arena.errors import NothingToPlan

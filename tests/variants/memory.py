@@ -1,7 +1,5 @@
 """A transcript that lives as long as its run."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 
 from augment.errors import ModelFault

@@ -1,7 +1,5 @@
 """One run of any recipe against a script, with everything that it did."""
 
-from __future__ import annotations
-
 import json
 import random
 from collections.abc import Iterable, Mapping

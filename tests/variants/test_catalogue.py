@@ -3,8 +3,6 @@
 Call counts and their order are those of the paper: m modifier, r reviewer, e engineer, v viewer.
 """
 
-from __future__ import annotations
-
 import math
 import random
 from collections.abc import Iterator

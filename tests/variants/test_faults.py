@@ -4,8 +4,6 @@ Calls are given by their role (m modifier, r reviewer, e engineer, v viewer); at
 are calls of their own.
 """
 
-from __future__ import annotations
-
 import csv
 import random
 import re

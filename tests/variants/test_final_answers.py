@@ -1,7 +1,5 @@
 """No ordinary final answer is mistaken for a call, and no call for a final answer."""
 
-from __future__ import annotations
-
 import random
 
 import pytest

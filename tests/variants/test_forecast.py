@@ -1,7 +1,5 @@
 """What a recipe is said to ask, beside what it asks."""
 
-from __future__ import annotations
-
 import json
 import random
 

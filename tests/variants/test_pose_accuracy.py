@@ -1,7 +1,5 @@
 """How near the pose tool and the control points of a prompt are to the centrelines themselves."""
 
-from __future__ import annotations
-
 import json
 import math
 from functools import cache

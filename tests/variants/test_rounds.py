@@ -1,7 +1,5 @@
 """Reviews and rounds: who is asked in which order, what counts in the end, what is on record."""
 
-from __future__ import annotations
-
 import pytest
 
 from augment.llm.messages import Reply

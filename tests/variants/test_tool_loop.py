@@ -1,7 +1,5 @@
 """The FC variant: calls in the answer and native ones, their limits, and what goes wrong."""
 
-from __future__ import annotations
-
 import json
 
 import pytest

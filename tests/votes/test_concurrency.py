@@ -1,7 +1,5 @@
 """Votes that arrive at once, on the database as it is configured."""
 
-from __future__ import annotations
-
 import uuid
 from collections import Counter
 from concurrent.futures import ThreadPoolExecutor

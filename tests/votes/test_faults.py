@@ -1,7 +1,5 @@
 """Opening a labelling, labelling, and what comes out of it."""
 
-from __future__ import annotations
-
 import csv
 import io
 

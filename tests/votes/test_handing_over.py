@@ -1,7 +1,5 @@
 """An expert's pairs are handed over while the expert and the takers vote, on either database."""
 
-from __future__ import annotations
-
 import threading
 import uuid
 from collections import Counter

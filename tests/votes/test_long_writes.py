@@ -1,7 +1,5 @@
 """Votes come in while the product itself writes or computes something long."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from datetime import timedelta

@@ -1,7 +1,5 @@
 """A vote that was confirmed survives a power cut."""
 
-from __future__ import annotations
-
 import os
 from concurrent.futures import ThreadPoolExecutor
 

@@ -1,7 +1,5 @@
 """What a process keeps of its counts: never older than the newest vote, however it came in."""
 
-from __future__ import annotations
-
 from typing import Any
 from uuid import uuid4
 

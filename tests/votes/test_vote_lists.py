@@ -1,7 +1,5 @@
 """The lists of votes behind the numbers of a rating: the database marks them as the rating did."""
 
-from __future__ import annotations
-
 from collections import Counter
 
 import pytest

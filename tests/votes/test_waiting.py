@@ -1,7 +1,5 @@
 """A vote that can't be written in time is given back, and the web server goes on meanwhile."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """The address of every page, its parameters filled in from the cast."""
 
-from __future__ import annotations
-
 import uuid
 
 from django.urls import reverse

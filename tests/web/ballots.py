@@ -1,7 +1,5 @@
 """What the tests of the voting page send and look at."""
 
-from __future__ import annotations
-
 import uuid
 
 from django.urls import reverse

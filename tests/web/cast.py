@@ -1,7 +1,5 @@
 """Who and what the tests of pages look at: one account per role, a job, studies, a picture."""
 
-from __future__ import annotations
-
 import re
 import struct
 import zlib

@@ -1,7 +1,5 @@
 """The pages that people can open, with rows behind them: for what has to hold on all of them."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from django.contrib.auth.models import User

@@ -1,7 +1,5 @@
 """Every page times every role, as one table."""
 
-from __future__ import annotations
-
 import pytest
 from django.test import Client
 from django.urls import reverse

@@ -1,7 +1,5 @@
 """Django's admin shows scenes and contestants, and nothing that tells how a study stands."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

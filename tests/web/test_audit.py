@@ -1,7 +1,5 @@
 """The log of administrative acts, and every door through which results could be seen early."""
 
-from __future__ import annotations
-
 import csv
 import io
 import json

@@ -1,7 +1,5 @@
 """Authors on the pages: admins mark them, results say what it changes, experts see none of it."""
 
-from __future__ import annotations
-
 import re
 from datetime import UTC, datetime
 

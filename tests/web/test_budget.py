@@ -1,7 +1,5 @@
 """Caps on the pages: entered at launch, shown beside what is used, raised where a job stopped."""
 
-from __future__ import annotations
-
 from decimal import Decimal
 
 import pytest

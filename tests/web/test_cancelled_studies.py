@@ -1,7 +1,5 @@
 """A study that was cancelled: no votes, no results, its votes stay."""
 
-from __future__ import annotations
-
 import pytest
 from django.contrib.auth.models import User
 from django.test import Client

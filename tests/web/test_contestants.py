@@ -1,7 +1,5 @@
 """Pages of contestants: in full, and out of forms once they are retired."""
 
-from __future__ import annotations
-
 import pytest
 from django.urls import reverse
 

@@ -1,7 +1,5 @@
 """Text can be read on every ground that it is put on, in light and in dark."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Displacement and findings on the pages of a job and of an augmentation."""
 
-from __future__ import annotations
-
 import re
 
 import pytest

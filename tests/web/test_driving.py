@@ -1,7 +1,5 @@
 """Simulating a job by its page, the table of driving scores, and the drives to look at."""
 
-from __future__ import annotations
-
 import io
 from collections.abc import Callable
 

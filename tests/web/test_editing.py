@@ -1,7 +1,5 @@
 """The pages on which references are drawn and augmentations corrected."""
 
-from __future__ import annotations
-
 import json
 import re
 

@@ -1,7 +1,5 @@
 """Endpoints, their models and prices by the pages; probes by a worker, line by line."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from decimal import Decimal
 

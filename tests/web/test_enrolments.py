@@ -1,7 +1,5 @@
 """Taking part by a link for everybody: from the form to the completion code."""
 
-from __future__ import annotations
-
 import csv
 import io
 

@@ -1,7 +1,5 @@
 """The orders of the grid of evidence, what stands beside its pictures, and the contact sheet."""
 
-from __future__ import annotations
-
 import re
 import uuid
 from pathlib import Path

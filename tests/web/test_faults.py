@@ -1,7 +1,5 @@
 """Pages of faults look like the product, and nothing on any page is inline."""
 
-from __future__ import annotations
-
 import pytest
 from django.test import RequestFactory
 

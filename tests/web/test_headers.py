@@ -1,7 +1,5 @@
 """Every answer says how long it may be kept and that no page asks for camera or position."""
 
-from __future__ import annotations
-
 import pytest
 from django.conf import LazySettings
 from django.http import HttpRequest, HttpResponse

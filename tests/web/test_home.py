@@ -1,7 +1,5 @@
 """Home says to each role what is next, and the switch of themes is remembered."""
 
-from __future__ import annotations
-
 import pytest
 from django.contrib.auth.models import User
 from django.urls import reverse

@@ -1,7 +1,5 @@
 """What a sentence asks for by fields: several objects, chains, and JSON both ways without loss."""
 
-from __future__ import annotations
-
 import html
 import json
 import re

@@ -1,7 +1,5 @@
 """What a scenario asks for, on its page: shown, accepted and replaced by staff."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from contextlib import AbstractContextManager

@@ -1,7 +1,5 @@
 """Inviting by pages: the link is shown once, a GET signs nobody in, the button does."""
 
-from __future__ import annotations
-
 import logging
 import re
 

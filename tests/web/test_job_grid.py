@@ -1,7 +1,5 @@
 """The grid of a job in parts: as many questions and bytes for ten thousand cells as for ten."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable
 

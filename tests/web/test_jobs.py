@@ -1,7 +1,5 @@
 """Launching, watching, retrying and cancelling a job by its pages."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import pytest

@@ -1,7 +1,5 @@
 """What somebody typed before the session ended is kept over the sign-in."""
 
-from __future__ import annotations
-
 import html
 import re
 

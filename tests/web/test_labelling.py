@@ -1,7 +1,5 @@
 """The pages of fault labels."""
 
-from __future__ import annotations
-
 import pytest
 from django.contrib.auth.models import User
 from django.urls import reverse

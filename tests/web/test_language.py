@@ -1,7 +1,5 @@
 """Voters' pages are English or German, by browser, switch and account; all others English."""
 
-from __future__ import annotations
-
 import pytest
 from django.test import Client
 from django.urls import reverse

@@ -1,7 +1,5 @@
 """Lists are found in by a word, narrowed by filters and shown page by page, at a fixed price."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import pytest

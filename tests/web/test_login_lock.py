@@ -1,7 +1,5 @@
 """Wrong passwords lock an account for the address they came from, and for nobody else."""
 
-from __future__ import annotations
-
 import pytest
 from django.conf import LazySettings
 from django.http import HttpResponse

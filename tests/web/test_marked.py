@@ -1,7 +1,5 @@
 """What the checks found, numbered in a picture of its own, for staff alone."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 

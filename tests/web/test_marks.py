@@ -1,7 +1,5 @@
 """The stacked bar of a job."""
 
-from __future__ import annotations
-
 import pytest
 
 from arena.templatetags.marks import job_mark, percent, segments

@@ -1,7 +1,5 @@
 """Measures over a pair: the same whoever drew what, right in pixels, only where they may be."""
 
-from __future__ import annotations
-
 import uuid
 
 import pytest

@@ -1,7 +1,5 @@
 """A new job by its page: the matrix, the estimate, one try first, the matrix file."""
 
-from __future__ import annotations
-
 import re
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Accounts without a shell: the first admin, links, pauses, roles, and being forgotten."""
 
-from __future__ import annotations
-
 import logging
 import re
 from collections.abc import Callable

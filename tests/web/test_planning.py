@@ -1,7 +1,5 @@
 """Planning a study by its page and its command, with and without a study at hand."""
 
-from __future__ import annotations
-
 from io import StringIO
 
 import pytest

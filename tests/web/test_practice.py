@@ -1,7 +1,5 @@
 """A practice round: five pairs with what was right and why, once, and nothing of it a vote."""
 
-from __future__ import annotations
-
 import re
 
 import pytest

@@ -1,7 +1,5 @@
 """The page that shows what a variant would send, held against what the wire then carries."""
 
-from __future__ import annotations
-
 import html
 import re
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """What has no way back asks once more, with its numbers, and works by forms alone."""
 
-from __future__ import annotations
-
 import html
 import re
 from typing import Any

@@ -1,7 +1,5 @@
 """Whoever only looks changes nothing: a GET writes no row."""
 
-from __future__ import annotations
-
 import re
 
 import pytest

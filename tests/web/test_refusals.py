@@ -1,7 +1,5 @@
 """What services refuse is said in the language of the voter, and kept in English."""
 
-from __future__ import annotations
-
 import pytest
 from django.utils.translation import override
 

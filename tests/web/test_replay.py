@@ -1,7 +1,5 @@
 """The drives on the voting page: where a study plays them, and no trace where it does not."""
 
-from __future__ import annotations
-
 import re
 
 import pytest

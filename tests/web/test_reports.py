@@ -1,7 +1,5 @@
 """A report leads an admin to the pair as it was shown, its mark where the expert set it."""
 
-from __future__ import annotations
-
 import re
 import uuid
 

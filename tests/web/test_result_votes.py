@@ -1,7 +1,5 @@
 """From a number of the results to its votes, and from a vote to the pair as it was shown."""
 
-from __future__ import annotations
-
 import csv
 import io
 import re

@@ -1,7 +1,5 @@
 """The results page: the table, its files, and what is said with them."""
 
-from __future__ import annotations
-
 import csv
 import io
 import json

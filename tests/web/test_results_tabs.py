@@ -1,7 +1,5 @@
 """The tabs of the results: what each shows, to whom, and that a page only reads."""
 
-from __future__ import annotations
-
 import pytest
 from django.contrib.auth.models import User
 from django.test import Client

@@ -1,7 +1,5 @@
 """New scenarios by a page: one beside its scene, or many from a file."""
 
-from __future__ import annotations
-
 import json
 
 import pytest

@@ -1,7 +1,5 @@
 """What the source of a scene left open stands on the page of its scenarios."""
 
-from __future__ import annotations
-
 import re
 
 import pytest

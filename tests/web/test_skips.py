@@ -1,7 +1,5 @@
 """A skip says why there is no vote: no page counts it as one, and nobody waits for it either."""
 
-from __future__ import annotations
-
 import re
 
 import pytest

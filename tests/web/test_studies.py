@@ -1,7 +1,5 @@
 """Opening, watching and closing a study by its pages."""
 
-from __future__ import annotations
-
 import re
 
 import pytest

@@ -1,7 +1,5 @@
 """A study is set up over several sittings: saved as it stands, taken up, opened, discarded."""
 
-from __future__ import annotations
-
 import html
 import re
 from typing import Any

@@ -1,7 +1,5 @@
 """Files of a study by buttons of its page: a worker writes each, for whoever may have it."""
 
-from __future__ import annotations
-
 import io
 import zipfile
 from pathlib import Path

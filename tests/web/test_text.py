@@ -1,7 +1,5 @@
 """The text description on the pages: where a study has it, and no trace where it has none."""
 
-from __future__ import annotations
-
 import json
 import re
 

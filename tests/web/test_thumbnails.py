@@ -1,7 +1,5 @@
 """Pages of many pictures show small ones, which are made once and kept where pictures are."""
 
-from __future__ import annotations
-
 import io
 from collections.abc import Iterator
 

@@ -1,7 +1,5 @@
 """The page of a transcript, its JSON, and the pictures that models were shown."""
 
-from __future__ import annotations
-
 import pytest
 from django.urls import reverse
 

@@ -1,7 +1,5 @@
 """Sending a recording and choosing its moment, page by page; workers run in this process."""
 
-from __future__ import annotations
-
 import json
 from tempfile import gettempdir
 

@@ -1,7 +1,5 @@
 """Votes that come as a file by a page."""
 
-from __future__ import annotations
-
 import pytest
 from django.core.files.uploadedfile import SimpleUploadedFile
 from django.http import HttpResponse

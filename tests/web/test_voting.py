@@ -1,7 +1,5 @@
 """The voting page: one vote per decision, nothing of who made what."""
 
-from __future__ import annotations
-
 import re
 
 import pytest

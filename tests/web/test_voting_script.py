@@ -1,7 +1,5 @@
 """What the voting page gives its script."""
 
-from __future__ import annotations
-
 import json
 import re
 from pathlib import Path

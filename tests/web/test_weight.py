@@ -1,7 +1,5 @@
 """What a browser loads with the voting page."""
 
-from __future__ import annotations
-
 import gzip
 import re
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The displacement errors of a job as a table: what its files, chart and page show."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Displacement errors as files. The same job always gives the same bytes."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from arena.exports.cells import csv_text

@@ -1,7 +1,5 @@
 """The mean driving scores of a job or study as a table: what its files and pages show."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from arena.exports.cells import csv_text

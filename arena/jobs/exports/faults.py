@@ -1,7 +1,5 @@
 """Fault labels of a job in the form of the paper's table, and how well the checks foresaw them."""
 
-from __future__ import annotations
-
 from collections import defaultdict
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass

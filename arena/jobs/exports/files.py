@@ -1,7 +1,5 @@
 """Scenarios of a job or a study as one zip: files, and a manifest of what they are and lost."""
 
-from __future__ import annotations
-
 import json
 import platform
 from collections.abc import Iterator

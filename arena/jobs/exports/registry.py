@@ -1,7 +1,5 @@
 """Every table of a job by name, for the API, pages and commands."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any, NamedTuple

@@ -3,8 +3,6 @@
 The same job always gives the same bytes. What is unknown or does not exist is empty.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field

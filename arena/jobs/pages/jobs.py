@@ -1,7 +1,5 @@
 """Pages of generation jobs, and what an admin does with one: pause, resume, cancel, try again."""
 
-from __future__ import annotations
-
 import uuid
 
 from django.contrib import messages

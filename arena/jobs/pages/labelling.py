@@ -1,7 +1,5 @@
 """Fault labels: the page of an expert, which tells nothing of who made what, and that of a job."""
 
-from __future__ import annotations
-
 import uuid
 from typing import Any
 

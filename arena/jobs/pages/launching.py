@@ -1,7 +1,5 @@
 """The page of a new job: choose, see what it would use, try one scenario first, launch."""
 
-from __future__ import annotations
-
 import uuid
 from decimal import Decimal
 from typing import Any

@@ -1,7 +1,5 @@
 """What a job is measured by: drives, displacement, analyses, and its files."""
 
-from __future__ import annotations
-
 import uuid
 from typing import Any
 

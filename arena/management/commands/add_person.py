@@ -1,7 +1,5 @@
 """`manage.py add_person`: an account with a role."""
 
-from __future__ import annotations
-
 import getpass
 import secrets
 import sys

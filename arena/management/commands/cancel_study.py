@@ -1,7 +1,5 @@
 """manage.py cancel_study: give an open study up."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from django.core.management.base import CommandError

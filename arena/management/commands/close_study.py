@@ -1,7 +1,5 @@
 """manage.py close_study: take no more votes."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from arena.studies.queries import study_named

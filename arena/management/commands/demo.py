@@ -1,7 +1,5 @@
 """`manage.py demo`: the main job on the catalogue, unattended, then served."""
 
-from __future__ import annotations
-
 import time
 from contextlib import nullcontext
 from functools import partial

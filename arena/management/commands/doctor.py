@@ -1,7 +1,5 @@
 """`manage.py doctor`: what is wrong with this installation."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import asdict
 from typing import Any

@@ -1,7 +1,5 @@
 """manage.py export: write results to files."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """manage.py hand_over: let others judge what an expert has not judged."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from arena.studies.queries import study_named

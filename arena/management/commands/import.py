@@ -1,7 +1,5 @@
 """`manage.py import study FOLDER`: what `manage.py export study` wrote, elsewhere."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

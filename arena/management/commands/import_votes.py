@@ -1,7 +1,5 @@
 """manage.py import_votes: keep votes from elsewhere as a study that can be rated."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

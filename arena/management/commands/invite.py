@@ -1,7 +1,5 @@
 """`manage.py invite`: links for the experts of a study."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from django.urls import reverse

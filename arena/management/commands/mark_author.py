@@ -1,7 +1,5 @@
 """manage.py mark_author: say who made which contestant of a study."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from django.contrib.auth.models import User

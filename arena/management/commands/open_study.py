@@ -1,7 +1,5 @@
 """manage.py open_study: plan a study and open it."""
 
-from __future__ import annotations
-
 from collections import Counter
 from typing import Any
 

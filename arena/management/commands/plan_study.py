@@ -1,7 +1,5 @@
 """manage.py plan_study: how many votes a study needs, and what they will tell."""
 
-from __future__ import annotations
-
 from dataclasses import asdict
 from typing import Any
 

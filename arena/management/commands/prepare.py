@@ -1,7 +1,5 @@
 """`manage.py prepare`: bring tables, files and texts up to date; again, it changes nothing."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from django.conf import settings

@@ -1,7 +1,5 @@
 """`manage.py prune --older-than 180d`: remove what models were asked and answered long ago."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from django.utils import timezone

@@ -1,7 +1,5 @@
 """manage.py rate: freeze a rating of a study and print it."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from arena.rating.rules import Intervals, Unit

@@ -1,7 +1,5 @@
 """manage.py rate_csv: rate votes from elsewhere."""
 
-from __future__ import annotations
-
 from inspect import signature
 from typing import Any
 

@@ -1,7 +1,5 @@
 """`manage.py restore FILE`: a backup into an empty installation, all of it or nothing."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """`manage.py serve`: everything the product needs on one machine, until Ctrl-C."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from django.conf import settings

@@ -1,7 +1,5 @@
 """The charts of a rating, for pages and as files: intervals, pairs, scenario types, scatters."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Which rows a study is made of, and how people stand in them."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any

@@ -1,7 +1,5 @@
 """Files of a study, as a worker writes them."""
 
-from __future__ import annotations
-
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager

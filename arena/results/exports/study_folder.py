@@ -1,7 +1,5 @@
 """Write a study's folder: its rows, its pictures, and tables and documents for people."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import re

@@ -4,8 +4,6 @@ In: a snapshot. Out: its lines in order with all that must be said with them, an
 column with its name wherever it stands.
 """
 
-from __future__ import annotations
-
 import json
 from dataclasses import dataclass, replace
 from typing import Any

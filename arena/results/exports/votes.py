@@ -1,7 +1,5 @@
 """Votes as files: those of a rating in the column form of Chatbot Arena, and a list of any."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import NamedTuple
 

@@ -3,8 +3,6 @@
 The same snapshot always gives the same bytes.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterable, Sequence
 from typing import Any

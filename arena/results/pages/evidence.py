@@ -1,7 +1,5 @@
 """The evidence of a rating: votes with their pictures, as a grid, a file, or one at a time."""
 
-from __future__ import annotations
-
 import uuid
 from collections.abc import Mapping
 from typing import Any

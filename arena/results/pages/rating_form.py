@@ -1,7 +1,5 @@
 """How a new rating is asked for, and rating at once or by a worker."""
 
-from __future__ import annotations
-
 from functools import partial
 from typing import Any, Unpack
 

@@ -1,7 +1,5 @@
 """The results of a study: its tabs, its files, a new rating, and opening them early."""
 
-from __future__ import annotations
-
 import uuid
 from typing import cast
 

@@ -1,7 +1,5 @@
 """The tabs of the results page, each made of a snapshot and its table."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from statistics import median_high

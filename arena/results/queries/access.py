@@ -1,7 +1,5 @@
 """Who may see results, and which."""
 
-from __future__ import annotations
-
 from enum import StrEnum
 from uuid import UUID
 

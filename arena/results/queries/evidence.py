@@ -4,8 +4,6 @@ In: a snapshot and what is looked for. Out: votes with the mark that says why on
 The database finds them, so that a page costs the same for any number.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime

@@ -1,7 +1,5 @@
 """Votes as arrays, and a rating by pairs, scenario types, displacement and cost."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass

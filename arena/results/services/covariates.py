@@ -1,7 +1,5 @@
 """What a rating can adjust for, as columns beside its votes: the side, and how much was shown."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any

@@ -1,7 +1,5 @@
 """Rating a study: which votes, which method, which seed, now or by a worker, and what is kept."""
 
-from __future__ import annotations
-
 import platform
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace

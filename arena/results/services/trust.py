@@ -1,7 +1,5 @@
 """How far a rating can be trusted, and what the votes of authors change in it."""
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 from collections.abc import Sequence

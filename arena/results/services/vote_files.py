@@ -3,8 +3,6 @@
 A vote set is known by the hash of its CSV file, so whoever has the file can check it.
 """
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Pages of single augmentations and of the prompts that lead to them, with all pictures."""
 
-from __future__ import annotations
-
 import json
 import re
 import uuid

@@ -1,7 +1,5 @@
 """Scenarios by form: a new one beside its scene, many from a file, one to be changed; intents."""
 
-from __future__ import annotations
-
 import json
 import uuid
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Pages of the catalogue: scenarios with their intents; retiring, renaming and deleting."""
 
-from __future__ import annotations
-
 import uuid
 from typing import Any
 

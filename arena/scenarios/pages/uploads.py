@@ -1,7 +1,5 @@
 """Scenes, and how they come from recordings: a worker reads a file, a person chooses a moment."""
 
-from __future__ import annotations
-
 import uuid
 
 from django.contrib import messages

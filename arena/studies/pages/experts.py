@@ -1,7 +1,5 @@
 """Experts of a study: progress, authors, links to invite and to enrol; forgetting somebody."""
 
-from __future__ import annotations
-
 import uuid
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Planning a study before there is one: how many votes, how long, and what they will tell."""
 
-from __future__ import annotations
-
 from dataclasses import asdict
 from typing import Any
 from urllib.parse import urlencode

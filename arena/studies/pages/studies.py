@@ -1,7 +1,5 @@
 """Pages of studies for admins and analysts: progress, reports and files, never who leads."""
 
-from __future__ import annotations
-
 import uuid
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Studies that are set up over several sittings, and what opening one would make."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import asdict

@@ -3,8 +3,6 @@
 Neither changes a vote; no rating, progress or export of votes sees answers to practice pairs.
 """
 
-from __future__ import annotations
-
 import random
 from collections import Counter
 from dataclasses import dataclass

@@ -4,8 +4,6 @@ The plan is stored before anybody can vote. The preregistration names nobody: ex
 in the order of their names. Its SHA-256 stands in every export of the study.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 import tomllib

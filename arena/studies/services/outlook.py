@@ -1,7 +1,5 @@
 """What somebody asks for who estimates how many votes a study needs; shares in percent."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from statistics import median
 from typing import Any

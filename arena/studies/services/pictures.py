@@ -1,7 +1,5 @@
 """Which pictures a study can show: of contestants, and of attention checks."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import replace
 from functools import partial

@@ -1,7 +1,5 @@
 """What somebody expects of a study, written down before its first vote, and what came of it."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

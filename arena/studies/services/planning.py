@@ -1,7 +1,5 @@
 """Plans as rows: the rules that a study was opened with, its showings, and later plannings."""
 
-from __future__ import annotations
-
 from collections import defaultdict
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass

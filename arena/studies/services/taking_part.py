@@ -1,7 +1,5 @@
 """Changes of who takes part: pairs handed over, enrolment by link, drop-outs, forgetting."""
 
-from __future__ import annotations
-
 import uuid
 from collections.abc import Sequence
 from datetime import datetime

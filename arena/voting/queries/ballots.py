@@ -1,7 +1,5 @@
 """What an expert has voted and votes on next. Nobody sees what is somebody else's."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from datetime import datetime
 from typing import Any

@@ -1,7 +1,5 @@
 """Which keys vote for a person, and what else the voting page remembers of them."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

@@ -4,8 +4,6 @@ Votes are append-only and a plan only grows, so how many there are and the newes
 whether something is new: a vote that commits late, with a smaller number, changes the first.
 """
 
-from __future__ import annotations
-
 from collections import OrderedDict
 from collections.abc import Callable, Hashable
 from threading import Lock

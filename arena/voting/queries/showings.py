@@ -1,7 +1,5 @@
 """What is shown of a pair: pictures behind tokens, texts, drives, and measures over it."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from itertools import pairwise

@@ -4,8 +4,6 @@ In: an expert and a `Decision` about a matchup. Out: a `Vote` row, the same one 
 decision sent again; or an error that says why nothing was stored.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass

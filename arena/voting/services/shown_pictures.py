@@ -1,7 +1,5 @@
 """What all showings of a scenario share: one window for both sides, and the scene before."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 from collections import defaultdict

@@ -5,8 +5,6 @@ reference, misjudges distances a little, calls close ones equal, and now and the
 key, as people do.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from typing import Any

@@ -1,7 +1,5 @@
 """Writers of SQLite one after the other, in the order in which they came, and not for ever."""
 
-from __future__ import annotations
-
 import fcntl
 import math
 import os

@@ -5,8 +5,6 @@ these in a bend. In a file without intersections, lanelets of forks and merges t
 do. Turn types are those that it names; a light holds for the ways in its direction.
 """
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 from dataclasses import dataclass, replace

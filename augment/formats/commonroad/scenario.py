@@ -4,8 +4,6 @@
 problem without one. `frame` is a time step; without one the step where the ego begins.
 """
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass

@@ -3,8 +3,6 @@
 Frame: the ego frame of t0. Sources: the published schema of 2020a and its documentation.
 """
 
-from __future__ import annotations
-
 from collections import defaultdict
 from collections.abc import Iterable, Sequence
 from typing import Any, Final

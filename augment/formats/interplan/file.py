@@ -5,8 +5,6 @@ changes are in their scene's ego frame. Metres and radians; positions are centre
 that nobody knows are kept aside, so that a reader can say that they say nothing here.
 """
 
-from __future__ import annotations
-
 import hashlib
 import math
 import re

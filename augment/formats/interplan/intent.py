@@ -4,8 +4,6 @@ Both count as instructions do, along the lanes of the ego's way and across them.
 interPlan's keys can hold comes up: vehicles and buses that stand, cones, people.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace

@@ -5,8 +5,6 @@ near. Frame: the ego frame of t0. The files are made by scenariogeneration. Sour
 OpenSCENARIO XML 1.2.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from datetime import UTC, datetime, time

@@ -8,8 +8,6 @@ folder holds a file for each scenario and may hold two indices:
     dataset_mapping.pkl  file name -> the folder that it lies in, from here
 """
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import replace

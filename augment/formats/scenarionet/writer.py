@@ -5,8 +5,6 @@ it imports and runs nothing of theirs. Frame: the ego frame of t0. Sources: the 
 description of the format in MetaDrive's `scenario_description.py` and `type.py`.
 """
 
-from __future__ import annotations
-
 import pickle
 import pickletools
 from collections.abc import Sequence

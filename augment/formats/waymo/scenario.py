@@ -6,8 +6,6 @@ y. A record is its length (8 bytes, little endian), the length's checksum (4), t
 payload's checksum (4); `scenario.proto` has the parts of the message that are read.
 """
 
-from __future__ import annotations
-
 import struct
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace

@@ -1,7 +1,5 @@
 """Register a language model that runs one variant."""
 
-from __future__ import annotations
-
 from argparse import ArgumentParser
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Put an instruction to a stored scene."""
 
-from __future__ import annotations
-
 from argparse import ArgumentParser
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Hold the catalogue's references against their intents, the checks and the camera."""
 
-from __future__ import annotations
-
 from argparse import ArgumentParser
 from typing import Any
 

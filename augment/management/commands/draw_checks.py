@@ -1,7 +1,5 @@
 """Draw pictures for attention checks."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from django.core.management.base import CommandParser

@@ -1,7 +1,5 @@
 """Run the stand-in language-model server."""
 
-from __future__ import annotations
-
 import os
 import signal
 from collections.abc import Callable, Iterator

@@ -1,7 +1,5 @@
 """Launch a generation job and, on demand, wait for its end."""
 
-from __future__ import annotations
-
 import time
 from argparse import ArgumentParser
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Make scenarios of interPlan's special scenarios, where nuPlan's logs are at hand."""
 
-from __future__ import annotations
-
 from argparse import ArgumentParser
 from collections import Counter
 from pathlib import Path

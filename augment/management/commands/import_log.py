@@ -1,7 +1,5 @@
 """Bring many moments of a recording into the database."""
 
-from __future__ import annotations
-
 from argparse import ArgumentParser, ArgumentTypeError
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Bring the catalogue's scenes and scenarios into the database."""
 
-from __future__ import annotations
-
 from argparse import ArgumentParser
 from typing import Any
 

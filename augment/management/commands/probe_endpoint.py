@@ -1,7 +1,5 @@
 """Ask an endpoint what it can do."""
 
-from __future__ import annotations
-
 from argparse import ArgumentParser
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Print the exact messages that a variant sends for a scenario."""
 
-from __future__ import annotations
-
 from argparse import ArgumentParser
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Have a language model read what a scenario's instruction asks for, and accept what it read."""
 
-from __future__ import annotations
-
 from argparse import ArgumentParser
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Let a job that is paused or stopped at its cap go on."""
 
-from __future__ import annotations
-
 from argparse import ArgumentParser
 from typing import Any
 

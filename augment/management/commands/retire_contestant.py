@@ -1,7 +1,5 @@
 """Retire a contestant, or take that back."""
 
-from __future__ import annotations
-
 from argparse import ArgumentParser
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Drive a job's results, or one scenario, in closed loop and print the driving scores."""
 
-from __future__ import annotations
-
 import time
 from argparse import ArgumentParser
 from collections.abc import Collection

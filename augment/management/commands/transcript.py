@@ -1,7 +1,5 @@
 """Write everything that led to an augmentation as one JSON document."""
 
-from __future__ import annotations
-
 import json
 import uuid
 from argparse import ArgumentParser

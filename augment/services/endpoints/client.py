@@ -6,8 +6,6 @@ SQLite the transaction locks the whole file), so no two workers count the same p
 renewed as long as its call lasts; that of a dead worker runs out.
 """
 
-from __future__ import annotations
-
 import logging
 import random
 import time

@@ -1,7 +1,5 @@
 """Contestants: who is there without being added, who is added, and what they would send."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any

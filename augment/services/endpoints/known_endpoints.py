@@ -5,8 +5,6 @@ goes to that host. So only variables that are meant for keys may be named: `*_AP
 ARENA_KEY_VARIABLES lists.
 """
 
-from __future__ import annotations
-
 import os
 import re
 from collections.abc import Callable

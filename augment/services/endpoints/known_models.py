@@ -4,8 +4,6 @@ Unknown stays unknown, never zero. Listed prices come with the package genai-pri
 the network: they are as new as the installed version.
 """
 
-from __future__ import annotations
-
 import json
 import re
 from collections.abc import Collection

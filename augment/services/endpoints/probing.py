@@ -3,8 +3,6 @@
 A fault that says nothing about the ability (a busy server) leaves the ability as it was.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, field, replace
 from datetime import datetime

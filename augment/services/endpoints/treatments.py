@@ -6,8 +6,6 @@ a mixture. So what was known of its models at its first run is kept with it, rol
 is the whole set of its options: what was chosen when it was added, and the defaults of then.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any

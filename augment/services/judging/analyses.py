@@ -1,7 +1,5 @@
 """What the rows of a job say of its contestants: lines, repeats, pairs, wordings, refusals."""
 
-from __future__ import annotations
-
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """How far stored augmentations are from their references: one by one, in groups, by object."""
 
-from __future__ import annotations
-
 from collections import defaultdict
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass

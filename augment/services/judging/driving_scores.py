@@ -1,7 +1,5 @@
 """Mean driving scores: by contestant, by scenario type, beside the unmodified scenes."""
 
-from __future__ import annotations
-
 from collections import Counter, defaultdict
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass

@@ -4,8 +4,6 @@ The reference and anybody's labels stay out of it. Marked pictures are for analy
 vote; the name of one says what is on it, so one that no longer fits the findings is never shown.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 from collections.abc import Sequence

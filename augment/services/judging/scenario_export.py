@@ -1,7 +1,5 @@
 """What a job made as scenarios in a standard format, with what is lost and where it comes from."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """Drives as rows: planned once, driven, scored, kept."""
 
-from __future__ import annotations
-
 import json
 import zlib
 from collections.abc import Collection

@@ -7,8 +7,6 @@ adds in one conditional UPDATE. A call that ends moves its reservation into what
 whose end nobody saw counts with its worst case if it was sent, and for nothing if it was not.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from decimal import Decimal

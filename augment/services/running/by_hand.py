@@ -4,8 +4,6 @@ The row is written with its modification and waits; a worker leases it as any ot
 settles it. The one that was corrected stays as it is.
 """
 
-from __future__ import annotations
-
 from django.contrib.auth.models import User
 from django.db import transaction
 

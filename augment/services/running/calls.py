@@ -5,8 +5,6 @@ is read, each in a transaction of its own: a crash in between loses nothing that
 Faults are never served from the store; a served answer is served again from its source.
 """
 
-from __future__ import annotations
-
 import logging
 import time
 from abc import ABC, abstractmethod

@@ -1,7 +1,5 @@
 """What people mean when they name contestants, scenarios and jobs, and what no job can do."""
 
-from __future__ import annotations
-
 import fnmatch
 from collections.abc import Sequence
 from contextlib import suppress

@@ -1,7 +1,5 @@
 """What a job may cost, before it is launched: from what its contestants used, else a guess."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass

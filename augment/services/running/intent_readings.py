@@ -1,7 +1,5 @@
 """Have a language model read an instruction; every call is recorded and within caps."""
 
-from __future__ import annotations
-
 from contextlib import AbstractContextManager
 
 from django.conf import settings

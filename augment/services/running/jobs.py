@@ -1,7 +1,5 @@
 """Generation jobs: launched, paused, resumed, cancelled, retried, finished."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any, TypeVar
 

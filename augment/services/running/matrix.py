@@ -6,8 +6,6 @@ contestants in full, scenarios and samples: `matrix_text` writes it, `load_matri
 makes the contestants that are missing, or names every error with its place and keeps nothing.
 """
 
-from __future__ import annotations
-
 import json
 import re
 from collections.abc import Mapping, Sequence

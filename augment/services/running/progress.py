@@ -4,8 +4,6 @@ Reasons of failure name what was at hand: a request's id, a count, a place in an
 differ in nothing else have one cause; its key is the same from one look to the next.
 """
 
-from __future__ import annotations
-
 import hashlib
 import re
 from collections import Counter, defaultdict

@@ -4,8 +4,6 @@ In: the primary key of an `Augmentation` row, which says scenario and contestant
 with its state, modification, notes or reason, and picture, and its calls as `ModelCall` rows.
 """
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Callable
 from contextlib import AbstractContextManager, ExitStack

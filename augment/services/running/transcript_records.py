@@ -4,8 +4,6 @@ The JSON document holds everything that led to an augmentation; see docs/using.m
 never zero.
 """
 
-from __future__ import annotations
-
 import base64
 import json
 from collections import defaultdict

@@ -1,7 +1,5 @@
 """Worker processes: which live, since when nobody recovers lost work, and whether to stop."""
 
-from __future__ import annotations
-
 import logging
 import socket
 from collections.abc import Callable

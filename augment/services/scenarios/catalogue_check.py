@@ -5,8 +5,6 @@ Those of the paper set are also held against what a driver expects (`catalogue_r
 Reads files, touches no rows.
 """
 
-from __future__ import annotations
-
 import json
 import math
 import re

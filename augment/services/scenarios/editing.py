@@ -4,8 +4,6 @@ In: a scenario. Out: one JSON document for a page. Back: a modification whose la
 its agents, whatever the page said.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from functools import lru_cache

@@ -4,8 +4,6 @@ What no field holds (moves, landmarks, settings, ...) stays beside the fields as
 request in its row, that of the whole beside all rows. The codec reads what they make together.
 """
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Iterator, Mapping

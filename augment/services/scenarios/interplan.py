@@ -5,8 +5,6 @@ token becomes a scene, each of its special scenarios a scenario with its human r
 stored already stays.
 """
 
-from __future__ import annotations
-
 import csv
 import json
 from collections.abc import Iterator, Mapping, Sequence

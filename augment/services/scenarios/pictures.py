@@ -1,7 +1,5 @@
 """Pictures of scenarios and augmentations, stored once under the hash of their bytes."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 from collections.abc import Iterable, Mapping, Sequence

@@ -1,7 +1,5 @@
 """What a variant would send for a stored scenario. Nobody is asked."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 from dataclasses import dataclass

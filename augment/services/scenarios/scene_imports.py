@@ -1,7 +1,5 @@
 """Recorded and written scenes from outside, as rows."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path

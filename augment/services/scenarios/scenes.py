@@ -1,7 +1,5 @@
 """Scenes and scenarios: how they come in, and how their rows are read as values."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import re

@@ -1,7 +1,5 @@
 """The receivers' own software, run in its own environment on what our writers wrote."""
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess

@@ -3,8 +3,6 @@
 The packages are there alone, so they are imported where they are used.
 """
 
-from __future__ import annotations
-
 import json
 import logging
 import sys
