@@ -36,7 +36,7 @@ KEPT_ANSWER = 1024 * 1024 * 1024
 class Connection(HTTPChannel):  # type: ignore[misc] # Waitress has no types
     """A connection that knows when its request began, and how much of it came in."""
 
-    began_at: float | None = None
+    began_at = 0.0
     came_in = 0
 
     def received(self, data: bytes) -> bool:
@@ -49,8 +49,7 @@ class Connection(HTTPChannel):  # type: ignore[misc] # Waitress has no types
     def is_late(self, now: float) -> bool:
         """Return whether the request that has begun should have been complete by now."""
         allowed_s = REQUEST_WITHIN_S + self.came_in / BYTES_A_SECOND
-        is_begun = self.request is not None and self.began_at is not None
-        return is_begun and now - self.began_at > allowed_s
+        return self.request is not None and now - self.began_at > allowed_s
 
     @property
     def is_idle(self) -> bool:

@@ -115,10 +115,11 @@ def test_the_page_shows_all_of_an_intent_and_takes_further_objects() -> None:
     fields = sent_by(analyst.get(url).content.decode())
     assert fields["i_kind"] == ["vehicles", "walk", "", "", ""]
     assert intent_of_fields(_entered_fields(querydict(fields))) == document
-    fields["i_kind"][2] = "cones"
-    analyst.post(url, fields)
+    fields["i_kind"][2], fields["i_distance_m"][2], fields["i_start"][2] = "walk", "9", "right"
+    answer = analyst.post(url, fields)
+    assert answer.status_code == 302, answer.content.decode()
     scenario.refresh_from_db()
-    assert [one["kind"] for one in scenario.intent["requests"]] == ["vehicles", "walk", "cones"]  # type: ignore[index]
+    assert [one["kind"] for one in scenario.intent["requests"]] == ["vehicles", "walk", "walk"]  # type: ignore[index]
 
 
 def querydict(fields: dict[str, list[str]]) -> QueryDict:

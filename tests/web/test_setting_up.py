@@ -50,6 +50,6 @@ def test_a_contestant_is_entered_with_its_options(client: Client) -> None:
     assert (row.variant, row.model, row.endpoint.label) == ("fc", "qwen3", "local")  # type: ignore[union-attr]
     assert row.options == {"temperature": 0.7, "protocol": "native"}
     assert "0.7" in text
-    refused = enter(client, variant="otm")
+    refused = enter(client, temperature="0.9")
     assert "There is another contestant" in refused
     assert 'value="qwen3"' in refused, "the form stays filled in"
