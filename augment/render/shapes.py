@@ -96,8 +96,8 @@ def stripes(
 
 def long_axis(polygon: FloatArray) -> tuple[float, float, float]:
     """Return the direction, length and width of a polygon's smallest rectangle."""
-    ring = shapely.Polygon(polygon).minimum_rotated_rectangle.exterior.coords
-    sides = np.diff(np.array(ring)[:3], axis=0)
+    rectangle = shapely.minimum_rotated_rectangle(shapely.Polygon(polygon))
+    sides = np.diff(shapely.get_coordinates(rectangle)[:3], axis=0)
     lengths = np.hypot(sides[:, 0], sides[:, 1])
     longer = int(lengths[1] > lengths[0])
     return math.atan2(*sides[longer, ::-1]), float(lengths[longer]), float(lengths[1 - longer])
