@@ -38,7 +38,7 @@ from augment.scene.entities import Scene, SceneOptions, without_traffic
 from augment.scene.intent import IntentOrigin
 from augment.scene.recording import Note, SceneNoteKind
 from augment.services.scenarios.scene_imports import keep_reading
-from augment.services.scenarios.scenes import Circumstances, add_scenario
+from augment.services.scenarios.scenes import add_scenario
 
 _KEY = "modification_details_dictionary"
 
@@ -191,13 +191,10 @@ def _keep_entry(
         reference=modification_to_document(read.modification),
         intent=None if intent is None else intent_to_document(intent),
         intent_origin=IntentOrigin.DERIVED,
-        circumstances=Circumstances(
-            density=density,
-            goal=goal,
-            traffic=traffic,
-            interplan=kept,
-            instruction_is_generated=True,
-        ),
+        density=density,
+        goal=goal or "",
+        traffic=traffic,
+        interplan=kept,
         actor=actor,
     )
     return ImportStep(StepKind.NEW, f"{read.id}: {slug}{left_out}")
