@@ -325,7 +325,7 @@ def _under_groups(rated: RatedCsv, lines: list[str]) -> Iterator[str]:
 
 
 def _summary(rated: RatedCsv) -> Iterator[str]:
-    """The method, how many pairs are told apart, the cross-check, and the covariates."""
+    """The method, how many pairs are told apart, and the covariates."""
     board = rated.board
     if board.tie_share is not None:
         yield f"{rated.how}; {board.votes} votes; {board.tie_share:.1%} ties."
@@ -335,14 +335,6 @@ def _summary(rated: RatedCsv) -> Iterator[str]:
             f"{int(found.above.sum())} of {models * (models - 1) // 2} pairs are told apart with "
             "all of them judged at once, at 5 % for the whole table."
         )
-    gaps = [
-        max(abs(line.check_lower - line.lower), abs(line.check_upper - line.upper))
-        for line in board.lines
-        if line.lower is not None and line.upper is not None
-        if line.check_lower is not None and line.check_upper is not None
-    ]
-    if gaps:
-        yield f"Bounds by the plain sandwich differ from these by at most {max(gaps):.0f} points."
     for name, coefficient in rated.coefficients:
         points = coefficient.points
         text = f"{name}: {points.value:+.1f} points for one"
@@ -363,7 +355,6 @@ def _write_csv(rated: RatedCsv) -> str:
 def _write_json(rated: RatedCsv) -> str:
     board = rated.board
     parts = {line.part for line in board.lines if line.rating is not None}
-    columns = (*COLUMNS, "check_lower", "check_upper")
     document: dict[str, Any] = {
         "method": board.method.value,
         "resample": board.unit.value,
@@ -376,7 +367,7 @@ def _write_json(rated: RatedCsv) -> str:
         "status": board.status.value,
         "notes": list(rated.notes),
         "standings": [
-            {column: _rounded(_value(line, column)) for column in columns}
+            {column: _rounded(_value(line, column)) for column in COLUMNS}
             | ({"part": line.part} if len(parts) > 1 else {})
             for line in board.standings
         ],

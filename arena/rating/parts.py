@@ -30,14 +30,7 @@ from arena.rating.ranking import (
     shown_ranks,
 )
 from arena.rating.rules import Intervals, Method, Order, Rules, Unit
-from arena.rating.sandwich import (
-    NORMAL,
-    Pulls,
-    factor,
-    plain_covariance,
-    pulls_of_model,
-    spread_of,
-)
+from arena.rating.sandwich import NORMAL, Pulls, factor, pulls_of_model, spread_of
 
 _SAME = 1e-6
 """Points. Rounds that all lie within this say nothing about the spread."""
@@ -62,9 +55,6 @@ class Rated:
     rank: IntArray | None = None
     rank_best: IntArray | None = None
     rank_worst: IntArray | None = None
-    check_lower: FloatArray | None = None
-    check_upper: FloatArray | None = None
-    covariance: FloatArray | None = None
     separation: Separation | None = None
     tie_strength: float | None = None
     coefficients: tuple[Coefficient, ...] = ()
@@ -125,12 +115,9 @@ def rate_part(votes: Comparisons, rules: Rules, status: Status) -> Rated:
     said = remarks.warnings(
         votes, rules=rules, rounds=values.shape[1], degenerate=plain.degenerate
     )
-    check = _cross_check(fitted, found, rules, reference)
     return replace(
-        _with_intervals(plain, found, rules.details),
+        _with_intervals(plain, found),
         rank=ranks,
-        check_lower=fitted.rating - check,
-        check_upper=fitted.rating + check,
         notes=notes,
         explanation=(
             *(() if is_adjusted else (remarks.NOT_ADJUSTED,)),
@@ -237,7 +224,6 @@ class _Intervals:
     upper: FloatArray
     above: BoolArray
     half_width: FloatArray
-    covariance: FloatArray | None
     separation: Separation | None = None
 
 
@@ -256,7 +242,6 @@ def _closed_form(
         upper=rating + half,
         above=judged.above,
         half_width=half,
-        covariance=spread.covariance,
         separation=judged,
     )
 
@@ -275,12 +260,6 @@ def _by_rounds(
     if few and rules.unit is not Unit.TWO_WAY:
         wider = factor(few) / NORMAL
     lower, upper = (fitted.rating + wider * (bound - fitted.rating) for bound in bounds)
-    covariance = None
-    if rules.details and rules.method is Method.BRADLEY_TERRY and fitted.pulls is not None:
-        covariance = plain_covariance(fitted.pulls, rules.unit)
-    elif rules.details:
-        whole = fitted.rounds.values[:, fitted.rounds.in_main.all(axis=0)]
-        covariance = np.cov(whole) if whole.shape[1] > 1 else None
     above = np.zeros((len(lower), len(lower)), dtype=bool)
     members = np.flatnonzero(reference)
     samples = values[members]
@@ -288,26 +267,10 @@ def _by_rounds(
     if 2 * is_fine.sum() >= len(is_fine):
         apart = above_in_rounds(fitted.rating[members], samples[:, is_fine])
         above[np.ix_(members, members)] = apart
-    return _Intervals(
-        lower=lower, upper=upper, above=above, half_width=upper - lower, covariance=covariance
-    )
+    return _Intervals(lower=lower, upper=upper, above=above, half_width=upper - lower)
 
 
-def _cross_check(
-    fitted: _Fitted, found: _Intervals, rules: Rules, reference: BoolArray
-) -> FloatArray:
-    """(C,) half-widths by the plain sandwich, Bradley-Terry only; NaN for who lacks a bound."""
-    if not rules.details or rules.method is not Method.BRADLEY_TERRY or fitted.pulls is None:
-        return np.full(len(fitted.rating), np.nan)
-    pulls = fitted.pulls.relative_to(reference)
-    is_closed = rules.intervals is Intervals.CLOSED_FORM
-    covariance = plain_covariance(pulls, rules.unit, keep_variances=is_closed)
-    variances = np.maximum(covariance.diagonal(), 0.0)
-    check = factor(remarks.few_clusters(pulls.votes, rules.unit)) * np.sqrt(variances)
-    return np.where(np.isnan(found.lower) | np.isnan(found.upper), np.nan, check)
-
-
-def _with_intervals(plain: Rated, found: _Intervals, details: bool) -> Rated:
+def _with_intervals(plain: Rated, found: _Intervals) -> Rated:
     lower, upper = found.lower, found.upper
     best, worst = rank_sets(above_by_bounds(found.above, lower, upper))
     unbounded = np.isnan(lower) & np.isnan(upper)
@@ -318,6 +281,5 @@ def _with_intervals(plain: Rated, found: _Intervals, details: bool) -> Rated:
         upper=upper,
         rank_best=best,
         rank_worst=worst,
-        covariance=found.covariance if details else None,
-        separation=found.separation if details else None,
+        separation=found.separation,
     )

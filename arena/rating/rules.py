@@ -99,7 +99,6 @@ class Rules:
     seed: int
     k: float
     order: Order
-    details: bool
     report: Report | None = None
 
     def __post_init__(self) -> None:
