@@ -144,9 +144,9 @@ def add_scenario(
         instruction: What is to be changed, in the user's words.
         slug: The scenario's name; made from the scene's and the type's when None.
         reference: A modification document that fits the scene.
-        intent: An intent document: what the instruction asks for.
+        intent: An intent document.
         intent_origin: Where that comes from.
-        keep_traffic: Whether the recorded traffic stays in the scene.
+        keep_traffic: Whether the recorded traffic stays.
         density: Of the traffic that is spawned where the recorded one is cleared; empty for none.
         goal: Where the ego's way turns; empty where nobody says.
         traffic: Who is spawned, where that is known already; None to spawn it.
@@ -155,8 +155,7 @@ def add_scenario(
 
     Raises:
         UnknownName: No such scene.
-        InvalidDocument: The slug, the type, the instruction, the surroundings, the intent or the
-            reference breaks its format.
+        InvalidDocument: One of these breaks its format.
         InvalidModification: The reference does not fit the scene.
         Conflict: The slug is taken, or traffic is to be kept and spawned.
     """
@@ -179,6 +178,11 @@ def add_scenario(
         read = intent_to_document(intent_from_document(intent))
         scenario.intent = placeable_intent(intent) if is_entered else read
         scenario.intent_origin = intent_origin
+    _insert(scenario, actor)
+    return scenario
+
+
+def _insert(scenario: Scenario, actor: User | None) -> None:
     try:
         with transaction.atomic():
             scenario.save(force_insert=True)
@@ -187,14 +191,13 @@ def add_scenario(
         raise Conflict(problem) from None
     after = {
         "slug": scenario.slug,
-        "scene": base_scene.slug,
-        "type": type,
-        "has_reference": reference is not None,
-        "keep_traffic": keep_traffic,
+        "scene": scenario.base_scene.slug,
+        "type": scenario.type,
+        "has_reference": scenario.reference is not None,
+        "keep_traffic": scenario.keep_traffic,
         "intent": scenario.intent_origin or None,
     }
     log_change(scenario, "add", actor, after=after)
-    return scenario
 
 
 def set_wording(scenario: Scenario, instruction: str, type: str) -> None:
