@@ -12,7 +12,7 @@ from augment.models import BaseScene, Scenario
 from augment.services.events import log_event
 from augment.services.scenarios import editing
 from augment.services.scenarios.pictures import redraw
-from augment.services.scenarios.scenes import set_wording
+from augment.services.scenarios.scenes import change_surroundings, set_wording
 
 MOST_NAMED = 8
 FILE_TOO_LARGE = "arena.file_too_large"

@@ -46,7 +46,6 @@ class ScenarioForm(forms.Form):
     slug = forms.CharField(required=False, max_length=scenes.SLUG_LENGTH)
     type = forms.ChoiceField(required=False)
     own_type = forms.CharField(required=False, max_length=scenes.LONGEST_TYPE)
-    own_label = forms.CharField(required=False, max_length=scenes.LONGEST_LABEL)
     instruction = forms.CharField(max_length=scenes.INSTRUCTION_LENGTH, strip=True)
     keep_traffic = forms.BooleanField(required=False)
     density = forms.ChoiceField(
@@ -64,13 +63,8 @@ class ScenarioForm(forms.Form):
     def wanted(self) -> dict[str, Any]:
         """Return what the valid form says of a scenario."""
         given = self.cleaned_data
-        return {
-            "type": given["type"] or given["own_type"],
-            "type_label": None if given["type"] else given["own_label"] or None,
-            "instruction": given["instruction"],
-            "keep_traffic": given["keep_traffic"],
-            "circumstances": scenes.read_circumstances(given["density"], given["goal"]),
-        }
+        names = ("instruction", "keep_traffic", "density", "goal")
+        return {name: given[name] for name in names} | {"type": given["type"] or given["own_type"]}
 
 
 @form_for(*STAFF)
