@@ -22,7 +22,6 @@ from augment.errors import AugmentError
 from augment.models import Contestant, Endpoint, EndpointModel, GenerationJob, Probe
 from augment.services.endpoints import known_endpoints
 from augment.services.endpoints.contestants import (
-    PROTOCOLS,
     REASONING_EFFORTS,
     VARIANTS,
     EnteredEndpoint,
@@ -43,23 +42,10 @@ SLUG_RULE = "Lower-case letters, digits, hyphens."
 # --- Contestants -------------------------------------------------------------------------------
 
 
-class OptionsForm(forms.Form):
+class OptionsForm(RequestForm):
     """How a contestant asks its model; what is empty stays open."""
 
-    temperature = forms.FloatField(required=False, label="Temperature")
-    seed = forms.IntegerField(required=False, label="Seed")
-    reasoning_effort = forms.ChoiceField(
-        required=False,
-        choices=[("", "–"), *((word, word) for word in REASONING_EFFORTS)],
-        label="Reasoning effort",
-    )
-    max_output_tokens = forms.IntegerField(required=False, label="Tokens of one answer, at most")
-    protocol = forms.ChoiceField(
-        required=False,
-        choices=[("", "–"), *((word, word) for word in PROTOCOLS)],
-        label="Tool protocol",
-    )
-    rounds = forms.IntegerField(required=False, label="Rounds, at most")
+    inputs = OPTION_INPUTS
 
     @property
     def option_fields(self) -> list[forms.BoundField]:
@@ -70,11 +56,6 @@ class OptionsForm(forms.Form):
     def has_options(self) -> bool:
         """Return whether any option is filled in, for the template."""
         return any(field.value() not in (None, "") for field in self.option_fields)
-
-    def options(self) -> dict[str, object]:
-        """Return those that are filled in and valid."""
-        given = {name: self.cleaned_data.get(name) for name in OptionsForm.base_fields}
-        return {name: value for name, value in given.items() if value not in (None, "")}
 
 
 class ContestantForm(OptionsForm):
@@ -187,7 +168,7 @@ def _ability(label: str) -> forms.TypedChoiceField:
     )
 
 
-class ModelForm(forms.Form):
+class ModelForm(forms.ModelForm):  # type: ignore[type-arg]
     """What somebody knows of a model; what is left empty is unknown."""
 
     model_class = forms.ChoiceField(
@@ -262,7 +243,7 @@ def endpoint_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         with refusals_in(form):
             known_endpoints.change_endpoint(
                 row,
-                facts=form.facts(),
+                facts=read_request(EndpointFacts, form.cleaned_data),
                 may_move_key=form.cleaned_data["move_key"],
                 actor=user_of(request),
             )

@@ -26,11 +26,6 @@ def client(admin: User) -> Client:
     return signed_in(admin)
 
 
-def enter(client: Client, **changes: str) -> str:
-    answer = client.post(reverse("contestant-new"), ENTERED | changes, follow=True)
-    return answer.content.decode()
-
-
 def test_the_paper_set_is_loaded_by_a_button_and_loading_it_again_changes_nothing(
     client: Client, admin: User
 ) -> None:
