@@ -1,14 +1,13 @@
 """Pages of contestants, and of the endpoints and models that they ask."""
 
 import uuid
-from datetime import date
-from decimal import Decimal
 from typing import Any
 
 from django import forms
 from django.contrib import messages
 from django.core.exceptions import PermissionDenied
 from django.db.models import Count
+from django.forms import model_to_dict
 from django.http import HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, redirect, render
 
@@ -16,30 +15,27 @@ from arena.contestants.queries import asking_of, probe_lines
 from arena.people.queries import role_of
 from arena.site.access import ADMIN, STAFF, act_for, form_for, page_for, user_of
 from arena.site.acts import refusals_in, send_later
-from arena.site.forms import form_field, offer
+from arena.site.forms import RequestForm, offer
 from arena.site.listing import read_listing, read_page
 from augment.errors import AugmentError
 from augment.models import Contestant, Endpoint, EndpointModel, GenerationJob, Probe
 from augment.services.endpoints import known_endpoints
-from augment.services.endpoints.contestants import (
-    REASONING_EFFORTS,
-    VARIANTS,
-    EnteredEndpoint,
-    enter_contestant,
+from augment.services.endpoints.contestants import OPTION_INPUTS, ContestantRequest, add_contestant
+from augment.services.endpoints.known_endpoints import (
+    MODEL_FACTS,
+    EndpointFacts,
+    EndpointRequest,
+    is_key_here,
+    list_key_variables,
 )
-from augment.services.endpoints.known_endpoints import FACTS, EndpointFacts, ModelFacts
 from augment.services.endpoints.probing import plan_probe
 from augment.services.endpoints.treatments import respondents_of
 from augment.services.events import retire, take_back
-from augment.services.inputs import inputs_of
+from augment.services.inputs import inputs_of, read_request, read_values
 from augment.services.running.workers import workforce
 from augment.tasks import enqueue_probe
 
 CONTESTANTS_AT_ONCE = 50
-SLUG_RULE = "Lower-case letters, digits, hyphens."
-
-
-# --- Contestants -------------------------------------------------------------------------------
 
 
 class OptionsForm(RequestForm):
@@ -49,30 +45,81 @@ class OptionsForm(RequestForm):
 
     @property
     def option_fields(self) -> list[forms.BoundField]:
-        """Return the fields of the options, for the template."""
-        return [self[name] for name in OptionsForm.base_fields]
+        """For the template."""
+        return [self[one.name] for one in OPTION_INPUTS]
 
     @property
     def has_options(self) -> bool:
-        """Return whether any option is filled in, for the template."""
+        """For the template: whether any is filled in, so that one sees which."""
         return any(field.value() not in (None, "") for field in self.option_fields)
 
 
 class ContestantForm(OptionsForm):
     """A model, a variant, and how it asks."""
 
-    slug = forms.SlugField(max_length=80, label="Slug", help_text=SLUG_RULE)
-    name = forms.CharField(
-        max_length=120, required=False, label="Name (made of model and variant)"
-    )
-    variant = forms.ChoiceField(choices=[(name, name) for name in VARIANTS], label="Variant")
+    inputs = inputs_of(ContestantRequest) + OPTION_INPUTS
     endpoint = forms.ChoiceField(label="Endpoint")
-    model = forms.CharField(max_length=120, label="Model id on the endpoint")
 
     def __init__(self, *args: Any, **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)
         known = Endpoint.objects.values_list("label", flat=True)
         offer(self, "endpoint", [(label, label) for label in known])
+
+    @property
+    def own_fields(self) -> list[forms.BoundField]:
+        """For the template: all but the options."""
+        return [self[one.name] for one in inputs_of(ContestantRequest)]
+
+
+class EndpointForm(RequestForm):
+    """A new endpoint."""
+
+    inputs = inputs_of(EndpointRequest)
+
+
+class EndpointFactsForm(RequestForm):
+    """What of an endpoint can be changed."""
+
+    inputs = inputs_of(EndpointFacts)
+
+    def __init__(self, *args: Any, **kwargs: Any) -> None:
+        super().__init__(*args, **kwargs)
+        self.fields["move_key"] = forms.BooleanField(
+            required=False, label="Its key may go to another server than so far"
+        )
+
+
+def _ability(label: str) -> forms.TypedChoiceField:
+    return forms.TypedChoiceField(
+        required=False,
+        label=label,
+        choices=[("", "unknown"), ("yes", "yes"), ("no", "no")],
+        coerce=lambda word: word == "yes",
+        empty_value=None,
+    )
+
+
+class ModelForm(forms.ModelForm):  # type: ignore[type-arg]
+    """What somebody knows of a model; what is left empty is unknown."""
+
+    vision = _ability("Sees pictures")
+    native_tools = _ability("Calls functions natively")
+    json_schema = _ability("Keeps to a JSON schema")
+    temperature = _ability("Temperature may be chosen")
+
+    class Meta:
+        model = EndpointModel
+        fields = MODEL_FACTS
+
+    def __init__(self, *args: Any, **kwargs: Any) -> None:
+        super().__init__(*args, **kwargs)
+        words = {True: "yes", False: "no"}
+        for name, value in self.initial.items():
+            if isinstance(value, bool):
+                self.initial[name] = words[value]
+
+
+# --- Contestants -------------------------------------------------------------------------------
 
 
 @page_for(*STAFF)
@@ -110,16 +157,15 @@ def contestant_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
 def new_contestant_page(request: HttpRequest) -> HttpResponse:
     """Add a contestant that asks a model."""
     form = ContestantForm(request.POST or None, initial=request.GET.dict())
-    names = ("slug", "name", "variant", "endpoint", "model")
     if form.is_valid():
-        given = {name: form.cleaned_data[name] for name in names}
-        given["endpoint"] = EnteredEndpoint(label=given["endpoint"])
+        given = form.cleaned_data
+        options = read_values(OPTION_INPUTS, given)
         with refusals_in(form):
-            row = enter_contestant(**given, options=form.options(), actor=user_of(request))
+            wanted = read_request(ContestantRequest, given, options=options)
+            row = add_contestant(wanted, user_of(request))
             messages.success(request, f"“{row.name}” is added.")
             return redirect("contestant", code=row.code)
-    context = {"form": form, "who": [form[name] for name in names]}
-    return render(request, "contestants/new.html", context)
+    return render(request, "contestants/new.html", {"form": form})
 
 
 @act_for(ADMIN, back="contestant")
@@ -133,77 +179,6 @@ def set_retired(request: HttpRequest, code: uuid.UUID) -> None:
 # --- Endpoints and models ----------------------------------------------------------------------
 
 
-class EndpointForm(forms.Form):
-    """An address, the variable with its key, and its limits; of a row, label and kind stay."""
-
-    label = forms.SlugField(max_length=80, label="Label", help_text=SLUG_RULE)
-    is_simulated = forms.BooleanField(
-        required=False, label="A stand-in: what it answers counts as simulated"
-    )
-    move_key = forms.BooleanField(
-        required=False, label="Its key may go to another server than so far"
-    )
-
-    def __init__(self, data: Any = None, *, row: Endpoint | None = None) -> None:
-        asked = inputs_of(EndpointFacts)
-        initial = {one.name: getattr(row, one.name) for one in asked} if row else {}
-        super().__init__(data, initial=initial)
-        self.fields |= {one.name: form_field(one) for one in asked}
-        for name in ("label", "is_simulated") if row else ("move_key",):
-            del self.fields[name]
-
-    def facts(self) -> EndpointFacts:
-        """Return what of the valid form can be changed later."""
-        given = {one.name: self.cleaned_data[one.name] for one in inputs_of(EndpointFacts)}
-        return EndpointFacts(**given)
-
-
-def _ability(label: str) -> forms.TypedChoiceField:
-    return forms.TypedChoiceField(
-        required=False,
-        label=label,
-        choices=[("", "unknown"), ("yes", "yes"), ("no", "no")],
-        coerce=lambda word: word == "yes",
-        empty_value=None,
-    )
-
-
-class ModelForm(forms.ModelForm):  # type: ignore[type-arg]
-    """What somebody knows of a model; what is left empty is unknown."""
-
-    model_class = forms.ChoiceField(
-        required=False, label="Class", choices=[("", "–"), *EndpointModel.ModelClass.choices]
-    )
-    price_in_usd = forms.DecimalField(
-        required=False, max_digits=12, decimal_places=6, label="USD per million tokens in"
-    )
-    price_out_usd = forms.DecimalField(
-        required=False, max_digits=12, decimal_places=6, label="USD per million tokens out"
-    )
-    price_as_of = forms.DateField(required=False, label="Price as of (YYYY-MM-DD)")
-    price_source = forms.CharField(required=False, max_length=200, label="Source of the price")
-    context_tokens = forms.IntegerField(required=False, label="Tokens of context")
-    max_output_tokens = forms.IntegerField(required=False, label="Tokens of one answer, at most")
-    reasoning_effort = forms.ChoiceField(
-        required=False,
-        choices=[("", "not sent"), *((word, word) for word in REASONING_EFFORTS)],
-        label="Reasoning effort",
-    )
-    vision = _ability("Sees pictures")
-    native_tools = _ability("Calls functions natively")
-    json_schema = _ability("Keeps to a JSON schema")
-    temperature = _ability("Temperature may be chosen")
-
-
-def _shown(value: Any) -> Any:
-    """Return a stored fact as its field shows it."""
-    if isinstance(value, bool):
-        return "yes" if value else "no"
-    if isinstance(value, Decimal):
-        return f"{value.normalize():f}"
-    return value.isoformat() if isinstance(value, date) else value
-
-
 @page_for(*STAFF)
 def endpoints_page(request: HttpRequest) -> HttpResponse:
     """List every endpoint with its limits, and whether its key is here."""
@@ -213,7 +188,7 @@ def endpoints_page(request: HttpRequest) -> HttpResponse:
 
 
 def _has_key(row: Endpoint) -> bool:
-    return not row.key_variable or known_endpoints.is_key_here(row.key_variable)
+    return not row.key_variable or is_key_here(row.key_variable)
 
 
 @form_for(ADMIN)
@@ -222,15 +197,11 @@ def new_endpoint_page(request: HttpRequest) -> HttpResponse:
     form = EndpointForm(request.POST or None)
     if form.is_valid():
         with refusals_in(form):
-            row = known_endpoints.add_endpoint(
-                label=form.cleaned_data["label"],
-                facts=form.facts(),
-                is_simulated=form.cleaned_data["is_simulated"],
-                actor=user_of(request),
-            )
+            wanted = read_request(EndpointRequest, form.cleaned_data)
+            row = known_endpoints.add_endpoint(wanted, user_of(request))
             messages.success(request, f"“{row.label}” is added. Name its models now.")
             return redirect("endpoint", code=row.code)
-    context = {"form": form, "variables": known_endpoints.list_key_variables()}
+    context = {"form": form, "variables": list_key_variables()}
     return render(request, "endpoints/new.html", context, status=422 if form.errors else 200)
 
 
@@ -238,7 +209,7 @@ def new_endpoint_page(request: HttpRequest) -> HttpResponse:
 def endpoint_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Show one endpoint with its models; admins change it here."""
     row = get_object_or_404(Endpoint, code=code)
-    form = EndpointForm(_sent_by_admin(request), row=row)
+    form = EndpointFactsForm(_sent_by_admin(request), initial=model_to_dict(row))
     if form.is_valid():
         with refusals_in(form):
             known_endpoints.change_endpoint(
@@ -255,7 +226,7 @@ def endpoint_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         "models": row.models.all(),
         "contestants": row.contestants.filter(retired_at=None).order_by("name"),
         "has_key": _has_key(row),
-        "variables": known_endpoints.list_key_variables(),
+        "variables": list_key_variables(),
     }
     return render(request, "endpoints/endpoint.html", context, status=422 if form.errors else 200)
 
@@ -280,12 +251,10 @@ def add_model(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
 def model_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Show what is known of a model, and its last probe, line by line while it is made."""
     row = get_object_or_404(EndpointModel.objects.select_related("endpoint"), code=code)
-    stored = {name: _shown(getattr(row, name)) for name in FACTS}
-    form = ModelForm(_sent_by_admin(request), initial=stored)
+    form = ModelForm(_sent_by_admin(request), instance=row)
     if form.is_valid():
         with refusals_in(form):
-            facts = ModelFacts(**form.cleaned_data)
-            known_endpoints.change_model(row, facts=facts, actor=user_of(request))
+            known_endpoints.change_model(row, facts=form.cleaned_data, actor=user_of(request))
             messages.success(request, "Kept. It counts for contestants that have not run yet.")
             return redirect("endpoint-model", code=code)
     probe = row.probes.first()

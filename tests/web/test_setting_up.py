@@ -39,12 +39,11 @@ def test_the_paper_set_is_loaded_by_a_button_and_loading_it_again_changes_nothin
 
 
 def test_a_contestant_is_entered_with_its_options(client: Client) -> None:
-    Endpoint.objects.create(label="local", base_url="http://127.0.0.1:11434/v1")
-    text = enter(client)
+    address = reverse("contestant-new")
+    refused = client.post(address, ENTERED).content.decode()
+    assert 'value="qwen3"' in refused, "there is no such endpoint, and the form stays filled in"
+    endpoint = Endpoint.objects.create(label="local", base_url="http://127.0.0.1:11434/v1")
+    assert "0.7" in client.post(address, ENTERED, follow=True).content.decode()
     row = Contestant.objects.get(slug="qwen-fc")
-    assert (row.variant, row.model, row.endpoint.label) == ("fc", "qwen3", "local")  # type: ignore[union-attr]
+    assert (row.variant, row.model, row.endpoint) == ("fc", "qwen3", endpoint)
     assert row.options == {"temperature": 0.7, "protocol": "native"}
-    assert "0.7" in text
-    refused = enter(client, temperature="0.9")
-    assert "There is another contestant" in refused
-    assert 'value="qwen3"' in refused, "the form stays filled in"
