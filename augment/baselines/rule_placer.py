@@ -22,14 +22,7 @@ from augment.baselines.placed_vehicles import (
 )
 from augment.baselines.placing_ground import PlacingGround
 from augment.checks import Ground, Severity
-from augment.checks.asked_places import LANES
-from augment.checks.lanes_across import (
-    LanesAcross,
-    find_picked,
-    list_absent,
-    resolve_anchors,
-    resolve_landmarks,
-)
+from augment.checks.lanes_across import LanesAcross, find_picked, list_absent, resolve_spots
 from augment.checks.registry import check_against_intent
 from augment.errors import CannotPlace
 from augment.geometry.frames import overlap
@@ -97,7 +90,7 @@ def place(scene: Scene, intent: Intent | None, *, seed: int = 0) -> Placement:
     absent = list_absent(intent, lanes)
     if absent:
         raise CannotPlace(f"Not in this scene: {', '.join(absent)}.")
-    resolved = resolve_landmarks(intent, lanes)
+    resolved = resolve_spots(intent, lanes)
     gone = [agent.id for pick in intent.removals for agent in find_picked(lanes, pick)]
     changes = Modification(removed=tuple(dict.fromkeys(gone)))
     sentences = [f"{name} is removed." for name in changes.removed]
@@ -118,7 +111,7 @@ def place(scene: Scene, intent: Intent | None, *, seed: int = 0) -> Placement:
         changes = replace(changes, moved=(*changes.moved, replace(moved, **same)))
         sentences.append(f"{agent.id} is moved to {distance_m:.1f} m along the ego's lane.")
     fitting = _Fitting(apply(scene, changes), intent.route, rng)
-    for added in resolve_anchors(resolved).requests:
+    for added in resolved.requests:
         agents, distance_m = fitting.fit(added)
         fitting.added += agents
         sentences.append(_describe(added, distance_m, fitting.left_of_lane_m(agents[0])))
@@ -291,7 +284,7 @@ def _describe(request: Request, distance_m: float, left_m: float) -> str:
     elif asked is not None and abs(distance_m - asked.low_m) > 0.01:
         why = f" (moved from {asked.low_m:g} m, where it had no room)"
     where = f"{distance_m:.1f} m {relation} the ego along its lane{why}"
-    lane = LANES[request.spot.lane or LaneChoice.OWN]
+    lane = f"the {request.spot.lane or LaneChoice.OWN} lane"
     match request:
         case VehicleRequest():
             motion = f"driving at {request.speed_mps:.1f} m/s" if request.speed_mps else "standing"

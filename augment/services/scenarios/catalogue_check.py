@@ -18,11 +18,10 @@ from pathlib import Path
 import numpy as np
 
 from augment.checks import Ground
-from augment.checks.ground import gaps_m
+from augment.checks.ground import VEHICLES, gaps_m, is_stopped
 from augment.checks.lanes_across import LanesAcross, find_mark
 from augment.checks.parties import AUTHORED
 from augment.checks.registry import check_against_intent
-from augment.checks.situation import VEHICLES, is_stopped
 from augment.geometry.frames import Box, Pose, difference, overlap
 from augment.geometry.polyline import FloatArray
 from augment.prompts.vectors import DEFAULT_RADIUS_M
@@ -423,7 +422,7 @@ def _find_under(ground: Ground, route: EgoRoute, ahead_m: float, left_m: float) 
     x_m, y_m = route.position(ahead_m, left_m)
     if ground.road.distance_m(x_m, y_m) > 0.0 or ground.carparks.distance_m(x_m, y_m) == 0.0:
         return WayPast.NONE
-    lanes = [one for one in ground.lanes.beside(x_m, y_m) if one.covers]
+    lanes = [one for one in ground.graph.beside(x_m, y_m) if one.covers]
     if not lanes or any(one.lane_id in route.lane_ids for one in lanes):
         return WayPast.OWN
     tangent_rad = route.heading_at(ahead_m)
