@@ -117,7 +117,7 @@ def overlap(first: Box, second: Box) -> Overlap:
     depth_m = float(ends.min())
     if depth_m <= 0.0:
         return APART
-    # Without a grid, boxes with sides on one line may be told to share nothing.
+    # Without a grid, sides that coincide but for rounding can leave nothing of what is shared.
     shared = shapely.intersection(shapely.Polygon(one), shapely.Polygon(other), grid_size=1e-9)
     area_m2 = float(shared.area)
     return Overlap(
