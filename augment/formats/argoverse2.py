@@ -21,7 +21,7 @@ from augment.errors import InvalidDocument
 from augment.formats.documents import read_json
 from augment.formats.reading import Log, LoggedTrack, Reader, speeds, tracks_of
 from augment.formats.road_map import RoadMap, Segment
-from augment.formats.values import WHAT, FloatArray, broken, finite, look_up
+from augment.formats.values import WHAT, FloatArray, fault_at, look_up, read_finite
 from augment.scene.entities import AgentType, AreaKind
 from augment.scene.recording import Note, SceneNoteKind
 from augment.scene.schema import problems_of
@@ -110,7 +110,7 @@ class ArgoverseSensor(Reader):
         stamps, sweeps = np.unique(boxes["timestamp_ns"], return_inverse=True)
         poses = poses.drop_duplicates("timestamp_ns").set_index("timestamp_ns").reindex(stamps)
         if not len(stamps) or poses.isna().any(axis=None):
-            raise broken(POSES, "has no pose at an annotated time")
+            raise fault_at(POSES, "has no pose at an annotated time")
         times_s = (stamps - stamps[0]) * 1e-9
         turn, places = _rotation(poses), poses[_PLACE].to_numpy(copy=True)
         forward = turn.apply([1.0, 0.0, 0.0])
@@ -161,7 +161,7 @@ class ArgoverseMotion(Reader):
         table = _read_table(file, _MOTION_COLUMNS)
         steps = table["timestep"]
         if not len(steps) or steps.min() < 0 or steps.max() >= MOST_STEPS:
-            raise broken(f"{file.name}: timestep", f"needs steps from 0 to {MOST_STEPS - 1}")
+            raise fault_at(f"{file.name}: timestep", f"needs steps from 0 to {MOST_STEPS - 1}")
         for kind in table["object_type"].unique():
             look_up(MOTION_TYPE_OF, kind, "object_type")
         names = {"track_id": "track", "object_type": "kind", "timestep": "step"}
@@ -213,13 +213,13 @@ def _read_table(file: Path, columns: Mapping[str, str]) -> "pd.DataFrame":
         table = table.cast(pa.schema([(name, types[kind]) for name, kind in columns.items()]))
     except (pa.ArrowException, *_ARROW_FAULTS) as fault:
         problem = f"can't be read, or has not the columns {', '.join(columns)}: {str(fault)[:200]}"
-        raise broken(file.name, problem) from None
+        raise fault_at(file.name, problem) from None
     for name in columns:
         if table[name].null_count:
-            raise broken(f"{file.name}: {name}", "a value is missing")
+            raise fault_at(f"{file.name}: {name}", "a value is missing")
     frame: pd.DataFrame = table.to_pandas()
     doubles = [name for name, kind in columns.items() if kind == "double"]
-    finite(frame[doubles], file.name)
+    read_finite(frame[doubles], file.name)
     return frame
 
 
@@ -230,7 +230,7 @@ def _rotation(columns: "pd.DataFrame") -> Rotation:
     try:
         return Rotation.from_quat(columns[_QUATERNION].to_numpy(copy=True))
     except ValueError as fault:
-        raise broken("qw", f"has a quaternion that is none: {fault}") from None
+        raise fault_at("qw", f"has a quaternion that is none: {fault}") from None
 
 
 # Maps
@@ -284,7 +284,7 @@ class _Map(_Part):
 def _only_file(folder: Path, pattern: str) -> Path:
     files = sorted(folder.glob(pattern))
     if len(files) != 1:
-        raise broken(pattern, f"{len(files)} such files in {folder}; there must be one")
+        raise fault_at(pattern, f"{len(files)} such files in {folder}; there must be one")
     return files[0]
 
 

@@ -18,7 +18,7 @@ import numpy as np
 
 from augment.formats.nuplan_map import city_around, open_tables
 from augment.formats.reading import Log, LoggedTrack, Moment, Reader, frames_every, tracks_of
-from augment.formats.values import FloatArray, broken, finite, look_up
+from augment.formats.values import FloatArray, fault_at, look_up, read_finite
 from augment.scene.entities import EGO_LENGTH_M, EGO_WIDTH_M, AgentType, TrafficLight
 from augment.scene.recording import Note, SceneNoteKind
 
@@ -71,7 +71,7 @@ class NuPlan(Reader):
         with open_tables(path) as base:
             place = base.execute("SELECT location, map_version, logfile FROM log").fetchone()
             if place is None:
-                raise broken("log", "has no row")
+                raise fault_at("log", "has no row")
             location, version, logfile = (str(one or "")[:200] for one in place)
             token = _token(base, item)
             times_s, ego, tracks = _motion(base, token)
@@ -120,23 +120,23 @@ def _map_of(path: Path, *names: str) -> Path:
     """The map of a log's city, which lies in a folder of its location or of its version."""
     for name in names:
         if not re.fullmatch(r"[\w.-]{0,60}", name):
-            raise broken("log", f"{name[:40]!r} is no name of a map")
+            raise fault_at("log", f"{name[:40]!r} is no name of a map")
     cities = [name for name in names if name.strip(".")]
     for folder in path.resolve().parents:
         found = {file for city in cities for file in (folder / "maps" / city).glob("*/map.gpkg")}
         if len(found) > 1:
-            raise broken(str(folder / "maps"), "has several maps of this city")
+            raise fault_at(str(folder / "maps"), "has several maps of this city")
         if found:
             return found.pop()
     text = f"has no map of {names[0]} beside or above it: maps/{names[0]}/*/map.gpkg"
-    raise broken(str(path), text)
+    raise fault_at(str(path), text)
 
 
 def _token(base: sqlite3.Connection, item: str | None) -> str:
     if item is not None and not item.startswith(TAG):
         if not re.fullmatch(r"[0-9a-f]{16}", item.lower()):
             problem = f"{item[:40]!r} is neither a token of 16 hex digits nor tag:TYPE"
-            raise broken("item", problem)
+            raise fault_at("item", problem)
         return item.lower()
     tag, number = None if item is None else item.removeprefix(TAG), 0
     counted = re.fullmatch(r"(.+):(\d{1,9})", tag or "")
@@ -144,7 +144,9 @@ def _token(base: sqlite3.Connection, item: str | None) -> str:
         tag, number = counted[1], int(counted[2])
     tokens = _tokens(base, tag)
     if number >= len(tokens):
-        raise broken("item", f"{len(tokens)} frames have the tag {tag!r}, from 0 on; not {number}")
+        raise fault_at(
+            "item", f"{len(tokens)} frames have the tag {tag!r}, from 0 on; not {number}"
+        )
     return tokens[number][0]
 
 
@@ -157,7 +159,7 @@ def _tokens(base: sqlite3.Connection, tag: str | None) -> list[tuple[str, int]]:
         text, values = text.replace("ORDER", join), (tag,)
     rows = base.execute(text, values).fetchall()
     if not rows:
-        raise broken("item", f"no frame has the tag {tag!r}" if tag else "the log has no frame")
+        raise fault_at("item", f"no frame has the tag {tag!r}" if tag else "the log has no frame")
     return [(str(token).lower(), _whole(time, "lidar_pc.timestamp")) for token, time in rows]
 
 
@@ -165,7 +167,7 @@ def _whole(value: object, place: str) -> int:
     if isinstance(value, str) and value.isdecimal() and len(value) <= 18:
         return int(value)
     if not isinstance(value, int):
-        raise broken(place, f"{str(value)[:40]!r} is no whole number")
+        raise fault_at(place, f"{str(value)[:40]!r} is no whole number")
     return value
 
 
@@ -177,7 +179,7 @@ def _motion(
         "SELECT timestamp FROM lidar_pc WHERE token = ?", (bytes.fromhex(token),)
     ).fetchone()
     if start is None:
-        raise broken("item", f"there is no lidar_pc {token}")
+        raise fault_at("item", f"there is no lidar_pc {token}")
     first = _whole(start[0], "lidar_pc.timestamp")
     rows = base.execute(
         "SELECT l.token, l.timestamp, e.x, e.y, e.qw, e.qx, e.qy, e.qz, e.vx, e.vy "
@@ -186,7 +188,7 @@ def _motion(
         (first, min(first, LATEST_US) + LASTS_US, MOST_FRAMES),
     ).fetchall()
     if not rows or rows[0][1] != first:
-        raise broken("ego_pose", f"has no pose for lidar_pc {token}")
+        raise fault_at("ego_pose", f"has no pose for lidar_pc {token}")
     chosen = rows[:1]
     for row in rows[1:]:
         if row[1] - chosen[-1][1] >= STEP_US * 0.9:
@@ -203,7 +205,7 @@ def _motion(
 
 def _finite(rows: Sequence[Sequence[Any]], place: str) -> FloatArray:
     """Finite numbers (R, C); NULL counts as 0."""
-    return finite([[value or 0.0 for value in row] for row in rows], place)
+    return read_finite([[value or 0.0 for value in row] for row in rows], place)
 
 
 def _boxes(base: sqlite3.Connection, frames: Sequence[bytes]) -> "pd.DataFrame":

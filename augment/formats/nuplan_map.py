@@ -20,7 +20,7 @@ import shapely
 
 from augment.formats.road_map import RoadMap, Segment
 from augment.formats.roads import RADIUS_M
-from augment.formats.values import FloatArray, broken
+from augment.formats.values import FloatArray, fault_at
 from augment.scene.entities import AreaKind, TrafficLight, TrafficSide
 
 BICYCLE_LANE = 1
@@ -48,14 +48,14 @@ def open_tables(path: Path) -> Iterator[sqlite3.Connection]:
         InvalidDocument: It is not there or no database, or has not what the block asks it for.
     """
     if not path.is_file():
-        raise broken(str(path), "is not there")
+        raise fault_at(str(path), "is not there")
     address = f"file:{quote(str(path.resolve()))}?mode=ro&immutable=1"
     try:
         with closing(sqlite3.connect(address, uri=True)) as base:
             base.execute("PRAGMA trusted_schema = OFF")
             yield base
     except (sqlite3.Error, UnicodeDecodeError) as fault:
-        raise broken(path.name, f"can't be read as a database: {fault}") from None
+        raise fault_at(path.name, f"can't be read as a database: {fault}") from None
 
 
 def city_around(
@@ -115,7 +115,7 @@ class _Layers:
         hemisphere, self._zone = divmod(self._system, 100)
         if hemisphere not in (326, 327) or not 1 <= self._zone <= 60:
             problem = f"{system[:40]!r} is no UTM zone as EPSG:326xx"
-            raise broken("meta.projectedCoordSystem", problem)
+            raise fault_at("meta.projectedCoordSystem", problem)
         text = "SELECT table_name, column_name, srs_id FROM gpkg_geometry_columns"
         self.geometry = {table: (column, system) for table, column, system in base.execute(text)}
         self.edges = {_name(fid): points for (fid,), points in self.read("boundaries", ("fid",))}
@@ -131,10 +131,10 @@ class _Layers:
         Of several parts, the longest; of a polygon, its outline.
         """
         if layer not in self.geometry:
-            raise broken("map", f"has no layer {layer!r}")
+            raise fault_at("map", f"has no layer {layer!r}")
         geometry, system = self.geometry[layer]
         if system not in (GEOGRAPHIC, self._system):
-            raise broken(layer, f"is in EPSG:{system}, which is not read")
+            raise fault_at(layer, f"is in EPSG:{system}, which is not read")
         names = ", ".join(f"[{name}]" for name in (*columns, geometry))
         text = f"SELECT {names} FROM [{layer}] WHERE [{geometry}] IS NOT NULL"
         rows = self._base.execute(text).fetchall()
@@ -164,7 +164,7 @@ class _Layers:
                     raise ValueError("degrees that are none")
                 points = to_utm(points, zone=self._zone, is_south=self._system >= 32700)
         except (ValueError, shapely.errors.ShapelyError) as fault:
-            raise broken(layer, f"has a broken geometry: {fault}") from None
+            raise fault_at(layer, f"has a broken geometry: {fault}") from None
         return np.split(points, np.flatnonzero(np.diff(owners)) + 1)
 
 
@@ -237,7 +237,7 @@ def _name(fid: Any) -> str:
         return ""
     text = str(int(fid) if isinstance(fid, float) and fid.is_integer() else fid)
     if not isinstance(fid, int | float | str) or not text.isdecimal() or len(text) > 18:
-        raise broken("map", f"{text[:40]!r} is no feature id")
+        raise fault_at("map", f"{text[:40]!r} is no feature id")
     return f"{int(text):09d}"
 
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from augment.formats.documents import read_json
 from augment.formats.reading import Moment, Reader, Reading
-from augment.formats.values import broken
+from augment.formats.values import fault_at
 from augment.formats.writing import Cell, LossReport, Written, write_each
 from augment.scene.codec import (
     SCENE_FORMAT,
@@ -49,7 +49,7 @@ class OwnJson(Reader):
     def read(self, path: Path, *, item: str | None, frame: int | None, name: str) -> Reading:
         """The scene under another name."""
         if frame or item is not None:
-            raise broken("frame", "a JSON scene has no parts and frame 0 alone")
+            raise fault_at("frame", "a JSON scene has no parts and frame 0 alone")
         scene = scene_from_document(read_json(path, what="scene"))
         return Reading(scene=replace(scene, name=name), recording=None)
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from augment.formats.road_map import RoadMap, complete_map
 from augment.formats.roads import RADIUS_M, road_around
-from augment.formats.values import FURTHEST, FloatArray, broken, finite
+from augment.formats.values import FURTHEST, FloatArray, fault_at, read_finite
 from augment.geometry.frames import Pose, wrap
 from augment.scene.entities import LENGTH_WIDTH_M, AgentType, Origin, Scene, TrafficAgent
 from augment.scene.lane_graph import LaneGraph
@@ -186,10 +186,10 @@ class Log:
     def _ego_pose(self, frame: int) -> Pose:
         steps = len(self.times_s)
         if not 0 <= frame < steps:
-            raise broken("frame", f"{frame} is not there; there are 0 to {steps - 1}")
+            raise fault_at("frame", f"{frame} is not there; there are 0 to {steps - 1}")
         x_m, y_m, heading_rad, _ = self.ego.states[frame].tolist()
         if not np.isfinite(self.ego.states[frame]).all():
-            raise broken("frame", f"{frame} has no ego in it")
+            raise fault_at("frame", f"{frame} has no ego in it")
         return Pose(x_m=x_m, y_m=y_m, heading_rad=wrap(heading_rad))
 
 
@@ -240,10 +240,10 @@ class Reader:
             InvalidDocument: The input breaks its format, or has no such moment.
         """
         if item is not None and not self.has_items:
-            raise broken("item", f"there are no parts, {item!r} is not there")
+            raise fault_at("item", f"there are no parts, {item!r} is not there")
         log = next(self.logs(path, item), None)
         if log is None:
-            raise broken("item", f"{str(item or 'a first part')[:60]!r} is not there")
+            raise fault_at("item", f"{str(item or 'a first part')[:60]!r} is not there")
         return log.reading_at(log.frame if frame is None else frame, name)
 
 
@@ -283,7 +283,7 @@ def tracks_of(
     """
     if "speed_mps" not in table:
         table = table.assign(speed_mps=np.nan)
-    states = finite(table[[*STATE[:3]]], "places")
+    states = read_finite(table[[*STATE[:3]]], "places")
     speeds_mps = table["speed_mps"].to_numpy()
     steps = table["step"].to_numpy()
     tracks = {}
@@ -316,7 +316,7 @@ def _tracks(log: Log, frame: int, origin: Pose) -> tuple[Track, ...]:
     """
     for one in (log.ego, *log.tracks):
         if (np.abs(one.states) > FURTHEST).any():
-            raise broken(one.name, f"has a number over {FURTHEST:.0e}")
+            raise fault_at(one.name, f"has a number over {FURTHEST:.0e}")
     met = []
     ego = log.ego.states[frame:, :2]
     # Where the ego's way is not known, near is near to where it was.

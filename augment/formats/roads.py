@@ -15,7 +15,7 @@ import numpy as np
 import shapely
 
 from augment.formats.road_map import Name, RoadMap, Segment, Way, following_of, ways_through
-from augment.formats.values import FURTHEST, FloatArray, broken
+from augment.formats.values import FURTHEST, FloatArray, fault_at
 from augment.geometry.frames import Pose, difference
 from augment.geometry.polyline import Polyline
 from augment.scene.entities import Area, Lane, LaneConnector, TrafficLight, TrafficSide
@@ -67,7 +67,7 @@ def road_around(city: RoadMap, ego: Pose) -> MapExtract:
         try:
             strip = _strip(segment, ego)
         except ValueError as fault:
-            raise broken(f"{city.place}.{segment.name}", str(fault)) from None
+            raise fault_at(f"{city.place}.{segment.name}", str(fault)) from None
         strips |= {} if strip is None else {segment.name: strip}
     inside = {name for name, strip in strips.items() if strip.segment.crosses}
     plain = sorted(
@@ -166,7 +166,7 @@ def _areas(city: RoadMap, ego: Pose) -> tuple[Area, ...]:
             ring = ring[:-1]
         if not np.isfinite(ring).all() or len(np.unique(ring, axis=0)) < 3:
             problem = f"has a {kind} area without an inside, or that is not finite"
-            raise broken(city.place, problem)
+            raise fault_at(city.place, problem)
         if _is_far(ring):
             continue
         distance_m = Polyline(np.vstack([ring, ring[:1]])).project(0.0, 0.0).distance_m

@@ -22,7 +22,7 @@ FURTHEST: Final = 1e8
 _MOST_LISTED = 40
 
 
-def broken(place: str, text: str) -> InvalidDocument:
+def fault_at(place: str, text: str) -> InvalidDocument:
     """Return the error of what is wrong in a recording, and where."""
     return InvalidDocument(WHAT, [(place, text)])
 
@@ -37,10 +37,10 @@ def look_up(table: Mapping[Key, Value], key: object, place: str) -> Value:
         return table[key]  # type: ignore[index]
     except (KeyError, TypeError):
         known = ", ".join(map(str, [*table][:_MOST_LISTED]))
-        raise broken(place, f"unknown {str(key)[:40]!r}; known: {known}") from None
+        raise fault_at(place, f"unknown {str(key)[:40]!r}; known: {known}") from None
 
 
-def numbers(rows: Any, place: str, columns: int | None = None) -> FloatArray:
+def read_numbers(rows: Any, place: str, columns: int | None = None) -> FloatArray:
     """Return rows of numbers as (R, C).
 
     Args:
@@ -57,29 +57,29 @@ def numbers(rows: Any, place: str, columns: int | None = None) -> FloatArray:
             array = np.array(rows, dtype=object).astype(np.float64)
         array = array.astype(np.float64).reshape(len(array), -1)
     except (TypeError, ValueError, OverflowError):
-        raise broken(place, "needs an array of numbers") from None
+        raise fault_at(place, "needs an array of numbers") from None
     if columns is not None and len(array) and array.shape[1] < columns:
-        raise broken(place, f"needs {columns} numbers a row")
+        raise fault_at(place, f"needs {columns} numbers a row")
     return array[:, :columns] if len(array) else np.empty((0, columns or 0))
 
 
-def finite(rows: Any, place: str, columns: int | None = None) -> FloatArray:
-    """Return rows of finite numbers; as `numbers`."""
-    array = numbers(rows, place, columns)
+def read_finite(rows: Any, place: str, columns: int | None = None) -> FloatArray:
+    """Return rows of finite numbers; as `read_numbers`."""
+    array = read_numbers(rows, place, columns)
     beyond = ~(np.abs(array) <= FURTHEST)
     if beyond.any():
         row = int(beyond.any(axis=1).argmax())
-        raise broken(f"{place}[{row}]", f"needs finite numbers up to {FURTHEST:.0e}")
+        raise fault_at(f"{place}[{row}]", f"needs finite numbers up to {FURTHEST:.0e}")
     return array
 
 
-def times(values: Any, place: str) -> FloatArray:
+def read_times(values: Any, place: str) -> FloatArray:
     """Return times in seconds since the first of them, (T,).
 
     Raises:
         InvalidDocument: There is none, or they do not ascend.
     """
-    times_s = numbers(values, place).reshape(-1)
+    times_s = read_numbers(values, place).reshape(-1)
     if not len(times_s) or not np.isfinite(times_s).all() or (np.diff(times_s) <= 0.0).any():
-        raise broken(place, "needs finite times that ascend")
+        raise fault_at(place, "needs finite times that ascend")
     return np.asarray(times_s - times_s[0])

@@ -14,7 +14,7 @@ import numpy as np
 
 from augment.formats.road_map import RoadMap, Segment
 from augment.formats.roads import midline
-from augment.formats.values import FURTHEST, FloatArray, broken, finite, look_up
+from augment.formats.values import FURTHEST, FloatArray, fault_at, look_up, read_finite
 from augment.geometry.polyline import Polyline
 from augment.scene.entities import AreaKind, TrafficLight, TurnType
 from augment.scene.lane_graph import turn_type_of
@@ -80,7 +80,7 @@ def whole(text: str | None, place: str) -> int:
     given = (text or "").strip()
     if len(given) <= 15 and given.removeprefix("-").isdecimal():
         return int(given)
-    raise broken(place, f"expected a whole number, got {given[:40]!r}")
+    raise fault_at(place, f"expected a whole number, got {given[:40]!r}")
 
 
 def real(text: str | None, place: str) -> float:
@@ -94,7 +94,7 @@ def real(text: str | None, place: str) -> float:
     except ValueError:
         number = math.nan
     if not abs(number) <= FURTHEST:
-        raise broken(place, f"expected a finite number, got {(text or '')[:40]!r}")
+        raise fault_at(place, f"expected a finite number, got {(text or '')[:40]!r}")
     return number
 
 
@@ -105,7 +105,7 @@ def points_of(parent: Element, place: str) -> FloatArray:
         InvalidDocument: A coordinate is missing or no number.
     """
     points = parent.findall("point")
-    return finite([(one.findtext("x"), one.findtext("y")) for one in points], place, 2)
+    return read_finite([(one.findtext("x"), one.findtext("y")) for one in points], place, 2)
 
 
 def _references(parent: Element, name: str) -> tuple[int, ...]:
@@ -180,7 +180,7 @@ def _light(element: Element) -> tuple[int, Light]:
         colour = look_up(COLOURS, part.findtext("color", "").strip(), place)
         steps = whole(part.findtext("duration"), f"{place}.duration")
         if not 0 <= steps <= 100_000:
-            raise broken(place, f"a duration of {steps} steps is none")
+            raise fault_at(place, f"a duration of {steps} steps is none")
         cycle += [colour] * steps
     is_off = element.findtext("active", "").strip() == "false"
     return light_id, Light(
@@ -194,7 +194,7 @@ def _segment(key: int, element: Element, limits: dict[int, float]) -> Segment:
     place = f"lanelet {key}"
     left, right = element.find("leftBound"), element.find("rightBound")
     if left is None or right is None:
-        raise broken(place, "needs a leftBound and a rightBound")
+        raise fault_at(place, "needs a leftBound and a rightBound")
     edges = points_of(left, place), points_of(right, place)
     signs = _references(element, "trafficSignRef")
     known = [limits[sign] for sign in signs if sign in limits]

@@ -17,7 +17,7 @@ from augment.formats.commonroad.network import network_of, points_of, real, whol
 from augment.formats.documents import read_xml
 from augment.formats.reading import LONGEST_GAP_S, Log, LoggedTrack, Reader
 from augment.formats.road_map import left_out_notes
-from augment.formats.values import WHAT, FloatArray, broken, look_up
+from augment.formats.values import WHAT, FloatArray, fault_at, look_up
 from augment.scene.entities import EGO_LENGTH_M, EGO_WIDTH_M, AgentType
 from augment.scene.recording import Note, SceneNoteKind
 
@@ -135,10 +135,10 @@ def _root(path: Path) -> tuple[Element, float]:
     version = root.get("commonRoadVersion", "")
     if root.tag != "commonRoad" or version not in VERSIONS:
         text = f"is {root.tag[:40]!r} of version {version[:20]!r}, not commonRoad of"
-        raise broken(path.name, f"{text} {' or '.join(VERSIONS)}")
+        raise fault_at(path.name, f"{text} {' or '.join(VERSIONS)}")
     step_s = real(root.get("timeStepSize"), "timeStepSize")
     if not 0.001 <= step_s <= 10.0:
-        raise broken("timeStepSize", f"{step_s:g} s is no step from 0.001 to 10 s")
+        raise fault_at("timeStepSize", f"{step_s:g} s is no step from 0.001 to 10 s")
     return root, step_s
 
 
@@ -181,12 +181,12 @@ def _obstacles(root: Element) -> tuple[list[Obstacle], list[Note]]:
 def _state(element: Element | None, place: str) -> tuple[int, State]:
     """The time step, and where something is then."""
     if element is None:
-        raise broken(place, "needs an initialState")
+        raise fault_at(place, "needs an initialState")
     heading_rad, step, speed_mps = (
         _value(element, name, place) for name in ("orientation", "time", "velocity")
     )
     if not 0.0 <= step <= MOST_STEPS:
-        raise broken(place, f"a time step lies from 0 to {MOST_STEPS}, not at {step:g}")
+        raise fault_at(place, f"a time step lies from 0 to {MOST_STEPS}, not at {step:g}")
     x_m, y_m = _center(element, place).tolist()
     return round(step), (x_m, y_m, heading_rad, abs(speed_mps))
 
@@ -212,7 +212,7 @@ def _center(state: Element, place: str) -> FloatArray:
         point = state.find(name)
         if point is not None:
             return np.array([real(point.findtext(axis), place) for axis in "xy"])
-    raise broken(place, "a position needs a point, or a shape with a centre")
+    raise fault_at(place, "a position needs a point, or a shape with a centre")
 
 
 def _size(element: Element, place: str) -> tuple[float, float]:

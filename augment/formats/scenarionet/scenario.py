@@ -19,7 +19,14 @@ import shapely
 from augment.formats.reading import Log, LoggedTrack, Reader
 from augment.formats.road_map import NARROWEST_M, WIDEST_M, RoadMap, Segment, left_out_notes
 from augment.formats.scenarionet.unpickling import read_pickle
-from augment.formats.values import FloatArray, broken, finite, look_up, numbers, times
+from augment.formats.values import (
+    FloatArray,
+    fault_at,
+    look_up,
+    read_finite,
+    read_numbers,
+    read_times,
+)
 from augment.scene.entities import LENGTH_WIDTH_M, AgentType, AreaKind, TrafficLight, TrafficSide
 from augment.scene.recording import Note, SceneNoteKind
 
@@ -92,7 +99,7 @@ class ScenarioNet(Reader):
         """The scenario of a file, or one or all of a folder's."""
         if not path.is_dir():
             if item is not None:
-                raise broken("item", f"a file holds one scenario, {item!r} is not there")
+                raise fault_at("item", f"a file holds one scenario, {item!r} is not there")
             yield _log(path, None)
             return
         for name in _names_in(path) if item is None else [item]:
@@ -106,7 +113,7 @@ class ScenarioNet(Reader):
 def _table(file: Path) -> dict[str, Any]:
     table = read_pickle(file) if file.is_file() else {}
     if not isinstance(table, dict) or not all(isinstance(key, str) for key in table):
-        raise broken(file.name, "is no dictionary of file names")
+        raise fault_at(file.name, "is no dictionary of file names")
     return table
 
 
@@ -115,7 +122,7 @@ def _names_in(folder: Path) -> list[str]:
     names = [name for name in _table(folder / SUMMARY) if name.endswith(ENDING)]
     names = names or sorted(file.name for file in folder.glob(_SCENARIOS))
     if not names:
-        raise broken(str(folder), "holds no scenario")
+        raise fault_at(str(folder), "holds no scenario")
     return names
 
 
@@ -126,10 +133,10 @@ def _file_in(folder: Path, item: str) -> Path:
         name = look_up({str(n): one for n, one in enumerate(_names_in(folder))}, item, "item")
     place = _table(folder / MAPPING).get(name, "")
     if not isinstance(place, str) or "\0" in place + name or Path(name).name != name:
-        raise broken(MAPPING, f"{name[:60]!r} has no folder")
+        raise fault_at(MAPPING, f"{name[:60]!r} has no folder")
     file = (folder / place / name).resolve()
     if not file.is_relative_to(folder.resolve().parent) or not file.is_file():
-        raise broken("item", f"{name[:60]!r} is not in the data set")
+        raise fault_at("item", f"{name[:60]!r} is not in the data set")
     return file
 
 
@@ -140,13 +147,13 @@ def _log(path: Path, item: str | None) -> Log:
     description = read_pickle(path)
     for name in ("tracks", "map_features", "metadata"):
         if not isinstance(description, dict) or not isinstance(description.get(name), dict):
-            raise broken(name, "is missing, or is no dictionary")
+            raise fault_at(name, "is missing, or is no dictionary")
     metadata = description["metadata"]
     given = metadata.get("ts", metadata.get("timestep"))
     if given is None:
         length = description.get("length")
         given = np.arange(length if isinstance(length, int) and length <= 100_000 else 0) * 0.1
-    times_s = times(given, "metadata.ts")
+    times_s = read_times(given, "metadata.ts")
     tracks, left_out = {}, Counter[str]()
     for key, track in description["tracks"].items():
         kind = track.get("type") if isinstance(track, dict) else None
@@ -189,18 +196,20 @@ def _log(path: Path, item: str | None) -> Log:
 def _track(key: str, track: dict[str, Any], steps: int, place: str) -> LoggedTrack:
     state = track.get("state")
     if not isinstance(state, dict):
-        raise broken(f"{place}.state", "is missing")
+        raise fault_at(f"{place}.state", "is missing")
     columns = {
-        name: numbers(state.get(name), f"{place}.state.{name}", needed)
+        name: read_numbers(state.get(name), f"{place}.state.{name}", needed)
         for name, needed in _COLUMNS.items()
     }
     known = {
-        size: numbers(state[size], place)[:, 0] for size in ("length", "width") if size in state
+        size: read_numbers(state[size], place)[:, 0]
+        for size in ("length", "width")
+        if size in state
     }
     for name, column in (columns | known).items():
         if len(column) != steps:
             text = f"has {len(column)} steps; the scenario has {steps}"
-            raise broken(f"{place}.state.{name}", text)
+            raise fault_at(f"{place}.state.{name}", text)
     speed_mps = np.hypot(*columns["velocity"].T)
     states = np.column_stack([columns["position"], columns["heading"], speed_mps])
     seen = (columns["valid"][:, 0] > 0.0) & np.isfinite(states).all(axis=1)
@@ -225,11 +234,11 @@ def _city(description: dict[str, Any], frame: int, city_name: str) -> RoadMap:
     for key, feature in description["map_features"].items():
         kind = feature.get("type") if isinstance(feature, dict) else None
         if not isinstance(kind, str):
-            raise broken(f"map_features.{key}", "needs a type")
+            raise fault_at(f"map_features.{key}", "needs a type")
         if kind in LANES:
             lanes[str(key)] = feature
         elif kind in AREA_OF and feature.get("polygon") is not None:
-            ring = finite(feature["polygon"], f"map_features.{key}", 2)
+            ring = read_finite(feature["polygon"], f"map_features.{key}", 2)
             if len(np.unique(ring, axis=0)) >= 3:
                 areas.append((AREA_OF[kind], ring))
         elif not kind.startswith(PASSED_OVER):
@@ -269,7 +278,7 @@ def _lights(states: object, frame: int) -> dict[str, TrafficLight]:
 
 def _segment(key: str, lane: dict[str, Any], lights: dict[str, TrafficLight]) -> Segment:
     place = f"map_features.{key}"
-    line = finite(lane.get("polyline"), place, 2)
+    line = read_finite(lane.get("polyline"), place, 2)
     limits = []
     for name, factor in (("speed_limit_kmh", 1.0 / 3.6), ("speed_limit_mph", 0.44704)):
         value = lane.get(name)
@@ -305,7 +314,7 @@ def _width(lane: dict[str, Any], line: FloatArray, place: str) -> float | None:
         widths = given.sum(axis=1)
     elif polygon is not None and len(line) >= 2:
         length_m = max(float(np.hypot(*np.diff(line, axis=0).T).sum()), 1e-6)
-        ring = finite(polygon, place, 2)
+        ring = read_finite(polygon, place, 2)
         widths = np.array([shapely.Polygon(ring).area / length_m]) if len(ring) >= 3 else widths
     known = widths[(widths >= NARROWEST_M) & (widths <= WIDEST_M)]
     return float(np.median(known)) if len(known) else None

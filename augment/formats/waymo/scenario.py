@@ -17,7 +17,14 @@ from google.protobuf.message import DecodeError
 
 from augment.formats.reading import Log, LoggedTrack, Reader
 from augment.formats.road_map import WIDEST_M, RoadMap, Segment, edge_of, left_out_notes, width_of
-from augment.formats.values import FloatArray, broken, finite, look_up, numbers, times
+from augment.formats.values import (
+    FloatArray,
+    fault_at,
+    look_up,
+    read_finite,
+    read_numbers,
+    read_times,
+)
 from augment.formats.waymo.scenario_pb2 import Scenario
 from augment.scene.entities import AgentType, AreaKind, TrafficLight
 from augment.scene.recording import SceneNoteKind
@@ -60,11 +67,11 @@ class WaymoMotion(Reader):
         for number, payload in read_records(path, only=item):
             scenario = read_scenario(payload)
             tracks = [_track(index, track) for index, track in enumerate(scenario.tracks)]
-            times_s = times(scenario.timestamps_seconds, "timestamps_seconds")
+            times_s = read_times(scenario.timestamps_seconds, "timestamps_seconds")
             for one in tracks:
                 if len(one.states) != len(times_s):
                     text = f"has {len(one.states)} states for {len(times_s)} times"
-                    raise broken(f"track {one.name}", text)
+                    raise fault_at(f"track {one.name}", text)
             ego = look_up(dict(enumerate(tracks)), scenario.sdc_track_index, "sdc_track_index")
             kinds = [track.object_type for track in scenario.tracks]
             yield Log(
@@ -112,18 +119,18 @@ def read_records(path: Path, *, only: str | None = None) -> Iterator[tuple[int, 
             record = f"{path.name}: record {number}"
             head = file.read(_HEAD.size)
             if len(head) < _HEAD.size:
-                raise broken(record, "is cut off in its length")
+                raise fault_at(record, "is cut off in its length")
             length, check = _HEAD.unpack(head)
             if masked_crc32c(head[:8]) != check:
-                raise broken(record, "has a length with a wrong checksum")
+                raise fault_at(record, "has a length with a wrong checksum")
             end = file.tell() + length + _FOOT.size
             if end > size:
-                raise broken(record, f"is cut off: {end - size} bytes of it are missing")
+                raise fault_at(record, f"is cut off: {end - size} bytes of it are missing")
             if only in (None, str(number)):
                 payload = file.read(length)
                 (check,) = _FOOT.unpack(file.read(_FOOT.size))
                 if masked_crc32c(payload) != check:
-                    raise broken(record, "has a payload with a wrong checksum")
+                    raise fault_at(record, "has a payload with a wrong checksum")
                 yield number, payload
             file.seek(end)
             number += 1
@@ -138,7 +145,7 @@ def read_scenario(payload: bytes) -> Any:
     try:
         return Scenario.FromString(payload)
     except DecodeError as fault:
-        raise broken("message", f"is broken: {fault}") from None
+        raise fault_at("message", f"is broken: {fault}") from None
 
 
 def _id(scenario: Any) -> str:
@@ -149,7 +156,7 @@ def _track(index: int, track: Any) -> LoggedTrack:
     """The track; boxes change a little from step to step, the usual one is taken."""
     kind = look_up(TYPE_OF, track.object_type, f"tracks[{index}].object_type")
     rows = [[getattr(state, name) for name in _STATE] for state in track.states]
-    columns = numbers(rows, f"tracks[{index}]", len(_STATE))
+    columns = read_numbers(rows, f"tracks[{index}]", len(_STATE))
     valid = np.array([state.valid for state in track.states], dtype=bool)
     states = np.column_stack([columns[:, :3], np.hypot(columns[:, 3], columns[:, 4])])
     states[~(valid & np.isfinite(states).all(axis=1))] = np.nan
@@ -200,7 +207,7 @@ def city_of(scenario: Any, frame: int) -> RoadMap:
 
 
 def _points(points: Iterable[Any]) -> FloatArray:
-    return finite([(point.x, point.y) for point in points], "map_features", 2)
+    return read_finite([(point.x, point.y) for point in points], "map_features", 2)
 
 
 def _segment(
