@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
-from scipy.spatial.transform import Rotation
 
 from augment.errors import InvalidDocument
 from augment.formats.documents import read_json
@@ -28,6 +27,7 @@ from augment.scene.schema import problems_of
 
 if TYPE_CHECKING:
     import pandas as pd
+    from scipy.spatial.transform import Rotation
 
 LICENCE = "CC BY-NC-SA 4.0"
 WORLD = "Argoverse 2 city frame"
@@ -226,7 +226,9 @@ def _read_table(file: Path, columns: Mapping[str, str]) -> "pd.DataFrame":
 _ARROW_FAULTS = (ValueError, TypeError, KeyError, IndexError, OSError, OverflowError)
 
 
-def _rotation(columns: "pd.DataFrame") -> Rotation:
+def _rotation(columns: "pd.DataFrame") -> "Rotation":
+    from scipy.spatial.transform import Rotation
+
     try:
         return Rotation.from_quat(columns[_QUATERNION].to_numpy(copy=True))
     except ValueError as fault:
