@@ -158,6 +158,7 @@ REST_FRAMEWORK = {
     "DEFAULT_RENDERER_CLASSES": ["rest_framework.renderers.JSONRenderer"],
     "DEFAULT_PARSER_CLASSES": ["rest_framework.parsers.JSONParser"],
     "DEFAULT_SCHEMA_CLASS": "arena.api.views.ArenaSchema",
+    "EXCEPTION_HANDLER": "arena.api.errors.answer_error",
 }
 SPECTACULAR_SETTINGS = {
     "TITLE": "Scenario Arena",
