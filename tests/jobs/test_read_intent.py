@@ -74,6 +74,7 @@ def test_an_answer_that_breaks_the_schema_is_asked_for_once_more() -> None:
     assert reading(broken, GOOD).state == State.READ
     second = ModelCall.objects.get(number=2)
     assert "requests[0].cones.shape" in str(second.request)
+    ModelCall.objects.all().delete()  # an answer from the store would be read again
     failed = reading(broken.replace("zigzag", "spiral"), broken)
     assert (failed.state, failed.document) == (State.FAILED, None)
 

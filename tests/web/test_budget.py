@@ -9,7 +9,7 @@ from arena.templatetags.marks import usd
 from augment.models import GenerationJob
 from augment.services.running import runner
 from augment.services.running.budget import Caps
-from tests.jobs.models import Model, llama_job
+from tests.jobs.models import Model, add_llama, llama_job
 from tests.jobs.rows import add_scenario, only_row
 from tests.web.cast import people, signed_in
 
@@ -28,7 +28,7 @@ def ran(job: GenerationJob, model: Model | None = None) -> GenerationJob:
 
 
 def test_a_job_is_launched_with_its_caps() -> None:
-    ran(llama_job(price="1"))
+    add_llama(price="1")
     add_scenario("street")
     sent = {"name": "R", "contestants": ["llama"], "scenarios": ["street"], "is_fresh": "on"}
     caps = {"cap_usd": "2.50", "cap_calls": "40", "cap_tokens": ""}
@@ -88,4 +88,4 @@ def test_an_estimate_launches_nothing_and_asks_for_no_name() -> None:
         shown = " ".join(answer.content.decode().split())
         assert sentence in shown
         assert "This field is required" not in shown
-    assert not GenerationJob.objects.exists()
+    assert GenerationJob.objects.count() == 1
