@@ -140,8 +140,8 @@ def read_instruction(request: HttpRequest, code: uuid.UUID) -> None:
     if reader is None:
         raise Conflict("Choose a model.")
     reading = plan_reading(
-        scenario=scenario.slug,
-        endpoint=reader.endpoint.label,
+        scenario=scenario,
+        endpoint=reader.endpoint,
         model=reader.model,
         actor=user_of(request),
     )
