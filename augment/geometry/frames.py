@@ -104,6 +104,11 @@ def overlap(first: Box, second: Box) -> Overlap:
 
     The depth is the smallest overlap of their shadows on the four side directions.
     """
+    reach_m = math.hypot(first.length_m, first.width_m) + math.hypot(
+        second.length_m, second.width_m
+    )
+    if math.dist((first.pose.x_m, first.pose.y_m), (second.pose.x_m, second.pose.y_m)) > reach_m:
+        return APART
     one, other = first.corners_m, second.corners_m
     sides = np.concatenate([np.diff(one[:3], axis=0), np.diff(other[:3], axis=0)])
     axes = sides / np.hypot(sides[:, 0], sides[:, 1])[:, None]
@@ -112,7 +117,9 @@ def overlap(first: Box, second: Box) -> Overlap:
     depth_m = float(ends.min())
     if depth_m <= 0.0:
         return APART
-    area_m2 = float(shapely.Polygon(one).intersection(shapely.Polygon(other)).area)
+    # Without a grid, sides that coincide but for rounding can leave nothing of what is shared.
+    shared = shapely.intersection(shapely.Polygon(one), shapely.Polygon(other), grid_size=1e-9)
+    area_m2 = float(shared.area)
     return Overlap(
         depth_m=depth_m,
         area_m2=area_m2,

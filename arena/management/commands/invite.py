@@ -22,8 +22,8 @@ class Command(TerminalCommand):
         "study": {"help": "name or code"},
         "--experts": {"nargs": "+", "metavar": "USERNAME", "help": "all by default"},
         "--address": {
-            "help": "of the pages, as experts reach it; by default that of the running "
-            f"server, else {Web().address}"
+            "default": Web().address,
+            "help": "of the pages, as experts reach it; default: %(default)s",
         },
     }
 

@@ -22,7 +22,7 @@ from arena.results.exports.tables import EARLY_LOOK, for_experts, leaderboard_ta
 from arena.results.exports.votes import VOTE_FORMATS, unrated_votes, vote_table
 from arena.results.exports.writers import FORMATS, bundle
 from arena.results.pages.rating_form import RatingForm, rate_or_send
-from arena.results.pages.tabs import TABS, both_versions, show_adjustment
+from arena.results.pages.tabs import TABS, show_adjustment
 from arena.results.queries.access import STAFF as STAFF_ROLES
 from arena.results.queries.access import (
     ResultsAccess,
@@ -79,9 +79,7 @@ def results_page(request: HttpRequest, code: uuid.UUID, tab: str = "table") -> H
         context["export"] = export_place(study, user) if is_imported(study) else None
     if snapshot is not None:
         table = leaderboard_table(snapshot)
-        if is_staff:
-            context["own_votes"] = both_versions(snapshot.results.own_votes, table)
-        else:
+        if not is_staff:
             table = for_experts(table)
         settled = count_settled(snapshot)
         context |= {
@@ -89,7 +87,7 @@ def results_page(request: HttpRequest, code: uuid.UUID, tab: str = "table") -> H
             "early_look": EARLY_LOOK,
             "settled": settled,
             "cast": snapshot.votes_counted - settled,
-            "adjusted": show_adjustment(snapshot, table),
+            "adjusted": show_adjustment(snapshot),
             **TABS[tab].fill(snapshot, table),
         }
     return render(request, "results/page.html", context)

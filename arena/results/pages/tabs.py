@@ -2,22 +2,13 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from statistics import median_high
 from typing import Any
 
 from arena.jobs.pages.measures import driving
 from arena.models import Snapshot
 from arena.models.votes import AIDS
 from arena.people.queries import natural_order
-from arena.rating.lines import rating_text
-from arena.rating.snapshot_document import (
-    Adjustment,
-    BothRanks,
-    OwnVotes,
-    PairRecord,
-    PanelRater,
-    TypeStanding,
-)
+from arena.rating.snapshot_document import PairRecord, PanelRater, TypeStanding
 from arena.results.exports.charts import FEW, heat_map
 from arena.results.exports.plots import plots
 from arena.results.exports.tables import ON_PAGE, LeaderboardTable, Row
@@ -73,31 +64,12 @@ class Tab:
 
 def standings(snapshot: Snapshot, table: LeaderboardTable) -> Context:
     """The table with its intervals, and the lines that say how far it can be trusted."""
-    trust, claims = snapshot.results.trust, snapshot.results.claims
-    rows = _by_slug(table)
+    trust = snapshot.results.trust
     moves = [line.moves for line in trust.raters if line.moves is not None]
-    widths = [(upper - lower) / 2 for lower, upper in claims.independent.values()]
-    effect = round(claims.design_effect or 0.0, 1)
-    check = snapshot.results.board.check
-    gaps = [
-        max(abs(check[row.slug][0] - row.lower), abs(check[row.slug][1] - row.upper))
-        for row in table.rows
-        if row.slug in check and row.lower is not None and row.upper is not None
-    ]
     return {
         "columns": ON_PAGE,
         "has_bounds": any(row.has_bound for row in table.rows),
         "largest_move": max(moves, default=None),
-        "removal": trust.removal,
-        "rival": trust.removal and rows[trust.removal.rival].name,
-        "disagreements": [
-            {"name": rows[line.slug].name, "place": place, "online": line.place}
-            for place, line in enumerate(trust.elo_order or (), start=1)
-            if line.place != place
-        ],
-        "independent": median_high(widths) if widths else None,
-        "design_effect": effect if effect > 1.0 else None,
-        "check": round(max(gaps)) if gaps else None,
         "ties": round((trust.tie_share or 0.0) * snapshot.votes_counted),
         "all_tied": trust.tie_share == 1.0,
         "has_places": any(row.rank_best != row.rank_worst for row in table.rows),
@@ -160,22 +132,16 @@ def types(snapshot: Snapshot, table: LeaderboardTable) -> Context:
 
 def raters(snapshot: Snapshot, table: LeaderboardTable) -> Context:
     """Agreement, repeats, sides, and the panel of experts."""
-    trust, own_votes = snapshot.results.trust, snapshot.results.own_votes
+    trust = snapshot.results.trust
     lines = [line for line in trust.raters if line.judge != AUTOMATIC]
     used = {name for line in lines for name, _ in line.aids}
     aids = [name for name in AIDS if name in used]
     authors = {judge for judge, _ in Filters.of_document(snapshot.filters).authors}
-    own = own_votes.by_judge if own_votes else {}
     return {
         "trust": trust,
         "all_tied": trust.tie_share == 1.0,
         "panel": [
-            {
-                "rater": line,
-                "is_author": line.judge in authors,
-                "own_votes": own.get(line.judge, 0),
-                **_counts(line, aids),
-            }
+            {"rater": line, "is_author": line.judge in authors, **_counts(line, aids)}
             for line in sorted(lines, key=lambda line: natural_order(line.name))
         ],
         "aids": aids,
@@ -185,11 +151,10 @@ def raters(snapshot: Snapshot, table: LeaderboardTable) -> Context:
 
 
 def coverage(snapshot: Snapshot, table: LeaderboardTable) -> Context:
-    """Votes against the plan, widths against votes, and how many votes narrower ones need."""
+    """Votes against the plan, and widths against votes."""
     plot = plots(snapshot, table).get("width")
     points = plot.points if plot else ()
     return {
-        "claims": snapshot.results.claims,
         "points": [(point, table.rows[point.number - 1]) for point in points],
         "heat": heat_map(snapshot.results.pairs, table.rows),
         "planned": sum(pair.planned or 0 for pair in snapshot.results.pairs),
@@ -260,40 +225,15 @@ TABS = {
 }
 
 
-def both_versions(kept: OwnVotes | Adjustment | None, table: LeaderboardTable) -> Context | None:
-    """A table with and without own votes, or adjusted and as voted; None without the other one."""
+def show_adjustment(snapshot: Snapshot) -> list[Context] | None:
+    """What the covariates are worth; None where nothing was to be adjusted for."""
+    kept = snapshot.results.adjustment
     if kept is None:
         return None
-    lines, rows = {line.slug: line for line in kept.lines}, _by_slug(table)
-    return {
-        "kept": kept,
-        "lines": [
-            {
-                "kept": lines[row.slug],
-                "name": row.name,
-                "simulated": row.simulated,
-                "elo_with": rating_text(lines[row.slug].rating_with),
-                "elo_without": rating_text(lines[row.slug].rating_without),
-                "moves": _moves(lines[row.slug]),
-            }
-            for row in table.rows
-        ],
-        "places": kept.largest and kept.largest.places,
-        "who": [rows[slug].name for slug in kept.largest.slugs] if kept.largest else [],
-    }
-
-
-def show_adjustment(snapshot: Snapshot, table: LeaderboardTable) -> Context | None:
-    """Effects and both versions of the table; None where nothing was to be adjusted for."""
-    kept = snapshot.results.adjustment
-    versions = both_versions(kept, table)
-    if kept is None or versions is None:
-        return None
-    labels = COVARIATE_LABELS
-    effects = [
-        {"label": labels.get(effect.name, effect.name), "kept": effect} for effect in kept.effects
+    return [
+        {"label": COVARIATE_LABELS.get(effect.name, effect.name), "kept": effect}
+        for effect in kept.effects
     ]
-    return versions | {"effects": effects}
 
 
 # --- Private -----------------------------------------------------------------------------------
@@ -301,11 +241,6 @@ def show_adjustment(snapshot: Snapshot, table: LeaderboardTable) -> Context | No
 
 def _by_slug(table: LeaderboardTable) -> Mapping[str, Row]:
     return {row.slug: row for row in table.rows}
-
-
-def _moves(line: BothRanks) -> bool:
-    ranks = (line.rank_with, line.rank_without)
-    return None not in ranks and ranks[0] != ranks[1]
 
 
 def _row_of_type(line: TypeStanding, row: Row) -> Row:
