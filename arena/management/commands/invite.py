@@ -5,7 +5,7 @@ from typing import Any
 from django.urls import reverse
 
 from arena.people.links import LINK_LIVES, invite
-from arena.serving.stack import Web, served_address
+from arena.serving.stack import Web
 from arena.studies.queries import expert_lines, expert_named, study_named
 from augment.services.terminal import TerminalCommand
 
@@ -39,7 +39,7 @@ class Command(TerminalCommand):
                 if line.may_be_invited and not line.has_live_link
             ]
         made = [(expert, invite(study=study, expert=expert)) for expert in chosen]
-        address = options["address"] or served_address() or Web().address
+        address = options["address"]
         for expert, fresh in made:
             path = reverse("invitation", args=[fresh.token])
             name = f"{expert.username} ({expert.person.pseudonym})"
