@@ -25,8 +25,14 @@ from augment.services.judging.findings import check_augmentation
 from augment.services.running.calls import IMAGES
 from augment.services.running.transcript_records import totals_of, transcript_of, tries_of
 from augment.services.scenarios.pictures import SceneView, reference_picture, scene_picture
-from augment.services.scenarios.prompts import Preview, list_choices, preview_prompt
-from augment.tasks import enqueue_marks, enqueue_prompts
+from augment.services.scenarios.prompts import (
+    Shown,
+    list_recipes,
+    preview_prompt,
+    prompt_document,
+    prompt_version,
+)
+from augment.tasks import enqueue_marks
 
 
 @allow_only(*STAFF)
@@ -116,16 +122,13 @@ def picture(request: HttpRequest, kind: str, code: uuid.UUID) -> HttpResponseBas
 def prompts_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Show the exact messages of a variant's role, with about how many tokens they are."""
     scenario, contestant = _scenario(code), _contestant(request)
-    problem, preview = "", Preview(shown=None)
+    problem, shown = "", None
     try:
-        preview = _preview(request, scenario)
+        shown = _preview(request, scenario)
     except AugmentError as error:
         problem = str(error)
-    look = looks_again(request, waits=preview.shown is None and not problem)
-    if look == 1:
-        send_later(request, enqueue_prompts, scenario.pk)
     role, variant = request.GET.get("role", "modifier"), request.GET.get("variant", "otm")
-    choices = list_choices()
+    choices = list_recipes()
     context = {
         "contestants": asking_contestants(),
         "contestant": contestant,
@@ -135,11 +138,11 @@ def prompts_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         "chosen": next((one for one in choices if one.slug == variant), None),
         "role": role,
         "is_native": "native" in request.GET,
-        "preview": preview,
-        "size": len(_written(preview).encode()),
+        "shown": shown,
+        "version": prompt_version(),
+        "size": 0 if shown is None else len(_written(shown).encode()),
         "problem": problem,
         "query": request.GET.urlencode(),
-        "look": look,
     }
     return render(request, "scenarios/prompts.html", context)
 
@@ -165,29 +168,28 @@ def prompt_file(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Answer with messages and tools as they would be sent, as JSON."""
     scenario = _scenario(code)
     try:
-        preview = _preview(request, scenario)
+        shown = _preview(request, scenario)
     except UnknownName as error:
         raise Http404 from error
     except AugmentError as error:
         return HttpResponse(str(error), status=422, content_type="text/plain; charset=utf-8")
-    if preview.shown is None:
-        raise Http404
-    answer = HttpResponse(_written(preview), content_type="application/json")
+    answer = HttpResponse(_written(shown), content_type="application/json")
     answer["Content-Disposition"] = f'attachment; filename="prompt-{scenario.slug}.json"'
     return answer
 
 
 @allow_only(*STAFF)
 @require_safe
-def prompt_image(request: HttpRequest, code: uuid.UUID, number: int) -> HttpResponseBase:
+def prompt_image(request: HttpRequest, code: uuid.UUID, number: int) -> HttpResponse:
     """Answer with a picture that the viewer of a variant would be shown."""
     try:
-        images = _preview(request, _scenario(code)).images
+        shown = _preview(request, _scenario(code))
     except AugmentError as error:
         raise Http404 from error
+    images = shown.messages[-1].images
     if number >= len(images):
         raise Http404
-    return picture_response(images[number])
+    return HttpResponse(images[number], content_type="image/png")
 
 
 def _scenario(code: uuid.UUID) -> Scenario:
@@ -213,7 +215,7 @@ def _how(contestant: Contestant | None, role: str) -> dict[str, Any]:
         return {}
 
 
-def _preview(request: HttpRequest, scenario: Scenario) -> Preview:
+def _preview(request: HttpRequest, scenario: Scenario) -> Shown:
     contestant, role = _contestant(request), request.GET.get("role", "modifier")
     if contestant is not None:
         return preview_contestant(scenario, contestant, role=role)
@@ -225,5 +227,5 @@ def _preview(request: HttpRequest, scenario: Scenario) -> Preview:
     )
 
 
-def _written(preview: Preview) -> str:
-    return json.dumps(preview.to_document(), ensure_ascii=False)
+def _written(shown: Shown) -> str:
+    return json.dumps(prompt_document(shown), ensure_ascii=False)
