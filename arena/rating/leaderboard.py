@@ -37,15 +37,13 @@ from arena.rating.rules import (
     MOST_CONTESTANTS,
     Intervals,
     Method,
-    Order,
-    Report,
     Rules,
     TooManyContestants,
     Unit,
     default_intervals,
 )
 
-__all__ = ["Intervals", "Leaderboard", "Line", "Method", "Order", "Unit", "rate"]
+__all__ = ["Intervals", "Leaderboard", "Line", "Method", "Unit", "rate"]
 
 ROUNDS = 10_000
 PAPER_ROUNDS = 1000
@@ -124,9 +122,6 @@ def rate(
     unit: Unit | None = None,
     intervals: Intervals | None = None,
     seed: int = 0,
-    k: float = models.K,
-    order: Order = Order.SHUFFLED,
-    report: Report | None = None,
 ) -> Leaderboard:
     """Rate all contestants that have votes, with 95 % intervals on the Elo scale, mean 1000.
 
@@ -145,9 +140,6 @@ def rate(
             no other.
         intervals: In closed form by default, but resampled where the unit is single votes.
         seed: Of its draws; the same votes and seed give the same table.
-        k: Points at stake in a vote, online Elo only.
-        order: Online Elo's point: the median over shuffled rounds, or the recorded order.
-        report: Is told how many rounds are done.
 
     Raises:
         TooManyContestants: More than 2000.
@@ -165,7 +157,7 @@ def rate(
         if method is not Method.BRADLEY_TERRY or intervals is not Intervals.CLOSED_FORM:
             raise ValueError("covariates need Bradley-Terry with intervals in closed form")
     intervals = intervals or default_intervals(method, unit)
-    return _rate(votes, Rules(method, unit, intervals, rounds, seed, k, order, report))
+    return _rate(votes, Rules(method, unit, intervals, rounds, seed))
 
 
 def _rate(votes: Comparisons, rules: Rules) -> Leaderboard:

@@ -20,7 +20,7 @@ from arena.rating.bootstrap import (
 from arena.rating.chains import Status
 from arena.rating.comparisons import BoolArray, Comparisons, FloatArray, IntArray, count_pairs
 from arena.rating.logistic import Coefficient, coefficients_of, fit_with_columns
-from arena.rating.models import Meetings, fit, replay_elo, resample_elo, to_elo
+from arena.rating.models import Meetings, fit, resample_elo, to_elo
 from arena.rating.ranking import (
     Separation,
     above_by_bounds,
@@ -29,7 +29,7 @@ from arena.rating.ranking import (
     rank_sets,
     shown_ranks,
 )
-from arena.rating.rules import Intervals, Method, Order, Rules, Unit
+from arena.rating.rules import Intervals, Method, Rules, Unit
 from arena.rating.sandwich import NORMAL, Pulls, factor, pulls_of_model, spread_of
 
 _SAME = 1e-6
@@ -157,10 +157,9 @@ class _Fitted:
 def _fit_votes(votes: Comparisons, rules: Rules) -> _Fitted | None:
     """None where the votes determine no ratings in Davidson's model."""
     if rules.method is Method.ELO:
-        samples = resample_elo(votes, rounds=rules.rounds, seed=rules.seed, k=rules.k)
-        is_recorded = rules.order is Order.RECORDED
-        rating = replay_elo(votes, k=rules.k) if is_recorded else np.median(samples, axis=1)
-        return _Fitted(rating=rating, rounds=RatedRounds.of_values(samples))
+        samples = resample_elo(votes, rounds=rules.rounds, seed=rules.seed)
+        rounds = RatedRounds.of_values(samples)
+        return _Fitted(rating=np.median(samples, axis=1), rounds=rounds)
     counts = count_pairs(votes)
     met = Meetings(len(votes.names), counts)
     ties = counts.outcomes[:, 1].sum(keepdims=True).astype(np.float64)
@@ -200,13 +199,9 @@ def _fit_votes(votes: Comparisons, rules: Rules) -> _Fitted | None:
         number = rounds_to_draw(votes, counts, number)
     blocks = resample(votes, counts, unit=rules.unit, rounds=number, seed=rules.seed)
 
-    def report(done: int) -> None:
-        if rules.report is not None:
-            rules.report(done, number)
-
     return _Fitted(
         rating=rating,
-        rounds=rate_rounds(votes, counts, blocks, refit, report=report),
+        rounds=rate_rounds(votes, counts, blocks, refit),
         pulls=pulls,
         tie_strength=tie_strength,
         coefficients=coefficients,
