@@ -1,6 +1,7 @@
 """The page that shows what a variant would send, held against what the wire then carries."""
 
 import html
+import json
 import re
 from collections.abc import Iterator
 
@@ -42,7 +43,7 @@ def test_the_page_shows_what_the_wire_then_carries(
     preview = preview_prompt(
         row.scenario, variant=variant, role="modifier", native_tools=bool(options)
     )
-    assert preview.to_document().get("tools") == sent.get("tools")
+    assert [json.loads(tool) for tool in preview.tools] == sent.get("tools", [])
     page = analyst.get(reverse("prompts", args=[row.scenario.code]), asked).content.decode()
     shown = [
         html.unescape(one) for one in re.findall(r"<pre data-message[^>]*>(.*?)</pre>", page, re.S)
@@ -58,6 +59,5 @@ def test_a_viewer_s_picture_is_shown_and_nobody_is_asked(analyst: Client) -> Non
     shown = analyst.get(url, asked).content.decode()
     assert "In which lane does each blue object stand?" in html.unescape(shown)
     picture = analyst.get(reverse("prompt-image", args=[here.code, 0]), asked)
-    png = b"".join(picture)
-    assert png.startswith(b"\x89PNG")
+    assert picture.content.startswith(b"\x89PNG")
     assert not ModelCall.objects.exists()

@@ -21,7 +21,7 @@ from augment.services.judging.findings import check_augmentation
 from augment.services.running.calls import IMAGES
 from augment.services.running.transcript_records import totals_of, transcript_of, tries_of
 from augment.services.scenarios.pictures import SceneView, reference_picture, scene_picture
-from augment.services.scenarios.prompts import Shown, list_recipes, preview_prompt
+from augment.services.scenarios.prompts import Shown, list_recipes, preview_prompt, prompt_version
 from augment.tasks import enqueue_marks
 
 
@@ -123,7 +123,8 @@ def prompts_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         "chosen": next((one for one in choices if one.slug == variant), None),
         "role": role,
         "is_native": "native" in request.GET,
-        "preview": preview,
+        "shown": shown,
+        "version": prompt_version(),
         "problem": problem,
         "query": request.GET.urlencode(),
     }
@@ -131,7 +132,7 @@ def prompts_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
 
 
 @page_for(*STAFF)
-def prompt_image(request: HttpRequest, code: uuid.UUID, number: int) -> HttpResponseBase:
+def prompt_image(request: HttpRequest, code: uuid.UUID, number: int) -> HttpResponse:
     """Answer with a picture that the viewer of a variant would be shown."""
     try:
         shown = _preview(request, _scenario(code))

@@ -1,8 +1,5 @@
 """What a variant would send for a stored scenario. Nobody is asked."""
 
-import json
-from typing import Any
-
 from django.db import connection
 
 from augment.errors import Conflict, UnknownName
@@ -62,12 +59,6 @@ def preview_prompt(
         reference_of(scenario) or Modification(),
         native_tools=native_tools,
     )
-
-
-def prompt_document(shown: Shown) -> dict[str, Any]:
-    """Return messages and tools as the body of the request has them."""
-    document: dict[str, Any] = {"messages": [one.to_document() for one in shown.messages]}
-    return document | ({"tools": list(map(json.loads, shown.tools))} if shown.tools else {})
 
 
 class StoredIntents:
