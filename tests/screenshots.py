@@ -112,7 +112,6 @@ def _shots() -> list[Shot]:
         shots.append(Shot(name="drive", who="admin", path=f"/drives/{drive.code}/"))
     if vote is not None:
         shots.append(Shot(name="results-vote", who="admin", path=f"{results}votes/{vote.key}/"))
-    shots.append(Shot(name="api-reference", who="admin", path="/api/v1/reference/"))
     return shots
 
 

@@ -37,11 +37,9 @@ from arena.site.access import (
     BACKEND,
     EXPERT,
     GONE,
-    KEPT,
     STAFF,
     allow_only,
     keep_secret,
-    read_form,
     user_of,
 )
 from arena.site.acts import refusals_in, refusals_told
@@ -105,17 +103,12 @@ class SignIn(LoginView):
     redirect_authenticated_user = True
 
     def get_context_data(self, **more: Any) -> dict[str, Any]:
-        """Add whether the first admin is still to be made, and what was typed elsewhere."""
-        more |= {KEPT: self.request.POST.get(KEPT, ""), "is_empty": not has_admin()}
-        return super().get_context_data(**more)
+        """Add whether the first admin is still to be made."""
+        return super().get_context_data(is_empty=not has_admin(), **more)
 
     def form_valid(self, form: AuthenticationForm) -> HttpResponse:
-        """Sign in; what was typed before the session expired is shown to be sent again."""
-        answer = super().form_valid(form)
-        if fields := read_form(self.request.POST.get(KEPT, "")):
-            context = {"fields": fields, "address": self.get_success_url()}
-            answer = render(self.request, "kept_form.html", context)
-        return with_own_language(answer, form.get_user())
+        """Sign in."""
+        return with_own_language(super().form_valid(form), form.get_user())
 
 
 def with_own_language(answer: HttpResponse, user: User) -> HttpResponse:

@@ -16,13 +16,7 @@ from augment.baselines.placed_people import place_cones, place_walkers
 from augment.baselines.placed_vehicles import count_arrangements, place_crash, place_vehicles
 from augment.baselines.placing_ground import PlacingGround
 from augment.checks import Ground, Severity
-from augment.checks.lanes_across import (
-    LanesAcross,
-    find_picked,
-    list_absent,
-    resolve_anchors,
-    resolve_landmarks,
-)
+from augment.checks.lanes_across import LanesAcross, find_picked, list_absent, resolve_spots
 from augment.checks.registry import check_against_intent
 from augment.errors import CannotPlace
 from augment.geometry.frames import overlap
@@ -86,7 +80,7 @@ def place(scene: Scene, intent: Intent | None, *, seed: int = 0) -> Placement:
     absent = list_absent(intent, lanes)
     if absent:
         raise CannotPlace(f"Not in this scene: {', '.join(absent)}.")
-    resolved = resolve_landmarks(intent, lanes)
+    resolved = resolve_spots(intent, lanes)
     gone = [agent.id for pick in intent.removals for agent in find_picked(lanes, pick)]
     changes = Modification(removed=tuple(dict.fromkeys(gone)))
     sentences = [f"{name} is removed." for name in changes.removed]
@@ -99,7 +93,7 @@ def place(scene: Scene, intent: Intent | None, *, seed: int = 0) -> Placement:
         changes = replace(changes, moved=(*changes.moved, replace(moved[0], **same)))
         sentences.append(f"{agent.id} is moved. {sentence}")
     fitting = _Fitting(apply(scene, changes), intent.route, rng)
-    for added in resolve_anchors(resolved).requests:
+    for added in resolved.requests:
         agents, sentence = fitting.fit(added)
         fitting.added += agents
         sentences.append(sentence)

@@ -15,12 +15,15 @@ from tests.variants.playing import GOOD
 pytestmark = [pytest.mark.redis, pytest.mark.slow, pytest.mark.timeout(600)]
 
 SEED = """
+from augment.models import Endpoint
 from augment.services.endpoints import contestants
-from augment.services.endpoints.known_endpoints import ensure_endpoint
+from augment.services.endpoints.contestants import ContestantRequest
 from tests.jobs.rows import add_scenario
 contestants.ensure_builtin()
-ensure_endpoint(label="waiting", base_url="{base_url}", is_simulated=True)
-contestants.add_contestant(slug="waiting", variant="otm", endpoint="waiting", model="waits")
+Endpoint.objects.create(label="waiting", base_url="{base_url}", is_simulated=True)
+contestants.add_contestant(
+    ContestantRequest(slug="waiting", variant="otm", endpoint="waiting", model="waits")
+)
 for number in range(1, 4):
     add_scenario(f"street-{{number}}")
 """

@@ -7,7 +7,7 @@ from django.utils import timezone
 
 from arena.models import Study
 from arena.people.links import LINK_LIVES, invite
-from arena.serving.stack import Web, served_address
+from arena.serving.stack import Web
 from arena.studies.queries import ExpertLine, expert_lines, study_named
 from augment.errors import UnknownName
 from augment.services.terminal import TerminalCommand
@@ -25,8 +25,8 @@ class Command(TerminalCommand):
         "study": {"help": "name or code"},
         "--experts": {"nargs": "+", "metavar": "USERNAME", "help": "all by default"},
         "--address": {
-            "help": "of the pages, as experts reach it; by default that of the running "
-            f"server, else {Web().address}"
+            "default": Web().address,
+            "help": "of the pages, as experts reach it; default: %(default)s",
         },
     }
 
@@ -37,11 +37,10 @@ class Command(TerminalCommand):
             (line, invite(study=study, expert=line.tally.expert))
             for line in _chosen(study, options["experts"])
         ]
-        address = options["address"] or served_address() or Web().address
         for line, fresh in made:
             path = reverse("invitation", args=[fresh.token])
             name = f"{line.tally.expert.get_username()} ({line.tally.pseudonym})"
-            self.stdout.write(f"{name}: {address.rstrip('/')}{path}")
+            self.stdout.write(f"{name}: {options['address'].rstrip('/')}{path}")
         if made:
             self.stdout.write(f"Each works for {LINK_LIVES.days} days and is not shown again.")
         else:

@@ -226,6 +226,7 @@ def drives_of_pair(*, user: User, code: UUID) -> dict[str, dict[str, Any]] | Non
 
 _Point = list[float]
 
+_RING_STEP_M = 10
 _MARGIN_PX = 24.0
 """Labels stay so far within the picture."""
 
@@ -253,18 +254,17 @@ def measures_of_pair(*, user: User, code: UUID) -> dict[str, Any] | None:
         return None
     view = view_shown(matchup)
     reach_m = math.hypot(view["width"], view["height"]) / view["px_per_m"]
-    measures = measures_of(matchup.scenario, reach_m=reach_m)
     lines = []
-    for line in measures.lines:
+    for line in measures_of(matchup.scenario):
         points = [_pixels(point, view) for point in line.points_m]
         if _is_seen(points, view):
             label = {"label": _label(line), **_label_place(points, view)}
             lines.append({"points": points, **label})
     rings = []
-    for ring in measures.rings:
-        centre, radius = _pixels(ring.centre_m, view), ring.radius_m * view["px_per_m"]
+    for radius_m in range(_RING_STEP_M, int(reach_m) + 1, _RING_STEP_M):
+        centre, radius = view["ego_px"], radius_m * view["px_per_m"]
         if place := _first_within(_around(centre, radius), view):
-            label = {"label": f"{ring.radius_m:.4g} m", "text": place, "anchor": "middle"}
+            label = {"label": f"{radius_m} m", "text": place, "anchor": "middle"}
             rings.append({"at": centre, "r": round(radius, 1), **label})
     return {"lines": lines, "rings": rings}
 

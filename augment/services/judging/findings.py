@@ -15,7 +15,7 @@ from django.core.files.storage import default_storage
 
 from augment.checks import Finding, FindingKind, Ground, Severity
 from augment.checks.finding import FaultClass
-from augment.checks.measures import LaneEdges, MeasureLine, Measures, find_measures, lane_edges_at
+from augment.checks.measures import LaneEdges, MeasureLine, find_measures, lane_edges_at
 from augment.checks.registry import check_against_intent
 from augment.errors import InvalidDocument, InvalidModification
 from augment.metrics.fault_guess import first_guess
@@ -197,17 +197,15 @@ def draw_marked(*, augmentation_pk: int) -> str:
     return name
 
 
-def measures_of(scenario: Scenario, *, reach_m: float) -> Measures:
-    """Return the lines and rings that help to measure a scenario's pictures, in their frame.
+def measures_of(scenario: Scenario) -> tuple[MeasureLine, ...]:
+    """Return the lines that help to measure a scenario's pictures, in their frame.
 
-    Args:
-        scenario: With its scene; no augmentation of it is looked at.
-        reach_m: The radius up to which rings are drawn.
+    No augmentation of the scenario is looked at.
 
     Raises:
         InvalidDocument: The stored scene or intent can't be read.
     """
-    return find_measures(_ground_of(scenario), intent_of(scenario), reach_m=reach_m)
+    return find_measures(_ground_of(scenario), intent_of(scenario))
 
 
 def lane_edges_of(scenario: Scenario, x_m: float, y_m: float) -> LaneEdges | None:

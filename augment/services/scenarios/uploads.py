@@ -108,16 +108,6 @@ def remove_upload(row: SceneUpload, actor: User | None = None) -> None:
         transaction.on_commit(partial(default_storage.delete, name))
 
 
-def read_again(row: SceneUpload) -> None:
-    """Let a failed upload wait once more.
-
-    Raises:
-        Conflict: It did not fail.
-    """
-    if not row.wait_again():
-        raise Conflict(f"“{row.name}” did not fail.")
-
-
 @contextmanager
 def open_upload(row: SceneUpload) -> Iterator[UntrustedInput]:
     """Open the file on this machine; it is gone afterwards.
