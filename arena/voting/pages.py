@@ -263,7 +263,7 @@ def _answer(request: HttpRequest, study: Study, expert: User) -> HttpResponse:
 def _reasons(pair: PracticePair) -> list[str]:
     """Which objects overlap in the broken picture, the worst first: it heaps all on the ego."""
     checked = check_augmentation(pair.broken)
-    faults = [line.finding for line in checked.faults] if checked else []
+    faults = checked.faults if checked else []
     overlaps = [one for one in faults if one.kind is FindingKind.OVERLAP]
     return [_overlap_in_words(one) for one in overlaps[:MOST_REASONS]]
 
