@@ -148,7 +148,7 @@ def test_a_correction_goes_the_whole_way_and_leaves_the_original() -> None:
     assert made.image != first.image
     checked, measured = check_augmentation(made), of_augmentation(made)
     assert checked is not None
-    assert checked.lines
+    assert checked.findings
     assert measured.displacement is not None
     assert len(measured.displacement.matches) == 1
     assert Augmentation.objects.filter(pk=first.pk).values().get() == before

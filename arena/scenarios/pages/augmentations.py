@@ -21,8 +21,8 @@ from augment.services.judging.findings import check_augmentation
 from augment.services.running.calls import IMAGES
 from augment.services.running.transcript_records import totals_of, transcript_of, tries_of
 from augment.services.scenarios.pictures import SceneView, reference_picture, scene_picture
-from augment.services.scenarios.prompts import Preview, list_choices, preview_prompt
-from augment.tasks import enqueue_marks, enqueue_prompts
+from augment.services.scenarios.prompts import Shown, list_recipes, preview_prompt, prompt_version
+from augment.tasks import enqueue_marks
 
 
 @page_for(*STAFF)
@@ -107,16 +107,13 @@ def picture(request: HttpRequest, kind: str, code: uuid.UUID) -> HttpResponseBas
 def prompts_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Show the exact messages of a variant's role, with about how many tokens they are."""
     scenario, contestant = _scenario(code), _contestant(request)
-    problem, preview = "", Preview(shown=None)
+    problem, shown = "", None
     try:
-        preview = _preview(request, scenario)
+        shown = _preview(request, scenario)
     except AugmentError as error:
         problem = str(error)
-    look = looks_again(request, waits=preview.shown is None and not problem)
-    if look == 1:
-        send_later(request, enqueue_prompts, scenario.pk)
     role, variant = request.GET.get("role", "modifier"), request.GET.get("variant", "otm")
-    choices = list_choices()
+    choices = list_recipes()
     context = {
         "contestants": asking_contestants(),
         "contestant": contestant,
@@ -126,24 +123,25 @@ def prompts_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         "chosen": next((one for one in choices if one.slug == variant), None),
         "role": role,
         "is_native": "native" in request.GET,
-        "preview": preview,
+        "shown": shown,
+        "version": prompt_version(),
         "problem": problem,
         "query": request.GET.urlencode(),
-        "look": look,
     }
     return render(request, "scenarios/prompts.html", context)
 
 
 @page_for(*STAFF)
-def prompt_image(request: HttpRequest, code: uuid.UUID, number: int) -> HttpResponseBase:
+def prompt_image(request: HttpRequest, code: uuid.UUID, number: int) -> HttpResponse:
     """Answer with a picture that the viewer of a variant would be shown."""
     try:
-        images = _preview(request, _scenario(code)).images
+        shown = _preview(request, _scenario(code))
     except AugmentError as error:
         raise Http404 from error
+    images = shown.messages[-1].images
     if number >= len(images):
         raise Http404
-    return picture_response(images[number])
+    return HttpResponse(images[number], content_type="image/png")
 
 
 def _scenario(code: uuid.UUID) -> Scenario:
@@ -169,7 +167,7 @@ def _how(contestant: Contestant | None, role: str) -> dict[str, Any]:
         return {}
 
 
-def _preview(request: HttpRequest, scenario: Scenario) -> Preview:
+def _preview(request: HttpRequest, scenario: Scenario) -> Shown:
     contestant, role = _contestant(request), request.GET.get("role", "modifier")
     if contestant is not None:
         return preview_contestant(scenario, contestant, role=role)

@@ -233,9 +233,9 @@ def check_change(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         {
             "severity": line.severity,
             "label": "measured" if line.severity == "fact" else line.severity,
-            "sentence": line.finding.sentence(),
+            "sentence": line.sentence(),
         }
-        for line in checked.lines
+        for line in checked.findings
     ]
     parts = ("modification", "problem", "is_against_intent")
     return JsonResponse({"lines": lines} | {name: getattr(checked, name) for name in parts})
