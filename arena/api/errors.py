@@ -28,7 +28,6 @@ STATUS: tuple[tuple[type[Exception], int, str], ...] = (
     (errors.StudyStillOpen, 403, "study_still_open"),
     (errors.AlreadyDecided, 409, "already_decided"),
     (errors.InvalidVote, 422, "invalid"),
-    (errors.InvalidPreference, 422, "invalid"),
     (errors.TooFast, 429, "too_fast"),
     (errors.DatabaseBusy, 503, "busy"),
     (Conflict, 409, "conflict"),
@@ -106,7 +105,7 @@ def _extras(exc: Exception) -> dict[str, Any]:
             return {"outcome": OUTCOME_LETTERS[exc.outcome]}
         case ValidationError():
             return {"fields": exc.detail}
-        case errors.InvalidVote() | errors.InvalidPreference():
+        case errors.InvalidVote():
             return {"fields": {name: [sentence] for name, sentence in exc.fields.items()}}
         case ParseError():
             return {"fields": {"body": [str(exc.detail)]}}
