@@ -5,6 +5,7 @@ The route is the recorded one where there is a recording, else the straightest. 
 
 import math
 from collections import Counter
+from collections.abc import Sequence
 from functools import cached_property
 
 import numpy as np
@@ -19,7 +20,7 @@ from augment.scene.ego_route import find_ego_lane
 from augment.scene.entities import AreaKind, LaneConnector, Scene, TrafficLight, TurnType
 from augment.scene.lane_graph import AnyLane, LaneGraph
 from augment.scene.recording import Recording
-from augment.simulation.path import Path, Region, dense
+from augment.simulation.path import SPACING_M, Path, Region, dense
 from augment.simulation.states import BoolArray, FloatArray, IntArray
 
 ROUTE_M = 600.0
@@ -167,12 +168,11 @@ class Road:
         )
         self.limits_mps = np.array([self._limit(way) for way in self.ways], dtype=np.float64)
         self._ends = not self.graph.successors(self.route[-1])
-        line = np.vstack([self.graph.lanes[name].centerline.points_m for name in self.route])
-        map_end_m = Path(dense(line)).length_m
+        on_map = self.path_over(self.route)
+        self.end_m, self.centreline = on_map.length_m, on_map
         if self._ends:
-            line = np.vstack([line, _straight_on(line)])  # repeats are dropped below
-        self.centreline = Path(dense(line))
-        self.end_m = map_end_m if self._ends else self.centreline.length_m
+            last = self.graph.lanes[self.route[-1]].centerline.points_m
+            self.centreline = self.path_over(self.route, run_out=_straight_on(last))
         ends = [self.graph.lanes[name].centerline.points_m[-1] for name in self.route]
         stations, _ = self.centreline.beside(np.array(ends))
         self._route_ends = np.maximum.accumulate(stations)
@@ -230,10 +230,22 @@ class Road:
         on_one = inside.all(axis=1).any(axis=-1) | both.all(axis=1).any(axis=-1)
         return np.asarray(on_one, dtype=np.bool_)
 
+    def path_over(
+        self,
+        names: Sequence[str],
+        *,
+        spacing_m: float = SPACING_M,
+        run_out: FloatArray | None = None,
+    ) -> Path:
+        """Return the centrelines of some ways in one, with a run-out (N, 2) at the end."""
+        lines = [self.graph.lanes[name].centerline.points_m for name in names]
+        lines += [] if run_out is None else [run_out]
+        return Path(dense(np.vstack(lines), spacing_m))
+
     def way_path(self, number: int) -> Path:
         """Return the centreline of one way, dense."""
         if number not in self._paths:
-            self._paths[number] = Path(dense(self.ways[number].centerline.points_m))
+            self._paths[number] = self.path_over([self.names[number]])
         return self._paths[number]
 
     @cached_property

@@ -145,11 +145,6 @@ class Objects:
         return boxes
 
 
-NOBODY = Objects(
-    ids=(), kinds=np.zeros(0, dtype=np.int64), boxes=np.zeros((0, 5)), speeds_mps=np.zeros(0)
-)
-
-
 def join_objects(parts: list[Objects]) -> Objects:
     """Return several rows of objects as one."""
     return Objects(

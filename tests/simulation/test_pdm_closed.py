@@ -255,7 +255,7 @@ def test_traffic_settles_at_the_steady_gap_and_its_sweep() -> None:
             boxes=np.array([[leader_m, 0.0, 0.0, 4.8, 2.0]]),
             speeds_mps=np.array([5.0]),
         )
-        drivers.step(join_objects([drivers.objects(), leader]))
+        drivers.step(np.zeros(5), join_objects([drivers.objects(), leader]))
         leader_m += 0.5
     gap = leader_m - 2.4 - (drivers.objects().boxes[0, 0] + 2.4)
     # 4.6.5: the gap is measured from the sweep's end, so it grows by the swept way.
