@@ -21,11 +21,12 @@ from augment.simulation.states import (
     EgoBody,
     FloatArray,
     IntArray,
+    Kind,
     Objects,
     corners,
     join_objects,
-    kinds_of,
     meet,
+    objects_of,
     radii,
 )
 
@@ -79,17 +80,6 @@ class DriveSetting:
             InvalidModification: The change does not fit the scene.
         """
         return apply(self.scene, self.modification)
-
-
-def objects_of(agents: Sequence[TrafficAgent]) -> Objects:
-    """Return agents as they stand in the scene."""
-    boxes = [(a.x_m, a.y_m, a.heading_rad, a.length_m, a.width_m) for a in agents]
-    return Objects(
-        ids=tuple(agent.id for agent in agents),
-        kinds=kinds_of([agent.type for agent in agents]),
-        boxes=np.array(boxes, dtype=np.float64).reshape(-1, 5),
-        speeds_mps=np.array([agent.speed_mps for agent in agents], dtype=np.float64),
-    )
 
 
 def lane_under(road: Road, agent: TrafficAgent) -> str | None:
@@ -364,7 +354,7 @@ class Traffic:
         ego_box = self._body.boxes(ego)
         me = Objects(
             ids=(EGO_ID,),
-            kinds=kinds_of([AgentType.VEHICLE]),
+            kinds=np.array([Kind.VEHICLE], dtype=np.int64),
             boxes=ego_box[None],
             speeds_mps=np.array([ego[SPEED]]),
         )

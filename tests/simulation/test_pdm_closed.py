@@ -22,8 +22,15 @@ from augment.simulation.planners import PLANNER_IDM, planner_named
 from augment.simulation.planning import Idm, Plan, Situation, foresee
 from augment.simulation.proposal_scores import ProposalScores, score_proposals
 from augment.simulation.road import Road
-from augment.simulation.states import FloatArray, Kind, Objects, join_objects, start_state
-from augment.simulation.traffic import TRAFFIC_IDM, DriveSetting, LaneDrivers, objects_of
+from augment.simulation.states import (
+    FloatArray,
+    Kind,
+    Objects,
+    join_objects,
+    objects_of,
+    start_state,
+)
+from augment.simulation.traffic import TRAFFIC_IDM, DriveSetting, LaneDrivers
 from tests.fixtures.shelf import entry, shown_scene
 from tests.house.source import ROOT
 from tests.scenes import cone, pedestrian, vehicle
