@@ -186,10 +186,6 @@ class _Fitting:
             if overlap(agent.box, other.box).depth_m > 0.0:
                 name = "the ego" if other is self._scene.ego else other.id or "what was added"
                 return f"{abs(distance_m):.1f} m from the ego it would stand in {name}.", 0
-        path_m = np.vstack([_path(agent) for agent in agents])
-        for setting in request.spot.settings:
-            if not self._place.fits(distance_m, path_m, setting):
-                return f"{abs(distance_m):.1f} m from the ego is not {setting}.", 0
         everyone = _numbered((*self.added, *agents), self._scene)
         before, own = everyone[: len(self.added)], everyone[len(self.added) :]
         ground = self._ground
@@ -227,12 +223,6 @@ def _shifts(wanted: Length) -> list[float]:
     tolerance_m = _SHIFT_ABOUT_M if wanted.is_approximate else _SHIFT_EXACT_M
     steps = range(1, int(tolerance_m / _SHIFT_STEP_M) + 1)
     return [0.0, *(sign * step * _SHIFT_STEP_M for step in steps for sign in (1.0, -1.0))]
-
-
-def _path(agent: TrafficAgent) -> np.typing.NDArray[np.float64]:
-    """Return where an agent stands or walks, a point (P, 2) about every half metre."""
-    start = np.array([agent.x_m, agent.y_m])
-    return np.linspace(start, agent.walk_to_m or start, 60 if agent.walk_to_m else 1)
 
 
 def _rounded(agent: TrafficAgent) -> TrafficAgent:

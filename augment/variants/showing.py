@@ -84,7 +84,6 @@ def shown_prompt(
     *,
     native_tools: bool = False,
     questions: Sequence[str] = EXAMPLE_QUESTIONS,
-    images: tuple[bytes, ...] | None = None,
 ) -> Shown:
     """Return what that role is asked first.
 
@@ -96,7 +95,6 @@ def shown_prompt(
         modification: What reviewers judge.
         native_tools: Whether the modifier calls natively.
         questions: What the viewer is asked.
-        images: What the viewer is shown, as `pictures` drew it before; None to draw it.
     """
     if role is ModelRole.MODIFIER:
         form = form_of(recipe, native_tools=native_tools)
@@ -106,8 +104,7 @@ def shown_prompt(
             tools=(json.dumps(fill.pose_tool().to_document()),) if native else (),
         )
     if role is ModelRole.VIEWER:
-        if images is None:
-            images = pictures(scene, modification, width_px=recipe.limits.picture_px)
+        images = pictures(scene, modification, width_px=recipe.limits.picture_px)
         return Shown(messages=fill.viewer_messages(questions, images))
     is_reviewer = role is ModelRole.REVIEWER
     messages = fill.reviewer_messages if is_reviewer else fill.engineer_messages

@@ -95,9 +95,7 @@ def _measure(request: HttpRequest, job: GenerationJob) -> dict[str, object]:
         "tool_calls": progress.tool_calls_by_contestant(job),
     }
     if job.samples > 1:
-        is_checked = request.GET.get("checks") == "1"
-        measured["repeats"] = repeatability(job, with_checks=is_checked)
-        measured["is_checked"] = is_checked
+        measured["repeats"] = repeatability(job)
     return measured
 
 
