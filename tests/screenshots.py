@@ -30,7 +30,7 @@ WIDTH, LEAST, MOST = 1280, 720, 1600
 QUALITIES = (50, 35, 20)
 LIGHT = 40_000
 """Bytes: the first quality that stays below, else the last one."""
-VOTES_HERE = ("vote", "vote-practice", "vote-help", "vote-skipped")
+VOTES_HERE = ("vote", "vote-practice", "vote-skipped")
 OPEN_HERE = ("study", "experts", "enrolment", "preregistration", "invite")
 
 

@@ -4,6 +4,7 @@ import uuid
 
 from django.urls import reverse
 
+from arena.models import Authorship
 from arena.people.links import invite, mark_author
 from arena.studies.services.drafts import keep_draft
 from arena.studies.services.experts import Complaint, report
@@ -79,7 +80,6 @@ def address(name: str, here: World) -> str:
         "rating-again": {"code": here.study.code, "rating": STRANGER},
         "matchup-image": {"token": shown.left_token},
         "replay": {"code": shown.code},
-        "measures": {"code": shown.code},
     }
     if name.startswith("endpoint") and name not in ("endpoints", "endpoint-new"):
         site, _ = Endpoint.objects.get_or_create(
@@ -107,8 +107,8 @@ def address(name: str, here: World) -> str:
         made = invite(study=here.study, expert=here.expert)
         arguments["revoke"] = {"code": made.invitation.code}
     if name == "author-back":
-        marked = mark_author(study=here.study, expert=here.expert, contestant="ann")
-        arguments["author-back"] = {"code": marked.code}
+        mark_author(study=here.study, expert=here.expert, contestant="ann")
+        arguments["author-back"] = {"code": Authorship.objects.get().code}
     own = (
         *("study", "preregistration", "experts", "invite", "author", "study-close"),
         *("study-cancel", "study-again"),

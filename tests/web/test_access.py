@@ -86,11 +86,9 @@ PAGES: dict[str, tuple[int, int, int]] = {
     "vote": (403, 403, 404),
     "report": (200, 403, 403),
     "vote-practice": (403, 403, 404),
-    "vote-help": (403, 403, 404),
     "vote-skipped": (403, 403, 404),
     "matchup-image": (200, 403, 404),
     "replay": (404, 403, 404),  # the study plays no drives
-    "measures": (200, 403, 404),
 }
 ACTIONS: dict[str, tuple[int, int, int]] = {
     "job-retry": (302, 403, 403),
@@ -136,7 +134,6 @@ ACTIONS: dict[str, tuple[int, int, int]] = {
     "enrolment-drop": (404, 403, 403),
     "theme": (302, 302, 302),
     "language": (302, 302, 302),
-    "vote-report": (403, 403, 404),
 }
 OPEN_TO_THE_WORLD = {
     "login",
