@@ -140,10 +140,7 @@ def read_instruction(request: HttpRequest, code: uuid.UUID) -> None:
     if reader is None:
         raise Conflict("Choose a model.")
     reading = plan_reading(
-        scenario=scenario.slug,
-        endpoint=reader.endpoint.label,
-        model=reader.model,
-        actor=user_of(request),
+        scenario=scenario, endpoint=reader.endpoint, model=reader.model, actor=user_of(request)
     )
     send_later(request, enqueue_reading, reading.pk)
     messages.success(request, f"{reader.model} reads it now.")
