@@ -63,7 +63,6 @@ def address(name: str, here: World) -> str:
         "set-intent": {"code": here.augmentation.scenario.code},
         "intent-edit": {"code": here.augmentation.scenario.code},
         "scenario-retired": {"code": here.augmentation.scenario.code},
-        "scene-retired": {"code": here.augmentation.scenario.base_scene.code},
         "scenario-edit": {"code": here.augmentation.scenario.code},
         "scenario-delete": {"code": here.augmentation.scenario.code},
         "scene-delete": {"code": here.augmentation.scenario.base_scene.code},

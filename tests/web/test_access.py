@@ -115,7 +115,6 @@ ACTIONS: dict[str, tuple[int, int, int]] = {
     "author-back": (302, 403, 403),
     "set-intent": (302, 302, 403),
     "scenario-retired": (302, 403, 403),
-    "scene-retired": (302, 403, 403),
     "scenario-delete": (200, 403, 403),
     "scene-delete": (200, 403, 403),
     "intent-read": (302, 403, 403),

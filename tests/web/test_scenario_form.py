@@ -86,7 +86,7 @@ def test_a_scenario_of_a_type_of_one_s_own_with_an_intent_by_fields(
             | {"i_distance_m": "20", "i_relation": "ahead"},
             "leaves open whether they stand or how fast they drive",
         ),
-        ({"type": "avoid_crashed_cars", "i_whole": "[" * 100_000}, "is no JSON"),
+        ({"type": "avoid_crashed_cars", "i_whole": "[" * 100_000}, "must be a JSON object"),
         ({"type": "jaywalking_pedestrian", "i_kind": "walk", "i_count": "x"}, "is no number"),
         ({"type": "jaywalking_pedestrian", "i_kind": "walk", "i_count": "inf"}, "is no number"),
         ({"type": "jaywalking_pedestrian", "i_kind": "walk", "i_count": "nan"}, "is no number"),
