@@ -152,7 +152,7 @@ def _init(xosc: Any, everyone: Sequence[Movement]) -> Any:
 def _maneuver(xosc: Any, cell: Cell, movement: Movement) -> Any | None:
     """What somebody does: come, follow a trajectory, go. None for who stands throughout."""
     agent, present = movement.agent, movement.is_present
-    waits = agent.walk_to_m is not None and cell.drive is None
+    waits = agent.walk_to_m is not None
     walk = _walk(agent) if waits else None
     if movement.stands and walk is None:
         return None
