@@ -77,14 +77,14 @@ class PlanningForm(forms.Form):
 
     def __init__(self, *args: Any, **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)
-        self.fields |= {one.name: form_field(one) for one in ESTIMATE_INPUTS}
+        self.fields |= {field.name: form_field(field) for field in ESTIMATE_INPUTS}
 
     def clean(self) -> dict[str, Any]:
         """Refuse more ties than contestants so far apart can have."""
         cleaned = super().clean() or {}
         if not self.errors:
-            possible = StudyEstimate(**cleaned).most_ties
-            if cleaned["ties"] >= possible:
-                problem = "Contestants so far apart can tie in less than {:.0f} % of votes."
-                self.add_error("ties", problem.format(possible))
+            try:
+                StudyEstimate(**cleaned).question()
+            except ValueError as error:
+                self.add_error("ties", str(error))
         return cleaned

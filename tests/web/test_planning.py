@@ -46,8 +46,7 @@ def test_an_open_study_gives_its_numbers_but_nothing_of_its_results() -> None:
     study = _voted()
     rate(study=study, early=True)
     known = known_of(study, people()["analyst"])
-    assert not known.from_results
-    assert known.values == {"contestants": 3, "experts": 2, "scenarios": 6}
+    assert known == {"contestants": 3, "experts": 2, "scenarios": 6}
 
 
 def test_the_command_says_the_same_numbers() -> None:
@@ -57,6 +56,6 @@ def test_the_command_says_the_same_numbers() -> None:
     said = out.getvalue()
     assert f"100 votes per expert, 900 in all, {expected.minutes:.0f} minutes each" in said
     assert "expert sd: 30 (guessed)" in said
-    assert "no number of votes reaches it" in said
+    assert "No number of votes reaches it" in said
     with pytest.raises(CommandError, match="gap: goes from 1 to 2000, not 0"):
         call_command("plan_study", "--gap", "0")

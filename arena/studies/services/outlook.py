@@ -1,14 +1,13 @@
 """What somebody asks for who estimates how many votes a study needs; shares in percent."""
 
 from dataclasses import dataclass
-from statistics import median
 from typing import Any
 
 from django.contrib.auth.models import User
 from django.db.models import Count, Max, Min
 
-from arena.models import Snapshot, Study, Vote
-from arena.rating.planning import Question, StudyDesign, estimate_effects
+from arena.models import Snapshot, Study
+from arena.rating.planning import Prospect, Question, StudyDesign, Wish, estimate_effects, foretell
 from arena.results.queries.access import ResultsAccess, latest_snapshot, results_access
 from arena.results.services.analysis import vote_arrays
 from arena.results.services.ratings import votes_of
@@ -45,11 +44,6 @@ class StudyEstimate:
     overlap: float = _number("Pairs that two experts judge", "%", 0, 80, 10)
     votes_per_expert: int | None = _whole("Votes per expert in mind", 1, 10_000, None)
 
-    @property
-    def most_ties(self) -> float:
-        """The percentage of ties that contestants so far apart can't reach."""
-        return 100 * self._design(ties=0.0).most_ties
-
     def question(self) -> Question:
         """Return what is to be foretold.
 
@@ -57,7 +51,16 @@ class StudyEstimate:
             ValueError: So many ties do not go together with so large a spread.
         """
         return Question(
-            design=self._design(ties=self.ties),
+            design=StudyDesign(
+                contestants=self.contestants,
+                experts=self.experts,
+                scenarios=self.scenarios,
+                spread=self.spread,
+                expert_sd=self.expert_sd,
+                scenario_sd=self.scenario_sd,
+                tie_share=self.ties / 100,
+                overlap_share=self.overlap / 100,
+            ),
             half_width=self.half_width,
             gap=self.gap,
             power=self.power / 100,
@@ -66,55 +69,51 @@ class StudyEstimate:
             extra_share=(self.repeats + self.checks) / 100,
         )
 
-    def _design(self, *, ties: float) -> StudyDesign:
-        return StudyDesign(
-            contestants=self.contestants,
-            experts=self.experts,
-            scenarios=self.scenarios,
-            spread=self.spread,
-            expert_sd=self.expert_sd,
-            scenario_sd=self.scenario_sd,
-            tie_share=ties / 100,
-            overlap_share=self.overlap / 100,
-        )
-
 
 ESTIMATE_INPUTS = inputs_of(StudyEstimate)
 
 
-LAST_VOTES = 2000
-FEWEST_VOTES = 20
-"""With fewer timed votes a pace is a guess."""
-LONGEST_S = 120.0
-"""Somebody who takes longer has left the room."""
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Known:
-    """What a study says of the next one like it.
+class Goal:
+    """What a study is to tell: what it takes, or why no number of votes reaches it."""
 
-    Attributes:
-        values: By the fields of StudyEstimate; only what is known.
-        from_results: Whether spread, ties and effects are among them.
-    """
-
-    values: dict[str, Any]
-    from_results: bool = False
+    title: str
+    prospect: Prospect | None
+    obstacle: str = ""
 
 
-def usual_seconds(study: Study | None = None) -> float | None:
-    """Return the median time of a vote, of a study or of all; None where too few were timed."""
-    votes = Vote.objects.filter(is_simulated=False, ms_visible__isnull=False)
-    if study is not None:
-        votes = votes.filter(matchup__study=study)
-    times = list(votes.order_by("-pk").values_list("ms_visible", flat=True)[:LAST_VOTES])
-    if len(times) < FEWEST_VOTES:
-        return None
-    return round(median(min(ms / 1000.0, LONGEST_S) for ms in times if ms is not None), 1)
+def forecast(question: Question) -> list[Goal]:
+    """Return what each goal takes, and what the votes in mind would tell."""
+    outlook = foretell(question)
+    narrow, apart = outlook.narrow, outlook.apart
+    unreached = "No number of votes reaches it: with every pair judged by everybody"
+    goals = [
+        Goal(
+            title=f"Expected widest interval ±{question.half_width:g}",
+            prospect=narrow.prospect,
+            obstacle=f"{unreached} it is ±{narrow.most.widest:.0f}. {_what_would_do(narrow)}",
+        ),
+        Goal(
+            title=f"Two that differ by {question.gap:g} told apart",
+            prospect=apart.prospect,
+            obstacle=f"{unreached} it is {apart.most.gap:.0f} points. {_what_would_do(apart)}",
+        ),
+    ]
+    if outlook.in_mind is not None:
+        goals.append(Goal(title="Votes in mind", prospect=outlook.in_mind))
+    return goals
 
 
-def known_of(study: Study, reader: User | None = None) -> Known:
-    """Return what a study says; nothing of its results where the reader may not see them.
+def _what_would_do(wish: Wish) -> str:
+    numbers = {"experts": wish.experts, "scenarios": wish.scenarios}
+    needs = [f"{number} {what}" for what, number in numbers.items() if number is not None]
+    return f"It takes {' or '.join(needs) or 'more experts and scenarios'}."
+
+
+def known_of(study: Study, reader: User | None = None) -> dict[str, Any]:
+    """Return what a study says of the next one like it, by the fields of StudyEstimate.
+
+    Nothing of its results where the reader may not see them.
 
     Args:
         study: Any.
@@ -128,7 +127,6 @@ def known_of(study: Study, reader: User | None = None) -> Known:
         "contestants": study.contestants.count(),
         "experts": study.experts.count(),
         "scenarios": study.scenarios.count(),
-        "seconds": usual_seconds(study),
         **{name: round(100 * study.rules.get(share, 0), 2) for name, share in shares.items()},
     }
     values = {name: value for name, value in values.items() if value}
@@ -136,8 +134,7 @@ def known_of(study: Study, reader: User | None = None) -> Known:
     if reader is not None:
         may_read = results_access(user=reader, study=study) is ResultsAccess.FULL
     snapshot = latest_snapshot(study) if may_read else None
-    results = {} if snapshot is None else _of_results(snapshot)
-    return Known(values=values | results, from_results=bool(results))
+    return values if snapshot is None else values | _of_results(snapshot)
 
 
 def _of_results(snapshot: Snapshot) -> dict[str, Any]:
