@@ -1,19 +1,24 @@
-"""What somebody asks for who estimates how many votes a study needs; shares in percent."""
+"""How many votes a study needs, and what it will tell, before its first vote.
 
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
 from django.contrib.auth.models import User
 from django.db.models import Count, Max, Min
+from scipy.special import ndtr, ndtri
 
 from arena.models import Snapshot, Study
 from arena.rating.planning import Prospect, Question, StudyDesign, Wish, estimate_effects, foretell
 from arena.results.queries.access import ResultsAccess, latest_snapshot, results_access
 from arena.results.services.analysis import vote_arrays
 from arena.results.services.ratings import votes_of
+from augment.errors import InvalidDocument
 from augment.services.inputs import InputKind, input_field, inputs_of
 
 POINTS = "Elo points"
+MOST_SEARCHED = 500
+"""No more experts, or scenarios, are thought of."""
 
 
 def _whole(label: str, least: int, most: int, default: int | None) -> Any:
@@ -26,7 +31,10 @@ def _number(label: str, unit: str, least: float, most: float, default: float) ->
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StudyEstimate:
-    """A study in mind, and what it is to tell; the defaults are guesses (docs/method.md)."""
+    """A study in mind, and what it is to tell; the defaults are guesses (docs/method.md).
+
+    Shares are in percent. The contestants lie evenly between the worst and the best.
+    """
 
     contestants: int = _whole("Contestants", 2, 500, 9)
     experts: int = _whole("Experts", 2, 500, 9)
@@ -152,6 +160,6 @@ def _of_results(snapshot: Snapshot) -> dict[str, Any]:
         "scenarios": len(set(comparisons.scenario.tolist())),
         "spread": round(rated["best"] - rated["worst"]),
         "ties": round(100 * float((comparisons.score == 0.5).mean()), 1),
-        "expert_sd": round(effects.expert_sd),
-        "scenario_sd": round(effects.scenario_sd),
+        "expert_sd": round(effects["expert"]),
+        "scenario_sd": round(effects["scenario"]),
     }
