@@ -37,17 +37,17 @@ WRITERS = {name: writers.WRITERS[name] for name in ("commonroad", "scenarionet")
 
 SAID: dict[str, dict[str, str]] = {
     "commonroad": {
-        "side": "that people drive on the left is not said",
+        "side": "on which side people drive",
         "ego motion": "of the ego's motion only start and end are written",
         "box": "its box of",
         "class": "NAME: a (cone|sign) becomes a constructionZone",
         "missing": "NAME: a barrier becomes a roadBoundary",
         "later": "NAME: is left out: it appears after t0",
         "walk": "NAME: the walk is written as motion alone",
-        "area": "NAME: left out: a .* area of this shape can't be a lanelet",
+        "area": "NAME: left out: a .* area is no lanelet",
         "turn": "NAME: (a U-turn becomes a turn to the left|its turn type is not said)",
-        "way": "centrelines that are off the middle of the edges, .*NAME by",
-        "width": "widths that are not the distance of the edges, .*NAME by",
+        "way": "of lanes the edges alone go out",
+        "width": "of lanes the edges alone go out",
     },
     "scenarionet": {
         "class": "NAME: a (BUS|CONSTRUCTION_SIGN) becomes a (VEHICLE|TRAFFIC_OBJECT)",

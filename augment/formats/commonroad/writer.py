@@ -12,38 +12,15 @@ from xml.etree import ElementTree as ET
 import numpy as np
 
 from augment.escaping import escape_controls
-from augment.formats.roads import width_between
-from augment.formats.writing import (
-    CannotExpress,
-    Cell,
-    LossReport,
-    Written,
-    appears_later,
-    bounds_of,
-    group_connectors,
-    has_gaps,
-    report_motion,
-    ways_of,
-    write_each,
-)
-from augment.geometry.polyline import FloatArray, Polyline
-from augment.scene.entities import (
-    AgentType,
-    Area,
-    AreaKind,
-    Lane,
-    LaneConnector,
-    Scene,
-    TrafficLight,
-    TrafficSide,
-    TurnType,
-)
+from augment.formats import writing
+from augment.formats.writing import Cell, LossReport
+from augment.geometry.polyline import FloatArray
+from augment.scene.entities import AgentType, Lane, LaneConnector, Scene, TrafficLight, TurnType
 from augment.scene.lane_graph import AnyLane, LaneGraph
 from augment.scene.motion import Movement
 
 VERSION: Final = "2020a"
 GOAL_RADIUS_M: Final = 2.0
-MOVES_M: Final = 1.0
 SPEED_SIGN = "274"
 _SAME_M = 0.01
 _STATIC = {
@@ -80,9 +57,9 @@ Ids = Mapping[str, int]
 """Whole numbers from 1 on, a new one for each name that is asked for."""
 
 
-def write(cells: Sequence[Cell]) -> Written:
+def write(cells: Sequence[Cell]) -> writing.Written:
     """One XML file for each cell."""
-    return write_each(cells, _write_one)
+    return writing.write_each(cells, _write_one)
 
 
 # Private
@@ -115,14 +92,19 @@ def _exact(name: str, value: float) -> ET.Element:
 
 def _write_one(cell: Cell, report: LossReport) -> dict[str, bytes]:
     scene = cell.after
-    if not ways_of(scene):
-        raise CannotExpress("CommonRoad needs at least one lane, and this scene has none")
+    if not writing.ways_of(scene):
+        raise writing.CannotExpress("CommonRoad needs at least one lane, and this scene has none")
     ids: Ids = defaultdict(count(1).__next__)
     # A map's name in a benchmark id has letters and digits alone.
     words = [part.capitalize() for part in cell.stem.split("-") if part.isascii()]
     root = _tag(
         "commonRoad",
-        _location(scene),
+        _tag(
+            "location",
+            _tag("geoNameId", -999),
+            _tag("gpsLatitude", 999),
+            _tag("gpsLongitude", 999),
+        ),
         _tag("scenarioTags"),
         *_map(cell, ids, report),
         *_obstacles(cell, ids, report),
@@ -144,46 +126,18 @@ def _write_one(cell: Cell, report: LossReport) -> dict[str, bytes]:
     return {f"{cell.stem}.xml": text.encode()}
 
 
-def _location(scene: Scene) -> ET.Element:
-    pose = scene.origin.pose
-    return _tag(
-        "location",
-        _tag("geoNameId", -999),
-        _tag("gpsLatitude", 999),
-        _tag("gpsLongitude", 999),
-        _tag(
-            "geoTransformation",
-            _tag("geoReference", scene.origin.frame),
-            _tag(
-                "additionalTransformation",
-                _tag("xTranslation", pose.x_m),
-                _tag("yTranslation", pose.y_m),
-                _tag("zRotation", pose.heading_rad),
-                _tag("scaling", 1.0),
-            ),
-        ),
-    )
-
-
 # The map: lanelets, then traffic signs, lights and intersections, as the schema orders them
 
 
 def _map(cell: Cell, ids: Ids, report: LossReport) -> Iterator[ET.Element]:
     scene = cell.after
-    graph, ways = LaneGraph(scene), ways_of(scene)
+    graph, ways = LaneGraph(scene), writing.ways_of(scene)
     for way in ways:
         ids[way.id]  # lanelets have the first numbers
-    off_m, apart_m = {}, {}
     for way in ways:
-        left, right = _paired_bounds(way)
-        off_m[way.id] = _off_middle_m(way.centerline, (left + right) / 2.0)
-        apart_m[way.id] = abs(width_between(way.centerline, *bounds_of(way)) - way.width_m)
-        yield _lanelet(ids[way.id], left, right, *_of_way(way, graph, ids))
-    crosswalks = [one for one in scene.areas if one.kind is AreaKind.CROSSWALK]
-    quads = [one for one in crosswalks if len(one.boundary_m) == 4]
-    for area in quads:
-        kind = _tag("laneletType", "crosswalk"), _tag("userBidirectional", "pedestrian")
-        yield _lanelet(ids[area.id], *_crosswalk_bounds(area), *kind)
+        bounds = zip(("leftBound", "rightBound"), _paired_bounds(way), strict=True)
+        edges = [_tag(name, *(_point("point", one) for one in line)) for name, line in bounds]
+        yield _tag("lanelet", *edges, *_of_way(way, graph, ids), id=ids[way.id])
     for limit in sorted({way.speed_limit_mps for way in ways if way.speed_limit_mps is not None}):
         sign = _tag("trafficSignID", SPEED_SIGN), _tag("additionalValue", float(limit))
         yield _tag(
@@ -204,23 +158,10 @@ def _map(cell: Cell, ids: Ids, report: LossReport) -> Iterator[ET.Element]:
                 id=ids[f"light of {connector.id}"],
             )
     yield from _intersections(scene, ids)
-    for distances, text in (
-        (off_m, "centrelines that are off the middle of the edges, which alone go out"),
-        (apart_m, "widths that are not the distance of the edges, which alone go out"),
-    ):
-        far = [f"{name} by {away:.2f} m" for name, away in distances.items() if away > _SAME_M]
-        if far:
-            report.lose(f"{text}: {', '.join(far)}")
-    text = "left out: a {} area of this shape can't be a lanelet"
-    report.lose_areas([one for one in scene.areas if one not in quads], text)
-
-
-def _lanelet(number: int, left: FloatArray, right: FloatArray, *parts: ET.Element) -> ET.Element:
-    bounds = [
-        _tag(name, *(_point("point", point) for point in points))
-        for name, points in (("leftBound", left), ("rightBound", right))
-    ]
-    return _tag("lanelet", *bounds, *parts, id=number)
+    report.lose(
+        "of lanes the edges alone go out: the middle and the width are what they make them"
+    )
+    report.lose_areas(scene.areas, "left out: a {} area is no lanelet")
 
 
 def _of_way(way: AnyLane, graph: LaneGraph, ids: Ids) -> Iterator[ET.Element]:
@@ -242,39 +183,24 @@ def _of_way(way: AnyLane, graph: LaneGraph, ids: Ids) -> Iterator[ET.Element]:
         yield _tag("trafficLightRef", ref=ids[f"light of {way.id}"])
 
 
-def _paired_bounds(way: AnyLane) -> tuple[FloatArray, FloatArray]:
+def _paired_bounds(way: AnyLane) -> list[FloatArray]:
     """Both edges with equally many points, opposite to each other; no point of either is lost."""
-    left, right = bounds_of(way)
-    if len(left.points_m) == len(right.points_m):
-        off_m = _off_middle_m(way.centerline, (left.points_m + right.points_m) / 2.0)
+    sides = writing.bounds_of(way)
+    edges = [side.points_m for side in sides]
+    if len(edges[0]) == len(edges[1]):
+        middle = ((edges[0] + edges[1]) / 2.0).tolist()
+        off_m = max(way.centerline.project(x, y).distance_m for x, y in middle)
         if off_m <= _SAME_M or not (way.left_boundary or way.right_boundary):
-            return left.points_m, right.points_m
-    lines = (left, right, way.centerline)
-    shares = np.concatenate([line.stations_m / line.length_m for line in lines]).round(9)
-    left_m, right_m = (side.points_at(np.unique(shares) * side.length_m) for side in (left, right))
-    return left_m, right_m
-
-
-def _off_middle_m(centerline: Polyline, middle: FloatArray) -> float:
-    return max(centerline.project(float(x), float(y)).distance_m for x, y in middle)
-
-
-def _crosswalk_bounds(area: Area) -> tuple[FloatArray, FloatArray]:
-    """The two longer edges, in one direction."""
-    ring = np.array(area.boundary_m)
-    sides_m = np.hypot(*(np.roll(ring, -1, axis=0) - ring).T)
-    if sides_m[0] + sides_m[2] < sides_m[1] + sides_m[3]:
-        ring = np.roll(ring, -1, axis=0)
-    first, second = ring[:2], ring[:1:-1]
-    along, across = first[1] - first[0], second[0] - first[0]
-    is_left = along[0] * across[1] - along[1] * across[0] < 0.0
-    return (first, second) if is_left else (second, first)
+            return edges
+    lines = (*sides, way.centerline)
+    shares = np.unique(np.concatenate([x.stations_m / x.length_m for x in lines]).round(9))
+    return [side.points_at(shares * side.length_m) for side in sides]
 
 
 def _intersections(scene: Scene, ids: Ids) -> Iterator[ET.Element]:
     """Connectors that share a lane at either end belong to one intersection."""
     entered = [connector for connector in scene.connectors if connector.from_lane is not None]
-    for group in group_connectors(entered):
+    for group in writing.group_connectors(entered):
         by_lane: dict[str, list[LaneConnector]] = defaultdict(list)
         for connector in group:
             by_lane[str(connector.from_lane)].append(connector)
@@ -302,11 +228,11 @@ def _is_static(movement: Movement) -> bool:
 
 def _obstacles(cell: Cell, ids: Ids, report: LossReport) -> Iterator[ET.Element]:
     others = sorted(cell.motion.others, key=lambda one: not _is_static(one))
-    later = [one.agent.id for one in others if appears_later(one)]
+    later = [one.agent.id for one in others if writing.appears_later(one)]
     text = "is left out: it appears after t0, and all obstacles are there from t0 on"
     report.lose_of(later, text, changes_scene=True)
     for movement in others:
-        if appears_later(movement):
+        if writing.appears_later(movement):
             continue
         agent, states = movement.agent, movement.states
         is_static = _is_static(movement)
@@ -354,31 +280,24 @@ def _problem(cell: Cell, ids: Ids) -> ET.Element:
 
 def _report(cell: Cell, report: LossReport) -> None:
     scene, ego, others = cell.after, cell.after.ego, cell.motion.others
-    report_motion(cell, report)
+    writing.report_motion(cell, report)
     report.lose(
         f"of the ego's motion only start and end are written; its box of {ego.length_m:g} x "
         f"{ego.width_m:g} m is not"
     )
     report.lose("names become numbers; a comment in the file has both")
     report.lose_types(_BECOMES)
-    names = [one.agent.id for one in others if has_gaps(one) and not _is_static(one)]
+    names = [one.agent.id for one in others if writing.has_gaps(one) and not _is_static(one)]
     report.lose_of(names, "goes and comes back; it ends where it goes first")
     names = [agent.id for agent in scene.agents if agent.walk_to_m is not None]
     report.lose_of(names, "the walk is written as motion alone, not as its end point")
-    static = [one for one in others if _is_static(one)]
-    moved = [
-        one for one in static if np.ptp(one.states[one.is_present, :2], axis=0).max() >= MOVES_M
-    ]
-    text = "moves, but things of this type can only stand there"
-    report.lose_of([one.agent.id for one in moved], text, changes_scene=True)
     connectors = scene.connectors
-    names = [one.id for one in connectors if one.turn_type is TurnType.U_TURN]
-    report.lose_of(names, "a U-turn becomes a turn to the left")
-    names = [one.id for one in connectors if one.from_lane is None]
-    report.lose_of(names, "its turn type is not said: no lane leads into it")
-    names = [one.id for one in connectors if one.traffic_light is TrafficLight.UNKNOWN]
-    report.lose_of(names, "a light of unknown state becomes one that is off")
+    turned = [one.id for one in connectors if one.turn_type is TurnType.U_TURN]
+    report.lose_of(turned, "a U-turn becomes a turn to the left")
+    entered = [one.id for one in connectors if one.from_lane is None]
+    report.lose_of(entered, "its turn type is not said: no lane leads into it")
+    dark = [one.id for one in connectors if one.traffic_light is TrafficLight.UNKNOWN]
+    report.lose_of(dark, "a light of unknown state becomes one that is off")
     if any(one.traffic_light is not TrafficLight.NONE for one in connectors):
         report.lose("lights stay as they are at t0; how they go on is not known")
-    if scene.traffic_side is TrafficSide.LEFT:
-        report.lose("that people drive on the left is not said")
+    report.lose("on which side people drive and where the ego is in the world is not said")

@@ -6,7 +6,6 @@ description of the format in MetaDrive's `scenario_description.py` and `type.py`
 """
 
 import pickle
-import pickletools
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
@@ -67,10 +66,6 @@ _HEIGHTS_M = {
     AgentType.BARRIER: 1.0,
 }
 _HEIGHT_M = 1.777
-_OLD_NAMES = {
-    "numpy._core.multiarray _reconstruct": "numpy.core.multiarray _reconstruct",
-    "numpy._core.multiarray scalar": "numpy.core.multiarray scalar",
-}
 
 
 def write(cells: Sequence[Cell]) -> Written:
@@ -96,7 +91,6 @@ def describe(cell: Cell, report: LossReport) -> dict[str, Any]:
     scene, motion = cell.after, cell.motion
     steps = len(motion.times_s)
     _report(cell, report)
-    tracks = {one.agent.id: _track(one) for one in (motion.ego, *motion.others)}
     return {
         "id": cell.stem,
         "version": VERSION,
@@ -115,10 +109,8 @@ def describe(cell: Cell, report: LossReport) -> dict[str, Any]:
             "tracks_to_predict": {},
             "traffic_side": scene.traffic_side.value,
             "provenance": scene.provenance,
-            "object_summary": {name: _summary(name, track) for name, track in tracks.items()},
-            "number_summary": {"num_objects": len(tracks)},
         },
-        "tracks": tracks,
+        "tracks": {one.agent.id: _track(one) for one in (motion.ego, *motion.others)},
         "dynamic_map_states": {
             connector.id: _light(connector, steps)
             for connector in scene.connectors
@@ -130,16 +122,9 @@ def describe(cell: Cell, report: LossReport) -> dict[str, Any]:
 
 def write_pickle(document: object) -> bytes:
     """The pickle, its names those of numpy 1."""
-    # Protocol 3 writes a name as a line of text, so that one can be put in place of another.
+    # Protocol 3 writes the module of a name as text, so that another can be put in its place.
     packed = pickle.dumps(document, protocol=3)
-    parts, done = [], 0
-    for code, name, start in pickletools.genops(packed):
-        if start is None or code.name != "GLOBAL" or name not in _OLD_NAMES:
-            continue
-        module, _, attribute = _OLD_NAMES[name].partition(" ")
-        parts += [packed[done:start], f"c{module}\n{attribute}\n".encode()]
-        done = start + len(f"c{name}\n")
-    return b"".join([*parts, packed[done:]])
+    return packed.replace(b"cnumpy._core.multiarray\n", b"cnumpy.core.multiarray\n")
 
 
 # Private
@@ -191,20 +176,6 @@ def _track(movement: Movement) -> dict[str, Any]:
             "dataset": DATASET,
             "motion": movement.source.value,
         },
-    }
-
-
-def _summary(name: str, track: dict[str, Any]) -> dict[str, Any]:
-    valid = track["state"]["valid"]
-    seen = track["state"]["position"][valid, :2]
-    first, gone = int(valid.argmax()), np.flatnonzero(~valid[int(valid.argmax()) :])
-    return {
-        "type": track["type"],
-        "object_id": name,
-        "track_length": len(valid),
-        "moving_distance": float(np.hypot(*np.diff(seen, axis=0).T).sum()),
-        "valid_length": int(valid.sum()),
-        "continuous_valid_length": int(gone[0]) if len(gone) else len(valid) - first,
     }
 
 
