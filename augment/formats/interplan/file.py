@@ -207,19 +207,9 @@ def read_entry(token: str, index: str | int, entry: SpecialScenario, scene: Scen
         return x_m, y_m
 
     def add(kind: AgentType, point: Point, heading_rad: float, **more: Any) -> None:
-        (x_m, y_m), (length_m, width_m) = point, LENGTH_WIDTH_M[kind]
-        agent = TrafficAgent(
-            id=f"Agent{len(scene.everyone) + 1 + len(added)}",
-            type=kind,
-            x_m=x_m,
-            y_m=y_m,
-            heading_rad=heading_rad,
-            width_m=width_m,
-            length_m=length_m,
-            lane_id=ground.graph.under(x_m, y_m, heading_rad),
-            **({"speed_mps": 0.0} | more),
-        )
-        added.append(agent)
+        number = len(scene.everyone) + 1 + len(added)
+        lane_id = ground.graph.under(*point, heading_rad)
+        added.append(_agent(number, kind, (*point, heading_rad), lane_id, **more))
 
     for kind, key in ((AgentType.VEHICLE, "stopped_vehicle"), (AgentType.BUS, "stopped_bus")):
         for number, (x_m, y_m, yaw_rad) in enumerate(getattr(entry, key)):
@@ -244,6 +234,27 @@ def read_entry(token: str, index: str | int, entry: SpecialScenario, scene: Scen
         type=entry.type,
         modification=Modification(added=tuple(added)),
         left_out=(*left_out, *(f"key {key}" for key in entry.model_extra or {})),
+    )
+
+
+def _agent(
+    number: int,
+    kind: AgentType,
+    pose: tuple[float, float, float],
+    lane_id: str | None,
+    **more: Any,
+) -> TrafficAgent:
+    length_m, width_m = LENGTH_WIDTH_M[kind]
+    return TrafficAgent(
+        id=f"Agent{number}",
+        type=kind,
+        x_m=pose[0],
+        y_m=pose[1],
+        heading_rad=pose[2],
+        width_m=width_m,
+        length_m=length_m,
+        lane_id=lane_id,
+        **({"speed_mps": 0.0} | more),
     )
 
 
