@@ -4,8 +4,8 @@
     for job in arena.list("jobs", state="running"):
         print(job["name"], job["by_state"])
 
-Staff find every operation at /api/v1/reference/. `post` sends JSON, `get` and `list` read it,
-`upload` sends files, `download` returns the bytes of one.
+docs/api.md and, for staff, /api/v1/openapi.json list every operation. `post` sends JSON, `get`
+and `list` read it, `upload` sends files, `download` returns the bytes of one.
 """
 
 from __future__ import annotations

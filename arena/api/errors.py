@@ -18,7 +18,6 @@ from arena.errors import (
     AlreadyDecided,
     ArenaError,
     DatabaseBusy,
-    InvalidPreference,
     InvalidVote,
     LinkOver,
     NoSnapshot,
@@ -44,7 +43,6 @@ STATUS: tuple[tuple[type[Exception], int, str], ...] = (
     (StudyStillOpen, 403, "study_still_open"),
     (AlreadyDecided, 409, "already_decided"),
     (InvalidVote, 422, "invalid"),
-    (InvalidPreference, 422, "invalid"),
     (TooFast, 429, "too_fast"),
     (DatabaseBusy, 503, "busy"),
     (Conflict, 409, "conflict"),
@@ -119,7 +117,7 @@ def _extras(exc: Exception) -> dict[str, Any]:
         return {"outcome": OUTCOME_LETTERS[exc.outcome]}
     if isinstance(exc, exceptions.ValidationError):
         return {"fields": exc.detail}
-    if isinstance(exc, (InvalidVote, InvalidPreference)):
+    if isinstance(exc, InvalidVote):
         return {"fields": {name: [sentence] for name, sentence in exc.fields.items()}}
     if isinstance(exc, exceptions.ParseError):
         return {"fields": {"body": [str(exc.detail)]}}

@@ -103,7 +103,6 @@ INSTALLED_APPS = [
     "arena",
 ]
 MIDDLEWARE = [
-    "arena.config.logs.RequestIdMiddleware",
     "arena.config.middleware.HeaderMiddleware",
     "django.middleware.security.SecurityMiddleware",
     "csp.middleware.CSPMiddleware",
@@ -113,7 +112,7 @@ MIDDLEWARE = [
     "django.middleware.common.CommonMiddleware",
     "django.middleware.csrf.CsrfViewMiddleware",
     "django.contrib.auth.middleware.AuthenticationMiddleware",
-    "arena.site.access.SignInMiddleware",
+    "django.contrib.auth.middleware.LoginRequiredMiddleware",
     "django.contrib.messages.middleware.MessageMiddleware",
     "django.middleware.clickjacking.XFrameOptionsMiddleware",
     "axes.middleware.AxesMiddleware",
@@ -286,26 +285,20 @@ LOGGING = {
     "version": 1,
     "disable_existing_loggers": False,
     "formatters": {
-        "line": {
-            "format": "{asctime} {levelname:7} [{request_id}] {name}: {message}",
-            "style": "{",
-        },
+        "line": {"format": "{asctime} {levelname:7} {name}: {message}", "style": "{"},
         "json": {
             "()": "pythonjsonlogger.json.JsonFormatter",
-            "fmt": "{asctime}{levelname}{name}{message}{request_id}{process}{threadName}",
+            "fmt": "{asctime}{levelname}{name}{message}{process}{threadName}",
             "style": "{",
             "rename_fields": {"asctime": "at", "levelname": "level", "threadName": "thread"},
         },
     },
-    "filters": {
-        "no_keys": {"()": "arena.config.logs.HideKeys"},
-        "request_id": {"()": "arena.config.logs.AddRequestId"},
-    },
+    "filters": {"no_keys": {"()": "arena.config.logs.HideKeys"}},
     "handlers": {
         "console": {
             "class": "logging.StreamHandler",
             "formatter": LOG_FORM,
-            "filters": ["no_keys", "request_id"],
+            "filters": ["no_keys"],
         }
     },
     "root": {"handlers": ["console"], "level": LOG_LEVEL},
@@ -316,5 +309,7 @@ LOGGING = {
         "fontTools": {"level": "WARNING"},
         "matplotlib": {"level": "WARNING"},
         "httpx2": {"level": "WARNING"},
+        # Threads of the web worker take turns at a queue on purpose: an entry is no news.
+        "waitress.queue": {"level": "ERROR"},
     },
 }

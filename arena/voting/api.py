@@ -1,6 +1,5 @@
 """What an expert does: pairs, their pictures, votes, reports and preferences."""
 
-from collections.abc import Sequence
 from typing import Any
 
 from django.core.files.storage import default_storage
@@ -22,11 +21,12 @@ from arena.api.fields import (
 )
 from arena.api.views import ApiView, FileView, Given, file_operation, operation
 from arena.errors import StudyNotOpen
-from arena.models import AIDS, OUTCOME_LETTERS, Matchup, Report, Study, Vote
+from arena.models import AIDS, OUTCOME_LETTERS, Report, Study, Vote
 from arena.people.services import keep_voting
 from arena.studies.queries import voting_study
 from arena.studies.services.experts import SIDES, Complaint, report
 from arena.studies.services.planning import next_pairs
+from arena.voting.queries.keys import voting_switches
 from arena.voting.queries.showings import as_shown, picture_shown
 from arena.voting.services.casting import LONGEST_COMMENT, decision_of, receive_vote
 
@@ -42,13 +42,6 @@ class MatchupsQuery(StrictSerializer):
 
     study = serializers.UUIDField()
     n = serializers.IntegerField(min_value=1, max_value=MOST, default=AHEAD)
-
-
-class SidesDocument(serializers.Serializer[Any]):
-    """What changed, one sentence for each object."""
-
-    a = serializers.ListField(child=serializers.CharField())
-    b = serializers.ListField(child=serializers.CharField())
 
 
 class MatchupDocument(serializers.Serializer[Any]):
@@ -71,7 +64,6 @@ class MatchupDocument(serializers.Serializer[Any]):
         required=False,
         help_text="Which kinds of marks the two pictures hold; absent of pairs planned before.",
     )
-    text = SidesDocument(required=False, help_text="In studies that offer it.")
 
 
 class VoteBody(StrictSerializer):
@@ -101,7 +93,6 @@ class ReceivedDocument(serializers.Serializer[Any]):
     saved = serializers.IntegerField(help_text="Pairs with a vote.")
     skipped = serializers.IntegerField(help_text="Pairs that were skipped instead.")
     total = serializers.IntegerField()
-    minutes_left = serializers.IntegerField(allow_null=True)
     next = MatchupDocument(many=True)
 
 
@@ -135,7 +126,6 @@ class PreferencesBody(StrictSerializer):
     single_keys = FlagField(required=False)
     legend = FlagField(required=False)
     keep_zoom = FlagField(required=False)
-    keys = serializers.DictField(child=TextField(max_length=8), required=False)
 
 
 class PreferencesDocument(serializers.Serializer[Any]):
@@ -144,10 +134,6 @@ class PreferencesDocument(serializers.Serializer[Any]):
     single_keys = serializers.BooleanField()
     legend = serializers.BooleanField()
     keep_zoom = serializers.BooleanField()
-    keys = serializers.DictField(
-        child=serializers.ListField(child=serializers.CharField()),
-        help_text="By action, its keys.",
-    )
 
 
 class MatchupsView(ApiView):
@@ -184,16 +170,14 @@ class VotesView(ApiView):
         n, outcome = given.pop("n"), OUTCOMES[given.pop("outcome")]
         decision = decision_of(matchup_code=given.pop("matchup"), outcome=outcome, **given)
         received = receive_vote(expert=self.user, decision=decision, ahead=n)
-        now = received.state
-        coming: Sequence[Matchup] = received.coming
+        progress, coming = received.progress, received.coming
         if len(coming) < n:  # this vote may allow more pairs to be planned
-            coming = next_pairs(study=now.study, expert=self.user, n=n)
+            coming = next_pairs(study=received.study, expert=self.user, n=n)
         return Response(
             {
-                "saved": now.progress.voted,
-                "skipped": now.progress.skipped,
-                "total": now.progress.total,
-                "minutes_left": now.progress.minutes_left,
+                "saved": progress.voted,
+                "skipped": progress.skipped,
+                "total": progress.total,
                 "next": [as_shown(matchup) for matchup in coming],
             }
         )
@@ -232,8 +216,8 @@ class PreferencesView(ApiView):
 
         Answers with all of them.
         """
-        keys = given.pop("keys", None)
-        return keep_voting(user=self.user, switches=given, keys=keys).as_json()
+        keep_voting(self.user, given)
+        return voting_switches(self.user)
 
 
 class ShownPictureView(FileView):

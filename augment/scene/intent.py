@@ -121,6 +121,11 @@ class Side(StrEnum):
         """The opposite side."""
         return Side.RIGHT if self is Side.LEFT else Side.LEFT
 
+    @property
+    def sign(self) -> float:
+        """Of numbers to that side: left is positive."""
+        return 1.0 if self is Side.LEFT else -1.0
+
 
 class Relation(StrEnum):
     """On which end of its anchor a distance is measured."""
@@ -181,6 +186,13 @@ class Pick:
         if self.every and self.ordinal != 1:
             raise ValueError("every one and one of a number contradict each other")
         return self
+
+    def __str__(self) -> str:
+        kind = f"every {self.kind}" if self.every else f"{self.kind} {self.ordinal}"
+        where = "ahead of" if self.relation is Relation.AHEAD else "behind"
+        side = f", on its {self.side}" if self.side else ""
+        lane = f", in the {self.lane} lane" if self.lane else ""
+        return f"{kind} {where} the ego{side}{lane}"
 
 
 MOST_REQUESTS = 20

@@ -4,6 +4,7 @@ import uuid
 
 from django.urls import reverse
 
+from arena.models import Authorship
 from arena.people.links import invite, mark_author
 from arena.studies.services.drafts import keep_draft
 from arena.studies.services.experts import Complaint, report
@@ -26,7 +27,6 @@ def address(name: str, here: World) -> str:
         "api-token-revoke": {"code": STRANGER},
         "job": {"code": here.job.code},
         "contestant": {"code": here.augmentation.contestant.code},
-        "contestant-prompts": {"code": here.augmentation.contestant.code},
         "contestant-retired": {"code": here.augmentation.contestant.code},
         "job-progress": {"code": here.job.code},
         "job-retry": {"code": here.job.code},
@@ -56,9 +56,7 @@ def address(name: str, here: World) -> str:
         "reference-edit": {"code": here.augmentation.scenario.code},
         "scenario-new": {"code": here.augmentation.scenario.base_scene.code},
         "prompts": {"code": here.augmentation.scenario.code},
-        "prompt-file": {"code": here.augmentation.scenario.code},
         "prompt-image": {"code": here.augmentation.scenario.code, "number": 0},
-        "reference-drop": {"code": here.augmentation.scenario.code},
         "edit-check": {"code": here.augmentation.scenario.code},
         "correct": {"code": here.augmentation.code},
         "intent": {"code": here.augmentation.scenario.code},
@@ -66,13 +64,11 @@ def address(name: str, here: World) -> str:
         "intent-edit": {"code": here.augmentation.scenario.code},
         "scenario-retired": {"code": here.augmentation.scenario.code},
         "scene-retired": {"code": here.augmentation.scenario.base_scene.code},
-        "scene-rename": {"code": here.augmentation.scenario.base_scene.code},
         "scenario-edit": {"code": here.augmentation.scenario.code},
         "scenario-delete": {"code": here.augmentation.scenario.code},
         "scene-delete": {"code": here.augmentation.scenario.base_scene.code},
         "intent-read": {"code": here.augmentation.scenario.code},
         "picture": {"kind": "augmentation", "code": shown.left.code},
-        "audit-export": {"form": "csv"},
         "results-export": {"code": here.study.code, "form": "csv"},
         "study-file": {"code": here.study.code, "kind": "interplan"},
         "study-write": {"code": here.study.code, "kind": "interplan"},
@@ -84,7 +80,6 @@ def address(name: str, here: World) -> str:
         "rating-again": {"code": here.study.code, "rating": STRANGER},
         "matchup-image": {"token": shown.left_token},
         "replay": {"code": shown.code},
-        "measures": {"code": shown.code},
     }
     if name.startswith("endpoint") and name not in ("endpoints", "endpoint-new"):
         site, _ = Endpoint.objects.get_or_create(
@@ -112,8 +107,8 @@ def address(name: str, here: World) -> str:
         made = invite(study=here.study, expert=here.expert)
         arguments["revoke"] = {"code": made.invitation.code}
     if name == "author-back":
-        marked = mark_author(study=here.study, expert=here.expert, contestant="ann")
-        arguments["author-back"] = {"code": marked.code}
+        mark_author(study=here.study, expert=here.expert, contestant="ann")
+        arguments["author-back"] = {"code": Authorship.objects.get().code}
     own = (
         *("study", "preregistration", "experts", "invite", "author", "study-close"),
         *("study-cancel", "study-again"),

@@ -166,7 +166,7 @@ OBJECTS: Columns = {
 }
 """`object` is matched, missing or surplus; places are in the ego frame."""
 
-MEASURES = ("displacement_m", "missed", "usd", "wrong")
+MEASURES = ("displacement_m", "missed", "usd")
 REPEATS: Columns = {
     "contestant": ("slug", TEXT),
     "name": ("name", TEXT),
@@ -213,7 +213,6 @@ ANALYSES: dict[str, tuple[str, Columns]] = {
             "scenarios": ("robustness.scenarios", WHOLE),
             "wordings": ("robustness.wordings", WHOLE),
             "within_m": ("robustness.within_m", NUMBER),
-            "median_range_m": ("robustness.median_range_m", NUMBER),
         },
     ),
     "refusals": (

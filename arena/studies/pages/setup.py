@@ -1,7 +1,5 @@
 """Setting a study up by one form, over several sittings as a draft; or by a file of votes."""
 
-from __future__ import annotations
-
 import re
 import uuid
 from pathlib import Path
@@ -32,7 +30,6 @@ from arena.studies.services import drafts
 from arena.studies.services.experts import has_practice
 from arena.studies.services.opening import open_study
 from arena.studies.services.plan import StudyPlan
-from augment.errors import AugmentError
 from augment.models import Contestant, GenerationJob
 
 KEEP = "keep"
@@ -139,24 +136,16 @@ def _open(request: HttpRequest, draft: StudyDraft | None, study_plan: StudyPlan)
 
 def _keep(request: HttpRequest, draft: StudyDraft | None) -> HttpResponse:
     """Save what stands in the form, whether it makes a study or not."""
-    actor, entered = user_of(request), _entered(request.POST)
-    try:
-        if draft is None:
-            kept = drafts.keep_draft(entered=entered, actor=actor)
-        else:
-            kept = drafts.change_draft(
-                draft=draft, entered=entered, revision=_revision(request), actor=actor
-            )
-    except AugmentError as error:
-        messages.error(request, str(error))
-        draft = draft and StudyDraft.objects.filter(pk=draft.pk).first()
-        form = _form(initial=entered)
-        if draft is None:
-            return _show(request, None, form, "", 422)
-        messages.info(request, "What you entered stands below; saving it again replaces theirs.")
-        return _show(request, draft, form, draft.revision, 409)
-    messages.success(request, "Saved as a draft: no expert sees it, and nothing is planned yet.")
-    return redirect("study-draft", code=kept.code)
+    entered = _entered(request.POST)
+    with refusals_told(request):
+        kept = drafts.keep_draft(
+            entered=entered, draft=draft, revision=_revision(request), actor=user_of(request)
+        )
+        messages.success(request, "Saved as a draft: no expert sees it, nothing is planned yet.")
+        return redirect("study-draft", code=kept.code)
+    # Shown with the revision of whoever was faster, so that saving again replaces theirs.
+    draft = draft and StudyDraft.objects.filter(pk=draft.pk).first()
+    return _show(request, draft, _form(initial=entered), draft.revision if draft else "", 409)
 
 
 def _show(
@@ -180,9 +169,9 @@ def _form(**given: Any) -> StudyForm:
 
 def _entered(posted: QueryDict) -> dict[str, object]:
     """Return the form as it came in; whole types are the scenarios that they have now."""
-    entered: dict[str, object] = {name: posted.get(name, "") for name in drafts.TEXTS}
-    entered |= {name: name in posted for name in drafts.SWITCHES}
-    entered |= {name: posted.getlist(name) for name in drafts.NAMES}
+    entered: dict[str, object] = posted.dict() | {
+        name: posted.getlist(name) for name in drafts.NAMES
+    }
     groups = [group for group in queries.by_type() if group.type in posted.getlist("types")]
     whole = [row.slug for group in groups for row in group.scenarios]
     return entered | {"scenarios": [*posted.getlist("scenarios"), *whole]}
@@ -196,7 +185,7 @@ def _revision(request: HttpRequest) -> int:
 def _initial(request: HttpRequest, draft: StudyDraft | None) -> dict[str, Any]:
     """Return what the draft has, or what the address says of a study that somebody planned."""
     if draft is not None:
-        return dict(drafts.entered_of(draft))
+        return dict(draft.entered)
     initial: dict[str, Any] = SUGGESTED | {"checks": usual_checks(), "practice": has_practice()}
     initial |= {name: request.GET[name] for name in PLANNED if request.GET.get(name)}
     if study := study_asked(request):
@@ -222,33 +211,23 @@ def _opening(study_plan: StudyPlan, draft: StudyDraft | None) -> Confirmation:
     """Ask whether to open the study, with what it would be in numbers.
 
     Raises:
-        ArenaError, AugmentError: It can't be opened.
+        AugmentError: It can't be opened.
     """
-    preview = drafts.preview_study(study_plan)
-    numbers: dict[str, object] = {**preview, "seconds": f"{preview['seconds']:g}"}
     facts = [
         "Experts: {experts}. Votes: {votes}. Contestants: {contestants}. Scenarios: {scenarios}.",
         "On top of the votes: hidden repeats {repeats}, attention checks {checks}.",
-        "Pairs of a scenario that are judged: {judged}; by two experts or more: {shared}.",
-        "Minutes for each expert: about {minutes}, at {seconds} s a pair.",
+        "Pairs that nobody can tell apart, settled as ties: {settled}.",
+        "Votes that are planned later, by those before: {later}.",
+        "Minutes for each expert: about {minutes}, at {seconds:g} s a pair.",
+        "Experts can vote at once. The rules can’t be changed afterwards.",
     ]
-    if preview["settled"]:
-        facts.append(
-            "Pairs that are settled as ties and shown to nobody: {settled}; within 0.15 m and 2° "
-            "in every object: {alike}, identical pictures among them. A tenth of those that are "
-            "alike and not identical is shown all the same."
-        )
-    if preview["later"]:
-        facts.append("Votes that are planned later, by those before: {later}.")
-    if study_plan.allow_simulated:
-        facts.append("What is simulated may take part; every page and file then says so.")
-    facts.append("Experts can vote at once. The rules can’t be changed afterwards.")
+    preview = drafts.preview_study(study_plan)
     page = ("New study", reverse("study-new"))
     if draft is not None:
         page = ("Draft", reverse("study-draft", args=[draft.code]))
     return Confirmation(
         title=f"Open the study “{study_plan.name}”?",
-        facts=tuple(fact.format(**numbers) for fact in facts),
+        facts=tuple(fact.format(**preview) for fact in facts),
         button="Open the study",
         back=page[1],
         is_final=False,
@@ -268,7 +247,7 @@ class VoteFileForm(forms.Form):
     )
     is_simulated = forms.BooleanField(required=False)
 
-    def clean_file(self) -> UploadedFile[bytes]:
+    def clean_file(self) -> "UploadedFile[bytes]":
         """Refuse a file that is too large for a page to wait for."""
         file: UploadedFile[bytes] = self.cleaned_data["file"]
         if (file.size or 0) > MOST_MB * 1_000_000:

@@ -32,7 +32,7 @@ from arena.rating.snapshot_document import VERSION as RESULTS_VERSION
 from arena.results.services.vote_files import VERSION as VOTES_VERSION
 from arena.studies.services.experts import require_practice_pictures
 from arena.studies.services.pictures import Cells, check_pictures, require_checks, windows_of
-from arena.studies.services.plan import SWITCH_COLUMNS, StudyPlan, log_study, read_hypotheses
+from arena.studies.services.plan import SWITCH_COLUMNS, StudyPlan, read_hypotheses
 from arena.studies.services.planning import store
 from arena.voting.services.shown_pictures import (
     SampleRule,
@@ -43,6 +43,7 @@ from arena.voting.services.shown_pictures import (
 from augment.errors import Conflict, UnknownName
 from augment.models import Contestant, Scenario
 from augment.services.endpoints.treatments import options_of
+from augment.services.events import log_change
 from augment.services.judging.displacement import alike_pairs
 from augment.services.running.choosing import find_job
 from augment.services.texts import check_prose, one_line
@@ -106,7 +107,7 @@ def open_study(study_plan: StudyPlan, *, actor: User | None = None) -> Study:
     study.preregistration = _as_text(_preregistration(study))
     study.save(update_fields=["preregistration"])
     after = {"name": study.name, "matchups": len(planned.matchups), "seed": study.seed}
-    log_study(study, "open", actor, after=after)
+    log_change(study, "open", actor, after=after)
     return study
 
 
@@ -245,7 +246,7 @@ def preregistration_bytes(study: Study) -> bytes:
 
 def preregistration_sha256(study: Study) -> str:
     """Return the hash of the file, empty where there is none."""
-    content = preregistration_bytes(study)
+    content = study.preregistration.encode()
     return hashlib.sha256(content).hexdigest() if content else ""
 
 
@@ -374,5 +375,5 @@ def _end(study: Study, state: Study.State, verb: str, actor: User | None, **more
     study.closed_at = timezone.now()
     study.save(update_fields=["state", "closed_at"])
     before = {"state": Study.State.OPEN.value}
-    log_study(study, verb, actor, before=before, after={"state": state.value, **more})
+    log_change(study, verb, actor, before=before, after={"state": state.value, **more})
     return study

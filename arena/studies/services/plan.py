@@ -6,13 +6,10 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any, Self
 
-from django.contrib.auth.models import User
-
 from arena.errors import NothingToPlan
 from arena.models import Snapshot, Study
 from arena.pairing.rules import MOST_ADAPTIVE, MOST_CHECKS, MOST_OVERLAP, MOST_REPEATS
 from arena.voting.services.shown_pictures import SampleRule
-from augment.services.events import log_event
 from augment.services.inputs import InputKind, input_field, inputs_of
 
 MOST = 100
@@ -139,24 +136,6 @@ def answer_hypotheses(snapshot: Snapshot) -> tuple[Answered, ...]:
     return tuple(answers)
 
 
-def log_study(
-    study: Study,
-    verb: str,
-    actor: User | None,
-    before: dict[str, Any] | None = None,
-    after: dict[str, Any] | None = None,
-) -> None:
-    """Log what was done to a study."""
-    log_event(
-        actor=actor,
-        verb=verb,
-        object_kind="study",
-        object_code=study.code,
-        before=before,
-        after=after,
-    )
-
-
 # --- What is asked for -------------------------------------------------------------------------
 
 LONGEST_NAME = 120
@@ -249,17 +228,6 @@ class StudyPlan:
         "Also show pairs that nobody can tell apart",
         "Pairs that differ by at most 0.15 m and 2° in every object are otherwise settled as "
         "ties, but for a tenth that is shown as a check.",
-    )
-    allow_text: bool = _switch(
-        "Experts may read a text description",
-        "It lists what was added, changed or removed in each image, with metres and headings; "
-        "votes say who read it.",
-    )
-    allow_measures: bool = _switch(
-        "Experts may measure",
-        "They may lay lines and rings of what the instruction asks for over both images, and "
-        "read distances to lane edges under the ruler; votes say who did.",
-        default=True,
     )
     allow_replay: bool = _switch(
         "Experts may play the drives",
