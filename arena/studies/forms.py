@@ -83,8 +83,8 @@ class PlanningForm(forms.Form):
         """Refuse more ties than contestants so far apart can have."""
         cleaned = super().clean() or {}
         if not self.errors:
-            try:
-                StudyEstimate(**cleaned).question()
-            except ValueError as error:
-                self.add_error("ties", str(error))
+            possible = StudyEstimate(**cleaned).most_ties
+            if cleaned["ties"] >= possible:
+                problem = "Contestants so far apart can tie in less than {:.0f} % of votes."
+                self.add_error("ties", problem.format(possible))
         return cleaned

@@ -6,7 +6,13 @@ from typing import Any
 from django.core.management.base import CommandError, CommandParser
 
 from arena.studies.queries import study_named
-from arena.studies.services.outlook import ESTIMATE_INPUTS, StudyEstimate, forecast, known_of
+from arena.studies.services.outlook import (
+    ESTIMATE_INPUTS,
+    Prospect,
+    StudyEstimate,
+    foretell,
+    known_of,
+)
 from augment.errors import AugmentError
 from augment.services.inputs import add_options, check_bounds
 from augment.services.terminal import TerminalCommand
@@ -31,19 +37,24 @@ class Command(TerminalCommand):
         estimate = StudyEstimate(**known | given)
         try:
             check_bounds(estimate)
-            goals = forecast(estimate.question())
-        except (AugmentError, ValueError) as error:
+            goals = foretell(estimate)
+        except AugmentError as error:
             raise CommandError(str(error)) from error
         for name, value in asdict(estimate).items():
             origin = "given" if name in given else "known" if name in known else "guessed"
             if value is not None:
                 self.stdout.write(f"{name.replace('_', ' ')}: {value:g} ({origin})")
+        self.stdout.write("")
         for goal in goals:
-            self.stdout.write(f"\n{goal.title}: {goal.obstacle if goal.prospect is None else ''}")
-            if plan := goal.prospect:
-                self.stdout.write(
-                    f"{plan.votes_per_expert:,} votes per expert, {plan.votes:,} in all, "
-                    f"{plan.minutes:.0f} minutes each; intervals ±{plan.half_width:.0f}, the "
-                    f"widest ±{plan.widest:.0f}; told apart from {plan.gap:.0f} points on; "
-                    f"{plan.judged_twice:,} pairs judged by two."
-                )
+            found = goal.prospect
+            text = goal.obstacle if found is None else _line(found, estimate.power)
+            self.stdout.write(f"{goal.text}: {text}")
+
+
+def _line(found: Prospect, power: float) -> str:
+    return (
+        f"{found.votes_per_expert:,} votes per expert, {found.votes:,} in all, "
+        f"{found.minutes:.0f} minutes each; intervals ±{found.half_width:.0f}, the widest "
+        f"±{found.widest:.0f}; told apart from {found.gap:.0f} points on with a chance of "
+        f"{power:g} %."
+    )

@@ -11,7 +11,7 @@ from arena.models import Study
 from arena.site.access import STAFF, allow_only, user_of
 from arena.site.acts import refusals_told
 from arena.studies.forms import PlanningForm
-from arena.studies.services.outlook import ESTIMATE_INPUTS, StudyEstimate, forecast, known_of
+from arena.studies.services.outlook import ESTIMATE_INPUTS, StudyEstimate, foretell, known_of
 
 
 @allow_only(*STAFF)
@@ -28,5 +28,5 @@ def planning_page(request: HttpRequest) -> HttpResponse:
     form = PlanningForm(values)
     context: dict[str, Any] = {"form": form, "study": study, "studies": Study.objects.all()}
     if form.is_valid():
-        context["goals"] = forecast(StudyEstimate(**form.cleaned_data).question())
+        context["goals"] = foretell(StudyEstimate(**form.cleaned_data))
     return render(request, "studies/plan.html", context, status=422 if form.errors else 200)
