@@ -114,14 +114,10 @@ class EstimateLineDocument(serializers.Serializer[Any]):
     calls = serializers.ListField(
         child=serializers.IntegerField(), help_text="At least, as expected, at most."
     )
-    tokens_in = serializers.IntegerField()
-    tokens_out = serializers.IntegerField()
+    tokens_in = serializers.IntegerField(allow_null=True)
+    tokens_out = serializers.IntegerField(allow_null=True)
     usd = serializers.DecimalField(None, 9, allow_null=True)
-    usd_most = serializers.DecimalField(None, 9, allow_null=True)
-    seen = serializers.IntegerField(
-        help_text="Earlier augmentations that it rests on; 0 for a guess."
-    )
-    answered = serializers.IntegerField(help_text="Rows whose answers are in the store already.")
+    seen = serializers.IntegerField(help_text="Earlier augmentations that it rests on.")
 
 
 class EstimateDocument(serializers.Serializer[Any]):
@@ -134,8 +130,6 @@ class EstimateDocument(serializers.Serializer[Any]):
     tokens_in = serializers.IntegerField()
     tokens_out = serializers.IntegerField()
     usd = serializers.DecimalField(None, 9)
-    usd_most = serializers.DecimalField(None, 9)
-    answered = serializers.IntegerField(help_text="Rows whose answers are in the store already.")
     lines = EstimateLineDocument(many=True)
 
 
@@ -199,7 +193,7 @@ class EstimateView(ApiView):
     def post(self, given: Given) -> Any:
         """What a job would use.
 
-        From recorded calls where there are some, else a guess.
+        From recorded calls; null where there are none, or no price.
         """
         return estimate(JobScope(**given))
 

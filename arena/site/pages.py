@@ -54,7 +54,7 @@ def home(request: HttpRequest) -> HttpResponse:
 
 def _expert(request: HttpRequest) -> HttpResponse:
     expert = user_of(request)
-    lines = studies.of_expert(expert)
+    lines = studies.progress_of(studies.listed_studies(expert), expert)
     closed = [line for line in lines if line.study.state == Study.State.CLOSED]
     is_open = [line for line in lines if line.study.state == Study.State.OPEN]
     context = {
@@ -72,7 +72,7 @@ def _expert(request: HttpRequest) -> HttpResponse:
 
 
 def _analyst(request: HttpRequest) -> HttpResponse:
-    lines = studies.of_studies()
+    lines = studies.progress_of(studies.listed_studies())
     context = {
         "running": [line for line in lines if line.study.state == Study.State.OPEN],
         "closed": [line for line in lines if line.study.state == Study.State.CLOSED],
@@ -86,7 +86,7 @@ def _admin(request: HttpRequest) -> HttpResponse:
         "inventory": inventory,
         "steps": list_steps(inventory),
         "jobs": count_each(list(GenerationJob.objects.all()[:LATEST_JOBS])),
-        "running": [line for line in studies.of_studies() if line.study.state == Study.State.OPEN],
+        "running": studies.progress_of(studies.listed_studies().filter(state=Study.State.OPEN)),
     }
     return render(request, "home/admin.html", context)
 

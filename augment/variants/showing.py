@@ -8,7 +8,7 @@ counts them too.
 import json
 import math
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from augment.llm.messages import Message
@@ -28,9 +28,6 @@ EXAMPLE_QUESTIONS = (
     "Between which grid lines is the centre of each blue object?",
 )
 """Shown to a viewer where no engineer has asked."""
-
-PROGRAM_TOKENS = 2_000
-"""What the program says between two answers: results of calls, problems, feedback."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -65,14 +62,6 @@ class CallRange:
     least: int
     usual: int
     most: int
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class TokenUse:
-    """Tokens of one role in one augmentation."""
-
-    prompt: int
-    completion: int
 
 
 def shown_prompt(
@@ -123,29 +112,3 @@ def calls_of(recipe: Recipe) -> dict[ModelRole, CallRange]:
     for role, asked in Counter(recipe.review.asks if recipe.review else ()).items():
         calls[role] = CallRange(least=asked, usual=asked, most=asked * rounds * again)
     return calls
-
-
-def most_tokens(recipe: Recipe, first: Mapping[ModelRole, int]) -> dict[ModelRole, TokenUse]:
-    """Return the tokens of conversations in which every answer reaches its length limit.
-
-    Args:
-        recipe: The variant.
-        first: At most so many tokens has the first prompt of each role.
-    """
-    limits = recipe.limits
-    # A cut-off answer is asked for again with twice the room.
-    longest = limits.max_output_tokens * (2 if limits.re_asks else 1)
-    turn = longest + PROGRAM_TOKENS
-    by_role = {}
-    for role, calls in calls_of(recipe).items():
-        # The modifier's conversation goes on through all rounds; a review is one of its own, and
-        # holds what the others said of the round.
-        talks, start = recipe.rounds, first[role] + turn
-        if role is ModelRole.MODIFIER:
-            talks, start = 1, first[role]
-        turns = calls.most // talks
-        by_role[role] = TokenUse(
-            prompt=talks * (turns * start + turn * turns * (turns - 1) // 2),
-            completion=calls.most * longest,
-        )
-    return by_role

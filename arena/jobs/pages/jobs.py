@@ -77,7 +77,7 @@ def job_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         "shown_causes": progress.SHOWN,
     }
     if counts.is_moving:  # a page that reloads every two seconds measures nothing
-        context |= {"workforce": workforce(), "pace": progress.pace_of(counts)}
+        context["workforce"] = workforce()
     elif counts.total <= MEASURED_AT_ONCE or _ASK_TO_MEASURE & request.GET.keys():
         context |= _measure(request, job)
     else:

@@ -1,7 +1,7 @@
 """The page of a new job: choose, see what it would use, try one scenario first, launch."""
 
 import uuid
-from dataclasses import asdict, replace
+from dataclasses import replace
 from decimal import Decimal
 from typing import Any
 
@@ -17,7 +17,6 @@ from arena.scenarios.queries import by_type, set_asked, set_choices
 from arena.site.access import ADMIN, allow_only, user_of
 from arena.site.acts import refusals_in, send_later
 from arena.site.forms import ChoiceForm, Offer, offer
-from augment.errors import AugmentError, Conflict
 from augment.models import Contestant, EndpointModel, GenerationJob
 from augment.services.endpoints.contestants import OPTION_INPUTS
 from augment.services.endpoints.known_endpoints import is_key_here
@@ -25,17 +24,9 @@ from augment.services.inputs import inputs_of, read_request, read_values
 from augment.services.running.choosing import find_obstacle, keys_missing
 from augment.services.running.estimates import JobEstimate, estimate
 from augment.services.running.jobs import JobRequest, JobScope, launch
-from augment.services.running.matrix import (
-    ChosenCells,
-    add_cells,
-    matrix_of,
-    matrix_text,
-    read_cells,
-    read_matrix,
-)
+from augment.services.running.matrix import add_cells, find_cells, matrix_of
 from augment.tasks import enqueue_job
 
-LONGEST_FILE = 1_000_000
 LONGEST_NAME = 120
 
 
@@ -50,10 +41,10 @@ class LaunchForm(ChoiceForm, OptionsForm):
         super().__init__(*args, **kwargs)
         self.models = models
         self.matrix = matrix_of(models)
-        keys = [cell.key for row in self.matrix for cell, obstacle in row.cells if not obstacle]
+        keys = [cell.key for row in self.matrix for cell in row.cells if not cell.obstacle]
         offer(self, "cells", [(key, key) for key in keys])
         self.fields["samples"].required = False
-        self.cells_chosen = ChosenCells()
+        self.cells_chosen: list[Contestant] = []
 
     def clean_samples(self) -> int:
         """Return 1 for an empty field."""
@@ -65,7 +56,7 @@ class LaunchForm(ChoiceForm, OptionsForm):
         if not (cleaned.get("contestants") or cleaned.get("cells")):
             self.add_error("contestants", "Choose at least one contestant.")
         with refusals_in(self):
-            self.cells_chosen = read_cells(
+            self.cells_chosen = find_cells(
                 cleaned.get("cells", []), read_values(OPTION_INPUTS, cleaned)
             )
         return cleaned
@@ -94,7 +85,7 @@ class LaunchForm(ChoiceForm, OptionsForm):
     def chosen_rows(self) -> list[Contestant]:
         """Return whoever is chosen, each once; those of cells may not be stored yet."""
         named = Contestant.objects.filter(slug__in=self.cleaned_data.get("contestants", []))
-        rows = [*named.select_related("endpoint"), *self.cells_chosen.contestants()]
+        rows = [*named.select_related("endpoint"), *self.cells_chosen]
         return list({row.slug: row for row in rows}.values())
 
     def estimated(self) -> JobEstimate | None:
@@ -112,11 +103,7 @@ class LaunchForm(ChoiceForm, OptionsForm):
 @require_http_methods(["GET", "HEAD", "POST"])
 def new_job_page(request: HttpRequest) -> HttpResponse:
     """Choose contestants and scenarios, then launch."""
-    if "read" in request.POST:
-        return _read_file(request)
     form = _form(request, request.POST or None, initial=_like(request))
-    if "matrix" in request.POST:
-        return _matrix_file(request, form)
     if "estimate" in request.POST:
         return _estimated(request, form)
     if form.is_bound and form.is_valid():
@@ -176,51 +163,8 @@ def _estimated(request: HttpRequest, form: LaunchForm) -> HttpResponse:
     """Show the form as it came in, with what the job would use; nothing is launched."""
     more: dict[str, Any] = {}
     with refusals_in(form):
-        estimate, cap = form.estimated(), form.cleaned_data.get("cap_usd")
-        more = {"estimate": estimate, "cap_usd": cap}
-        if estimate is not None and cap is not None:
-            more["rows_within"] = estimate.rows_within(cap)
+        more = {"estimate": form.estimated(), "cap_usd": form.cleaned_data.get("cap_usd")}
     return _page(request, form, **more)
-
-
-def _matrix_file(request: HttpRequest, form: LaunchForm) -> HttpResponse:
-    """Answer with what is chosen as a file for `generate --matrix`, which needs no name."""
-    form.is_valid()
-    form.errors.pop("name", None)
-    if form.errors:
-        return _page(request, form, status=422)
-    text = matrix_text(
-        form.chosen_rows(),
-        form.cleaned_data["scenarios"],
-        samples=form.cleaned_data["samples"],
-        name=form.cleaned_data.get("name", ""),
-    )
-    return HttpResponse(
-        text,
-        content_type="application/yaml; charset=utf-8",
-        headers={"Content-Disposition": 'attachment; filename="matrix.yaml"'},
-    )
-
-
-def _read_file(request: HttpRequest) -> HttpResponse:
-    """Fill in the form from a matrix file; contestants that it has in full are made."""
-    file = request.FILES.get("file")
-    try:
-        if file is None:
-            raise Conflict("Choose a matrix file.")
-        if file.size is None or file.size > LONGEST_FILE:
-            raise Conflict("The file is too long for a matrix: at most 1 MB.")
-        matrix = read_matrix(file.read().decode(), actor=user_of(request))
-    except UnicodeDecodeError:
-        problem = "The file is not UTF-8."
-    except AugmentError as error:
-        problem = str(error)
-    else:
-        for slug in matrix.made:
-            messages.success(request, f"“{slug}” is added.")
-        initial = asdict(matrix.scope) | {"name": matrix.name}
-        return _page(request, _form(request, None, initial=initial))
-    return _page(request, _form(request, None), status=422, file_problem=problem)
 
 
 def _launch(request: HttpRequest, form: LaunchForm) -> GenerationJob:
