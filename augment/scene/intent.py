@@ -133,6 +133,11 @@ class Relation(StrEnum):
     AHEAD = "ahead"
     BEHIND = "behind"
 
+    @property
+    def words(self) -> str:
+        """Between a place and what it is counted from."""
+        return "ahead of" if self is Relation.AHEAD else "behind"
+
 
 class LaneChoice(StrEnum):
     """A lane by its place beside the ego's."""
@@ -189,10 +194,9 @@ class Pick:
 
     def __str__(self) -> str:
         kind = f"every {self.kind}" if self.every else f"{self.kind} {self.ordinal}"
-        where = "ahead of" if self.relation is Relation.AHEAD else "behind"
         side = f", on its {self.side}" if self.side else ""
         lane = f", in the {self.lane} lane" if self.lane else ""
-        return f"{kind} {where} the ego{side}{lane}"
+        return f"{kind} {self.relation.words} the ego{side}{lane}"
 
 
 MOST_REQUESTS = 20

@@ -184,7 +184,7 @@ def test_statements_are_short_and_name_what_they_are_about() -> None:
     assert [str(one) for one in list_statements(intent)] == [
         "bus: number 1",
         "bus: 20 m ahead of the ego",
-        "bus: in the ego's lane",
+        "bus: in the own lane",
         "bus: 1.1 m from the lane centre towards the left lane boundary",
         "bus: stands",
         "pedestrian: number 1",

@@ -10,14 +10,15 @@ from django.urls import reverse
 from django.views.decorators.http import require_safe
 
 from arena.models import Study
-from arena.rating.planning import Prospect, Question, Wish, foretell
 from arena.site.access import STAFF, allow_only, user_of
 from arena.studies.forms import PlanningForm
 from arena.studies.pages.setup import study_asked
 from arena.studies.services.outlook import (
     ESTIMATE_INPUTS,
     Known,
+    Prospect,
     StudyEstimate,
+    foretell,
     known_of,
     usual_seconds,
 )
@@ -55,61 +56,17 @@ def planning_page(request: HttpRequest) -> HttpResponse:
         "parts": [(title, [form[name] for name in names]) for title, names in PARTS.items()],
     }
     if form.is_valid():
-        question = StudyEstimate(**form.cleaned_data).question()
-        context["lines"] = _lines(question, form.cleaned_data, study)
+        context["lines"] = [
+            {"goal": goal, "address": _new_study(goal.prospect, form.cleaned_data, study)}
+            for goal in foretell(StudyEstimate(**form.cleaned_data))
+        ]
         context["power"] = f"{form.cleaned_data['power']:g}"
     return render(request, "studies/plan.html", context, status=422 if form.errors else 200)
 
 
-def _lines(
-    question: Question, entered: dict[str, Any], study: Study | None
-) -> list[dict[str, Any]]:
-    """Return each goal with what it takes, or why it can't be reached."""
-    outlook = foretell(question)
-    narrow, apart = outlook.narrow, outlook.apart
-    goals: list[tuple[str, Prospect | None, str]] = [
-        (
-            f"Expected widest interval ±{question.half_width:g}",
-            narrow.prospect,
-            f"it is ±{narrow.most.widest:.0f}. {_needed(question, narrow)}",
-        ),
-        (
-            f"Two that differ by {question.gap:g} told apart",
-            apart.prospect,
-            f"{apart.most.gap:.0f} points can be told apart. {_needed(question, apart)}",
-        ),
-    ]
-    if outlook.in_mind is not None:
-        goals.append(("Votes in mind", outlook.in_mind, ""))
-    unreached = "No number of votes reaches it: with every pair judged by everybody "
-    return [
-        {
-            "goal": goal,
-            "prospect": prospect,
-            "obstacle": unreached + why,
-            "address": _new_study(prospect, entered, study) if prospect else "",
-        }
-        for goal, prospect, why in goals
-    ]
-
-
-def _needed(question: Question, wish: Wish) -> str:
-    """Return what would reach a wish that no number of votes reaches."""
-    texts = []
-    if wish.experts is not None:
-        texts.append(
-            f"On {question.design.scenarios} scenarios it takes {wish.experts} experts or more."
-        )
-    if wish.scenarios is not None:
-        texts.append(
-            f"With {question.design.experts} experts it takes {wish.scenarios} scenarios or more."
-        )
-    return " ".join(texts) or "It takes more experts and more scenarios."
-
-
-def _new_study(prospect: Prospect, entered: dict[str, Any], study: Study | None) -> str:
+def _new_study(prospect: Prospect | None, entered: dict[str, Any], study: Study | None) -> str:
     """Return the address of the form of a new study with so many votes."""
-    if prospect.votes_per_expert > 10_000:
+    if prospect is None or prospect.votes_per_expert > 10_000:
         return ""
     values: dict[str, Any] = {"votes_per_expert": prospect.votes_per_expert}
     values |= {name: f"{entered[name]:g}" for name in ON_TOP}
