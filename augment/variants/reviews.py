@@ -6,10 +6,11 @@ decides. Geometric, our own: the deterministic checks speak, no model does; wher
 an intent they are held against it as well.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import partial
+from typing import Any
 
 from augment.checks import Ground, Severity
 from augment.checks.registry import check_against_intent
@@ -20,7 +21,7 @@ from augment.prompts.reply import read_questions, read_ratings, read_sight, read
 from augment.prompts.vectors import DEFAULT_RADIUS_M, short_names
 from augment.render.bev import draw_for_review
 from augment.render.camera import WIDTH_PX, camera_for
-from augment.scene.entities import Modification, Scene
+from augment.scene.entities import Lane, LaneConnector, Modification, Scene, TrafficAgent
 from augment.scene.intent import Intent
 from augment.variants.respondents import ModelRole, Respondents
 
@@ -123,7 +124,7 @@ def review_text(submission: Submission) -> Verdict:
         ModelFault: The wire broke for good.
     """
     accepted_from = submission.limits.accepted_from
-    messages = _review_messages(fill.reviewer_messages, submission)
+    messages = _review_messages(ModelRole.REVIEWER, submission)
     reader = partial(read_ratings, accepted_from=accepted_from)
     with _unusable("the reviewer"):
         review, _, _ = submission.respondents.read(ModelRole.REVIEWER, messages, reader)
@@ -157,7 +158,7 @@ def review_picture(submission: Submission) -> Verdict:
         ModelFault: The wire broke for good.
     """
     read = submission.respondents.read
-    messages = _review_messages(fill.engineer_messages, submission)
+    messages = _review_messages(ModelRole.ENGINEER, submission)
     with _unusable("a reviewer"):
         questions, asked, reply = read(ModelRole.ENGINEER, messages, read_questions)
         shown = pictures(
@@ -167,7 +168,7 @@ def review_picture(submission: Submission) -> Verdict:
             ModelRole.VIEWER,
             fill.viewer_messages(questions, shown),
             partial(read_sight, count=len(questions)),
-            again=fill.viewer_re_ask_messages,
+            again=partial(fill.review_re_ask_messages, text="viewer_re_ask.md"),
         )
         talk = (*asked, fill.model_message(reply.text))
         messages = fill.verdict_messages(talk, questions, seen)
@@ -235,7 +236,8 @@ def pictures(
     The ids are those of the engineer's vectors; the window depends on the scene and on what is
     reviewed, never on a reference.
     """
-    shown, change = _under_short_names(scene, modification)
+    names = short_names(scene)
+    shown, change = (_rename(one, names.agents | names.lanes) for one in (scene, modification))
     return draw_for_review(shown, change, camera_for(shown, change).at_width(width_px))
 
 
@@ -254,10 +256,9 @@ GEOMETRIC_REVIEW = Review(name="geometric", judge=review_geometry)
 # Private
 
 
-def _review_messages(
-    messages: Callable[..., fill.Messages], submission: Submission
-) -> fill.Messages:
-    return messages(
+def _review_messages(role: ModelRole, submission: Submission) -> fill.Messages:
+    return fill.review_messages(
+        role,
         submission.scene,
         submission.instruction,
         submission.modification,
@@ -277,40 +278,13 @@ def _unusable(who: str) -> Iterator[None]:
         raise ReviewUnusable(f"{who} declined: {refused}") from refused
 
 
-def _under_short_names(scene: Scene, modification: Modification) -> tuple[Scene, Modification]:
-    """Return both under the ids that the prompts use."""
-    names = short_names(scene)
-
-    def lane_id(name: str | None) -> str | None:
-        return names.lanes.get(name or "")
-
-    shown = replace(
-        scene,
-        ego=replace(scene.ego, id=names.agents[scene.ego.id]),
-        agents=tuple(replace(agent, id=names.agents[agent.id]) for agent in scene.agents),
-        lanes=tuple(
-            replace(
-                lane,
-                id=names.lanes[lane.id],
-                left_neighbor=lane_id(lane.left_neighbor),
-                right_neighbor=lane_id(lane.right_neighbor),
-                successors=tuple(names.lanes[n] for n in lane.successors if n in names.lanes),
-            )
-            for lane in scene.lanes
-        ),
-        connectors=tuple(
-            replace(
-                connector,
-                id=names.lanes[connector.id],
-                from_lane=lane_id(connector.from_lane),
-                to_lane=lane_id(connector.to_lane),
-            )
-            for connector in scene.connectors
-        ),
-    )
-    change = Modification(
-        added=modification.added,
-        moved=tuple(replace(agent, id=names.agents[agent.id]) for agent in modification.moved),
-        removed=tuple(names.agents[name] for name in modification.removed),
-    )
-    return shown, change
+def _rename(value: Any, names: Mapping[str, str]) -> Any:
+    """Return a value of a scene with other ids wherever these stand in it."""
+    if isinstance(value, str):
+        return names.get(value, value)
+    if isinstance(value, tuple):
+        return tuple(_rename(one, names) for one in value)
+    if isinstance(value, Scene | Modification | TrafficAgent | Lane | LaneConnector):
+        parts = {part.name: getattr(value, part.name) for part in fields(value)}
+        return replace(value, **{name: _rename(part, names) for name, part in parts.items()})
+    return value
