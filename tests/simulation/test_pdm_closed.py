@@ -15,12 +15,13 @@ from augment.simulation.pdm_closed import (
     PAPER_OFFSETS_M,
     PROPOSAL_IDM,
     PdmClosed,
+    ProposalScores,
     brake,
     must_brake,
+    score_proposals,
 )
-from augment.simulation.planners import PLANNER_IDM, planner_named
-from augment.simulation.planning import Idm, Plan, Situation, foresee
-from augment.simulation.proposal_scores import ProposalScores, score_proposals
+from augment.simulation.planners import planner_named
+from augment.simulation.planning import PLANNER_IDM, Idm, Plan, Situation, foresee
 from augment.simulation.road import Road
 from augment.simulation.states import (
     FloatArray,
