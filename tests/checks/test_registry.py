@@ -22,9 +22,9 @@ from augment.scene.entities import (
     TrafficAgent,
     TrafficSide,
 )
-from tests.checks.worlds import Reference, moved_agent, moved_scene, references, severities
+from tests.checks.worlds import Reference, references, severities
 from tests.recorded import recorded
-from tests.scenes import cone, curve, junction, scene, vehicle
+from tests.scenes import cone, curve, junction, moved_agent, moved_scene, scene, vehicle
 
 WORLDS = (
     scene(),

@@ -8,7 +8,7 @@ import shapely
 from hypothesis import given
 from hypothesis import strategies as st
 
-from augment.simulation.path import Path, Region, dense
+from augment.simulation.path import Path, dense
 from augment.simulation.states import EgoBody, FloatArray, corners, meet
 from augment.simulation.tracker import track
 from tests.properties import examples
@@ -156,17 +156,6 @@ def test_boxes_meet_where_their_polygons_do(pairs: list[tuple[tuple[float, ...],
     clear = np.abs(shapely.distance(a, b) - 1e-9) > 1e-9  # nobody argues about rounding
     clear |= shapely.area(shapely.intersection(a, b)) > 1e-9
     assert (meet(first, second) == shapely.intersects(a, b))[clear].all()
-
-
-@examples(25)
-@given(st.integers(0, 2**32 - 1))
-def test_a_region_answers_as_its_polygon_does(seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    rings = [rng.uniform(-20.0, 20.0, (3, 2)) for _ in range(4)]
-    ground = shapely.union_all([shapely.Polygon(ring) for ring in rings])
-    points = rng.uniform(-25.0, 25.0, (40, 10, 2))
-    found = Region(ground).contains(points)
-    assert (found == shapely.contains_xy(ground, points[..., 0], points[..., 1])).all()
 
 
 @examples(25)
