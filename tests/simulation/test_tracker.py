@@ -41,28 +41,6 @@ def bent(speed_mps: float, curvature: float, gain_mps2: float = 0.0) -> FloatArr
     return np.array(poses)
 
 
-def test_the_speed_follows_the_closed_form_through_the_pedals_lag() -> None:
-    states = follow(straight(8.0), (0.0, 0.0, 0.0, 5.0))
-    speed, pull = 5.0, 0.0
-    for state in states:
-        assert state[3] == pytest.approx(speed, abs=1e-9)
-        assert state[4] == pytest.approx(pull, abs=1e-9)
-        command = 10.0 * (8.0 - speed) / 11.0
-        pull += DT / (DT + 0.2) * (command - pull)
-        speed += pull * DT
-
-
-def test_the_first_steering_rate_is_the_closed_form_of_the_lateral_error() -> None:
-    # With a speed that stays, the error after ten steps is e0 + b_e * rate, the heading error
-    # b_h * rate, where b_h = (v dt dt / L) * 45 and b_e = (v dt)^2 dt / L * sum of j (9 - j).
-    speed, offset = 8.0, 0.5
-    states = follow(straight(speed), (0.0, offset, 0.0, speed))
-    by_heading = speed * DT * DT / BODY.wheelbase_m * 45.0
-    by_offset = (speed * DT) ** 2 * DT / BODY.wheelbase_m * sum(j * (9 - j) for j in range(10))
-    rate = -by_offset * offset / (by_offset**2 + 10.0 * by_heading**2 + 1.0)
-    assert states[1, 5] == pytest.approx(DT / (DT + 0.05) * rate * DT, rel=1e-9)
-
-
 def test_at_walking_pace_the_stopping_controller_takes_half_the_missing_speed() -> None:
     slow = follow(straight(0.0), (0.0, 0.0, 0.0, 0.2))
     assert slow[1, 4] == pytest.approx(-0.5 * 0.2 / 3.0, rel=1e-6)
