@@ -23,7 +23,7 @@ import numpy as np
 
 from augment.checks import Ground
 from augment.errors import ToolError
-from augment.geometry.bezier import CubicBezier, FitError
+from augment.geometry.bezier import CubicBezier
 from augment.geometry.frames import Box, Pose, overlap
 from augment.prompts.calls import PARAMETERS, TOOL
 from augment.prompts.vectors import (
@@ -35,7 +35,7 @@ from augment.prompts.vectors import (
     short_names,
     shown_agents,
 )
-from augment.scene.bezier_lanes import BezierLane, LanePiece
+from augment.scene.bezier_lanes import LanePiece
 from augment.scene.entities import LENGTH_WIDTH_M, AgentType, Scene, TrafficAgent
 
 LANE_START = "lane"
@@ -58,7 +58,7 @@ _TOUCH_M = 0.01
 _SEARCHED_M, _STEP_M = 50.0, 0.5
 _MOST_LISTED = 80
 
-AnyLine = LaneCurve | BezierLane
+AnyLine = LaneCurve | CubicBezier
 """What a call goes along: a shown lane, or a curve of the model's own."""
 
 
@@ -249,7 +249,7 @@ class PoseTool:
         return {
             name: (curve, piece)
             for curve in self.curves.values()
-            for name, piece in zip(curve.pieces, curve.lane.pieces, strict=True)
+            for name, piece in zip(curve.pieces, curve.lane, strict=True)
         }
 
     @cached_property
@@ -268,9 +268,7 @@ class PoseTool:
             for curve, piece in self._pieces.values():
                 if np.abs(piece.curve.control_m - lane.control_m).max() <= COPIED_WITHIN_M:
                     return curve, piece.start_m
-            exact = FitError(position_m=0.0, heading_rad=0.0)
-            piece = LanePiece(curve=lane, start_m=0.0, end_m=lane.length_m, error=exact)
-            return BezierLane(pieces=(piece,)), 0.0
+            return lane, 0.0
         if lane in self.curves:
             return self.curves[lane], 0.0
         if lane in self._pieces:
