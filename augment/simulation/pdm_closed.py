@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from augment.simulation import shapes
 from augment.simulation.comfort import PROPOSAL, comfort_signals, is_comfortable
 from augment.simulation.planning import (
     FALLBACK_LIMIT_MPS,
@@ -40,12 +41,7 @@ from augment.simulation.states import (
     X,
     Y,
     are_at_fault,
-    bearings,
     classify_contacts,
-    corners,
-    meet,
-    moved_ahead,
-    radii,
 )
 from augment.simulation.tracker import track
 
@@ -86,7 +82,7 @@ def brake(ego: FloatArray, body: EgoBody) -> FloatArray:
     if speed > _LOW_MPS:
         commanded *= 1.1
     way_m = commanded * STEP_S * np.arange(WHOLE_STEPS + 1)
-    return moved_ahead(np.tile(body.boxes(ego), (len(way_m), 1)), way_m)
+    return shapes.moved_ahead(np.tile(body.boxes(ego), (len(way_m), 1)), way_m)
 
 
 class PdmClosed:
@@ -138,7 +134,7 @@ class PdmClosed:
         """The objects that count: near, and not touching the ego since some step."""
         box = self._body.boxes(situation.ego)
         near = nearest(situation.objects, box[:2])
-        touching = meet(np.broadcast_to(box, near.boxes.shape), near.boxes)
+        touching = shapes.meet(box, near.boxes)
         self._touched |= {name for name, hit in zip(near.ids, touching, strict=True) if hit}
         return near.chosen(np.array([name not in self._touched for name in near.ids], dtype=bool))
 
@@ -256,20 +252,20 @@ class _Look:
     def __init__(self, states: FloatArray, forecast: Forecast, road: Road, body: EgoBody) -> None:
         self.states, self.road, self.body = states, road, body
         self.boxes = body.boxes(states)
-        self.corners = corners(self.boxes)
+        self.corners = shapes.corners(self.boxes)
         self.off_road: BoolArray = np.any(~road.drivable.contains(self.corners), axis=-1)
         self.objects, self.moving_boxes = forecast.objects, forecast.boxes
-        self._sizes = radii(forecast.boxes[0])
+        self._sizes = shapes.radii(forecast.boxes[0])
 
     def contacts(self, boxes: FloatArray, later: int) -> tuple[IntArray, IntArray, IntArray]:
         """Proposal, moment and object (K,) where boxes (B, T, 5), `later` steps on, meet."""
         moments = (np.arange(boxes.shape[1]) + later) // STEPS_A_SLICE
         others = self.moving_boxes[np.minimum(moments, len(self.moving_boxes) - 1)]
-        reach = (self._sizes + radii(boxes[0, 0])) ** 2
+        reach = (self._sizes + shapes.radii(boxes[0, 0])) ** 2
         dx = boxes[..., None, 0] - others[None, ..., 0]
         dy = boxes[..., None, 1] - others[None, ..., 1]
         proposal, moment, thing = np.nonzero(dx * dx + dy * dy <= reach)
-        hit = meet(boxes[proposal, moment], others[moment, thing])
+        hit = shapes.meet(boxes[proposal, moment], others[moment, thing])
         return proposal[hit], moment[hit], thing[hit]
 
     def astray(self, proposal: IntArray, moment: IntArray) -> BoolArray:
@@ -337,7 +333,7 @@ def _time_to_collision(look: _Look) -> FloatArray:
     proposal, moment, thing, later = (row[first] for row in (proposal, moment, thing, later))
     moments = np.minimum((moment + later) // STEPS_A_SLICE, len(look.moving_boxes) - 1)
     places = look.moving_boxes[moments, thing, :2]
-    bearing = bearings(look.states[proposal, moment], places)
+    bearing = shapes.bearings(look.states[proposal, moment], places)
     made[proposal[bearing < AHEAD_RAD]] = 0.0
     beside = (bearing >= AHEAD_RAD) & (bearing <= BEHIND_RAD) & (made[proposal] > 0.0)
     proposal, moment = proposal[beside], moment[beside]
@@ -350,7 +346,7 @@ def _time_to_collision(look: _Look) -> FloatArray:
 def _meetings(look: _Look, later: int) -> IntArray:
     """Proposal, moment, object and steps (4, K) of who meets if the ego goes straight on."""
     boxes, speed = look.boxes.copy(), look.states[..., SPEED]
-    boxes[..., :3] = moved_ahead(boxes, speed * (later * STEP_S))
+    boxes[..., :3] = shapes.moved_ahead(boxes, speed * (later * STEP_S))
     proposal, moment, thing = look.contacts(boxes, later)
     meetings = np.stack([proposal, moment, thing, np.full(len(proposal), later)])
     return meetings[:, speed[proposal, moment] > _STILL_MPS]

@@ -15,9 +15,10 @@ from typing import Protocol, runtime_checkable
 
 import numpy as np
 
+from augment.simulation import shapes
 from augment.simulation.path import Path
 from augment.simulation.road import Road
-from augment.simulation.states import SPEED, STEP_S, EgoBody, FloatArray, Kind, Objects, corners
+from augment.simulation.states import SPEED, STEP_S, EgoBody, FloatArray, Kind, Objects
 
 FALLBACK_LIMIT_MPS = 15.0
 SLICE_S = 0.2
@@ -210,7 +211,7 @@ class ParallelPaths:
         near &= (middle[..., 0] > ego_m - _BEHIND_M) & (middle[..., 0] < ego_m + reach_m + size)
         kept = np.flatnonzero(near.any(axis=0))
         boxes, middle = boxes[:, kept], middle[:, kept]
-        edges = self._beside(corners(boxes))
+        edges = self._beside(shapes.corners(boxes))
         low, high = edges[..., 1].min(axis=-1), edges[..., 1].max(axis=-1)
         meets = low[:, None] <= self._offsets[:, None] + body.width_m / 2.0
         meets &= high[:, None] >= self._offsets[:, None] - body.width_m / 2.0

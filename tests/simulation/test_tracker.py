@@ -9,7 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from augment.simulation.path import Path, dense
-from augment.simulation.states import EgoBody, FloatArray, corners, meet
+from augment.simulation.shapes import corners, meet
+from augment.simulation.states import EgoBody, FloatArray
 from augment.simulation.tracker import track
 from tests.properties import examples
 
