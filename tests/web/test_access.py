@@ -84,7 +84,6 @@ PAGES: dict[str, tuple[int, int, int]] = {
     "study-file": (404, 404, 403),  # nothing was written yet
     "results-chart": (403, 403, 403),
     "vote": (403, 403, 404),
-    "report": (200, 403, 403),
     "vote-practice": (403, 403, 404),
     "vote-skipped": (403, 403, 404),
     "matchup-image": (200, 403, 404),
@@ -131,7 +130,6 @@ ACTIONS: dict[str, tuple[int, int, int]] = {
     "study-draft-discard": (200, 403, 403),
     "study-hand-over": (302, 403, 403),
     "labelling-close": (404, 403, 403),
-    "enrolment-drop": (404, 403, 403),
     "theme": (302, 302, 302),
     "language": (302, 302, 302),
 }

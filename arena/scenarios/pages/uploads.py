@@ -92,7 +92,7 @@ def upload_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         "upload": row,
         "maps": maps,
         "moment": moment,
-        "chosen": moment and queries.place_of(maps, item=moment.item, frame=moment.frame),
+        "chosen": moment and queries.place_of(maps, moment),
         "notes": [] if moment is None else uploads.sentences_of(moment),
         "kept": row.moments.filter(state=UploadMoment.State.KEPT).select_related("scene"),
         "look": looks_again(request, waits=waits),

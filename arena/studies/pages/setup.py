@@ -10,7 +10,7 @@ from django import forms
 from django.contrib import messages
 from django.contrib.auth.models import User
 from django.core.files.uploadedfile import UploadedFile
-from django.http import Http404, HttpRequest, HttpResponse, QueryDict
+from django.http import HttpRequest, HttpResponse, QueryDict
 from django.shortcuts import get_object_or_404, redirect, render
 from django.urls import reverse
 from django.views.decorators.http import require_http_methods, require_POST
@@ -37,9 +37,6 @@ KEEP = "keep"
 
 SUGGESTED = {"votes_per_expert": 40, "overlap": 10}
 """What a new form holds beside the defaults of a plan."""
-
-PLANNED = ("votes_per_expert", "repeats", "checks", "overlap")
-"""What the planning page hands on to a new study."""
 
 MOST_MB = 20
 """Some 200,000 votes, read while the page waits; more goes by `manage.py import_votes`."""
@@ -114,7 +111,7 @@ def draw_checks(request: HttpRequest) -> HttpResponse:
 def _set_up(request: HttpRequest, draft: StudyDraft | None) -> HttpResponse:
     if KEEP in request.POST:
         return _keep(request, draft)
-    form = _form(data=request.POST or None, initial=_initial(request, draft))
+    form = _form(data=request.POST or None, initial=_initial(draft))
     if form.is_valid() and not wants_to_change(request):
         with refusals_in(form):
             study_plan = form.study_plan()
@@ -182,29 +179,11 @@ def _revision(request: HttpRequest) -> int:
     return int(given) if given.isascii() and given.isdigit() and len(given) < 9 else 0
 
 
-def _initial(request: HttpRequest, draft: StudyDraft | None) -> dict[str, Any]:
-    """Return what the draft has, or what the address says of a study that somebody planned."""
+def _initial(draft: StudyDraft | None) -> dict[str, Any]:
+    """Return what the draft has, or what suits most studies."""
     if draft is not None:
         return dict(draft.entered)
-    initial: dict[str, Any] = SUGGESTED | {"checks": usual_checks(), "practice": has_practice()}
-    initial |= {name: request.GET[name] for name in PLANNED if request.GET.get(name)}
-    if study := study_asked(request):
-        initial["contestants"] = list(study.contestants.values_list("slug", flat=True))
-        initial["scenarios"] = list(study.scenarios.values_list("slug", flat=True))
-        initial["experts"] = list(study.experts.values_list("username", flat=True))
-    return initial
-
-
-def study_asked(request: HttpRequest) -> Study | None:
-    """Return the study whose code the address names, if it names one; or answer 404."""
-    code = request.GET.get("study")
-    if not code:
-        return None
-    try:
-        wanted = uuid.UUID(code)
-    except ValueError:
-        raise Http404 from None
-    return get_object_or_404(Study.objects.select_related("vote_file"), code=wanted)
+    return SUGGESTED | {"checks": usual_checks(), "practice": has_practice()}
 
 
 def _opening(study_plan: StudyPlan, draft: StudyDraft | None) -> Confirmation:

@@ -15,7 +15,7 @@ from django.utils.text import slugify
 from django.views.decorators.http import require_http_methods, require_POST, require_safe
 
 from arena import tasks
-from arena.models import Report, Study, StudyFile
+from arena.models import Study, StudyFile
 from arena.people.queries import by_pseudonym, experts
 from arena.results.pages.rating_form import rate_or_send
 from arena.results.queries.access import ResultsAccess, results_access
@@ -45,7 +45,6 @@ from arena.studies.services.opening import cancel_study, close_study, preregistr
 from arena.studies.services.plan import PLAN_INPUTS, plan_of
 from arena.studies.services.taking_part import hand_over
 from arena.voting.queries.ballots import tallies
-from arena.voting.queries.showings import view_shown
 from augment.services.inputs import InputKind
 
 STUDIES_AT_ONCE = 25
@@ -276,40 +275,3 @@ def _study_for(request: HttpRequest, code: uuid.UUID, kind: str) -> Study:
     if kind in SHOWS_RESULTS and access is not ResultsAccess.FULL:
         raise PermissionDenied
     return study
-
-
-# --- Reports -----------------------------------------------------------------------------------
-
-
-@allow_only(ADMIN)
-@require_safe
-def report_page(request: HttpRequest, code: uuid.UUID, key: uuid.UUID) -> HttpResponse:
-    """One report, with both pictures as the expert saw them and the mark in them."""
-    study = get_object_or_404(Study, code=code)
-    report = get_object_or_404(queries.reports_of(study), key=key)
-    matchup, view = report.matchup, view_shown(report.matchup)
-    votes_here = study.experts.filter(pk=user_of(request).pk).exists()
-    is_blind = study.state == Study.State.OPEN and votes_here
-    sides = (
-        (Report.Side.LEFT, "A", matchup.left_token, matchup.left),
-        (Report.Side.RIGHT, "B", matchup.right_token, matchup.right),
-    )
-    context = {
-        "study": study,
-        "report": report,
-        "view": view,
-        "radius": view["width"] / 40,
-        "pictures": [
-            {
-                "letter": letter,
-                "token": token,
-                "made": None if is_blind else made,
-                "is_named": report.side in (side, Report.Side.BOTH),
-            }
-            for side, letter, token, made in sides
-        ],
-        "before": matchup.original_token if matchup.original_image else "",
-    }
-    if report.mark_x is not None and report.mark_y is not None:
-        context["mark"] = (report.mark_x * view["width"], report.mark_y * view["height"])
-    return render(request, "studies/report.html", context)

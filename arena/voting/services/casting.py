@@ -143,7 +143,7 @@ def receive_vote(*, expert: User, decision: Decision, ahead: int = 0) -> Receive
 
     Raises:
         TooFast: The account votes faster than that; nothing was stored.
-        DatabaseBusy: It could not be written within ARENA_VOTE_WAIT_S; nothing was stored.
+        DatabaseBusy: It could not be written within VOTE_WAIT_S; nothing was stored.
         ArenaError: As in `cast_vote`.
         Conflict: As in `cast_vote`.
     """

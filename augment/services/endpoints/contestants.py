@@ -58,7 +58,7 @@ OPTION_INPUTS = tuple(
         kind=_OPTION_KINDS.get(rule.kind, InputKind.CHOICE if rule.choices else InputKind.TEXT),
         label=name.replace("_", " ").capitalize(),
         least=rule.least,
-        most=12 if rule.pattern else rule.most,
+        most=rule.most,
         choices={word: word for word in rule.choices},
         default=None,
     )
