@@ -26,7 +26,7 @@ from arena.api.views import (
     page_of,
 )
 from arena.exports.formats import download
-from arena.jobs.exports.registry import JOB_TABLES
+from arena.jobs.exports.tables import JOB_TABLES
 from augment.models import GenerationJob
 from augment.services.running import budget, jobs
 from augment.services.running.budget import Caps
@@ -251,4 +251,6 @@ class JobExportView(FileView):
         if name not in JOB_TABLES:
             raise Http404
         table, stem = JOB_TABLES[name], f"{slugify(job.name) or 'job'}-{name}"
-        return download(table.formats, form, stem, lambda: table.make(job))
+        if form not in table.formats:
+            raise Http404
+        return download(table.formats, form, stem, table.make(job))

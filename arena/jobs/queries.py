@@ -1,15 +1,13 @@
 """A part of a job's grid: so many scenarios, contestants and samples as one page can hold."""
 
-import hashlib
 from collections import defaultdict
-from collections.abc import Collection, Hashable
+from collections.abc import Collection
 from dataclasses import dataclass
 from uuid import UUID
 
 from django.contrib.auth.models import User
 from django.core.paginator import Page, Paginator
-from django.db.models import Count, Q, QuerySet, TextField
-from django.db.models.functions import Cast
+from django.db.models import Count, Q, QuerySet
 
 from arena.errors import NotYours
 from arena.models import FaultLabel, LabellingRound, LabelTask, Study
@@ -23,7 +21,6 @@ from augment.models import (
     Simulation,
 )
 from augment.services.endpoints.known_models import CONTESTANT, Spending, sum_spending
-from augment.services.judging.analyses import JobAnalysis, analyse_job
 from augment.services.judging.simulations import Options
 
 State = Augmentation.State
@@ -209,39 +206,7 @@ def model_classes(contestants: Collection[Contestant]) -> dict[int, str]:
     return {pk: name for pk, name in classes.items() if name is not None}
 
 
-def analysis_of(job: GenerationJob) -> JobAnalysis:
-    """Everything about a job; three queries, and one more where it is not kept."""
-    return _ANALYSED.get(analysed_from(job), lambda: analyse_job(job))
-
-
-def analysed_from(job: GenerationJob) -> Hashable:
-    """Another value whenever a row of the job, a scenario or a contestant of it changes.
-
-    Stored documents are compared as text, which costs a tenth of parsing them.
-    """
-    rows = job.augmentations.order_by("pk").values_list(
-        "pk", "state", "scenario", "contestant", "sample", Cast("modification", TextField())
-    )
-    mine = job.augmentations.order_by()
-    scenarios = Scenario.objects.filter(pk__in=mine.values("scenario")).order_by("pk")
-    contestants = Contestant.objects.filter(pk__in=mine.values("contestant")).order_by("pk")
-    read = (
-        rows,
-        scenarios.values_list(
-            *("pk", "slug", "paraphrase_of"),
-            *(Cast(name, TextField()) for name in ("intent", "reference")),
-        ),
-        contestants.values_list("pk", "slug", "name", "kind"),
-    )
-    found = hashlib.sha256()
-    for lines in read:
-        found.update(repr(list(lines)).encode())
-    return (job.pk, found.digest())
-
-
-# --- Private -----------------------------------------------------------------------------------
-
-_ANALYSED: Remembered[JobAnalysis] = Remembered(10)
+# --- Labellings --------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

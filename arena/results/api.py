@@ -22,24 +22,19 @@ from arena.api.views import (
     FileView,
     Given,
     RowDocument,
-    as_file,
     file_operation,
     keep_and_send,
     operation,
 )
 from arena.errors import NoSnapshot
-from arena.exports.files import CONTENT_TYPE as ZIP_TYPE
 from arena.exports.formats import download
 from arena.models import Snapshot, Study
 from arena.models.ratings import STORED
 from arena.pairing.order import MAIN, REPEAT
 from arena.rating.leaderboard import Intervals, Line, Method
 from arena.rating.rules import Unit
-from arena.results.exports.charts import CONTENT_TYPES, chart_bytes
-from arena.results.exports.tables import LeaderboardTable, leaderboard_table
-from arena.results.exports.votes import VOTE_FORMATS, vote_table
-from arena.results.exports.writers import FORMATS as LEADERBOARD
-from arena.results.exports.writers import bundle
+from arena.results.exports.tables import leaderboard_table
+from arena.results.exports.writers import RATING_FILES
 from arena.results.queries.access import must_read_results
 from arena.results.queries.votes import Filters
 from arena.results.services.ratings import DEFAULT_ROUNDS, MOST_ROUNDS, is_big, plan_snapshot
@@ -83,12 +78,8 @@ class TableDocument(serializers.Serializer[Any]):
 
     method = serializers.CharField(source="method_text")
     left_out = serializers.DictField(child=serializers.IntegerField())
-    warnings = serializers.SerializerMethodField()
+    warnings = serializers.ListField(child=serializers.CharField())
     rows = StandingDocument(many=True)
-
-    def get_warnings(self, table: LeaderboardTable) -> list[str]:
-        """Return them as sentences."""
-        return list(table.warnings)
 
 
 class SnapshotDocument(RowDocument[Snapshot]):
@@ -194,9 +185,6 @@ def get_snapshot(view: ApiView, code: uuid.UUID) -> Snapshot:
     return snapshot
 
 
-CHARTS = ("pairs", "types")
-
-
 class SnapshotExportView(FileView):
     """A rating as a file."""
 
@@ -204,15 +192,12 @@ class SnapshotExportView(FileView):
 
     @file_operation(
         types=[
-            *(one.content_type for one in LEADERBOARD.values()),
-            *(one.content_type for one in VOTE_FORMATS.values()),
-            *CONTENT_TYPES.values(),
-            ZIP_TYPE,
+            form.content_type for one in RATING_FILES.values() for form in one.formats.values()
         ],
         name="exportSnapshot",
         words={
-            "name": ["leaderboard", "votes", "all", *CHARTS],
-            "form": [*LEADERBOARD, *VOTE_FORMATS, *CONTENT_TYPES, "zip"],
+            "name": RATING_FILES,
+            "form": [form for one in RATING_FILES.values() for form in one.formats],
         },
     )
     def get(self, request: Request, code: uuid.UUID, name: str, form: str) -> HttpResponseBase:
@@ -223,21 +208,14 @@ class SnapshotExportView(FileView):
         snapshot = get_snapshot(self, code)
         if snapshot.state != Snapshot.State.READY:
             raise NoSnapshot("This rating is not ready.")
-        study = slugify(snapshot.study.name) or "study"
-        if name == "all":
-            if form != "zip":
-                raise Http404
-            return as_file(bundle(snapshot), ZIP_TYPE, f"{study}-rating.zip")
-        stem = f"{study}-{name}"
-        if name == "leaderboard":
-            return download(LEADERBOARD, form, stem, lambda: leaderboard_table(snapshot))
-        if name == "votes":
-            return download(VOTE_FORMATS, form, stem, lambda: vote_table(snapshot))
+        if name not in RATING_FILES or form not in RATING_FILES[name].formats:
+            raise Http404
         try:
-            content = chart_bytes(snapshot, name=name, file_format=form)
+            made = RATING_FILES[name].make(snapshot)
         except UnknownName as error:
             raise Http404 from error
-        return as_file(content, CONTENT_TYPES[form], f"{stem}.{form}")
+        stem = f"{slugify(snapshot.study.name) or 'study'}-{'rating' if name == 'all' else name}"
+        return download(RATING_FILES[name].formats, form, stem, made)
 
 
 # --- Private -----------------------------------------------------------------------------------

@@ -10,12 +10,13 @@ from django.contrib.auth.models import User
 from hypothesis import given
 from hypothesis import strategies as st
 
+from arena.exports.files import zip_bytes
 from arena.models import Snapshot, Study
 from arena.pairing.order import MAIN
 from arena.people.links import mark_author
 from arena.rating.leaderboard import rate as rate_votes
 from arena.rating.snapshot_document import OwnVotes
-from arena.results.exports.writers import bundle
+from arena.results.exports.writers import bundle_files
 from arena.results.queries.votes import Entrant, Filters, Judged, VoteSet
 from arena.results.services.analysis import vote_arrays
 from arena.results.services.ratings import rate_now as rate
@@ -61,7 +62,7 @@ def own_votes(snapshot: Snapshot) -> OwnVotes:
 
 
 def zipped(snapshot: Snapshot) -> dict[str, bytes]:
-    with zipfile.ZipFile(io.BytesIO(bundle(snapshot))) as archive:
+    with zipfile.ZipFile(io.BytesIO(zip_bytes(bundle_files(snapshot)))) as archive:
         return {name: archive.read(name) for name in archive.namelist()}
 
 

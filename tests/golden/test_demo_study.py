@@ -20,8 +20,8 @@ from django.core.files.storage import default_storage
 from django.utils import timezone
 from pytest_django import Settings
 
+from arena.jobs.exports.displacement import FORMATS as DISPLACEMENT
 from arena.jobs.exports.displacement import displacement_table
-from arena.jobs.exports.displacement_files import FORMATS as DISPLACEMENT
 from arena.management.demo import JOB, RATED, SIMULATED_EXPERTS, SIMULATED_STUDY, vote_and_rate
 from arena.models import Person, Study
 from arena.models.people import fresh_token

@@ -68,11 +68,6 @@ def test_the_cross_check_is_the_plain_two_way_sandwich(shown: Shown) -> None:
     kept = shown.results.board.check
     for slug, error in zip(slugs, errors, strict=True):
         assert kept[slug] == pytest.approx((rating[slug] - error, rating[slug] + error), rel=1e-5)
-    gap = max(
-        max(abs(kept[slug][0] - (line.lower or 0)), abs(kept[slug][1] - (line.upper or 0)))
-        for slug, line in shown.lines.items()
-    )
-    assert f"differ from these by at most {gap:.0f} points" in shown.said("table")
 
 
 def test_ties_and_what_is_left_out(shown: Shown) -> None:
@@ -227,16 +222,6 @@ def test_pairs_their_scores_and_adjusted_p_values(shown: Shown) -> None:
         over = sum(pair[1] == line.slug for pair in above)
         under = sum(pair[0] == line.slug for pair in above)
         assert (line.rank_best, line.rank_worst) == (1 + over, len(slugs) - under)
-    heat = [row for row in shown.rows("pairs") if len(row) == 1 + len(slugs) and row[0]]
-    order = sorted(slugs, key=lambda slug: -rating[slug])
-    for slug, cells in zip(order, heat, strict=True):
-        assert cells[0].endswith(shown.lines[slug].name)
-        for other, cell in zip(order, cells[1:], strict=True):
-            own = [vote.score_of(slug) for vote in shown.main if vote.names == {slug, other}]
-            if own:
-                percent, number = map(int, cell.split())
-                assert number == len(own)
-                assert percent == pytest.approx(100 * np.mean(own), abs=0.5 + 1e-9)
 
 
 def test_each_type_is_rated_by_its_own_votes(shown: Shown) -> None:
@@ -255,6 +240,3 @@ def test_each_type_is_rated_by_its_own_votes(shown: Shown) -> None:
             for bound, sign in ((line.lower, -1), (line.upper, 1)):
                 if bound is not None:
                     assert bound == pytest.approx(rating[line.slug] + sign * width, rel=1e-4)
-
-
-# --- Raters --------------------------------------------------------------------------------------

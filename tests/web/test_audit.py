@@ -89,7 +89,7 @@ def test_it_is_exported_as_csv_and_as_json_lines() -> None:
 # --- Early looks -------------------------------------------------------------------------------
 
 GIVES_RESULTS = re.compile(
-    r"\b(leaderboard_table|bundle|chart_bytes|vote_table|vote_list_csv|snapshot_to_export"
+    r"\b(leaderboard_table|bundle_files|RATING_FILES|vote_table|vote_list_csv|snapshot_to_export"
     r"|write_study|ask_for_study_file|unrated_votes|plan_snapshot|answer_hypotheses|known_of)\("
     r"|services\.ratings import .*\brate_now\b"
 )
@@ -137,13 +137,14 @@ def _pages(study: Study, rating: Snapshot) -> dict[str, str]:
         **{tab: reverse("results-tab", args=[code, tab]) for tab in TABS},
         "votes": reverse("results-votes", args=[code]),
         **{
-            form: reverse("results-export", args=[code, form])
-            for form in ("csv", "json", "latex", "parquet", "zip")
+            f"{name}.{form}": reverse("results-export", args=[code, name, form])
+            for name, form in (
+                *(("leaderboard", form) for form in ("csv", "json", "latex", "parquet")),
+                *(("all", "zip"), ("votes", "csv"), ("pairs", "svg")),
+            )
         },
-        "votes.csv": reverse("results-votes-export", args=[code, "csv"]),
         "api rating": reverse("api-snapshot", args=[rating.code]),
         "api file": reverse("api-snapshot-file", args=[rating.code, "leaderboard", "csv"]),
-        "pairs.svg": reverse("results-chart", args=[code, "pairs", "svg"]),
     }
 
 

@@ -1,10 +1,9 @@
-"""A new job by its page: the matrix, the estimate, one try first, the matrix file."""
+"""A new job by its page: the matrix, the estimate, one try first."""
 
 import re
 from typing import Any
 
 import pytest
-from django.core.files.uploadedfile import SimpleUploadedFile
 from django.test import Client
 from django.urls import reverse
 
@@ -129,30 +128,3 @@ def test_a_duplicate_fills_the_form_with_what_the_job_had(admin: Client, models:
     assert 'name="scenarios" value="one" checked' not in form
     for nobody in ("no-code", "00000000-0000-0000-0000-000000000000"):
         assert admin.get(f"{reverse('job-new')}?like={nobody}").status_code == 200
-
-
-# --- The matrix file -----------------------------------------------------------------------------
-
-
-def upload(admin: Client, text: str | bytes) -> tuple[int, str]:
-    data = text if isinstance(text, bytes) else text.encode()
-    file = SimpleUploadedFile("matrix.yaml", data)
-    answer = admin.post(reverse("job-new"), {"read": "1", "file": file})
-    return answer.status_code, answer.content.decode()
-
-
-def test_the_file_that_the_page_writes_fills_the_page_again(
-    admin: Client, models: Endpoint
-) -> None:
-    sent = {"name": "Round 2", "cells": [OTM], "scenarios": ["two"], "samples": "2", "matrix": "1"}
-    written = admin.post(reverse("job-new"), sent | {"temperature": "0.5"})
-    assert written.headers["Content-Type"].startswith("application/yaml")
-    assert not Contestant.objects.filter(endpoint=models).exists(), "writing makes nobody"
-    status, form = upload(admin, written.content)
-    made = Contestant.objects.get(endpoint=models)
-    assert (status, made.options) == (200, {"temperature": 0.5})
-    assert f"“{made.slug}” is added." in form
-    assert f'name="contestants" value="{made.slug}" checked' in form
-    assert 'name="scenarios" value="two" checked' in form
-    assert 'value="Round 2"' in form
-    assert not GenerationJob.objects.exists(), "reading launches nothing"

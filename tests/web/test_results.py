@@ -50,7 +50,7 @@ def test_files_carry_the_numbers_of_the_page() -> None:
     rate(study=study, rounds=50)
 
     def file(form: str) -> str:
-        answer = analyst.get(reverse("results-export", args=[study.code, form]))
+        answer = analyst.get(reverse("results-export", args=[study.code, "leaderboard", form]))
         assert answer.headers["Content-Disposition"].startswith("attachment; filename=")
         return answer.content.decode()
 
@@ -59,7 +59,12 @@ def test_files_carry_the_numbers_of_the_page() -> None:
     assert json.loads(file("json"))["votes"]["counted"] == 18
     assert "Ann" in file("latex")
     assert file("csv") == file("csv")
-    assert analyst.get(reverse("results-export", args=[study.code, "docx"])).status_code == 404
+    assert (
+        analyst.get(
+            reverse("results-export", args=[study.code, "leaderboard", "docx"])
+        ).status_code
+        == 404
+    )
 
 
 def test_what_is_simulated_is_said_on_every_page_of_the_study() -> None:

@@ -1,11 +1,11 @@
 """The page of a new job: choose, see what it would use, try one scenario first, launch."""
 
-import uuid
 from decimal import Decimal
 from typing import Any
 
 from django import forms
 from django.contrib import messages
+from django.core.exceptions import ValidationError
 from django.db import transaction
 from django.http import HttpRequest, HttpResponse
 from django.shortcuts import redirect, render
@@ -16,23 +16,14 @@ from arena.scenarios.queries import by_type, set_asked, set_choices
 from arena.site.access import ADMIN, allow_only, user_of
 from arena.site.acts import refusals_in, send_later
 from arena.site.forms import CapsForm, ChoiceForm, Offer, offer
-from augment.errors import AugmentError, Conflict
 from augment.models import Contestant, EndpointModel, GenerationJob
 from augment.services.endpoints.known_endpoints import is_key_here
 from augment.services.running import jobs
 from augment.services.running.choosing import find_obstacle, keys_missing
 from augment.services.running.estimates import JobEstimate, estimate_rows
-from augment.services.running.matrix import (
-    ChosenCells,
-    add_cells,
-    matrix_of,
-    matrix_text,
-    read_cells,
-    read_matrix,
-)
+from augment.services.running.matrix import ChosenCells, add_cells, matrix_of, read_cells
 from augment.tasks import enqueue_job
 
-LONGEST_FILE = 1_000_000
 LONGEST_NAME = 120
 
 
@@ -114,11 +105,7 @@ class LaunchForm(ChoiceForm, CapsForm, OptionsForm):
 @require_http_methods(["GET", "HEAD", "POST"])
 def new_job_page(request: HttpRequest) -> HttpResponse:
     """Choose contestants and scenarios, then launch."""
-    if "read" in request.POST:
-        return _read_file(request)
     form = _form(request, request.POST or None, initial=_like(request))
-    if "matrix" in request.POST:
-        return _matrix_file(request, form)
     if "estimate" in request.POST:
         return _estimated(request, form)
     if form.is_bound and form.is_valid():
@@ -153,23 +140,20 @@ def _page(
 def _like(request: HttpRequest) -> dict[str, Any]:
     """Return the values of another job where the address names one."""
     try:
-        code = uuid.UUID(request.GET.get("like", ""))
-    except ValueError:
+        job = GenerationJob.objects.filter(code=request.GET.get("like") or None).first()
+    except ValidationError:
         return {}
-    job = GenerationJob.objects.filter(code=code).first()
     if job is None:
         return {}
-    caps: dict[str, Any] = {"cap_calls": job.cap_calls, "cap_tokens": job.cap_tokens}
-    if job.cap_usd is not None:
-        caps["cap_usd"] = f"{job.cap_usd.normalize():f}"
-    like = {
+    names = ("samples", "is_fresh", "cap_calls", "cap_tokens")
+    like: dict[str, Any] = {name: getattr(job, name) for name in names}
+    like |= {
         "name": f"{job.name} (2)"[:LONGEST_NAME],
         "contestants": list(job.contestants.values_list("slug", flat=True)),
         "scenarios": list(job.scenarios.values_list("slug", flat=True)),
-        "samples": job.samples,
-        "is_fresh": job.is_fresh,
-        **caps,
     }
+    if job.cap_usd is not None:
+        like["cap_usd"] = f"{job.cap_usd.normalize():f}"
     is_all = request.GET.get("all") == "1"
     return like | (job.full_plan or {}) if is_all else like
 
@@ -183,51 +167,6 @@ def _estimated(request: HttpRequest, form: LaunchForm) -> HttpResponse:
         if estimate is not None and cap is not None:
             more["rows_within"] = estimate.rows_within(cap)
     return _page(request, form, **more)
-
-
-def _matrix_file(request: HttpRequest, form: LaunchForm) -> HttpResponse:
-    """Answer with what is chosen as a file for `generate --matrix`, which needs no name."""
-    form.is_valid()
-    form.errors.pop("name", None)
-    if form.errors:
-        return _page(request, form, status=422)
-    text = matrix_text(
-        form.chosen_rows(),
-        form.cleaned_data["scenarios"],
-        samples=form.cleaned_data["samples"],
-        name=form.cleaned_data.get("name", ""),
-    )
-    return HttpResponse(
-        text,
-        content_type="application/yaml; charset=utf-8",
-        headers={"Content-Disposition": 'attachment; filename="matrix.yaml"'},
-    )
-
-
-def _read_file(request: HttpRequest) -> HttpResponse:
-    """Fill in the form from a matrix file; contestants that it has in full are made."""
-    file = request.FILES.get("file")
-    try:
-        if file is None:
-            raise Conflict("Choose a matrix file.")
-        if file.size is None or file.size > LONGEST_FILE:
-            raise Conflict("The file is too long for a matrix: at most 1 MB.")
-        matrix = read_matrix(file.read().decode(), actor=user_of(request))
-    except UnicodeDecodeError:
-        problem = "The file is not UTF-8."
-    except AugmentError as error:
-        problem = str(error)
-    else:
-        for slug in matrix.made:
-            messages.success(request, f"“{slug}” is added.")
-        initial = {
-            "name": matrix.name or "",
-            "contestants": list(matrix.contestants),
-            "scenarios": list(matrix.scenarios),
-            "samples": matrix.samples,
-        }
-        return _page(request, _form(request, None, initial=initial))
-    return _page(request, _form(request, None), status=422, file_problem=problem)
 
 
 def _launch(request: HttpRequest, form: LaunchForm) -> GenerationJob:

@@ -15,7 +15,8 @@ from django.template.loader import render_to_string
 
 from arena.errors import ArenaError
 from arena.exports.cells import csv_text
-from arena.jobs.exports.tables import object_sheet, sheet_csv
+from arena.exports.formats import sheet_csv
+from arena.jobs.exports.displacement import object_sheet
 from arena.models import Matchup, Snapshot, Study, Vote
 from arena.results.exports.closure import Closure, close_over, travelling_rows
 from arena.results.exports.writers import MANIFEST as RATING_MANIFEST

@@ -12,7 +12,6 @@ from django.utils.text import slugify
 from django.views.decorators.http import require_safe
 
 from arena.models import ImportedVote, Matchup, Snapshot, Study
-from arena.models.votes import AID_LABELS
 from arena.people.queries import natural_order
 from arena.results.exports.tables import shown_name
 from arena.results.exports.votes import vote_list_csv
@@ -46,10 +45,6 @@ class VoteSearchForm(forms.Form):
     expert = forms.ChoiceField(label="Expert", required=False)
     mark = forms.ChoiceField(label="Counts", required=False, choices=[*MARKS.items()])
     part = forms.ChoiceField(label="Only", required=False, choices=[_ALL, *PARTS.items()])
-    aid = forms.ChoiceField(
-        label="Looked with", required=False, choices=[_ALL, *AID_LABELS.items()]
-    )
-    comment = forms.CharField(label="Words in the comment", required=False, max_length=200)
     order = forms.ChoiceField(
         label="Begin with", required=False, choices=[("", "First votes"), *ORDERS.items()]
     )
@@ -67,7 +62,7 @@ class VoteSearchForm(forms.Form):
         if not self._study.shows_all_samples:
             del fields["sample"]
         if is_imported(self._study):
-            for name in ("type", "part", "aid", "comment", "order"):
+            for name in ("type", "part", "order"):
                 del fields[name]
 
     def clean_scenario(self) -> str:

@@ -2,11 +2,9 @@
 
 A cell with a set of options is one contestant: the one that there is, else one to be made when a
 job is launched. Options that a variant has no use for are left out for it. A file holds the
-contestants in full, scenarios and samples: `matrix_text` writes it, `load_matrix` reads it and
-makes the contestants that are missing, or names every error with its place and keeps nothing.
+contestants in full, scenarios and samples: `load_matrix` reads it and makes the contestants that are missing, or names every error with its place and keeps nothing.
 """
 
-import json
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -17,7 +15,6 @@ from django.db import transaction
 from pydantic import Field, ValidationError
 
 from augment.errors import AugmentError, InvalidDocument, UnknownName
-from augment.formats.documents import read_yaml
 from augment.models import Contestant, Endpoint, EndpointModel
 from augment.scene.schema import Document, problems_of
 from augment.services.endpoints.contestants import LONGEST_NAME, add_contestant, ensure_builtin
@@ -231,37 +228,6 @@ def load_matrix(document: object, *, actor: User | None = None) -> Matrix:
         samples=given.samples,
         made=tuple(slug for slug in slugs if slug not in before),
     )
-
-
-def read_matrix(text: str, *, actor: User | None = None) -> Matrix:
-    """Return the matrix of a YAML file's text; as `load_matrix`."""
-    return load_matrix(read_yaml(text, what=WHAT), actor=actor)
-
-
-def matrix_text(
-    contestants: Sequence[Contestant],
-    scenarios: Sequence[str],
-    *,
-    samples: int = 1,
-    name: str = "",
-) -> str:
-    """Return the YAML of what is chosen, to be read by `load_matrix` here or elsewhere.
-
-    Contestants that are not stored yet are written like the others: whoever reads it makes them.
-    """
-    lines = ["# Read by: manage.py generate --matrix FILE"]
-    lines += [f"name: {json.dumps(name)}"] if name else []
-    lines += [f"samples: {samples}", "contestants:"]
-    for row in sorted(contestants, key=lambda row: row.slug):
-        if row.endpoint is None:
-            lines.append(f"  - {json.dumps(row.slug)}")
-            continue
-        names = ("slug", "name", "variant", "model", "roles", "options")
-        whole = {key: getattr(row, key) for key in names} | {"endpoint": row.endpoint.label}
-        first, *rest = [f"{key}: {json.dumps(value)}" for key, value in whole.items()]
-        lines += [f"  - {first}", *(f"    {line}" for line in rest)]
-    lines += ["scenarios:", *(f"  - {json.dumps(slug)}" for slug in scenarios)]
-    return "\n".join(lines) + "\n"
 
 
 # --- Private -----------------------------------------------------------------------------------
