@@ -185,6 +185,12 @@ def read_value(line: Any, value: Value, digits: int | None = 4) -> object:
             return read
 
 
+def csv_of(columns: Mapping[str, Value], lines: Iterable[object]) -> bytes:
+    """Return a CSV file with one line a row; floats have two decimals."""
+    rows = ([read_value(line, value, None) for value in columns.values()] for line in lines)
+    return csv_text(list(columns), rows).encode()
+
+
 def join_numbers(numbers: Iterable[float], number: str = ".6g") -> str:
     """Return several numbers as one cell."""
     return " ".join(format(value, number) for value in numbers)

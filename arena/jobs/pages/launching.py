@@ -140,7 +140,7 @@ def _page(
 def _like(request: HttpRequest) -> dict[str, Any]:
     """Return the values of another job where the address names one."""
     try:
-        job = GenerationJob.objects.filter(code=request.GET.get("like") or None).first()
+        job = GenerationJob.objects.filter(code=request.GET.get("like", "")).first()
     except ValidationError:
         return {}
     if job is None:

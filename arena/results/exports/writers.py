@@ -3,7 +3,6 @@
 The same snapshot always gives the same bytes.
 """
 
-from collections.abc import Iterable, Mapping
 from functools import partial
 from operator import attrgetter
 from typing import Any
@@ -15,10 +14,10 @@ from arena.exports.formats import (
     Format,
     Sheet,
     Value,
+    csv_of,
     drawings,
     formats,
     json_bytes,
-    read_value,
     sheet_csv,
     sheet_parquet,
 )
@@ -179,11 +178,11 @@ def bundle_files(snapshot: Snapshot) -> dict[str, bytes]:
     }
     files["pairs.csv"] = _pairs_csv(results)
     files["types.csv"] = _types_csv(results)
-    files["raters.csv"] = _csv(RATERS, results.trust.raters)
+    files["raters.csv"] = csv_of(RATERS, results.trust.raters)
     if frozen := preregistration_bytes(snapshot.study):
         files[FILE_NAME] = frozen
     if table.hypotheses:
-        files["hypotheses.csv"] = _csv(HYPOTHESES, table.hypotheses)
+        files["hypotheses.csv"] = csv_of(HYPOTHESES, table.hypotheses)
     files["statistics.json"] = json_bytes(_statistics(results), sort_keys=True)
     files[MANIFEST] = json_bytes(_manifest(snapshot, table, files), sort_keys=True)
     return files
@@ -319,11 +318,6 @@ def _statistics(results: Results) -> dict[str, Any]:
         if holder:
             del holder[codes]
     return document | {"trust": trust, "judges": sorted(results.judges.values())}
-
-
-def _csv(columns: Mapping[str, Value], lines: Iterable[object]) -> bytes:
-    rows = ([read_value(line, value, None) for value in columns.values()] for line in lines)
-    return csv_text(list(columns), rows).encode()
 
 
 def _pairs_csv(results: Results) -> bytes:

@@ -2,7 +2,8 @@
 
 A cell with a set of options is one contestant: the one that there is, else one to be made when a
 job is launched. Options that a variant has no use for are left out for it. A file holds the
-contestants in full, scenarios and samples: `load_matrix` reads it and makes the contestants that are missing, or names every error with its place and keeps nothing.
+contestants in full, scenarios and samples: `load_matrix` reads it and makes the contestants that
+are missing, or names every error with its place and keeps nothing.
 """
 
 import re
