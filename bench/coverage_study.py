@@ -7,15 +7,14 @@ no pair should be told apart. 400 studies a row take about half an hour of one p
 """
 
 import argparse
-import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import product
 from pathlib import Path
 
 import numpy as np
 
-from arena.rating import models, remarks, sandwich
+from arena.rating import models, sandwich
 from arena.rating.comparisons import BoolArray, Comparisons, FloatArray, count_pairs
 from arena.rating.leaderboard import FEWEST_TO_JUDGE
 from arena.rating.models import DidNotConverge, Meetings, to_elo
@@ -28,8 +27,7 @@ EFFECTS = ((0.0, 0.0), (100.0, 40.0), (0.0, 80.0))
 """Points by which scenarios, and experts, differ about a contestant."""
 ROUNDS = 500
 PAGE = Path(__file__).resolve().parents[1] / "docs" / "rating.md"
-DEFAULT, CHECK, SINGLE = "closed form, default", "cross-check", "single votes"
-METHODS = (DEFAULT, CHECK, SINGLE)
+DEFAULT, SINGLE = METHODS = "closed form, default", "single votes"
 
 
 def worlds() -> Iterator[tuple[str, World]]:
@@ -63,25 +61,14 @@ class Found:
 
     Attributes:
         held: By method, (N, C) whether the interval holds the truth.
-        half_widths: By method, (N, C) points.
         told_apart: (N,) whether any true order of a pair is contradicted, or equals told apart.
     """
 
     held: dict[str, list[BoolArray]] = field(default_factory=lambda: {m: [] for m in METHODS})
-    half_widths: dict[str, list[FloatArray]] = field(
-        default_factory=lambda: {method: [] for method in METHODS}
-    )
     told_apart: list[bool] = field(default_factory=list)
 
     def coverage(self, method: str = DEFAULT, contestants: slice = slice(None)) -> float:
         return float(np.array(self.held[method])[:, contestants].mean())
-
-    def half_width(self, method: str = DEFAULT, contestants: slice = slice(None)) -> float:
-        return float(np.array(self.half_widths[method])[:, contestants].mean())
-
-    def cell(self, method: str = DEFAULT, contestants: slice = slice(None)) -> str:
-        coverage = self.coverage(method, contestants)
-        return f"{coverage:.1%} ±{self.half_width(method, contestants):.0f}"
 
     @property
     def false(self) -> float:
@@ -109,16 +96,12 @@ def _add(found: Found, votes: Comparisons, truth: FloatArray, seed: int | None) 
     strengths = models.fit(met, counts.games[:, None], counts.scores[:, None])[:, 0]
     pulls = pulls_of_model(votes, met, counts.games, strengths)
     rating, spread = to_elo(strengths), spread_of(pulls, Unit.TWO_WAY)
-    few = sandwich.factor(remarks.few_clusters(votes, Unit.TWO_WAY))
-    plain = sandwich.plain_covariance(pulls, Unit.TWO_WAY, keep_variances=True)
     half_widths = {
         DEFAULT: spread.half_widths(),
-        CHECK: few * np.sqrt(np.maximum(plain.diagonal(), 0.0)),
         SINGLE: sandwich.NORMAL * np.sqrt(pulls.by_row().diagonal()),
     }
     for method, half_width in half_widths.items():
         found.held[method].append(np.abs(rating - truth) <= half_width)
-        found.half_widths[method].append(half_width)
     if seed is not None:
         above = judge_pairs(rating, spread, rounds=ROUNDS, seed=seed).above
         found.told_apart.append(bool((above & (truth[:, None] < truth + 1e-6)).any()))
@@ -153,61 +136,26 @@ def _range(values: Sequence[float], form: str) -> str:
     return lowest if lowest == highest else f"{lowest} to {highest}"
 
 
-def controversial_lines(studies: int) -> Iterator[str]:
-    """One contestant about whom experts differ four times as much (160 points against 40)."""
-    yield from _head("experts x votes", DEFAULT, "of the one contestant", CHECK, "of the one")
-    for experts in (3, 5, 9, 20):
-        world = World(
-            ratings=paper_ratings(),
-            scenario_sd=100.0,
-            expert_sd=40.0,
-            experts=experts,
-            votes_per_expert=200,
-            controversial=(4,),
-        )
-        found, one = study(world, studies=studies), slice(4, 5)
-        cells = [
-            found.cell(method, of) for method in (DEFAULT, CHECK) for of in (slice(None), one)
-        ]
-        yield f"| {experts} x 200 | " + " | ".join(cells) + " |"
-
-
 def _head(*heads: str) -> Iterator[str]:
     yield "| " + " | ".join(heads) + " |"
     yield "|---" * len(heads) + "|"
 
 
-def write_table(name: str, text: str) -> None:
-    """Replace what stands between the marks of a table."""
-    begin, end = f"<!-- {name} -->\n", f"<!-- end of {name} -->"
-    page = re.sub(
-        f"{re.escape(begin)}.*?{re.escape(end)}",
-        lambda _: f"{begin}{text}\n{end}",
-        PAGE.read_text(),
-        flags=re.S,
-    )
-    PAGE.write_text(page)
-
-
-def print_tables(tables: Mapping[str, Callable[[int], Iterator[str]]], *, studies: int) -> None:
-    """Print tables line by line; with `--write` each goes between its marks in the page.
-
-    Args:
-        tables: What gives the lines of each, for so many studies a row.
-        studies: How many, unless the command says so.
-    """
+def main() -> None:
     parser = argparse.ArgumentParser()
-    parser.add_argument("studies", type=int, nargs="?", default=studies)
+    parser.add_argument("studies", type=int, nargs="?", default=400)
     parser.add_argument("--write", action="store_true", help="into docs/rating.md")
     asked = parser.parse_args()
-    for name, lines_of in tables.items():
-        said = [f"{asked.studies} simulated studies a row.", ""]
-        for line in lines_of(asked.studies):
-            print(line, flush=True)
-            said.append(line)
-        if asked.write:
-            write_table(name, "\n".join(said))
+    printed = [f"{asked.studies} simulated studies a row.", ""]
+    for line in lines(asked.studies):
+        print(line, flush=True)
+        printed.append(line)
+    if asked.write:
+        before, rest = PAGE.read_text().split("<!-- worlds -->\n")
+        after = rest.partition("<!-- end of worlds -->")[2]
+        text = "\n".join(["<!-- worlds -->", *printed, "<!-- end of worlds -->"])
+        PAGE.write_text(before + text + after)
 
 
 if __name__ == "__main__":
-    print_tables({"controversial": controversial_lines, "worlds": lines}, studies=400)
+    main()

@@ -8,9 +8,9 @@ import math
 import random
 from collections.abc import Callable
 from dataclasses import replace
-from enum import StrEnum
 from itertools import pairwise
 
+from augment.checks.finding import FaultClass
 from augment.geometry.frames import difference, wrap
 from augment.scene.ego_route import EgoRoute
 from augment.scene.entities import (
@@ -334,70 +334,34 @@ def moving(route: EgoRoute, agents: Agents, rng: random.Random) -> Agents | None
     return replace_agent(agents, agent, replace(agent, speed_mps=round(rng.uniform(3.0, 12.0), 1)))
 
 
-class FaultKind(StrEnum):
-    """What goes wrong in a placement, by the class that it belongs to."""
+Maker = Callable[[EgoRoute, Agents, random.Random], Agents | None]
 
-    NEIGHBOUR_LANE = "neighbour-lane"
-    STRAIGHT_LINE = "straight-line"
-    ALONG_LANE = "along-lane"
-    OFF_ROAD = "off-road"
-    BEYOND_JUNCTION = "beyond-junction"
-    EGO_HEADING = "ego-heading"
-    FLIPPED = "flipped"
-    DEGREES = "degrees-as-radians"
-    FACING_AWAY = "facing-away"
-    OVERLAP = "overlap"
-    MISSING = "missing-object"
-    EXTRA = "extra-object"
-    WRONG_SIDE = "wrong-side"
-    WRONG_TYPE = "wrong-type"
-    MOVING = "moving-parked"
-
-
-POSITION_KINDS = (
-    FaultKind.NEIGHBOUR_LANE,
-    FaultKind.STRAIGHT_LINE,
-    FaultKind.ALONG_LANE,
-    FaultKind.OFF_ROAD,
-    FaultKind.BEYOND_JUNCTION,
-)
-HEADING_KINDS = (
-    FaultKind.EGO_HEADING,
-    FaultKind.FLIPPED,
-    FaultKind.DEGREES,
-    FaultKind.FACING_AWAY,
-)
-LOGIC_KINDS = (
-    FaultKind.OVERLAP,
-    FaultKind.MISSING,
-    FaultKind.EXTRA,
-    FaultKind.WRONG_SIDE,
-    FaultKind.WRONG_TYPE,
-    FaultKind.MOVING,
-)
-
-
-def inject_fault(
-    route: EgoRoute, agents: Agents, kind: FaultKind, rng: random.Random
-) -> Agents | None:
-    """The agents with that fault, None where it makes no difference here."""
-    return _MAKERS[kind](route, agents, rng) if agents else None
-
-
-_MAKERS: dict[FaultKind, Callable[[EgoRoute, Agents, random.Random], Agents | None]] = {
-    FaultKind.NEIGHBOUR_LANE: neighbour_lane,
-    FaultKind.STRAIGHT_LINE: straight_line,
-    FaultKind.ALONG_LANE: along_lane,
-    FaultKind.OFF_ROAD: off_road,
-    FaultKind.BEYOND_JUNCTION: beyond_junction,
-    FaultKind.EGO_HEADING: ego_heading,
-    FaultKind.FLIPPED: flip_vehicle,
-    FaultKind.DEGREES: degrees,
-    FaultKind.FACING_AWAY: facing_away,
-    FaultKind.OVERLAP: overlap,
-    FaultKind.MISSING: missing,
-    FaultKind.EXTRA: extra,
-    FaultKind.WRONG_SIDE: wrong_side,
-    FaultKind.WRONG_TYPE: wrong_type,
-    FaultKind.MOVING: moving,
+FAULTS: dict[FaultClass, dict[str, Maker]] = {
+    FaultClass.POSITION: {
+        "neighbour-lane": neighbour_lane,
+        "straight-line": straight_line,
+        "along-lane": along_lane,
+        "off-road": off_road,
+        "beyond-junction": beyond_junction,
+    },
+    FaultClass.HEADING: {
+        "ego-heading": ego_heading,
+        "flipped": flip_vehicle,
+        "degrees-as-radians": degrees,
+        "facing-away": facing_away,
+    },
+    FaultClass.LOGIC: {
+        "overlap": overlap,
+        "missing-object": missing,
+        "extra-object": extra,
+        "wrong-side": wrong_side,
+        "wrong-type": wrong_type,
+        "moving-parked": moving,
+    },
 }
+"""What goes wrong in a placement, by its true label and its kind.
+
+Each returns the agents with the fault, None where it makes no difference.
+"""
+MAKERS = {kind: maker for makers in FAULTS.values() for kind, maker in makers.items()}
+LABELS = {kind: label for label, makers in FAULTS.items() for kind in makers}

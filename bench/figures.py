@@ -1,17 +1,12 @@
-"""Write the figures of README.md, method.md and catalogue.md anew: `make figures`.
+"""Write the figures of README.md and method.md anew: `make figures`.
 
 The other measurements write their own section of docs/benchmarks.md and docs/rating.md, because
 they take long or need other software.
 """
 
-import os
-
-import django
-
-from augment.services.scenarios.catalogue_check import WayPast
 from bench import displacement, injected_faults
-from bench.report import ROOT, table, write_block
-from tests.fixtures.shelf import FOLDER, SLUGS
+from bench.report import ROOT, write_block
+from tests.fixtures.shelf import SLUGS
 
 
 def main() -> None:
@@ -23,23 +18,6 @@ def main() -> None:
     write_block("faults", injected_faults.class_table(tally), page=readme)
     faults = injected_faults.report(tally, count=injected_faults.COUNT, seed=injected_faults.SEED)
     write_block("faults", faults, page=method)
-    write_ways()
-
-
-def write_ways() -> None:
-    """By which lane the ego gets past the references of the paper set."""
-    os.environ.setdefault("DJANGO_SETTINGS_MODULE", "arena.config.settings")
-    django.setup()
-    from augment.services.scenarios.catalogue_check import check_catalogue
-
-    found = check_catalogue(folder=FOLDER).scenarios
-    rows = [
-        [way.value, str(sum(one.way_past is way for one in found))]
-        for way in WayPast
-        if way is not WayPast.NONE
-    ]
-    body = table(["way past", "scenarios"], rows)
-    write_block("ways", body, page=ROOT / "docs" / "catalogue.md")
 
 
 if __name__ == "__main__":

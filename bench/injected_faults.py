@@ -18,16 +18,11 @@ from augment.metrics.fault_guess import first_guess
 from augment.scene.ego_route import EgoRoute
 from augment.scene.entities import Modification
 from augment.scene.intent import Intent
-from bench.faults import HEADING_KINDS, LOGIC_KINDS, POSITION_KINDS, FaultKind, inject_fault
+from bench.faults import LABELS, MAKERS
 from bench.report import table
 from bench.shifts import jitter, move_along
 from tests.fixtures.shelf import SLUGS, entry, shown_scene
 
-LABELS = {
-    **dict.fromkeys(POSITION_KINDS, FaultClass.POSITION),
-    **dict.fromkeys(HEADING_KINDS, FaultClass.HEADING),
-    **dict.fromkeys(LOGIC_KINDS, FaultClass.LOGIC),
-}
 COUNT, SEED = 1000, 2026
 SHIFTS_M = (1.0, 2.0, 2.5, 3.0, 4.0, 5.0)
 
@@ -54,7 +49,7 @@ class Tally:
     hits: Counter[FaultClass] = field(default_factory=Counter)
     false: Counter[FaultClass] = field(default_factory=Counter)
     missed: Counter[FaultClass] = field(default_factory=Counter)
-    named: dict[FaultKind, Counter[str]] = field(default_factory=lambda: defaultdict(Counter))
+    named: dict[str, Counter[str]] = field(default_factory=lambda: defaultdict(Counter))
     clean: int = 0
     right: int = 0
 
@@ -121,10 +116,8 @@ def class_table(tally: Tally) -> str:
 def kinds_table(tally: Tally) -> str:
     """Return a row per kind of fault."""
     kinds = [
-        [kind.value, LABELS[kind].value, *(str(seen[name]) for name in _COUNTS)]
-        for kind, seen in sorted(
-            tally.named.items(), key=lambda item: list(FaultKind).index(item[0])
-        )
+        [kind, label.value, *(str(tally.named[kind][name]) for name in _COUNTS)]
+        for kind, label in LABELS.items()
     ]
     return table(["kind", "true label", "n", "with intent", "class named", "and no other"], kinds)
 
@@ -152,16 +145,16 @@ _COUNTS = ("n", "read", "named", "alone")
 
 def _injections(
     among: tuple[Case, ...], count: int, rng: random.Random
-) -> Iterator[tuple[Case, FaultKind, Modification]]:
+) -> Iterator[tuple[Case, str, Modification]]:
     """Kinds in turn, each on the next scenario on which it makes a difference."""
-    kinds, turns, number = list(FaultKind), Counter[FaultKind](), 0
+    kinds, turns, number = list(MAKERS), Counter[str](), 0
     while number < count:
         kind = kinds[number % len(kinds)]
         for _ in among:
             case = among[turns[kind] % len(among)]
             turns[kind] += 1
             right = jitter(case.route, case.reference, rng)
-            agents = inject_fault(case.route, right.added, kind, rng)
+            agents = MAKERS[kind](case.route, right.added, rng) if right.added else None
             if agents is not None:
                 yield case, kind, Modification(added=agents)
                 break

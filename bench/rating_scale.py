@@ -2,7 +2,7 @@
 
     python -m bench.rating_scale [--rows N ...] [--write]
 
-Each row is a process of its own, which makes the votes, rates them with all defaults and details
+Each row is a process of its own, which makes the votes, rates them with all defaults
 and says what rating took; memory is the most that the process ever held, votes
 included. One row is a file rated by `manage.py rate_csv`, start of the process and reading
 included. All votes are simulated; some experts give many more of them than others. `--write` puts
@@ -33,7 +33,7 @@ WINNERS = ("model_a", "tie", "model_b")
 
 
 WHAT = """`python -m bench.rating_scale [--write]` (in `make bench`): `rate(votes)` with
-its defaults (two-way, rank sets, cross-check) each row in a process of its own.
+its defaults (two-way, rank sets) each row in a process of its own.
 Simulated votes; the experts' numbers of votes differ widely."""
 BELOW = (
     """Targets: 2 s for LLMFAO's size and 5 s for football's (simulated alike; the files are not at

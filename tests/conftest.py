@@ -23,7 +23,6 @@ from tests.stack import SMALL_DEMO, Home
 
 GROUPS = {
     "tests/journeys/test_demo.py": "demo_home",
-    "tests/browser/test_two_experts.py": "demo_home",
     "tests/browser/": "browser",
     "tests/results/test_every_": "every_number",
 }

@@ -20,7 +20,7 @@ with warnings.catch_warnings():
 
 from arena.serving.probes import find_redis_server, port_answers
 from tests.buckets import Bucket, bucket
-from tests.processes import Machine, Process, wait_until
+from tests.processes import EAGER, Machine, Process, environment_of, wait_until
 from tests.stack import free_port
 
 # It says good-bye at the end of the process, when nobody listens any more.
@@ -66,17 +66,9 @@ class Services:
         """A machine with an empty folder of its own."""
         folder = self.folder / name
         folder.mkdir()
-        kept = {key: value for key, value in os.environ.items() if not key.startswith("OPENAI_")}
-        environment = kept | {
-            "ARENA_VAR_DIR": str(folder / "var"),
-            "ARENA_MEDIA_DIR": str(folder / "media"),
-            "DATABASE_URL": self.postgres.get_uri(),
-            "REDIS_URL": f"redis://127.0.0.1:{self.redis_port}/0",
-            "ARENA_HEARTBEAT_S": "1",
-            "ARENA_STALE_AFTER_S": "5",
-            "ARENA_RECOVER_EVERY_S": "1",
-            "PYTHONWARNINGS": "ignore",
-        }
+        environment = environment_of(folder) | EAGER | {"ARENA_STALE_AFTER_S": "5"}
+        environment["DATABASE_URL"] = self.postgres.get_uri()
+        environment["REDIS_URL"] = f"redis://127.0.0.1:{self.redis_port}/0"
         return Host(
             folder=folder, environment={**environment, **self.bucket.environment, **self.changes}
         )

@@ -147,6 +147,28 @@ class Machine:
         return started
 
 
+EAGER = {
+    "ARENA_HEARTBEAT_S": "1",
+    "ARENA_STALE_AFTER_S": "120",  # a busy machine is no dead one; see Machine.age
+    "ARENA_RECOVER_EVERY_S": "1",
+    "PYTHONWARNINGS": "ignore",
+}
+
+
+def environment_of(folder: Path) -> dict[str, str]:
+    """What an installation in a folder is told, without any Redis and anybody's key."""
+    kept = {
+        name: value
+        for name, value in os.environ.items()
+        if name != "REDIS_URL" and not name.startswith("OPENAI_")
+    }
+    return kept | {
+        "ARENA_VAR_DIR": str(folder / "var"),
+        "ARENA_MEDIA_DIR": str(folder / "media"),
+        "DATABASE_URL": f"sqlite:///{folder / 'db.sqlite3'}",
+    }
+
+
 @contextmanager
 def machine(
     changes: Mapping[str, str] = MappingProxyType({}), *, database: Path | None = None
@@ -156,18 +178,8 @@ def machine(
     The folder is a short one of its own, because a socket's path has 108 bytes.
     """
     folder = Path(tempfile.mkdtemp(prefix="arena-"))
-    kept = {name: value for name, value in os.environ.items() if not name.startswith("OPENAI_")}
-    environment = kept | {
-        "ARENA_VAR_DIR": str(folder / "var"),
-        "ARENA_MEDIA_DIR": str(folder / "media"),
-        "DATABASE_URL": f"sqlite:///{folder / 'db.sqlite3'}",
-        "REDIS_URL": f"redis+socket://{folder / SOCKET}",
-        "ARENA_HEARTBEAT_S": "1",
-        "ARENA_STALE_AFTER_S": "120",  # a busy machine is no dead one; see Machine.age
-        "ARENA_RECOVER_EVERY_S": "1",
-        "PYTHONWARNINGS": "ignore",
-    }
-    made = Machine(folder=folder, environment=environment | dict(changes))
+    redis = {"REDIS_URL": f"redis+socket://{folder / SOCKET}", **EAGER}
+    made = Machine(folder=folder, environment=environment_of(folder) | redis | dict(changes))
     try:
         if database is None:
             made.must("migrate", "--verbosity", "0")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import shutil
 import signal
 import socket
@@ -15,7 +14,7 @@ from random import SystemRandom
 from urllib.error import URLError
 from urllib.request import urlopen
 
-from tests.processes import ROOT, Machine, wait_until
+from tests.processes import ROOT, Machine, environment_of, wait_until
 
 SMALL_DEMO = ("demo", "--no-serve", "--per-type", "2", "--driven", "1")
 
@@ -30,17 +29,7 @@ class Home(Machine):
 
     @classmethod
     def at(cls, folder: Path) -> Home:
-        kept = {
-            name: value
-            for name, value in os.environ.items()
-            if name != "REDIS_URL" and not name.startswith("OPENAI_")
-        }
-        ours = {
-            "ARENA_VAR_DIR": str(folder / "var"),
-            "ARENA_MEDIA_DIR": str(folder / "media"),
-            "DATABASE_URL": f"sqlite:///{folder / 'db.sqlite3'}",
-        }
-        return cls(folder=folder, environment=kept | ours)
+        return cls(folder=folder, environment=environment_of(folder))
 
     def copy(self, folder: Path) -> Home:
         """The same data elsewhere, to be changed by one test."""

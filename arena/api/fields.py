@@ -8,7 +8,7 @@ from rest_framework import serializers
 from rest_framework.exceptions import ParseError
 from rest_framework.parsers import JSONParser
 
-from augment.services.inputs import Input, InputKind
+from augment.services.inputs import Input, InputKind, inputs_of
 
 
 class SoundJSONParser(JSONParser):
@@ -119,18 +119,39 @@ MOST_LINES = 2_000
 Field = serializers.Field[Any, Any, Any, Any]
 
 
+class RequestBody(StrictSerializer):
+    """A body whose fields are the inputs of a request, beside those of the class.
+
+    Attributes:
+        request: The dataclass.
+    """
+
+    request: type
+
+    def get_fields(self) -> dict[str, Field]:
+        """Return a field for each input."""
+        return {
+            one.name: body_field(one) for one in inputs_of(self.request)
+        } | super().get_fields()
+
+
 def body_field(asked: Input) -> Field:
     """Return the field of a body."""
-    given: dict[str, Any] = {"help_text": asked.explanation}
-    given |= {"required": True} if asked.is_required else {"default": asked.default}
+    given: dict[str, Any] = {"help_text": asked.explanation, "required": asked.is_required}
+    if not asked.is_required:
+        given["default"] = asked.default
+        given["allow_null"] = asked.default is None
     bounds: dict[str, Any] = {"min_value": asked.least, "max_value": asked.most}
     match asked.kind:
         case InputKind.TEXT:
+            given["allow_blank"] = asked.default == ""
             return TextField(**given | {"max_length": asked.most})
         case InputKind.WHOLE:
             return WholeNumberField(**given, **bounds)
         case InputKind.NUMBER:
             return NumberField(**given, **bounds)
+        case InputKind.DECIMAL:
+            return serializers.DecimalField(16, 9, **given, **bounds)
         case InputKind.SWITCH:
             return FlagField(**given)
         case InputKind.CHOICE:

@@ -12,7 +12,7 @@ from rest_framework import serializers
 from rest_framework.response import Response
 
 from arena.api.access import ADMINS, STAFF
-from arena.api.fields import FlagField, StrictSerializer, TextField, WholeNumberField
+from arena.api.fields import RequestBody, StrictSerializer, TextField
 from arena.api.views import (
     ApiView,
     Given,
@@ -25,9 +25,8 @@ from arena.api.views import (
 )
 from arena.contestants.queries import probe_lines
 from augment.models import Contestant, Endpoint, EndpointModel, Probe
-from augment.services.endpoints import known_endpoints
-from augment.services.endpoints.contestants import VARIANTS, EnteredEndpoint, enter_contestant
-from augment.services.endpoints.known_endpoints import EndpointFacts
+from augment.services.endpoints.contestants import VARIANTS, ContestantRequest, add_contestant
+from augment.services.endpoints.known_endpoints import EndpointRequest, add_endpoint, add_model
 from augment.services.endpoints.probing import plan_probe
 from augment.services.running.transcript_records import contestant_documents
 from augment.tasks import enqueue_probe
@@ -73,14 +72,10 @@ class WholeContestantDocument(serializers.Serializer[Any]):
     retired_at = serializers.DateTimeField(allow_null=True)
 
 
-class ContestantBody(StrictSerializer):
+class ContestantBody(RequestBody):
     """A new contestant that asks a language model."""
 
-    slug = TextField(max_length=80)
-    variant = serializers.ChoiceField(choices=list(VARIANTS))
-    endpoint = TextField(max_length=80, help_text="The label of an endpoint.")
-    model = TextField(max_length=120, help_text="The model id on the endpoint.")
-    name = TextField(max_length=120, required=False, default="", allow_blank=True)
+    request = ContestantRequest
     options = serializers.DictField(required=False, default=dict, help_text="By name.")
 
 
@@ -106,8 +101,7 @@ class ContestantsView(ApiView):
 
         The same one twice is one.
         """
-        endpoint = EnteredEndpoint(label=given.pop("endpoint"))
-        return _documents([enter_contestant(**given, endpoint=endpoint, actor=self.user)])[0]
+        return _documents([add_contestant(ContestantRequest(**given), self.user)])[0]
 
 
 def _documents(rows: Sequence[Contestant]) -> list[dict[str, Any]]:
@@ -128,23 +122,10 @@ class EndpointDocument(RowDocument[Endpoint]):
         )
 
 
-class EndpointBody(StrictSerializer):
+class EndpointBody(RequestBody):
     """A new endpoint."""
 
-    label = TextField(max_length=80)  # type: ignore[assignment]
-    is_simulated = FlagField(required=False, default=False)
-    base_url = TextField(max_length=200)
-    key_variable = TextField(max_length=80, required=False, default="", allow_blank=True)
-    max_concurrency = WholeNumberField(
-        required=False, default=4, min_value=1, max_value=known_endpoints.HIGHEST_CONCURRENCY
-    )
-    requests_per_minute = WholeNumberField(
-        required=False,
-        default=None,
-        allow_null=True,
-        min_value=1,
-        max_value=known_endpoints.HIGHEST_PER_MINUTE,
-    )
+    request = EndpointRequest
 
 
 class EndpointModelDocument(RowDocument[EndpointModel]):
@@ -211,12 +192,7 @@ class EndpointsView(ApiView):
 
         409 where the label is taken.
         """
-        return known_endpoints.add_endpoint(
-            label=given.pop("label"),
-            is_simulated=given.pop("is_simulated"),
-            facts=EndpointFacts(**given),
-            actor=self.user,
-        )
+        return add_endpoint(EndpointRequest(**given), self.user)
 
 
 class ModelsView(ApiView):
@@ -231,7 +207,7 @@ class ModelsView(ApiView):
         Comes with its listed price; all else is unknown before a probe.
         """
         row = get_object_or_404(Endpoint, code=code)
-        return known_endpoints.add_model(row, model=given["model"], actor=self.user)
+        return add_model(row, model=given["model"], actor=self.user)
 
 
 class ProbeView(ApiView):

@@ -13,7 +13,7 @@ from rest_framework.request import Request
 from rest_framework.response import Response
 
 from arena.api.access import ADMINS, STAFF
-from arena.api.fields import FlagField, StrictSerializer, TextField, WholeNumberField
+from arena.api.fields import RequestBody
 from arena.api.views import (
     ApiView,
     FileView,
@@ -28,14 +28,11 @@ from arena.api.views import (
 from arena.exports.formats import download
 from arena.jobs.exports.tables import JOB_TABLES
 from augment.models import GenerationJob
-from augment.services.running import budget, jobs
-from augment.services.running.budget import Caps
 from augment.services.running.estimates import estimate
+from augment.services.running.jobs import JobRequest, JobScope, launch
 from augment.services.running.progress import JobCounts, count_each, count_rows
 from augment.services.running.workers import workforce
 from augment.tasks import enqueue_job
-
-MOST_CHOSEN = 5_000
 
 
 class JobQuery(PageQuery):
@@ -96,34 +93,16 @@ class ProgressDocument(CountsDocument):
         return found.is_moving and workforce().works
 
 
-class EstimateBody(StrictSerializer):
+class EstimateBody(RequestBody):
     """A job that is not launched."""
 
-    contestants = serializers.ListField(
-        child=TextField(max_length=80), max_length=MOST_CHOSEN, help_text="Slugs."
-    )
-    scenarios = serializers.ListField(
-        child=TextField(max_length=80), max_length=MOST_CHOSEN, help_text="Slugs."
-    )
-    samples = WholeNumberField(
-        required=False, default=1, min_value=1, max_value=jobs.HIGHEST_SAMPLES
-    )
-    is_fresh = FlagField(
-        required=False, default=False, help_text="Ignore answers that are stored already."
-    )
+    request = JobScope
 
 
-class JobBody(EstimateBody):
+class JobBody(RequestBody):
     """A new job; a missing cap is none."""
 
-    name = TextField(max_length=120)
-    cap_usd = serializers.DecimalField(16, 9, required=False, default=None)
-    cap_calls = WholeNumberField(
-        required=False, default=None, min_value=1, max_value=budget.HIGHEST_CALLS
-    )
-    cap_tokens = WholeNumberField(
-        required=False, default=None, min_value=1, max_value=budget.HIGHEST_TOKENS
-    )
+    request = JobRequest
 
 
 class EstimateLineDocument(serializers.Serializer[Any]):
@@ -179,9 +158,7 @@ class JobsView(ApiView):
 
         Workers begin at once.
         """
-        limits = Caps(**{name: given.pop(f"cap_{name}") for name in ("usd", "calls", "tokens")})
-        launch = partial(jobs.launch, caps=limits, **given, actor=self.user)
-        job, warnings = keep_and_send(launch, enqueue_job)
+        job, warnings = keep_and_send(partial(launch, JobRequest(**given), self.user), enqueue_job)
         return count_rows(job), warnings
 
 
@@ -224,7 +201,7 @@ class EstimateView(ApiView):
 
         From recorded calls where there are some, else a guess.
         """
-        return estimate(**given)
+        return estimate(JobScope(**given))
 
 
 class JobExportView(FileView):

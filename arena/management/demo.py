@@ -24,12 +24,17 @@ from arena.studies.services.opening import close_study, open_study
 from arena.studies.services.plan import StudyPlan
 from arena.voting.services.simulation import simulate_votes
 from augment.models import Augmentation, BaseScene, Contestant, Endpoint, GenerationJob, Scenario
-from augment.services.endpoints.contestants import REFERENCE, add_contestant, ensure_builtin
-from augment.services.endpoints.known_endpoints import ensure_endpoint
+from augment.services.endpoints.contestants import (
+    REFERENCE,
+    ContestantRequest,
+    add_contestant,
+    ensure_builtin,
+)
+from augment.services.endpoints.known_endpoints import EndpointRequest, ensure_endpoint
 from augment.services.judging.driving_scores import scores_of_job
 from augment.services.judging.simulations import NUPLAN, Options, plan_scenario
 from augment.services.running.choosing import ALL, resolve_contestants
-from augment.services.running.jobs import launch
+from augment.services.running.jobs import JobRequest, launch
 from augment.services.running.progress import count_rows
 from augment.services.scenarios.catalogue import load_catalogue
 from augment.tasks import enqueue_job, enqueue_simulations
@@ -80,9 +85,14 @@ def prepare(say: Callable[[str], None]) -> None:
     count = len(scenarios_of(None))
     say(f"Catalogue: {count} scenarios on {BaseScene.objects.count()} scenes")
     ensure_builtin()
-    ensure_endpoint(label=STAND_IN, base_url=_stand_in_address(), is_simulated=True)
+    address = _stand_in_address()
+    Endpoint.objects.filter(label=STAND_IN).update(base_url=address)
+    ensure_endpoint(EndpointRequest(label=STAND_IN, base_url=address, is_simulated=True))
     for slug, variant, model, name in SIMULATED:
-        add_contestant(slug=slug, variant=variant, endpoint=STAND_IN, model=model, name=name)
+        request = ContestantRequest(
+            slug=slug, variant=variant, endpoint=STAND_IN, model=model, name=name
+        )
+        add_contestant(request)
     names = ", ".join(Contestant.objects.values_list("slug", flat=True))
     say(f"Contestants: {names}")
     for username, role in PEOPLE:
@@ -113,9 +123,8 @@ def generate(
     Raises:
         DemoFailed: It does not get on, or rows failed.
     """
-    job = GenerationJob.objects.filter(name=JOB).first() or launch(
-        name=JOB, contestants=resolve_contestants([ALL]), scenarios=scenarios
-    )
+    request = JobRequest(name=JOB, contestants=resolve_contestants([ALL]), scenarios=scenarios)
+    job = GenerationJob.objects.filter(name=JOB).first() or launch(request)
     enqueue_job(job.pk)
     ended, last_said, moved_at = -1, -1, time.monotonic()
     while (now := count_rows(job)).under_way:

@@ -26,7 +26,6 @@ from augment.services.judging.displacement import By, types_named
 from augment.services.judging.driving_scores import options_driven
 from augment.services.judging.simulations import SCORES, Options
 from augment.services.running.choosing import find_job
-from augment.services.scenarios.interplan import job_as_interplan
 
 Chosen = dict[str, Any]
 """The arguments of the command line by name."""
@@ -183,13 +182,15 @@ def _write_modifications(options: Chosen, say: Say) -> ExportedFile:
     """Write all modifications of a job as interPlan's YAML."""
     if options["format"] != "interplan":
         raise UnknownName("format", options["format"], ["interplan"])
-    text, losses = job_as_interplan(
-        find_job(options["job"]), contestant=options["contestant"], strict=options["strict"]
+    exported = scenario_export.export_job(
+        find_job(options["job"]), file_format="interplan", contestant=options["contestant"]
     )
+    losses = (*exported.missing, *exported.written.refused, *exported.written.losses)
     for loss in losses:
         say(f"Lost: {loss}.")
     say(f"{len(losses)} things could not be said in interPlan's format.")
-    return ExportedFile(text.encode(), "yaml", True)
+    (content,) = exported.written.files.values()
+    return ExportedFile(content, "yaml", True)
 
 
 def _write_scenarios(options: Chosen, say: Say) -> ExportedFile:
@@ -199,7 +200,6 @@ def _write_scenarios(options: Chosen, say: Say) -> ExportedFile:
         file_format=options["format"],
         contestant=options["contestant"],
         motion=options["motion"],
-        strict=options["strict"],
     )
     written = exported.written
     told = {"Left out": exported.missing, "Refused": written.refused, "Lost": written.losses}
@@ -228,7 +228,6 @@ _OF_RATING: dict[str, dict[str, Any]] = {
     "--rating": {"type": UUID, "help": "the code of an older rating"},
     "--early": {"action": "store_true", "help": "export from an open study; this is logged"},
 }
-_STRICT = {"action": "store_true", "help": "write nothing if a scenario would not be the same"}
 _CONTESTANT = {"help": "the slug of one; all unless given"}
 _DRIVEN = {"help": "as it was simulated with"}
 
@@ -315,7 +314,7 @@ KINDS: dict[str, ExportKind] = {
         "job",
         "what a job's contestants made",
         _write_modifications,
-        _format(["interplan"], "interplan") | {"--contestant": _CONTESTANT, "--strict": _STRICT},
+        _format(["interplan"], "interplan") | {"--contestant": _CONTESTANT},
     ),
     "scenarios": ExportKind(
         "job",
@@ -332,7 +331,6 @@ KINDS: dict[str, ExportKind] = {
                 "what everybody does",
             },
             "--contestant": _CONTESTANT,
-            "--strict": _STRICT,
         },
     ),
 }

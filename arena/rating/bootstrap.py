@@ -178,12 +178,7 @@ Refit = Callable[[Rounds, BoolArray | None], FloatArray]
 
 
 def rate_rounds(
-    votes: Comparisons,
-    counts: PairCounts,
-    blocks: Iterator[Rounds],
-    refit: Refit,
-    *,
-    report: Callable[[int], None],
+    votes: Comparisons, counts: PairCounts, blocks: Iterator[Rounds], refit: Refit
 ) -> RatedRounds:
     """Rate every round; those that do not determine everybody, component by component.
 
@@ -192,16 +187,12 @@ def rate_rounds(
         counts: The same, by pair.
         blocks: The rounds.
         refit: Rates them.
-        report: Is told how many are done.
     """
     size = len(votes.names)
     by_votes = np.argsort(-tally(votes).sum(axis=1), kind="stable")
     met = Meetings(size, counts)
     found: list[RatedRounds] = []
-    done = 0
     for block in blocks:
-        done += block.games.shape[1]
-        report(done)
         is_fine = are_determined(met, block.games, block.scores)
         found.append(RatedRounds.of_values(refit(block.chosen(np.flatnonzero(is_fine)), None)))
         left = np.flatnonzero(~is_fine)

@@ -28,7 +28,7 @@ from arena.rating.chains import (
     ranks_across,
     standing_order,
 )
-from arena.rating.comparisons import Comparisons, FloatArray, count_pairs, restrict_to, tally
+from arena.rating.comparisons import Comparisons, count_pairs, restrict_to, tally
 from arena.rating.lines import Line
 from arena.rating.logistic import Coefficient
 from arena.rating.parts import Rated, rate_part
@@ -37,15 +37,13 @@ from arena.rating.rules import (
     MOST_CONTESTANTS,
     Intervals,
     Method,
-    Order,
-    Report,
     Rules,
     TooManyContestants,
     Unit,
     default_intervals,
 )
 
-__all__ = ["Intervals", "Leaderboard", "Line", "Method", "Order", "Unit", "rate"]
+__all__ = ["Intervals", "Leaderboard", "Line", "Method", "Unit", "rate"]
 
 ROUNDS = 10_000
 PAPER_ROUNDS = 1000
@@ -67,11 +65,8 @@ class Leaderboard:
         tie_share: Ties among the votes, None without votes.
         tie_strength: v of Davidson's model, None with other methods.
         degenerate_rounds: Bootstrap rounds whose votes did not determine everybody's rating.
-        covariance: (C, C) of the ratings in squared points, NaN where there is no rating: the
-            sandwich of the unit for Bradley-Terry, that of the rounds for other methods. None
-            without intervals or where details were not asked for.
         separation: All pairs judged at once, matrices (C, C), NaN for those without votes. None
-            where there are no intervals, several parts, or details were not asked for.
+            where there are no intervals, or several parts.
         coefficients: Of the votes' covariates, in their order; none where these are not
             determined, or in several parts.
     """
@@ -92,7 +87,6 @@ class Leaderboard:
     tie_share: float | None = None
     tie_strength: float | None = None
     degenerate_rounds: int = 0
-    covariance: FloatArray | None = field(default=None, compare=False)
     separation: Separation | None = field(default=None, compare=False)
     coefficients: tuple[Coefficient, ...] = ()
 
@@ -128,10 +122,6 @@ def rate(
     unit: Unit | None = None,
     intervals: Intervals | None = None,
     seed: int = 0,
-    k: float = models.K,
-    order: Order = Order.SHUFFLED,
-    details: bool = True,
-    report: Report | None = None,
 ) -> Leaderboard:
     """Rate all contestants that have votes, with 95 % intervals on the Elo scale, mean 1000.
 
@@ -150,10 +140,6 @@ def rate(
             no other.
         intervals: In closed form by default, but resampled where the unit is single votes.
         seed: Of its draws; the same votes and seed give the same table.
-        k: Points at stake in a vote, online Elo only.
-        order: Online Elo's point: the median over shuffled rounds, or the recorded order.
-        details: Also what costs extra: covariance, cross-check and separation.
-        report: Is told how many rounds are done.
 
     Raises:
         TooManyContestants: More than 2000.
@@ -171,7 +157,7 @@ def rate(
         if method is not Method.BRADLEY_TERRY or intervals is not Intervals.CLOSED_FORM:
             raise ValueError("covariates need Bradley-Terry with intervals in closed form")
     intervals = intervals or default_intervals(method, unit)
-    return _rate(votes, Rules(method, unit, intervals, rounds, seed, k, order, details, report))
+    return _rate(votes, Rules(method, unit, intervals, rounds, seed))
 
 
 def _rate(votes: Comparisons, rules: Rules) -> Leaderboard:
@@ -218,7 +204,6 @@ def _rate(votes: Comparisons, rules: Rules) -> Leaderboard:
         tie_share=float(counted[:, 1].sum() / counted.sum()) if len(votes) else None,
         tie_strength=whole.tie_strength,
         degenerate_rounds=max((found.degenerate for found in rated), default=0),
-        covariance=_joined_covariance(len(lines), present, parts, rated),
         separation=separation,
         coefficients=whole.coefficients,
     )
@@ -237,20 +222,6 @@ def _status(diagnosis: Diagnosis, rated: list[Rated]) -> Status:
         if any(found.is_open for found in rated):
             return Status.OPEN_INTERVALS
     return diagnosis.status
-
-
-def _joined_covariance(
-    contestants: int, present: list[int], parts: list[tuple[int, ...]], rated: list[Rated]
-) -> FloatArray | None:
-    """(C, C) of the parts' covariances, NaN between parts."""
-    if all(found.covariance is None for found in rated):
-        return None
-    joined = np.full((contestants, contestants), np.nan)
-    for part, found in zip(parts, rated, strict=True):
-        members = [present[member] for member in part]
-        if found.covariance is not None:
-            joined[np.ix_(members, members)] = found.covariance
-    return joined
 
 
 # --- Lines, filled part by part ------------------------------------------------------------------

@@ -161,9 +161,6 @@ def _head(head: str) -> str:
     return rf"\textbf{{{escape(head)}}}{_UPWARDS.get(head, '')}"
 
 
-_IN_TEX = {"∞": r"$\infty$", "≤": r"$\leq$", "≥": r"$\geq$", "–": "--", "±": r"$\pm$"}
-
-
 def _in_tex(number: str) -> str:
     """A printed number; the signs of open intervals are mathematics."""
     for sign, command in (
@@ -198,8 +195,6 @@ class Line:
             Nobody is first for want of bounds: see `ranking.shown_ranks`.
         rank_best, rank_worst: The simultaneous 95 % rank set: behind everybody who is shown to be
             above and ahead of everybody who is shown to be below, all pairs judged at once.
-        check_lower, check_upper: The interval by the plain sandwich (Bradley-Terry only), to
-            compare.
         part: Who have the same number here are rated together; ratings and ranks of different
             parts can't be compared.
     """
@@ -211,8 +206,6 @@ class Line:
     rank: int | None = None
     rank_best: int | None = None
     rank_worst: int | None = None
-    check_lower: float | None = None
-    check_upper: float | None = None
     votes: int = 0
     wins: int = 0
     ties: int = 0

@@ -237,19 +237,6 @@ _VOTES_AT_ONCE = 32_000
 """How many votes are drawn ahead in all rounds together: what stays in a core's second cache."""
 
 
-def replay_elo(votes: Comparisons, *, k: float = K) -> FloatArray:
-    """(C,) ratings after all votes in the order of their rows, from 1000 each."""
-    step = 0.5 * k / _ELO_PER_HALF
-    halves = [0.0] * len(votes.names)
-    columns = (votes.first, votes.second, 2.0 * votes.score - 1.0)
-    rows = (np.repeat(column, votes.count).tolist() for column in columns)
-    for first, second, gain in zip(*rows, strict=True):
-        moved = step * (math.tanh(halves[second] - halves[first]) + gain)
-        halves[first] += moved
-        halves[second] -= moved
-    return MEAN_ELO + _ELO_PER_HALF * np.array(halves)
-
-
 def resample_elo(votes: Comparisons, *, rounds: int, seed: int, k: float = K) -> FloatArray:
     """(C, B) ratings after as many votes as there are, drawn with replacement in random order."""
     halves = np.zeros(len(votes.names) * rounds)

@@ -20,7 +20,7 @@ from arena.rating.bootstrap import (
 from arena.rating.chains import Status
 from arena.rating.comparisons import BoolArray, Comparisons, FloatArray, IntArray, count_pairs
 from arena.rating.logistic import Coefficient, coefficients_of, fit_with_columns
-from arena.rating.models import Meetings, fit, replay_elo, resample_elo, to_elo
+from arena.rating.models import Meetings, fit, resample_elo, to_elo
 from arena.rating.ranking import (
     Separation,
     above_by_bounds,
@@ -29,15 +29,8 @@ from arena.rating.ranking import (
     rank_sets,
     shown_ranks,
 )
-from arena.rating.rules import Intervals, Method, Order, Rules, Unit
-from arena.rating.sandwich import (
-    NORMAL,
-    Pulls,
-    factor,
-    plain_covariance,
-    pulls_of_model,
-    spread_of,
-)
+from arena.rating.rules import Intervals, Method, Rules, Unit
+from arena.rating.sandwich import NORMAL, Pulls, factor, pulls_of_model, spread_of
 
 _SAME = 1e-6
 """Points. Rounds that all lie within this say nothing about the spread."""
@@ -62,9 +55,6 @@ class Rated:
     rank: IntArray | None = None
     rank_best: IntArray | None = None
     rank_worst: IntArray | None = None
-    check_lower: FloatArray | None = None
-    check_upper: FloatArray | None = None
-    covariance: FloatArray | None = None
     separation: Separation | None = None
     tie_strength: float | None = None
     coefficients: tuple[Coefficient, ...] = ()
@@ -125,12 +115,9 @@ def rate_part(votes: Comparisons, rules: Rules, status: Status) -> Rated:
     said = remarks.warnings(
         votes, rules=rules, rounds=values.shape[1], degenerate=plain.degenerate
     )
-    check = _cross_check(fitted, found, rules, reference)
     return replace(
-        _with_intervals(plain, found, rules.details),
+        _with_intervals(plain, found),
         rank=ranks,
-        check_lower=fitted.rating - check,
-        check_upper=fitted.rating + check,
         notes=notes,
         explanation=(
             *(() if is_adjusted else (remarks.NOT_ADJUSTED,)),
@@ -170,10 +157,9 @@ class _Fitted:
 def _fit_votes(votes: Comparisons, rules: Rules) -> _Fitted | None:
     """None where the votes determine no ratings in Davidson's model."""
     if rules.method is Method.ELO:
-        samples = resample_elo(votes, rounds=rules.rounds, seed=rules.seed, k=rules.k)
-        is_recorded = rules.order is Order.RECORDED
-        rating = replay_elo(votes, k=rules.k) if is_recorded else np.median(samples, axis=1)
-        return _Fitted(rating=rating, rounds=RatedRounds.of_values(samples))
+        samples = resample_elo(votes, rounds=rules.rounds, seed=rules.seed)
+        rounds = RatedRounds.of_values(samples)
+        return _Fitted(rating=np.median(samples, axis=1), rounds=rounds)
     counts = count_pairs(votes)
     met = Meetings(len(votes.names), counts)
     ties = counts.outcomes[:, 1].sum(keepdims=True).astype(np.float64)
@@ -213,13 +199,9 @@ def _fit_votes(votes: Comparisons, rules: Rules) -> _Fitted | None:
         number = rounds_to_draw(votes, counts, number)
     blocks = resample(votes, counts, unit=rules.unit, rounds=number, seed=rules.seed)
 
-    def report(done: int) -> None:
-        if rules.report is not None:
-            rules.report(done, number)
-
     return _Fitted(
         rating=rating,
-        rounds=rate_rounds(votes, counts, blocks, refit, report=report),
+        rounds=rate_rounds(votes, counts, blocks, refit),
         pulls=pulls,
         tie_strength=tie_strength,
         coefficients=coefficients,
@@ -237,7 +219,6 @@ class _Intervals:
     upper: FloatArray
     above: BoolArray
     half_width: FloatArray
-    covariance: FloatArray | None
     separation: Separation | None = None
 
 
@@ -256,7 +237,6 @@ def _closed_form(
         upper=rating + half,
         above=judged.above,
         half_width=half,
-        covariance=spread.covariance,
         separation=judged,
     )
 
@@ -275,12 +255,6 @@ def _by_rounds(
     if few and rules.unit is not Unit.TWO_WAY:
         wider = factor(few) / NORMAL
     lower, upper = (fitted.rating + wider * (bound - fitted.rating) for bound in bounds)
-    covariance = None
-    if rules.details and rules.method is Method.BRADLEY_TERRY and fitted.pulls is not None:
-        covariance = plain_covariance(fitted.pulls, rules.unit)
-    elif rules.details:
-        whole = fitted.rounds.values[:, fitted.rounds.in_main.all(axis=0)]
-        covariance = np.cov(whole) if whole.shape[1] > 1 else None
     above = np.zeros((len(lower), len(lower)), dtype=bool)
     members = np.flatnonzero(reference)
     samples = values[members]
@@ -288,26 +262,10 @@ def _by_rounds(
     if 2 * is_fine.sum() >= len(is_fine):
         apart = above_in_rounds(fitted.rating[members], samples[:, is_fine])
         above[np.ix_(members, members)] = apart
-    return _Intervals(
-        lower=lower, upper=upper, above=above, half_width=upper - lower, covariance=covariance
-    )
+    return _Intervals(lower=lower, upper=upper, above=above, half_width=upper - lower)
 
 
-def _cross_check(
-    fitted: _Fitted, found: _Intervals, rules: Rules, reference: BoolArray
-) -> FloatArray:
-    """(C,) half-widths by the plain sandwich, Bradley-Terry only; NaN for who lacks a bound."""
-    if not rules.details or rules.method is not Method.BRADLEY_TERRY or fitted.pulls is None:
-        return np.full(len(fitted.rating), np.nan)
-    pulls = fitted.pulls.relative_to(reference)
-    is_closed = rules.intervals is Intervals.CLOSED_FORM
-    covariance = plain_covariance(pulls, rules.unit, keep_variances=is_closed)
-    variances = np.maximum(covariance.diagonal(), 0.0)
-    check = factor(remarks.few_clusters(pulls.votes, rules.unit)) * np.sqrt(variances)
-    return np.where(np.isnan(found.lower) | np.isnan(found.upper), np.nan, check)
-
-
-def _with_intervals(plain: Rated, found: _Intervals, details: bool) -> Rated:
+def _with_intervals(plain: Rated, found: _Intervals) -> Rated:
     lower, upper = found.lower, found.upper
     best, worst = rank_sets(above_by_bounds(found.above, lower, upper))
     unbounded = np.isnan(lower) & np.isnan(upper)
@@ -318,6 +276,5 @@ def _with_intervals(plain: Rated, found: _Intervals, details: bool) -> Rated:
         upper=upper,
         rank_best=best,
         rank_worst=worst,
-        covariance=found.covariance if details else None,
-        separation=found.separation if details else None,
+        separation=found.separation,
     )

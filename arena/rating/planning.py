@@ -17,18 +17,15 @@ from functools import lru_cache
 import numpy as np
 from scipy.special import ndtr, ndtri
 
-from arena.rating.comparisons import LEVEL, Comparisons, FloatArray, t_quantile
-from arena.rating.leaderboard import Intervals, Leaderboard, rate
-from arena.rating.models import ELO_PER_LOGIT
+from arena.rating.chains import are_determined
+from arena.rating.comparisons import LEVEL, Comparisons, FloatArray, count_pairs, t_quantile
+from arena.rating.models import ELO_PER_LOGIT, Meetings, fit
 from arena.rating.ranking import CAUTION
 from arena.rating.rules import Unit
-from arena.rating.sandwich import MOST_PRIOR
+from arena.rating.sandwich import MOST_PRIOR, pulls_of_model, spread_of
 
 MOST_SEARCHED = 500
 """No more experts, or scenarios, are thought of."""
-
-_ROUNDS = 100
-"""Of past votes; the rounds only say who is determined at all."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -321,13 +318,14 @@ class Effects:
 
 
 def estimate_effects(votes: Comparisons) -> Effects | None:
-    """Return what past votes say; None where they do not determine ratings with intervals."""
-    means = {}
-    for unit in (Unit.VOTE, Unit.EXPERT, Unit.SCENARIO):
-        board = rate(votes, unit=unit, intervals=Intervals.CLOSED_FORM, rounds=_ROUNDS)
-        if board.covariance is None or np.isnan(board.covariance.diagonal()).any():
-            return None
-        means[unit] = float(board.covariance.diagonal().mean())
+    """Return what past votes say; None where they do not determine ratings."""
+    counts = count_pairs(votes)
+    met = Meetings(len(votes.names), counts)
+    games, scores = counts.games[:, None], counts.scores[:, None]
+    if not are_determined(met, games, scores).all():
+        return None
+    pulls = pulls_of_model(votes, met, counts.games, fit(met, games, scores)[:, 0])
+    means = {unit: float(spread_of(pulls, unit).covariance.diagonal().mean()) for unit in Unit}
     share = 1.0 - 1.0 / len(votes.names)
 
     def standard_deviation(unit: Unit, clusters: int) -> float:
@@ -337,22 +335,3 @@ def estimate_effects(votes: Comparisons) -> Effects | None:
         expert_sd=standard_deviation(Unit.EXPERT, len(np.unique(votes.expert))),
         scenario_sd=standard_deviation(Unit.SCENARIO, len(np.unique(votes.scenario))),
     )
-
-
-def design_effects(board: Leaderboard, independent: Leaderboard) -> list[float]:
-    """Return how many votes weigh as much as one independent vote, by contestant with an interval.
-
-    The ratio of the variances. Half-widths would also count what Student's t adds for few experts.
-
-    Args:
-        board: Its covariance knows of experts and scenarios.
-        independent: The same votes rated as if each stood for itself.
-    """
-    if board.covariance is None or independent.covariance is None:
-        return []
-    both = zip(board.covariance.diagonal(), independent.covariance.diagonal(), strict=True)
-    return [
-        float(clustered / alone)
-        for line, (clustered, alone) in zip(board.lines, both, strict=True)
-        if line.lower is not None and line.upper is not None and alone > 0.0
-    ]

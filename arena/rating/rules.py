@@ -1,6 +1,5 @@
 """How to rate: method, what hangs together, how intervals are found, how often, by which seed."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -25,13 +24,6 @@ class Unit(StrEnum):
     def kinds(self) -> tuple[str, ...]:
         """The arrays of votes by which they hang together."""
         return {"vote": (), "two-way": ("expert", "scenario")}.get(self.value, (self.value,))
-
-
-class Order(StrEnum):
-    """What online Elo shows as its point; its rounds are always shuffled."""
-
-    SHUFFLED = "shuffled"
-    RECORDED = "recorded"
 
 
 class Intervals(StrEnum):
@@ -80,10 +72,6 @@ def unit_for(*, judges: bool, items: bool) -> Unit:
     return Unit.SCENARIO if items else Unit.VOTE
 
 
-Report = Callable[[int, int], None]
-"""Is told how many rounds are done, and of how many."""
-
-
 @dataclass(frozen=True, slots=True)
 class Rules:
     """How to rate; the fields are the arguments of `leaderboard.rate`.
@@ -97,10 +85,6 @@ class Rules:
     intervals: Intervals
     rounds: int
     seed: int
-    k: float
-    order: Order
-    details: bool
-    report: Report | None = None
 
     def __post_init__(self) -> None:
         if self.rounds < 1:

@@ -143,14 +143,8 @@ def pulls_of_model(
 # --- The plain sandwich --------------------------------------------------------------------------
 
 
-def plain_covariance(pulls: Pulls, unit: Unit, *, keep_variances: bool = False) -> FloatArray:
-    """(C, C) in which each contestant stands for itself; the cross-check of the intervals.
-
-    Args:
-        pulls: What each row pulls.
-        unit: What hangs together.
-        keep_variances: Though negative directions are cut off.
-    """
+def plain_covariance(pulls: Pulls, unit: Unit) -> FloatArray:
+    """(C, C) covariance in which each contestant stands for itself."""
     kinds = [np.unique(getattr(pulls.votes, kind), return_inverse=True) for kind in unit.kinds]
     if not kinds:
         return without_negative_parts(pulls.by_row())
@@ -163,9 +157,7 @@ def plain_covariance(pulls: Pulls, unit: Unit, *, keep_variances: bool = False) 
         sign * pulls.by_cluster(of_row, number) * number / max(1, number - 1)
         for number, of_row, sign in clusters
     ]
-    found = np.asarray(sum(squares))
-    whole = without_negative_parts(found)
-    return _with_variances(whole, found.diagonal()) if keep_variances else whole
+    return without_negative_parts(np.asarray(sum(squares)))
 
 
 def factor(clusters: int | None) -> float:

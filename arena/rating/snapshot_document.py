@@ -14,7 +14,6 @@ from typing import Annotated, Any
 from pydantic import PlainValidator, TypeAdapter, ValidationError
 
 from arena.rating.comparisons import Estimate
-from arena.rating.influence import FitTest
 from arena.rating.logistic import SideBias
 from arena.rating.reliability import Agreement, Rater, Repeats
 from augment.errors import InvalidDocument
@@ -46,49 +45,6 @@ Kept = Annotated[str, PlainValidator(read_text)]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class LargestMove:
-    """By how many ranks somebody moves at most, and who does."""
-
-    places: int
-    slugs: tuple[str, ...]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class BothRanks:
-    """A contestant in two versions of a rating, with and without something."""
-
-    slug: str
-    rank_with: int | None
-    rating_with: float | None
-    rank_without: int | None
-    rating_without: float | None
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class OwnVotes:
-    """The rating with and without the votes of authors on their own contestants.
-
-    Attributes:
-        left_out: Whether the table leaves them out.
-        votes, experts: How many there are, and by how many.
-        of_experts: How many experts there are in all.
-        rounds: Of the version that the table does not show; `reasons` are about that one.
-        largest: None where nobody has a rank in both versions.
-        by_judge: Their number by the judge's code.
-    """
-
-    left_out: bool
-    votes: int
-    experts: int
-    of_experts: int
-    rounds: int
-    reasons: tuple[Kept, ...]
-    largest: LargestMove | None
-    lines: tuple[BothRanks, ...]
-    by_judge: dict[str, int]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class CovariateEffect:
     """What one unit of a covariate is worth, in Elo points, and how likely that is by chance."""
 
@@ -99,26 +55,15 @@ class CovariateEffect:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Adjustment:
-    """What a rating was adjusted for, and what that changes.
-
-    Attributes:
-        effects: None where the votes do not determine them; then the table is not adjusted.
-        lines: With it and without it.
-        largest: None where nobody has a rank in both versions.
-    """
+    """What a rating was adjusted for; without effects the votes do not determine any."""
 
     effects: tuple[CovariateEffect, ...]
-    lines: tuple[BothRanks, ...]
-    largest: LargestMove | None
 
 
 VERSION = 4
 """3 is without what a rating was adjusted for; 2 also without adjusted
 p-values and the measures that came with them; 1 also without the order of the board and without
 notes in the lines of types; a rating of version 0 kept its standings alone."""
-
-Bounds = tuple[float, float]
-
 
 _SINCE_2, _SINCE_3, _SINCE_4, _SINCE_5 = {"since": 2}, {"since": 3}, {"since": 4}, {"since": 5}
 """Of fields that documents of earlier versions do not have, unless they say something."""
@@ -148,7 +93,6 @@ class BoardRemarks:
         reasons: Why ratings or intervals are missing; None where only the status says so.
         warnings: What else to keep in mind.
         tie_strength: v of Davidson's model.
-        check: The intervals in closed form.
         order: Slugs, best first.
         parts: Whose ratings compare: those with the same number.
         above: The pairs that differ with all of them judged at once, the higher one first; None
@@ -161,34 +105,10 @@ class BoardRemarks:
     tie_strength: float | None = None
     experts: int = 0
     scenarios: int = 0
-    check: dict[str, Bounds] = field(default_factory=dict)
     order: tuple[str, ...] = field(default=(), metadata=_SINCE_2)
     parts: dict[str, int] = field(default_factory=dict)
     above: tuple[tuple[str, str], ...] | None = None
     p_values: tuple[PairP, ...] | None = field(default=None, metadata=_SINCE_3)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Overtaking:
-    """How few votes would have to go for somebody else to be first.
-
-    Attributes:
-        exact: Whether fewer are proved not to do; else it is an upper bound.
-        rival: The slug of who comes first then.
-    """
-
-    votes: int
-    exact: bool
-    rival: str
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class OnlinePlace:
-    """What online Elo makes of a contestant."""
-
-    slug: str
-    elo: float
-    place: int
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -220,7 +140,6 @@ class Trust:
 
     Attributes:
         tie_share: From 0 to 1.
-        elo_order: Contestants by Bradley-Terry, with what online Elo makes of them.
     """
 
     tie_share: float | None = None
@@ -228,33 +147,6 @@ class Trust:
     side: SideBias | None = None
     repeats: Repeats | None = None
     raters: tuple[PanelRater, ...] = ()
-    removal: Overtaking | None = None
-    elo_order: tuple[OnlinePlace, ...] | None = None
-    fit: FitTest | None = None
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class VotesWanted:
-    """The votes in all that an interval of +-`half_width` Elo points needs."""
-
-    half_width: float
-    votes: int
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Precision:
-    """What intervals would claim of independent votes, and what narrower ones need.
-
-    Attributes:
-        half_width: Of the typical interval, Elo points.
-        independent: The intervals that single votes as units give, by slug.
-        design_effect: How many of these votes weigh as much as an independent one.
-    """
-
-    half_width: float | None = None
-    independent: dict[str, Bounds] = field(default_factory=dict)
-    design_effect: float | None = None
-    planning: tuple[VotesWanted, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -345,8 +237,6 @@ class Results:
     version: int = 0
     board: BoardRemarks = field(default_factory=BoardRemarks)
     trust: Trust = field(default_factory=Trust)
-    claims: Precision = field(default_factory=Precision)
-    own_votes: OwnVotes | None = None
     adjustment: Adjustment | None = field(default=None, metadata=_SINCE_4)
     pairs: tuple[PairRecord, ...] = ()
     types: tuple[TypeRating, ...] = ()

@@ -4,36 +4,25 @@ The file is CSV with any usual separator, JSON lines or Parquet; what it is foll
 content, not from its name.
 """
 
-from __future__ import annotations
-
 import csv
-import json
-import math
-from array import array
-from collections import defaultdict
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack, contextmanager
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TextIO
+from typing import Any
 
 import numpy as np
 
-from arena.rating.comparisons import LOSS, TIE, WIN, Comparisons, FloatArray, IntArray
+from arena.rating.comparisons import LOSS, TIE, WIN, Comparisons, IntArray
 
 NEEDED = ("model_a", "model_b", "winner")
 OPTIONAL = ("judge", "item")
-SIDE = "side"
-"""A covariate that every file has: `model_a` was on the left."""
+SIMULATED = "simulated"
+"""A column that our own files have; a yes in it marks a vote as made up."""
 WINNERS = {"model_a": WIN, "model_b": LOSS, "tie": TIE, "tie (bothbad)": TIE}
-SEPARATORS = (",", ";", "\t", "|")
-LONGEST_CELL = 2**26
+SEPARATORS = ",;\t|"
 _FIRST_BYTES = 65_536
-_PARQUET = b"PAR1"
+_MOST_IN_A_LINE = 2**26
 _UTF_16 = (b"\xff\xfe", b"\xfe\xff")
-_LINES_TO_REPORT = 20_000
-
-Row = list[str]
 
 
 class VotesFileUnreadable(ValueError):
@@ -41,336 +30,156 @@ class VotesFileUnreadable(ValueError):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class TextTable:
-    """A table while it is being read.
+class VotesTable:
+    """The columns of a file that matter, as text without spaces around it.
 
     Attributes:
-        header: The names of the columns, without spaces around them.
-        rows: Their cells, one row after the other; an empty list for a blank line.
-        lines_read: How many lines of the file have been read so far; rows in Parquet, with one
-            for the header.
+        first_line: The number of the first vote's line; blank lines are not counted.
     """
 
-    header: Row
-    rows: Iterator[Row]
-    lines_read: Callable[[], int]
+    columns: dict[str, list[str]]
+    first_line: int
+
+    def refuse(self, place: int, reason: str) -> VotesFileUnreadable:
+        """Return the error that a vote, from 0, is wrong."""
+        return VotesFileUnreadable(f"line {place + self.first_line}: {reason}")
+
+    def check_filled(self, names: Sequence[str]) -> None:
+        """Refuse columns in which a cell says nothing: empty, or what other programs write."""
+        for name in names:
+            for place, cell in enumerate(self.columns[name]):
+                if not cell or cell.lower() == "nan":
+                    raise self.refuse(place, f"{name} is {cell or 'empty'}")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class VotesFile:
-    """What a file holds.
-
-    Attributes:
-        comparisons: Its votes, experts are judges, scenarios items. A column that was not asked
-            for is one judge or item for all; without either, equal votes are in one row.
-        repeats: How many votes repeat an earlier one of the same judge, item and pair; None where
-            these were not asked for.
-    """
-
-    comparisons: Comparisons
-    repeats: int | None
-
-
-def columns_of(path: Path) -> tuple[str, ...]:
-    """Return the columns that the file has beside the needed ones.
+def read_table(path: Path) -> VotesTable:
+    """Read the known columns that a file has; text is UTF-8, or UTF-16 with its mark.
 
     Raises:
-        VotesFileUnreadable: The first line does not name the needed columns, each once.
+        VotesFileUnreadable: It can't be read, a column is missing, a winner is unknown, a name is
+            missing, or a model meets itself.
     """
-    with open_votes(path) as table:
-        return tuple(name for name in table.header if name not in NEEDED)
+    from pyarrow import ArrowException, compute, string
 
-
-@contextmanager
-def open_votes(path: Path) -> Iterator[TextTable]:
-    """Open the table of a file that has the needed columns, each once.
-
-    Raises:
-        VotesFileUnreadable: It has not, or can't be read at all.
-    """
-    allowed = f"needed are {', '.join(NEEDED)}, allowed besides {' and '.join(OPTIONAL)}"
-    with ExitStack() as stack:
-        try:
-            table = stack.enter_context(_open_table(path))
-        except (StopIteration, RuntimeError):
-            raise VotesFileUnreadable(f"line 1: the file is empty; {allowed}") from None
-        except (csv.Error, ValueError) as error:
-            raise VotesFileUnreadable(f"line 1: {error}; {allowed}") from error
+    try:
+        table, first_line = _load(path, {*NEEDED, *OPTIONAL, SIMULATED})
         for name in NEEDED:
-            if name not in table.header:
-                raise VotesFileUnreadable(f"line 1: there is no column {name!r}; {allowed}")
-        for name in (*NEEDED, *OPTIONAL):
-            if table.header.count(name) > 1:
-                raise VotesFileUnreadable(f"line 1: the column {name!r} is there twice")
-        yield table
-
-
-def read_votes(
-    path: Path,
-    *,
-    clusters: Sequence[str],
-    covariates: Sequence[str] = (),
-    in_order: bool = False,
-    report: Callable[[int], None] | None = None,
-) -> VotesFile:
-    """Read all votes.
-
-    Args:
-        path: CSV, JSON lines or Parquet; text in UTF-8 or UTF-16.
-        clusters: Which of the optional columns to read; every line must fill them.
-        covariates: What else may say who wins: `side`, or a name NAME with columns NAME_a and
-            NAME_b of numbers, of which the difference counts.
-        in_order: Keep a row for each line, in the order of the lines.
-        report: Is told how many votes are read.
-
-    Raises:
-        VotesFileUnreadable: A column is missing, a winner is unknown, a cell that is needed is
-            empty or no number, a model meets itself, or a line has more or fewer cells than the
-            first.
-    """
-    numbers = [f"{name}_{end}" for name in covariates if name != SIDE for end in "ab"]
-    models, *others = codes = [_Codes() for _ in ("model", *clusters)]
-    # With judges and items hardly two votes are equal.
-    is_grouped = not (clusters or covariates or in_order)
-    grouped: defaultdict[tuple[int, ...], int] = defaultdict(int)
-    coded, values = array("q"), array("d")
-    for count, (line, cells) in enumerate(_votes_in(path, (*NEEDED, *clusters, *numbers)), 1):
-        first, second, winner, *rest = cells
-        row = (
-            models[first],
-            models[second],
-            round(2 * WINNERS[winner]),
-            *(of_column[cell] for of_column, cell in zip(others, rest, strict=False)),
-        )
-        if is_grouped:
-            grouped[row] += 1
-        else:
-            coded.extend(row)
-        named = zip(numbers, rest[len(clusters) :], strict=True)
-        values.extend(_number(line, column, cell) for column, cell in named)
-        if report is not None and count % _LINES_TO_REPORT == 0:
-            report(count)
-    width = len(NEEDED) + len(clusters)
-    if is_grouped:
-        coded.extend(code for row in grouped for code in row)
-    rows = np.array(coded, dtype=np.int64).reshape(-1, width)
-    counts = np.array(list(grouped.values()) or [1] * len(rows), dtype=np.int64)
-    if report is not None:
-        report(int(counts.sum()))
-    return VotesFile(
-        comparisons=_as_votes(
-            rows, counts, clusters, codes, _columns(covariates, values, len(rows))
-        ),
-        repeats=_repeats(rows) if len(clusters) == len(OPTIONAL) else None,
+            if name not in table.column_names:
+                raise VotesFileUnreadable(
+                    f"line 1: there is no column {name!r}; needed are {', '.join(NEEDED)}"
+                )
+        columns = {
+            name: compute.utf8_trim_whitespace(table[name].cast(string()).fill_null(""))
+            for name in table.column_names
+        }
+    except (ArrowException, UnicodeError, csv.Error) as error:
+        raise VotesFileUnreadable(f"it can't be read: {error}") from error
+    found = VotesTable(
+        columns={name: column.to_pylist() for name, column in columns.items()},
+        first_line=first_line,
     )
-
-
-def is_missing(name: str) -> bool:
-    """Return whether a cell says nothing: empty, or what other programs write for that."""
-    return not name or name.lower() == "nan"
-
-
-# --- Lines ---------------------------------------------------------------------------------------
-
-
-def _votes_in(path: Path, wanted: Sequence[str]) -> Iterator[tuple[int, Row]]:
-    """Yield the number and the wanted cells of each line that is not blank."""
-    with open_votes(path) as table:
-        places = [table.header.index(name) for name in wanted]
-        width = len(table.header)
-        before = table.lines_read()
-        while True:
-            try:
-                row = next(table.rows, None)
-            except (csv.Error, ValueError) as error:
-                raise VotesFileUnreadable(f"line {before + 1}: {error}") from error
-            if row is None:
-                return
-            if row:
-                while len(row) > width and not row[-1].strip():
-                    row = row[:-1]
-                cells = [row[place].strip() for place in places] if len(row) == width else []
-                if wrong := _wrong(len(row), width, dict(zip(wanted, cells, strict=False))):
-                    raise VotesFileUnreadable(f"line {before + 1}: {wrong}")
-                yield before + 1, cells
-            before = table.lines_read()
-
-
-def _wrong(cells_there: int, width: int, cells: dict[str, str]) -> str:
-    """Return what is wrong with a line, empty if nothing is."""
-    if cells_there != width:
-        return f"there are {cells_there} cells, in the first line {width}"
-    for name, cell in cells.items():
-        if is_missing(cell):
-            return f"{name} is {cell!r}, which is no name" if cell else f"{name} is empty"
-    if cells["winner"] not in WINNERS:
-        return f"the winner {cells['winner']!r} is none of {', '.join(WINNERS)}"
-    if cells["model_a"] == cells["model_b"]:
-        return f"{cells['model_a']!r} is compared with itself"
-    return ""
-
-
-def _number(line: int, column: str, cell: str) -> float:
-    try:
-        value = float(cell)
-    except ValueError:
-        value = math.nan
-    if not math.isfinite(value):
-        raise VotesFileUnreadable(f"line {line}: {column} is {cell!r}, which is no number")
-    return value
-
-
-class _Codes(dict[str, int]):
-    """Numbers names as they come."""
-
-    def __missing__(self, name: str) -> int:
-        self[name] = len(self)
-        return self[name]
-
-    def alphabetical(self) -> IntArray:
-        """(n,) from the number of a name to its place in the alphabet."""
-        places = np.empty(len(self), dtype=np.int64)
-        places[[self[name] for name in sorted(self)]] = np.arange(len(self))
-        return places
-
-
-def _as_votes(
-    rows: IntArray,
-    counts: IntArray,
-    clusters: Sequence[str],
-    codes: Sequence[_Codes],
-    columns: Sequence[FloatArray],
-) -> Comparisons:
-    """Return the numbers as comparisons, names in alphabetical order: no order of lines counts."""
-    models, *others = (of_column.alphabetical() for of_column in codes)
-    of_clusters = {
-        name: place[rows[:, len(NEEDED) + index]]
-        for index, (name, place) in enumerate(zip(clusters, others, strict=True))
-    }
-    nobody = np.zeros(len(rows), dtype=np.int64)
-    return Comparisons(
-        names=tuple(sorted(codes[0])),
-        first=models[rows[:, 0]],
-        second=models[rows[:, 1]],
-        score=rows[:, 2] / 2.0,
-        expert=of_clusters.get("judge", nobody),
-        scenario=of_clusters.get("item", nobody),
-        count=counts,
-        covariates=np.column_stack(columns) if columns else np.empty((len(rows), 0)),
-    )
-
-
-def _columns(covariates: Sequence[str], values: array[float], rows: int) -> list[FloatArray]:
-    """(R,) of each covariate, from both ends' numbers of each row, one row after the other."""
-    pairs = sum(name != SIDE for name in covariates)
-    both = np.array(values, dtype=np.float64).reshape(rows, pairs, 2)
-    differences = iter((both[:, :, 0] - both[:, :, 1]).T)
-    return [np.ones(rows) if name == SIDE else next(differences) for name in covariates]
-
-
-def _repeats(rows: IntArray) -> int:
-    """Count votes of a judge on an item and pair that have one already."""
-    keys = np.column_stack([np.sort(rows[:, :2], axis=1), rows[:, len(NEEDED) :]])
-    return len(keys) - len(np.unique(keys, axis=0))
-
-
-# --- Kinds of files ------------------------------------------------------------------------------
-
-
-@contextmanager
-def _open_table(path: Path) -> Iterator[TextTable]:
-    """Open a file by what its first bytes say that it is."""
-    with path.open("rb") as file:
-        start = file.read(_FIRST_BYTES)
-    if start.startswith(_PARQUET):
-        yield _parquet(path)
-        return
-    csv.field_size_limit(LONGEST_CELL)
-    with path.open(encoding=_encoding(start), newline="") as lines:
-        beginning = lines.read(_FIRST_BYTES)
-        lines.seek(0)
-        if beginning.lstrip().startswith("{"):
-            yield _json_lines(lines)
-        else:
-            yield _separated(lines, beginning)
-
-
-def _encoding(start: bytes) -> str:
-    if start.startswith(_UTF_16):
-        return "utf-16"
-    if start[1:2] == b"\0":
-        return "utf-16-le"
-    return "utf-16-be" if start[:1] == b"\0" else "utf-8-sig"
-
-
-def _separated(lines: TextIO, beginning: str) -> TextTable:
-    """A row a line; the separator is the one that finds most of the known columns."""
-
-    def count_known(separator: str) -> int:
-        first = next(csv.reader(beginning.splitlines(keepends=True), delimiter=separator), [])
-        return len({cell.strip() for cell in first} & {*NEEDED, *OPTIONAL})
-
-    reader = csv.reader(lines, strict=True, delimiter=max(SEPARATORS, key=count_known))
-    header = [name.strip() for name in next(reader)]
-    while header and not header[-1]:
-        header.pop()
-    return TextTable(header=header, rows=reader, lines_read=lambda: reader.line_num)
-
-
-def _json_lines(lines: TextIO) -> TextTable:
-    """An object a line; the columns are those of the first."""
-    count = 0
-    first = _object(next(line for line in lines if line.strip()))
-    header = list(first)
-    lines.seek(0)
-
-    def rows() -> Iterator[Row]:
-        nonlocal count
-        for line in lines:
-            if line.strip():
-                found = _object(line)
-                row = [_text(found.get(name)) for name in header]
-            else:
-                row = []
-            count += 1
-            yield row
-
-    return TextTable(header=header, rows=rows(), lines_read=lambda: count)
-
-
-def _object(line: str) -> dict[str, object]:
-    try:
-        found = json.loads(line)
-    except json.JSONDecodeError as error:
-        raise ValueError(f"no JSON object: {error}") from error
-    if not isinstance(found, dict):
-        raise ValueError("no JSON object")
+    found.check_filled(NEEDED)
+    votes = zip(*(found.columns[name] for name in NEEDED), strict=True)
+    for place, (model_a, model_b, winner) in enumerate(votes):
+        if winner not in WINNERS:
+            raise found.refuse(place, f"the winner {winner!r} is none of {', '.join(WINNERS)}")
+        if model_a == model_b:
+            raise found.refuse(place, f"{model_a!r} is compared with itself")
     return found
 
 
-def _parquet(path: Path) -> TextTable:
-    from pyarrow import ArrowException, parquet
+def as_comparisons(table: VotesTable, clusters: Sequence[str]) -> tuple[Comparisons, int | None]:
+    """Number the names in alphabetical order, so that no order of lines counts.
 
-    try:
-        file = parquet.ParquetFile(path)
-    except ArrowException as error:
-        raise ValueError(f"no readable Parquet: {error}") from error
-    header = list(file.schema_arrow.names)
-    count = 1
+    Args:
+        table: What was read.
+        clusters: Which of the optional columns to use; every line must fill them. A column that
+            is not used is one judge or item for all.
 
-    def rows() -> Iterator[Row]:
-        nonlocal count
-        for batch in file.iter_batches():
-            for cells in zip(*(column.to_pylist() for column in batch.columns), strict=True):
-                row = [_text(cell) for cell in cells]
-                count += 1
-                yield row
+    Returns:
+        The votes, experts are judges and scenarios items; and how many of them repeat an earlier
+        one of the same judge, item and pair, None where these are not both used.
 
-    return TextTable(header=header, rows=rows(), lines_read=lambda: count)
+    Raises:
+        VotesFileUnreadable: A cell that is needed is empty.
+    """
+    table.check_filled(clusters)
+    columns = table.columns
+    names, ends = _number(columns["model_a"] + columns["model_b"])
+    outcome = np.array([2 * WINNERS[winner] for winner in columns["winner"]], dtype=np.int64)
+    codes = [_number(columns[name])[1] for name in clusters]
+    rows = np.column_stack([*np.split(ends, 2), outcome, *codes])
+    rows, count = np.unique(rows, axis=0, return_counts=True)
+    nobody = np.zeros(len(rows), dtype=np.int64)
+    of_clusters = dict(zip(clusters, rows.T[len(NEEDED) :], strict=True))
+    comparisons = Comparisons(
+        names=tuple(names),
+        first=rows[:, 0].copy(),
+        second=rows[:, 1].copy(),
+        score=rows[:, 2] / 2.0,
+        expert=of_clusters.get("judge", nobody).copy(),
+        scenario=of_clusters.get("item", nobody).copy(),
+        count=count,
+    )
+    if len(clusters) < len(OPTIONAL):
+        return comparisons, None
+    keys = np.column_stack([np.sort(rows[:, :2], axis=1), rows[:, len(NEEDED) :]])
+    return comparisons, comparisons.votes - len(np.unique(keys, axis=0))
 
 
-def _text(cell: object) -> str:
-    """As our CSV files have it."""
-    if isinstance(cell, bool):
-        return "yes" if cell else "no"
-    return "" if cell is None else str(cell)
+# --- Private -----------------------------------------------------------------------------------
+
+
+def _load(path: Path, wanted: set[str]) -> tuple[Any, int]:
+    """Return an Arrow table with those of the columns that there are, and its first line."""
+    from pyarrow import csv as arrow_csv
+    from pyarrow import json as arrow_json
+    from pyarrow import parquet, string
+
+    with path.open("rb") as file:
+        start = file.read(_FIRST_BYTES)
+    if start.startswith(b"PAR1"):
+        there = set(parquet.read_schema(path).names)
+        return parquet.read_table(path, columns=sorted(wanted & there)), 2
+    if start.lstrip(b"\xef\xbb\xbf \r\n\t").startswith(b"{"):
+        options = arrow_json.ReadOptions(use_threads=False, block_size=_MOST_IN_A_LINE)
+        table = arrow_json.read_json(path, read_options=options)
+        return table.select([name for name in table.column_names if name in wanted]), 1
+    encoding = "utf-16" if start.startswith(_UTF_16) else "utf-8-sig"
+    with path.open(encoding=encoding, newline="") as lines:
+        separator, header = _read_header(lines.readline(_FIRST_BYTES))
+    known = [name for name in dict.fromkeys(header) if name in wanted]
+    for name in known:
+        if header.count(name) > 1:
+            raise VotesFileUnreadable(f"line 1: the column {name!r} is there twice")
+    table = arrow_csv.read_csv(
+        path,
+        arrow_csv.ReadOptions(
+            use_threads=False,
+            encoding=encoding,
+            block_size=_MOST_IN_A_LINE,
+            column_names=header,
+            skip_rows=1,
+        ),
+        arrow_csv.ParseOptions(delimiter=separator, newlines_in_values=True),
+        arrow_csv.ConvertOptions(
+            include_columns=known, column_types={name: string() for name in known}
+        ),
+    )
+    return table, 2
+
+
+def _read_header(line: str) -> tuple[str, list[str]]:
+    """Return the separator that finds most of the known columns, and the columns."""
+    headers = [
+        (separator, [name.strip() for name in next(csv.reader([line], delimiter=separator), [])])
+        for separator in SEPARATORS
+    ]
+    return max(headers, key=lambda found: len({*found[1]} & {*NEEDED, *OPTIONAL}))
+
+
+def _number(cells: Sequence[str]) -> tuple[list[str], IntArray]:
+    """Return the names in alphabetical order, and the number of each cell's."""
+    names = sorted(set(cells))
+    number = {name: index for index, name in enumerate(names)}
+    return names, np.array([number[cell] for cell in cells], dtype=np.int64)

@@ -44,11 +44,11 @@ from arena.studies.services.plan import HIGHEST_SEED
 from augment.errors import UnknownName
 from augment.services.scenarios.scenes import type_choices
 
-_FIELDS: dict[str, Callable[[], serializers.Field[Any, Any, Any, Any]]] = {
-    "str": serializers.CharField,
-    "int": serializers.IntegerField,
-    "int | None": partial(serializers.IntegerField, allow_null=True),
-    "float | None": partial(serializers.FloatField, allow_null=True),
+_FIELDS: dict[Any, Callable[[], serializers.Field[Any, Any, Any, Any]]] = {
+    str: serializers.CharField,
+    int: serializers.IntegerField,
+    int | None: partial(serializers.IntegerField, allow_null=True),
+    float | None: partial(serializers.FloatField, allow_null=True),
 }
 """By the type of a line's field."""
 
@@ -66,7 +66,7 @@ class StandingDocument(serializers.Serializer[Any]):
 
     def get_fields(self) -> dict[str, serializers.Field[Any, Any, Any, Any]]:
         """Return these and all stored fields of a line."""
-        kinds = {column.name: _FIELDS[str(column.type)] for column in fields(Line)}
+        kinds = {column.name: _FIELDS[column.type] for column in fields(Line)}
         stored = {name: kinds[name]() for name in STORED}
         stored["elo"] = serializers.FloatField(source="rating", allow_null=True)
         del stored["rating"]

@@ -12,12 +12,7 @@ from augment.models import BaseScene, Scenario
 from augment.services.events import log_event
 from augment.services.scenarios import editing
 from augment.services.scenarios.pictures import redraw
-from augment.services.scenarios.scenes import (
-    Circumstances,
-    change_circumstances,
-    check_slug,
-    set_wording,
-)
+from augment.services.scenarios.scenes import change_surroundings, check_slug, set_wording
 
 MOST_NAMED = 8
 FILE_TOO_LARGE = "arena.file_too_large"
@@ -138,9 +133,9 @@ def change_scenario(
     *,
     instruction: str,
     type: str,
-    type_label: str | None,
     keep_traffic: bool,
-    circumstances: Circumstances,
+    density: str,
+    goal: str,
     actor: User | None = None,
 ) -> Scenario:
     """Set the instruction, type and circumstances of a scenario that was not worked on yet.
@@ -155,8 +150,8 @@ def change_scenario(
         raise Conflict(f"“{row.slug}” is the catalogue’s own; change it in its file.")
     _refuse_needed(row, "changed")
     before = _state(row)
-    set_wording(row, instruction, type, type_label)
-    change_circumstances(row, circumstances, keep_traffic=keep_traffic)
+    set_wording(row, instruction, type)
+    change_surroundings(row, keep_traffic=keep_traffic, density=density, goal=goal)
     row.save()
     log_event(
         actor=actor,

@@ -10,7 +10,7 @@ from django import forms
 from arena.scenarios.queries import TypeGroup
 from augment.errors import Conflict
 from augment.models import Contestant
-from augment.services.inputs import Input, InputKind
+from augment.services.inputs import Input, InputKind, inputs_of
 from augment.services.running.budget import Caps
 
 LONGEST_LINES = 60_000
@@ -86,21 +86,6 @@ class ChoiceForm(forms.Form):
         return [name for name, its in slugs.items() if its & chosen and its - chosen]
 
 
-class CapsForm(forms.Form):
-    """What a job may use at most; an empty field is no cap, or one that stays."""
-
-    cap_usd = forms.DecimalField(required=False, max_digits=16, decimal_places=9)
-    cap_calls = forms.IntegerField(required=False)
-    cap_tokens = forms.IntegerField(required=False)
-
-    def caps(self) -> Caps:
-        """Return what was entered, once the form is valid."""
-        entered = self.cleaned_data
-        return Caps(
-            usd=entered["cap_usd"], calls=entered["cap_calls"], tokens=entered["cap_tokens"]
-        )
-
-
 class LinesField(forms.CharField):
     """A text whose lines are the values."""
 
@@ -122,6 +107,7 @@ def form_field(asked: Input) -> forms.Field:
         given["initial"] = asked.default
     bounds = {"min_value": asked.least, "max_value": asked.most}
     look = {"class": "input"}
+    choices = [("", "–")] * (asked.default is None) + list(asked.choices.items())
     kinds: dict[InputKind, tuple[type[forms.Field], dict[str, Any]]] = {
         InputKind.TEXT: (
             forms.CharField,
@@ -136,16 +122,41 @@ def form_field(asked: Input) -> forms.Field:
             forms.FloatField,
             bounds | {"widget": forms.NumberInput(attrs={**look, "step": "any"})},
         ),
+        InputKind.DECIMAL: (
+            forms.DecimalField,
+            bounds | {"max_digits": 16, "decimal_places": 9, "required": asked.is_required},
+        ),
         InputKind.SWITCH: (forms.BooleanField, {"required": False}),
         InputKind.CHOICE: (
             forms.ChoiceField,
-            {"choices": list(asked.choices.items()), "widget": forms.Select(attrs=look)},
+            {"choices": choices, "widget": forms.Select(attrs=look)},
         ),
         InputKind.LINES: (LinesField, {"initial": "", "max_length": LONGEST_LINES}),
         InputKind.NAMES: (forms.MultipleChoiceField, {}),
     }
     field, more = kinds[asked.kind]
     return field(**given | more)
+
+
+class RequestForm(forms.Form):
+    """A form of a request's inputs, beside the fields of the class.
+
+    Attributes:
+        inputs: What is asked for.
+    """
+
+    inputs: tuple[Input, ...] = ()
+
+    def __init__(self, *args: Any, **kwargs: Any) -> None:
+        super().__init__(*args, **kwargs)
+        missing = [one for one in self.inputs if one.name not in self.fields]
+        self.fields |= {one.name: form_field(one) for one in missing}
+
+
+class CapsForm(RequestForm):
+    """What a job may use at most; an empty field is no cap, or one that stays."""
+
+    inputs = inputs_of(Caps)
 
 
 def read_json(text: str | bytes, *, otherwise: str) -> Any:

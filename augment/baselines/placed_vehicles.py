@@ -157,8 +157,7 @@ def place_crash(
     ground: PlacingGround,
     distance_m: float,
     rng: np.random.Generator,
-    *,
-    arrangement: int = 0,
+    arrangement: int,
 ) -> tuple[TrafficAgent, ...]:
     """Return the crashed vehicles, the first at the spot.
 

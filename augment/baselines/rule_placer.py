@@ -12,17 +12,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from augment.baselines.placed_people import APART_M, CONE_SPACING_M, place_cones, place_walkers
-from augment.baselines.placed_vehicles import (
-    BUMPER_GAP_M,
-    SLIGHT_OFFSET_M,
-    count_arrangements,
-    place_crash,
-    place_vehicles,
-)
+from augment.baselines.placed_people import place_cones, place_walkers
+from augment.baselines.placed_vehicles import count_arrangements, place_crash, place_vehicles
 from augment.baselines.placing_ground import PlacingGround
 from augment.checks import Ground, Severity
-from augment.checks.asked_places import LANES
 from augment.checks.lanes_across import (
     LanesAcross,
     find_picked,
@@ -39,14 +32,10 @@ from augment.scene.intent import (
     ConesRequest,
     CrashRequest,
     Intent,
-    LaneChoice,
-    Lateral,
-    LateralTarget,
     Length,
-    Nearness,
+    Move,
     Relation,
     Request,
-    Shape,
     VehicleRequest,
     WalkRequest,
 )
@@ -55,14 +44,14 @@ _SHIFT_STEP_M = 0.25
 _SHIFT_EXACT_M = 0.5
 _SHIFT_ABOUT_M = 1.5
 """How far along the lane a placement may give way, for an exact and for an "about" distance."""
-NO_INTENT = "The scenario has no intent: nobody has written down what its instruction asks for."
 _BODIES = {AgentType.BUS: Body.BUS, AgentType.BICYCLE: Body.BICYCLE}
-_NAMES = {
-    VehicleRequest: "vehicles",
-    WalkRequest: "pedestrians",
-    ConesRequest: "cones",
-    CrashRequest: "crashed vehicles",
+_NEEDS: dict[type[Request], tuple[str, str, str]] = {
+    VehicleRequest: ("vehicles", "speed_mps", "whether they stand or how fast they drive"),
+    WalkRequest: ("pedestrians", "start", "the side that they come from"),
+    ConesRequest: ("cones", "shape", "the shape"),
+    CrashRequest: ("crashed vehicles", "count", "the count"),
 }
+"""How a request's agents are called, and what it must say besides distance and count."""
 
 _Agents = tuple[TrafficAgent, ...]
 
@@ -72,7 +61,7 @@ class Placement:
     """What was placed.
 
     Attributes:
-        notes: What stands where and why, for a page.
+        notes: What stands where, for a page.
     """
 
     modification: Modification
@@ -87,7 +76,7 @@ def place(scene: Scene, intent: Intent | None, *, seed: int = 0) -> Placement:
             needs, or the map or the traffic leaves no room for it.
     """
     if intent is None:
-        raise CannotPlace(NO_INTENT)
+        raise CannotPlace("The scenario has no intent that says what its instruction asks for.")
     if intent.unmet:
         raise CannotPlace(f"The wish can't be met: {intent.unmet}")
     rng = np.random.default_rng(seed)
@@ -103,48 +92,33 @@ def place(scene: Scene, intent: Intent | None, *, seed: int = 0) -> Placement:
     sentences = [f"{name} is removed." for name in changes.removed]
     for move in resolved.moves:
         agent = find_picked(lanes, move.who)[0]
-        request = VehicleRequest(
-            spot=move.spot,
-            body=_BODIES.get(agent.type, Body.VEHICLE),
-            facing=move.facing,
-            turn_deg=move.turn_deg,
-            speed_mps=agent.speed_mps if move.speed_mps is None else move.speed_mps,
-            count=1,
-        )
         others = tuple(one for one in apply(scene, changes).agents if one.id != agent.id)
         fitting = _Fitting(replace(scene, agents=others), intent.route, rng)
-        (moved,), distance_m = fitting.fit(request)
+        moved, sentence = fitting.fit(_as_request(move, agent))
         same = {name: getattr(agent, name) for name in ("id", "type", "length_m", "width_m")}
-        changes = replace(changes, moved=(*changes.moved, replace(moved, **same)))
-        sentences.append(f"{agent.id} is moved to {distance_m:.1f} m along the ego's lane.")
+        changes = replace(changes, moved=(*changes.moved, replace(moved[0], **same)))
+        sentences.append(f"{agent.id} is moved. {sentence}")
     fitting = _Fitting(apply(scene, changes), intent.route, rng)
     for added in resolve_anchors(resolved).requests:
-        agents, distance_m = fitting.fit(added)
+        agents, sentence = fitting.fit(added)
         fitting.added += agents
-        sentences.append(_describe(added, distance_m, fitting.left_of_lane_m(agents[0])))
-    conventions = list(dict.fromkeys(itertools.chain(*map(_conventions, intent.requests))))
-    if conventions:
-        sentences.append(f"Left open, so by convention: {'; '.join(conventions)}.")
+        sentences.append(sentence)
     if intent.beyond:
-        quoted = ", ".join(f"“{words}”" for words in intent.beyond)
-        sentences.append(f"Asked for beyond the intent's fields, and not placed: {quoted}.")
+        sentences.append(f"Not placed, for no field holds it: {', '.join(intent.beyond)}.")
     changes = replace(changes, added=_numbered(fitting.added, scene))
     return Placement(modification=changes, notes=" ".join(sentences))
 
 
 def list_open(request: Request) -> list[str]:
     """Return what a request leaves open without which nothing can be placed, a sentence each."""
-    needs: dict[str, object] = {"the distance": request.spot.distance}
-    match request:
-        case VehicleRequest():
-            needs |= {"whether they stand or how fast they drive": request.speed_mps}
-        case WalkRequest():
-            needs |= {"the side that they come from": request.start}
-        case ConesRequest():
-            needs |= {"the shape": request.shape}
-    needs |= {"the count": request.count}
+    who, field, what = _NEEDS[type(request)]
+    needs = {
+        "the distance": request.spot.distance,
+        what: getattr(request, field),
+        "the count": request.count,
+    }
     return [
-        f"What is asked of the {_NAMES[type(request)]} leaves open {what}."
+        f"What is asked of the {who} leaves open {what}."
         for what, given in needs.items()
         if given is None
     ]
@@ -165,11 +139,12 @@ class _Fitting:
         self._scene, self._ground = scene, Ground.of(scene)
         self.added: _Agents = ()
 
-    def fit(self, request: Request) -> tuple[_Agents, float]:
-        """The agents of a request nearest to the asked distance that the checks pass, and it."""
+    def fit(self, request: Request) -> tuple[_Agents, str]:
+        """Return the agents nearest to the asked distance that the checks pass, and a note."""
         for open_part in list_open(request):
             raise CannotPlace(open_part)
-        wanted = request.spot.distance or Length(low_m=0.0, high_m=0.0)
+        wanted = request.spot.distance
+        assert wanted is not None
         asked_m = wanted.drawn(self._rng)
         sign = 1.0 if request.spot.relation is Relation.AHEAD else -1.0
         draw = int(self._rng.integers(2**32))
@@ -181,70 +156,46 @@ class _Fitting:
             if wanted.is_range and not (wanted.low_m <= distance_m <= wanted.high_m):
                 continue
             again = np.random.default_rng(draw)
-            agents = self._placed(request, sign * distance_m, again, arrangement)
-            problem = self._problem(request, sign * distance_m, agents)
-            if problem is None:
-                problem, doubts = self._verdict(request, agents)
-                if problem is None and doubts == 0:
-                    return agents, distance_m
-                if problem is None and (best is None or doubts < best[0]):
-                    best = doubts, agents, distance_m
-            first_problem = first_problem or problem or ""
-        if best is not None:
-            return best[1], best[2]
-        raise CannotPlace(first_problem)
+            agents = self._put(request, sign * distance_m, again, arrangement)
+            problem, doubts = self._judge(request, sign * distance_m, agents)
+            first_problem = first_problem or problem
+            if not problem and (best is None or doubts < best[0]):
+                best = doubts, agents, distance_m
+                if doubts == 0:
+                    break
+        if best is None:
+            raise CannotPlace(first_problem)
+        _, agents, distance_m = best
+        who = _NEEDS[type(request)][0]
+        return agents, f"{who.capitalize()}: {distance_m:.1f} m {request.spot.relation}."
 
-    def left_of_lane_m(self, agent: TrafficAgent) -> float:
-        """How far an agent stands left of the centre of its lane, 0 off every lane."""
-        if agent.lane_id is None:
-            return 0.0
-        line = self._ground.graph.lane(agent.lane_id).centerline
-        return line.project(agent.x_m, agent.y_m).d_m
-
-    def _placed(
+    def _put(
         self, request: Request, distance_m: float, rng: np.random.Generator, arrangement: int
     ) -> _Agents:
-        """To the millimetre, so that no digits are kept that the arithmetic alone made up."""
-        ground = self._place
         match request:
             case VehicleRequest():
-                agents = place_vehicles(request, ground, distance_m, rng)
+                agents = place_vehicles(request, self._place, distance_m, rng)
             case WalkRequest():
-                agents = place_walkers(request, ground, distance_m, rng)
+                agents = place_walkers(request, self._place, distance_m, rng)
             case ConesRequest():
-                agents = place_cones(request, ground, distance_m, rng)
+                agents = place_cones(request, self._place, distance_m, rng)
             case CrashRequest():
-                agents = place_crash(request, ground, distance_m, rng, arrangement=arrangement)
-        return tuple(
-            replace(
-                agent,
-                x_m=_millimetres(agent.x_m),
-                y_m=_millimetres(agent.y_m),
-                heading_rad=round(agent.heading_rad, 5),
-                walk_to_m=agent.walk_to_m
-                and (_millimetres(agent.walk_to_m[0]), _millimetres(agent.walk_to_m[1])),
-            )
-            for agent in agents
-        )
+                agents = place_crash(request, self._place, distance_m, rng, arrangement)
+        return tuple(map(_rounded, agents))
 
-    def _problem(self, request: Request, distance_m: float, agents: _Agents) -> str | None:
-        """Why the agents can't stand there, None if they can."""
-        ego = self._scene.ego
-        for agent, other in itertools.product(agents, (*self._scene.everyone, *self.added)):
-            if overlap(agent.box, other.box).depth_m > 0.0:
-                name = "the ego" if other is ego else other.id or "what was added"
-                return f"{abs(distance_m):.1f} m from the ego it would stand in {name}."
-        path_m = np.vstack([_path(agent) for agent in agents])
-        for setting in request.spot.settings:
-            if not self._place.fits(distance_m, path_m, setting):
-                return f"{abs(distance_m):.1f} m from the ego is not {setting}."
-        return None
-
-    def _verdict(self, request: Request, agents: _Agents) -> tuple[str | None, int]:
-        """The first finding that hardly any instruction can mean, and how many are doubtful.
+    def _judge(self, request: Request, distance_m: float, agents: _Agents) -> tuple[str, int]:
+        """Return why the agents can't stand there, "" if they can, and how much is doubtful.
 
         The checks see the request and the placement, never a reference.
         """
+        for agent, other in itertools.product(agents, (*self._scene.everyone, *self.added)):
+            if overlap(agent.box, other.box).depth_m > 0.0:
+                name = "the ego" if other is self._scene.ego else other.id or "what was added"
+                return f"{abs(distance_m):.1f} m from the ego it would stand in {name}.", 0
+        path_m = np.vstack([_path(agent) for agent in agents])
+        for setting in request.spot.settings:
+            if not self._place.fits(distance_m, path_m, setting):
+                return f"{abs(distance_m):.1f} m from the ego is not {setting}.", 0
         everyone = _numbered((*self.added, *agents), self._scene)
         before, own = everyone[: len(self.added)], everyone[len(self.added) :]
         ground = self._ground
@@ -253,11 +204,23 @@ class _Fitting:
         intent = Intent(requests=(request,), route=self._route)
         findings = check_against_intent(ground, Modification(added=own), intent)
         wrong = (one.sentence() for one in findings if one.severity is Severity.WRONG)
-        return next(wrong, None), sum(one.severity is Severity.DOUBTFUL for one in findings)
+        return next(wrong, ""), sum(one.severity is Severity.DOUBTFUL for one in findings)
+
+
+def _as_request(move: Move, agent: TrafficAgent) -> VehicleRequest:
+    """Return a road user's move as the placement of a new one."""
+    return VehicleRequest(
+        spot=move.spot,
+        body=_BODIES.get(agent.type, Body.VEHICLE),
+        facing=move.facing,
+        turn_deg=move.turn_deg,
+        speed_mps=agent.speed_mps if move.speed_mps is None else move.speed_mps,
+        count=1,
+    )
 
 
 def _numbered(agents: _Agents, scene: Scene) -> _Agents:
-    """The agents with the ids that follow the highest AgentN of the scene."""
+    """Return the agents with the ids that follow the highest AgentN of the scene."""
     names = [agent.id.removeprefix("Agent") for agent in scene.everyone]
     first = max((int(name) for name in names if name.isdecimal()), default=0) + 1
     return tuple(
@@ -266,97 +229,24 @@ def _numbered(agents: _Agents, scene: Scene) -> _Agents:
 
 
 def _shifts(wanted: Length) -> list[float]:
-    """0, then further and further to either side."""
+    """Return 0, then further and further to either side."""
     tolerance_m = _SHIFT_ABOUT_M if wanted.is_approximate else _SHIFT_EXACT_M
     steps = range(1, int(tolerance_m / _SHIFT_STEP_M) + 1)
     return [0.0, *(sign * step * _SHIFT_STEP_M for step in steps for sign in (1.0, -1.0))]
 
 
 def _path(agent: TrafficAgent) -> np.typing.NDArray[np.float64]:
-    """Where an agent stands or walks, a point (P, 2) about every half metre."""
+    """Return where an agent stands or walks, a point (P, 2) about every half metre."""
     start = np.array([agent.x_m, agent.y_m])
     return np.linspace(start, agent.walk_to_m or start, 60 if agent.walk_to_m else 1)
 
 
-def _millimetres(length_m: float) -> float:
-    return round(length_m, 3) + 0.0  # + 0.0 makes -0.0 a plain zero
-
-
-def _describe(request: Request, distance_m: float, left_m: float) -> str:
-    """One sentence: what stands where along the ego's lane."""
-    relation = "ahead of" if request.spot.relation is Relation.AHEAD else "behind"
-    asked, why = request.spot.distance, ""
-    if asked is not None and asked.is_range:
-        why = f" (drawn from {asked})"
-    elif asked is not None and abs(distance_m - asked.low_m) > 0.01:
-        why = f" (moved from {asked.low_m:g} m, where it had no room)"
-    where = f"{distance_m:.1f} m {relation} the ego along its lane{why}"
-    lane = LANES[request.spot.lane or LaneChoice.OWN]
-    match request:
-        case VehicleRequest():
-            motion = f"driving at {request.speed_mps:.1f} m/s" if request.speed_mps else "standing"
-            across = _across(request.spot.lateral, abs(left_m))
-            return f"A {request.body}, {motion}, {where}, in {lane}, {across}."
-        case WalkRequest():
-            who = "A pedestrian" if request.count == 1 else f"{request.count} pedestrians"
-            end = request.start.other if request.start else "other side"
-            return f"{who}, {where}, crossing the road from the {request.start} to the {end}."
-        case ConesRequest():
-            worker = " and one worker" if request.has_worker else ""
-            return f"{request.count} cones in a {request.shape}{worker}, {where}, in {lane}."
-        case CrashRequest():
-            plural = "buses" if request.body is Body.BUS else f"{request.body}s"
-            return f"{request.count} crashed {plural}, the nearest {where}, in {lane}."
-
-
-def _across(lateral: Lateral | None, offset_m: float) -> str:
-    if lateral is None or lateral.target is LateralTarget.LANE_CENTRE:
-        return "on the lane centre"
-    is_drawn = lateral.offset is not None and lateral.offset.is_range
-    remark = f" (drawn from {lateral.offset})" if is_drawn else ""
-    return f"{offset_m:.2f} m{remark} from the lane centre towards the {lateral.target}"
-
-
-def _conventions(request: Request) -> list[str]:
-    """What fills the open parts of a request, where it is no refusal."""
-    lateral = request.spot.lateral
-    is_walk = isinstance(request, WalkRequest)
-    rules = [(request.spot.lane is None and not is_walk, "in the ego's lane")]
-    match request:
-        case VehicleRequest():
-            is_open_row = request.spacing is None and request.count != 1
-            rules += [
-                (lateral is None, "in the middle of the lane"),
-                (_is_slight(lateral), f"slightly is {SLIGHT_OFFSET_M:g} m"),
-                (request.facing is None, "facing as the lane leads"),
-                (is_open_row, f"{BUMPER_GAP_M:g} m from bumper to bumper"),
-            ]
-        case WalkRequest():
-            is_open_row = len(request.behind) + 1 < (request.count or 0)
-            rules += [(is_open_row, f"{APART_M:g} m from one to the next")]
-        case ConesRequest():
-            is_open_row = request.spacing is None and request.reach_m is None
-            is_open_taper = request.shape is Shape.TAPER and request.start is None
-            is_open_post = request.has_worker and request.post is None
-            rules += [
-                (is_open_row, f"{CONE_SPACING_M:g} m between the cones"),
-                (is_open_taper, "the taper begins at the kerb's side of the lane"),
-                (
-                    is_open_post and request.shape is not Shape.RING,
-                    "the worker stands where people do at such a shape",
-                ),
-            ]
-        case CrashRequest():
-            turns = [other.turn_deg is not None for other in request.others]
-            gaps = [other.gap is not None for other in request.others]
-            rules += [
-                (not any(turns), "the angles between them"),
-                (not (gaps and all(gaps)), "as near as they come without sharing ground"),
-            ]
-    return [words for holds, words in rules if holds]
-
-
-def _is_slight(lateral: Lateral | None) -> bool:
-    if lateral is None or lateral.target is LateralTarget.LANE_CENTRE:
-        return False
-    return lateral.offset is None and lateral.nearness in (None, Nearness.SLIGHTLY)
+def _rounded(agent: TrafficAgent) -> TrafficAgent:
+    """Keep millimetres, and no digits that the arithmetic alone made up."""
+    x_m, y_m, *end = (
+        round(value, 3) + 0.0  # + 0.0 makes -0.0 a plain zero
+        for value in (agent.x_m, agent.y_m, *(agent.walk_to_m or ()))
+    )
+    walk_to_m = (end[0], end[1]) if end else None
+    heading_rad = round(agent.heading_rad, 5)
+    return replace(agent, x_m=x_m, y_m=y_m, heading_rad=heading_rad, walk_to_m=walk_to_m)

@@ -112,7 +112,9 @@ def overlap(first: Box, second: Box) -> Overlap:
     depth_m = float(ends.min())
     if depth_m <= 0.0:
         return APART
-    area_m2 = float(shapely.Polygon(one).intersection(shapely.Polygon(other)).area)
+    # Without a grid, sides that coincide but for rounding can leave nothing of what is shared.
+    shared = shapely.intersection(shapely.Polygon(one), shapely.Polygon(other), grid_size=1e-9)
+    area_m2 = float(shared.area)
     return Overlap(
         depth_m=depth_m,
         area_m2=area_m2,

@@ -155,13 +155,15 @@ class EndpointModel(models.Model):
         return f"{self.model} at {self.endpoint}"
 
     def clean(self) -> None:
-        """A price needs its other half, a date and a source.
+        """A price is 0 or more and needs its other half, a date and a source.
 
         Raises:
-            ValidationError: One of them is missing.
+            ValidationError: It is not, or one of them is missing.
         """
         if self.price_in_usd is None and self.price_out_usd is None:
             return
+        if min(self.price_in_usd or 0, self.price_out_usd or 0) < 0:
+            raise ValidationError({"price_in_usd": "a price is 0 or more"})
         needed = ("price_in_usd", "price_out_usd", "price_as_of", "price_source")
         missing = [name for name in needed if getattr(self, name) in (None, "")]
         if missing:

@@ -3,15 +3,13 @@
 The form that was asked for is a line that is exactly one JSON object. It counts wherever it
 stands: an answer with such a call is no final answer, since it was written without the result.
 Models write other forms as well: within a sentence or a list, over several lines, with other
-keys, other quotes, or as Python. These count where the answer holds no block of changes, so that
-nobody who tells in a final answer what was called before is taken to call again. Of Python only
-literals are read and nothing is evaluated: no arithmetic, no units, no names of variables.
+keys. These count where the answer holds no block of changes, so that nobody who tells in a final
+answer what was called before is taken to call again.
 
 Whatever the text, nothing is raised: a call that can't be read is a call with a problem, which
 goes back to the model.
 """
 
-import ast
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -19,7 +17,6 @@ from dataclasses import dataclass, replace
 from augment.errors import ReplyUnreadable
 from augment.prompts.blocks import (
     LONGEST_ANSWER,
-    LONGEST_VALUE,
     names_changes,
     strict_json,
     strict_json_at,
@@ -34,16 +31,9 @@ MOST_LOOKED_AT = 64
 _FORM = '{"call": "pose_on_lane", "arguments": {...}}'
 _NAMES = ("call", "name", "function", "tool", "tool_name", "function_name")
 _ARGUMENTS = ("arguments", "parameters", "args", "kwargs", "input")
-_ASIDE = frozenset({"id", "type"})
-_OBJECT = rf"""\{{\s*["'](?P<key>{"|".join((*_NAMES, *_ARGUMENTS, TOOL))})["']\s*:"""
-_PYTHON = r"(?<![\w.])(?P<name>\w{0,40}?(?:pose_|_pose)\w{0,40})[ \t]{0,3}\("
-_OPENING = re.compile(f"{_OBJECT}|{_PYTHON}")
+_OPENING = re.compile(rf"""\{{\s*["'](?:{"|".join((*_NAMES, *_ARGUMENTS, TOOL))})["']\s*:""")
 _EXACT = re.compile(r'\{\s*"call"\s*:')
 _ALONE_BEHIND = re.compile(r"[ \t`]*(?:\n|\Z)")
-_ID = re.compile(r"[A-Z][a-z]+[0-9]+[a-z]?|lane")
-_BRACKET = re.compile(r""""[^"\\\n]*(?:\\.[^"\\\n]*)*"|'[^'\\\n]*(?:\\.[^'\\\n]*)*'|[][(){}]""")
-_ODD_ESCAPE = re.compile(r"""\\[^"'\\/bfnrtu]""")
-_JSON_WORDS = {"true": True, "false": False, "null": None}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -103,50 +93,28 @@ def _calls(text: str, *, exact_alone: bool) -> Iterator[WrittenCall]:
     end = looked_at = 0
     for opening in _OPENING.finditer(text):
         start = opening.start()
-        is_exact = _EXACT.match(text, start) is not None and _begins_line(text, start)
+        begins_line = not text[text.rfind("\n", 0, start) + 1 : start].strip(" \t`")
+        is_exact = begins_line and _EXACT.match(text, start) is not None
         if start < end or (exact_alone and not is_exact):
             continue
         looked_at += 1
         if looked_at > MOST_LOOKED_AT:
             return
-        read = _python_call if opening["name"] is not None else _object_call
-        call, end = read(text, opening)
-        if call is not None:
-            yield call
-
-
-def _begins_line(text: str, start: int) -> bool:
-    line = text.rfind("\n", 0, start) + 1
-    return not text[line:start].strip(" \t`")
-
-
-def _object_call(text: str, opening: re.Match[str]) -> tuple[WrittenCall | None, int]:
-    """Read a call written as an object; None where it is some other object, and where it ends."""
-    start, is_strict = opening.start(), True
-    try:
-        written, end = strict_json_at(text, start)
-    except ReplyUnreadable as broken:
-        is_strict = False
-        end = _closing(text, start)
         try:
-            written = _value(_expression(text[start:end]))
-        except ValueError:
+            written, end = strict_json_at(text, start)
+        except ReplyUnreadable as broken:
             fault = broken.problems[0].replace("the JSON block", "the line")
-            problem = f"a call is one line of the form {_FORM}; {fault}"
-            line_end = text.find("\n", start)
-            return WrittenCall(problem=problem), len(text) if line_end < 0 else line_end
-    call = _call_of(written)
-    is_alone = _begins_line(text, start) and _ALONE_BEHIND.match(text, end) is not None
-    has_form = isinstance(written, dict) and written.keys() == {"call", "arguments"}
-    if call is None or call.problem or (is_alone and has_form and is_strict):
-        return call, end
-    return replace(call, mended=True), end
+            yield WrittenCall(problem=f"a call is one line of the form {_FORM}; {fault}")
+            end = text.find("\n", start) if "\n" in text[start:] else len(text)
+            continue
+        if isinstance(written, dict) and (call := _call_of(written)) is not None:
+            has_form = begins_line and written.keys() == {"call", "arguments"}
+            is_mended = not (call.problem or (has_form and _ALONE_BEHIND.match(text, end)))
+            yield replace(call, mended=is_mended)
 
 
-def _call_of(written: object) -> WrittenCall | None:
+def _call_of(written: dict[str, object]) -> WrittenCall | None:
     """Return what an object calls, None where it is something else."""
-    if not isinstance(written, dict):
-        return None
     inner = written.get("function")
     body: dict[str, object] = inner if isinstance(inner, dict) else written
     if body.keys() == {TOOL}:
@@ -158,7 +126,7 @@ def _call_of(written: object) -> WrittenCall | None:
     if not isinstance(name, str):
         is_call = name_key == "call" or arguments_key is not None
         return WrittenCall(problem=f"a call has the form {_FORM}") if is_call else None
-    if arguments_key is not None and rest.keys() <= _ASIDE:
+    if arguments_key is not None and rest.keys() <= {"id", "type"}:
         return _with_arguments(name, body[arguments_key])
     if arguments_key is None and name == TOOL and rest.keys() & set(PARAMETERS):
         return _with_arguments(name, rest)
@@ -171,81 +139,3 @@ def _with_arguments(name: str, arguments: object) -> WrittenCall:
     if isinstance(arguments, str):
         return replace(read_arguments(arguments), name=name)
     return WrittenCall(name=name, arguments=arguments)
-
-
-def _python_call(text: str, opening: re.Match[str]) -> tuple[WrittenCall | None, int]:
-    """Read a call written as Python; None where the tool is only named, and where it ends."""
-    start, name = opening.end(), opening["name"]
-    end = _closing(text, start - 1)
-    try:
-        call = _expression(f"f({text[start:end]}")
-        if not isinstance(call, ast.Call):
-            raise ValueError("it is no call")
-        placed = [_value(argument) for argument in call.args]
-        named = [(one.arg, _value(one.value, bare=True)) for one in call.keywords]
-    except ValueError as broken:
-        if not re.match(r"[^)\n]*[=\"'0-9]", text[start : start + 200]):
-            return None, start  # a signature
-        return WrittenCall(problem=f"a call is one line of the form {_FORM}; {broken}"), end
-    if not placed and not named:
-        return None, end
-    pairs = [*zip(PARAMETERS, placed, strict=False), *named]
-    if len(placed) > len(PARAMETERS) or len(dict(pairs)) < len(pairs):
-        return WrittenCall(problem=f"a call has the form {_FORM} and each argument once"), end
-    return WrittenCall(name=name, arguments=dict(pairs), mended=True), end
-
-
-def _closing(text: str, start: int) -> int:
-    """Return where the bracket that opens there is closed, or the end of what is looked at."""
-    depth = 0
-    for bracket in _BRACKET.finditer(text, start, start + LONGEST_VALUE):
-        if bracket.group() in "([{":
-            depth += 1
-        elif bracket.group() in ")]}":
-            depth -= 1
-            if depth == 0:
-                return bracket.end()
-    return start + 1
-
-
-def _expression(written: str) -> ast.expr:
-    """Parse a Python expression.
-
-    Raises:
-        ValueError: It is none.
-    """
-    # Python warns of escapes that it does not know, and reads some that JSON does not.
-    if _ODD_ESCAPE.search(written):
-        raise ValueError("it has an escape that JSON does not know")
-    try:
-        return ast.parse(written, mode="eval").body
-    except SyntaxError as error:
-        raise ValueError(f"it breaks: {error.msg}") from None
-    except (ValueError, RecursionError, MemoryError):
-        raise ValueError("it is nested too deeply or holds odd characters") from None
-
-
-def _value(node: ast.expr, *, bare: bool = False) -> object:
-    """Return what a literal stands for; ids may lack their quotes where `bare`.
-
-    Raises:
-        ValueError: It is none.
-    """
-    match node:
-        case ast.Constant(value=None | bool() | int() | float() | str() as value):
-            return value
-        case ast.UnaryOp(op=ast.USub(), operand=ast.Constant(value=int() | float() as number)):
-            return -number
-        case ast.UnaryOp(op=ast.UAdd(), operand=ast.Constant(value=int() | float() as number)):
-            return number
-        case ast.Name(id=name) if name in _JSON_WORDS:
-            return _JSON_WORDS[name]
-        case ast.Name(id=name) if bare and _ID.fullmatch(name):
-            return name
-        case ast.List(elts=entries):
-            return [_value(entry) for entry in entries]
-        case ast.Dict(keys=keys, values=values):
-            names = [key.value for key in keys if isinstance(key, ast.Constant)]
-            if len(set(names)) == len(keys) and all(isinstance(key, str) for key in names):
-                return dict(zip(names, map(_value, values), strict=True))
-    raise ValueError(f"{type(node).__name__} is no value")

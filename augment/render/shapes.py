@@ -3,6 +3,7 @@
 import math
 
 import numpy as np
+import shapely
 from numpy.typing import NDArray
 
 from augment.geometry.polyline import FloatArray
@@ -78,32 +79,28 @@ def stripes(
 
     They lie evenly about the polygon's middle, which is left free.
     """
-    normal = np.array([-math.sin(angle_rad), math.cos(angle_rad)])
-    across = polygon @ normal
-    middle = (across.min() + across.max()) / 2.0
-    count = math.ceil((across.max() - across.min()) / 2.0 / period)
-    pieces = []
-    for index in range(-count, count):
-        centre = middle + (index + 0.5) * period
-        piece = _half(polygon, normal, centre - width / 2.0)
-        pieces.append(_half(piece, -normal, -(centre + width / 2.0)))
-    return [piece for piece in pieces if len(piece) >= 3]
+    cos, sin = math.cos(angle_rad), math.sin(angle_rad)
+    turned = polygon @ np.array([[cos, -sin], [sin, cos]])
+    (left, low), (right, high) = turned.min(axis=0) - 1.0, turned.max(axis=0) + 1.0
+    shape, middle = shapely.Polygon(turned), (low + high) / 2.0
+    count = math.ceil((high - low) / 2.0 / period)
+    starts = [middle + (n + 0.5) * period - width / 2.0 for n in range(-count, count)]
+    pieces = [shapely.clip_by_rect(shape, left, start, right, start + width) for start in starts]
+    back = np.array([[cos, sin], [-sin, cos]])
+    return [
+        np.array(piece.exterior.coords)[:-1] @ back
+        for piece in pieces
+        if isinstance(piece, shapely.Polygon) and not piece.is_empty
+    ]
 
 
 def long_axis(polygon: FloatArray) -> tuple[float, float, float]:
     """Return the direction, length and width of a polygon's smallest rectangle."""
-    best = (0.0, math.inf, 1.0)
-    for dx, dy in np.diff(np.vstack([polygon, polygon[:1]]), axis=0):
-        if math.hypot(dx, dy) < 1e-6:
-            continue
-        angle = math.atan2(dy, dx)
-        along = polygon @ np.array([math.cos(angle), math.sin(angle)])
-        across = polygon @ np.array([-math.sin(angle), math.cos(angle)])
-        length, width = float(np.ptp(along)), float(np.ptp(across))
-        if length * width < best[1] * best[2] - 1e-6:
-            best = (angle, length, width)
-    angle, length, width = best
-    return best if length >= width else (angle + math.pi / 2.0, width, length)
+    rectangle = shapely.minimum_rotated_rectangle(shapely.Polygon(polygon))
+    sides = np.diff(shapely.get_coordinates(rectangle)[:3], axis=0)
+    lengths = np.hypot(sides[:, 0], sides[:, 1])
+    longer = int(lengths[1] > lengths[0])
+    return math.atan2(*sides[longer, ::-1]), float(lengths[longer]), float(lengths[1 - longer])
 
 
 # Private
@@ -129,17 +126,3 @@ def _lengthened(points: FloatArray) -> FloatArray:
         share = _REACH / math.hypot(x - inner_x, y - inner_y)
         longer[end] = x + share * (x - inner_x), y + share * (y - inner_y)
     return longer
-
-
-def _half(polygon: FloatArray, normal: FloatArray, limit: float) -> FloatArray:
-    """Return the part of a polygon where the product with the normal is at least the limit."""
-    depth = polygon @ normal - limit if len(polygon) else polygon
-    kept: list[FloatArray] = []
-    for index in range(len(polygon)):
-        following = (index + 1) % len(polygon)
-        if depth[index] >= 0.0:
-            kept.append(polygon[index])
-        if (depth[index] < 0.0) != (depth[following] < 0.0):
-            share = depth[index] / (depth[index] - depth[following])
-            kept.append(polygon[index] + share * (polygon[following] - polygon[index]))
-    return np.array(kept).reshape(-1, 2)

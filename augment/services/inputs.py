@@ -4,15 +4,16 @@
 the options of commands are made of that list: a field that is added is added to all of them.
 """
 
-from argparse import BooleanOptionalAction
+from argparse import ArgumentTypeError, BooleanOptionalAction
 from collections.abc import Iterable, Mapping
 from dataclasses import MISSING, dataclass, field, fields
+from decimal import Decimal, InvalidOperation
 from enum import StrEnum
-from typing import Any
-
-from django.core.management.base import CommandParser
+from typing import Any, TypeVar
 
 from augment.errors import InvalidDocument
+
+Request = TypeVar("Request")
 
 
 class InputKind(StrEnum):
@@ -21,6 +22,7 @@ class InputKind(StrEnum):
     TEXT = "text"
     WHOLE = "whole"
     NUMBER = "number"
+    DECIMAL = "decimal"
     SWITCH = "switch"
     CHOICE = "choice"
     LINES = "lines"
@@ -35,7 +37,8 @@ class Input:
         unit: Of a number; "%" for percent.
         least, most: The bounds of a number; `most` also of a text's length.
         choices: Words and their labels.
-        default: What holds where nothing is given; MISSING where something must be.
+        default: What holds where nothing is given; MISSING where something must be. None is
+            unknown, open or without limit.
     """
 
     name: str = ""
@@ -43,8 +46,8 @@ class Input:
     label: str
     help: str = ""
     unit: str = ""
-    least: float | None = None
-    most: float | None = None
+    least: float | Decimal | None = None
+    most: float | Decimal | None = None
     choices: Mapping[str, str] = field(default_factory=dict)
     default: Any = MISSING
 
@@ -89,6 +92,23 @@ def inputs_of(request: type) -> tuple[Input, ...]:
     )
 
 
+def read_request(request: type[Request], given: Mapping[str, Any], **more: Any) -> Request:
+    """Return the request that the values of a form, a body or a command line make.
+
+    Args:
+        request: A dataclass with inputs.
+        given: Values by name; empty ones leave the default, other names are ignored.
+        more: What else the request holds.
+    """
+    return request(**read_values(inputs_of(request), given) | more)
+
+
+def read_values(inputs: Iterable[Input], given: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the values of these inputs that are not empty."""
+    values = {one.name: given.get(one.name) for one in inputs}
+    return {name: value for name, value in values.items() if value not in (None, "")}
+
+
 def check_bounds(request: Any) -> None:
     """Do nothing for a request whose numbers are within their bounds.
 
@@ -100,23 +120,48 @@ def check_bounds(request: Any) -> None:
         for one in inputs_of(type(request))
         if one.least is not None and one.most is not None
         if (value := getattr(request, one.name)) is not None
-        if not one.least <= value <= one.most
+        if value != value or not one.least <= value <= one.most  # NaN is not itself
     ]
     if problems:
         raise InvalidDocument("request", problems)
 
 
-def add_options(parser: CommandParser, inputs: Iterable[Input]) -> None:
-    """Give a command an option for each; a text that is required stands without a name."""
+def read_decimal(text: str) -> Decimal:
+    """Return the finite decimal that somebody typed, such as 2.50.
+
+    Raises:
+        ArgumentTypeError: It is none.
+    """
+    try:
+        value = Decimal(text)
+    except InvalidOperation:
+        value = Decimal("NaN")
+    if not value.is_finite():
+        raise ArgumentTypeError(f"{text!r} is no number such as 2.50")
+    return value
+
+
+def add_options(parser: Any, inputs: Iterable[Input], *, is_any_required: bool = True) -> None:
+    """Give a command an option for each; the first text that is required stands without a name.
+
+    Args:
+        parser: Of the command, or a group of it.
+        inputs: What is asked for; `is_fresh` becomes --fresh.
+        is_any_required: Whether what the request needs has to be given; else all may be left out
+            and is None then.
+    """
+    has_positional = False
     for one in inputs:
-        is_positional = one.kind is InputKind.TEXT and one.is_required
+        is_required = one.is_required and is_any_required
+        is_positional = one.kind is InputKind.TEXT and is_required and not has_positional
+        has_positional |= is_positional
+        default = None if one.is_required or not is_any_required else one.default
         words = one.explanation
-        if one.default and not isinstance(one.default, bool) and not one.is_required:
-            words += f" (default: {one.default})"
+        if default and not isinstance(default, bool):
+            words += f" (default: {default})"
         given: dict[str, Any] = {"help": words.replace("%", "%%")}
         if not is_positional:
-            default = None if one.is_required else one.default
-            given |= {"required": one.is_required, "default": default}
+            given |= {"dest": one.name, "required": is_required, "default": default}
         match one.kind:
             case InputKind.SWITCH:
                 given["action"] = BooleanOptionalAction
@@ -124,11 +169,13 @@ def add_options(parser: CommandParser, inputs: Iterable[Input]) -> None:
                 given["choices"] = list(one.choices)
             case InputKind.LINES | InputKind.NAMES:
                 # An option that is given twice loses nothing; argparse extends only lists.
-                default = None if one.is_required else list(one.default)
+                default = None if default is None else list(default)
                 given |= {"nargs": "+", "action": "extend", "default": default}
-            case InputKind.WHOLE | InputKind.NUMBER:
-                given["type"] = int if one.kind is InputKind.WHOLE else float
+            case InputKind.WHOLE | InputKind.NUMBER | InputKind.DECIMAL:
+                given["type"] = _NUMBERS[one.kind]
                 given["metavar"] = "PERCENT" if one.unit == "%" else "N"
-        parser.add_argument(
-            one.name if is_positional else f"--{one.name.replace('_', '-')}", **given
-        )
+        flag = one.name.removeprefix("is_").replace("_", "-")
+        parser.add_argument(one.name if is_positional else f"--{flag}", **given)
+
+
+_NUMBERS = {InputKind.WHOLE: int, InputKind.NUMBER: float, InputKind.DECIMAL: read_decimal}

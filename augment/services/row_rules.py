@@ -32,7 +32,6 @@ from augment.scene.codec import (
 )
 from augment.scene.recording import notes_from_document
 from augment.services.endpoints.known_endpoints import EndpointFacts, check_facts
-from augment.services.running.jobs import check_samples
 from augment.services.scenarios.scenes import (
     INSTRUCTION_LENGTH,
     check_reference,
@@ -42,7 +41,7 @@ from augment.services.scenarios.scenes import (
 )
 from augment.services.texts import check_picture_name, check_prose, check_stored_name, one_line
 from augment.simulation.planners import OFFSETS_M
-from augment.variants.options import options_from_document
+from augment.variants.options import MOST_SAMPLES, options_from_document
 from augment.variants.respondents import ModelRole
 
 LONGEST_TRACE = 1 << 26
@@ -85,7 +84,8 @@ def _check_contestant(row: Contestant) -> None:
 
 def _check_job(row: GenerationJob) -> None:
     one_line("name", row.name, what="job")
-    check_samples(row.samples)
+    if not 1 <= row.samples <= MOST_SAMPLES:
+        raise InvalidDocument("job", [("samples", f"goes from 1 to {MOST_SAMPLES}")])
 
 
 def _check_augmentation(row: Augmentation) -> None:

@@ -153,7 +153,7 @@ class ContestantOptions:
         problems = []
         for name, value in self.to_document().items():
             try:
-                object.__setattr__(self, name, _RULES[name].read(value))
+                object.__setattr__(self, name, RULES[name].read(value))
             except ValueError as fault:
                 problems.append((name, str(fault)))
         if problems:
@@ -184,24 +184,24 @@ class ContestantOptions:
         chosen = {
             name: value
             for name, value in self.to_document().items()
-            if name != "prompt_version" and value != _RULES[name].default
+            if name != "prompt_version" and value != RULES[name].default
         }
         return chosen | ({"sample": sample} if sample > 1 else {})
 
     def describe(self) -> str:
         """Return what was chosen in a few words, for names; empty where nothing was."""
         chosen = self.to_document().items()
-        return ", ".join(_RULES[name].words.format(value) for name, value in chosen)
+        return ", ".join(RULES[name].words.format(value) for name, value in chosen)
 
     def slug(self) -> str:
         """Return the same as a part of a slug."""
         chosen = self.to_document().items()
-        parts = [_RULES[name].slug.format(value) for name, value in chosen]
+        parts = [RULES[name].slug.format(value) for name, value in chosen]
         return "-".join(parts).lower().replace(".", "p")
 
 
-_RULES: dict[str, _Rule] = {one.name: one.metadata["rule"] for one in fields(ContestantOptions)}
-NAMES = tuple(_RULES)
+RULES: dict[str, _Rule] = {one.name: one.metadata["rule"] for one in fields(ContestantOptions)}
+NAMES = tuple(RULES)
 
 
 def options_from_document(document: Mapping[str, Any]) -> ContestantOptions:
@@ -222,7 +222,7 @@ def names_for(recipe: Recipe) -> tuple[str, ...]:
     useful = {"rounds", *recipe.review.options} if recipe.review else set[str]()
     if recipe.tools is not Tools.NONE:
         useful.add("protocol")
-    return tuple(name for name in NAMES if name in useful or not _RULES[name].without)
+    return tuple(name for name in NAMES if name in useful or not RULES[name].without)
 
 
 def check_options(recipe: Recipe, options: ContestantOptions) -> None:
@@ -233,7 +233,7 @@ def check_options(recipe: Recipe, options: ContestantOptions) -> None:
     """
     allowed = names_for(recipe)
     problems = [
-        (f"options.{name}", f"{recipe.slug} {_RULES[name].without}")
+        (f"options.{name}", f"{recipe.slug} {RULES[name].without}")
         for name in options.to_document()
         if name not in allowed
     ]

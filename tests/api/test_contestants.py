@@ -3,21 +3,19 @@ from django.urls import reverse
 
 from augment.models import EndpointModel
 from augment.services.endpoints import contestants
-from augment.services.endpoints.known_endpoints import ensure_endpoint
-from augment.variants.options import ContestantOptions
+from augment.services.endpoints.contestants import ContestantRequest
+from augment.services.endpoints.known_endpoints import EndpointRequest, ensure_endpoint
 from tests.web.cast import people, signed_in
 
 pytestmark = pytest.mark.django_db
 
 
 def test_a_contestant_is_told_in_full_to_staff_alone() -> None:
-    ensure_endpoint(label="here", base_url="http://127.0.0.1:1/v1")
+    ensure_endpoint(EndpointRequest(label="here", base_url="http://127.0.0.1:1/v1"))
     contestants.add_contestant(
-        slug="one",
-        variant="otm",
-        endpoint="here",
-        model="m",
-        options=ContestantOptions(temperature=0.7),
+        ContestantRequest(
+            slug="one", variant="otm", endpoint="here", model="m", options={"temperature": 0.7}
+        )
     )
     EndpointModel.objects.update(temperature=False)
     accounts = people()

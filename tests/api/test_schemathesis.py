@@ -27,7 +27,7 @@ from arena.results.services.ratings import open_early
 from arena.results.services.ratings import rate_now as rate
 from arena.studies import api
 from augment.models import Endpoint, EndpointModel, Probe, SceneUpload, UploadMoment
-from augment.services.endpoints.known_endpoints import ensure_endpoint
+from augment.services.endpoints.known_endpoints import EndpointRequest, ensure_endpoint
 from augment.services.endpoints.known_models import model_at
 from tests.api.tokens import secret_of
 from tests.study_rows import matchups_of, vote
@@ -72,7 +72,7 @@ def here() -> World:
     found = world()
     for matchup in matchups_of(found.study, "eva")[:4]:
         vote(matchup, "left")
-    site = ensure_endpoint(label="here", base_url="http://127.0.0.1:9/v1")
+    site = ensure_endpoint(EndpointRequest(label="here", base_url="http://127.0.0.1:9/v1"))
     Probe.objects.create(model=model_at(endpoint=site, model="m"))
     upload = SceneUpload.objects.create(name="log.zip", size_bytes=1, state="failed")
     UploadMoment.objects.create(upload=upload)

@@ -55,7 +55,7 @@ def test_a_file_becomes_a_closed_study_that_is_rated(tmp_path: Path) -> None:
         ("x,y,left,j0,i0", r"line 38: .*model_a.*tie \(bothbad\)"),
         ("x,y,,j0,i0", "line 38: winner is empty"),
         ("x,x,tie,j0,i0", "line 38"),
-        ("x,y,tie", "line 38: there are 3 cells"),
+        ("x,y,tie", "Row #38: Expected 5 columns, got 3"),
         (f"{'x' * 201},y,tie,j0,i0", "line 38: model_a has 201 signs, 200 are allowed"),
     ],
 )

@@ -11,7 +11,6 @@ import pytest
 from django.core.files.base import ContentFile
 from django.core.files.storage import default_storage
 from django.core.management import call_command
-from django.core.management.base import CommandError
 from django.test import Client
 from django.urls import reverse
 
@@ -110,14 +109,6 @@ def test_the_own_format_comes_back_exactly(job: GenerationJob, tmp_path: Path) -
         assert manifest_of(archive)["lost"] == []
     assert before == junction()
     assert after.agents == ADDED.added
-
-
-def test_strict_writes_nothing_once_something_would_change(
-    job: GenerationJob, tmp_path: Path
-) -> None:
-    with pytest.raises(CommandError, match="there is no modification: refused"):
-        export("--format", "scenarionet", "--strict", "--out", str(tmp_path / "x.zip"))
-    assert not list(tmp_path.glob("*.zip"))
 
 
 def ask_for(client: Client, job: GenerationJob, form: str) -> None:

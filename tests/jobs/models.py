@@ -3,6 +3,7 @@
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
+from dataclasses import asdict
 from datetime import date
 from decimal import Decimal
 
@@ -12,6 +13,7 @@ from augment.llm.messages import Reply, Request
 from augment.models import Augmentation, Contestant, Endpoint, EndpointModel, GenerationJob
 from augment.services.running import jobs, runner
 from augment.services.running.budget import NO_CAPS, Caps
+from augment.services.running.jobs import JobRequest
 from tests.jobs.rows import INSTRUCTION, add_model, add_scenario, only_row
 from tests.llm.scripted import ScriptedClient
 from tests.variants.playing import GOOD
@@ -109,7 +111,13 @@ def llama_job(
     for number, slug in enumerate(slugs):
         add_scenario(slug, instruction=f"{INSTRUCTION} Not more than {number + 1}.")
     return jobs.launch(
-        name="Round 1", contestants=["llama"], scenarios=slugs, caps=caps, is_fresh=is_fresh
+        JobRequest(
+            name="Round 1",
+            contestants=["llama"],
+            scenarios=slugs,
+            **asdict(caps),
+            is_fresh=is_fresh,
+        )
     )
 
 

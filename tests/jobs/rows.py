@@ -8,6 +8,7 @@ from augment.scene.codec import intent_to_document, modification_to_document, sc
 from augment.scene.entities import Modification, ScenarioType, Scene
 from augment.scene.intent import Shape
 from augment.services.running import jobs
+from augment.services.running.jobs import JobRequest
 from augment.services.running.runner import AUGMENTATIONS, Held
 from augment.services.work import Settlement
 from tests.intents import cones
@@ -54,7 +55,9 @@ def launch(*, scenarios: int = 1, contestants: tuple[str, ...] = ("reference",))
             add_kind(slug)
     places = [add_scenario(f"street-{number}") for number in range(1, scenarios + 1)]
     return jobs.launch(
-        name="Round 1", contestants=list(contestants), scenarios=[row.slug for row in places]
+        JobRequest(
+            name="Round 1", contestants=list(contestants), scenarios=[row.slug for row in places]
+        )
     )
 
 

@@ -4,10 +4,11 @@ from typing import Any
 
 from augment.models import Augmentation, Contestant
 from augment.services.endpoints import contestants
-from augment.services.endpoints.known_endpoints import ensure_endpoint
+from augment.services.endpoints.contestants import ContestantRequest
+from augment.services.endpoints.known_endpoints import EndpointRequest, ensure_endpoint
 from augment.services.endpoints.known_models import tell_sight
 from augment.services.running import jobs, runner
-from augment.variants.options import options_from_document
+from augment.services.running.jobs import JobRequest
 from tests.jobs.rows import add_scenario
 from tests.llm.json_server import JsonServer
 from tests.scenes import cone, scene
@@ -56,14 +57,10 @@ class Scripted(JsonServer):
 
 
 def add(server: Scripted, slug: str, variant: str = "otm", **options: object) -> Contestant:
-    ensure_endpoint(label="here", base_url=server.url)
+    ensure_endpoint(EndpointRequest(label="here", base_url=server.url))
     server.script = SCRIPTS[variant]
     made = contestants.add_contestant(
-        slug=slug,
-        variant=variant,
-        endpoint="here",
-        model="m",
-        options=options_from_document(options),
+        ContestantRequest(slug=slug, variant=variant, endpoint="here", model="m", options=options)
     )
     assert made.endpoint is not None
     tell_sight(endpoint=made.endpoint, model="m", sees=True)
@@ -77,7 +74,9 @@ def run(*slugs: str, samples: int = 1) -> list[Augmentation]:
         add_scenario(
             "street", scene=far, keep_traffic=True, reference=None, intent=None, intent_origin=""
         )
-    job = jobs.launch(name="J", contestants=slugs, scenarios=["street"], samples=samples)
+    job = jobs.launch(
+        JobRequest(name="J", contestants=slugs, scenarios=["street"], samples=samples)
+    )
     for row in job.augmentations.order_by("contestant__slug", "sample"):
         runner.work_on(augmentation_pk=row.pk)
     return list(job.augmentations.order_by("contestant__slug", "sample"))

@@ -7,7 +7,7 @@ from decimal import Decimal
 import pytest
 from django.utils import timezone
 
-from augment.errors import Conflict, EndpointBusy, LeaseLost, ModelFault
+from augment.errors import Conflict, EndpointBusy, InvalidDocument, LeaseLost, ModelFault
 from augment.llm.costs import Price, WorstCase
 from augment.llm.messages import Reply
 from augment.models import (
@@ -23,6 +23,7 @@ from augment.services.endpoints import client
 from augment.services.running import budget, jobs, runner
 from augment.services.running.budget import Caps, Room, costs_of
 from augment.services.running.estimates import estimate
+from augment.services.running.jobs import JobRequest, JobScope
 from augment.services.running.runner import AUGMENTATIONS, Held
 from tests.jobs.models import Model, add_llama, after_a_second_look, llama_job, ran, reply
 from tests.jobs.rows import NOON, STALE, add_kind, add_scenario, launch, leased, only_row
@@ -75,7 +76,7 @@ def test_a_fault_counts_where_it_may_be_billed(fault: ModelFault, is_billed: boo
 
 
 def test_a_call_that_found_no_place_counts_nothing() -> None:
-    job = llama_job(price="1", caps=Caps(usd=Decimal(1)))
+    job = llama_job(price="1", caps=Caps(cap_usd=Decimal(1)))
     row = ran(job, Model(EndpointBusy("local", 1800.0)))
     assert row.state == ROW.FAILED
     assert_nothing_is_counted(job)
@@ -83,7 +84,7 @@ def test_a_call_that_found_no_place_counts_nothing() -> None:
 
 @pytest.mark.parametrize("queue_finds_out", [True, False])
 def test_a_claim_that_is_lost_before_a_call_is_sent_costs_nothing(queue_finds_out: bool) -> None:
-    job = llama_job(price="1", caps=Caps(usd=Decimal(1)))
+    job = llama_job(price="1", caps=Caps(cap_usd=Decimal(1)))
     row = only_row(job)
 
     def lose_the_claim() -> None:
@@ -109,7 +110,7 @@ def assert_nothing_is_counted(job: GenerationJob) -> None:
 
 
 def test_a_job_that_has_no_room_for_a_call_asks_nothing_and_is_stopped() -> None:
-    job = llama_job(caps=Caps(tokens=5))
+    job = llama_job(caps=Caps(cap_tokens=5))
     model = Model()
     row = ran(job, model)
     assert model.requests == []
@@ -125,10 +126,10 @@ def test_a_job_that_has_no_room_for_a_call_asks_nothing_and_is_stopped() -> None
 
 
 def test_a_stopped_attempt_is_replayed_from_its_answers_also_in_a_fresh_job() -> None:
-    job = llama_job(caps=Caps(calls=1), is_fresh=True)
+    job = llama_job(caps=Caps(cap_calls=1), is_fresh=True)
     model = Model(after_a_second_look)
     assert ran(job, model).state == ROW.QUEUED
-    budget.raise_cap(job, caps=Caps(calls=2))
+    budget.raise_cap(job, caps=Caps(cap_calls=2))
     jobs.resume(job)
     assert ran(job, model).state == ROW.DONE
     assert len(model.requests) == len(set(model.requests)) == 2
@@ -201,7 +202,7 @@ def in_flight(job: GenerationJob, held: Held, *, is_sent: bool = True) -> ModelC
 
 def test_a_money_cap_needs_every_price() -> None:
     with pytest.raises(Conflict, match=r"nobody knows that of llama3\.1 at local: cap the job by"):
-        llama_job(caps=Caps(usd=Decimal(1)))
+        llama_job(caps=Caps(cap_usd=Decimal(1)))
     assert not GenerationJob.objects.exists()
 
 
@@ -210,10 +211,12 @@ def test_a_money_cap_takes_contestants_that_cost_nothing() -> None:
     add_scenario("street")
     launch()
     job = jobs.launch(
-        name="R",
-        contestants=["llama", "reference"],
-        scenarios=["street"],
-        caps=Caps(usd=Decimal("2.50")),
+        JobRequest(
+            name="R",
+            contestants=["llama", "reference"],
+            scenarios=["street"],
+            cap_usd=Decimal("2.50"),
+        )
     )
     assert job.cap_usd == Decimal("2.5")
     event = Event.objects.filter(verb="launch").first()
@@ -225,16 +228,16 @@ def test_a_money_cap_takes_contestants_that_cost_nothing() -> None:
 @pytest.mark.parametrize(
     "given",
     [
-        Caps(usd=Decimal(0)),
-        Caps(usd=Decimal("NaN")),
-        Caps(usd=Decimal("-1")),
-        Caps(calls=0),
-        Caps(tokens=-5),
-        Caps(calls=10**12),
+        Caps(cap_usd=Decimal(0)),
+        Caps(cap_usd=Decimal("NaN")),
+        Caps(cap_usd=Decimal("-1")),
+        Caps(cap_calls=0),
+        Caps(cap_tokens=-5),
+        Caps(cap_calls=10**12),
     ],
 )
 def test_a_cap_that_can_not_be_is_refused(given: Caps) -> None:
-    with pytest.raises(Conflict, match="is more than 0 and at most"):
+    with pytest.raises(InvalidDocument, match="goes from 1"):
         given.columns()
 
 
@@ -331,7 +334,12 @@ def test_without_earlier_runs_it_is_a_guess_from_the_prompts() -> None:
     for number in range(4):
         add_scenario(f"street-{number}")
     add_kind("reference")
-    found = estimate(["llama", "reference"], [f"street-{number}" for number in range(4)])
+    found = estimate(
+        JobScope(
+            contestants=["llama", "reference"],
+            scenarios=[f"street-{number}" for number in range(4)],
+        )
+    )
     (line,) = found.lines
     assert (found.rows, found.asking_rows, line.seen) == (8, 4, 0)
     assert line.calls == (4, 4, 8)
@@ -348,7 +356,7 @@ def test_after_a_run_it_is_what_was_used() -> None:
     runner.work_on(augmentation_pk=only_row(job).pk, connect=Model())
     for slug in ("other", "another"):
         add_scenario(slug)
-    (line,) = estimate(["llama"], ["other", "another"]).lines
+    (line,) = estimate(JobScope(contestants=["llama"], scenarios=["other", "another"])).lines
     assert (line.seen, line.tokens_in, line.tokens_out) == (1, 2 * 2900, 2 * 120)
     assert line.calls == (2, 2, 4)
     assert line.usd == Decimal("0.00604")
@@ -359,7 +367,7 @@ DONE = Augmentation.State.DONE
 
 def again(*, is_fresh: bool = False) -> GenerationJob:
     return jobs.launch(
-        name="Again", contestants=["llama"], scenarios=["street-1"], is_fresh=is_fresh
+        JobRequest(name="Again", contestants=["llama"], scenarios=["street-1"], is_fresh=is_fresh)
     )
 
 

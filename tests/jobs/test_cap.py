@@ -33,16 +33,16 @@ ONE_WORST_CASE = 20_000
 """Tokens; more than one call of these reserves, so that the last ones fit as well."""
 
 HALF: dict[str, Caps] = {
-    "calls": Caps(calls=CALLS // 2 + 1),
-    "tokens": Caps(tokens=CALLS // 2 * USED + ONE_WORST_CASE),
-    "usd": Caps(usd=Decimal(CALLS // 2 * USED + ONE_WORST_CASE) / 1_000_000),
+    "calls": Caps(cap_calls=CALLS // 2 + 1),
+    "tokens": Caps(cap_tokens=CALLS // 2 * USED + ONE_WORST_CASE),
+    "usd": Caps(cap_usd=Decimal(CALLS // 2 * USED + ONE_WORST_CASE) / 1_000_000),
 }
 """Caps for a model that costs 1 USD per million tokens."""
 
 ALL: dict[str, Caps] = {
-    "calls": Caps(calls=CALLS),
-    "tokens": Caps(tokens=CALLS * USED + ONE_WORST_CASE),
-    "usd": Caps(usd=Decimal(CALLS * USED + ONE_WORST_CASE) / 1_000_000),
+    "calls": Caps(cap_calls=CALLS),
+    "tokens": Caps(cap_tokens=CALLS * USED + ONE_WORST_CASE),
+    "usd": Caps(cap_usd=Decimal(CALLS * USED + ONE_WORST_CASE) / 1_000_000),
 }
 
 

@@ -22,10 +22,18 @@ from augment.models import (
     ModelCall,
 )
 from augment.services.endpoints import contestants, known_endpoints
-from augment.services.endpoints.known_endpoints import ensure_endpoint, may_hold_key, move_of
+from augment.services.endpoints.contestants import ContestantRequest
+from augment.services.endpoints.known_endpoints import (
+    EndpointFacts,
+    EndpointRequest,
+    change_endpoint,
+    ensure_endpoint,
+    may_hold_key,
+    move_of,
+)
 from augment.services.running import jobs, runner
-from augment.services.running.budget import Caps
 from augment.services.running.choosing import find_obstacle, keys_missing
+from augment.services.running.jobs import JobRequest
 from augment.variants.respondents import ModelRole
 from tests.intents import intents
 from tests.jobs.models import add_llama, llama_job, ran
@@ -38,19 +46,19 @@ LOCAL = "http://127.0.0.1:11434/v1"
 
 def local(*, is_simulated: bool = False, key_variable: str = "") -> Endpoint:
     return ensure_endpoint(
-        label="local", base_url=LOCAL, is_simulated=is_simulated, key_variable=key_variable
+        EndpointRequest(
+            label="local", base_url=LOCAL, is_simulated=is_simulated, key_variable=key_variable
+        )
     )
 
 
-def add(slug: str = "llama-otm", **changes: str) -> Contestant:
-    facts = {"variant": "OTM", "endpoint": "local", "model": "llama3.1:70b"} | changes
-    return contestants.add_contestant(
-        slug=slug,
-        variant=facts["variant"],
-        endpoint=facts["endpoint"],
-        model=facts["model"],
-        name=facts.get("name"),
-    )
+def add(slug: str = "llama-otm", **changes: Any) -> Contestant:
+    facts: dict[str, Any] = {
+        "variant": "OTM",
+        "endpoint": "local",
+        "model": "llama3.1:70b",
+    } | changes
+    return contestants.add_contestant(ContestantRequest(slug=slug, **facts))
 
 
 def test_the_builtin_contestants_are_made_once() -> None:
@@ -101,11 +109,12 @@ def test_a_key_in_place_of_its_variable_is_refused_and_not_repeated() -> None:
     assert "sk-proj-123" not in str(caught.value)
 
 
-def test_an_endpoint_that_moves_is_logged_before_and_after() -> None:
-    local()
-    ensure_endpoint(label="local", base_url="http://127.0.0.1:9/v1/")
-    endpoint = Endpoint.objects.get()
-    assert endpoint.base_url == "http://127.0.0.1:9/v1"
+def test_an_endpoint_is_moved_only_where_that_is_asked_for_and_it_is_logged() -> None:
+    row = local()
+    with pytest.raises(Conflict, match="change it on its page"):
+        ensure_endpoint(EndpointRequest(label="local", base_url="http://127.0.0.1:9/v1/"))
+    change_endpoint(row, facts=EndpointFacts(base_url="http://127.0.0.1:9/v1/"))
+    assert Endpoint.objects.get().base_url == "http://127.0.0.1:9/v1"
     event = Event.objects.filter(verb="change").get()
     assert event.before is not None
     assert event.before["base_url"] == LOCAL
@@ -122,9 +131,9 @@ def test_the_command_makes_endpoint_and_contestant_in_one_call() -> None:
 
 
 def test_a_contestant_that_is_refused_leaves_no_endpoint_behind() -> None:
-    facts = ("--variant", "none", "--endpoint", "here", "--model", "m", "--base-url", LOCAL)
-    with pytest.raises(CommandError, match="Unknown variant"):
-        call_command("add_contestant", "fake", *facts)
+    facts = ("--variant", "otm", "--endpoint", "here", "--model", "m", "--base-url", LOCAL)
+    with pytest.raises(CommandError, match="has no review"):
+        call_command("add_contestant", "fake", *facts, "--rounds", "2")
     assert not Endpoint.objects.exists()
 
 
@@ -138,7 +147,7 @@ def test_a_contestant_that_is_refused_leaves_no_endpoint_behind() -> None:
 )
 def test_an_address_that_no_model_is_served_from_is_refused(base_url: str, says: str) -> None:
     with pytest.raises(InvalidDocument, match=says) as caught:
-        ensure_endpoint(label="local", base_url=base_url)
+        ensure_endpoint(EndpointRequest(label="local", base_url=base_url))
     assert "secret" not in str(caught.value)
     assert not Endpoint.objects.exists()
 
@@ -173,12 +182,7 @@ def test_which_variables_may_hold_a_key(settings: Any, variable: str, may: bool)
 @pytest.mark.parametrize("variable", SECRETS)
 def test_a_variable_that_is_not_for_keys_can_not_be_entered(variable: str) -> None:
     with pytest.raises(InvalidDocument, match=f"{variable} may not be sent to an endpoint"):
-        ensure_endpoint(label="thief", base_url=URL, key_variable=variable)
-    with pytest.raises(CommandError, match="ends in _API_KEY"):
-        call_command(
-            *("add_contestant", "thief", "--variant", "otm", "--endpoint", "thief"),
-            *("--model", "m", "--base-url", URL, "--key-variable", variable),
-        )
+        ensure_endpoint(EndpointRequest(label="thief", base_url=URL, key_variable=variable))
     assert not Endpoint.objects.exists()
 
 
@@ -207,7 +211,7 @@ def test_a_contestant_with_such_a_variable_is_refused_at_launch() -> None:
     assert "DATABASE_URL may not hold a key" in find_obstacle(llama)
     assert keys_missing(llama) == []
     with pytest.raises(Conflict, match="llama: the variable DATABASE_URL may not hold a key"):
-        jobs.launch(name="J", contestants=["llama"], scenarios=["street"])
+        jobs.launch(JobRequest(name="J", contestants=["llama"], scenarios=["street"]))
 
 
 # --- Another host ------------------------------------------------------------------------------
@@ -243,16 +247,13 @@ def test_when_a_key_would_go_to_another_server(
 
 
 def test_a_key_goes_to_another_host_only_when_told_twice_and_is_logged() -> None:
-    keyed()
-    command = (
-        *("add_contestant", "one", "--variant", "otm", "--endpoint", "local", "--model", "m"),
-        *("--base-url", "https://thief.example/v1", "--key-variable", "MY_API_KEY"),
-    )
-    with pytest.raises(CommandError, match=f"went to {OLD} and would go to {NEW}. Say"):
-        call_command(*command)
+    row = keyed()
+    facts = EndpointFacts(base_url="https://thief.example/v1", key_variable="MY_API_KEY")
+    with pytest.raises(Conflict, match=f"went to {OLD} and would go to {NEW}. Say"):
+        change_endpoint(row, facts=facts)
     assert Endpoint.objects.get().base_url == "https://models.example/v1"
     assert not Event.objects.exists()
-    call_command(*command, "--move-key")
+    change_endpoint(row, facts=facts, may_move_key=True)
     assert Endpoint.objects.get().base_url == "https://thief.example/v1"
     event = Event.objects.get(verb="move key")
     assert (event.before, event.after) == (
@@ -278,14 +279,16 @@ def opened(endpoint: Endpoint) -> AbstractContextManager[ChatClient]:
 
 
 def add_roles(variant: str, **roles: tuple[str | None, str]) -> Contestant:
-    ensure_endpoint(label="here", base_url="http://127.0.0.1:1/v1")
-    ensure_endpoint(label="there", base_url="http://127.0.0.1:2/v1")
+    ensure_endpoint(EndpointRequest(label="here", base_url="http://127.0.0.1:1/v1"))
+    ensure_endpoint(EndpointRequest(label="there", base_url="http://127.0.0.1:2/v1"))
     return contestants.add_contestant(
-        slug="one",
-        variant=variant,
-        endpoint="here",
-        model="text-model",
-        roles={ModelRole(role): seat for role, seat in roles.items()},
+        ContestantRequest(
+            slug="one",
+            variant=variant,
+            endpoint="here",
+            model="text-model",
+            roles={ModelRole(role): seat for role, seat in roles.items()},
+        )
     )
 
 
@@ -317,7 +320,9 @@ def test_a_role_that_nobody_plays_is_refused() -> None:
 
 
 def test_a_simulated_reviewer_makes_a_simulated_contestant() -> None:
-    ensure_endpoint(label="stand-in", base_url="http://127.0.0.1:3/v1", is_simulated=True)
+    ensure_endpoint(
+        EndpointRequest(label="stand-in", base_url="http://127.0.0.1:3/v1", is_simulated=True)
+    )
     assert add_roles("tqa", reviewer=("stand-in", "fake-good")).is_simulated
 
 
@@ -326,7 +331,7 @@ def test_visual_qa_with_a_viewer_known_to_be_blind_is_refused_at_launch() -> Non
     add_scenario("street-1")
     sees("text-model", "here", vision=False)
     with pytest.raises(Conflict, match="one: its viewer text-model at here sees text alone"):
-        jobs.launch(name="J", contestants=["one"], scenarios=["street-1"])
+        jobs.launch(JobRequest(name="J", contestants=["one"], scenarios=["street-1"]))
 
 
 def test_visual_qa_waits_until_the_viewer_is_probed_or_somebody_tells() -> None:
@@ -334,7 +339,7 @@ def test_visual_qa_waits_until_the_viewer_is_probed_or_somebody_tells() -> None:
     add_scenario("street-1")
     sees("text-model", "here", vision=True)
     with pytest.raises(Conflict) as raised:
-        jobs.launch(name="J", contestants=["one"], scenarios=["street-1"])
+        jobs.launch(JobRequest(name="J", contestants=["one"], scenarios=["street-1"]))
     obstacle = find_obstacle(Contestant.objects.get())
     assert "viewer eyes at there sees pictures" in obstacle
     assert f"one: {obstacle}" in str(raised.value)
@@ -348,7 +353,7 @@ def test_visual_qa_waits_until_the_viewer_is_probed_or_somebody_tells() -> None:
         "vision": True,
     }
     assert find_obstacle(Contestant.objects.get()) == ""
-    jobs.launch(name="J", contestants=["one"], scenarios=["street-1"])
+    jobs.launch(JobRequest(name="J", contestants=["one"], scenarios=["street-1"]))
 
 
 def test_a_cap_in_money_needs_the_price_of_every_role() -> None:
@@ -357,28 +362,30 @@ def test_a_cap_in_money_needs_the_price_of_every_role() -> None:
     EndpointModel.objects.filter(model="text-model").update(price_in_usd=1, price_out_usd=2)
     with pytest.raises(Conflict, match="boss at there"):
         jobs.launch(
-            name="J", contestants=["one"], scenarios=["street-1"], caps=Caps(usd=Decimal(1))
+            JobRequest(name="J", contestants=["one"], scenarios=["street-1"], cap_usd=Decimal(1))
         )
 
 
 def test_each_role_is_asked_at_its_own_endpoint(server: FakeServer) -> None:
     with running(intents=intents) as other:
-        ensure_endpoint(label="a", base_url=server.url, is_simulated=True)
-        ensure_endpoint(label="b", base_url=other.url, is_simulated=True)
+        ensure_endpoint(EndpointRequest(label="a", base_url=server.url, is_simulated=True))
+        ensure_endpoint(EndpointRequest(label="b", base_url=other.url, is_simulated=True))
         contestants.add_contestant(
-            slug="two",
-            variant="fc+vqa",
-            endpoint="a",
-            model="fake-qa-low",
-            roles={
-                ModelRole.VIEWER: ("b", "fake-careless"),
-                ModelRole.ENGINEER: ("b", "fake-good"),
-            },
+            ContestantRequest(
+                slug="two",
+                variant="fc+vqa",
+                endpoint="a",
+                model="fake-qa-low",
+                roles={
+                    ModelRole.VIEWER: ("b", "fake-careless"),
+                    ModelRole.ENGINEER: ("b", "fake-good"),
+                },
+            )
         )
         add_scenario("street-1")
         EndpointModel.objects.filter(model="fake-qa-low").update(native_tools=True)
         EndpointModel.objects.filter(model="fake-careless").update(vision=True)
-        job = jobs.launch(name="J", contestants=["two"], scenarios=["street-1"])
+        job = jobs.launch(JobRequest(name="J", contestants=["two"], scenarios=["street-1"]))
         row = only_row(job)
         ran(row, opened)
     assert row.state == Augmentation.State.DONE, row.reason

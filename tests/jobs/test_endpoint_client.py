@@ -13,6 +13,7 @@ from augment.llm.openai_wire import OpenAIWire
 from augment.models import Augmentation, CallLease, Endpoint, EndpointModel, Event, ModelCall
 from augment.services.endpoints.client import EndpointClient, Queue
 from augment.services.running import jobs, runner
+from augment.services.running.jobs import JobRequest
 from augment.variants.respondents import ModelRole, RespondentClient, Respondents
 from tests.jobs.rows import add_model, add_scenario, only_row
 from tests.jobs.scripted import Scripted
@@ -77,7 +78,7 @@ def test_a_worker_goes_through_the_limits_and_the_profile() -> None:
         EndpointModel.objects.create(endpoint=endpoint, model="m", temperature=False)
         add_model("m", endpoint=endpoint, model="m")
         add_scenario("street")
-        row = only_row(jobs.launch(name="R", contestants=["m"], scenarios=["street"]))
+        row = only_row(jobs.launch(JobRequest(name="R", contestants=["m"], scenarios=["street"])))
         runner.work_on(augmentation_pk=row.pk)
         assert all("temperature" not in body for body in server.bodies)
         assert CallLease.objects.count() == len(server.bodies) == ModelCall.objects.count() > 0

@@ -10,6 +10,7 @@ from augment.errors import Conflict, UnknownName
 from augment.models import Augmentation, Contestant, Event, GenerationJob, ModelCall
 from augment.services.running import jobs
 from augment.services.running.budget import Caps
+from augment.services.running.jobs import JobRequest
 from augment.services.running.progress import cause_of, count_rows, failure_groups
 from augment.services.running.runner import AUGMENTATIONS
 from tests.jobs.models import Model, after_a_second_look, llama_job, ran, reply
@@ -33,7 +34,9 @@ def test_a_launch_is_logged_with_who_and_what() -> None:
     add_kind("reference")
     add_scenario("street")
     admin = User.objects.create_user("admin")
-    job = jobs.launch(name="R", contestants=["reference"], scenarios=["street"], actor=admin)
+    job = jobs.launch(
+        JobRequest(name="R", contestants=["reference"], scenarios=["street"]), actor=admin
+    )
     event = Event.objects.get()
     assert job.launched_by == admin
     assert (event.actor, event.verb, event.object_code) == (admin, "launch", str(job.code))
@@ -44,7 +47,7 @@ def test_a_launch_is_logged_with_who_and_what() -> None:
 def test_an_unknown_contestant_stops_the_launch_and_names_the_known() -> None:
     add_kind("reference")
     with pytest.raises(UnknownName, match=r"Unknown contestant 'gpt'\. Known: reference"):
-        jobs.launch(name="R", contestants=["gpt"], scenarios=["nowhere"])
+        jobs.launch(JobRequest(name="R", contestants=["gpt"], scenarios=["nowhere"]))
     assert not GenerationJob.objects.exists()
 
 
@@ -54,8 +57,8 @@ def test_the_reference_can_not_run_where_there_is_none() -> None:
     add_scenario("bare", reference=None)
     add_scenario("full")
     with pytest.raises(Conflict, match="without a reference modification: bare"):
-        jobs.launch(name="R", contestants=["reference"], scenarios=["full", "bare"])
-    jobs.launch(name="R", contestants=["rule-placer"], scenarios=["bare"])
+        jobs.launch(JobRequest(name="R", contestants=["reference"], scenarios=["full", "bare"]))
+    jobs.launch(JobRequest(name="R", contestants=["rule-placer"], scenarios=["bare"]))
 
 
 def test_a_job_is_finished_when_nothing_is_under_way() -> None:
@@ -137,7 +140,7 @@ def test_all_calls_of_what_is_in_flight_are_made_though_the_job_is_paused_betwee
             jobs.pause(GenerationJob.objects.get())
 
     model = Model(after_a_second_look, looking_on=pause_once)
-    row = ran(llama_job(caps=Caps(calls=9)), model)
+    row = ran(llama_job(caps=Caps(cap_calls=9)), model)
     assert (row.state, len(model.requests)) == (State.DONE, 2)
     assert GenerationJob.objects.get().state == Job.FINISHED, "nothing is left to resume"
 

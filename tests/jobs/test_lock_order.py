@@ -39,9 +39,9 @@ def test_a_worker_holds_its_row_before_the_job() -> None:
 
 
 def test_who_raises_a_cap_and_resumes_holds_what_waits_before_the_job() -> None:
-    job = llama_job(caps=Caps(tokens=5))
+    job = llama_job(caps=Caps(cap_tokens=5))
     runner.work_on(augmentation_pk=job.augmentations.get().pk, connect=Model())
-    assert held(lambda: jobs.resume(job, higher=Caps(tokens=50_000))) == [ROWS, JOB]
+    assert held(lambda: jobs.resume(job, higher=Caps(cap_tokens=50_000))) == [ROWS, JOB]
     job.refresh_from_db()
     assert (job.state, job.cap_tokens) == ("running", 50_000)
 

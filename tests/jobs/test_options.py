@@ -12,12 +12,14 @@ from augment.errors import Conflict, InvalidDocument
 from augment.models import Augmentation, Contestant, EndpointModel, GenerationJob, ModelCall
 from augment.prompts.fill import prompt_version
 from augment.services.endpoints import contestants
-from augment.services.endpoints.known_endpoints import ensure_endpoint
+from augment.services.endpoints.contestants import ContestantRequest
+from augment.services.endpoints.known_endpoints import EndpointRequest, ensure_endpoint
 from augment.services.endpoints.treatments import options_of
 from augment.services.running import jobs, runner
 from augment.services.running.choosing import find_obstacle
+from augment.services.running.jobs import JobRequest
 from augment.services.running.transcript_records import transcript_of
-from augment.variants.options import NAMES, ContestantOptions, options_from_document
+from augment.variants.options import NAMES, options_from_document
 from tests.jobs.rows import add_scenario
 from tests.jobs.scripted import SCRIPTS, Bodies, Scripted, add, run
 from tests.llm.json_server import serving
@@ -143,15 +145,17 @@ def test_samples_are_asked_anew_with_seeds_of_their_own() -> None:
 def test_another_option_never_reuses_an_answer_and_the_same_does() -> None:
     with serving(Scripted()) as server:
         for slug, rounds in (("two", 2), ("also-two", 2), ("three", 3)):
-            ensure_endpoint(label="here", base_url=server.url)
+            ensure_endpoint(EndpointRequest(label="here", base_url=server.url))
             server.script = SCRIPTS["tqa"]
             contestants.add_contestant(
-                slug=slug,
-                variant="tqa",
-                endpoint="here",
-                model="m",
-                name=slug,
-                options=ContestantOptions(rounds=rounds),
+                ContestantRequest(
+                    slug=slug,
+                    variant="tqa",
+                    endpoint="here",
+                    model="m",
+                    name=slug,
+                    options={"rounds": rounds},
+                )
             )
         run("two")
         assert len(server.bodies) == 4
@@ -238,11 +242,15 @@ def test_who_ran_with_other_prompts_is_not_run_with_these() -> None:
 
 
 def job_at(server: Scripted, variant: str = "fc") -> None:
-    ensure_endpoint(label="here", base_url=server.url)
-    contestants.add_contestant(slug="one", variant=variant, endpoint="here", model="m")
+    ensure_endpoint(EndpointRequest(label="here", base_url=server.url))
+    contestants.add_contestant(
+        ContestantRequest(slug="one", variant=variant, endpoint="here", model="m")
+    )
     add_scenario("first")
     add_scenario("second")
-    jobs.launch(name="J", contestants=["one"], scenarios=["first", "second"], is_fresh=True)
+    jobs.launch(
+        JobRequest(name="J", contestants=["one"], scenarios=["first", "second"], is_fresh=True)
+    )
 
 
 def run_on(scenario: str) -> Augmentation:
@@ -288,8 +296,10 @@ def test_what_is_learnt_after_the_first_run_changes_nothing_that_is_sent(
         run_on("second")
         assert shapes(server) == before
         # Another contestant of the same model sends what is known now.
-        contestants.add_contestant(slug="two", variant="fc", endpoint="here", model="m", name="2")
-        jobs.launch(name="K", contestants=["two"], scenarios=["first"], is_fresh=True)
+        contestants.add_contestant(
+            ContestantRequest(slug="two", variant="fc", endpoint="here", model="m", name="2")
+        )
+        jobs.launch(JobRequest(name="K", contestants=["two"], scenarios=["first"], is_fresh=True))
         server.bodies.clear()
         runner.work_on(augmentation_pk=Augmentation.objects.get(contestant__slug="two").pk)
         is_sent = not later.keys() <= {"vision", "json_schema", "temperature"}

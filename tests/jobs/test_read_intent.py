@@ -17,7 +17,7 @@ from augment.llm.messages import Reply
 from augment.models import Event, IntentReading, ModelCall, Scenario
 from augment.scene.codec import intent_to_document, intent_to_parts
 from augment.scene.intent import Shape
-from augment.services.endpoints.known_endpoints import ensure_endpoint
+from augment.services.endpoints.known_endpoints import EndpointRequest, ensure_endpoint
 from augment.services.running import intent_readings
 from augment.services.running.budget import Caps
 from augment.services.running.intent_readings import READINGS, plan_reading, read_intent
@@ -42,12 +42,12 @@ def reading(
 ) -> IntentReading:
     if not Scenario.objects.exists():
         add_scenario("street", intent=None, intent_origin="")
-        ensure_endpoint(label="here", base_url="http://127.0.0.1:1/v1")
+        ensure_endpoint(EndpointRequest(label="here", base_url="http://127.0.0.1:1/v1"))
     return read_intent(
         scenario="street",
         endpoint="here",
         model="m",
-        caps=caps or Caps(calls=6),
+        caps=caps or Caps(cap_calls=6),
         is_fresh=is_fresh,
         client=opened(ScriptedClient(answers)),
     )
@@ -87,10 +87,10 @@ def test_an_answer_that_breaks_the_schema_is_asked_for_once_more() -> None:
 
 
 def test_a_cap_ends_a_reading_before_the_call_that_would_pass_it() -> None:
-    made = reading("no block", caps=Caps(calls=1))
+    made = reading("no block", caps=Caps(cap_calls=1))
     assert (made.state, made.calls.count()) == (State.FAILED, 1)
     assert made.reason == "The cap is reached: 1 calls"
-    assert reading(caps=Caps(tokens=100)).calls.count() == 0
+    assert reading(caps=Caps(cap_tokens=100)).calls.count() == 0
 
 
 def test_a_broken_wire_is_a_failed_reading_with_a_sentence() -> None:
@@ -108,7 +108,7 @@ def run(*arguments: str) -> str:
 def test_the_command_reads_through_the_wire_shows_statements_and_accepts(tmp_path: Path) -> None:
     add_scenario("street", intent=None, intent_origin="")
     with running(intents=intents) as server:
-        ensure_endpoint(label="stand-in", base_url=server.url)
+        ensure_endpoint(EndpointRequest(label="stand-in", base_url=server.url))
         said = run("--endpoint", "stand-in", "--model", "fake-good")
     assert "- cones: 20 m ahead of the ego\n" in said
     assert "It does not count yet." in said
@@ -121,7 +121,7 @@ def test_the_command_reads_through_the_wire_shows_statements_and_accepts(tmp_pat
 
 def test_a_worker_asks_for_a_planned_reading_once() -> None:
     add_scenario("street", intent=None, intent_origin="")
-    ensure_endpoint(label="here", base_url="http://127.0.0.1:1/v1")
+    ensure_endpoint(EndpointRequest(label="here", base_url="http://127.0.0.1:1/v1"))
     row = plan_reading(scenario="street", endpoint="here", model="m")
     READINGS.perform(row.pk)  # nobody listens there
     row.refresh_from_db()

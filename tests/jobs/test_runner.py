@@ -23,6 +23,7 @@ from augment.scene.intent import Intent
 from augment.services.endpoints import contestants
 from augment.services.endpoints.client import Queue, place_at
 from augment.services.running import jobs, runner, workers
+from augment.services.running.jobs import JobRequest
 from augment.services.running.runner import AUGMENTATIONS
 from tests.intents import parked
 from tests.jobs.models import Model, Wire, llama_job, ran, reply
@@ -128,7 +129,9 @@ def test_what_nobody_foresaw_fails_the_row_and_is_logged(caplog: pytest.LogCaptu
 def one_job(kind: str, **columns: Any) -> Augmentation:
     add_kind("someone", kind)
     add_scenario("street", **columns)
-    return only_row(jobs.launch(name="R", contestants=["someone"], scenarios=["street"]))
+    return only_row(
+        jobs.launch(JobRequest(name="R", contestants=["someone"], scenarios=["street"]))
+    )
 
 
 def test_a_reference_that_does_not_fit_is_a_failure_with_a_sentence() -> None:
@@ -141,7 +144,7 @@ def test_a_reference_that_does_not_fit_is_a_failure_with_a_sentence() -> None:
 def test_the_rule_placer_places_the_same_each_time() -> None:
     first = ran(one_job(Contestant.Kind.RULE))
     assert first.state == State.DONE
-    again = jobs.launch(name="R2", contestants=["someone"], scenarios=["street"])
+    again = jobs.launch(JobRequest(name="R2", contestants=["someone"], scenarios=["street"]))
     second = ran(only_row(again))
     assert second.modification == first.modification
     assert second.image == first.image
@@ -153,7 +156,7 @@ PARKED = parked(22.0)
 def quantised(slug: str, intent: Intent) -> Augmentation:
     add_scenario(f"street-{slug}", intent=intent_to_document(intent))
     contestants.ensure_builtin()
-    job = jobs.launch(name="Q", contestants=[slug], scenarios=[f"street-{slug}"])
+    job = jobs.launch(JobRequest(name="Q", contestants=[slug], scenarios=[f"street-{slug}"]))
     return ran(only_row(job))
 
 
@@ -170,7 +173,7 @@ def test_simulated_errors_of_an_earlier_version_run_no_more() -> None:
     Contestant.objects.filter(slug="someone").update(error_rates={"position": 0.1})
     add_scenario("street")
     with pytest.raises(Conflict, match="A job can't run someone"):
-        jobs.launch(name="R", contestants=["someone"], scenarios=["street"])
+        jobs.launch(JobRequest(name="R", contestants=["someone"], scenarios=["street"]))
 
 
 @pytest.fixture(autouse=True)

@@ -76,10 +76,10 @@ def test_a_request_in_it_is_what_the_server_was_sent_and_nothing_else() -> None:
 
 
 def test_a_call_from_the_store_names_its_source() -> None:
-    job = llama_job(price="1", caps=Caps(calls=1))
+    job = llama_job(price="1", caps=Caps(cap_calls=1))
     model = Model(after_a_second_look)
     row = ran(only_row(job), model)
-    budget.raise_cap(job, caps=Caps(calls=2))
+    budget.raise_cap(job, caps=Caps(cap_calls=2))
     jobs.resume(job)
     document = transcript_of(ran(row, model))
     paid = document["attempts"][0]["steps"][0]

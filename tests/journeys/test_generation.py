@@ -1,8 +1,10 @@
 """A generation job on a real Redis and real workers that are killed in the middle of it."""
 
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from threading import Thread
+from typing import Any
 
 import pytest
 
@@ -13,12 +15,15 @@ from tests.variants.playing import GOOD
 pytestmark = [pytest.mark.redis, pytest.mark.slow, pytest.mark.timeout(600)]
 
 SEED = """
+from augment.models import Endpoint
 from augment.services.endpoints import contestants
-from augment.services.endpoints.known_endpoints import ensure_endpoint
+from augment.services.endpoints.contestants import ContestantRequest
 from tests.jobs.rows import add_scenario
 contestants.ensure_builtin()
-ensure_endpoint(label="waiting", base_url="{base_url}", is_simulated=True)
-contestants.add_contestant(slug="waiting", variant="otm", endpoint="waiting", model="waits")
+Endpoint.objects.create(label="waiting", base_url="{base_url}", is_simulated=True)
+contestants.add_contestant(
+    ContestantRequest(slug="waiting", variant="otm", endpoint="waiting", model="waits")
+)
 for number in range(1, 4):
     add_scenario(f"street-{{number}}")
 """
@@ -38,6 +43,7 @@ while SceneUpload.objects.get().state != "running":
 call_command("generate", *{chosen})
 """
 BY_STATE = "SELECT state, COUNT(*) FROM augment_augmentation GROUP BY state"
+DONE = "SELECT id FROM augment_augmentation WHERE state = 'done'"
 RUNNING = "SELECT id FROM augment_augmentation WHERE state = 'running'"
 ATTEMPTS = "SELECT augmentation_id, number, outcome FROM augment_attempt ORDER BY 1, 2"
 
@@ -69,8 +75,9 @@ def place(seeded: Path) -> Iterator[Machine]:
         yield made
 
 
-def is_finished(place: Machine) -> bool:
-    return place.rows("SELECT state FROM augment_generationjob") == [("finished",)]
+def wait_for_the_job(place: Machine) -> None:
+    state = "SELECT state FROM augment_generationjob"
+    wait_until(lambda: place.rows(state) == [("finished",)], what="the job is over", within_s=240)
 
 
 def in_flight(place: Machine, model: WaitingModel, *, at_once: int = 2) -> set[int]:
@@ -93,73 +100,68 @@ def check_each_row_is_done_once(place: Machine, killed: set[int]) -> None:
     assert all((place.media / name).is_file() for name in images)
 
 
-def test_a_job_survives_kill_9_of_its_worker(place: Machine, model: WaitingModel) -> None:
-    redis = place.redis()
-    worker = place.worker(pool="prefork")
+class Processes:
+    """A Redis and a worker, which a test may kill and start again."""
+
+    def __init__(self, place: Machine, **options: Any) -> None:
+        self._place, self._options = place, options
+        self.start()
+
+    def start(self, *, redis: bool = True, worker: bool = True) -> None:
+        if redis:
+            self.redis = self._place.redis()
+        if worker:
+            self.worker = self._place.worker(**self._options)
+
+
+@contextmanager
+def processes(place: Machine, **options: Any) -> Iterator[Processes]:
+    started = Processes(place, **options)
     try:
+        yield started
+    finally:
+        started.worker.stop()
+        started.redis.stop()
+
+
+@pytest.mark.parametrize(("pool", "redis"), [("prefork", False), ("threads", True)])
+def test_a_job_survives_kill_9_of_its_worker_and_the_loss_of_all_messages(
+    place: Machine, model: WaitingModel, pool: str, redis: bool
+) -> None:
+    with processes(place, pool=pool) as running:
         place.must("generate", *CHOSEN)
         killed = in_flight(place, model)
-        worker.kill()
+        running.worker.kill()
+        if redis:
+            running.redis.kill()
         assert len(killed) == 2
         place.age("heartbeat_at", state="running")
         model.gate.set()
-        worker = place.worker(pool="prefork")
-        wait_until(lambda: is_finished(place), what="the job is over", within_s=240)
+        running.start(redis=redis)
+        wait_for_the_job(place)
         check_each_row_is_done_once(place, killed)
-    finally:
-        worker.stop()
-        redis.stop()
-
-
-def test_a_job_survives_the_loss_of_redis_with_all_its_messages(
-    place: Machine, model: WaitingModel
-) -> None:
-    """And that of a worker of threads."""
-    redis = place.redis()
-    worker = place.worker()
-    try:
-        place.must("generate", *CHOSEN)
-        killed = in_flight(place, model)
-        worker.kill()
-        redis.kill()
-        place.age("heartbeat_at", state="running")
-        model.gate.set()
-        redis = place.redis()
-        worker = place.worker()
-        wait_until(lambda: is_finished(place), what="the job is over", within_s=240)
-        check_each_row_is_done_once(place, killed)
-    finally:
-        worker.stop()
-        redis.stop()
 
 
 def test_a_job_goes_on_when_redis_alone_comes_back_empty(
     place: Machine, model: WaitingModel
 ) -> None:
-    redis = place.redis()
-    worker = place.worker(concurrency=1)
-    try:
+    with processes(place, concurrency=1) as running:
         place.must("generate", *CHOSEN)
         in_flight(place, model, at_once=1)
-        redis.kill()
+        running.redis.kill()
         place.age("sent_at", state="queued")
-        redis = place.redis()
+        running.start(worker=False)
         model.gate.set()
-        wait_until(lambda: is_finished(place), what="the job is over", within_s=240)
+        wait_for_the_job(place)
         check_each_row_is_done_once(place, killed=set())
-    finally:
-        worker.stop()
-        redis.stop()
 
 
 def test_a_worker_that_is_told_to_stop_waits_for_its_calls_and_takes_nothing_on(
     place: Machine, model: WaitingModel
 ) -> None:
-    redis = place.redis()
-    worker = place.worker()
-    try:
+    with processes(place) as running:
         place.must("generate", *CHOSEN)
-        flying = in_flight(place, model)
+        flying, worker = in_flight(place, model), running.worker
         stopping = Thread(target=worker.stop)
         stopping.start()
         wait_until(lambda: "Warm shutdown" in worker.said(), what="the worker was told to stop")
@@ -167,37 +169,26 @@ def test_a_worker_that_is_told_to_stop_waits_for_its_calls_and_takes_nothing_on(
         stopping.join(200)
         assert not worker.is_alive()
         assert "Cold shutdown" not in worker.said()
-        done = {
-            pk for (pk,) in place.rows("SELECT id FROM augment_augmentation WHERE state='done'")
-        }
-        assert flying <= done
+        assert flying <= {pk for (pk,) in place.rows(DONE)}
         assert place.rows(RUNNING) == []
         assert place.rows("SELECT COUNT(*) FROM augment_worker WHERE ended_at IS NULL") == [(0,)]
-        worker = place.worker()
-        wait_until(lambda: is_finished(place), what="the job is over", within_s=240)
+        running.start(redis=False)
+        wait_for_the_job(place)
         check_each_row_is_done_once(place, killed=set())
         assert model.asked == 2, "the third has the same prompt; nothing was asked again"
-    finally:
-        worker.stop()
-        redis.stop()
 
 
 def test_the_command_waits_for_the_job_and_reports(place: Machine, model: WaitingModel) -> None:
     """What was done by its table; a failure by its reason, and ends with 1."""
     model.gate.set()
-    redis = place.redis()
-    worker = place.worker()
     facts = ("--variant", "otm", "--endpoint", "cloud", "--model", "m")
     address = ("--base-url", model.base_url, "--key-variable", "NO_SUCH_API_KEY")
     chosen = ("--contestants", "cloudy", "--scenarios", "street-1", "street-2", "--wait")
-    try:
+    with processes(place):
         said = place.must("generate", *CHOSEN, "--wait", "--timeout", "240")
         asked = model.asked
         place.must("add_contestant", "cloudy", *facts, *address)
         ended = place.manage("generate", *chosen)
-    finally:
-        worker.stop()
-        redis.stop()
     assert said.splitlines()[-4:] == [
         "Over.",
         "contestant  done  unreadable  refused  failed",
@@ -222,23 +213,18 @@ def test_a_job_goes_on_in_a_worker_that_reads_a_freezing_pickle(
 ) -> None:
     _, pickle = scenarionet_of_nested_tuples_as_a_key(tmp_path)
     model.gate.set()
-    redis = place.redis()
-    worker = place.worker()
     upload = "SELECT state, lost, reason FROM augment_sceneupload"
     meanwhile = (
         "SELECT COUNT(*) FROM augment_augmentation a, augment_sceneupload u "
         "WHERE a.state = 'done' AND a.finished_at < u.finished_at"
     )
-    try:
+    with processes(place):
         code = UPLOAD_THEN_GENERATE.format(path=pickle, chosen=CHOSEN)
         place.must("shell", "--verbosity", "0", "-c", code)
-        wait_until(lambda: is_finished(place), what="the job is over", within_s=240)
+        wait_for_the_job(place)
         wait_until(lambda: place.rows(upload)[0][0] == "failed", what="the file is refused")
-        state = place.rows(upload)
-        assert state[0][1] == 0, "no worker was lost over it"
-        assert "made.pkl: takes more than 8 s of computing to read" in state[0][2]
+        ((_, lost, reason),) = place.rows(upload)
+        assert lost == 0, "no worker was lost over it"
+        assert "made.pkl: takes more than 8 s of computing to read" in reason
         assert place.rows(BY_STATE) == [("done", 6)]
         assert place.rows(meanwhile)[0][0] > 0
-    finally:
-        worker.stop()
-        redis.stop()

@@ -14,12 +14,12 @@ from tests.scenes import cone
 
 pytestmark = pytest.mark.django_db
 
-CSV = """scene,type,type_label,instruction,slug,keep_traffic,reference
-street-scene,cut_in,Cut-in,"Let a car cut in, closely.",one,yes,
-street-scene,jaywalking_pedestrian,,Let somebody cross.,,,change.json
+CSV = """scene,type,instruction,slug,keep_traffic,reference
+street-scene,cut_in,"Let a car cut in, closely.",one,yes,
+street-scene,jaywalking_pedestrian,Let somebody cross.,,,change.json
 """
 YAML = """
-- {scene: street-scene, type: cut_in, type_label: Cut-in, instruction: Let a car cut in.}
+- {scene: street-scene, type: cut_in, instruction: Let a car cut in.}
 - {scene: street-scene, type: cut_in, instruction: And another., keep_traffic: true}
 """
 
@@ -46,7 +46,7 @@ def test_a_csv_file_is_added_row_by_row(
         "2 scenarios.",
     ]
     one = Scenario.objects.get(slug="one")
-    assert (one.type, one.type_label, one.keep_traffic) == ("cut_in", "Cut-in", True)
+    assert (one.type, one.type_label, one.keep_traffic) == ("cut_in", "Cut in", True)
     assert one.instruction == "Let a car cut in, closely."
     assert Scenario.objects.get(slug="street-scene-jaywalker-1").reference is not None
 
@@ -63,9 +63,9 @@ def test_a_yaml_file_is_added_too(tmp_path: Path) -> None:
 def test_one_bad_row_keeps_all_out_and_every_error_is_named(tmp_path: Path) -> None:
     wrong = (
         CSV
-        + """nowhere,cut_in,,Something.,,,
-street-scene,cut_in,Other,Something.,,maybe,
-street-scene,cut_in,,,,,none.json
+        + """nowhere,cut_in,Something.,,,
+street-scene,cut_in,Something.,,maybe,
+street-scene,cut_in,,,,none.json
 """
     )
     with pytest.raises(CommandError) as refused:

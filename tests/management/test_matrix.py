@@ -8,8 +8,8 @@ from django.core.management import CommandError, call_command
 from augment.errors import InvalidDocument
 from augment.formats.documents import read_yaml
 from augment.models import Contestant, Event, GenerationJob
-from augment.services.endpoints.known_endpoints import ensure_endpoint
-from augment.services.running.matrix import load_matrix
+from augment.services.endpoints.known_endpoints import EndpointRequest, ensure_endpoint
+from augment.services.running.matrix import load_matrix, matrix_text
 from tests.jobs.rows import add_scenario
 
 pytestmark = pytest.mark.django_db
@@ -32,7 +32,7 @@ scenarios: [street, lane]
 
 @pytest.fixture(autouse=True)
 def rows() -> None:
-    ensure_endpoint(label="here", base_url="http://127.0.0.1:1/v1")
+    ensure_endpoint(EndpointRequest(label="here", base_url="http://127.0.0.1:1/v1"))
     for slug in ("street", "lane"):
         add_scenario(slug)
 
@@ -81,12 +81,28 @@ scenarios: [street, nowhere]
 
 def test_a_file_is_read_twice_and_makes_its_contestants_once() -> None:
     loaded = load_matrix(read_yaml(WHOLE, what="matrix"))
-    assert (loaded.made, loaded.contestants) == (
+    assert (loaded.made, loaded.scope.contestants) == (
         ("small", "native"),
         ("reference", "small", "native"),
     )
-    assert (loaded.scenarios, loaded.samples, loaded.name) == (("street", "lane"), 2, "Protocols")
-    assert load_matrix(read_yaml(WHOLE, what="matrix")).made == ()
-    changed = WHOLE.replace("temperature: 0.7", "temperature: 0.8")
+    assert (loaded.scope.scenarios, loaded.scope.samples, loaded.name) == (
+        ("street", "lane"),
+        2,
+        "Protocols",
+    )
+    rows = list(
+        Contestant.objects.filter(slug__in=loaded.scope.contestants).select_related("endpoint")
+    )
+    text = matrix_text(rows, loaded.scope.scenarios, samples=2, name="Again: #1")
+    assert load_matrix(read_yaml(text, what="matrix")).made == ()
+    Contestant.objects.filter(endpoint__isnull=False).delete()
+    again = load_matrix(read_yaml(text, what="matrix"))
+    assert set(again.made) == set(loaded.made)
+    assert (again.scope.scenarios, again.scope.samples, again.name) == (
+        loaded.scope.scenarios,
+        2,
+        "Again: #1",
+    )
+    changed = text.replace('"temperature": 0.7', '"temperature": 0.8')
     with pytest.raises(InvalidDocument, match="another contestant called 'native'"):
         load_matrix(read_yaml(changed, what="matrix"))

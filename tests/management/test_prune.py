@@ -14,6 +14,7 @@ from django.utils import timezone
 from arena.models import Study
 from augment.models import Augmentation, Event, GenerationJob, ModelCall
 from augment.services.running import jobs, runner
+from augment.services.running.jobs import JobRequest
 from tests import study_rows
 from tests.jobs.models import Model, llama_job
 
@@ -107,7 +108,7 @@ def test_what_goes_on_keeps_everything() -> None:
 
 def test_the_source_of_an_answer_that_an_open_study_shows_stays() -> None:
     old_job(scenarios=1)
-    again = jobs.launch(name="2", contestants=["llama"], scenarios=["street-1"])
+    again = jobs.launch(JobRequest(name="2", contestants=["llama"], scenarios=["street-1"]))
     row = again.augmentations.get()
     runner.work_on(augmentation_pk=row.pk, connect=Model())
     age()

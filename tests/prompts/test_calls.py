@@ -51,20 +51,6 @@ FORMS = {
     "tags": f'<tool_call>\n{{"name": "pose_on_lane", "arguments": {D}}}\n</tool_call>',
     "flat": '{"call": "pose_on_lane", ' + D[1:],
     "by its name": f'{{"pose_on_lane": {D}}}',
-    "single quotes": f'{{"call": "pose_on_lane", "arguments": {D}}}'.replace('"', "'"),
-    "trailing comma": f'{{"call": "pose_on_lane", "arguments": {D[:-1]},}},}}',
-    "Python": 'pose_on_lane(lane="Lane1", start="Agent1", distance_m=21.4)',
-    "Python in single quotes": "pose_on_lane(lane='Lane1', start='Agent1', distance_m=21.4)",
-    "Python in order": 'pose_on_lane("Lane1", "Agent1", 21.4)',
-    "Python, partly in order": 'pose_on_lane("Lane1", start="Agent1", distance_m=+21.4)',
-    "Python without quotes": "pose_on_lane(lane=Lane1, start=Agent1, distance_m=21.4)",
-    "Python over lines": (
-        '```python\npose = pose_on_lane(\n    lane="Lane1",\n    start="Agent1",\n'
-        "    distance_m=21.4,\n)\n```"
-    ),
-    "Python in a sentence": (
-        'So I use `pose_on_lane(lane="Lane1", start="Agent1", distance_m=21.4)` here.'
-    ),
 }
 
 
@@ -80,12 +66,13 @@ def test_many_calls_come_in_the_order_in_which_they_were_written() -> None:
     lines = [
         '{"call": "pose_on_lane", "arguments": {"distance_m": 1}}',
         '- {"name": "pose_on_lane", "arguments": {"distance_m": 2}}',
-        "pose_on_lane(distance_m=3), then pose_on_lane(distance_m=4)",
+        '{"tool": "pose_on_lane", "args": {"distance_m": 3}}; {"pose_on_lane": {"lane": "Lane1"}}',
         '[{"call": "pose_on_lane", "arguments": {"distance_m": 5}},',
         ' {"call": "pose_on_lane", "arguments": {"distance_m": 6}}]',
     ]
     calls = calls_in("\n".join(lines))
-    assert [call.arguments for call in calls] == [{"distance_m": n} for n in range(1, 7)]
+    expected = [{"distance_m": n} for n in (1, 2, 3, 5, 6)]
+    assert [call.arguments for call in calls] == [*expected[:3], {"lane": "Lane1"}, *expected[3:]]
     assert [call.mended for call in calls] == [False, *[True] * 5]
 
 
@@ -98,12 +85,8 @@ MALFORMED = [
     ('{"call": {"lane": "Lane1"}, "arguments": {}}', "has the form"),
     ('{"name": "pose_on_lane", "arguments": "{lane: 1}"}', "the arguments are not JSON"),
     ("{'call': 'pose_on_lane', 'arguments': {'distance_m': NaN}}", "one line of the form"),
-    ("pose_on_lane(lane='Lane1', distance_m=21.4 m)", "it breaks"),
-    ("pose_on_lane(lane='Lane1', distance_m=20+1.4)", "BinOp is no value"),
-    ("pose_on_lane(lane='Lane1', lane='Lane2')", "each argument once"),
-    ("pose_on_lane('Lane1', lane='Lane2')", "has the form"),
-    ("pose_on_lane(1, 2, 3, 4, 5, 6)", "has the form"),
     ("I need pose_on_lane(lane, start, distance_m) for this.", "is named and not called"),
+    ("pose_on_lane(lane='Lane1', distance_m=21.4)", "is named and not called"),
     ("I would ask pose_on_lane for the pose.", "is named and not called"),
 ]
 
@@ -151,9 +134,7 @@ def test_no_text_breaks_the_reader_of_calls(text: str, data: st.DataObject) -> N
         assert call.problem or call.name
 
 
-@pytest.mark.parametrize(
-    "piece", ["{'call':", '{"name": "', "pose_on_lane(", "pose_on_lane(a=[", "pose_"]
-)
+@pytest.mark.parametrize("piece", ["{'call':", '{"name": "', '{"call": [', "pose_"])
 def test_the_time_for_a_hostile_answer_is_bounded(piece: str) -> None:
     # Of a limited number of places each is read over a limited number of characters.
     assert len(calls_in(piece * (199_000 // len(piece)))) <= MOST_LOOKED_AT

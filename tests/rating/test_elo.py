@@ -1,4 +1,4 @@
-"""Online Elo: the plain replay is the paper's formula, and every round is a plain replay."""
+"""Online Elo: every round plays the paper's formula."""
 
 import numpy as np
 import pytest
@@ -28,29 +28,16 @@ def by_kind(votes: Comparisons) -> Comparisons:
 
 
 @pytest.mark.parametrize("k", [0.5, 4.0, 64.0])
-def test_a_replay_is_the_papers_formula(k: float) -> None:
-    votes = simulated(TRUTH, 2000, 1)
-    assert models.replay_elo(votes, k=k) == pytest.approx(as_worded(votes, k), abs=1e-9)
-
-
-def test_nothing_said_the_stake_is_four_points() -> None:
-    votes = simulated(TRUTH, 300, 1)
-    assert models.replay_elo(votes) == pytest.approx(as_worded(votes, 4.0), abs=1e-9)
-
-
-@pytest.mark.parametrize("k", [0.5, 4.0, 64.0])
-@pytest.mark.parametrize(("size", "rounds"), [(307, 130), (11_003, 3), (5, 1)])
+@pytest.mark.parametrize(("size", "rounds"), [(307, 130), (5003, 3), (5, 1)])
 def test_every_round_is_a_replay_of_votes_drawn_with_replacement(
     size: int, rounds: int, k: float
 ) -> None:
     """Few votes and many, in one go and in several with a remainder."""
     votes = by_kind(simulated(TRUTH, size, 1, ties=0.5))
     order = np.random.default_rng(5).integers(0, len(votes), size=(len(votes), rounds))
-    replays = [
-        models.replay_elo(select_votes(votes, order[:, number]), k=k) for number in range(rounds)
-    ]
+    replays = [as_worded(select_votes(votes, order[:, number]), k) for number in range(rounds)]
     sampled = models.resample_elo(votes, rounds=rounds, seed=5, k=k).T
-    assert sampled == pytest.approx(np.array(replays), abs=1e-9)
+    assert sampled == pytest.approx(np.array(replays), abs=1e-8)
 
 
 def test_counted_votes_are_resampled_like_as_many_rows() -> None:
@@ -92,5 +79,5 @@ def test_one_sided_votes_drive_apart_without_end_and_without_rounding() -> None:
         scenario=votes.scenario,
     )
     assert models.resample_elo(always, rounds=2, seed=0)[:, 1] == pytest.approx(
-        as_worded(always, models.K), abs=1e-6
+        as_worded(always, 4.0), abs=1e-6
     )

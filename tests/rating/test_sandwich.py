@@ -1,4 +1,4 @@
-"""The closed-form cross-check, against formulas, packages and the bootstrap."""
+"""Closed-form covariances, against formulas, packages and the bootstrap."""
 
 import json
 from dataclasses import replace
@@ -30,6 +30,10 @@ TRUTH = [1060.0, 1020.0, 1000.0, 980.0, 940.0]
 
 def covariance(votes: Comparisons, unit: Unit) -> FloatArray:
     return plain_covariance(pulls_of(votes), unit)
+
+
+def half_widths(votes: Comparisons, unit: Unit) -> FloatArray:
+    return np.asarray(factor(None) * np.sqrt(covariance(votes, unit).diagonal()))
 
 
 def pulls_of(votes: Comparisons) -> Pulls:
@@ -82,17 +86,11 @@ def test_two_ways_are_the_one_and_the_other_without_what_is_in_both() -> None:
 @pytest.mark.parametrize("unit", [Unit.VOTE, Unit.SCENARIO])
 def test_the_bootstrap_agrees_where_clusters_are_many(unit: Unit) -> None:
     votes = simulated(TRUTH, 4000, 3, scenarios=200)
-    for line in rate(votes, unit=unit, intervals=Intervals.RESAMPLES, rounds=4000).lines:
-        assert line.lower == pytest.approx(line.check_lower, abs=1.5)
-        assert line.upper == pytest.approx(line.check_upper, abs=1.5)
-
-
-def test_rows_of_a_covariance_add_to_zero_and_the_board_carries_it() -> None:
-    votes = simulated(TRUTH, 800, 4)
-    board = rate(votes, intervals=Intervals.RESAMPLES, rounds=200)
-    assert board.covariance is not None
-    assert board.covariance == pytest.approx(covariance(votes, Unit.TWO_WAY))
-    assert np.abs(board.covariance.sum(axis=1)).max() < 1e-6
+    lines = rate(votes, unit=unit, intervals=Intervals.RESAMPLES, rounds=4000).lines
+    for line, half in zip(lines, half_widths(votes, unit), strict=True):
+        assert line.rating is not None
+        assert line.lower == pytest.approx(line.rating - half, abs=1.5)
+        assert line.upper == pytest.approx(line.rating + half, abs=1.5)
 
 
 @pytest.mark.parametrize("name", [name for name in ARENA_RANK if name != "what"])
@@ -114,9 +112,11 @@ def test_ratings_and_intervals_agree_with_arena_rank(name: str) -> None:
         count=counts[seen],
     )
     board = rate(votes, unit=Unit.VOTE, rounds=100)
-    assert [line.rating for line in board.lines] == pytest.approx(answer["rating"], abs=0.05)
-    assert [line.check_lower for line in board.lines] == pytest.approx(answer["lower"], abs=0.1)
-    assert [line.check_upper for line in board.lines] == pytest.approx(answer["upper"], abs=0.1)
+    ratings = np.array([line.rating for line in board.lines], dtype=np.float64)
+    half = half_widths(votes, Unit.VOTE)
+    assert ratings == pytest.approx(np.array(answer["rating"]), abs=0.05)
+    assert ratings - half == pytest.approx(np.array(answer["lower"]), abs=0.1)
+    assert ratings + half == pytest.approx(np.array(answer["upper"]), abs=0.1)
 
 
 # --- Moderated variances ---------------------------------------------------------------------

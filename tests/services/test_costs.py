@@ -10,6 +10,7 @@ from augment.llm.messages import Reply, Request
 from augment.models import Augmentation, Contestant, GenerationJob
 from augment.services.endpoints.known_models import Spending
 from augment.services.running import jobs, runner
+from augment.services.running.jobs import JobRequest
 from tests.jobs.models import Model, llama_job, reply
 from tests.jobs.rows import only_row
 from tests.variants.playing import GOOD
@@ -46,7 +47,7 @@ def test_an_error_of_the_endpoint_is_a_call_that_used_nothing() -> None:
 def test_an_answer_from_the_store_counts_as_what_it_had_cost() -> None:
     first = llama_job(price="1")
     spent(first, Model())
-    again = jobs.launch(name="Again", contestants=["llama"], scenarios=["street-1"])
+    again = jobs.launch(JobRequest(name="Again", contestants=["llama"], scenarios=["street-1"]))
     found = spent(again, Model())
     assert found == Spending(augmentations=1, calls=1, tokens=3020, nano_usd=3_020_000)
 
@@ -54,5 +55,5 @@ def test_an_answer_from_the_store_counts_as_what_it_had_cost() -> None:
 def test_usage_that_nobody_told_is_unknown_also_in_a_copy() -> None:
     silent = Model(lambda request: Reply(text=GOOD))
     assert spent(llama_job(price="1"), silent).tokens is None
-    again = jobs.launch(name="Again", contestants=["llama"], scenarios=["street-1"])
+    again = jobs.launch(JobRequest(name="Again", contestants=["llama"], scenarios=["street-1"]))
     assert spent(again, Model()).tokens is None

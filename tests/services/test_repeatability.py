@@ -12,6 +12,7 @@ from augment.scene.codec import modification_to_document
 from augment.scene.entities import Modification
 from augment.services.judging.analyses import repeatability
 from augment.services.running import jobs
+from augment.services.running.jobs import JobRequest
 from tests.jobs.rows import TWO_CONES, add_kind, add_scenario
 
 pytestmark = pytest.mark.django_db
@@ -28,7 +29,9 @@ def job() -> GenerationJob:
         add_kind(slug)
     for slug in ("street", "lane"):
         add_scenario(slug)
-    made = jobs.launch(name="J", contestants=["a", "b"], scenarios=["street", "lane"], samples=2)
+    made = jobs.launch(
+        JobRequest(name="J", contestants=["a", "b"], scenarios=["street", "lane"], samples=2)
+    )
     done = Augmentation.State.DONE
     places = {("street", 1): 0.3, ("street", 2): 0.5, ("lane", 1): 0.1, ("lane", 2): 0.5}
     for (scenario, sample), by_m in places.items():

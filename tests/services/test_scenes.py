@@ -13,7 +13,7 @@ from augment.scene.codec import (
 )
 from augment.scene.entities import Modification
 from augment.scene.intent import Shape
-from augment.services.endpoints.known_endpoints import ensure_endpoint
+from augment.services.endpoints.known_endpoints import EndpointRequest, ensure_endpoint
 from augment.services.scenarios.editing import accept_reading, enter_intent
 from augment.services.scenarios.scene_imports import import_scene
 from augment.services.scenarios.scenes import add_scenario, reference_of
@@ -106,7 +106,7 @@ def test_no_door_takes_an_intent_that_jobs_would_refuse(street: BaseScene) -> No
     made = scenario(intent=whole)
     with pytest.raises(InvalidDocument, match="leaves open the shape"):
         enter_intent(scenario=made.slug, document=left_open)
-    endpoint = ensure_endpoint(label="here", base_url="http://127.0.0.1:1/v1")
+    endpoint = ensure_endpoint(EndpointRequest(label="here", base_url="http://127.0.0.1:1/v1"))
     IntentReading.objects.create(
         scenario=made, endpoint=endpoint, model="m", state="read", document=left_open
     )

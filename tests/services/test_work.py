@@ -18,7 +18,7 @@ from arena.results.services.ratings import plan_snapshot
 from arena.studies.services.opening import close_study
 from augment.errors import BudgetSpent, Conflict, LeaseLost, WorkerStopping
 from augment.models import Event, SceneUpload, Simulation, UploadMoment, Work
-from augment.services.endpoints.known_endpoints import ensure_endpoint
+from augment.services.endpoints.known_endpoints import EndpointRequest, ensure_endpoint
 from augment.services.endpoints.known_models import model_at
 from augment.services.endpoints.probing import plan_probe
 from augment.services.judging import simulations
@@ -45,13 +45,15 @@ def a_drive() -> Work:
 
 def a_reading() -> Work:
     add_scenario("street")
-    ensure_endpoint(label="here", base_url="http://127.0.0.1:1/v1")
+    ensure_endpoint(EndpointRequest(label="here", base_url="http://127.0.0.1:1/v1"))
     return plan_reading(scenario="street", endpoint="here", model="m")
 
 
 def a_probe() -> Work:
     return plan_probe(
-        model_at(endpoint=ensure_endpoint(label="h", base_url="http://h"), model="m")
+        model_at(
+            endpoint=ensure_endpoint(EndpointRequest(label="h", base_url="http://h")), model="m"
+        )
     )
 
 

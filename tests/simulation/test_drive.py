@@ -35,16 +35,16 @@ from augment.simulation.road import Road, find_route
 from augment.simulation.score import score_drive
 from augment.simulation.states import EgoBody, X, Y
 from augment.simulation.traffic import DriveSetting
-from bench.recording_lengths import (
+from tests.properties import examples
+from tests.recorded import recorded
+from tests.scenes import junction, pedestrian, vehicle
+from tests.simulation.short_recordings import (
     LENGTHS_S,
     ConstantSpeed,
     cut,
     half_speed_drives,
     recorded_street,
 )
-from tests.properties import examples
-from tests.recorded import recorded
-from tests.scenes import junction, pedestrian, vehicle
 from tests.simulation.worlds import street
 
 

@@ -1,30 +1,49 @@
 """No ordinary final answer is mistaken for a call, and no call for a final answer."""
 
+import json
 import random
+from dataclasses import dataclass
 
 import pytest
 
-from augment.fake_llm.playing import CARELESS, GOOD
-from augment.llm.client import Patience
+from augment.fake_llm.playing import CARELESS, GOOD, Character
+from augment.fake_llm.wire import chat_request
+from augment.llm.client import Patience, Sending, watch_nothing
+from augment.llm.messages import Reply, Request
 from augment.prompts.blocks import names_changes
 from augment.prompts.calls import calls_in
 from augment.variants.pipeline import run
 from augment.variants.recipes import find_recipe
 from augment.variants.respondents import RespondentClient
-from bench.mutated_answers import Answering
 from tests.fixtures.shelf import SLUGS, entry, shown_scene
+from tests.intents import intents
 from tests.prompts.test_calls import FORMS
 from tests.variants.memory import MemoryTranscript
 
 
-def answers(slug: str, variant: str, character: object) -> list[str]:
+@dataclass(frozen=True)
+class StandIn:
+    """A client whose answers are the stand-in's, without a server."""
+
+    character: Character
+
+    def fitted(self, request: Request) -> Request:
+        return request
+
+    def complete(self, request: Request, *, sending: Sending = watch_nothing) -> Reply:
+        body = json.dumps(request.to_document()).encode()
+        text = self.character.answer(chat_request(body), intents)[0]
+        return Reply(text=text, model="m", finish_reason="stop")
+
+
+def answers(slug: str, variant: str, character: Character) -> list[str]:
     """What the stand-in says to the modifier, in order."""
     transcript = MemoryTranscript()
     run(
         find_recipe(variant),
         scene=shown_scene(slug),
         instruction=entry(slug).instruction,
-        modifier=RespondentClient(client=Answering(character, 10**9, random.Random(0)), model="m"),  # type: ignore[arg-type]
+        modifier=RespondentClient(client=StandIn(character), model="m"),
         transcript=transcript,
         patience=Patience(sleep=lambda _: None, rng=random.Random(0)),
     )

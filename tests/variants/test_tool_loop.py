@@ -72,9 +72,8 @@ def test_a_call_in_another_form_is_answered_and_recorded_as_mended(
     ("answer", "said"),
     [
         ("- {'call': 'pose_on_lane', 'arguments': {'lane': Lane1}}", "one line of the form"),
-        ("pose_on_lane(lane='Lane1', distance_m=20 + 1.4)", "BinOp is no value"),
         ("I would call pose_on_lane from Agent1.", "is named and not called"),
-        ("x = retrieve_suitable_pose('Lane1', 'Agent1', 21.4)", "no function 'retrieve_suit"),
+        ("x = pose_on_lane('Lane1', 'Agent1', 21.4)", "is named and not called"),
     ],
 )
 def test_a_call_that_is_not_understood_is_told_so_and_never_to_keep_a_placement(
@@ -87,7 +86,7 @@ def test_a_call_that_is_not_understood_is_told_so_and_never_to_keep_a_placement(
     assert told.endswith("or give your answer in the five sections.")
     assert (play.roles, play.x_m) == ("mm", 21.4)
     (note,) = play.notes("tool_call")
-    assert note["mended"] is (said == "no function 'retrieve_suit")
+    assert not note["mended"]
 
 
 def test_after_eight_calls_none_is_answered_and_an_answer_is_due() -> None:

@@ -83,28 +83,13 @@ def test_an_admin_marks_an_author_and_takes_it_back_by_plain_forms(
 # --- Results -----------------------------------------------------------------------------------
 
 
-def test_staff_read_both_versions_of_the_table_and_who_is_an_author() -> None:
+def test_staff_read_who_is_an_author() -> None:
     study = full_study(size=SIZE)
     analyst = signed_in(people()["analyst"])
-    snapshot = rated(study)
-    assert HEADING not in page(analyst, study, "results")
     mark(study, "expert-1", "gpt-4o-otm")
-    snapshot = rated(study)
-    own = snapshot.results.own_votes
-    assert own is not None
-    shown = page(analyst, study, "results")
-    assert HEADING in shown
-    assert (
-        f"{own.votes} votes</a>, by 1 of 4 experts, are by authors on contestants of their own."
-    ) in shown
-    assert "The table above counts them." in shown
-    assert "computed with 100 resamples" in shown
-    table = shown[shown.index(HEADING) : shown.index("How to read this")]
-    for line in own.lines:
-        assert f'<td class="num">{round(line.rating_without or 0)}</td>' in table
+    rated(study)
     raters = page(analyst, study, "results-tab", "raters")
     assert raters.count(">Author</span>") == 1
-    assert f"n {own.votes}<" in raters
     assert "expert-1" not in raters
     assert "marked an author" in page(analyst, study, "results-tab", "log")
 

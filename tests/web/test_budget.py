@@ -39,14 +39,14 @@ def test_a_job_is_launched_with_its_caps() -> None:
 
 
 def test_the_page_shows_what_is_spent_beside_the_cap() -> None:
-    shown = page_of(ran(llama_job(price="2", caps=Caps(usd=Decimal("0.5")))))
+    shown = page_of(ran(llama_job(price="2", caps=Caps(cap_usd=Decimal("0.5")))))
     assert "$0.0060" in shown
     assert "$0.50" in shown
     assert "unknown" not in shown
 
 
 def test_a_stopped_job_is_raised_and_resumed_from_its_page() -> None:
-    job = ran(llama_job(caps=Caps(tokens=5)))
+    job = ran(llama_job(caps=Caps(cap_tokens=5)))
     admin = signed_in(people()["admin"])
     url, resume = reverse("job", args=[job.code]), reverse("job-resume", args=[job.code])
     shown = admin.get(url).content.decode()

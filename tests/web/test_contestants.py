@@ -5,23 +5,25 @@ from django.urls import reverse
 
 from augment.models import Contestant, Event
 from augment.services.endpoints import contestants
-from augment.services.endpoints.known_endpoints import ensure_endpoint
+from augment.services.endpoints.contestants import ContestantRequest
+from augment.services.endpoints.known_endpoints import EndpointRequest, ensure_endpoint
 from augment.services.running.choosing import resolve_contestants
-from augment.variants.options import ContestantOptions
 from tests.web.cast import people, signed_in
 
 pytestmark = pytest.mark.django_db
 
 
 def add(slug: str = "one") -> Contestant:
-    ensure_endpoint(label="here", base_url="http://127.0.0.1:1/v1")
+    ensure_endpoint(EndpointRequest(label="here", base_url="http://127.0.0.1:1/v1"))
     return contestants.add_contestant(
-        slug=slug,
-        variant="fc+tqa",
-        endpoint="here",
-        model="m",
-        name=slug.upper(),
-        options=ContestantOptions(temperature=0.7, rounds=2),
+        ContestantRequest(
+            slug=slug,
+            variant="fc+tqa",
+            endpoint="here",
+            model="m",
+            name=slug.upper(),
+            options={"temperature": 0.7, "rounds": 2},
+        )
     )
 
 

@@ -11,7 +11,7 @@ from django.test import Client
 from augment.models import EndpointModel, IntentReading, Scenario
 from augment.scene.codec import intent_to_document
 from augment.scene.intent import Shape
-from augment.services.endpoints.known_endpoints import ensure_endpoint
+from augment.services.endpoints.known_endpoints import EndpointRequest, ensure_endpoint
 from tests.intents import cones
 from tests.jobs.rows import add_scenario
 from tests.web.cast import people, signed_in
@@ -49,7 +49,7 @@ def test_the_page_shows_what_the_instruction_asks_for(staff: Client) -> None:
 
 def test_what_a_model_read_is_shown_and_counts_once_accepted(staff: Client) -> None:
     scenario = add_scenario("street", intent=None, intent_origin="")
-    endpoint = ensure_endpoint(label="here", base_url="http://127.0.0.1:1/v1")
+    endpoint = ensure_endpoint(EndpointRequest(label="here", base_url="http://127.0.0.1:1/v1"))
     IntentReading.objects.create(
         scenario=scenario, endpoint=endpoint, model="m", state="read", document=RING
     )
@@ -73,7 +73,7 @@ def test_an_admin_has_an_instruction_read_by_a_worker(
     django_capture_on_commit_callbacks: Callable[..., AbstractContextManager[object]],
 ) -> None:
     scenario = add_scenario("street", intent=None, intent_origin="")
-    endpoint = ensure_endpoint(label="here", base_url="http://127.0.0.1:1/v1")
+    endpoint = ensure_endpoint(EndpointRequest(label="here", base_url="http://127.0.0.1:1/v1"))
     reader = EndpointModel.objects.create(endpoint=endpoint, model="m")
     sent: list[int] = []
     monkeypatch.setattr("arena.scenarios.pages.scenarios.enqueue_reading", sent.append)

@@ -9,7 +9,7 @@ from django.urls import reverse
 
 from augment.models import Contestant, Endpoint, EndpointModel, GenerationJob
 from augment.services.running import jobs
-from augment.services.running.budget import Caps
+from augment.services.running.jobs import JobRequest
 from tests.jobs import rows
 from tests.web.cast import people, signed_in
 
@@ -74,7 +74,7 @@ def test_a_cell_becomes_its_contestant_once_and_other_options_another(
     [
         ({}, "Choose at least one contestant."),
         ({"cells": ["otm|here"]}, "is not one of the available choices"),
-        ({"cells": [OTM], "temperature": "3"}, "must be a number from 0 to 2"),
+        ({"cells": [OTM], "temperature": "3"}, "less than or equal to 2"),
         ({"cells": [OTM], "scenarios": []}, "Choose at least one scenario."),
     ],
 )
@@ -109,12 +109,14 @@ def test_one_scenario_is_tried_first_and_the_rest_is_remembered(
 def test_a_duplicate_fills_the_form_with_what_the_job_had(admin: Client, models: Endpoint) -> None:
     rows.add_kind("reference")
     job = jobs.launch(
-        name="Old",
-        contestants=["reference"],
-        scenarios=["two"],
-        caps=Caps(tokens=7),
-        samples=2,
-        is_fresh=True,
+        JobRequest(
+            name="Old",
+            contestants=["reference"],
+            scenarios=["two"],
+            cap_tokens=7,
+            samples=2,
+            is_fresh=True,
+        )
     )
     form = admin.get(f"{reverse('job-new')}?like={job.code}").content.decode()
     for part in (

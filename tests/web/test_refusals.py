@@ -13,6 +13,7 @@ from arena.studies.services.taking_part import hand_over
 from augment.models import Event
 from augment.services.running import budget, jobs
 from augment.services.running.budget import Caps
+from augment.services.running.jobs import JobRequest
 from tests import study_rows
 from tests.jobs import rows
 
@@ -35,12 +36,15 @@ def test_nothing_that_is_stored_is_german() -> None:
     job = rows.launch()
     with override("de"):
         capped = jobs.launch(
-            name="Capped",
-            contestants=["reference"],
-            scenarios=["street-1"],
-            caps=Caps(calls=5, tokens=900),
+            JobRequest(
+                name="Capped",
+                contestants=["reference"],
+                scenarios=["street-1"],
+                cap_calls=5,
+                cap_tokens=900,
+            )
         )
-        budget.raise_cap(capped, caps=Caps(calls=50))
+        budget.raise_cap(capped, caps=Caps(cap_calls=50))
         rows.leased(rows.only_row(job)).settle(rows.failed(), now=rows.NOON)
         invite(study=study, expert=study.experts.get(username="eva"))
         hand_over(study=study, username="eva", to=["finn"])

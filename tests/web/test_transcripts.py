@@ -5,6 +5,7 @@ from django.urls import reverse
 
 from augment.models import Augmentation
 from augment.services.running import jobs, runner
+from augment.services.running.jobs import JobRequest
 from tests.jobs.models import Model, llama_job, reply
 from tests.jobs.rows import only_row
 from tests.web.cast import people, signed_in
@@ -38,7 +39,7 @@ def test_the_page_shows_role_tokens_cost_and_the_answer() -> None:
 
 def test_a_call_from_the_store_is_marked_and_leads_to_its_source() -> None:
     first = ran(only_row(llama_job(price="1")))
-    job = jobs.launch(name="Again", contestants=["llama"], scenarios=["street-1"])
+    job = jobs.launch(JobRequest(name="Again", contestants=["llama"], scenarios=["street-1"]))
     shown = page_of(ran(only_row(job)))
     assert "answered from the store" in shown
     source = f"{reverse('augmentation', args=[first.code])}#call-1-1"

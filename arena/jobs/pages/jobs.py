@@ -18,10 +18,11 @@ from arena.site.acts import Confirmation, ask, is_sure, refusals_told, send_late
 from arena.site.forms import CapsForm
 from arena.site.listing import choice_asked, page_asked, read_listing, read_page, search_asked
 from augment.models import Augmentation, GenerationJob
+from augment.services.inputs import read_request
 from augment.services.judging.analyses import repeatability
 from augment.services.judging.scenario_export import FORMATS
 from augment.services.running import jobs, progress
-from augment.services.running.budget import costs_of
+from augment.services.running.budget import Caps, costs_of
 from augment.services.running.workers import workforce
 from augment.tasks import enqueue_job
 
@@ -164,7 +165,7 @@ def resume_job(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         messages.error(request, "A cap is a number; nothing was changed.")
         return redirect("job", code=code)
     with refusals_told(request), transaction.atomic():
-        jobs.resume(job, higher=form.caps(), actor=user_of(request))
+        jobs.resume(job, higher=read_request(Caps, form.cleaned_data), actor=user_of(request))
         send_later(request, enqueue_job, job.pk)
         messages.success(request, "What is left is queued again.")
     return redirect("job", code=code)

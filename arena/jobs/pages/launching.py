@@ -15,27 +15,25 @@ from arena.contestants.pages import OptionsForm
 from arena.scenarios.queries import by_type, set_asked, set_choices
 from arena.site.access import ADMIN, allow_only, user_of
 from arena.site.acts import refusals_in, send_later
-from arena.site.forms import CapsForm, ChoiceForm, Offer, offer
+from arena.site.forms import ChoiceForm, Offer, offer
 from augment.models import Contestant, EndpointModel, GenerationJob
+from augment.services.endpoints.contestants import OPTION_INPUTS
 from augment.services.endpoints.known_endpoints import is_key_here
-from augment.services.running import jobs
+from augment.services.inputs import inputs_of, read_request, read_values
 from augment.services.running.choosing import find_obstacle, keys_missing
-from augment.services.running.estimates import JobEstimate, estimate_rows
+from augment.services.running.estimates import JobEstimate
 from augment.services.running.matrix import ChosenCells, add_cells, matrix_of, read_cells
 from augment.tasks import enqueue_job
 
 LONGEST_NAME = 120
 
 
-class LaunchForm(ChoiceForm, CapsForm, OptionsForm):
+class LaunchForm(ChoiceForm, OptionsForm):
     """A new job: cells of the matrix, contestants, scenarios and caps."""
 
+    inputs = inputs_of(JobRequest) + OPTION_INPUTS
     contestants = forms.MultipleChoiceField(required=False)
     cells = forms.MultipleChoiceField(required=False)
-    samples = forms.IntegerField(
-        min_value=1, max_value=jobs.HIGHEST_SAMPLES, initial=1, required=False
-    )
-    is_fresh = forms.BooleanField(required=False)
 
     def __init__(self, *args: Any, models: list[EndpointModel], **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)
@@ -43,6 +41,7 @@ class LaunchForm(ChoiceForm, CapsForm, OptionsForm):
         self.matrix = matrix_of(models)
         keys = [cell.key for row in self.matrix for cell, obstacle in row.cells if not obstacle]
         offer(self, "cells", [(key, key) for key in keys])
+        self.fields["samples"].required = False
         self.cells_chosen = ChosenCells()
 
     def clean_samples(self) -> int:
@@ -55,7 +54,9 @@ class LaunchForm(ChoiceForm, CapsForm, OptionsForm):
         if not (cleaned.get("contestants") or cleaned.get("cells")):
             self.add_error("contestants", "Choose at least one contestant.")
         with refusals_in(self):
-            self.cells_chosen = read_cells(cleaned.get("cells", []), self.options())
+            self.cells_chosen = read_cells(
+                cleaned.get("cells", []), read_values(OPTION_INPUTS, cleaned)
+            )
         return cleaned
 
     @property
@@ -90,15 +91,10 @@ class LaunchForm(ChoiceForm, CapsForm, OptionsForm):
         self.is_valid()
         for name in ("name", "contestants", "scenarios"):
             self.errors.pop(name, None)
-        contestants, scenarios = self.chosen_rows(), self.cleaned_data.get("scenarios", [])
-        if not (contestants and scenarios):
+        contestants = self.chosen_rows()
+        if not (contestants and self.cleaned_data.get("scenarios")):
             return None
-        return estimate_rows(
-            contestants,
-            scenarios,
-            samples=self.cleaned_data.get("samples", 1),
-            is_fresh=self.cleaned_data.get("is_fresh", False),
-        )
+        return estimate(read_request(JobScope, self.cleaned_data), contestants)
 
 
 @allow_only(ADMIN)
@@ -171,24 +167,21 @@ def _estimated(request: HttpRequest, form: LaunchForm) -> HttpResponse:
 
 def _launch(request: HttpRequest, form: LaunchForm) -> GenerationJob:
     """Launch the job; of one that tries first, one scenario with a memory of the rest."""
-    chosen = form.cleaned_data
-    scenarios, samples, name, plan = chosen["scenarios"], chosen["samples"], chosen["name"], None
-    if "try" in request.POST:
-        names = ("name", "scenarios", "samples", "is_fresh", "cap_usd", "cap_calls", "cap_tokens")
-        plan = {
-            field: str(value) if isinstance(value, Decimal) else value
-            for field in names
-            if (value := chosen.get(field)) is not None
-        }
-        scenarios, samples, name = scenarios[:1], 1, f"{name}, first try"
+    given = dict(form.cleaned_data)
     made = add_cells(form.cells_chosen, actor=user_of(request))
-    return jobs.launch(
-        name=name[:LONGEST_NAME],
-        contestants=list(dict.fromkeys([*chosen["contestants"], *made])),
-        scenarios=scenarios,
-        caps=form.caps(),
-        samples=samples,
-        is_fresh=chosen["is_fresh"],
-        full_plan=plan,
-        actor=user_of(request),
-    )
+    given["contestants"] = [*given["contestants"], *made]
+    asked_for = read_request(JobRequest, given)
+    if "try" in request.POST:
+        plan = {
+            name: str(value) if isinstance(value, Decimal) else value
+            for name, value in read_values(inputs_of(JobRequest), form.cleaned_data).items()
+            if name != "contestants"
+        }
+        asked_for = replace(
+            asked_for,
+            name=f"{asked_for.name}, first try"[:LONGEST_NAME],
+            scenarios=asked_for.scenarios[:1],
+            samples=1,
+            full_plan=plan,
+        )
+    return launch(asked_for, user_of(request))

@@ -8,6 +8,8 @@ from django.core.management.base import CommandError, CommandParser
 from arena.management import rate_csv
 from augment.services.terminal import TerminalCommand
 
+_OPTIONS = tuple(signature(rate_csv.run).parameters)
+
 
 class Command(TerminalCommand):
     """The door for Django to arena.management.rate_csv; manage.py goes there itself."""
@@ -22,13 +24,7 @@ class Command(TerminalCommand):
     def handle(self, *args: Any, **options: Any) -> None:
         """Rate, then print."""
         try:
-            said = rate_csv.run(
-                **{
-                    name: options[name]
-                    for name in signature(rate_csv.run).parameters
-                    if name in options
-                }
-            )
+            printed = rate_csv.run(**{name: options[name] for name in _OPTIONS})
         except rate_csv.CsvNotRated as error:
             raise CommandError(str(error)) from error
-        self.stdout.write_data(said)
+        self.stdout.write_data(printed)

@@ -311,12 +311,8 @@ def _statistics(results: Results) -> dict[str, Any]:
     trust = document.get("trust", {})
     for line in trust.setdefault("raters", []):
         del line["judge"], line["expert"]
-    for holder, codes in (
-        (trust.get("repeats"), "by_expert"),
-        (document.get("own_votes"), "by_judge"),
-    ):
-        if holder:
-            del holder[codes]
+    if trust.get("repeats"):
+        del trust["repeats"]["by_expert"]
     return document | {"trust": trust, "judges": sorted(results.judges.values())}
 
 

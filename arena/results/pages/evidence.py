@@ -23,7 +23,6 @@ from arena.site.access import STAFF, allow_only
 from arena.site.listing import page_asked
 from arena.site.pictures import sized_picture_response
 from arena.voting.queries.showings import describe_in_words, picture_of_side
-from augment.services.running.jobs import HIGHEST_SAMPLES
 from augment.services.scenarios.scenes import type_choices
 
 _ALL = ("", "all")
@@ -39,9 +38,7 @@ class VoteSearchForm(forms.Form):
         label="Scenario type", required=False, choices=lambda: [_ALL, *type_choices()]
     )
     scenario = forms.CharField(label="Scenario", required=False, max_length=200)
-    sample = forms.IntegerField(
-        label="Sample", required=False, min_value=1, max_value=HIGHEST_SAMPLES
-    )
+    sample = forms.IntegerField(label="Sample", required=False, min_value=1)
     expert = forms.ChoiceField(label="Expert", required=False)
     mark = forms.ChoiceField(label="Counts", required=False, choices=[*MARKS.items()])
     part = forms.ChoiceField(label="Only", required=False, choices=[_ALL, *PARTS.items()])

@@ -106,10 +106,9 @@ def fill_types(snapshot: Snapshot, table: LeaderboardTable) -> Context:
 
 def fill_raters(snapshot: Snapshot, table: LeaderboardTable) -> Context:
     """Agreement, repeats, sides, and the panel of experts."""
-    trust, own_votes = snapshot.results.trust, snapshot.results.own_votes
+    trust = snapshot.results.trust
     lines = [line for line in trust.raters if line.judge != AUTOMATIC]
     authors = {judge for judge, _ in Filters.of_document(snapshot.filters).authors}
-    own = own_votes.by_judge if own_votes else {}
     return {
         "trust": trust,
         "all_tied": trust.tie_share == 1.0,

@@ -179,8 +179,6 @@ class VoteSet:
     Attributes:
         entrants: By slug.
         counted: The votes that count.
-        with_own: The same and, where they are left out for that alone, those of authors on their
-            own contestants.
         repeats: Decided hidden repeats, whether they count or not.
         checks: Votes on attention checks, and `references` who should win them.
         left_out: How many votes do not count, by reason.
@@ -188,7 +186,6 @@ class VoteSet:
 
     entrants: tuple[Entrant, ...]
     counted: tuple[Judged, ...]
-    with_own: tuple[Judged, ...]
     repeats: tuple[Judged, ...]
     checks: tuple[Judged, ...]
     references: frozenset[str]
@@ -231,7 +228,6 @@ def vote_set(study: Study, *, filters: Filters, last: int | None) -> VoteSet:
     return VoteSet(
         entrants=_entrants(study, votes),
         counted=tuple(vote for vote in votes if vote.mark == COUNTED),
-        with_own=tuple(vote for vote in votes if vote.mark in (COUNTED, LeftOut.OWN)),
         repeats=tuple(vote for vote in votes if vote.kind == REPEAT and vote.outcome in RATED),
         checks=checks,
         references=frozenset(references.values_list("slug", flat=True) if checks else ()),
@@ -345,11 +341,6 @@ def settled_ties(study: Study, votes: Iterable[Judged], filters: Filters) -> lis
             tie = tie._replace(mark=LeftOut.FILTERED.value)
         ties.append(tie._replace(mark=AUTOMATIC_TIE) if filters.leave_out_settled else tie)
     return ties
-
-
-def is_own_vote(vote: Judged, filters: Filters) -> bool:
-    """Whether an author voted on a contestant of their own; settled ties are nobody's votes."""
-    return vote.kind != AUTOMATIC and filters.is_own(vote.judge, vote.left, vote.right)
 
 
 def marked_votes(snapshot: Snapshot) -> QuerySet[Vote]:

@@ -160,7 +160,6 @@ def _rate_type(arrays: VoteArrays, name: str, whole: Leaderboard) -> TypeRating:
         unit=whole.unit,
         intervals=whole.intervals,
         seed=whole.seed,
-        details=False,
     )
     return TypeRating(
         type=name,

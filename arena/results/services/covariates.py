@@ -10,9 +10,7 @@ from arena.models import Study, Vote
 from arena.pairing.order import MAIN
 from arena.pairing.rules import scenario_of
 from arena.rating.comparisons import Comparisons, FloatArray
-from arena.rating.leaderboard import Leaderboard
 from arena.rating.lines import whole_percent
-from arena.rating.snapshot_document import Adjustment, BothRanks, CovariateEffect, LargestMove
 from arena.results.queries.votes import AUTOMATIC, Judged, VoteSet
 from augment.models import Augmentation
 
@@ -54,55 +52,6 @@ def with_covariates(
         ).reshape(-1, 2)
         columns |= {OBJECTS: both[:, 0], VEHICLES: both[:, 1]}
     return replace(comparisons, covariates=np.column_stack([columns[name] for name in names]))
-
-
-def adjustment(names: Sequence[str], board: Leaderboard, plain: Leaderboard) -> Adjustment | None:
-    """What adjusting changes; None where nobody asked for it.
-
-    Args:
-        names: What was adjusted for.
-        board: With it.
-        plain: Without it.
-    """
-    if not names:
-        return None
-    lines = both_ranks(board, plain)
-    return Adjustment(
-        effects=tuple(
-            CovariateEffect(name=name, points=one.points, p_value=one.p_value)
-            for name, one in zip(names, board.coefficients, strict=False)
-        ),
-        lines=lines,
-        largest=largest_move(lines),
-    )
-
-
-def both_ranks(with_it: Leaderboard, without: Leaderboard) -> tuple[BothRanks, ...]:
-    """The ranks and ratings of everybody in two versions of a rating."""
-    return tuple(
-        BothRanks(
-            slug=first.name,
-            rank_with=first.rank,
-            rating_with=first.rating,
-            rank_without=second.rank,
-            rating_without=second.rating,
-        )
-        for first, second in zip(with_it.lines, without.lines, strict=True)
-    )
-
-
-def largest_move(lines: Sequence[BothRanks]) -> LargestMove | None:
-    """By how many ranks somebody moves; None where nobody has a rank in both versions."""
-    moves = {
-        line.slug: abs(line.rank_with - line.rank_without)
-        for line in lines
-        if line.rank_with is not None and line.rank_without is not None
-    }
-    if not moves:
-        return None
-    places = max(moves.values())
-    who = [slug for slug, moved in moves.items() if moved == places] if places else []
-    return LargestMove(places=places, slugs=tuple(who))
 
 
 # --- Private -----------------------------------------------------------------------------------

@@ -19,7 +19,7 @@ from arena.rating.comparisons import Comparisons
 from arena.rating.leaderboard import Leaderboard, Method, rate
 from arena.rating.rules import Intervals, TooManyContestants, Unit, default_intervals, unit_for
 from arena.rating.snapshot_document import VERSION as RESULTS_VERSION
-from arena.rating.snapshot_document import Results
+from arena.rating.snapshot_document import Adjustment, CovariateEffect, Results
 from arena.results.queries.access import votes_in
 from arena.results.queries.votes import (
     AUTOMATIC,
@@ -35,11 +35,10 @@ from arena.results.services.analysis import VoteArrays, vote_arrays
 from arena.results.services.covariates import (
     COVARIATES,
     WITHOUT_PICTURES,
-    adjustment,
     settled_remark,
     with_covariates,
 )
-from arena.results.services.trust import board_remarks, precision, trust, with_and_without
+from arena.results.services.trust import board_remarks, trust
 from arena.results.services.vote_files import VERSION as VOTES_VERSION
 from arena.results.services.vote_files import digest_of, vote_rows, votes_csv
 from arena.studies.queries import authors_of
@@ -198,11 +197,11 @@ def compute(snapshot: Snapshot, report: Callable[[int], None]) -> Computed:
     votes = _vote_set(snapshot)
     arrays = vote_arrays(votes.entrants, votes.counted)
     report(20)
-    plain = board = _rate(snapshot, arrays.comparisons)
-    if names := snapshot.covariates:
-        board = _rate(snapshot, with_covariates(arrays.comparisons, votes.counted, names))
+    board = _rate(
+        snapshot, with_covariates(arrays.comparisons, votes.counted, snapshot.covariates)
+    )
     report(60)
-    snapshot.results = results = _results(snapshot, votes, arrays, board, plain)
+    snapshot.results = results = _results(snapshot, votes, arrays, board)
     report(90)
     snapshot.votes_sha256 = digest_of(votes_csv(vote_rows(votes.counted, results.judges)))
     snapshot.votes_counted = len(votes.counted)
@@ -383,9 +382,9 @@ def _rate(snapshot: Snapshot, comparisons: Comparisons) -> Leaderboard:
 
 
 def _results(
-    snapshot: Snapshot, votes: VoteSet, arrays: VoteArrays, board: Leaderboard, plain: Leaderboard
+    snapshot: Snapshot, votes: VoteSet, arrays: VoteArrays, board: Leaderboard
 ) -> Results:
-    study, seed = snapshot.study, snapshot.seed
+    study = snapshot.study
     from_file = is_imported(study)
     filters = Filters.of_document(snapshot.filters)
     planned = analysis.planned_pairs(study, filters)
@@ -396,10 +395,8 @@ def _results(
     return Results(
         version=RESULTS_VERSION,
         board=board_remarks(board, *filter(None, [remark])),
-        trust=trust(arrays, votes, plain, seed=seed),
-        claims=precision(arrays, board, seed=seed),
-        own_votes=with_and_without(votes, filters, board, snapshot.covariates),
-        adjustment=adjustment(snapshot.covariates, board, plain),
+        trust=trust(arrays, votes, seed=snapshot.seed),
+        adjustment=_adjustment(snapshot.covariates, board),
         pairs=analysis.pairs(arrays.comparisons, votes.counted, planned),
         types=analysis.by_type(arrays, board),
         displacement=() if from_file else analysis.displacement(study),
@@ -410,4 +407,17 @@ def _results(
             if entrant.contestant is not None
         },
         judges={vote.judge: vote.judge_name for vote in votes.counted},
+    )
+
+
+def _adjustment(names: Sequence[str], board: Leaderboard) -> Adjustment | None:
+    """What a unit of each covariate is worth; None where nobody asked for it."""
+    if not names:
+        return None
+    effects = zip(names, board.coefficients, strict=False)
+    return Adjustment(
+        effects=tuple(
+            CovariateEffect(name=name, points=effect.points, p_value=effect.p_value)
+            for name, effect in effects
+        )
     )

@@ -18,11 +18,12 @@ from arena.errors import VotesUnreadable
 from arena.exports.cells import csv_text
 from arena.models import ImportedVote, Study, Vote, VoteFile
 from arena.rating.votes_file import (
+    NEEDED,
     OPTIONAL,
+    SIMULATED,
     VotesFileUnreadable,
-    columns_of,
-    open_votes,
-    read_votes,
+    VotesTable,
+    read_table,
 )
 from arena.results.queries.votes import Judged
 from arena.voting.services.turns import in_turn
@@ -118,9 +119,6 @@ AT_ONCE = 500
 DEAD_AFTER = timedelta(minutes=10)
 """An import that has written nothing for so long is over: its process was ended."""
 
-SIMULATED = "simulated"
-"""A column that our own files have; a yes in it marks the whole study."""
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ImportedVotes:
@@ -152,16 +150,23 @@ def import_votes(
     name = one_line("name", name, what="study")
     if Study.objects.filter(name=name).exists():
         raise _taken(name)
-    contestants, digest = _checked(path)
+    table, digest = _read(path)
+    contestants = {*table.columns["model_a"], *table.columns["model_b"]}
+    made_up = not {"yes", "true"}.isdisjoint(table.columns.get(SIMULATED, ()))
     remove_dead()
     file = VoteFile.objects.create(name=path.name[:200], sha256=digest)
     try:
-        votes, any_simulated = _write(path, file)
-        study = _publish(file, name, votes, is_simulated or any_simulated, actor)
+        votes = 0
+        waiting = _rows(table, file)
+        while batch := list(islice(waiting, AT_ONCE)):
+            with in_turn(), transaction.atomic():
+                _hold(file)
+                votes += len(ImportedVote.objects.bulk_create(batch))
+        study = _publish(file, name, votes, is_simulated or made_up, actor)
     except BaseException:  # also Ctrl-C; after a kill the next import does it
         _remove(file)
         raise
-    return ImportedVotes(study=study, votes=votes, contestants=contestants)
+    return ImportedVotes(study=study, votes=votes, contestants=len(contestants))
 
 
 def remove_dead() -> int:
@@ -170,39 +175,49 @@ def remove_dead() -> int:
     Returns:
         How many there were.
     """
-    dead = VoteFile.objects.filter(study=None, written_at__lt=timezone.now() - DEAD_AFTER)
-    found = list(dead)
-    for file in found:
+    dead = list(VoteFile.objects.filter(study=None, written_at__lt=timezone.now() - DEAD_AFTER))
+    for file in dead:
         _remove(file)
-    return len(found)
+    return len(dead)
 
 
 # --- Private -----------------------------------------------------------------------------------
 
 
-def _checked(path: Path) -> tuple[int, str]:
-    """How many contestants a sound file has, and its SHA-256."""
+def _read(path: Path) -> tuple[VotesTable, str]:
+    """Read a sound file and its SHA-256."""
     try:
-        columns = columns_of(path)
-        clusters = [name for name in OPTIONAL if name in columns]
-        return len(read_votes(path, clusters=clusters).comparisons.names), _sha256(path)
+        table = read_table(path)
+        table.check_filled([name for name in OPTIONAL if name in table.columns])
+        for column, cells in table.columns.items():
+            for place, cell in enumerate(cells):
+                if len(cell) > LONGEST_CELL:
+                    reason = f"{column} has {len(cell)} signs, {LONGEST_CELL} are allowed"
+                    raise table.refuse(place, reason)
+        with path.open("rb") as file:
+            return table, hashlib.file_digest(file, "sha256").hexdigest()
     except VotesFileUnreadable as error:
         raise VotesUnreadable(str(error)) from error
     except OSError as error:
         raise VotesUnreadable(f"{path.name} can't be read: {error.strerror}.") from error
 
 
-def _write(path: Path, file: VoteFile) -> tuple[int, bool]:
-    """Store the rows; how many, and whether one of them is marked as simulated."""
-    votes, any_simulated = 0, False
-    waiting = _rows(path, file)
-    while batch := list(islice(waiting, AT_ONCE)):
-        with in_turn(), transaction.atomic():
-            _hold(file)
-            ImportedVote.objects.bulk_create(row for row, _ in batch)
-        votes += len(batch)
-        any_simulated = any_simulated or any(is_marked for _, is_marked in batch)
-    return votes, any_simulated
+def _rows(table: VotesTable, file: VoteFile) -> Iterator[ImportedVote]:
+    """One row a vote; a column that the file does not have is empty."""
+    nothing = [""] * len(table.columns["winner"])
+    cells = (table.columns.get(name, nothing) for name in (*NEEDED, *OPTIONAL))
+    for line, (first, second, winner, judge, item) in enumerate(
+        zip(*cells, strict=True), start=table.first_line
+    ):
+        yield ImportedVote(
+            file=file,
+            line=line,
+            first=first,
+            second=second,
+            outcome=winner,
+            judge=judge,
+            item=item,
+        )
 
 
 def _hold(file: VoteFile) -> None:
@@ -264,37 +279,3 @@ def _remove(file: VoteFile) -> None:
 
 def _taken(name: str) -> Conflict:
     return Conflict(f"There is a study named {name!r} already.")
-
-
-def _rows(path: Path, file: VoteFile) -> Iterator[tuple[ImportedVote, bool]]:
-    """One row a line, and whether it is marked as simulated; the file has been checked before."""
-    with open_votes(path) as table:
-        place = {column: index for index, column in enumerate(table.header)}
-        for cells in table.rows:
-            if not cells:
-                continue
-            found = {
-                column: cells[place[column]].strip() if column in place else ""
-                for column in ("model_a", "model_b", "winner", "judge", "item", SIMULATED)
-            }
-            for column, cell in found.items():
-                if len(cell) > LONGEST_CELL:
-                    raise VotesUnreadable(
-                        f"line {table.lines_read()}: {column} has {len(cell)} signs, "
-                        f"{LONGEST_CELL} are allowed"
-                    )
-            row = ImportedVote(
-                file=file,
-                line=table.lines_read(),
-                first=found["model_a"],
-                second=found["model_b"],
-                outcome=ImportedVote.Outcome(found["winner"]),
-                judge=found["judge"],
-                item=found["item"],
-            )
-            yield row, found[SIMULATED] == "yes"
-
-
-def _sha256(path: Path) -> str:
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()

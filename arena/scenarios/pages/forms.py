@@ -52,11 +52,9 @@ from augment.services.scenarios.intent_fields import (
 from augment.services.scenarios.pictures import SceneView
 from augment.services.scenarios.scenes import (
     INSTRUCTION_LENGTH,
-    LONGEST_LABEL,
     LONGEST_TYPE,
     SLUG_LENGTH,
     add_scenario,
-    read_circumstances,
     type_choices,
 )
 from augment.tasks import enqueue_job, enqueue_scenario
@@ -94,7 +92,6 @@ class ScenarioForm(IntentForm):
     slug = forms.CharField(required=False, max_length=SLUG_LENGTH)
     type = forms.ChoiceField(required=False)
     own_type = forms.CharField(required=False, max_length=LONGEST_TYPE)
-    own_label = forms.CharField(required=False, max_length=LONGEST_LABEL)
     instruction = forms.CharField(max_length=INSTRUCTION_LENGTH, strip=True)
     keep_traffic = forms.BooleanField(required=False)
     density = forms.ChoiceField(
@@ -113,13 +110,8 @@ class ScenarioForm(IntentForm):
     def wanted(self) -> dict[str, Any]:
         """Return what the form says of a scenario, once it is valid."""
         given = self.cleaned_data
-        return {
-            "type": given["type"] or given["own_type"],
-            "type_label": None if given["type"] else given["own_label"] or None,
-            "instruction": given["instruction"],
-            "keep_traffic": given["keep_traffic"],
-            "circumstances": read_circumstances(given["density"], given["goal"]),
-        }
+        names = ("instruction", "keep_traffic", "density", "goal")
+        return {name: given[name] for name in names} | {"type": given["type"] or given["own_type"]}
 
 
 @allow_only(*STAFF)

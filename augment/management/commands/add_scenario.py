@@ -18,7 +18,7 @@ from augment.services.scenarios.bulk import (
     read_part,
     read_rows,
 )
-from augment.services.scenarios.scenes import add_scenario, read_circumstances
+from augment.services.scenarios.scenes import add_scenario
 from augment.services.terminal import TerminalCommand
 
 
@@ -38,9 +38,6 @@ class Command(TerminalCommand):
         )
         parser.add_argument("--scene", help="the slug of a stored scene")
         parser.add_argument("--type", help=f"one of {types}, or a slug of your own")
-        parser.add_argument(
-            "--type-label", help="what people read for a type of your own; made from its slug"
-        )
         parser.add_argument("--instruction", help="what is to be changed")
         parser.add_argument(
             "--slug", help="the scenario's name; made up from the others if absent"
@@ -74,16 +71,13 @@ class Command(TerminalCommand):
         missing = [f"--{name}" for name in NEEDED if options[name] is None]
         if missing:
             raise CommandError(f"{', '.join(missing)} is needed, or --file FILE instead of all.")
-        names = ("scene", "type", "type_label", "instruction", "slug")
+        names = ("scene", "type", "instruction", "slug", "keep_traffic")
         given = {name: options[name] for name in names}
+        given |= {name: options[name] or "" for name in ("density", "goal")}
         for name, what in PARTS.items():
             file = options[name]
             given[name] = None if file is None else read_part(file, what)
-        scenario = add_scenario(
-            **given,
-            keep_traffic=options["keep_traffic"],
-            circumstances=read_circumstances(options["density"] or "", options["goal"] or ""),
-        )
+        scenario = add_scenario(**given)
         with_reference = "with" if scenario.reference is not None else "without"
         with_intent = "" if scenario.intent is None else ", with its intent"
         self.stdout.write(

@@ -2,6 +2,7 @@
 
 import time
 from argparse import ArgumentParser
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -10,13 +11,14 @@ from django.db import transaction
 from django.utils import timezone
 
 from augment.formats.documents import read_yaml_file
-from augment.management.arguments import add_cap_arguments, caps_of
 from augment.models import Augmentation, GenerationJob
 from augment.services.endpoints.contestants import ensure_builtin
+from augment.services.inputs import add_options, inputs_of, read_request
 from augment.services.running import jobs
 from augment.services.running.budget import limit_of
 from augment.services.running.choosing import resolve_contestants, resolve_scenarios
 from augment.services.running.estimates import ContestantEstimate, JobEstimate, estimate
+from augment.services.running.jobs import JobRequest, JobScope
 from augment.services.running.matrix import WHAT, Matrix, load_matrix
 from augment.services.running.progress import contestant_lines, count_rows, failure_groups
 from augment.services.terminal import TerminalCommand
@@ -29,7 +31,7 @@ STOPPED = 3
 
 
 class Command(TerminalCommand):
-    """generate --contestants A B --scenarios X Y | --matrix FILE [--cap USD] [--wait]."""
+    """generate --contestants A B --scenarios X Y | --matrix FILE [--cap-usd N] [--wait]."""
 
     help = "Run contestants on scenarios; workers do it, `manage.py serve` starts them."
 
@@ -42,27 +44,11 @@ class Command(TerminalCommand):
             help="YAML with contestants, scenarios and samples instead of the arguments, "
             "as the page of a new job writes it; checked as a whole before anything runs",
         )
-        parser.add_argument("--contestants", nargs="+", help="slugs, or all")
-        parser.add_argument(
-            "--scenarios",
-            nargs="+",
-            help="slugs, patterns such as 'interplan-*', or all, catalogue, set:paper, set:hard, "
-            "paraphrases",
-        )
-        parser.add_argument("--name", help="what people call the job")
-        parser.add_argument(
-            "--samples",
-            type=int,
-            metavar="K",
-            help="ask every contestant K times about every scenario; default: 1",
-        )
-        add_cap_arguments(parser)
-        parser.add_argument(
-            "--fresh", action="store_true", help="ask anew what models answered in other jobs"
-        )
+        add_options(parser, inputs_of(JobRequest), is_any_required=False)
         parser.add_argument(
             "--estimate",
             "--dry-run",
+            dest="estimate",
             action="store_true",
             help="say what it would use, and launch and keep nothing",
         )
@@ -80,22 +66,17 @@ class Command(TerminalCommand):
             raise CommandError("Name --contestants and --scenarios, or --matrix FILE.")
         if options["estimate"]:
             with transaction.atomic():
-                runs = _runs(options)
-                expected = estimate(runs.contestants, runs.scenarios, samples=runs.samples)
+                matrix = _matrix(options)
+                expected = estimate(matrix.scope)
                 transaction.set_rollback(True)
-            self._say(runs, expected)
+            self._say(matrix, expected)
             return
         check_broker()
         with transaction.atomic():
-            runs = _runs(options)
-            job = jobs.launch(
-                name=options["name"] or runs.name or f"Job of {timezone.now():%Y-%m-%d %H:%M} UTC",
-                contestants=runs.contestants,
-                scenarios=runs.scenarios,
-                caps=caps_of(options),
-                samples=runs.samples,
-                is_fresh=options["fresh"],
-            )
+            matrix = _matrix(options)
+            name = options["name"] or matrix.name or f"Job of {timezone.now():%Y-%m-%d %H:%M} UTC"
+            given = options | asdict(matrix.scope) | {"is_fresh": options["is_fresh"]}
+            job = jobs.launch(read_request(JobRequest, given | {"name": name}))
             transaction.on_commit(lambda: enqueue_job(job.pk))
         self.stdout.write(f"Job {job.code}, {job.name!r}: {count_rows(job).total} to run.")
         if options["wait"]:
@@ -105,8 +86,8 @@ class Command(TerminalCommand):
                 raise CommandError("Not waited for; the job goes on.", returncode=130) from None
             self.report(job)
 
-    def _say(self, runs: Matrix, expected: JobEstimate) -> None:
-        for slug in runs.made:
+    def _say(self, matrix: Matrix, expected: JobEstimate) -> None:
+        for slug in matrix.made:
             self.stdout.write(f"Would be added: {slug}.")
         self.stdout.write(f"{expected.rows} to run, {expected.asking_rows} of them ask models.")
         for line in expected.lines:
@@ -171,18 +152,20 @@ class Command(TerminalCommand):
             raise CommandError(f"{number} failed; see the reasons above.", returncode=1)
 
 
-def _runs(options: dict[str, Any]) -> Matrix:
+def _matrix(options: dict[str, Any]) -> Matrix:
     """Return what is to run, of the file or of the arguments."""
     if options["matrix"] is not None:
         return load_matrix(read_yaml_file(options["matrix"], what=WHAT))
     ensure_builtin()
-    return Matrix(
-        name=None,
-        contestants=tuple(resolve_contestants(options["contestants"])),
-        scenarios=tuple(resolve_scenarios(options["scenarios"])),
-        samples=1 if options["samples"] is None else options["samples"],
-        made=(),
+    scope = read_request(
+        JobScope,
+        options
+        | {
+            "contestants": resolve_contestants(options["contestants"]),
+            "scenarios": resolve_scenarios(options["scenarios"]),
+        },
     )
+    return Matrix(name="", scope=scope, made=())
 
 
 def _use(expected: JobEstimate | ContestantEstimate) -> str:

@@ -13,7 +13,7 @@ from augment.services.terminal import TerminalCommand
 
 
 class Command(TerminalCommand):
-    """`manage.py import_interplan FOLDER [--nuplan FOLDER] [--instructions FILE]`."""
+    """`manage.py import_interplan FOLDER [--nuplan FOLDER]`."""
 
     help = (
         "Import interPlan's special scenarios with their human references: a scene for each base "
@@ -32,20 +32,12 @@ class Command(TerminalCommand):
             metavar="FOLDER",
             help="holds nuPlan's .db files and maps/ somewhere; default: the same folder",
         )
-        parser.add_argument(
-            "--instructions",
-            type=Path,
-            metavar="FILE",
-            help="a CSV file with the columns id and instruction; without one the sentences are "
-            "made from the references",
-        )
 
     def handle(self, *args: Any, **options: Any) -> None:
         """Import one by one, and say each."""
         counts: Counter[StepKind] = Counter()
-        folder, data, sentences = (options[one] for one in ("folder", "nuplan", "instructions"))
         try:
-            for step in import_interplan(folder=folder, data=data, instructions=sentences):
+            for step in import_interplan(folder=options["folder"], data=options["nuplan"]):
                 counts[step.kind] += 1
                 self.stdout.write(step.text)
                 self.stdout.flush()

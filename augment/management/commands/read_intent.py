@@ -7,11 +7,11 @@ from typing import Any
 from django.core.management.base import CommandError
 
 from augment.formats.documents import read_json
-from augment.management.arguments import add_cap_arguments, caps_of
 from augment.models import IntentReading
 from augment.scene.codec import intent_from_document
 from augment.scene.intent_statements import list_statements
-from augment.services.running.budget import NO_CAPS
+from augment.services.inputs import add_options, inputs_of, read_request
+from augment.services.running.budget import NO_CAPS, Caps
 from augment.services.running.intent_readings import USUAL_CAPS, read_intent
 from augment.services.scenarios.editing import accept_reading, enter_intent
 from augment.services.terminal import TerminalCommand
@@ -31,7 +31,7 @@ class Command(TerminalCommand):
         parser.add_argument("scenario", help="a slug")
         parser.add_argument("--endpoint", help="the label of an endpoint")
         parser.add_argument("--model", help="the model id on the endpoint")
-        add_cap_arguments(parser)
+        add_options(parser, inputs_of(Caps))
         parser.add_argument("--fresh", action="store_true", help="ask anew what was answered")
         parser.add_argument(
             "--accept", action="store_true", help="let the last reading count from now on"
@@ -49,7 +49,7 @@ class Command(TerminalCommand):
         if asks and (endpoint is None or model is None):
             raise CommandError("--endpoint and --model go together.")
         if asks:
-            caps = caps_of(options)
+            caps = read_request(Caps, options)
             reading = read_intent(
                 scenario=slug,
                 endpoint=endpoint,

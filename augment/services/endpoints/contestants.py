@@ -1,7 +1,7 @@
 """Contestants: who is there without being added, who is added, and what they would send."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from django.contrib.auth.models import User
@@ -10,7 +10,7 @@ from django.db import transaction
 from augment.baselines.registry import PLACERS
 from augment.errors import Conflict
 from augment.models import Contestant, Scenario
-from augment.services.endpoints.known_endpoints import EndpointFacts, add_endpoint, find_endpoint
+from augment.services.endpoints.known_endpoints import SLUG_RULE, find_endpoint
 from augment.services.endpoints.known_models import model_at
 from augment.services.endpoints.treatments import (
     Respondent,
@@ -20,27 +20,24 @@ from augment.services.endpoints.treatments import (
     respondents_of,
 )
 from augment.services.events import log_change
+from augment.services.inputs import Input, InputKind, input_field
 from augment.services.scenarios.prompts import Preview, preview_prompt
 from augment.services.scenarios.scenes import check_slug
 from augment.services.texts import one_line
 from augment.variants.options import (
-    EFFORTS,
-    NAMES,
+    RULES,
     ContestantOptions,
     ToolProtocol,
     check_options,
     options_from_document,
 )
-from augment.variants.recipes import RECIPES, Tools, find_recipe, spell_variant
+from augment.variants.recipes import RECIPES, Recipe, Tools, find_recipe, spell_variant
 from augment.variants.respondents import ModelRole
 
 Kind = Contestant.Kind
 LONGEST_NAME = 120
 
 VARIANTS = tuple(RECIPES)
-PROTOCOLS = tuple(protocol.value for protocol in ToolProtocol)
-REASONING_EFFORTS = tuple(EFFORTS)
-OPTION_NAMES = tuple(NAMES)
 
 REFERENCE = "reference"
 _BUILTIN = {REFERENCE: ("Reference", Kind.REFERENCE)} | {
@@ -48,19 +45,47 @@ _BUILTIN = {REFERENCE: ("Reference", Kind.REFERENCE)} | {
     for slug, placer in PLACERS.items()
 }
 
+_OPTION_KINDS = {int: InputKind.WHOLE, float: InputKind.NUMBER}
+
 Roles = Mapping[ModelRole, tuple[str | None, str]]
 """Who else plays a reviewer's role: the label of an endpoint (None: the contestant's own) and the
 model id there."""
 
+OPTION_INPUTS = tuple(
+    Input(
+        name=name,
+        kind=_OPTION_KINDS.get(rule.kind, InputKind.CHOICE if rule.choices else InputKind.TEXT),
+        label=name.replace("_", " ").capitalize(),
+        least=rule.least,
+        most=12 if rule.pattern else rule.most,
+        choices={word: word for word in rule.choices},
+        default=None,
+    )
+    for name, rule in RULES.items()
+)
+"""The options of a contestant; what is not given stays open."""
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class EnteredEndpoint:
-    """Where a contestant's model is: a label alone for an endpoint that is there already."""
 
-    label: str
-    base_url: str = ""
-    key_variable: str = ""
-    is_simulated: bool = False
+@dataclass(frozen=True, kw_only=True)
+class ContestantRequest:
+    """A new contestant that asks a language model.
+
+    Attributes:
+        options: How it asks, by name; what is open is fixed at its first run.
+        roles: Who else plays a role.
+    """
+
+    slug: str = input_field(InputKind.TEXT, "Slug", SLUG_RULE, most=80)
+    name: str = input_field(
+        InputKind.TEXT, "Name", "Empty: made of model and variant.", default="", most=LONGEST_NAME
+    )
+    variant: str = input_field(
+        InputKind.CHOICE, "Variant", choices={name: name for name in RECIPES}
+    )
+    endpoint: str = input_field(InputKind.TEXT, "Label of an endpoint", most=80)
+    model: str = input_field(InputKind.TEXT, "Model id on the endpoint", most=120)
+    options: Mapping[str, Any] = field(default_factory=dict)
+    roles: Roles = field(default_factory=dict)
 
 
 @transaction.atomic
@@ -73,107 +98,53 @@ def ensure_builtin() -> list[Contestant]:
 
 
 @transaction.atomic
-def add_contestant(
-    *,
-    slug: str,
-    variant: str,
-    endpoint: str,
-    model: str,
-    name: str | None = None,
-    roles: Roles | None = None,
-    options: ContestantOptions | None = None,
-    actor: User | None = None,
-) -> Contestant:
+def add_contestant(request: ContestantRequest, actor: User | None = None) -> Contestant:
     """Add a language model that runs one variant; simulated where its endpoint is.
 
     The same contestant twice is one. `openai` can be named without having been added where
     OPENAI_API_KEY is set.
-
-    Args:
-        slug: Lower-case letters, digits and hyphens.
-        variant: The name of a recipe, in any case.
-        endpoint: The label of an endpoint.
-        model: The model id on that endpoint.
-        name: What people read; made from model and variant when None, and from the endpoint
-            where another contestant is called so.
-        roles: Who else plays a role.
-        options: How it asks; what is open is fixed at its first run.
-        actor: Who adds it.
 
     Raises:
         UnknownName: No such variant or endpoint.
         InvalidDocument: The slug, a model, a role, an option or the name can't be used.
         Conflict: The slug belongs to another contestant.
     """
-    check_slug(slug, what="contestant")
-    recipe = find_recipe(variant)
-    check_roles(recipe, roles or {})
-    chosen = options or ContestantOptions()
-    check_options(recipe, chosen)
-    model = one_line("model", model, what="contestant")
-    own = Respondent(endpoint=find_endpoint(endpoint, actor), model=model)
-    others = _reviewers(roles or {}, own, actor)
+    check_slug(request.slug, what="contestant")
+    recipe = find_recipe(request.variant)
+    check_roles(recipe, request.roles)
+    options = options_from_document(request.options)
+    check_options(recipe, options)
+    model = one_line("model", request.model, what="contestant")
+    own = Respondent(endpoint=find_endpoint(request.endpoint, actor), model=model)
+    others = _reviewers(request.roles, own, actor)
     for respondent in (own, *others.values()):
         model_at(endpoint=respondent.endpoint, model=respondent.model)
-    title = _title(slug, recipe.slug, own, others, chosen) if name is None else name
-    columns = _columns(title, recipe.slug, own, others, chosen)
-    contestant, made = Contestant.objects.get_or_create(slug=slug, defaults=columns)
+    title = request.name or _title(request.slug, recipe, options, own, others)
+    is_simulated = any(one.endpoint.is_simulated for one in (own, *others.values()))
+    columns: dict[str, Any] = {
+        "name": one_line("name", title, what="contestant"),
+        "kind": Kind.SIMULATED if is_simulated else Kind.LLM,
+        "variant": recipe.slug,
+        "endpoint": own.endpoint,
+        "model": own.model,
+        "roles": {
+            role.value: {"endpoint": one.endpoint.label, "model": one.model}
+            for role, one in others.items()
+        },
+        "options": options.to_document(),
+    }
+    row, made = Contestant.objects.get_or_create(slug=request.slug, defaults=columns)
     if made:
         log_change(
-            contestant,
-            "add",
-            actor,
-            after=columns | {"slug": slug, "endpoint": own.endpoint.label},
+            row, "add", actor, after=columns | {"slug": row.slug, "endpoint": own.endpoint.label}
         )
-    same = [field for field in columns if field != "name" or name is not None]
-    if any(getattr(contestant, field) != columns[field] for field in same):
+    same = columns.keys() - ({"name"} if not request.name else set())
+    if any(getattr(row, name) != columns[name] for name in same):
         raise Conflict(
-            f"There is another contestant called {contestant.slug!r} already: "
-            f"{contestant.name} ({contestant.kind}); choose another slug."
+            f"There is another contestant called {row.slug!r} already: {row.name} ({row.kind}); "
+            "choose another slug."
         )
-    return contestant
-
-
-@transaction.atomic
-def enter_contestant(
-    *,
-    slug: str,
-    name: str,
-    variant: str,
-    model: str,
-    endpoint: EnteredEndpoint,
-    options: Mapping[str, object],
-    actor: User,
-) -> Contestant:
-    """Add endpoint and contestant, or neither of them.
-
-    Args:
-        slug: Lower-case letters, digits and hyphens.
-        name: What people read; empty to have it made from model and variant.
-        variant: The name of a recipe.
-        model: The model id on the endpoint.
-        endpoint: Made where an address is given; one that is there is never moved.
-        options: By name; what is missing stays open.
-        actor: Who enters it.
-
-    Raises:
-        AugmentError: Something can't be used; the sentence says what and what is allowed.
-        Conflict: There is an endpoint of that label already, and an address was given.
-    """
-    chosen = options_from_document(options)
-    if endpoint.base_url:
-        facts = EndpointFacts(base_url=endpoint.base_url, key_variable=endpoint.key_variable)
-        is_simulated = endpoint.is_simulated
-        add_endpoint(label=endpoint.label, facts=facts, is_simulated=is_simulated, actor=actor)
-    return add_contestant(
-        slug=slug,
-        variant=variant,
-        endpoint=endpoint.label,
-        model=model,
-        name=name or None,
-        options=chosen,
-        actor=actor,
-    )
+    return row
 
 
 def asking_contestants() -> list[Contestant]:
@@ -219,39 +190,18 @@ def _reviewers(roles: Roles, own: Respondent, actor: User | None) -> dict[ModelR
     }
 
 
-def _columns(
-    name: str,
-    variant: str,
-    own: Respondent,
-    others: Mapping[ModelRole, Respondent],
-    options: ContestantOptions,
-) -> dict[str, Any]:
-    is_simulated = any(one.endpoint.is_simulated for one in (own, *others.values()))
-    return {
-        "name": one_line("name", name, what="contestant"),
-        "kind": Kind.SIMULATED if is_simulated else Kind.LLM,
-        "variant": variant,
-        "endpoint": own.endpoint,
-        "model": own.model,
-        "roles": {
-            role.value: {"endpoint": one.endpoint.label, "model": one.model}
-            for role, one in others.items()
-        },
-        "options": options.to_document(),
-    }
-
-
 def _title(
     slug: str,
-    variant: str,
+    recipe: Recipe,
+    options: ContestantOptions,
     own: Respondent,
     others: Mapping[ModelRole, Respondent],
-    options: ContestantOptions,
 ) -> str:
     """Return what people read where nobody chose a name; no other contestant's name."""
-    played = (f"{role} {respondent.model}" for role, respondent in others.items())
-    described = options.describe()
-    parts = [own.model, spell_variant(variant), *played, *([f"({described})"] * bool(described))]
+    played = [f"{role} {respondent.model}" for role, respondent in others.items()]
+    parts = [own.model, spell_variant(recipe.slug), *played]
+    if described := options.describe():
+        parts.append(f"({described})")
     title = " ".join(parts)[:LONGEST_NAME]
     if Contestant.objects.filter(name=title).exclude(slug=slug).exists():
         title = f"{title} at {own.endpoint.label}"[:LONGEST_NAME]

@@ -7,10 +7,8 @@ ARENA_KEY_VARIABLES lists.
 
 import os
 import re
-from collections.abc import Callable
-from dataclasses import asdict, dataclass, fields
-from datetime import date
-from decimal import Decimal
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass
 from typing import Any
 from urllib.parse import urlsplit
 
@@ -30,16 +28,14 @@ from augment.services.texts import one_line
 
 OPENAI, OPENAI_URL, OPENAI_KEY = "openai", "https://api.openai.com/v1", "OPENAI_API_KEY"
 
-HIGHEST_CONCURRENCY = 1000
-HIGHEST_PER_MINUTE = 1_000_000
-
+SLUG_RULE = "Lower-case letters, digits, hyphens."
 KEY_RULE = "a variable whose name ends in _API_KEY, or one that ARENA_KEY_VARIABLES lists"
 
 _A_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,79}")
 _FOR_KEYS = re.compile(r"[A-Za-z_][A-Za-z0-9_]*_API_KEY")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True)
 class EndpointFacts:
     """What of an endpoint can be changed."""
 
@@ -51,67 +47,70 @@ class EndpointFacts:
         most=80,
     )
     max_concurrency: int = input_field(
-        InputKind.WHOLE,
-        "Calls at once, over all workers",
-        default=4,
-        least=1,
-        most=HIGHEST_CONCURRENCY,
+        InputKind.WHOLE, "Calls at once, over all workers", default=4, least=1, most=1000
     )
     requests_per_minute: int | None = input_field(
         InputKind.WHOLE,
         "Calls a minute, at most (empty: no limit)",
         default=None,
         least=1,
-        most=HIGHEST_PER_MINUTE,
+        most=1_000_000,
     )
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ModelFacts:
-    """What somebody knows of a model; None, or nothing, is unknown."""
+@dataclass(frozen=True, kw_only=True)
+class EndpointRequest(EndpointFacts):
+    """A new endpoint; label and kind stay for ever."""
 
-    model_class: str = ""
-    vision: bool | None = None
-    native_tools: bool | None = None
-    json_schema: bool | None = None
-    temperature: bool | None = None
-    reasoning_effort: str = ""
-    context_tokens: int | None = None
-    max_output_tokens: int | None = None
-    price_in_usd: Decimal | None = None
-    price_out_usd: Decimal | None = None
-    price_as_of: date | None = None
-    price_source: str = ""
+    label: str = input_field(InputKind.TEXT, "Label", SLUG_RULE, most=80)
+    is_simulated: bool = input_field(
+        InputKind.SWITCH, "A stand-in: what it answers counts as simulated", default=False
+    )
 
 
-FACTS = tuple(field.name for field in fields(ModelFacts))
+MODEL_FACTS = (
+    *("model_class", "price_in_usd", "price_out_usd", "price_as_of", "price_source"),
+    *("context_tokens", "max_output_tokens", "reasoning_effort"),
+    *("vision", "native_tools", "json_schema", "temperature"),
+)
+"""What somebody can say of a model; None, or nothing, is unknown."""
 
 
 @transaction.atomic
-def add_endpoint(
-    *, label: str, facts: EndpointFacts, is_simulated: bool = False, actor: User | None = None
-) -> Endpoint:
+def add_endpoint(request: EndpointRequest, actor: User | None = None) -> Endpoint:
     """Add an endpoint.
-
-    Args:
-        label: Lower-case letters, digits and hyphens; what commands call it, for ever.
-        facts: Where it is, and its limits.
-        is_simulated: Whether what it answers counts as simulated, for ever.
-        actor: Who adds it.
 
     Raises:
         InvalidDocument: Something can't be used, each with what is allowed.
         Conflict: There is one of that label.
     """
-    check_slug(label, what="endpoint")
-    if Endpoint.objects.filter(label=label).exists():
-        raise Conflict(
-            f"There is an endpoint “{label}” already. Choose it from the list, or give the "
-            "new one another label."
-        )
-    columns = check_facts(facts)
-    row = Endpoint.objects.create(label=label, is_simulated=is_simulated, **columns)
+    check_slug(request.label, what="endpoint", key="label")
+    if Endpoint.objects.filter(label=request.label).exists():
+        raise Conflict(f"There is an endpoint “{request.label}” already; choose another label.")
+    row = Endpoint.objects.create(**check_facts(request))
     log_change(row, "add", actor, after=facts_of(row))
+    return row
+
+
+@transaction.atomic
+def ensure_endpoint(request: EndpointRequest, actor: User | None = None) -> Endpoint:
+    """Return the endpoint of that label, added where there is none.
+
+    Raises:
+        InvalidDocument: Something can't be used.
+        Conflict: There is one of that label with another address or key, or of another kind.
+    """
+    row = Endpoint.objects.filter(label=request.label).first()
+    if row is None:
+        return add_endpoint(request, actor)
+    given = check_facts(request)
+    if any(
+        getattr(row, name) != given[name] for name in ("base_url", "key_variable", "is_simulated")
+    ):
+        raise Conflict(
+            f"Endpoint {row.label!r} is at {row.base_url} already; change it on its page or "
+            "choose another label."
+        )
     return row
 
 
@@ -131,7 +130,7 @@ def change_endpoint(
     if move is not None and not may_move_key:
         raise Conflict(
             f"The key in {facts.key_variable} of endpoint {row.label!r} went to {move[0]} and "
-            f"would go to {move[1]}. Say that it may (--move-key), if that is meant."
+            f"would go to {move[1]}. Say that it may, if that is meant."
         )
     before = facts_of(row)
     for name, value in wanted.items():
@@ -142,48 +141,6 @@ def change_endpoint(
         after = {"server": move[1], "key_variable": row.key_variable}
         log_change(row, "move key", actor, before={"server": move[0]}, after=after)
     return row
-
-
-@transaction.atomic
-def ensure_endpoint(
-    *,
-    label: str,
-    base_url: str,
-    key_variable: str = "",
-    is_simulated: bool = False,
-    may_move_key: bool = False,
-    actor: User | None = None,
-) -> Endpoint:
-    """Return the endpoint of that label, added or moved to that address.
-
-    Args:
-        label: Lower-case letters, digits and hyphens.
-        base_url: Up to and including "/v1" or its like.
-        key_variable: The environment variable that holds the key where the worker runs; empty
-            where none is needed.
-        is_simulated: Whether what it answers counts as simulated.
-        may_move_key: Whether the key of an endpoint that exists may go to another server.
-        actor: Who wants it.
-
-    Raises:
-        InvalidDocument: The label, the address or the variable can't be used.
-        Conflict: The endpoint exists and is simulated where this one is not, or the reverse; or
-            its key would go to another server, and nobody said that it may.
-    """
-    facts = EndpointFacts(base_url=base_url, key_variable=key_variable)
-    row = Endpoint.objects.filter(label=label).first()
-    if row is None:
-        return add_endpoint(label=label, facts=facts, is_simulated=is_simulated, actor=actor)
-    if row.is_simulated != is_simulated:
-        word = "simulated" if row.is_simulated else "not simulated"
-        raise Conflict(f"Endpoint {label!r} is {word}, and stays so; choose another label.")
-    facts = EndpointFacts(
-        base_url=base_url,
-        key_variable=key_variable,
-        max_concurrency=row.max_concurrency,
-        requests_per_minute=row.requests_per_minute,
-    )
-    return change_endpoint(row, facts=facts, may_move_key=may_move_key, actor=actor)
 
 
 def find_endpoint(label: str, actor: User | None = None) -> Endpoint:
@@ -204,8 +161,8 @@ def find_endpoint(label: str, actor: User | None = None) -> Endpoint:
         raise Conflict(
             f"Endpoint {OPENAI!r} was not added yet: set {OPENAI_KEY} here, or name its address."
         )
-    facts = EndpointFacts(base_url=OPENAI_URL, key_variable=OPENAI_KEY)
-    return add_endpoint(label=OPENAI, facts=facts, actor=actor)
+    request = EndpointRequest(label=OPENAI, base_url=OPENAI_URL, key_variable=OPENAI_KEY)
+    return add_endpoint(request, actor)
 
 
 @transaction.atomic
@@ -227,9 +184,14 @@ def add_model(endpoint: Endpoint, *, model: str, actor: User | None = None) -> E
 
 @transaction.atomic
 def change_model(
-    row: EndpointModel, *, facts: ModelFacts, actor: User | None = None
+    row: EndpointModel, *, facts: Mapping[str, Any], actor: User | None = None
 ) -> EndpointModel:
     """Store what somebody says of a model. It counts for contestants that have not run yet.
+
+    Args:
+        row: Which.
+        facts: By the names of MODEL_FACTS.
+        actor: Who says so.
 
     Raises:
         InvalidDocument: A fact can't be, or a price lacks its other half, its date or its source.
@@ -237,16 +199,14 @@ def change_model(
     rows = EndpointModel.objects.select_for_update(of=("self",)).select_related("endpoint")
     row = rows.get(pk=row.pk)
     before = facts_of(row.endpoint)
-    for name, value in asdict(facts).items():
-        setattr(row, name, value)
+    for name in MODEL_FACTS:
+        setattr(row, name, facts[name])
     try:
         row.full_clean(validate_unique=False, validate_constraints=False)
     except ValidationError as error:
         texts = [(name, str(text)) for name, said in error.message_dict.items() for text in said]
         raise InvalidDocument("model", texts) from None
-    if min(facts.price_in_usd or 0, facts.price_out_usd or 0) < 0:
-        raise InvalidDocument("model", [("price_in_usd", "a price is 0 or more")])
-    row.save(update_fields=list(FACTS))
+    row.save(update_fields=list(MODEL_FACTS))
     _log_change(row.endpoint, before, actor)
     return row
 

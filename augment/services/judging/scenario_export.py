@@ -1,22 +1,23 @@
 """What a job made as scenarios in a standard format, with what is lost and where it comes from."""
 
 import re
-from collections.abc import Mapping, Sequence
+from collections import defaultdict
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from augment.errors import Conflict, UnknownName
+from augment.formats.interplan.file import InterplanSource
+from augment.formats.nuplan_log import NuPlan
 from augment.formats.writers import WRITERS, writer_named
 from augment.formats.writing import Cell, Loss, Written
 from augment.models import Augmentation, BaseScene, GenerationJob, Simulation
 from augment.scene.codec import modification_from_document, recording_from_document
 from augment.scene.entities import AgentType, TrafficAgent
 from augment.scene.motion import Motion, MotionSource, Movement
-from augment.scene.recording import Recording
 from augment.services.judging.simulations import trace_document
-from augment.services.scenarios.interplan import refuse_changes
 from augment.services.scenarios.scenes import scene_of, type_of
 
 FORMATS = tuple(WRITERS)
@@ -67,26 +68,22 @@ class Exported:
     @property
     def warnings(self) -> tuple[str, ...]:
         """What anyone who passes the files on has to know."""
-        bound = [source.scene for source in self.sources if source.is_non_commercial]
-        unknown = [source.scene for source in self.sources if source.is_non_commercial is None]
-        lines = []
-        if bound:
-            lines.append(
-                f"Made from data that must not be used commercially: {', '.join(bound)}; its "
-                "licence holds for these files too."
-            )
-        if unknown:
-            lines.append(f"The licence of these sources is not known: {', '.join(unknown)}.")
-        return tuple(lines)
+        by_licence: dict[bool | None, list[str]] = defaultdict(list)
+        for source in self.sources:
+            by_licence[source.is_non_commercial].append(source.scene)
+        texts = {
+            True: "Made from data that must not be used commercially: %s; so must these files.",
+            None: "The licence of these sources is not known: %s.",
+        }
+        return tuple(
+            text % ", ".join(by_licence[bound])
+            for bound, text in texts.items()
+            if bound in by_licence
+        )
 
 
 def export_job(
-    job: GenerationJob,
-    *,
-    file_format: str,
-    contestant: str | None = None,
-    motion: str = RECORDED,
-    strict: bool = False,
+    job: GenerationJob, *, file_format: str, contestant: str | None = None, motion: str = RECORDED
 ) -> Exported:
     """Return all that a job made, as scenarios of that format.
 
@@ -95,35 +92,33 @@ def export_job(
         file_format: One of `FORMATS`.
         contestant: The slug of the only contestant to write; None for all.
         motion: `RECORDED`, or the name of a planner whose finished drives say what everybody does.
-        strict: Whether nothing is written once a scenario would not be the same there.
 
     Raises:
         UnknownName: No such format or contestant, or nothing was driven by that planner.
-        Conflict: Nothing is there to write, or `strict` and something would change.
+        Conflict: Nothing is there to write.
     """
     writer_named(file_format)  # what nobody can write is refused before anything is read
-    rows = _rows(job, contestant)
-    drives = {} if motion == RECORDED else _drives(job, motion)
-    origin = ExportOrigin(kind="job", name=job.name, code=str(job.code))
-    driven_by = None if motion == RECORDED else motion
+    rows = job.augmentations.select_related("scenario__base_scene", "contestant")
+    slugs = sorted(set(rows.values_list("contestant__slug", flat=True)))
+    if contestant is not None and contestant not in slugs:
+        raise UnknownName("contestant", contestant, slugs)
+    rows = rows.filter(contestant__slug__in=slugs if contestant is None else [contestant])
     return export_rows(
-        *(rows, origin, file_format),
+        rows.order_by("scenario__slug", "contestant__slug", "sample"),
+        ExportOrigin(kind="job", name=job.name, code=str(job.code)),
+        file_format,
         many=job.samples > 1,
-        drives=drives,
-        driven_by=driven_by,
-        strict=strict,
+        drives=None if motion == RECORDED else _drives(job, motion),
     )
 
 
 def export_rows(
-    rows: Sequence[Augmentation],
+    rows: Iterable[Augmentation],
     origin: ExportOrigin,
     file_format: str,
     *,
     many: bool = False,
     drives: Mapping[int, Simulation] | None = None,
-    driven_by: str | None = None,
-    strict: bool = False,
 ) -> Exported:
     """Return augmentations as scenarios of that format.
 
@@ -132,59 +127,43 @@ def export_rows(
         origin: What they were taken from.
         file_format: One of `FORMATS`.
         many: Whether cells have several samples, which the names then say.
-        drives: By the key of an augmentation the drive that says what everybody does.
-        driven_by: The planner of the drives; None where what was recorded is written.
-        strict: Whether nothing is written once a scenario would not be the same there.
+        drives: By the key of an augmentation the drive that says what everybody does; None where
+            what was recorded does.
 
     Raises:
         UnknownName: No such format.
-        Conflict: Nothing is there to write, or `strict` and something would change.
+        Conflict: Nothing is there to write.
     """
-    writer, found = writer_named(file_format), drives or {}
-    cells, missing, extra = [], [], []
+    writer = writer_named(file_format)
+    cells, missing, undriven = [], [], []
     scenes: dict[str, BaseScene] = {}
     for row in rows:
-        cell_name = f"{row.scenario.slug} by {row.contestant.slug}"
-        if many:
-            cell_name += f", sample {row.sample}"
+        name = f"{row.scenario.slug} by {row.contestant.slug}"
+        name += f", sample {row.sample}" if many else ""
         if row.modification is None:
             text = f"there is no modification: {row.state}"
-            missing.append(Loss(cell=cell_name, text=text, changes_scene=True))
+            missing.append(Loss(cell=name, text=text, changes_scene=True))
             continue
-        cell = _cell(cell_name, row, many=many)
-        if row.pk in found:
-            cell = replace(cell, drive=_motion(cell, trace_document(found[row.pk])))
-        elif driven_by is not None:
-            text = f"{driven_by} has not driven it; not as driven"
-            extra.append(Loss(cell=cell_name, text=text))
+        cell = _cell(name, row, many=many)
+        if drives is not None and row.pk in drives:
+            cell = replace(cell, drive=_motion(cell, trace_document(drives[row.pk])))
+        elif drives is not None:
+            undriven.append(Loss(cell=name, text="not driven; written as recorded"))
         cells.append(cell)
         scenes[row.scenario.base_scene.slug] = row.scenario.base_scene
     if not cells:
         raise Conflict(f"{origin.name} has no modification that could be written.")
     written = writer(cells)
-    written = replace(written, losses=(*extra, *written.losses))
-    if strict:
-        refuse_changes([*missing, *written.refused, *written.losses], where=file_format)
     return Exported(
         origin=origin,
         format=file_format,
-        written=written,
+        written=replace(written, losses=(*undriven, *written.losses)),
         missing=tuple(missing),
         sources=tuple(_source(scenes[slug]) for slug in sorted(scenes)),
     )
 
 
 # --- Private -----------------------------------------------------------------------------------
-
-
-def _rows(job: GenerationJob, contestant: str | None) -> Sequence[Augmentation]:
-    rows = job.augmentations.select_related("scenario__base_scene", "contestant")
-    slugs = sorted(set(rows.values_list("contestant__slug", flat=True)))
-    if contestant is not None:
-        if contestant not in slugs:
-            raise UnknownName("contestant", contestant, slugs)
-        rows = rows.filter(contestant__slug=contestant)
-    return list(rows.order_by("scenario__slug", "contestant__slug", "sample"))
 
 
 def _drives(job: GenerationJob, planner: str) -> dict[int, Simulation]:
@@ -202,8 +181,10 @@ def _drives(job: GenerationJob, planner: str) -> dict[int, Simulation]:
 
 
 def _cell(name: str, row: Augmentation, *, many: bool) -> Cell:
-    scenario = row.scenario
-    assert row.modification is not None
+    scenario, scene = row.scenario, row.scenario.base_scene
+    source = None
+    if scene.source == NuPlan.name and scene.source_item:
+        source = InterplanSource(token=scene.source_item, **(scenario.interplan or {}))
     return Cell(
         name=name,
         stem=f"{scenario.slug}--{row.contestant.slug}" + (f"--{row.sample}" if many else ""),
@@ -212,24 +193,19 @@ def _cell(name: str, row: Augmentation, *, many: bool) -> Cell:
         modification=modification_from_document(row.modification),
         keeps_traffic=scenario.keep_traffic,
         made_on=(row.finished_at or row.created_at).date(),
-        recording=_recording(scenario.base_scene),
+        recording=None if scene.recording is None else recording_from_document(scene.recording),
+        source=source,
     )
 
 
-def _recording(base_scene: BaseScene) -> Recording | None:
-    if base_scene.recording is None:
-        return None
-    return recording_from_document(base_scene.recording)
-
-
 def _source(row: BaseScene) -> Source:
-    bound: bool | None = None
-    if _NON_COMMERCIAL.search(row.provenance):
-        bound = True
-    elif row.provenance.lower().startswith(_OWN):
-        bound = False
+    bound = bool(_NON_COMMERCIAL.search(row.provenance))
+    is_known = bound or row.provenance.lower().startswith(_OWN)
     return Source(
-        scene=row.slug, format=row.source, provenance=row.provenance, is_non_commercial=bound
+        scene=row.slug,
+        format=row.source,
+        provenance=row.provenance,
+        is_non_commercial=bound if is_known else None,
     )
 
 
@@ -237,26 +213,22 @@ def _motion(cell: Cell, trace: dict[str, Any]) -> Motion:
     """Return what everybody did in a drive; agents that are not in the drive stand."""
     steps = int(trace["steps"])
     driven = {one["id"]: one for one in trace["objects"]}
-    agents = [(agent, driven.pop(agent.id, None)) for agent in cell.after.agents]
-    for one in driven.values():  # they came later
-        pose = next(pose for pose in one["poses"] if pose)
-        later = TrafficAgent(
-            id=one["id"],
-            type=AgentType(one["type"]),
-            **dict(zip(("x_m", "y_m", "heading_rad", "speed_mps"), pose, strict=True)),
-            width_m=one["width_m"],
-            length_m=one["length_m"],
-        )
-        agents.append((later, one))
-    ego = Movement(
-        agent=cell.after.ego,
-        source=MotionSource.SIMULATED,
-        states=np.array(trace["ego"]["poses"], dtype=np.float64),
-    )
+    agents = {agent.id: agent for agent in cell.after.agents}
+    for one in trace["objects"]:
+        if one["id"] not in agents:  # it came later
+            pose = next(pose for pose in one["poses"] if pose)
+            agents[one["id"]] = TrafficAgent(
+                id=one["id"],
+                type=AgentType(one["type"]),
+                **dict(zip(("x_m", "y_m", "heading_rad", "speed_mps"), pose, strict=True)),
+                width_m=one["width_m"],
+                length_m=one["length_m"],
+            )
+    states = np.array(trace["ego"]["poses"], dtype=np.float64)
     return Motion(
         times_s=np.arange(steps, dtype=np.float64) * float(trace["step_s"]),
-        ego=ego,
-        others=tuple(_movement(agent, one, steps) for agent, one in agents),
+        ego=Movement(agent=cell.after.ego, source=MotionSource.SIMULATED, states=states),
+        others=tuple(_movement(agent, driven.get(name), steps) for name, agent in agents.items()),
     )
 
 

@@ -24,6 +24,7 @@ from augment.models import Contestant, GenerationJob, ModelCall
 from augment.services.clock import Moment
 from augment.services.endpoints.treatments import list_unpriced_models
 from augment.services.events import log_change
+from augment.services.inputs import InputKind, check_bounds, input_field
 
 State = GenerationJob.State
 
@@ -65,33 +66,43 @@ class Used:
 _NOTHING = Used(tokens=0, nano_usd=0, is_estimated=False, calls=0)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True)
 class Caps:
     """What a job may use at most; None is no cap. Of several, the first that is reached counts."""
 
-    usd: Decimal | None = None
-    calls: int | None = None
-    tokens: int | None = None
+    cap_usd: Decimal | None = input_field(
+        InputKind.DECIMAL,
+        "USD that language models may cost at most",
+        "Needs the price of every model.",
+        default=None,
+        least=Decimal("1e-9"),
+        most=HIGHEST_USD,
+    )
+    cap_calls: int | None = input_field(
+        InputKind.WHOLE,
+        "Calls to language models at most",
+        default=None,
+        least=1,
+        most=HIGHEST_CALLS,
+    )
+    cap_tokens: int | None = input_field(
+        InputKind.WHOLE,
+        "Tokens at most, in and out together",
+        default=None,
+        least=1,
+        most=HIGHEST_TOKENS,
+    )
 
     def columns(self) -> dict[str, int]:
         """Return the given caps as columns of a job.
 
         Raises:
-            Conflict: A cap is nothing or less, or too high to be counted to.
+            InvalidDocument: A cap is nothing or less, or too high to be counted to.
         """
-        columns: dict[str, int] = {}
-        caps = (
-            ("USD", "cap_nano_usd", self.usd, HIGHEST_USD),
-            ("calls", "cap_calls", self.calls, HIGHEST_CALLS),
-            ("tokens", "cap_tokens", self.tokens, HIGHEST_TOKENS),
-        )
-        for unit, column, value, highest in caps:
-            if value is None:
-                continue
-            if not (Decimal(value).is_finite() and 0 < value <= highest):
-                raise Conflict(f"A cap in {unit} is more than 0 and at most {highest}.")
-            columns[column] = nano_usd_of(value) if isinstance(value, Decimal) else value
-        return columns
+        check_bounds(self)
+        usd = None if self.cap_usd is None else nano_usd_of(self.cap_usd)
+        columns = {"cap_nano_usd": usd, "cap_calls": self.cap_calls, "cap_tokens": self.cap_tokens}
+        return {name: value for name, value in columns.items() if value is not None}
 
 
 NO_CAPS = Caps()
@@ -255,7 +266,7 @@ def check_caps(caps: Caps, contestants: Sequence[Contestant]) -> dict[str, int]:
         Conflict: A cap can't be, or there is one in USD and an unknown price.
     """
     columns = caps.columns()
-    unknown = list_unpriced_models(contestants) if caps.usd is not None else []
+    unknown = list_unpriced_models(contestants) if caps.cap_usd is not None else []
     if unknown:
         raise Conflict(
             f"A cap in USD needs prices, and nobody knows that of {', '.join(unknown)}: cap "

@@ -15,6 +15,7 @@ from augment.prompts.fill import prompt_version
 from augment.scene.entities import Modification
 from augment.services.endpoints.known_models import price_of
 from augment.services.endpoints.treatments import Respondent, options_of, respondents_of
+from augment.services.running.jobs import JobScope
 from augment.services.scenarios.scenes import reference_of, scene_of
 from augment.variants.options import recipe_with
 from augment.variants.recipes import Recipe, find_recipe
@@ -101,48 +102,35 @@ class JobEstimate:
         return None if usd >= self.usd else int(self.asking_rows * usd / self.usd)
 
 
-def estimate(
-    contestants: Sequence[str],
-    scenarios: Sequence[str],
-    *,
-    samples: int = 1,
-    is_fresh: bool = False,
-) -> JobEstimate:
+def estimate(scope: JobScope, who: Sequence[Contestant] | None = None) -> JobEstimate:
     """Return what a job of these would use; unknown slugs are left out.
+
+    Args:
+        scope: What the job runs.
+        who: Its contestants, each once, where some are not stored yet.
 
     Raises:
         UnknownName: A contestant's variant is none of ours any more.
         Conflict: An endpoint that a contestant names is gone.
     """
-    who = Contestant.objects.filter(slug__in=contestants).select_related("endpoint")
-    return estimate_rows(list(who.order_by("slug")), scenarios, samples=samples, is_fresh=is_fresh)
-
-
-def estimate_rows(
-    who: Sequence[Contestant],
-    scenarios: Sequence[str],
-    *,
-    samples: int = 1,
-    is_fresh: bool = False,
-) -> JobEstimate:
-    """Return the same of contestants, each once, be they stored or not."""
-    where = Scenario.objects.filter(slug__in=scenarios).order_by("slug")
+    if who is None:
+        rows = Contestant.objects.filter(slug__in=scope.contestants)
+        who = list(rows.select_related("endpoint").order_by("slug"))
+    where = Scenario.objects.filter(slug__in=scope.scenarios).order_by("slug")
     pks = list(where.values_list("pk", flat=True))
     asking = [row for row in who if row.endpoint is not None and pks]
     measured = pks[:: max(1, len(pks) // SAMPLES)][:SAMPLES] if asking else []
     prompts = _Prompts(Scenario.objects.select_related("base_scene").filter(pk__in=measured))
-    rows = len(pks) * samples
-    answered: Counter[int] = Counter()
-    if not is_fresh:
-        answered = _count_answered(asking, scenarios, samples)
-    lines = tuple(_line(row, rows, answered[row.pk], prompts) for row in asking)
+    cells = len(pks) * scope.samples
+    answered = Counter[int]() if scope.is_fresh else _count_answered(asking, scope)
+    lines = tuple(_line(row, cells, answered[row.pk], prompts) for row in asking)
     usd_most = sum((line.usd_most or Decimal(0) for line in lines), Decimal(0))
     return JobEstimate(
-        rows=len(who) * rows,
+        rows=len(who) * cells,
         scenarios=len(pks),
         contestants=len(who),
         lines=lines,
-        asking_rows=len(asking) * rows,
+        asking_rows=len(asking) * cells,
         answered=answered.total(),
         calls=tuple(sum(line.calls[place] for line in lines) for place in range(3)),
         tokens_in=sum(line.tokens_in for line in lines),
@@ -218,9 +206,7 @@ def _usd(
     return usd_of(total)
 
 
-def _count_answered(
-    contestants: Sequence[Contestant], scenarios: Sequence[str], samples: int
-) -> Counter[int]:
+def _count_answered(contestants: Sequence[Contestant], scope: JobScope) -> Counter[int]:
     """Count by contestant the cells that it has answered before with the installed prompts.
 
     Their requests are the same, so their answers come from the store and cost nothing.
@@ -231,8 +217,8 @@ def _count_answered(
     cells = Augmentation.objects.order_by().filter(
         Exists(asked),
         contestant__in=[row.pk for row in contestants if row.pk is not None],
-        scenario__slug__in=scenarios,
-        sample__lte=samples,
+        scenario__slug__in=scope.scenarios,
+        sample__lte=scope.samples,
         state__in=Augmentation.SHOWABLE,
     )
     return Counter(

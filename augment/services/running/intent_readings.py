@@ -31,7 +31,7 @@ from augment.variants.pipeline import ask_for_intent
 from augment.variants.respondents import NoteKind
 
 State = IntentReading.State
-USUAL_CAPS = Caps(calls=6)
+USUAL_CAPS = Caps(cap_calls=6)
 """Two answers, each with two more attempts where the wire breaks."""
 
 
@@ -95,7 +95,7 @@ def plan_reading(
     if site is None:
         labels = Endpoint.objects.values_list("label", flat=True)
         raise UnknownName("endpoint", endpoint, list(labels))
-    if caps.usd is not None and price_of(site, model) is None:
+    if caps.cap_usd is not None and price_of(site, model) is None:
         raise Conflict("A cap in USD needs the price of the model, and nobody knows it.")
     return IntentReading.objects.create(
         scenario=row, endpoint=site, model=model, asked_by=actor, **caps.columns()

@@ -1,6 +1,7 @@
 """Generation jobs: launched, paused, resumed, cancelled, retried, finished."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any, TypeVar
 
 from django.contrib.auth.models import User
@@ -13,6 +14,7 @@ from augment.models import Augmentation, Contestant, GenerationJob, Scenario
 from augment.services.clock import DATABASE_TIME, Moment, database_now
 from augment.services.endpoints.treatments import loosen_unanswered
 from augment.services.events import log_change
+from augment.services.inputs import InputKind, check_bounds, input_field
 from augment.services.running.budget import (
     NO_CAPS,
     Caps,
@@ -30,9 +32,6 @@ from augment.variants.options import MOST_SAMPLES
 State = Augmentation.State
 JobState = GenerationJob.State
 
-HIGHEST_SAMPLES = MOST_SAMPLES
-"""Of one cell of a job."""
-
 OPEN = (JobState.RUNNING, *GenerationJob.HELD)
 """States of jobs that are not over."""
 
@@ -45,68 +44,77 @@ _MAY_END = (JobState.RUNNING, JobState.PAUSED)
 _Row = TypeVar("_Row", Contestant, Scenario)
 
 
+@dataclass(frozen=True, kw_only=True)
+class JobScope:
+    """What a job runs: contestants x scenarios x samples."""
+
+    contestants: Sequence[str] = input_field(InputKind.NAMES, "Contestants", "Slugs.")
+    scenarios: Sequence[str] = input_field(InputKind.NAMES, "Scenarios", "Slugs.")
+    samples: int = input_field(
+        InputKind.WHOLE,
+        "Samples",
+        "So often each contestant is asked about each scenario.",
+        default=1,
+        least=1,
+        most=MOST_SAMPLES,
+    )
+    is_fresh: bool = input_field(
+        InputKind.SWITCH, "Ask anew what models answered in other jobs", default=False
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class JobRequest(JobScope, Caps):
+    """A new job.
+
+    Attributes:
+        full_plan: Of a job that tries one scenario first: what was chosen for the whole one.
+    """
+
+    name: str = input_field(InputKind.TEXT, "Name", "What people call it.", most=120)
+    full_plan: dict[str, Any] | None = None
+
+
 @transaction.atomic
-def launch(
-    *,
-    name: str,
-    contestants: Sequence[str],
-    scenarios: Sequence[str],
-    caps: Caps = NO_CAPS,
-    samples: int = 1,
-    is_fresh: bool = False,
-    full_plan: dict[str, Any] | None = None,
-    actor: User | None = None,
-) -> GenerationJob:
+def launch(request: JobRequest, actor: User | None = None) -> GenerationJob:
     """Write a job and its waiting rows; the caller sends the messages.
 
     Args:
-        name: What people call it.
-        contestants: Slugs; a slug given twice counts once.
-        scenarios: Slugs; a slug given twice counts once.
-        caps: What it may use at most.
-        samples: Samples per contestant and scenario.
-        is_fresh: Whether language models are asked anew what they answered in other jobs before.
-        full_plan: Of a job that tries one scenario first: what was chosen for the whole one.
+        request: What it runs; a slug given twice counts once.
         actor: Who launches it, None for the machine.
 
     Raises:
-        InvalidDocument: The name is empty, too long or not one line.
+        InvalidDocument: The name is empty, too long or not one line; or a number can't be.
         UnknownName: A slug that nobody registered.
         Conflict: Nothing is chosen, a contestant can't be run, the reference is to run on
             scenarios that have none, a viewer can't see, or a cap in USD meets an unknown price.
     """
-    name = one_line("name", name, what="job")
-    loosen_unanswered(_in_order(Contestant.objects.all(), contestants, "contestant"))
-    who = _in_order(Contestant.objects.all(), contestants, "contestant")
-    where = _in_order(Scenario.objects.all(), scenarios, "scenario")
+    name = one_line("name", request.name, what="job")
+    check_bounds(request)
+    loosen_unanswered(_in_order(Contestant.objects.all(), request.contestants, "contestant"))
+    who = _in_order(Contestant.objects.all(), request.contestants, "contestant")
+    where = _in_order(Scenario.objects.all(), request.scenarios, "scenario")
     refuse_impossible(who, where)
-    check_samples(samples)
     job = GenerationJob.objects.create(
         name=name,
         launched_by_id=actor.pk if actor else None,
-        samples=samples,
-        is_fresh=is_fresh,
-        full_plan=full_plan,
-        **check_caps(caps, who),
+        samples=request.samples,
+        is_fresh=request.is_fresh,
+        full_plan=request.full_plan,
+        **check_caps(request, who),
     )
     job.contestants.set(who)
     job.scenarios.set(where)
     Augmentation.objects.bulk_create(
         Augmentation(job=job, scenario=scenario, contestant=contestant, sample=sample)
-        for sample in range(1, samples + 1)
+        for sample in range(1, job.samples + 1)
         for scenario in where
         for contestant in who
     )
-    settings = {"samples": samples, "is_fresh": is_fresh, "cap": limit_of(job)}
+    settings = {"samples": job.samples, "is_fresh": job.is_fresh, "cap": limit_of(job)}
     slugs = {"contestants": [row.slug for row in who], "scenarios": [row.slug for row in where]}
     _log(job, "launch", actor, after={"name": name, **slugs, **settings})
     return job
-
-
-def check_samples(samples: int) -> None:
-    """Raise Conflict for a number of samples that a job can't ask for."""
-    if not 1 <= samples <= MOST_SAMPLES:
-        raise Conflict(f"Samples go from 1 to {MOST_SAMPLES}, not {samples}.")
 
 
 @transaction.atomic

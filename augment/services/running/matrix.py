@@ -18,9 +18,15 @@ from pydantic import Field, ValidationError
 from augment.errors import AugmentError, InvalidDocument, UnknownName
 from augment.models import Contestant, Endpoint, EndpointModel
 from augment.scene.schema import Document, problems_of
-from augment.services.endpoints.contestants import LONGEST_NAME, add_contestant, ensure_builtin
+from augment.services.endpoints.contestants import (
+    LONGEST_NAME,
+    ContestantRequest,
+    add_contestant,
+    ensure_builtin,
+)
 from augment.services.endpoints.known_endpoints import may_hold_key
 from augment.services.running.choosing import resolve_scenarios
+from augment.services.running.jobs import JobScope
 from augment.services.scenarios.scenes import SLUG_LENGTH
 from augment.variants.options import (
     MOST_SAMPLES,
@@ -73,15 +79,12 @@ class Matrix:
     """What a file stands for, checked as a whole.
 
     Attributes:
-        name: Of the job, None where the file has none.
-        contestants, scenarios: Slugs, each once.
+        name: Of the job, empty where the file has none.
         made: The contestants that were made for it.
     """
 
-    name: str | None
-    contestants: tuple[str, ...]
-    scenarios: tuple[str, ...]
-    samples: int
+    name: str
+    scope: JobScope
     made: tuple[str, ...]
 
 
@@ -175,14 +178,14 @@ def add_cells(chosen: ChosenCells, *, actor: User | None = None) -> list[str]:
     slugs = []
     for cell, row in zip(chosen.cells, chosen.contestants(), strict=True):
         if row._state.adding:
-            row = add_contestant(
+            request = ContestantRequest(
                 slug=row.slug,
                 variant=cell.variant,
                 endpoint=cell.endpoint,
                 model=cell.model,
-                options=options_from_document(row.options),
-                actor=actor,
+                options=row.options,
             )
+            row = add_contestant(request, actor)
         slugs.append(row.slug)
     return slugs
 
@@ -223,10 +226,10 @@ def load_matrix(document: object, *, actor: User | None = None) -> Matrix:
         raise InvalidDocument(WHAT, problems)
     slugs = tuple(dict.fromkeys(contestants))
     return Matrix(
-        name=given.name,
-        contestants=slugs,
-        scenarios=tuple(dict.fromkeys(scenarios)),
-        samples=given.samples,
+        name=given.name or "",
+        scope=JobScope(
+            contestants=slugs, scenarios=tuple(dict.fromkeys(scenarios)), samples=given.samples
+        ),
         made=tuple(slug for slug in slugs if slug not in before),
     )
 
@@ -240,16 +243,16 @@ def _find_or_add(wanted: str | ContestantDocument, actor: User | None) -> str:
             raise ValueError(f"{wanted!r} is no contestant; write it in full to have it made")
         return wanted
     is_there = Contestant.objects.filter(slug=wanted.slug).exists()
-    return add_contestant(
+    request = ContestantRequest(
         slug=wanted.slug,
-        name=None if is_there else wanted.name,
+        name="" if is_there or wanted.name is None else wanted.name,
         variant=wanted.variant,
         endpoint=wanted.endpoint,
         model=wanted.model,
         roles={ModelRole(role): (one.endpoint, one.model) for role, one in wanted.roles.items()},
-        options=options_from_document(wanted.options),
-        actor=actor,
-    ).slug
+        options=wanted.options,
+    )
+    return add_contestant(request, actor).slug
 
 
 def _contestant(cell: MatrixCell, options: ContestantOptions) -> Contestant:

@@ -19,12 +19,12 @@ from django.db import transaction
 
 from augment.errors import AugmentError, Conflict, InvalidDocument
 from augment.formats.documents import read_json, read_text_file, read_yaml
-from augment.services.scenarios.scenes import add_scenario, read_circumstances
+from augment.services.scenarios.scenes import add_scenario
 from augment.services.scenarios.uploads import plain_name
 
 WHAT = "list of scenarios"
 NEEDED = ("scene", "type", "instruction")
-OPTIONAL = ("slug", "type_label", "keep_traffic", "density", "goal", "reference", "intent")
+OPTIONAL = ("slug", "keep_traffic", "density", "goal", "reference", "intent")
 MOST_ROWS = 10_000
 MOST_ROWS_AT_ONCE = 300
 """On a page: adding them holds the database for some seconds."""
@@ -166,11 +166,6 @@ def _read(row: Mapping[str, Any], folder: Path) -> dict[str, Any]:
         for name, value in given.items()
         if name != "keep_traffic" and not isinstance(value, str)
     ]
-    density, goal = (str(given.pop(name, "")) for name in ("density", "goal"))
-    try:
-        given["circumstances"] = read_circumstances(density, goal)
-    except InvalidDocument as error:
-        problems += error.problems
     keep = str(given.get("keep_traffic", "")).strip().lower()
     if keep not in (*_NO, *_YES):
         problems.append(("keep_traffic", f"{keep!r} must be yes or no"))

@@ -4,7 +4,7 @@ import hashlib
 import json
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 from django.contrib.auth.models import User
@@ -38,10 +38,9 @@ from augment.scene.entities import in_type_order as in_type_order
 from augment.scene.intent import Intent, IntentOrigin
 from augment.scene.lane_graph import LaneGraph
 from augment.services.events import log_change
-from augment.services.texts import check_prose, one_line
+from augment.services.texts import check_prose
 
 LONGEST_TYPE = 40
-LONGEST_LABEL = 60
 
 
 def type_choices() -> list[tuple[str, str]]:
@@ -85,82 +84,22 @@ def check_type(name: str) -> None:
         raise InvalidDocument("scenario", [("type", f"{name!r} must be {rule}")])
 
 
-def label_for(name: str, label: str | None) -> str:
-    """The label that a scenario of this type is stored with: empty for one of the five.
-
-    Args:
-        name: One of the five, or a slug of one's own.
-        label: What people are to read; None for what the type is called already, else for the
-            slug as words ("cut_in" is "Cut in").
+def _label_for(name: str) -> str:
+    """Return the label that a scenario of this type is stored with: empty for one of the five.
 
     Raises:
-        InvalidDocument: The slug or the label can't be.
-        Conflict: The type is called otherwise already.
+        InvalidDocument: The slug of a type of one's own can't be.
     """
-    if type_of(name) is not None:
-        if label:
-            raise InvalidDocument("scenario", [("type_label", f"{name} has a label of its own")])
-        return ""
     check_type(name)
+    if type_of(name) is not None:
+        return ""
     before = Scenario.objects.filter(type=name).values_list("type_label", flat=True).first()
-    if not label:
-        return before or re.sub(r"[_-]", " ", name).capitalize()
-    label = one_line("type_label", label, what="scenario", longest=LONGEST_LABEL)
-    if before is not None and before != label:
-        raise Conflict(
-            f"The scenario type {name!r} is called {before!r} already, not {label!r}; leave the "
-            "label away, or choose another slug."
-        )
-    taken = [
-        one for one, shown in type_choices() if shown.lower() == label.lower() and one != name
-    ]
-    if taken:
-        raise Conflict(f"Another scenario type, {taken[0]!r}, is called {label!r} already.")
-    return label
+    return before or re.sub(r"[_-]", " ", name).capitalize()
 
 
 SLUG_LENGTH = 80
 INSTRUCTION_LENGTH = 2_000
 """An instruction is read above the pictures, and by models: a few sentences."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Circumstances:
-    """What a scenario sets besides its change, and where it comes from.
-
-    Attributes:
-        density: Of the traffic that is spawned where the recorded one is cleared.
-        goal: Where the ego's way turns.
-        traffic: Who is spawned, where that is known already; None to spawn it.
-        interplan: The parts of interPlan's file that it comes from.
-        instruction_is_generated: Whether no person wrote the instruction.
-    """
-
-    density: TrafficDensity = TrafficDensity.NONE
-    goal: TurnType | None = None
-    traffic: Sequence[TrafficAgent] | None = None
-    interplan: dict[str, Any] | None = None
-    instruction_is_generated: bool = False
-
-
-def read_circumstances(density: str, goal: str) -> Circumstances:
-    """Read density and goal as somebody typed them; empty texts choose neither.
-
-    Raises:
-        InvalidDocument: There is no such density or goal.
-    """
-    known = {"density": (density, [*TrafficDensity]), "goal": (goal, [*GOALS])}
-    problems = [
-        (name, f"{given!r} must be one of {', '.join(choices)}")
-        for name, (given, choices) in known.items()
-        if given and given not in choices
-    ]
-    if problems:
-        raise InvalidDocument("scenario", problems)
-    return Circumstances(
-        density=TrafficDensity(density or TrafficDensity.NONE),
-        goal=TurnType(goal) if goal else None,
-    )
 
 
 def placeable_intent(document: object) -> dict[str, Any]:
@@ -186,13 +125,15 @@ def add_scenario(
     scene: str,
     type: str,
     instruction: str,
-    type_label: str | None = None,
     slug: str | None = None,
     reference: dict[str, Any] | None = None,
     intent: object = None,
     intent_origin: IntentOrigin = IntentOrigin.ENTERED,
     keep_traffic: bool = False,
-    circumstances: Circumstances | None = None,
+    density: str = "",
+    goal: str = "",
+    traffic: Sequence[TrafficAgent] | None = None,
+    interplan: dict[str, Any] | None = None,
     actor: User | None = None,
 ) -> Scenario:
     """Keep an instruction for a scene, with its intent and reference if there are any.
@@ -200,23 +141,23 @@ def add_scenario(
     Args:
         scene: The slug of a stored scene.
         type: The value of a `ScenarioType`, or a slug of one's own.
-        type_label: What people read for a type of one's own; made from the slug when None.
         instruction: What is to be changed, in the user's words.
         slug: The scenario's name; made from the scene's and the type's when None.
         reference: A modification document that fits the scene.
-        intent: An intent document: what the instruction asks for.
+        intent: An intent document.
         intent_origin: Where that comes from.
-        keep_traffic: Whether the recorded traffic stays in the scene.
-        circumstances: Spawned traffic, goal and source; None for none of them.
+        keep_traffic: Whether the recorded traffic stays.
+        density: Of the traffic that is spawned where the recorded one is cleared; empty for none.
+        goal: Where the ego's way turns; empty where nobody says.
+        traffic: Who is spawned, where that is known already; None to spawn it.
+        interplan: The parts of interPlan's file that it comes from, with a generated instruction.
         actor: Who did it.
 
     Raises:
         UnknownName: No such scene.
-        InvalidDocument: The slug, the type, the instruction, the intent or the reference breaks
-            its format.
+        InvalidDocument: One of these breaks its format.
         InvalidModification: The reference does not fit the scene.
-        Conflict: The slug is taken, the type has another label, or traffic is to be kept and
-            spawned.
+        Conflict: The slug is taken, or traffic is to be kept and spawned.
     """
     base_scene = BaseScene.objects.filter(slug=scene).first()
     if base_scene is None:
@@ -225,13 +166,12 @@ def add_scenario(
         raise Conflict(f"The scene “{base_scene.slug}” is retired; offer it again first.")
     if slug is not None:
         check_slug(slug, what="scenario")
-        if Scenario.objects.filter(slug=slug).exists():
-            raise Conflict(f"There is a scenario called {slug!r} already; choose another slug.")
     scenario = Scenario(
-        slug=slug or _free_slug(base_scene, type), base_scene=base_scene, keep_traffic=keep_traffic
+        slug=slug or _free_slug(base_scene, type), base_scene=base_scene, interplan=interplan
     )
-    set_wording(scenario, instruction, type, type_label)
-    _set_circumstances(scenario, circumstances or Circumstances(), reference)
+    set_wording(scenario, instruction, type)
+    scenario.instruction_is_generated = interplan is not None
+    _set_surroundings(scenario, keep_traffic, density, goal, traffic, reference)
     if intent is not None:
         # The catalogue leaves some open on purpose: the rule placer refuses them, models do not.
         is_entered = intent_origin is IntentOrigin.ENTERED
@@ -242,50 +182,12 @@ def add_scenario(
     return scenario
 
 
-def set_wording(scenario: Scenario, instruction: str, type: str, type_label: str | None) -> None:
-    """Set type and instruction without saving; an instruction that changes is a person's own.
-
-    Raises:
-        InvalidDocument: The type or the instruction breaks its format.
-        Conflict: The type has another label.
-    """
-    check_prose("instruction", instruction, what="scenario", longest=INSTRUCTION_LENGTH)
-    scenario.type, scenario.type_label = type, label_for(type, type_label)
-    scenario.instruction_is_generated &= scenario.instruction == instruction.strip()
-    scenario.instruction = instruction.strip()
-
-
-def change_circumstances(scenario: Scenario, given: Circumstances, *, keep_traffic: bool) -> None:
-    """Set traffic and goal of a scenario that was never asked, without saving.
-
-    Raises:
-        InvalidModification: The reference does not fit any more.
-        Conflict: Traffic is to be kept and spawned.
-    """
-    before = (scenario.keep_traffic, scenario.traffic_density, scenario.goal)
-    if before == (keep_traffic, given.density.value, given.goal or ""):
-        return
-    spawned = None
-    if before[:2] == (keep_traffic, given.density.value) and scenario.spawned is not None:
-        spawned = modification_from_document(scenario.spawned).added
-    reference, scenario.keep_traffic = scenario.reference, keep_traffic
-    kept = replace(
-        given,
-        traffic=spawned,
-        interplan=scenario.interplan,
-        instruction_is_generated=scenario.instruction_is_generated,
-    )
-    scenario.spawned = None
-    _set_circumstances(scenario, kept, reference)
-    scenario.original_image, scenario.windows = "", {}
-
-
 def _insert(scenario: Scenario, actor: User | None) -> None:
     try:
         with transaction.atomic():
             scenario.save(force_insert=True)
-    except IntegrityError:  # somebody else was faster
-        problem = f"There is a scenario called {scenario.slug!r} already; try again."
+    except IntegrityError:
+        problem = f"There is a scenario called {scenario.slug!r} already; choose another slug."
         raise Conflict(problem) from None
     after = {
         "slug": scenario.slug,
@@ -298,25 +200,71 @@ def _insert(scenario: Scenario, actor: User | None) -> None:
     log_change(scenario, "add", actor, after=after)
 
 
-def _set_circumstances(
-    scenario: Scenario, given: Circumstances, reference: dict[str, Any] | None
+def set_wording(scenario: Scenario, instruction: str, type: str) -> None:
+    """Set type and instruction without saving; an instruction that changes is a person's own.
+
+    Raises:
+        InvalidDocument: The type or the instruction breaks its format.
+    """
+    check_prose("instruction", instruction, what="scenario", longest=INSTRUCTION_LENGTH)
+    scenario.type, scenario.type_label = type, _label_for(type)
+    scenario.instruction_is_generated &= scenario.instruction == instruction.strip()
+    scenario.instruction = instruction.strip()
+
+
+def change_surroundings(
+    scenario: Scenario, *, keep_traffic: bool, density: str, goal: str
+) -> None:
+    """Set traffic and goal of a scenario that was never asked, without saving.
+
+    Raises:
+        InvalidDocument: There is no such density or goal.
+        InvalidModification: The reference does not fit any more.
+        Conflict: Traffic is to be kept and spawned.
+    """
+    before = scenario.keep_traffic, scenario.traffic_density
+    is_same_traffic = before == (keep_traffic, density or TrafficDensity.NONE)
+    if is_same_traffic and scenario.goal == goal:
+        return
+    traffic = None
+    if is_same_traffic and scenario.spawned is not None:
+        traffic = modification_from_document(scenario.spawned).added
+    _set_surroundings(scenario, keep_traffic, density, goal, traffic, scenario.reference)
+    scenario.original_image, scenario.windows = "", {}
+
+
+def _set_surroundings(
+    scenario: Scenario,
+    keep_traffic: bool,
+    density: str,
+    goal: str,
+    traffic: Sequence[TrafficAgent] | None,
+    reference: dict[str, Any] | None,
 ) -> None:
     """Keep them and the reference; spawned traffic stays whatever becomes of the reference."""
-    change = None if reference is None else modification_from_document(reference)
-    scenario.traffic_density, scenario.goal = given.density.value, given.goal or ""
-    scenario.interplan = given.interplan
-    scenario.instruction_is_generated = given.instruction_is_generated
-    density, traffic = given.density, given.traffic
-    if scenario.keep_traffic and density is not TrafficDensity.NONE:
+    choices = {"density": (density, [*TrafficDensity]), "goal": (goal, [*GOALS])}
+    problems = [
+        (name, f"{given!r} must be one of {', '.join(known)}")
+        for name, (given, known) in choices.items()
+        if given and given not in known
+    ]
+    if problems:
+        raise InvalidDocument("scenario", problems)
+    spawned = TrafficDensity(density or TrafficDensity.NONE)
+    if keep_traffic and spawned is not TrafficDensity.NONE:
         raise Conflict("Spawned traffic replaces the recorded one: choose one of the two.")
+    scenario.keep_traffic, scenario.traffic_density = keep_traffic, spawned.value
+    scenario.goal = TurnType(goal).value if goal else ""
+    change = None if reference is None else modification_from_document(reference)
     if traffic is None:
         base = scenario.base_scene
         traffic = spawn_traffic(
             without_traffic(scene_from_document(base.document)),
-            density,
+            spawned,
             seed=base.slug,
             clear_of=() if change is None else change.added,
         )
+    scenario.spawned = None
     if traffic:
         scenario.spawned = modification_to_document(Modification(added=tuple(traffic)))
     if change is not None:

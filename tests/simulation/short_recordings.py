@@ -1,29 +1,18 @@
-"""Half the expert's speed on short recordings: `python -m bench.recording_lengths`.
+"""Recordings cut to 3, 6, 8 and 15 s, each driven for 15 s at half of the expert's mean speed."""
 
-Cuts recordings to 3, 6, 8 and 15 s, drives 15 s on each at half of the expert's mean speed, and
-prints a table; with REALDATA_DIR set also for the recorded log. `--write` stores it in
-docs/simulation.md.
-"""
-
-import os
-import sys
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import numpy as np
 
 from augment.scene.entities import Scene
 from augment.scene.recording import Recording, Track
 from augment.simulation.drive import Drive, Expert, expert_of, run
-from augment.simulation.metrics import progress_ratio
 from augment.simulation.planning import Plan, Situation
 from augment.simulation.road import Road
 from augment.simulation.score import score_drive
 from augment.simulation.states import STEP_S, EgoBody
 from augment.simulation.traffic import DriveSetting
-from bench.report import ROOT, table, write_block
-from tests.recorded import recorded
 from tests.scenes import vehicle
 from tests.simulation.worlds import street
 
@@ -103,30 +92,3 @@ def half_speed_drives(scene: Scene, recording: Recording) -> Iterator[HalfSpeed]
         drive = run(setting, ConstantSpeed(expert.progress_m / 15.0 / 2.0), road=road)
         value = score_drive(drive, expert).value
         yield HalfSpeed(recorded_s=length_s, drive=drive, expert=expert, score=value)
-
-
-def main() -> None:
-    """Drive, and print the table or store it."""
-    worlds = {"street": recorded_street()}
-    if "REALDATA_DIR" in os.environ:
-        worlds["Argoverse 2 log"] = recorded(Path(os.environ["REALDATA_DIR"]))
-    lines = [
-        [
-            name,
-            f"{one.recorded_s:g} s",
-            f"{one.expert.progress_m:.1f}",
-            f"{100.0 * progress_ratio(one.drive, one.expert):.1f}",
-            f"{len(one.drive.objects[-1])}",
-            f"{100.0 * one.score:.1f}",
-        ]
-        for name, (scene, recording) in worlds.items()
-        for one in half_speed_drives(scene, recording)
-    ]
-    head = ["scene", "recorded", "expert (m)", "progress (%)", "others at the end", "score (%)"]
-    print(text := table(head, lines))
-    if "--write" in sys.argv[1:]:
-        write_block("recording lengths", text, page=ROOT / "docs" / "simulation.md")
-
-
-if __name__ == "__main__":
-    main()
