@@ -49,26 +49,6 @@ def test_counts_of_every_line_and_what_the_page_prints(shown: Shown) -> None:
         assert any(cell.startswith(str(round(100 * np.mean(own)))) for cell in cells[4:])
 
 
-def test_the_cross_check_is_the_plain_two_way_sandwich(shown: Shown) -> None:
-    votes, slugs = shown.main, shown.slugs
-    experts, items = codes([v.judge for v in votes]), codes([v.item for v in votes])
-    covariance = 0
-    for sign, groups in ((1, experts), (1, items), (-1, experts * 1000 + items)):
-        found = glm(
-            votes, slugs, cov_type="cluster", cov_kwds={"groups": groups, "use_correction": False}
-        )
-        number = len(np.unique(groups))
-        covariance = covariance + sign * found.cov_params() * number / (number - 1)
-    centred = np.vstack([np.zeros(len(slugs) - 1), np.eye(len(slugs) - 1)])
-    centred -= centred.mean(axis=0)
-    variances = (centred @ covariance @ centred.T).diagonal()
-    errors = POINTS * np.sqrt(variances) * t.ppf(0.975, len(np.unique(experts)) - 1)
-    rating = elo_of(glm(votes, slugs), slugs)
-    kept = shown.results.board.check
-    for slug, error in zip(slugs, errors, strict=True):
-        assert kept[slug] == pytest.approx((rating[slug] - error, rating[slug] + error), rel=1e-5)
-
-
 def test_ties_and_what_is_left_out(shown: Shown) -> None:
     ties = np.mean([vote.score == 0.5 for vote in shown.main])
     assert shown.results.trust.tie_share == pytest.approx(ties)

@@ -1,5 +1,6 @@
 """The page of a new job: choose, see what it would use, try one scenario first, launch."""
 
+from dataclasses import replace
 from decimal import Decimal
 from typing import Any
 
@@ -21,7 +22,8 @@ from augment.services.endpoints.contestants import OPTION_INPUTS
 from augment.services.endpoints.known_endpoints import is_key_here
 from augment.services.inputs import inputs_of, read_request, read_values
 from augment.services.running.choosing import find_obstacle, keys_missing
-from augment.services.running.estimates import JobEstimate
+from augment.services.running.estimates import JobEstimate, estimate
+from augment.services.running.jobs import JobRequest, JobScope, launch
 from augment.services.running.matrix import ChosenCells, add_cells, matrix_of, read_cells
 from augment.tasks import enqueue_job
 

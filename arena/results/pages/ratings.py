@@ -17,7 +17,7 @@ from arena.results.exports.tables import EARLY_LOOK, for_experts, leaderboard_ta
 from arena.results.exports.votes import VOTE_FORMATS, unrated_votes
 from arena.results.exports.writers import CHART_FORMATS, RATING_FILES
 from arena.results.pages.rating_form import RatingForm, rate_or_send
-from arena.results.pages.tabs import FOR_EXPERTS, TABS, show_both_versions
+from arena.results.pages.tabs import FOR_EXPERTS, TABS, show_adjustment
 from arena.results.queries.access import (
     ResultsAccess,
     results_access,
@@ -79,15 +79,16 @@ def results_page(request: HttpRequest, code: uuid.UUID, tab: str = "table") -> H
 
 def _of_rating(snapshot: Snapshot, tab: str, *, is_staff: bool) -> dict[str, object]:
     """Return what the page shows of a rating."""
-    results, table = snapshot.results, leaderboard_table(snapshot)
+    table = leaderboard_table(snapshot)
+    if not is_staff:
+        table = for_experts(table)
     settled = count_settled(snapshot)
     return {
-        "table": table if is_staff else for_experts(table),
-        "own_votes": show_both_versions(results.own_votes, table) if is_staff else None,
+        "table": table,
         "early_look": EARLY_LOOK,
         "settled": settled,
         "cast": snapshot.votes_counted - settled,
-        "adjusted": show_both_versions(results.adjustment, table),
+        "adjusted": show_adjustment(snapshot),
         **TABS[tab](snapshot, table),
     }
 

@@ -8,8 +8,7 @@ from arena.jobs.exports.driving import DrivingTable, shown_driving
 from arena.jobs.queries import shown_augmentations
 from arena.models import Snapshot
 from arena.people.queries import natural_order
-from arena.rating.lines import rating_text
-from arena.rating.snapshot_document import Adjustment, BothRanks, OwnVotes, PairRecord, PanelRater
+from arena.rating.snapshot_document import PairRecord, PanelRater
 from arena.results.exports.charts import scatters_of
 from arena.results.exports.tables import ON_PAGE, LeaderboardTable, Row
 from arena.results.queries.access import log_of, names_in_log, snapshots_of
@@ -39,7 +38,6 @@ def fill_table(snapshot: Snapshot, table: LeaderboardTable) -> Context:
         "columns": ON_PAGE,
         "has_bounds": any(row.has_bound for row in table.rows),
         "largest_move": max(moves, default=None),
-        "rival": trust.removal and _by_slug(table)[trust.removal.rival].name,
         "ties": round((trust.tie_share or 0.0) * snapshot.votes_counted),
         "all_tied": trust.tie_share == 1.0,
         "has_places": any(row.rank_best != row.rank_worst for row in table.rows),
@@ -113,12 +111,7 @@ def fill_raters(snapshot: Snapshot, table: LeaderboardTable) -> Context:
         "trust": trust,
         "all_tied": trust.tie_share == 1.0,
         "panel": [
-            {
-                "rater": line,
-                "is_author": line.judge in authors,
-                "own_votes": own.get(line.judge, 0),
-                **_counts(line),
-            }
+            {"rater": line, "is_author": line.judge in authors, **_counts(line)}
             for line in sorted(lines, key=lambda line: natural_order(line.name))
         ],
         "automatic": sum(line.votes for line in trust.raters if line.judge == AUTOMATIC),
@@ -138,9 +131,9 @@ def _counts(rater: PanelRater) -> Context:
 
 
 def fill_coverage(snapshot: Snapshot, table: LeaderboardTable) -> Context:
-    """Widths against votes, and how many votes narrower ones need."""
+    """Widths against votes."""
     rows = [(n, row) for n, row in enumerate(table.rows, 1) if row.half_width is not None]
-    return {"claims": snapshot.results.claims, "rows": rows}
+    return {"rows": rows}
 
 
 def fill_displacement(snapshot: Snapshot, table: LeaderboardTable) -> Context:
@@ -218,34 +211,14 @@ FOR_EXPERTS = ("table", "pairs", "types")
 """The tabs that not only analysts and admins see."""
 
 
-def show_both_versions(
-    kept: OwnVotes | Adjustment | None, table: LeaderboardTable
-) -> Context | None:
-    """A table with and without own votes, or adjusted and as voted; None without the other one."""
+def show_adjustment(snapshot: Snapshot) -> list[Context] | None:
+    """What the covariates are worth; None where nothing was to be adjusted for."""
+    kept, labels = snapshot.results.adjustment, COVARIATE_LABELS
     if kept is None:
         return None
-    lines, rows = {line.slug: line for line in kept.lines}, _by_slug(table)
-    labels = COVARIATE_LABELS
-    return {
-        "kept": kept,
-        "effects": [
-            {"label": labels.get(effect.name, effect.name), "kept": effect}
-            for effect in getattr(kept, "effects", ())
-        ],
-        "lines": [
-            {
-                "kept": lines[row.slug],
-                "name": row.name,
-                "simulated": row.simulated,
-                "elo_with": rating_text(lines[row.slug].rating_with),
-                "elo_without": rating_text(lines[row.slug].rating_without),
-                "moves": _moves(lines[row.slug]),
-            }
-            for row in table.rows
-        ],
-        "places": kept.largest and kept.largest.places,
-        "who": [rows[slug].name for slug in kept.largest.slugs] if kept.largest else [],
-    }
+    return [
+        {"label": labels.get(effect.name, effect.name), "kept": effect} for effect in kept.effects
+    ]
 
 
 # --- Private -----------------------------------------------------------------------------------
@@ -253,8 +226,3 @@ def show_both_versions(
 
 def _by_slug(table: LeaderboardTable) -> Mapping[str, Row]:
     return {row.slug: row for row in table.rows}
-
-
-def _moves(line: BothRanks) -> bool:
-    ranks = (line.rank_with, line.rank_without)
-    return None not in ranks and ranks[0] != ranks[1]
