@@ -40,7 +40,7 @@ class Format(Generic[Table]):
     write: Callable[[Table], bytes]
 
 
-class Exported(NamedTuple):
+class Export(NamedTuple):
     """Something that is offered as files.
 
     Attributes:

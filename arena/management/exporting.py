@@ -9,7 +9,7 @@ from uuid import UUID
 from django.utils.text import slugify
 
 from arena.errors import StudyStillOpen
-from arena.exports.formats import Exported, format_named
+from arena.exports.formats import Export, format_named
 from arena.jobs.exports.files import scenario_zip, zip_name
 from arena.jobs.exports.tables import ANALYSES, JOB_FILES
 from arena.models import Snapshot, Study
@@ -80,7 +80,7 @@ def add_kinds(kinds: Any) -> None:
         parser.add_argument("--out", required=True, help="a file; - for standard output")
 
 
-def _write(exported: Exported, form: str, find: Callable[[], Any], **more: Any) -> ExportedFile:
+def _write(exported: Export, form: str, find: Callable[[], Any], **more: Any) -> ExportedFile:
     """Write one format of what is found; the format is looked at first."""
     chosen = format_named(exported.formats, form)
     content = chosen.write(exported.make(find(), **more))
@@ -115,7 +115,7 @@ def _write_votes(options: Chosen, say: Say) -> ExportedFile:
     """Write the votes that the rating counted; of a cancelled study all that were given."""
     study = study_named(options["study"])
     if study.state == Study.State.CANCELLED:
-        return _write(Exported(VOTE_FORMATS, unrated_votes), options["format"], lambda: study)
+        return _write(Export(VOTE_FORMATS, unrated_votes), options["format"], lambda: study)
     return _write_rating(options, say)
 
 

@@ -16,7 +16,7 @@ from rest_framework.request import Request
 
 from arena import tasks
 from arena.api.access import STAFF
-from arena.api.fields import FlagField, StrictSerializer, TextField, WholeNumberField
+from arena.api.fields import RequestBody
 from arena.api.views import (
     ApiView,
     FileView,
@@ -30,19 +30,16 @@ from arena.errors import NoSnapshot
 from arena.exports.formats import download
 from arena.models import Snapshot, Study
 from arena.models.ratings import STORED
-from arena.pairing.order import MAIN, REPEAT
-from arena.rating.leaderboard import Intervals, Line, Method
-from arena.rating.rules import Unit
+from arena.rating.leaderboard import Line
 from arena.results.exports.tables import leaderboard_table
 from arena.results.exports.writers import RATING_FILES
 from arena.results.queries.access import must_read_results
-from arena.results.queries.votes import Filters
-from arena.results.services.ratings import DEFAULT_ROUNDS, MOST_ROUNDS, is_big, plan_snapshot
+from arena.results.services.rating_request import RatingRequest
+from arena.results.services.ratings import is_big, plan_snapshot
 from arena.results.services.ratings import rate_now as rate
 from arena.studies.api import get_study
-from arena.studies.services.plan import HIGHEST_SEED
 from augment.errors import UnknownName
-from augment.services.scenarios.scenes import type_choices
+from augment.services.inputs import read_request
 
 _FIELDS: dict[Any, Callable[[], serializers.Field[Any, Any, Any, Any]]] = {
     str: serializers.CharField,
@@ -108,33 +105,10 @@ class SnapshotDocument(RowDocument[Snapshot]):
         return TableDocument(leaderboard_table(row)).data if ready else None
 
 
-class SnapshotBody(StrictSerializer):
+class SnapshotBody(RequestBody):
     """How to rate; what is missing is the default."""
 
-    method = serializers.ChoiceField(
-        choices=[one.value for one in Method], required=False, default=Method.BRADLEY_TERRY.value
-    )
-    resample = serializers.ChoiceField(
-        source="unit", choices=[one.value for one in Unit], required=False
-    )
-    intervals = serializers.ChoiceField(choices=[one.value for one in Intervals], required=False)
-    rounds = WholeNumberField(
-        required=False, default=DEFAULT_ROUNDS, min_value=1, max_value=MOST_ROUNDS
-    )
-    seed = WholeNumberField(required=False, default=0, min_value=0, max_value=HIGHEST_SEED)
-    types = serializers.ListField(
-        child=TextField(max_length=40), required=False, default=list, max_length=200
-    )
-    experts = serializers.ListField(
-        child=TextField(max_length=200),
-        required=False,
-        default=list,
-        max_length=5_000,
-        help_text="Codes as a rating names them; none for all.",
-    )
-    with_repeats = FlagField(required=False, default=False)
-    leave_out_settled = FlagField(required=False, default=False)
-    leave_out_own = FlagField(required=False, default=False)
+    request = RatingRequest
 
 
 class SnapshotsView(ApiView):
@@ -150,10 +124,11 @@ class SnapshotsView(ApiView):
         """
         study = get_study(code)
         must_read_results(user=self.user, study=study)
-        wanted = _wanted(given) | {"early": study.state == Study.State.OPEN, "actor": self.user}
+        choices = read_request(RatingRequest, given).choices()
+        choices |= {"early": study.state == Study.State.OPEN, "actor": self.user}
         if not is_big(study):
-            return rate(study=study, **wanted)
-        plan = partial(plan_snapshot, study=study, **wanted)
+            return rate(study=study, **choices)
+        plan = partial(plan_snapshot, study=study, **choices)
         planned, warnings = keep_and_send(plan, tasks.send_snapshot)
         planned.reason = " ".join([planned.reason, *warnings]).strip()
         return planned
@@ -216,25 +191,3 @@ class SnapshotExportView(FileView):
             raise Http404 from error
         stem = f"{slugify(snapshot.study.name) or 'study'}-{'rating' if name == 'all' else name}"
         return download(RATING_FILES[name].formats, form, stem, made)
-
-
-# --- Private -----------------------------------------------------------------------------------
-
-
-def _wanted(given: dict[str, Any]) -> dict[str, Any]:
-    """Return the choices of the rating services."""
-    kinds = (MAIN, REPEAT) if given.pop("with_repeats") else (MAIN,)
-    known = [name for name, _ in type_choices()]
-    for name in given["types"]:
-        if name not in known:
-            raise serializers.ValidationError(
-                {"types": [f"There is no type {name!r}; there are {', '.join(known)}."]}
-            )
-    filters = Filters(
-        types=tuple(given.pop("types")),
-        experts=tuple(given.pop("experts")),
-        kinds=kinds,
-        leave_out_settled=given.pop("leave_out_settled"),
-        leave_out_own=given.pop("leave_out_own"),
-    )
-    return given | {"filters": filters}

@@ -249,7 +249,7 @@ HOSTILE: list[tuple[str, dict[str, Any], str]] = [
     ("augment.simulation", {"offsets": "wide"}, "offsets: one of paper, original"),
     ("augment.simulation", {"trace": "AAAA"}, "trace: "),
     ("augment.generationjob", {"state": "running"}, "state: 'running' is not over"),
-    ("augment.generationjob", {"samples": 9999}, "Samples go from 1 to"),
+    ("augment.generationjob", {"samples": 9999}, "samples: goes from 1 to"),
     ("augment.augmentation", {"state": "queued"}, "state: 'queued' is not over"),
     ("augment.augmentation", {"image": "../../secret.png"}, "image: '../../secret.png' must be"),
     ("augment.augmentation", {"image": f"/{'0' * 64}.png"}, "must be bev/"),

@@ -107,7 +107,7 @@ def demo_folder(steady_rows: None, tmp_path: Path, settings: Settings) -> Path:
     for person in Person.objects.all():
         person.code = uuid.uuid5(uuid.NAMESPACE_URL, person.user.username)
         person.save()
-    vote_and_rate([f"place-{number:02d}" for number in range(PLACES)], print, tmp_path / "tables")
+    vote_and_rate([f"place-{number:02d}" for number in range(PLACES)], tmp_path / "tables")
     return tmp_path / "tables"
 
 

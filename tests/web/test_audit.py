@@ -178,7 +178,7 @@ def test_no_page_shows_results_of_an_open_study_before_an_early_look() -> None:
         dict.fromkeys(pages, 200)
     )
     admin = signed_in(accounts["admin"])
-    assert admin.get(pages["csv"]).status_code == 403
+    assert admin.get(pages["leaderboard.csv"]).status_code == 403
 
 
 @pytest.mark.parametrize(

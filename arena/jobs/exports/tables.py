@@ -12,7 +12,7 @@ from arena.exports.formats import (
     WHOLE,
     YES_NO,
     Columns,
-    Exported,
+    Export,
     Sheet,
     sheet_of,
 )
@@ -148,32 +148,32 @@ def analysis_sheet(job: GenerationJob, *, part: str) -> Sheet:
 
 
 JOB_TABLES = {
-    "faults": Exported(faults.FORMATS, faults.fault_table, "how often experts saw which fault"),
-    "tool-calls": Exported(
+    "faults": Export(faults.FORMATS, faults.fault_table, "how often experts saw which fault"),
+    "tool-calls": Export(
         TABLE_FORMATS, tool_call_sheet, "calls of the function: tried, understood, mended"
     ),
-    "augmentations": Exported(
+    "augmentations": Export(
         TABLE_FORMATS, augmentation_sheet, "one row for each augmentation of a job"
     ),
-    "repeats": Exported(TABLE_FORMATS, repeat_sheet, "what varies between the samples of a job"),
-    "displacement-objects": Exported(TABLE_FORMATS, displacement.object_sheet),
+    "repeats": Export(TABLE_FORMATS, repeat_sheet, "what varies between the samples of a job"),
+    "displacement-objects": Export(TABLE_FORMATS, displacement.object_sheet),
     **{
-        f"displacement-by-{by.value}": Exported(
+        f"displacement-by-{by.value}": Export(
             displacement.FORMATS, partial(displacement.displacement_table, by=by)
         )
         for by in By
     },
     **{
-        f"driving-{score}": Exported(driving.FORMATS, partial(driving.driving_table, score=score))
+        f"driving-{score}": Export(driving.FORMATS, partial(driving.driving_table, score=score))
         for score in SCORES
     },
     **{
-        f"analyses-{part}": Exported(TABLE_FORMATS, partial(analysis_sheet, part=part))
+        f"analyses-{part}": Export(TABLE_FORMATS, partial(analysis_sheet, part=part))
         for part in ANALYSES
     },
 }
 JOB_FILES = JOB_TABLES | {
-    "transcripts": Exported(
+    "transcripts": Export(
         TRANSCRIPT_FORMATS,
         lambda job: job,
         "every transcript of a job: a line of JSON each, or with their images as a zip",

@@ -25,18 +25,22 @@ from arena.exports.formats import TABLE_FORMATS, download
 from arena.jobs.exports import displacement, driving
 from arena.jobs.exports.files import TRANSCRIPT_FORMATS, transcript_lines
 from arena.jobs.exports.tables import JOB_FILES
-from arena.jobs.queries import DRIVES, Part, before_of, drive_cells
+from arena.jobs.queries import before_of
 from arena.jobs.services import ask_for_file
 from arena.models import ScenarioFile
 from arena.site.access import ADMIN, STAFF, allow_only, user_of
 from arena.site.acts import refusals_told, send_later
-from arena.site.listing import choice_asked, page_asked
+from arena.site.listing import choice_asked, read_page
 from augment.errors import UnknownName
 from augment.models import GenerationJob, Simulation
 from augment.services.judging import simulations
 from augment.services.judging.analyses import analyse_job
 from augment.services.judging.displacement import By, types_named
-from augment.services.judging.driving_scores import least_clearance_m, options_driven
+from augment.services.judging.driving_scores import (
+    drives_of_job,
+    least_clearance_m,
+    options_driven,
+)
 from augment.services.judging.scenario_export import FORMATS
 from augment.services.judging.simulations import FILES, NUPLAN, SCORES, Options, drive_file
 from augment.tasks import enqueue_simulations
@@ -45,6 +49,7 @@ PDM_CLOSED = Options().planner
 OFFSETS = {"paper": "Up to 4 m (paper)", "original": "Up to 1 m (original)"}
 """What the names of the lateral offsets mean."""
 
+DRIVES_AT_ONCE = 50
 PLANNERS = {PDM_CLOSED: "PDM-Closed", "idm": "IDM"}
 
 
@@ -74,34 +79,19 @@ def simulate_job(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
 @allow_only(*STAFF)
 @require_safe
 def drives_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
-    """Show the drives of a job in a grid, page by page."""
+    """List the drives of a job that were made one way, page by page."""
     job = get_object_or_404(GenerationJob, code=code)
-    score, known = score_asked(request), options_driven(job)
+    known = options_driven(job)
     way = _way_asked(request, known)
-    part = Part(
-        view=DRIVES,
-        row=page_asked(request, "row"),
-        column=page_asked(request, "column"),
-        sample=page_asked(request, "sample"),
+    drives = Simulation.objects.filter(drives_of_job(job)).defer("trace")
+    rows = (known[way] if known else Options()).of(drives)
+    related = rows.select_related("scenario", "augmentation__contestant")
+    ordered = related.order_by(
+        "scenario__type", "scenario__slug", "augmentation__contestant__name"
     )
-    cells = drive_cells(job, known[way] if known else Options(), part)
-    lines = [
-        {
-            "scenario": row.scenario,
-            "scenes": [
-                _cell(found.get(row.scenario.pk), score)
-                for found in (cells.before, cells.reference)
-            ],
-            "cells": [
-                _cell(cells.by_augmentation.get(sample[0].pk) if sample else None, score)
-                for sample in row.cells
-            ],
-        }
-        for row in cells.grid.rows
-    ]
-    context = {"job": job, "lines": lines, "grid": cells.grid, "score": score}
-    driven = {"labels": driving.SCORE_LABELS, "driven": way}
-    return render(request, "drives/list.html", context | driven)
+    page = read_page(request, ordered, size=DRIVES_AT_ONCE)
+    lines = [(row, least_clearance_m(row)) for row in page.object_list]
+    return render(request, "drives/list.html", {"job": job, "page": page, "lines": lines})
 
 
 @allow_only(*STAFF)
@@ -180,16 +170,6 @@ def _way_asked(request: HttpRequest, known: list[Options]) -> int:
 def _driven(code: uuid.UUID) -> Simulation:
     rows = Simulation.objects.select_related("scenario", "augmentation__contestant")
     return get_object_or_404(rows, code=code)
-
-
-def _cell(row: Simulation | None, score: str) -> dict[str, Any] | None:
-    if row is None:
-        return None
-    return {
-        "row": row,
-        "value": getattr(row, SCORES[score]),
-        "clearance_m": least_clearance_m(row),
-    }
 
 
 def _metrics(row: Simulation | None) -> list[dict[str, Any]]:

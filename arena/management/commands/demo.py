@@ -38,12 +38,6 @@ class Command(TerminalCommand):
             "metavar": "N",
             "help": "only N scenarios of each type; default: all",
         },
-        "--driven": {
-            "type": at_least(0),
-            "metavar": "N",
-            "default": demo.DRIVEN_PER_TYPE,
-            "help": "drive N scenarios of each type; default: %(default)s",
-        },
     }
 
     def handle(self, *args: Any, **options: Any) -> None:
@@ -51,13 +45,11 @@ class Command(TerminalCommand):
         web = Web(host=options["host"], port=options["port"])
         try:
             with hold_alone(self.stdout.write):
-                self._run(
-                    web, options["per_type"], options["driven"], serve=not options["no_serve"]
-                )
+                self._run(web, options["per_type"], serve=not options["no_serve"])
         except KeyboardInterrupt:
             raise CommandError(STOPPED, returncode=INTERRUPTED) from None
 
-    def _run(self, web: Web, per_type: int | None, driven: int, *, serve: bool) -> None:
+    def _run(self, web: Web, per_type: int | None, *, serve: bool) -> None:
         started = time.monotonic()
         server = [web_server(web)] if serve else []
         call_command("prepare", verbosity=0)
@@ -70,25 +62,20 @@ class Command(TerminalCommand):
             try:
                 supervisor.start()
                 look = partial(_look_at, supervisor)
-                job = demo.generate(scenarios, self.stdout.write, look)
-                demo.start_drives(scenarios, per_type=driven)
+                demo.generate(scenarios, self.stdout.write, look)
                 folder = settings.VAR_DIR / "demo"
-                board = demo.vote_and_rate(scenarios, self.stdout.write, folder)
-                drives = demo.driving_lines(job, look)
-                self._show(board, drives, web, time.monotonic() - started, serve=serve)
+                board = demo.vote_and_rate(scenarios, folder)
+                demo.start_drives()
+                self._show(board, web, time.monotonic() - started, serve=serve)
                 if serve and not supervisor.is_stopping:
                     supervisor.watch()
             finally:
                 supervisor.stop()
 
-    def _show(
-        self, board: demo.DemoTable, drives: list[str], web: Web, took_s: float, *, serve: bool
-    ) -> None:
+    def _show(self, board: demo.DemoTable, web: Web, took_s: float, *, serve: bool) -> None:
         lines = [
             "",
             board.text,
-            "",
-            *drives,
             "",
             f"Tables:   {', '.join(str(_short(path)) for path in board.files)}",
             f"Pictures: {_pictures()}/bev/",

@@ -10,7 +10,7 @@ from typing import Any
 from arena.exports.cells import csv_text
 from arena.exports.files import zip_bytes
 from arena.exports.formats import (
-    Exported,
+    Export,
     Format,
     Sheet,
     Value,
@@ -202,10 +202,10 @@ def chart_named(snapshot: Snapshot, *, name: str) -> Chart:
 
 CHARTS = ("pairs", "types", "width", "displacement", "elo-usd", "elo-tokens")
 RATING_FILES = {
-    "leaderboard": Exported(FORMATS, leaderboard_table, "the newest rating of a study"),
-    "votes": Exported(VOTE_FORMATS, vote_table, "the votes of the newest rating, with pseudonyms"),
-    "all": Exported(formats(zip=zip_bytes), bundle_files),
-    **{name: Exported(CHART_FORMATS, partial(chart_named, name=name)) for name in CHARTS},
+    "leaderboard": Export(FORMATS, leaderboard_table, "the newest rating of a study"),
+    "votes": Export(VOTE_FORMATS, vote_table, "the votes of the newest rating, with pseudonyms"),
+    "all": Export(formats(zip=zip_bytes), bundle_files),
+    **{name: Export(CHART_FORMATS, partial(chart_named, name=name)) for name in CHARTS},
 }
 """What a rating is offered as. PostgreSQL keeps the keys of stored documents in an order of its
 own, so documents are sorted."""

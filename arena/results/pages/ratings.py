@@ -27,11 +27,13 @@ from arena.results.queries.access import (
 )
 from arena.results.queries.evidence import count_settled
 from arena.results.queries.votes import is_imported
+from arena.results.services.rating_request import RatingRequest
 from arena.results.services.ratings import open_early
 from arena.site.access import ADMIN, ANALYST, EXPERT, STAFF, allow_only, user_of
 from arena.site.acts import refusals_told, tell_errors
 from arena.studies.pages.studies import export_place
 from augment.errors import UnknownName
+from augment.services.inputs import read_request
 
 SHOWN = 12
 """So many ratings can be chosen on the page; the log lists all."""
@@ -102,10 +104,9 @@ def rate_study(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     if not form.is_valid():
         tell_errors(request, form)
         return redirect("results", code=code)
-    choices = form.choices()
-    choices["early"] = study.state == Study.State.OPEN
-    choices["actor"] = user_of(request)
     with refusals_told(request):
+        choices = read_request(RatingRequest, form.cleaned_data).choices()
+        choices |= {"early": study.state == Study.State.OPEN, "actor": user_of(request)}
         rate_or_send(request, study, **choices)
     return redirect("results", code=code)
 

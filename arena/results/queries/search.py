@@ -79,7 +79,6 @@ class VoteSearch:
     Attributes:
         contestant, opponent: Slugs of who was shown.
         scenario: A slug, and `type` the type of scenarios.
-        sample: Its number, in a study that shows every sample on its own.
         expert: The code of a judge.
         outcome: Of OUTCOMES; won, tied and lost are seen from the contestant.
         part: Of PARTS: what a number of the results stands for.
@@ -90,7 +89,6 @@ class VoteSearch:
     contestant: str = ""
     opponent: str = ""
     scenario: str = ""
-    sample: str = ""
     type: str = ""
     expert: str = ""
     outcome: str = ""
@@ -116,11 +114,7 @@ def find_votes(snapshot: Snapshot, search: VoteSearch) -> QuerySet[Vote]:
         return rows.none()
     if search.expert:
         rows = rows.filter(expert__in=users_of([search.expert]).values())
-    words = {
-        "matchup__scenario__slug": search.scenario,
-        "matchup__right__sample": search.sample,  # both sides show the same one
-        "matchup__scenario__type": search.type,
-    }
+    words = {"matchup__scenario__slug": search.scenario, "matchup__scenario__type": search.type}
     rows = rows.filter(**{path: word for path, word in words.items() if word})
     if search.outcome == "both_miss":
         rows = rows.filter(both_miss=True)
@@ -146,7 +140,7 @@ def find_lines(snapshot: Snapshot, search: VoteSearch) -> QuerySet[ImportedVote]
 
 def is_found(tie: Judged, search: VoteSearch) -> bool:
     """Whether a tie on a pair that nobody can tell apart is looked for."""
-    if search.part or search.sample:
+    if search.part:
         return False
     marks = {EVERY: True, LEFT_OUT: tie.mark not in (COUNTED, AUTOMATIC_TIE)}
     return (
