@@ -105,11 +105,9 @@ class JobBody(RequestBody):
     request = JobRequest
 
 
-class EstimateLineDocument(serializers.Serializer[Any]):
-    """The expected use of one contestant."""
+class UseDocument(serializers.Serializer[Any]):
+    """An expected use; money is null where a price is unknown."""
 
-    slug = serializers.CharField()
-    name = serializers.CharField()
     rows = serializers.IntegerField()
     calls = serializers.ListField(
         child=serializers.IntegerField(), help_text="At least, as expected, at most."
@@ -118,24 +116,24 @@ class EstimateLineDocument(serializers.Serializer[Any]):
     tokens_out = serializers.IntegerField()
     usd = serializers.DecimalField(None, 9, allow_null=True)
     usd_most = serializers.DecimalField(None, 9, allow_null=True)
+    answered = serializers.IntegerField(help_text="Rows whose answers are in the store already.")
+
+
+class EstimateLineDocument(UseDocument):
+    """The expected use of one contestant."""
+
+    slug = serializers.CharField()
+    name = serializers.CharField()
     seen = serializers.IntegerField(
         help_text="Earlier augmentations that it rests on; 0 for a guess."
     )
-    answered = serializers.IntegerField(help_text="Rows whose answers are in the store already.")
 
 
-class EstimateDocument(serializers.Serializer[Any]):
+class EstimateDocument(UseDocument):
     """The expected use of a job."""
 
-    rows = serializers.IntegerField()
     scenarios = serializers.IntegerField()
     contestants = serializers.IntegerField()
-    calls = serializers.ListField(child=serializers.IntegerField())
-    tokens_in = serializers.IntegerField()
-    tokens_out = serializers.IntegerField()
-    usd = serializers.DecimalField(None, 9)
-    usd_most = serializers.DecimalField(None, 9)
-    answered = serializers.IntegerField(help_text="Rows whose answers are in the store already.")
     lines = EstimateLineDocument(many=True)
 
 

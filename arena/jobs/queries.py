@@ -10,7 +10,7 @@ from django.core.paginator import Page, Paginator
 from django.db.models import Count, Q, QuerySet
 
 from arena.errors import NotYours
-from arena.models import FaultLabel, LabellingRound, LabelTask, Study
+from arena.models import LabellingRound, LabelTask, Study
 from arena.voting.queries.remembering import Remembered, plan_of
 from augment.models import (
     Augmentation,
@@ -222,30 +222,6 @@ def next_task(*, labelling: LabellingRound, expert: User) -> LabelTask | None:
         .order_by("position")
         .first()
     )
-
-
-def labels_of(job: GenerationJob) -> QuerySet[FaultLabel]:
-    """Every label on the augmentations of a job, each with its augmentation's contestant."""
-    found = FaultLabel.objects.filter(augmentation__job=job).select_related("augmentation")
-    return found.only(*_LABEL, "augmentation__contestant").order_by("augmentation", "pk")
-
-
-def contestants_of(job: GenerationJob) -> list[tuple[Contestant, int]]:
-    """The contestants of a job by name, each with its answers that are none; two queries."""
-    missed = Q(state__in=(Augmentation.State.UNREADABLE, Augmentation.State.REFUSED))
-    counted = dict(
-        job.augmentations.order_by()
-        .values_list("contestant")
-        .annotate(missed=Count("pk", filter=missed))
-    )
-    found = Contestant.objects.filter(pk__in=counted).order_by("name", "slug")
-    return [(who, counted[who.pk]) for who in found.only("name", "slug", "kind")]
-
-
-_LABEL = (
-    *("augmentation", "position", "heading", "logic"),
-    *("guessed_position", "guessed_heading", "guessed_logic"),
-)
 
 
 def _counted(rows: QuerySet[LabellingRound]) -> list[LabellingProgress]:

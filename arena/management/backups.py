@@ -105,17 +105,15 @@ def take_backup(path: Path, *, now: datetime, say: Say) -> Manifest:
         raise ArenaError(f"{path} is there already; a backup overwrites nothing.")
     if missing := find_unapplied_migrations():
         raise ArenaError(f"Run `manage.py prepare` first: {', '.join(missing)} are not applied.")
-    handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-    beside = Path(name)
-    try:
-        with os.fdopen(handle, "wb") as file:
+    with tempfile.TemporaryDirectory(dir=path.parent, prefix=f".{path.name}.") as folder:
+        beside = Path(folder, path.name)
+        beside.touch(mode=0o600)
+        with beside.open("wb") as file:
             with zipfile.ZipFile(file, "w") as archive:
                 manifest = _fill(archive, now, say)
             file.flush()
             os.fsync(file.fileno())
         beside.rename(path)
-    finally:
-        beside.unlink(missing_ok=True)
     return manifest
 
 

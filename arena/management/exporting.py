@@ -1,6 +1,6 @@
 """What `manage.py export` can write: the arguments of each kind, and the file it makes."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -21,10 +21,10 @@ from arena.results.queries.votes import is_imported
 from arena.results.services.ratings import log_early_look
 from arena.studies.queries import study_named
 from augment.errors import Conflict, UnknownName
-from augment.services.judging import scenario_export
+from augment.services.judging import scenario_export, simulations
 from augment.services.judging.displacement import By, types_named
 from augment.services.judging.driving_scores import options_driven
-from augment.services.judging.simulations import SCORES, Options
+from augment.services.judging.simulations import SCORES
 from augment.services.running.choosing import find_job
 
 Chosen = dict[str, Any]
@@ -106,8 +106,6 @@ def _write_rating(options: Chosen, say: Say) -> ExportedFile:
     """Write a table or chart of the rating, or all of them as one zip."""
     form = options["format"]
     name = "all" if form == "zip" else options.get("chart") or options["what"]
-    if name not in RATING_FILES:
-        raise UnknownName("chart", name, list(CHARTS))
     return _write(RATING_FILES[name], form, lambda: _snapshot(options))
 
 
@@ -143,18 +141,14 @@ def _write_plain(options: Chosen, say: Say) -> ExportedFile:
 def _write_displacement(options: Chosen, say: Say) -> ExportedFile:
     """Write how far from the references: in groups, or one row an object."""
     by, types = options["by"], options["types"]
-    if by not in (*By, BY_OBJECT):
-        raise UnknownName("grouping", by, [*By, BY_OBJECT])
     name = "displacement-objects" if by == BY_OBJECT else f"displacement-by-{by}"
     return _write_table(name, options, types=None if types is None else types_named(types))
 
 
 def _write_driving(options: Chosen, say: Say) -> ExportedFile:
     """Write mean scores of the drives that were made just so."""
-    if options["score"] not in SCORES:
-        raise UnknownName("score", options["score"], list(SCORES))
     job = find_job(options["job"])
-    how = Options(
+    how = simulations.Options(
         planner=options["planner"], offsets=options["offsets"], is_reactive=options["reactive"]
     )
     if how not in options_driven(job):
@@ -163,8 +157,6 @@ def _write_driving(options: Chosen, say: Say) -> ExportedFile:
 
 
 def _write_analyses(options: Chosen, say: Say) -> ExportedFile:
-    if options["part"] not in ANALYSES:
-        raise UnknownName("part", options["part"], list(ANALYSES))
     return _write_table(f"analyses-{options['part']}", options)
 
 
@@ -180,8 +172,6 @@ def _write_samples(options: Chosen, say: Say) -> ExportedFile:
 
 def _write_modifications(options: Chosen, say: Say) -> ExportedFile:
     """Write all modifications of a job as interPlan's YAML."""
-    if options["format"] != "interplan":
-        raise UnknownName("format", options["format"], ["interplan"])
     exported = scenario_export.export_job(
         find_job(options["job"]), file_format="interplan", contestant=options["contestant"]
     )
@@ -219,18 +209,22 @@ def _write_scenarios(options: Chosen, say: Say) -> ExportedFile:
 # --- All of them ---------------------------------------------------------------------------------
 
 
-def _format(names: Mapping[str, Any] | list[str], default: str | None = "csv") -> dict[str, Any]:
-    help_text = f"one of {', '.join(names)}"
-    return {"--format": {"default": default, "help": help_text}}
+Options = dict[str, dict[str, Any]]
 
 
-_OF_RATING: dict[str, dict[str, Any]] = {
-    "--rating": {"type": UUID, "help": "the code of an older rating"},
-    "--early": {"action": "store_true", "help": "export from an open study; this is logged"},
-}
-_CONTESTANT = {"help": "the slug of one; all unless given"}
-_DRIVEN = {"help": "as it was simulated with"}
+def _option(flag: str, text: str, **how: Any) -> Options:
+    return {flag: {"help": text} | how}
 
+
+def _format(names: Iterable[str], **how: Any) -> Options:
+    return _option("--format", f"one of {', '.join(names)}", **{"default": "csv"} | how)
+
+
+_OF_RATING = _option("--rating", "the code of an older rating", type=UUID) | _option(
+    "--early", "export from an open study; this is logged", action="store_true"
+)
+_CONTESTANT = _option("--contestant", "the slug of one; all unless given")
+_DRIVEN = "as it was simulated with"
 
 KINDS: dict[str, ExportKind] = {
     "leaderboard": ExportKind(
@@ -246,8 +240,8 @@ KINDS: dict[str, ExportKind] = {
         "study",
         "a chart of the newest rating beside the table's",
         _write_rating,
-        {"--chart": {"required": True, "help": f"one of {', '.join(CHARTS)}"}}
-        | _format(RATING_FILES["pairs"].formats, "svg")
+        _option("--chart", "which", choices=CHARTS, required=True)
+        | _format(RATING_FILES["pairs"].formats, default="svg")
         | _OF_RATING,
     ),
     "contact-sheet": ExportKind(
@@ -260,45 +254,35 @@ KINDS: dict[str, ExportKind] = {
         "job",
         "how far from the references",
         _write_displacement,
-        {
-            "--by": {
-                "default": "type",
-                "help": f"one of {', '.join(By)}; or {BY_OBJECT}, for one row an object",
-            },
-            "--types": {
-                "nargs": "+",
-                "help": "scenario types, or all; by variant only those with definite places "
-                "unless given",
-            },
-        }
+        _option("--by", "grouped by, or a row an object", choices=[*By, BY_OBJECT], default="type")
+        | _option("--types", "scenario types, or all; by variant a few unless given", nargs="+")
         | _format(JOB_FILES["displacement-by-type"].formats),
     ),
     "samples": ExportKind(
         "job",
         "a sheet of pictures with captions",
         _write_samples,
-        {
-            "--scenarios": {"nargs": "+", "required": True, "help": "slugs, top to bottom"},
-            "--contestants": {"nargs": "+", "required": True, "help": "left to right"},
-            "--sample": {"type": int, "default": 1, "help": "which one of each cell"},
-        }
-        | _format([*SHEET_FORMATS, "or what the file's ending says"], None),
+        _option("--scenarios", "slugs, top to bottom", nargs="+", required=True)
+        | _option("--contestants", "left to right", nargs="+", required=True)
+        | _option("--sample", "which one of each cell", type=int, default=1)
+        | _format([*SHEET_FORMATS, "or what the file's ending says"], default=None),
     ),
     "driving": ExportKind(
         "job",
         "mean driving scores of what was simulated",
         _write_driving,
-        {
-            "--score": {"default": "nuplan", "help": f"one of {', '.join(SCORES)}"},
-            "--planner": {"default": "pdm-closed"} | _DRIVEN,
-            "--offsets": {"default": "paper"} | _DRIVEN,
-            "--reactive": {"action": "store_true"} | _DRIVEN,
-        }
+        _option("--score", "whose rules", choices=list(SCORES), default="nuplan")
+        | _option("--planner", _DRIVEN, default="pdm-closed")
+        | _option("--offsets", _DRIVEN, default="paper")
+        | _option("--reactive", _DRIVEN, action="store_true")
         | _format(JOB_FILES["driving-nuplan"].formats),
     ),
     **{
         name: ExportKind(
-            "job", table.help, _write_plain, _format(table.formats, next(iter(table.formats)))
+            "job",
+            table.help,
+            _write_plain,
+            _format(table.formats, default=next(iter(table.formats))),
         )
         for name, table in JOB_FILES.items()
         if table.help
@@ -307,30 +291,26 @@ KINDS: dict[str, ExportKind] = {
         "job",
         "pairs of contestants, wordings, refusals",
         _write_analyses,
-        {"--part": {"required": True, "help": f"one of {', '.join(ANALYSES)}"}}
+        _option("--part", "which", choices=list(ANALYSES), required=True)
         | _format(JOB_FILES["analyses-pairs"].formats),
     ),
     "modifications": ExportKind(
         "job",
         "what a job's contestants made",
         _write_modifications,
-        _format(["interplan"], "interplan") | {"--contestant": _CONTESTANT},
+        _format(["interplan"], choices=["interplan"], default="interplan") | _CONTESTANT,
     ),
     "scenarios": ExportKind(
         "job",
         "what a job made, in a standard format",
         _write_scenarios,
-        {
-            "--format": {
-                "required": True,
-                "help": f"one of {', '.join(scenario_export.FORMATS)}; OUT is a folder",
-            },
-            "--motion": {
-                "default": scenario_export.RECORDED,
-                "help": f"{scenario_export.RECORDED}, or the planner whose finished drives say "
-                "what everybody does",
-            },
-            "--contestant": _CONTESTANT,
-        },
+        _format([*scenario_export.FORMATS, "OUT is a folder"], required=True, default=None)
+        | _option(
+            "--motion",
+            f"{scenario_export.RECORDED}, or the planner whose finished drives say what "
+            "everybody does",
+            default=scenario_export.RECORDED,
+        )
+        | _CONTESTANT,
     ),
 }

@@ -105,7 +105,7 @@ def test_pairs_wordings_and_refusals_come_as_files(tmp_path: Path) -> None:
         str(out),
     )
     assert json.loads(out.read_text())["rows"][0]["scenarios"] == 7
-    with pytest.raises(CommandError, match="pairs, wordings, refusals"):
+    with pytest.raises(CommandError, match="elephants"):
         exported(job, "elephants", tmp_path)
 
 

@@ -81,9 +81,9 @@ def test_the_heat_map_mirrors_scores_and_says_nothing_without_votes() -> None:
 
 @pytest.mark.parametrize("simulated", [True, False])
 def test_the_key_of_a_file_has_the_colour_of_its_points(simulated: bool) -> None:
-    row, interval = a_row("x", simulated=simulated), (None, 1.0, None)
+    row = a_row("x", simulated=simulated)
     points = [
-        Point(number=n, row=row, x=x, interval=interval, model_class="utility")
+        Point(number=n, row=row, x=x, model_class="utility")
         for n, x in enumerate((1.0, 2.0), start=1)
     ]
     drawing = scatter_chart(Scatter(across="Votes", points=points), file_format="svg").decode()

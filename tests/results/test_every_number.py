@@ -80,7 +80,7 @@ def test_what_an_expert_less_changes(shown: Shown) -> None:
     assert (said in shown.said("table")) == (max(moves) > 0)
 
 
-# --- Pairs, types and coverage -------------------------------------------------------------------
+# --- Pairs and types -------------------------------------------------------------------
 
 
 def test_pairs_their_scores_and_adjusted_p_values(shown: Shown) -> None:

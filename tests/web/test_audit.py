@@ -124,7 +124,7 @@ def test_every_door_to_results_is_on_the_list() -> None:
     assert found == set(DOORS)
 
 
-TABS = ("table", "pairs", "types", "raters", "coverage", "displacement", "cost", "log")
+TABS = ("table", "pairs", "types", "raters", "displacement", "cost", "log")
 GATED = ("results", *TABS)
 """What answers with the question whether to look early."""
 

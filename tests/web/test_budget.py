@@ -27,17 +27,6 @@ def ran(job: GenerationJob, model: Model | None = None) -> GenerationJob:
     return job
 
 
-def test_a_job_is_launched_with_its_caps() -> None:
-    add_llama(price="1")
-    add_scenario("street")
-    sent = {"name": "R", "contestants": ["llama"], "scenarios": ["street"], "is_fresh": "on"}
-    caps = {"cap_usd": "2.50", "cap_calls": "40", "cap_tokens": ""}
-    signed_in(people()["admin"]).post(reverse("job-new"), sent | caps)
-    job = GenerationJob.objects.get()
-    assert (job.cap_usd, job.cap_calls, job.cap_tokens) == (Decimal("2.5"), 40, None)
-    assert job.is_fresh
-
-
 def test_the_page_shows_what_is_spent_beside_the_cap() -> None:
     shown = page_of(ran(llama_job(price="2", caps=Caps(cap_usd=Decimal("0.5")))))
     assert "$0.0060" in shown

@@ -5,6 +5,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from django.db.models import Count, Q
 
 from arena.exports.formats import (
     TEXT,
@@ -16,13 +17,18 @@ from arena.exports.formats import (
     sheet_of,
     table_formats,
 )
-from arena.jobs.queries import contestants_of, labels_of
 from arena.models import FaultLabel
 from arena.rating.lines import UNKNOWN, escape, latex_table
 from arena.rating.reliability import DifferenceMetric, cohens_kappa, krippendorff_alpha
 from arena.results.exports.tables import shown_name
-from augment.models import GenerationJob
+from augment.models import Augmentation, Contestant, GenerationJob
 from augment.services.judging.findings import FaultClass
+
+_MISSES = (Augmentation.State.UNREADABLE, Augmentation.State.REFUSED)
+_LABEL = (
+    *("augmentation", "position", "heading", "logic", "augmentation__contestant"),
+    *("guessed_position", "guessed_heading", "guessed_logic"),
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -108,19 +114,23 @@ class FaultTable:
 
 
 def fault_table(job: GenerationJob) -> FaultTable:
-    """Return the table of a job; three queries, which read a row a label and a row a contestant.
+    """Return the table of a job; two queries, which read a row a label and a row a contestant.
 
     Of several experts on one augmentation a fault counts where more than half of them see it.
     """
-    labels = list(labels_of(job))
+    rows = FaultLabel.objects.filter(augmentation__job=job).select_related("augmentation")
+    labels = list(rows.only(*_LABEL).order_by("augmentation", "pk"))
     by_augmentation: defaultdict[int, list[FaultLabel]] = defaultdict(list)
     for label in labels:
         by_augmentation[label.augmentation_id].append(label)
     by_contestant: defaultdict[int, list[list[FaultLabel]]] = defaultdict(list)
     for own in by_augmentation.values():
         by_contestant[own[0].augmentation.contestant_id].append(own)
+    mine = Q(augmentations__job=job)
+    missed = Count("augmentations", filter=mine & Q(augmentations__state__in=_MISSES))
+    contestants = Contestant.objects.filter(mine).annotate(missed=missed)
     lines = []
-    for who, missed in contestants_of(job):
+    for who in contestants.only("name", "slug", "kind").order_by("name", "slug"):
         labelled = by_contestant[who.pk]
         counts = {
             fault.value: sum(_is_seen(fault, own) for own in labelled) if labelled else None
@@ -132,7 +142,7 @@ def fault_table(job: GenerationJob) -> FaultTable:
             is_simulated=who.is_simulated,
             labelled=len(labelled),
             labels=sum(map(len, labelled)),
-            without_modification=missed,
+            without_modification=who.missed,
             **counts,
         )
         lines.append(line)

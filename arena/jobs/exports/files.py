@@ -6,20 +6,17 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import asdict
 from importlib import metadata
-from typing import Any
 
 from django.core.files.base import ContentFile
-from django.core.files.storage import default_storage
 from django.utils.text import slugify
 
 from arena.exports.files import zip_bytes
-from arena.exports.formats import formats, json_bytes
+from arena.exports.formats import Format, formats, json_bytes
 from arena.models import ScenarioFile
 from arena.results.services.vote_files import digest_of
 from arena.results.services.written_files import FileWork, MadeFile
 from augment.models import Augmentation, GenerationJob
 from augment.services.judging.scenario_export import Exported, export_job
-from augment.services.running.calls import IMAGES
 from augment.services.running.transcript_records import record_of, tries_by_augmentation
 
 MANIFEST = "manifest.json"
@@ -98,8 +95,8 @@ AT_ONCE = 50
 """So many transcripts are read and held in memory together."""
 
 
-def transcript_records(job: GenerationJob) -> Iterator[dict[str, Any]]:
-    """Yield a record for each augmentation as they were made, images by their SHA-256 alone."""
+def transcript_lines(job: GenerationJob) -> Iterator[bytes]:
+    """Yield a line for each augmentation as they were made, images by their SHA-256 alone."""
     rows = Augmentation.objects.filter(job=job).order_by("pk")
     keys = list(rows.values_list("pk", flat=True))
     for start in range(0, len(keys), AT_ONCE):
@@ -108,28 +105,10 @@ def transcript_records(job: GenerationJob) -> Iterator[dict[str, Any]]:
         chosen = rows.filter(pk__in=part)
         for row in chosen.select_related("job", "scenario", "contestant__endpoint"):
             record = record_of(row, tries.get(row.pk, []))
-            yield record | {"images": sorted(record["images"])}
+            record["images"] = sorted(record["images"])
+            yield (json.dumps(record, ensure_ascii=False) + "\n").encode()
 
 
-def transcript_lines(job: GenerationJob) -> Iterator[bytes]:
-    """Yield each record as one line."""
-    return map(_line_of, transcript_records(job))
-
-
-def transcript_zip(job: GenerationJob) -> bytes:
-    """Return the lines, and every image that one of them names and that is still there."""
-    records = list(transcript_records(job))
-    files = {"transcripts.jsonl": b"".join(map(_line_of, records))}
-    for digest in {digest for record in records for digest in record["images"]}:
-        name = f"{IMAGES}/{digest}.png"
-        if default_storage.exists(name):
-            with default_storage.open(name) as file:
-                files[f"images/{digest}.png"] = file.read()
-    return zip_bytes(files)
-
-
-def _line_of(record: dict[str, Any]) -> bytes:
-    return (json.dumps(record, ensure_ascii=False) + "\n").encode()
-
-
-TRANSCRIPT_FORMATS = formats(jsonl=lambda job: b"".join(transcript_lines(job)), zip=transcript_zip)
+TRANSCRIPT_FORMATS: dict[str, Format[GenerationJob]] = formats(
+    jsonl=lambda job: b"".join(transcript_lines(job))
+)

@@ -174,8 +174,6 @@ JOB_TABLES = {
 }
 JOB_FILES = JOB_TABLES | {
     "transcripts": Export(
-        TRANSCRIPT_FORMATS,
-        lambda job: job,
-        "every transcript of a job: a line of JSON each, or with their images as a zip",
+        TRANSCRIPT_FORMATS, lambda job: job, "every transcript of a job, a line of JSON each"
     )
 }

@@ -130,7 +130,8 @@ def driving_section(request: HttpRequest, job: GenerationJob) -> dict[str, objec
     """Return the context of the driving part of a job's page."""
     known = options_driven(job)
     chosen = _way_asked(request, known)
-    table = driving.driving_table(job, score=score_asked(request), **_how_driven(request, job))
+    score = choice_asked(request, "score", list(SCORES)) or NUPLAN
+    table = driving.driving_table(job, score=score, **_how_driven(request, job))
     ways = [
         {
             "planner": PLANNERS.get(one.planner, one.planner),
@@ -154,12 +155,6 @@ def _how_driven(request: HttpRequest, job: GenerationJob) -> dict[str, Any]:
     """Return the way of driving that the address asks for, the last one unless it says so."""
     known = options_driven(job)
     return {"options": known[_way_asked(request, known)]} if known else {}
-
-
-def score_asked(request: HttpRequest) -> str:
-    """Return the score that the address names, nuPlan's unless it names one."""
-    wanted = request.GET.get("score", NUPLAN)
-    return wanted if wanted in SCORES else NUPLAN
 
 
 def _way_asked(request: HttpRequest, known: list[Options]) -> int:
@@ -192,7 +187,7 @@ def export_table(request: HttpRequest, code: uuid.UUID, name: str, form: str) ->
     options: dict[str, Any] = {}
     if name.startswith("driving-"):
         options = _how_driven(request, job)
-    elif name.startswith("displacement-") and _is_all(request):
+    elif name.startswith("displacement-") and request.GET.get("types") == "all":
         options = {"types": types_named(["all"])}
     stem = f"{slugify(job.name) or 'job'}-{name}" + "-all-types" * ("types" in options)
     return download(JOB_FILES[name].formats, form, stem, JOB_FILES[name].make(job, **options))
@@ -248,7 +243,8 @@ def download_scenarios(request: HttpRequest, code: uuid.UUID) -> FileResponse:
 
 def displacement_section(request: HttpRequest, job: GenerationJob) -> dict[str, object]:
     """Return the context of the displacement part of a job's page: by contestant unless asked."""
-    by, is_all = By(choice_asked(request, "by", list(By)) or By.CONTESTANT), _is_all(request)
+    by = By(choice_asked(request, "by", list(By)) or By.CONTESTANT)
+    is_all = request.GET.get("types") == "all"
     types = types_named(["all"]) if is_all else None
     return {
         "table": displacement.displacement_table(job, by=by, types=types),
@@ -261,8 +257,3 @@ def displacement_section(request: HttpRequest, job: GenerationJob) -> dict[str, 
         "has_choice": by is By.VARIANT,
         "is_all": is_all,
     }
-
-
-def _is_all(request: HttpRequest) -> bool:
-    """Return whether the address asks for all scenario types."""
-    return request.GET.get("types") == "all"

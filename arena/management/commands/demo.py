@@ -3,7 +3,6 @@
 import time
 from contextlib import nullcontext
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 from django.conf import settings
@@ -73,24 +72,16 @@ class Command(TerminalCommand):
                 supervisor.stop()
 
     def _show(self, board: demo.DemoTable, web: Web, took_s: float, *, serve: bool) -> None:
+        where = "Scenario Arena is at" if serve else "“make serve” serves it at"
         lines = [
-            "",
-            board.text,
-            "",
-            f"Tables:   {', '.join(str(_short(path)) for path in board.files)}",
-            f"Pictures: {_pictures()}/bev/",
-            f"The demo took {took_s:.0f} s.",
+            f"\n{board.text}\n",
+            f"Tables:   {', '.join(map(str, board.files))}",
+            f"The demo took {took_s:.0f} s.\n",
+            f"{where} {web.address}",
+            *demo.login_lines(),
+            f"  Vote as 'expert' in the study {demo.OPEN_STUDY!r}.",
+            f"  See the drives as 'admin': Jobs, {demo.JOB!r}, See the drives.",
         ]
-        if serve:
-            lines += ["", f"Scenario Arena is at {web.address}  (Ctrl-C stops it)"]
-        else:
-            lines += ["", f"“make serve” serves it at {web.address}"]
-        lines += demo.login_lines()
-        if serve:
-            lines += [
-                f"  Vote as 'expert' in the study {demo.OPEN_STUDY!r}.",
-                f"  See the drives as 'admin': Jobs, {demo.JOB!r}, See the drives.",
-            ]
         self.stdout.write("\n".join(lines))
         self.stdout.flush()
 
@@ -109,16 +100,3 @@ def _look_at(supervisor: Supervisor) -> None:
     supervisor.insist_on_steadiness()
     if supervisor.is_stopping:
         raise KeyboardInterrupt
-
-
-def _pictures() -> str:
-    media = settings.STORAGES["default"].get("OPTIONS", {})
-    if "bucket_name" not in media:
-        return str(_short(settings.MEDIA_ROOT))
-    return f"s3://{media['bucket_name']}/{media['location']}".rstrip("/")
-
-
-def _short(path: Path) -> Path:
-    """The path as seen from here, where that is shorter."""
-    here = Path.cwd()
-    return path.relative_to(here) if path.is_relative_to(here) else path

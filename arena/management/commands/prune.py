@@ -40,7 +40,7 @@ class Command(TerminalCommand):
                 "Nothing is that old, or it belongs to a job or a study that goes on."
             )
             return
-        self.stdout.write(f"Together: {_said(_sum(losses))}\n\n{LOST}")
+        self.stdout.write(f"\n{LOST}")
 
     def _remove(self, before: Any, now: Any) -> None:
         for loss, done in remove_old(before=before, now=now):
@@ -57,11 +57,4 @@ def _said(loss: TextLoss) -> str:
     return (
         f"{loss.calls:,} requests and {loss.answers:,} answers, "
         f"{loss.characters / 1e6:.1f} MB of text, {loss.transcripts:,} transcripts"
-    )
-
-
-def _sum(losses: list[TextLoss]) -> TextLoss:
-    counts = ("calls", "answers", "transcripts", "characters")
-    return TextLoss(
-        job=None, **{name: sum(getattr(one, name) for one in losses) for name in counts}
     )

@@ -17,7 +17,6 @@ from arena.results.exports.drawing import (
     INK,
     MARK,
     SIMULATED,
-    SOFT,
     Interval,
     draw_interval,
     house_style,
@@ -50,32 +49,27 @@ class Point:
 
     Attributes:
         number: Its place in the table.
-        interval: What is drawn upwards.
         model_class: Whose colour it has, empty without.
     """
 
     number: int
     row: Row
     x: float
-    interval: Interval
     model_class: str = ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Scatter:
-    """A chart of one thing against another.
+    """A chart of Elo against something else.
 
     Attributes:
-        across, up: What the axes say.
+        across: What that is.
         is_log: Whether the axis across is logarithmic.
-        falls: Draws the curve `falls` / sqrt(x) behind the points, None without one.
     """
 
     across: str
-    up: str = "Elo with 95 % interval"
     points: Sequence[Point]
     is_log: bool = False
-    falls: float | None = None
 
 
 def charts(snapshot: Snapshot) -> Mapping[str, Chart]:
@@ -94,39 +88,22 @@ def scatters_of(snapshot: Snapshot, table: LeaderboardTable) -> dict[str, Scatte
     """Return the scatter charts that have points, by name."""
     metres = {line.slug: line.median_m for line in snapshot.results.displacement}
     costs = {line.slug: line for line in snapshot.results.cost}
-    rows = list(enumerate(table.rows, start=1))
-    rated = [(n, row) for n, row in rows if row.rating is not None]
+    rated = [(n, row) for n, row in enumerate(table.rows, start=1) if row.rating is not None]
     far = [
-        Point(number=n, row=row, x=x, interval=row.interval)
+        Point(number=n, row=row, x=x)
         for n, row in rated
         if (x := metres.get(row.slug)) is not None
     ]
-    by_name = {
-        "width": _width_scatter(rows),
-        "displacement": Scatter(across="Median displacement (m)", points=far),
-    }
+    by_name = {"displacement": Scatter(across="Median displacement (m)", points=far)}
     for name, label in (("usd", "USD"), ("tokens", "Tokens")):
         spent = [
-            Point(number=n, row=row, x=x, interval=row.interval, model_class=cost.model_class)
+            Point(number=n, row=row, x=x, model_class=cost.model_class)
             for n, row in rated
             if (cost := costs.get(row.slug)) and (x := getattr(cost, name))
         ]
         across = f"{label} per scenario"
         by_name[f"elo-{name}"] = Scatter(across=across, points=spent, is_log=True)
     return {name: plot for name, plot in by_name.items() if plot.points}
-
-
-def _width_scatter(rows: Sequence[tuple[int, Row]]) -> Scatter:
-    """Plot half-widths against votes, with the curve that falls with the root of the votes."""
-    points = [
-        Point(number=n, row=row, x=row.votes, interval=(None, row.half_width, None))
-        for n, row in rows
-        if row.half_width is not None
-    ]
-    constants = sorted((point.row.half_width or 0.0) * point.x**0.5 for point in points)
-    falls = constants[len(constants) // 2] if constants else None
-    up = "Half-width of the interval (Elo)"
-    return Scatter(across="Votes", up=up, points=points, falls=falls)
 
 
 def interval_chart(table: LeaderboardTable, *, file_format: str) -> bytes:
@@ -204,14 +181,9 @@ def scatter_chart(plot: Scatter, *, file_format: str) -> bytes:
             _scale_logarithmically(axes)
         for point in plot.points:
             _draw_point(axes, point)
-        if plot.falls is not None:
-            xs = np.linspace(min(point.x for point in plot.points), axes.get_xlim()[1], 81)
-            axes.plot(xs, plot.falls / np.sqrt(xs), color=SOFT, linewidth=0.9, linestyle="--")
-            axes.set_xlim(left=0.0)
-            axes.set_ylim(bottom=0.0)
         axes.grid()
         axes.set_xlabel(plot.across)
-        axes.set_ylabel(plot.up)
+        axes.set_ylabel("Elo with 95 % interval")
         legend = figure.legend(loc="outside right upper", frameon=False, fontsize=7)
         for text, point in zip(legend.get_texts(), plot.points, strict=True):
             text.set_color(SIMULATED if point.row.simulated else INK)
@@ -234,13 +206,13 @@ def _draw_point(axes: Axes, point: Point) -> None:
     draw_interval(
         axes,
         point.x,
-        point.interval,
+        point.row.interval,
         simulated=row.simulated,
         colour=_CLASSES.get(point.model_class, MARK),
         upright=True,
         label=f"{point.number}  {name}" + (f" ({kind})" if kind else ""),
     )
-    place = (point.x, point.interval[1] or 0.0)
+    place = (point.x, row.rating or 0.0)
     axes.annotate(str(point.number), place, (4, 4), textcoords="offset points")
 
 

@@ -3,7 +3,6 @@
 import hashlib
 import json
 import re
-import shutil
 import tempfile
 from collections.abc import Callable, Iterable, Iterator
 from importlib.metadata import version
@@ -136,14 +135,12 @@ def write_study(study: Study, out: Path, *, say: Callable[[str], None]) -> None:
     if study.state == Study.State.CANCELLED:
         raise ArenaError(f"The study {study.name!r} was cancelled; export its votes instead.")
     out.parent.mkdir(parents=True, exist_ok=True)
-    beside = Path(tempfile.mkdtemp(dir=out.parent, prefix=f".{out.name}."))
-    try:
+    with tempfile.TemporaryDirectory(dir=out.parent, prefix=f".{out.name}.") as folder:
+        beside = Path(folder, out.name)
+        beside.mkdir()
         with frozen_rows():
             _fill(study, beside, say)
-        beside.chmod(0o755)
         beside.rename(out)
-    finally:
-        shutil.rmtree(beside, ignore_errors=True)
 
 
 class _Folder:

@@ -53,13 +53,6 @@ class Row(Line):
         return shown_name(self.name, self.simulated)
 
     @property
-    def half_width(self) -> float | None:
-        """Half of the interval's width, None where it has no two ends."""
-        if self.lower is None or self.upper is None:
-            return None
-        return (self.upper - self.lower) / 2
-
-    @property
     def score_text(self) -> str:
         """The mean score of a vote, a dash without votes."""
         return f"{self.score_percent} %" if self.votes else "–"

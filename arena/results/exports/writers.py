@@ -200,7 +200,7 @@ def chart_named(snapshot: Snapshot, *, name: str) -> Chart:
     return known[name]
 
 
-CHARTS = ("pairs", "types", "width", "displacement", "elo-usd", "elo-tokens")
+CHARTS = ("pairs", "types", "displacement", "elo-usd", "elo-tokens")
 RATING_FILES = {
     "leaderboard": Export(FORMATS, leaderboard_table, "the newest rating of a study"),
     "votes": Export(VOTE_FORMATS, vote_table, "the votes of the newest rating, with pseudonyms"),

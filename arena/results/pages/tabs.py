@@ -130,12 +130,6 @@ def _counts(rater: PanelRater) -> Context:
     }
 
 
-def fill_coverage(snapshot: Snapshot, table: LeaderboardTable) -> Context:
-    """Widths against votes."""
-    rows = [(n, row) for n, row in enumerate(table.rows, 1) if row.half_width is not None]
-    return {"rows": rows}
-
-
 def fill_displacement(snapshot: Snapshot, table: LeaderboardTable) -> Context:
     """Elo against the distance from the references."""
     metres = {line.slug: line for line in snapshot.results.displacement}
@@ -201,7 +195,6 @@ TABS: dict[str, Callable[[Snapshot, LeaderboardTable], Context]] = {
     "pairs": fill_pairs,
     "types": fill_types,
     "raters": fill_raters,
-    "coverage": fill_coverage,
     "displacement": fill_displacement,
     "driving": fill_driving,
     "cost": fill_cost,
