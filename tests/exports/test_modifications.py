@@ -65,7 +65,7 @@ def test_a_job_goes_to_a_file(job: GenerationJob, tmp_path: Path) -> None:
     ("options", "sentence"),
     [
         (("--contestant", "nobody"), "Unknown contestant 'nobody'. Known: reference, rule"),
-        (("--format", "toml"), "Unknown format 'toml'"),
+        (("--format", "toml"), "invalid choice: 'toml'"),
     ],
 )
 def test_a_wrong_wish_is_a_sentence(
