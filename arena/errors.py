@@ -70,19 +70,6 @@ class InvalidVote(ArenaError):
         super().__init__(" ".join(fields.values()))
 
 
-class InvalidPreference(ArenaError):
-    """What somebody chose for themselves can't be kept.
-
-    Args:
-        field: What it is about.
-        sentence: What is wrong with it.
-    """
-
-    def __init__(self, field: str, sentence: str) -> None:
-        self.fields = {field: sentence}
-        super().__init__(sentence)
-
-
 class NothingToPlan(ArenaError):
     """The rules of a study can't be met with the augmentations that exist; the text says why."""
 

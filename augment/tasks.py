@@ -30,7 +30,7 @@ from augment.services.judging.simulations import DRIVES
 from augment.services.running import workers
 from augment.services.running.intent_readings import READINGS
 from augment.services.running.runner import AUGMENTATIONS
-from augment.services.scenarios import pictures, prompts
+from augment.services.scenarios import pictures
 from augment.services.scenarios.uploads import MOMENTS, UPLOADS
 from augment.services.work import KINDS, WorkKind, register
 
@@ -52,7 +52,6 @@ DRAWN: Mapping[str, Callable[[int], object]] = {
     "marks": lambda pk: draw_marked(augmentation_pk=pk),
     "scene": pictures.draw_scene,
     "scenario": pictures.draw_scenario,
-    "prompts": prompts.draw_prompts,
 }
 """Pictures of the row with that key, as far as they are not there yet."""
 
@@ -167,7 +166,6 @@ enqueue_upload = sender(UPLOADS)
 enqueue_simulations = partial(enqueue, DRIVES)
 
 enqueue_marks = partial(send, draw, "marks")
-enqueue_prompts = partial(send, draw, "prompts")
 enqueue_scenario = partial(send, draw, "scenario")
 enqueue_scene = partial(send, draw, "scene")
 

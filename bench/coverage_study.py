@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from arena.rating import models, sandwich
+from arena.rating import models
 from arena.rating.comparisons import BoolArray, Comparisons, FloatArray, count_pairs
 from arena.rating.leaderboard import FEWEST_TO_JUDGE
 from arena.rating.models import DidNotConverge, Meetings, to_elo
@@ -98,7 +98,7 @@ def _add(found: Found, votes: Comparisons, truth: FloatArray, seed: int | None) 
     rating, spread = to_elo(strengths), spread_of(pulls, Unit.TWO_WAY)
     half_widths = {
         DEFAULT: spread.half_widths(),
-        SINGLE: sandwich.NORMAL * np.sqrt(pulls.by_row().diagonal()),
+        SINGLE: 1.959964 * np.sqrt(pulls.by_row().diagonal()),
     }
     for method, half_width in half_widths.items():
         found.held[method].append(np.abs(rating - truth) <= half_width)

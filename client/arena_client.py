@@ -4,8 +4,8 @@
     for job in arena.list("jobs", state="running"):
         print(job["name"], job["by_state"])
 
-Staff find every operation at /api/v1/reference/. `post` sends JSON, `get` and `list` read it,
-`upload` sends files, `download` returns the bytes of one.
+docs/api.md and, for staff, /api/v1/openapi.json list every operation. `post` sends JSON, `get`
+and `list` read it, `upload` sends files, `download` returns the bytes of one.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ import time
 import urllib.error
 import urllib.request
 import uuid
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 from urllib.parse import urlencode
@@ -28,8 +28,6 @@ KEYED = (PREFIX + "votes", PREFIX + "reports")
 """Idempotent requests: their body has a key."""
 
 AGAIN_S = 1.0
-MOST_KEPT = 256
-"""Size of the cache of answers with ETags."""
 
 
 class ApiError(Exception):
@@ -65,23 +63,12 @@ class Arena:
         self.address = address.rstrip("/")
         self.token = token
         self.timeout_s, self.patience_s = timeout_s, patience_s
-        self._kept: dict[str, tuple[str, Any]] = {}
 
     # --- Any resource --------------------------------------------------------------------------
 
     def get(self, path: str, **query: object) -> Any:
-        """Return the JSON at a path below /api/v1/, from the cache where it has not changed."""
-        address = self._address(path, query)
-        tag, body = self._kept.get(address, ("", None))
-        answer = self._send("GET", address, headers={"If-None-Match": tag} if tag else {})
-        if answer.status == 304:
-            return body
-        body = json.loads(answer.body)
-        if answer.tag:
-            if len(self._kept) >= MOST_KEPT:
-                self._kept.clear()
-            self._kept[address] = (answer.tag, body)
-        return body
+        """Return the JSON at a path below /api/v1/."""
+        return json.loads(self.download(path, **query))
 
     def list(self, path: str, **query: object) -> Iterator[dict[str, Any]]:
         """Yield every row of a list."""
@@ -96,7 +83,7 @@ class Arena:
         """Send JSON and return the answer."""
         headers = {"Content-Type": "application/json"}
         data = json.dumps(body).encode()
-        return json.loads(self._send("POST", self._address(path, {}), data, headers).body)
+        return json.loads(self._send("POST", self._address(path, {}), data, headers))
 
     def upload(
         self, path: str, files: Mapping[str, str | Path | Sequence[str | Path]], **fields: object
@@ -109,11 +96,11 @@ class Arena:
                 parts.append(_part(mark, name, Path(file).read_bytes(), file))
         data = b"".join([*parts, f"--{mark}--\r\n".encode()])
         headers = {"Content-Type": f"multipart/form-data; boundary={mark}"}
-        return json.loads(self._send("POST", self._address(path, {}), data, headers).body)
+        return json.loads(self._send("POST", self._address(path, {}), data, headers))
 
     def download(self, path: str, **query: object) -> bytes:
         """Return the bytes of a file."""
-        return self._send("GET", self._address(path, query)).body
+        return self._send("GET", self._address(path, query))
 
     # --- What takes more than one request ------------------------------------------------------
 
@@ -126,17 +113,20 @@ class Arena:
         """Set a new account's password by its link; return a client for that account."""
         return self._as(self.post("welcome", link=link, password=password)["token"])
 
-    def wait_for_job(self, code: str, *, every_s: float = 2, within_s: float = 3600) -> Any:
-        """Wait until nothing of a job is under way, and return it."""
-        return self._wait(f"jobs/{code}", lambda job: bool(job["is_over"]), every_s, within_s)
-
     def wait_for(self, path: str, *states: str, every_s: float = 1, within_s: float = 3600) -> Any:
-        """Poll a row until it has one of these states, and return it.
+        """Poll a row until it has one of these states, or a job until it is over; return it.
 
         Raises:
             TimeoutError: It has none of them in time.
         """
-        return self._wait(path, lambda row: row["state"] in states, every_s, within_s)
+        ends_at = time.monotonic() + within_s
+        while True:
+            row = self.get(path)
+            if row["state"] in states or row.get("is_over"):
+                return row
+            if time.monotonic() >= ends_at:
+                raise TimeoutError(f"{path} is still under way after {within_s} s")
+            time.sleep(every_s)
 
     def pairs(self, study: str) -> Iterator[dict[str, Any]]:
         """Yield the pairs that are left; vote on each before taking the next."""
@@ -165,19 +155,9 @@ class Arena:
             path = PREFIX + path.removeprefix("/")
         return self.address + path + ("?" + urlencode(query) if query else "")
 
-    def _wait(
-        self, path: str, is_over: Callable[[Any], bool], every_s: float, within_s: float
-    ) -> Any:
-        ends_at = time.monotonic() + within_s
-        while not is_over(found := self.get(path)):
-            if time.monotonic() >= ends_at:
-                raise TimeoutError(f"{path} is still under way after {within_s} s")
-            time.sleep(every_s)
-        return found
-
     def _send(
         self, method: str, address: str, data: bytes | None = None, headers: Any = None
-    ) -> _Answer:
+    ) -> bytes:
         sent = dict(headers or {})
         if self.token:
             sent["Authorization"] = f"Bearer {self.token}"
@@ -187,11 +167,9 @@ class Arena:
             request = urllib.request.Request(address, data, sent, method=method)
             try:
                 with _STAYING.open(request, timeout=self.timeout_s) as answer:
-                    tag = answer.headers.get("ETag", "")
-                    return _Answer(answer.status, tag, answer.read())
+                    content: bytes = answer.read()
+                    return content
             except urllib.error.HTTPError as error:
-                if error.code == 304:
-                    return _Answer(304, "", b"")
                 wait_s = _wait_s(error)
                 if wait_s is None or time.monotonic() + wait_s > ends_at:
                     raise ApiError(error.code, _error_in(error)) from None
@@ -210,11 +188,6 @@ class _StaysHere(urllib.request.HTTPRedirectHandler):
 
 
 _STAYING = urllib.request.build_opener(_StaysHere)
-
-
-class _Answer:
-    def __init__(self, status: int, tag: str, body: bytes) -> None:
-        self.status, self.tag, self.body = status, tag, body
 
 
 def _part(mark: str, name: str, content: bytes, file: str | Path | None = None) -> bytes:

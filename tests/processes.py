@@ -132,7 +132,7 @@ class Machine:
         arguments = [str(find_redis_server()), "--port", "0", "--unixsocket", str(self.socket)]
         arguments += ["--save", "", "--appendonly", "no", "--dir", str(self.folder)]
         started = Process(arguments, environment=self.environment, log=self.folder / "redis.log")
-        wait_until(lambda: redis_answers(self.socket), what="Redis answers")
+        wait_until(lambda: redis_answers(f"unix://{self.socket}"), what="Redis answers")
         return started
 
     def worker(self, *, pool: str = "threads", concurrency: int = 2) -> Process:

@@ -30,7 +30,7 @@ WIDTH, LEAST, MOST = 1280, 720, 1600
 QUALITIES = (50, 35, 20)
 LIGHT = 40_000
 """Bytes: the first quality that stays below, else the last one."""
-VOTES_HERE = ("vote", "vote-practice", "vote-help", "vote-skipped")
+VOTES_HERE = ("vote", "vote-practice", "vote-skipped")
 OPEN_HERE = ("study", "experts", "enrolment", "preregistration", "invite")
 
 
@@ -97,9 +97,7 @@ def _shots() -> list[Shot]:
         Shot(name="home-of-an-analyst", who="analyst", path="/"),
         Shot(name="home-of-an-admin", who="admin", path="/"),
     ]
-    for name in sorted(
-        PAGES.keys() - ACTIONS.keys() - {"home", "report", "drive", "results-vote"}
-    ):
+    for name in sorted(PAGES.keys() - ACTIONS.keys() - {"home", "drive", "results-vote"}):
         who = "expert" if name in VOTES_HERE else "admin"
         here = voted if name in (*VOTES_HERE, *OPEN_HERE) else rated
         shots.append(Shot(name=name, who=who, path=address(name, here)))
@@ -109,7 +107,6 @@ def _shots() -> list[Shot]:
         shots.append(Shot(name="drive", who="admin", path=f"/drives/{drive.code}/"))
     if vote is not None:
         shots.append(Shot(name="results-vote", who="admin", path=f"{results}votes/{vote.key}/"))
-    shots.append(Shot(name="api-reference", who="admin", path="/api/v1/reference/"))
     return shots
 
 

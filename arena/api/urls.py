@@ -14,12 +14,11 @@ from arena.voting import api as voting
 
 
 def _at(address: str, view: type[ApiView], name: str) -> URLPattern:
-    found: URLPattern = path(address, view.as_view(), name=name)
-    return found
+    pattern: URLPattern = path(address, view.as_view(), name=name)
+    return pattern
 
 
 urlpatterns: list[URLPattern] = [
-    path("reference/", reference.reference_page, name="api-reference"),
     _at("openapi.json", reference.DocumentView, "api-document"),
     _at("people", people.PeopleView, "api-people"),
     _at("first", people.FirstView, "api-first"),

@@ -26,7 +26,6 @@ from rest_framework.response import Response
 from rest_framework.views import APIView
 
 from arena.api.access import RoleAllowed
-from arena.api.errors import error_response
 from arena.api.fields import SoundJSONParser, StrictSerializer
 from augment.errors import QueueFault
 
@@ -65,14 +64,6 @@ class ApiView(APIView):
         """Keep shared caches from storing the response."""
         response.headers.setdefault("Cache-Control", "private, no-cache")
         return super().finalize_response(request, response, *args, **kwargs)
-
-    def handle_exception(self, exc: Exception) -> Response:
-        """Return the response to an exception of the table; raise any other again."""
-        found = error_response(exc)
-        if found is None:
-            raise exc
-        found.exception = True
-        return found
 
     def answer_page(
         self,

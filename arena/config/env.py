@@ -1,250 +1,172 @@
-"""Typed readers of the environment; a wrong value stops the start with a sentence."""
+"""The environment variables of the product and what each may hold; see docs/deploying.md."""
 
 import os
 import re
-from collections.abc import Callable
+import stat
+from contextlib import suppress
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Annotated, Any, Literal
 from urllib.parse import parse_qsl, urlsplit
 
 import dj_database_url
 from django.core.exceptions import ImproperlyConfigured
+from pydantic import AfterValidator, BaseModel, BeforeValidator, Field, ValidationError
 
-from arena.config import private
-
-T = TypeVar("T")
-
-_OWN = ("DATABASE_URL", "REDIS_URL", "AWS_SECRET_ACCESS_KEY", "AWS_SESSION_TOKEN")
-"""Secrets of the product itself, beside those called ARENA_..."""
-
-_TRUE, _FALSE = {"1", "true", "yes", "on"}, {"0", "false", "no", "off", ""}
+BASE_DIR = Path(__file__).resolve().parents[2]
 
 
-def read(name: str, default: T, parse: Callable[[str], T], allowed: str) -> T:
-    """The value of an environment variable, or the default where it is not set.
+def _like(pattern: str, allowed: str) -> AfterValidator:
+    def check(text: str) -> str:
+        if not re.fullmatch(pattern, text):
+            raise ValueError(allowed)
+        return text
 
-    Raises:
-        ImproperlyConfigured: The value can't be parsed; the sentence names variable and choices.
-    """
-    raw = os.environ.get(name)
-    if raw is None:
-        return default
-    try:
-        return parse(raw.strip())
-    except (ValueError, KeyError) as error:
-        raise ImproperlyConfigured(f"{name}={raw!r} can't be used: {allowed}.") from error
+    return AfterValidator(check)
 
 
-def boolean(name: str, *, default: bool) -> bool:
-    """A switch: 1/true/yes/on or 0/false/no/off."""
-
-    def parse(raw: str) -> bool:
-        word = raw.lower()
-        if word not in _TRUE | _FALSE:
-            raise ValueError(word)
-        return word in _TRUE
-
-    return read(name, default, parse, "use 1 or 0 (true, yes, on; false, no, off)")
+def _split(text: Any) -> Any:
+    return [part.strip() for part in text.split(",") if part.strip()]
 
 
-def integer(name: str, *, default: int, low: int, high: int) -> int:
-    """A whole number from low to high."""
-
-    def parse(raw: str) -> int:
-        number = int(raw)
-        if not low <= number <= high:
-            raise ValueError(raw)
-        return number
-
-    return read(name, default, parse, f"a whole number from {low} to {high} is needed")
+def _open_folder(path: Path) -> Path:
+    """Return an absolute folder that is there, or can be made."""
+    path = path.expanduser().resolve()
+    nearest = next(place for place in (path, *path.parents) if place.exists())
+    if not nearest.is_dir() or not os.access(nearest, os.W_OK):
+        raise ValueError("a folder is needed that can be written to")
+    return path
 
 
-def names(name: str, *, default: tuple[str, ...]) -> list[str]:
-    """A list of at least one name, separated by commas."""
-
-    def parse(raw: str) -> tuple[str, ...]:
-        parts = tuple(part.strip() for part in raw.split(",") if part.strip())
-        if not parts:
-            raise ValueError(raw)
-        return parts
-
-    return list(read(name, default, parse, "names separated by commas are needed"))
+def _read_database(url: str) -> dict[str, Any]:
+    parts = dict(dj_database_url.parse(url)) if "://" in url else {}
+    # A database in memory would be another one for every process.
+    if not url.startswith(("sqlite:", "postgres")) or parts.get("NAME") in {None, "", ":memory:"}:
+        raise ValueError("use sqlite:///PATH or postgresql://USER:PASSWORD@HOST:PORT/NAME")
+    return parts
 
 
-def dotted_paths(name: str) -> tuple[str, ...]:
-    """Dotted paths of Python classes, separated by commas; none by default."""
-
-    def parse(raw: str) -> tuple[str, ...]:
-        paths = tuple(path.strip() for path in raw.split(",") if path.strip())
-        for path in paths:
-            if "." not in path or not all(part.isidentifier() for part in path.split(".")):
-                raise ValueError(path)
-        return paths
-
-    return read(name, (), parse, "use PACKAGE.MODULE.CLASS, more than one separated by commas")
+def _read_redis(url: str) -> str:
+    address = urlsplit(url)
+    pattern = r"rediss?://[^/\s]+(/\d*)?|redis\+socket://(/[^/]+)+"
+    if not re.fullmatch(pattern, url) or (address.port or 1) < 1:  # raises beyond 65535
+        raise ValueError("use redis://HOST:PORT/N, rediss://... or redis+socket:///PATH")
+    return url
 
 
-def origins(name: str) -> list[str]:
-    """Addresses of other servers with their scheme, separated by commas; none by default."""
-
-    def parse(raw: str) -> list[str]:
-        parts = [part.strip() for part in raw.split(",") if part.strip()]
-        for part in parts:
-            address = urlsplit(part)
-            if address.scheme not in {"http", "https"} or not address.hostname:
-                raise ValueError(part)
-        return parts
-
-    return read(name, [], parse, "use https://NAME, more than one separated by commas")
-
-
-def proxy(name: str) -> str:
-    """The address of an HTTP proxy; none by default."""
-
-    def parse(raw: str) -> str:
-        address = urlsplit(raw)
-        if raw and (address.scheme != "http" or not address.hostname or not address.port):
-            raise ValueError(raw)
-        return raw
-
-    return read(name, "", parse, "use http://HOST:PORT")
-
-
-def key_variables(name: str) -> list[str]:
-    """Names of environment variables with keys of language models, separated by commas."""
-
-    def parse(raw: str) -> list[str]:
-        parts = [part.strip() for part in raw.split(",") if part.strip()]
-        for part in parts:
-            if not part.isidentifier() or part.startswith("ARENA_") or part in _OWN:
-                raise ValueError(part)
-        return parts
-
-    own = ", ".join(_OWN)
-    return read(name, [], parse, f"names are needed, none of ARENA_*, {own}, separated by commas")
-
-
-def at_least_twice(longer: str, longer_s: int, shorter: str, shorter_s: int) -> None:
-    """Two settings that only work together.
+def read_media(url: str) -> dict[str, Any]:
+    """Return where pictures are kept, as Django's STORAGES wants it: a folder or a bucket.
 
     Raises:
-        ImproperlyConfigured: The longer time is not twice the shorter one.
+        ValueError: It is no address of a bucket.
     """
-    if longer_s < 2 * shorter_s:
-        raise ImproperlyConfigured(
-            f"{longer}={longer_s} can't be used with {shorter}={shorter_s}: it must be at least "
-            "twice as long."
+    if not url:
+        return {"BACKEND": "arena.config.storage.WholeFiles"}
+    found = re.fullmatch(r"s3://([a-z0-9][a-z0-9.-]{1,61}[a-z0-9])(/[^?]*)?(?:\?(.*))?", url)
+    wanted = dict(parse_qsl(found[3])) if found and found[3] else {}
+    endpoint = urlsplit(wanted.get("endpoint", "https://given"))
+    is_address = endpoint.scheme in {"http", "https"} and bool(endpoint.hostname)
+    if not found or not wanted.keys() <= {"endpoint", "region"} or not is_address:
+        raise ValueError(
+            "use s3://BUCKET/PREFIX?endpoint=https://HOST:PORT&region=REGION, all but BUCKET "
+            "optional"
         )
+    options = {
+        "bucket_name": found[1],
+        "location": (found[2] or "").strip("/"),
+        "endpoint_url": wanted.get("endpoint"),
+        "region_name": wanted.get("region"),
+    }
+    return {"BACKEND": "arena.config.s3_media.S3Media", "OPTIONS": options}
 
 
-def choice(name: str, *, default: str, allowed: tuple[str, ...]) -> str:
-    """One word of a closed set."""
-    table = {word: word for word in allowed}
-    return read(
-        name, default, lambda raw: table[raw.lower()], f"one of {', '.join(allowed)} is needed"
+Folder = Annotated[Path, AfterValidator(_open_folder)]
+Origin = Annotated[str, _like(r"https?://[^/\s]+", "use https://NAME")]
+Planner = Annotated[str, _like(r"[A-Za-z_]\w*(\.[A-Za-z_]\w*)+", "use PACKAGE.MODULE.CLASS")]
+KeyVariable = Annotated[
+    str,
+    _like(
+        r"(?!ARENA_|DATABASE_URL$|REDIS_URL$|AWS_)[A-Za-z_]\w*",
+        "use the name of a variable that is no secret of the product itself",
+    ),
+]
+Comma = BeforeValidator(_split)
+
+
+class Environment(BaseModel):
+    """The variables with their defaults; lists are separated by commas."""
+
+    ARENA_VAR_DIR: Folder = BASE_DIR / "var"
+    ARENA_SECRET_KEY: str = ""
+    DATABASE_URL: Annotated[dict[str, Any], BeforeValidator(_read_database)] | None = None
+    REDIS_URL: Annotated[str, AfterValidator(_read_redis)] = ""
+    ARENA_MEDIA_DIR: Folder = BASE_DIR / "media"
+    ARENA_MEDIA_URL: Annotated[dict[str, Any], BeforeValidator(read_media)] = read_media("")
+    ARENA_UPLOAD_MB: int = Field(200, ge=1, le=4096)
+    ARENA_DEBUG: bool = False
+    ARENA_HOSTS: Annotated[list[str], Comma] = Field(
+        ["localhost", "127.0.0.1", "[::1]"], min_length=1
     )
+    ARENA_ORIGINS: Annotated[list[Origin], Comma] = []
+    ARENA_HTTPS: bool = False
+    ARENA_PROXIES: int = Field(0, ge=0, le=9)
+    ARENA_LOGIN_FAILURES_ADDRESS: int = Field(50, ge=1, le=100_000)
+    ARENA_HEARTBEAT_S: int = Field(5, ge=1, le=60)
+    ARENA_STALE_AFTER_S: int = Field(20, ge=2, le=3600)
+    ARENA_RECOVER_EVERY_S: int = Field(30, ge=1, le=3600)
+    ARENA_PLANNERS: Annotated[list[Planner], Comma] = []
+    ARENA_LLM_QUEUE_S: int = Field(1800, ge=1, le=86_400)
+    ARENA_LLM_TIMEOUT_S: int = Field(120, ge=1, le=3600)
+    ARENA_LLM_PROXY: Annotated[str, _like(r"(http://[^/:\s]+:\d+)?", "use http://HOST:PORT")] = ""
+    ARENA_KEY_VARIABLES: Annotated[list[KeyVariable], Comma] = []
+    ARENA_VOTES_PER_S: int = Field(4, ge=1, le=1000)
+    ARENA_LOG_LEVEL: Literal["debug", "info", "warning", "error"] = "info"
+    ARENA_LOG_FORM: Literal["line", "json"] = "line"
+    ARENA_METRICS_TOKEN: str = ""
 
 
-def folder(name: str, *, default: Path) -> Path:
-    """An absolute folder; it need not exist yet, but it must be possible to make it."""
+def read_environment() -> Environment:
+    """Return the settings of this process; an empty text leaves a default.
 
-    def parse(raw: str) -> Path:
-        path = Path(raw).expanduser().resolve()
-        nearest = next(place for place in (path, *path.parents) if place.exists())
-        if not raw or not nearest.is_dir() or not os.access(nearest, os.W_OK):
-            raise ValueError(raw)
-        return path
-
-    return read(name, default, parse, "a folder is needed that can be written to")
-
-
-def media(name: str) -> dict[str, Any]:
-    """Where pictures are kept, as Django's STORAGES wants it: a folder unless a bucket is named.
-
-    s3://BUCKET, s3://BUCKET/PREFIX, both with ?endpoint=https://HOST:PORT&region=REGION.
+    Raises:
+        ImproperlyConfigured: Values can't be used; a line each names variable and what is allowed.
     """
-    folder: dict[str, Any] = {"BACKEND": "arena.config.storage.WholeFiles"}
-
-    def parse(raw: str) -> dict[str, Any]:
-        if not raw:  # what a compose file passes on where nothing is set
-            return folder
-        address = urlsplit(raw)
-        wanted = dict(parse_qsl(address.query, strict_parsing=True)) if address.query else {}
-        endpoint = urlsplit(wanted.get("endpoint", "https://given"))
-        if (
-            address.scheme != "s3"
-            or not re.fullmatch(r"[a-z0-9][a-z0-9.-]{1,61}[a-z0-9]", address.netloc)
-            or not wanted.keys() <= {"endpoint", "region"}
-            or endpoint.scheme not in {"http", "https"}
-            or not endpoint.hostname
-        ):
-            raise ValueError(raw)
-        options = {
-            "bucket_name": address.netloc,
-            "location": address.path.strip("/"),
-            "endpoint_url": wanted.get("endpoint"),
-            "region_name": wanted.get("region"),
-        }
-        return {"BACKEND": "arena.config.s3_media.S3Media", "OPTIONS": options}
-
-    allowed = (
-        "use s3://BUCKET/PREFIX?endpoint=https://HOST:PORT&region=REGION, all but BUCKET optional"
-    )
-    return read(name, folder, parse, allowed)
+    texts = {name: os.environ.get(name, "").strip() for name in Environment.model_fields}
+    try:
+        read = Environment(**{name: text for name, text in texts.items() if text})  # type: ignore[arg-type]
+    except ValidationError as error:
+        lines = [
+            f"{fault['loc'][0]}={texts[str(fault['loc'][0])]!r} can't be used: "
+            f"{fault['msg'].removeprefix('Value error, ')}."
+            for fault in error.errors()
+        ]
+        raise ImproperlyConfigured("\n".join(lines)) from None
+    if read.ARENA_STALE_AFTER_S < 2 * read.ARENA_HEARTBEAT_S:
+        # Else every row would be taken away from the worker that is busy with it.
+        raise ImproperlyConfigured(
+            "ARENA_STALE_AFTER_S must be at least twice as long as ARENA_HEARTBEAT_S."
+        )
+    return read
 
 
-def database(name: str, *, default: Path) -> dict[str, object]:
-    """A database by its URL: sqlite:///PATH or postgresql://USER:PASSWORD@HOST:PORT/NAME.
-
-    The default is an SQLite file, given as a path: not every path can be written as a URL.
-    """
-
-    def parse(raw: str) -> dict[str, object]:
-        if urlsplit(raw).scheme not in {"sqlite", "postgres", "postgresql"}:
-            raise ValueError(raw)
-        parts = dict(dj_database_url.parse(raw))
-        if parts["NAME"] in {"", ":memory:"}:  # every process would have one of its own
-            raise ValueError(raw)
-        return parts
-
-    allowed = "use sqlite:///PATH or postgresql://USER:PASSWORD@HOST:PORT/NAME"
-    standard: dict[str, object] = {"ENGINE": "django.db.backends.sqlite3", "NAME": str(default)}
-    return read(name, standard, parse, allowed)
+def close_folder(folder: Path) -> None:
+    """Make a folder that only its owner reads; one for all, or around the program, stays open."""
+    folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+    if not folder.stat().st_mode & stat.S_ISVTX and not BASE_DIR.is_relative_to(folder):
+        with suppress(OSError):  # somebody else's, or on a disk without modes
+            folder.chmod(0o700)
 
 
-def sqlite_file(name: str, path: Path) -> None:
-    """Make an SQLite file that only its owner reads, or mend one that others could read.
+def make_sqlite_file(path: Path) -> None:
+    """Make a file that only its owner reads; what SQLite puts beside it has the same mode.
 
     Raises:
         ImproperlyConfigured: There can't be a file at that place.
     """
     try:
-        private.make_folder(path.parent)
-        private.make_database(path)
+        path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+        os.close(os.open(path, os.O_RDONLY | os.O_CREAT, 0o600))
     except OSError as error:
         raise ImproperlyConfigured(
-            f"{name}: {path} can't be used: {error.strerror}. A file is needed that can be "
+            f"DATABASE_URL: {path} can't be used: {error.strerror}. A file is needed that can be "
             "written to."
         ) from error
-
-
-def redis(name: str, *, default: str) -> str:
-    """The URL of a Redis: redis://HOST:PORT/N, rediss:// or unix (redis+socket:///PATH)."""
-
-    def parse(raw: str) -> str:
-        address = urlsplit(raw)
-        if address.scheme == "redis+socket":
-            place = address.path
-        elif address.scheme in {"redis", "rediss"}:
-            place = address.hostname or ""
-            int(address.path.strip("/") or 0)
-            _ = address.port  # raises where it is no port
-        else:
-            place = ""
-        if not place:
-            raise ValueError(raw)
-        return raw
-
-    return read(
-        name, default, parse, "use redis://HOST:PORT/N, rediss://... or redis+socket:///PATH"
-    )

@@ -4,7 +4,6 @@ The defaults let a newcomer run at once: SQLite and files under var/ and media/.
 """
 
 import hashlib
-import os
 import re
 import secrets
 import tempfile
@@ -14,29 +13,27 @@ from typing import Any
 
 from csp.constants import NONE, SELF
 
-from arena.config import env, private
+from arena.config.env import BASE_DIR as BASE_DIR
+from arena.config.env import close_folder, make_sqlite_file, read_environment
 from arena.exports.files import write_once
 
-BASE_DIR = Path(__file__).resolve().parents[2]
-VAR_DIR = env.folder("ARENA_VAR_DIR", default=BASE_DIR / "var")
-private.make_folder(VAR_DIR)
-private.mend_folder(VAR_DIR, around=BASE_DIR)
+ENV = read_environment()
+VAR_DIR = ENV.ARENA_VAR_DIR
+close_folder(VAR_DIR)
 
 # --- Who may reach it --------------------------------------------------------------------------
 
-DEBUG = env.boolean("ARENA_DEBUG", default=False)
-ALLOWED_HOSTS = env.names("ARENA_HOSTS", default=("localhost", "127.0.0.1", "[::1]"))
-CSRF_TRUSTED_ORIGINS = env.origins("ARENA_ORIGINS")
-HTTPS = env.boolean("ARENA_HTTPS", default=False)
+DEBUG = ENV.ARENA_DEBUG
+ALLOWED_HOSTS = ENV.ARENA_HOSTS
+CSRF_TRUSTED_ORIGINS = ENV.ARENA_ORIGINS
+HTTPS = ENV.ARENA_HTTPS
 
 
 def _secret_key() -> str:
     """From the environment, else a key that is made once and kept in var/."""
     kept = VAR_DIR / "secret_key"
-    given = env.read("ARENA_SECRET_KEY", "", str, "any long random text")
-    if given:
-        return given
-    private.mend_file(kept)
+    if ENV.ARENA_SECRET_KEY:
+        return ENV.ARENA_SECRET_KEY
     if not kept.exists():
         # The server and its workers start at once: the first key made is the key of all.
         write_once(kept, secrets.token_urlsafe(50).encode())
@@ -49,7 +46,7 @@ SECURE_SSL_REDIRECT = HTTPS
 SECURE_REDIRECT_EXEMPT = [r"^(healthz|readyz|metrics)$"]  # asked from inside, without the proxy
 SECURE_HSTS_SECONDS = 31_536_000 if HTTPS else 0
 SECURE_PROXY_SSL_HEADER = ("HTTP_X_FORWARDED_PROTO", "https") if HTTPS else None
-PROXIES = env.integer("ARENA_PROXIES", default=0, low=0, high=9)
+PROXIES = ENV.ARENA_PROXIES
 SESSION_COOKIE_AGE = 30 * 24 * 3600
 X_FRAME_OPTIONS = "DENY"
 SECURE_REFERRER_POLICY = "same-origin"
@@ -71,14 +68,10 @@ CONTENT_SECURITY_POLICY = {
 # can lock out somebody else. Far more of them, whatever the accounts, lock the address.
 # Kept in the database, so it holds for every web server.
 AXES_HANDLER = "arena.config.login.LoginLimit"
-ADDRESS_FAILURE_LIMIT = env.integer(
-    "ARENA_LOGIN_FAILURES_ADDRESS", default=50, low=1, high=100_000
-)
+ADDRESS_FAILURE_LIMIT = ENV.ARENA_LOGIN_FAILURES_ADDRESS
 AXES_LOCKOUT_PARAMETERS = [["username", "ip_address"]]
-AXES_FAILURE_LIMIT = env.integer("ARENA_LOGIN_FAILURES", default=5, low=1, high=100)
-AXES_COOLOFF_TIME = timedelta(
-    minutes=env.integer("ARENA_LOGIN_LOCK_MIN", default=15, low=1, high=1440)
-)
+AXES_FAILURE_LIMIT = 5
+AXES_COOLOFF_TIME = timedelta(minutes=15)
 AXES_RESET_COOL_OFF_ON_FAILURE_DURING_LOCKOUT = False
 AXES_RESET_ON_SUCCESS = True
 AXES_DISABLE_ACCESS_LOG = True
@@ -103,7 +96,6 @@ INSTALLED_APPS = [
     "arena",
 ]
 MIDDLEWARE = [
-    "arena.config.logs.RequestIdMiddleware",
     "arena.config.middleware.HeaderMiddleware",
     "django.middleware.security.SecurityMiddleware",
     "csp.middleware.CSPMiddleware",
@@ -113,7 +105,7 @@ MIDDLEWARE = [
     "django.middleware.common.CommonMiddleware",
     "django.middleware.csrf.CsrfViewMiddleware",
     "django.contrib.auth.middleware.AuthenticationMiddleware",
-    "arena.site.access.SignInMiddleware",
+    "django.contrib.auth.middleware.LoginRequiredMiddleware",
     "django.contrib.messages.middleware.MessageMiddleware",
     "django.middleware.clickjacking.XFrameOptionsMiddleware",
     "axes.middleware.AxesMiddleware",
@@ -166,6 +158,7 @@ REST_FRAMEWORK = {
     "DEFAULT_RENDERER_CLASSES": ["rest_framework.renderers.JSONRenderer"],
     "DEFAULT_PARSER_CLASSES": ["rest_framework.parsers.JSONParser"],
     "DEFAULT_SCHEMA_CLASS": "arena.api.views.ArenaSchema",
+    "EXCEPTION_HANDLER": "arena.api.errors.answer_error",
 }
 SPECTACULAR_SETTINGS = {
     "TITLE": "Scenario Arena",
@@ -188,7 +181,10 @@ def _database() -> dict[str, object]:
     readers go on meanwhile. FULL: what is confirmed is on the disk, also after a power cut; it
     costs a vote 0.3 ms.
     """
-    found = env.database("DATABASE_URL", default=VAR_DIR / "arena.sqlite3")
+    found: dict[str, object] = ENV.DATABASE_URL or {
+        "ENGINE": "django.db.backends.sqlite3",
+        "NAME": str(VAR_DIR / "arena.sqlite3"),  # not every path can be written as a URL
+    }
     if found["ENGINE"] == "django.db.backends.sqlite3":
         found["OPTIONS"] = {
             "timeout": 20,
@@ -199,7 +195,7 @@ def _database() -> dict[str, object]:
         }
         # Tests run on a file as well: threads that vote at once need what a memory database lacks.
         found["TEST"] = {"NAME": str(VAR_DIR / "test.sqlite3")}
-        env.sqlite_file("DATABASE_URL", Path(str(found["NAME"])))
+        make_sqlite_file(Path(str(found["NAME"])))
     else:
         found["CONN_HEALTH_CHECKS"] = True
     # Opening a connection for every request would cost as much as a vote, on SQLite as well.
@@ -208,19 +204,20 @@ def _database() -> dict[str, object]:
 
 
 DATABASES = {"default": _database()}
-MEDIA_ROOT = env.folder("ARENA_MEDIA_DIR", default=BASE_DIR / "media")
-private.mend_folder(MEDIA_ROOT, around=BASE_DIR)
+MEDIA_ROOT = ENV.ARENA_MEDIA_DIR
+if "OPTIONS" not in ENV.ARENA_MEDIA_URL:  # no bucket
+    close_folder(MEDIA_ROOT)
 STATIC_ROOT = VAR_DIR / "static"
 STATIC_URL = "static/"
 STATICFILES_DIRS = [BASE_DIR / "static"]
 STORAGES: dict[str, dict[str, Any]] = {
-    "default": env.media("ARENA_MEDIA_URL"),
+    "default": ENV.ARENA_MEDIA_URL,
     "staticfiles": {"BACKEND": "arena.config.storage.ModuleStorage"},
 }
 WHITENOISE_KEEP_ONLY_HASHED_FILES = True
 
 # Files by which somebody sends something; larger ones are let pass by unread.
-UPLOAD_MB = env.integer("ARENA_UPLOAD_MB", default=200, low=1, high=4096)
+UPLOAD_MB = ENV.ARENA_UPLOAD_MB
 FILE_UPLOAD_HANDLERS = [
     "arena.config.uploads.BoundedUpload",
     "django.core.files.uploadhandler.MemoryFileUploadHandler",
@@ -236,8 +233,8 @@ PRIVATE_REDIS_SOCKET = VAR_DIR / "redis.sock"
 if not re.fullmatch(r"[A-Za-z0-9/._ -]{1,100}", str(PRIVATE_REDIS_SOCKET)):
     digest = hashlib.sha256(str(VAR_DIR).encode()).hexdigest()[:16]
     PRIVATE_REDIS_SOCKET = Path(tempfile.gettempdir()) / f"arena-{digest}.sock"
-REDIS_URL = env.redis("REDIS_URL", default=f"redis+socket://{PRIVATE_REDIS_SOCKET}")
-REDIS_IS_PRIVATE = REDIS_URL.startswith("redis+socket:") and "REDIS_URL" not in os.environ
+REDIS_IS_PRIVATE = not ENV.REDIS_URL
+REDIS_URL = ENV.REDIS_URL or f"redis+socket://{PRIVATE_REDIS_SOCKET}"
 CELERY_BROKER_URL = REDIS_URL
 CELERY_TASK_IGNORE_RESULT = True
 CELERY_TASK_ACKS_LATE = True
@@ -256,56 +253,43 @@ CELERY_TASK_ROUTES = {
 CELERY_BROKER_TRANSPORT_OPTIONS = {"visibility_timeout": 3600, "socket_connect_timeout": 5}
 CELERY_TIMEZONE = "UTC"
 
-HEARTBEAT_S = env.integer("ARENA_HEARTBEAT_S", default=5, low=1, high=60)
-STALE_AFTER_S = env.integer("ARENA_STALE_AFTER_S", default=20, low=2, high=3600)
-# Else every row would be taken away from the worker that is busy with it.
-env.at_least_twice("ARENA_STALE_AFTER_S", STALE_AFTER_S, "ARENA_HEARTBEAT_S", HEARTBEAT_S)
-RECOVER_EVERY_S = env.integer("ARENA_RECOVER_EVERY_S", default=30, low=1, high=3600)
+HEARTBEAT_S = ENV.ARENA_HEARTBEAT_S
+STALE_AFTER_S = ENV.ARENA_STALE_AFTER_S
+RECOVER_EVERY_S = ENV.ARENA_RECOVER_EVERY_S
 # A planner is code that workers import: beside the built-in ones these alone.
-PLANNERS = env.dotted_paths("ARENA_PLANNERS")
+PLANNERS = tuple(ENV.ARENA_PLANNERS)
+LLM_QUEUE_S = ENV.ARENA_LLM_QUEUE_S
+LLM_TIMEOUT_S = ENV.ARENA_LLM_TIMEOUT_S
+LLM_ANSWER_MB = 8
+LLM_PROXY = ENV.ARENA_LLM_PROXY
+KEY_VARIABLES = ENV.ARENA_KEY_VARIABLES
 
-LLM_QUEUE_S = env.integer("ARENA_LLM_QUEUE_S", default=1800, low=1, high=86400)
-LLM_TIMEOUT_S = env.integer("ARENA_LLM_TIMEOUT_S", default=120, low=1, high=3600)
-LLM_ANSWER_MB = env.integer("ARENA_LLM_ANSWER_MB", default=8, low=1, high=256)
-LLM_PROXY = env.proxy("ARENA_LLM_PROXY")
-KEY_VARIABLES = env.key_variables("ARENA_KEY_VARIABLES")
-
-# --- Voting ------------------------------------------------------------------------------------
-
-VOTE_WAIT_S = env.integer("ARENA_VOTE_WAIT_S", default=5, low=1, high=60)
-VOTES_PER_S = env.integer("ARENA_VOTES_PER_S", default=4, low=1, high=1000)
+VOTE_WAIT_S = 5
+VOTES_PER_S = ENV.ARENA_VOTES_PER_S
 
 # --- What it says about itself -----------------------------------------------------------------
 
-LOG_LEVEL = env.choice(
-    "ARENA_LOG_LEVEL", default="info", allowed=("debug", "info", "warning", "error")
-).upper()
-LOG_FORM = env.choice("ARENA_LOG_FORM", default="line", allowed=("line", "json"))
-METRICS_TOKEN = env.read("ARENA_METRICS_TOKEN", "", str, "any long random text")
+LOG_LEVEL = ENV.ARENA_LOG_LEVEL.upper()
+LOG_FORM = ENV.ARENA_LOG_FORM
+METRICS_TOKEN = ENV.ARENA_METRICS_TOKEN
 LOGGING = {
     "version": 1,
     "disable_existing_loggers": False,
     "formatters": {
-        "line": {
-            "format": "{asctime} {levelname:7} [{request_id}] {name}: {message}",
-            "style": "{",
-        },
+        "line": {"format": "{asctime} {levelname:7} {name}: {message}", "style": "{"},
         "json": {
             "()": "pythonjsonlogger.json.JsonFormatter",
-            "fmt": "{asctime}{levelname}{name}{message}{request_id}{process}{threadName}",
+            "fmt": "{asctime}{levelname}{name}{message}{process}{threadName}",
             "style": "{",
             "rename_fields": {"asctime": "at", "levelname": "level", "threadName": "thread"},
         },
     },
-    "filters": {
-        "no_keys": {"()": "arena.config.logs.HideKeys"},
-        "request_id": {"()": "arena.config.logs.AddRequestId"},
-    },
+    "filters": {"no_keys": {"()": "arena.config.logs.HideKeys"}},
     "handlers": {
         "console": {
             "class": "logging.StreamHandler",
             "formatter": LOG_FORM,
-            "filters": ["no_keys", "request_id"],
+            "filters": ["no_keys"],
         }
     },
     "root": {"handlers": ["console"], "level": LOG_LEVEL},
@@ -316,5 +300,7 @@ LOGGING = {
         "fontTools": {"level": "WARNING"},
         "matplotlib": {"level": "WARNING"},
         "httpx2": {"level": "WARNING"},
+        # Threads of the web worker take turns at a queue on purpose: an entry is no news.
+        "waitress.queue": {"level": "ERROR"},
     },
 }

@@ -9,7 +9,6 @@ from django.core.files.base import File
 from django.core.files.storage import FileSystemStorage
 from whitenoise.storage import CompressedManifestStaticFilesStorage
 
-from arena.config import private
 from arena.exports.files import write_pieces
 from augment.errors import MediaFault
 
@@ -29,8 +28,8 @@ class WholeFiles(FileSystemStorage):
     def _save(self, name: str, content: File[bytes]) -> str:
         path = Path(self.path(name))
         try:
-            private.make_folder(path.parent)
-            write_pieces(path, content.chunks(), mode=private.FILE)
+            path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+            write_pieces(path, content.chunks(), mode=0o600)
         except OSError as fault:  # a full disk, a folder that somebody took away
             cause = fault.strerror or str(fault)
             logger.error("Could not write %s: %s", path, fault)

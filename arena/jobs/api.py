@@ -112,8 +112,8 @@ class UseDocument(serializers.Serializer[Any]):
     calls = serializers.ListField(
         child=serializers.IntegerField(), help_text="At least, as expected, at most."
     )
-    tokens_in = serializers.IntegerField()
-    tokens_out = serializers.IntegerField()
+    tokens_in = serializers.IntegerField(allow_null=True)
+    tokens_out = serializers.IntegerField(allow_null=True)
     usd = serializers.DecimalField(None, 9, allow_null=True)
     usd_most = serializers.DecimalField(None, 9, allow_null=True)
     answered = serializers.IntegerField(help_text="Rows whose answers are in the store already.")
@@ -197,7 +197,7 @@ class EstimateView(ApiView):
     def post(self, given: Given) -> Any:
         """What a job would use.
 
-        From recorded calls where there are some, else a guess.
+        From recorded calls; null where there are none, or no price.
         """
         return estimate(JobScope(**given))
 

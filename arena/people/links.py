@@ -6,10 +6,8 @@ Marks of authorship stand here too: like a link, each joins one expert to one st
 import secrets
 from dataclasses import dataclass
 from datetime import timedelta
-from typing import Any
 
 from django.contrib.auth.models import User
-from django.contrib.sessions.models import Session
 from django.db import transaction
 from django.db.models import Case, F, Q, Value, When
 from django.utils import timezone
@@ -17,16 +15,10 @@ from django.utils.translation import gettext as _
 
 from arena.errors import LinkOver, NotYours, TokenOver, TooManyRequests
 from arena.models import ApiToken, Authorship, Invitation, Study, token_digest
-from arena.people.queries import (
-    api_token_by_secret,
-    effective_role,
-    invitation_by_token,
-    may_be_let_in,
-    role_of,
-    roles_offered,
-)
+from arena.people.queries import TOKEN_ROLES, effective_role, may_be_let_in, role_of
+from arena.people.services import end_sessions
 from augment.errors import Conflict, UnknownName
-from augment.services.events import log_event
+from augment.services.events import log_change
 from augment.services.texts import one_line
 
 PREFIX = "arena_"
@@ -59,7 +51,7 @@ def make_api_token(*, owner: User, name: str, role: str, days: int) -> FreshToke
     Args:
         owner: Whose it is; only they make it.
         name: What it is for.
-        role: One of `roles_offered`.
+        role: One of `TOKEN_ROLES` of the owner's role.
         days: How long it works, one of `DAYS`.
 
     Raises:
@@ -68,7 +60,7 @@ def make_api_token(*, owner: User, name: str, role: str, days: int) -> FreshToke
         Conflict: It is to work for another time, or the owner has too many.
     """
     name = one_line("name", name, what="token", longest=80)
-    offered = roles_offered(owner)
+    offered = TOKEN_ROLES.get(role_of(owner) or "", ())
     if role not in offered:
         raise UnknownName("role", role, list(offered))
     if days not in DAYS:
@@ -87,16 +79,20 @@ def make_api_token(*, owner: User, name: str, role: str, days: int) -> FreshToke
         token_sha256=token_digest(secret),
         expires_at=now + timedelta(days=days),
     )
-    _log_token(token, owner, "add")
+    _log_token(token, "add", owner)
     return FreshToken(token=token, secret=secret)
 
 
 @transaction.atomic
 def revoke_api_token(*, token: ApiToken, actor: User) -> None:
     """Revoke a token; twice changes nothing."""
-    alive = ApiToken.objects.filter(pk=token.pk, revoked_at=None)
-    if alive.update(revoked_at=timezone.now()):
-        _log_token(token, actor, "revoke")
+    if ApiToken.objects.filter(pk=token.pk, revoked_at=None).update(revoked_at=timezone.now()):
+        _log_token(token, "revoke", actor)
+
+
+def _log_token(token: ApiToken, verb: str, actor: User) -> None:
+    facts = {"name": token.name, "role": token.role, "owner": str(token.owner.person.code)}
+    log_change(token, verb, actor, after=facts | {"expires_at": token.expires_at.isoformat()})
 
 
 def use_api_token(secret: str) -> tuple[User, ApiToken]:
@@ -106,7 +102,10 @@ def use_api_token(secret: str) -> tuple[User, ApiToken]:
         TokenOver: It is nobody's, over, or its owner may do nothing of the kind any more.
         TooManyRequests: More requests than its role has within the window.
     """
-    token = api_token_by_secret(secret)
+    alive = ApiToken.objects.select_related("owner").filter(
+        revoked_at=None, expires_at__gt=timezone.now(), owner__is_active=True
+    )
+    token = alive.filter(token_sha256=token_digest(secret)).first()
     role = None if token is None else effective_role(token.role, role_of(token.owner))
     if token is None or role is None:
         raise TokenOver("This token opens nothing: it is unknown, expired or revoked.")
@@ -130,16 +129,6 @@ def _count(token: ApiToken, most: int) -> None:
         last_used_at=now,
     ):
         raise TooManyRequests(most, WINDOW.seconds)
-
-
-def _log_token(token: ApiToken, actor: User, verb: str) -> None:
-    after = {
-        "name": token.name,
-        "role": token.role,
-        "owner": str(token.owner.person.code),
-        "expires_at": token.expires_at.isoformat(),
-    }
-    log_event(actor=actor, verb=verb, object_kind="api token", object_code=token.code, after=after)
 
 
 # --- Invitations -------------------------------------------------------------------------------
@@ -169,7 +158,7 @@ def invite(*, study: Study, expert: User, actor: User | None = None) -> FreshLin
         Conflict: The study was cancelled, or the account can't be let in by a link: it is
             simulated, inactive, or more than an expert.
     """
-    must_take_part(study=study, expert=expert)
+    _must_take_part(study, expert)
     if study.state == Study.State.CANCELLED:
         raise Conflict(f"The study '{study.name}' was cancelled; nobody is invited.")
     if not may_be_let_in(expert):
@@ -186,16 +175,28 @@ def invite(*, study: Study, expert: User, actor: User | None = None) -> FreshLin
     replaced = [str(code) for code in older.values_list("code", flat=True)]
     older.update(revoked_at=now)
     token = secrets.token_urlsafe(32)
-    invitation = Invitation.objects.create(
+    row = Invitation.objects.create(
         study=study,
         expert=expert,
         token_sha256=token_digest(token),
         invited_by=actor,
         expires_at=now + LINK_LIVES,
     )
-    before = {"replaced": replaced} if replaced else None
-    _log_invitation(invitation, "invite", actor, _facts(invitation), before)
-    return FreshLink(invitation=invitation, token=token)
+    facts = {"study": str(study.code), "expert": str(expert.person.code)}
+    log_change(row, "invite", actor, before={"replaced": replaced}, after=facts)
+    return FreshLink(invitation=row, token=token)
+
+
+def find_invitation(token: str) -> Invitation | None:
+    """Return the invitation whose link carries this token, whatever its state."""
+    rows = Invitation.objects.select_related("study", "expert__person", "invited_by")
+    return rows.filter(token_sha256=token_digest(token)).first()
+
+
+def lets_in(invitation: Invitation) -> bool:
+    """Return whether the link of an invitation works."""
+    is_alive = invitation.state(timezone.now()) in Invitation.ALIVE
+    return is_alive and may_be_let_in(invitation.expert)
 
 
 @transaction.atomic
@@ -203,128 +204,77 @@ def accept(*, token: str) -> Invitation:
     """Let the expert of a link in; it goes on working on their other devices until it ends.
 
     Raises:
-        NotYours: No link has this token.
-        LinkOver: It expired, was taken back, or its account may not be let in any more.
+        LinkOver: It is nobody's, expired, was taken back, or its account may not be let in.
     """
-    invitation = invitation_by_token(token, locked=True)
-    now = timezone.now()
-    if invitation.state(now) not in Invitation.ALIVE or not may_be_let_in(invitation.expert):
+    Invitation.objects.select_for_update().filter(token_sha256=token_digest(token)).first()
+    invitation = find_invitation(token)
+    if invitation is None or not lets_in(invitation):
         raise LinkOver("This link lets nobody in any more.")
-    is_first = invitation.used_at is None
-    if is_first:
-        invitation.used_at = now
+    if invitation.used_at is None:
+        invitation.used_at = timezone.now()
         invitation.save(update_fields=["used_at"])
-    _log_invitation(invitation, "accept", invitation.expert, {"is_first": is_first})
+    log_change(invitation, "accept", invitation.expert)
     return invitation
 
 
 @transaction.atomic
-def revoke(*, invitation: Invitation, actor: User | None = None) -> int:
-    """Revoke a link and sign out whoever came in by a link to the same study.
-
-    Returns:
-        How many sessions ended; revoking twice changes nothing more.
-    """
+def revoke(*, invitation: Invitation, actor: User | None = None) -> None:
+    """Revoke a link and sign out whoever came in by a link to the same study."""
     row = Invitation.objects.select_for_update().get(pk=invitation.pk)
     if row.revoked_at is None:
         row.revoked_at = timezone.now()
         row.save(update_fields=["revoked_at"])
-    ended = _end_sessions(row)
-    _log_invitation(row, "revoke", actor, {**_facts(row), "sessions_ended": ended})
-    return ended
-
-
-def _end_sessions(invitation: Invitation) -> int:
-    """Delete the sessions that a link of this expert and study began."""
-    same = Invitation.objects.filter(study=invitation.study_id, expert=invitation.expert_id)
-    codes = {str(code) for code in same.values_list("code", flat=True)}
-    begun = [
-        session.pk
-        for session in Session.objects.filter(expire_date__gt=timezone.now())
-        if session.get_decoded().get(SESSION_KEY) in codes
-    ]
-    Session.objects.filter(pk__in=begun).delete()
-    return len(begun)
-
-
-def _facts(invitation: Invitation) -> dict[str, Any]:
-    return {
-        "study": str(invitation.study.code),
-        "expert": str(invitation.expert.person.code),
-        "expires_at": invitation.expires_at.isoformat(),
-    }
-
-
-def _log_invitation(
-    row: Invitation,
-    verb: str,
-    actor: User | None,
-    after: dict[str, Any],
-    before: dict[str, Any] | None = None,
-) -> None:
-    log_event(
-        actor=actor,
-        verb=verb,
-        object_kind="invitation",
-        object_code=row.code,
-        before=before,
-        after=after,
-    )
+    same = Invitation.objects.filter(study=row.study_id, expert=row.expert_id)
+    end_sessions(SESSION_KEY, {str(code) for code in same.values_list("code", flat=True)})
+    facts = {"study": str(row.study.code), "expert": str(row.expert.person.code)}
+    log_change(row, "revoke", actor, after=facts)
 
 
 # --- Authorships -------------------------------------------------------------------------------
 
 
-def must_take_part(*, study: Study, expert: User) -> None:
-    """Raise NotYours for an account that is no expert of the study."""
-    if not study.experts.filter(pk=expert.pk).exists():
-        raise NotYours(f"{expert.get_username()} does not take part in '{study.name}'.")
-
-
 @transaction.atomic
 def mark_author(
-    *, study: Study, expert: User, contestant: str, actor: User | None = None
-) -> Authorship:
-    """Mark an expert as an author of a contestant of the study, whatever its state.
+    *,
+    study: Study,
+    expert: User,
+    contestant: str,
+    is_author: bool = True,
+    actor: User | None = None,
+) -> None:
+    """Mark an expert as an author of a contestant of the study, or take that back.
 
-    Their votes stay as they are; ratings made from then on know of it. Twice changes nothing.
+    Votes stay as they are; ratings made from then on know of it. Twice changes nothing.
 
     Args:
         study: Also an open one: experts see nothing of it.
         expert: Takes part in the study.
         contestant: The slug of one of its contestants.
+        is_author: False takes the mark back.
         actor: Who says so, for the log.
 
     Raises:
         NotYours: The account does not take part in the study.
         UnknownName: The study has no such contestant.
     """
-    must_take_part(study=study, expert=expert)
-    made = study.contestants.filter(slug=contestant).first()
-    if made is None:
+    _must_take_part(study, expert)
+    row = study.contestants.filter(slug=contestant).first()
+    if row is None:
         known = study.contestants.order_by("slug").values_list("slug", flat=True)
         raise UnknownName("contestant", contestant, list(known))
-    row, is_new = Authorship.objects.get_or_create(
-        study=study, expert=expert, contestant=made, defaults={"marked_by": actor}
-    )
-    if is_new:
-        _log_author("mark author", row, actor)
-    return row
+    marks = Authorship.objects.filter(study=study, expert=expert, contestant=row)
+    if is_author:
+        _, is_changed = marks.get_or_create(
+            study=study, expert=expert, contestant=row, defaults={"marked_by": actor}
+        )
+    else:
+        is_changed = marks.delete()[0] > 0
+    if is_changed:
+        verb = "mark author" if is_author else "take back author"
+        facts = {"expert": str(expert.person.code), "contestant": contestant}
+        log_change(study, verb, actor, after=facts)
 
 
-@transaction.atomic
-def take_back_author(*, authorship: Authorship, actor: User | None = None) -> None:
-    """Remove a mark of authorship; ratings made before keep it.
-
-    Twice changes nothing more.
-    """
-    held = Authorship.objects.select_for_update(of=("self",)).filter(pk=authorship.pk).first()
-    if held is None:
-        return
-    _log_author("take back author", held, actor)
-    held.delete()
-
-
-def _log_author(verb: str, row: Authorship, actor: User | None) -> None:
-    after = {"expert": str(row.expert.person.code), "contestant": row.contestant.slug}
-    log_event(actor=actor, verb=verb, object_kind="study", object_code=row.study.code, after=after)
+def _must_take_part(study: Study, expert: User) -> None:
+    if not study.experts.filter(pk=expert.pk).exists():
+        raise NotYours(f"{expert.get_username()} does not take part in '{study.name}'.")

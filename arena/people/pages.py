@@ -1,6 +1,8 @@
 """Pages of accounts: sign-in, the list of people, links to set a password, one's own tokens."""
 
 import uuid
+from collections.abc import Callable
+from functools import wraps
 from typing import Any
 
 from django import forms
@@ -13,6 +15,7 @@ from django.contrib.auth.views import LoginView
 from django.http import HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, redirect, render
 from django.urls import reverse
+from django.utils import timezone
 from django.utils.translation import gettext as _
 from django.utils.translation import gettext_lazy, ngettext
 from django.views.decorators.cache import never_cache
@@ -24,12 +27,14 @@ from arena.people import services
 from arena.people.links import DAYS, REQUESTS, make_api_token, revoke_api_token
 from arena.people.queries import (
     ROLES,
+    TOKEN_ROLES,
     Language,
-    api_tokens_of,
+    by_pseudonym,
     has_admin,
+    is_forgotten,
     language_of,
-    list_accounts,
-    roles_offered,
+    role_given,
+    role_of,
 )
 from arena.site.access import (
     ADMIN,
@@ -37,11 +42,9 @@ from arena.site.access import (
     BACKEND,
     EXPERT,
     GONE,
-    KEPT,
     STAFF,
     allow_only,
     keep_secret,
-    read_form,
     user_of,
 )
 from arena.site.acts import refusals_in, refusals_told
@@ -105,23 +108,17 @@ class SignIn(LoginView):
     redirect_authenticated_user = True
 
     def get_context_data(self, **more: Any) -> dict[str, Any]:
-        """Add whether the first admin is still to be made, and what was typed elsewhere."""
-        more |= {KEPT: self.request.POST.get(KEPT, ""), "is_empty": not has_admin()}
-        return super().get_context_data(**more)
+        """Add whether the first admin is still to be made."""
+        return super().get_context_data(is_empty=not has_admin(), **more)
 
     def form_valid(self, form: AuthenticationForm) -> HttpResponse:
-        """Sign in; what was typed before the session expired is shown to be sent again."""
-        answer = super().form_valid(form)
-        if fields := read_form(self.request.POST.get(KEPT, "")):
-            context = {"fields": fields, "address": self.get_success_url()}
-            answer = render(self.request, "kept_form.html", context)
-        return with_own_language(answer, form.get_user())
+        """Sign in."""
+        return with_own_language(super().form_valid(form), form.get_user())
 
 
 def with_own_language(answer: HttpResponse, user: User) -> HttpResponse:
     """Set this browser's language to what the account chose, if it chose any."""
-    chosen = language_of(user)
-    if chosen is not None:
+    if chosen := language_of(user):
         keep_language(answer, chosen)
     return answer
 
@@ -133,43 +130,47 @@ def keep_language(answer: HttpResponse, language: Language) -> None:
     )
 
 
-@login_not_required
-@never_cache
-@require_http_methods(PAGES)
+def link_page(view: Callable[..., HttpResponse]) -> Callable[..., HttpResponse]:
+    """Let a page be opened by its link alone, kept secret; a link that is over says so."""
+
+    @login_not_required
+    @never_cache
+    @require_http_methods(PAGES)
+    @wraps(view)
+    def answer(request: HttpRequest, **named: Any) -> HttpResponse:
+        try:
+            return keep_secret(view(request, **named))
+        except LinkOver:
+            return keep_secret(render(request, "people/link_over.html", status=GONE))
+
+    return answer
+
+
+@link_page
 def first_page(request: HttpRequest, token: str) -> HttpResponse:
     """The page of the link that `serve` prints where there is no admin yet."""
+    services.check_first_link(token)
     form = FirstForm(User(), request.POST or None)
-    try:
-        services.check_first_link(token)
-        if form.is_valid():
-            name, password = form.cleaned_data["username"], form.cleaned_data["new_password1"]
-            with refusals_in(form, "username"):
-                user = services.make_first_admin(token=token, username=name, password=password)
-                login(request, user, backend=BACKEND)
-                return redirect("home")
-    except LinkOver:
-        return keep_secret(render(request, "people/link_over.html", status=GONE))
-    context = {"form": form, "is_first": True}
-    return keep_secret(render(request, "people/welcome.html", context))
-
-
-@login_not_required
-@never_cache
-@require_http_methods(PAGES)
-def welcome_page(request: HttpRequest, token: str) -> HttpResponse:
-    """Where somebody sets the password of an account that was made for them."""
-    try:
-        user = services.find_welcomed(token)
-        form = SetPasswordForm(user, request.POST or None)
-        if form.is_valid():
-            password = form.cleaned_data["new_password1"]
-            user = services.accept_welcome(token=token, password=password)
+    if form.is_valid():
+        name, password = form.cleaned_data["username"], form.cleaned_data["new_password1"]
+        with refusals_in(form, "username"):
+            user = services.make_first_admin(token=token, username=name, password=password)
             login(request, user, backend=BACKEND)
             return redirect("home")
-    except LinkOver:
-        return keep_secret(render(request, "people/link_over.html", status=GONE))
-    context = {"form": form, "welcomed": user}
-    return keep_secret(render(request, "people/welcome.html", context))
+    return render(request, "people/welcome.html", {"form": form, "is_first": True})
+
+
+@link_page
+def welcome_page(request: HttpRequest, token: str) -> HttpResponse:
+    """Where somebody sets the password of an account that was made for them."""
+    user = services.find_welcomed(token)
+    form = SetPasswordForm(user, request.POST or None)
+    if form.is_valid():
+        password = form.cleaned_data["new_password1"]
+        user = services.accept_welcome(token=token, password=password)
+        login(request, user, backend=BACKEND)
+        return redirect("home")
+    return render(request, "people/welcome.html", {"form": form, "welcomed": user})
 
 
 @never_cache
@@ -203,9 +204,24 @@ def people_page(request: HttpRequest) -> HttpResponse:
                 **form.cleaned_data, password=None, actor=user_of(request)
             )
             return _link_page(request, user)
-    lines = [(line, ROLE_NAMES.get(line.role or "", "")) for line in list_accounts()]
-    context = {"lines": lines, "form": form, "roles": ROLE_NAMES.items()}
+    context = {"lines": _list_accounts(), "form": form, "roles": ROLE_NAMES.items()}
     return render(request, "people/list.html", context)
+
+
+def _list_accounts() -> list[dict[str, Any]]:
+    """Return every account, by role and pseudonym.
+
+    Left out are those that the machine votes for and those that enrolled by a link, which the page
+    of their study lists.
+    """
+    accounts = User.objects.filter(person__is_simulated=False, enrolled=None)
+    accounts = accounts.select_related("person").prefetch_related("groups")
+    places = {role: place for place, role in enumerate((*ROLES, None))}
+    by_role = sorted(by_pseudonym(accounts), key=lambda user: places[role_given(user)])
+    return [
+        {"account": user, "role": role_given(user), "is_forgotten": is_forgotten(user)}
+        for user in by_role
+    ]
 
 
 @allow_only(ADMIN)
@@ -252,8 +268,8 @@ def _link_page(request: HttpRequest, user: User) -> HttpResponse:
 @require_http_methods(PAGES)
 def tokens_page(request: HttpRequest) -> HttpResponse:
     """One's own tokens, and a form for a new one, which is shown this once."""
-    user = user_of(request)
-    roles = roles_offered(user)
+    user, now = user_of(request), timezone.now()
+    roles = TOKEN_ROLES.get(role_of(user) or "", ())
     form = TokenForm(request.POST or None, roles=roles)
     fresh = None
     if form.is_valid():
@@ -263,7 +279,10 @@ def tokens_page(request: HttpRequest) -> HttpResponse:
     context = {
         "form": form,
         "fresh": fresh,
-        "lines": [(*line, ROLE_NAMES[line[0].role]) for line in api_tokens_of(user)],
+        "lines": [
+            (token, token.state(now), ROLE_NAMES[token.role])
+            for token in ApiToken.objects.filter(owner=user)
+        ],
         "limits": [(ROLE_NAMES[role], REQUESTS[role]) for role in roles],
         "is_staff": roles and roles[0] in STAFF,
         "is_admin": ADMIN in roles,

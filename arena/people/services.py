@@ -1,8 +1,7 @@
 """Accounts: made, let in by a link, paused, given another role; and what each chooses."""
 
 import uuid
-from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import Any
 
 from django.contrib.auth.models import Group, User
@@ -13,25 +12,19 @@ from django.core import signing
 from django.core.exceptions import ValidationError
 from django.db import IntegrityError, transaction
 from django.utils import timezone
-from django.utils.translation import gettext as _
 
-from arena.errors import InvalidPreference, LinkOver
+from arena.errors import LinkOver
 from arena.models import Person
 from arena.people.queries import ROLES, has_admin, is_forgotten, role_of
-from arena.voting.queries.keys import (
-    KEY_LABELS,
-    SOMETIMES,
-    SWITCHES,
-    USUAL_KEYS,
-    VotingPreferences,
-    read_voting,
-)
 from augment.errors import Conflict, InvalidDocument, UnknownName
-from augment.services.events import log_event
+from augment.services.events import log_change
 from augment.services.texts import one_line
 
 LINK_LIVES_S = 24 * 3600
 """How long the first admin's link works."""
+
+SIGNED_IN = "_auth_user_id"
+"""Where Django's sessions keep the key of the account."""
 
 OVER = "This link lets nobody in any more."
 _SALT = "arena.first-start"
@@ -67,14 +60,10 @@ def create_person(
         User._meta.get_field("username").clean(username, None)
     except ValidationError as error:
         raise InvalidDocument("person", [("username", " ".join(error.messages))]) from None
-    if User.objects.filter(username=username).exists():
-        raise Conflict(f"The username {username!r} is taken.")
     if pseudonym is None:
         pseudonym = _free_pseudonym(role)
     else:
         pseudonym = one_line("pseudonym", pseudonym, what="person", longest=60)
-        if Person.objects.filter(pseudonym=pseudonym).exists():
-            raise Conflict(f"The pseudonym {pseudonym!r} is taken.")
     is_admin = role == "admin"
     try:
         with transaction.atomic():
@@ -83,13 +72,11 @@ def create_person(
             )
             user.person.pseudonym, user.person.is_simulated = pseudonym, is_simulated
             user.person.save(update_fields=["pseudonym", "is_simulated"])
-    except IntegrityError:  # taken since it was looked up
-        raise Conflict(
-            f"The username {username!r} or the pseudonym {pseudonym!r} was taken just now; try "
-            "again."
-        ) from None
+    except IntegrityError:
+        raise Conflict(f"The username {username!r} or pseudonym {pseudonym!r} is taken.") from None
     user.groups.add(Group.objects.get_or_create(name=role)[0])
-    log_person(user, "add", actor, after={"role": role, "is_simulated": is_simulated})
+    after = {"role": role, "is_simulated": is_simulated}
+    log_change(user.person, "add", actor, after=after)
     return user
 
 
@@ -140,7 +127,7 @@ def make_welcome_token(user: User, *, actor: User) -> str:
     if not user.is_active or user.person.is_simulated:
         raise Conflict(f"{user.get_username()} can't sign in.")
     end_links(user)
-    log_person(user, "make link", actor)
+    log_change(user.person, "make link", actor)
     return f"{user.person.code.hex}-{default_token_generator.make_token(user)}"
 
 
@@ -211,8 +198,8 @@ def set_active(*, user: User, is_active: bool, actor: User) -> None:
     user.is_active = is_active
     user.save(update_fields=["is_active"])
     if not is_active:
-        sign_out(user)
-    log_person(user, "resume" if is_active else "pause", actor)
+        end_sessions(SIGNED_IN, {str(user.pk)})
+    log_change(user.person, "resume" if is_active else "pause", actor)
 
 
 @transaction.atomic
@@ -226,11 +213,11 @@ def set_role(*, user: User, role: str, actor: User) -> None:
     _check_role(role)
     check_may_change(user, actor)
     end_links(user)
-    before = role_of(User.objects.get(pk=user.pk))
+    before = {"role": role_of(User.objects.get(pk=user.pk))}
     user.groups.set([Group.objects.get_or_create(name=role)[0]])
     user.is_staff = user.is_superuser = role == "admin"
     user.save(update_fields=["is_staff", "is_superuser"])
-    log_person(user, "change role", actor, before={"role": before}, after={"role": role})
+    log_change(user.person, "change role", actor, before=before, after={"role": role})
 
 
 def check_may_change(user: User, actor: User) -> None:
@@ -248,29 +235,11 @@ def check_may_change(user: User, actor: User) -> None:
         raise Conflict("You are not an admin any more.")
 
 
-def sign_out(user: User) -> None:
-    """End the sessions of an account; they are stored sealed and read one by one."""
+def end_sessions(name: str, values: Collection[str]) -> None:
+    """End the sessions that keep one of the values under a name; they are stored sealed."""
     for session in Session.objects.filter(expire_date__gte=timezone.now()).iterator():
-        if session.get_decoded().get("_auth_user_id") == str(user.pk):
+        if session.get_decoded().get(name) in values:
             session.delete()
-
-
-def log_person(
-    user: User,
-    verb: str,
-    actor: User | None,
-    before: dict[str, Any] | None = None,
-    after: dict[str, Any] | None = None,
-) -> None:
-    """Log what was done to an account."""
-    log_event(
-        actor=actor,
-        verb=verb,
-        object_kind="person",
-        object_code=user.person.code,
-        before=before,
-        after=after,
-    )
 
 
 # --- What a person chooses ---------------------------------------------------------------------
@@ -288,62 +257,10 @@ def keep_preference(user: User, **chosen: Any) -> Person:
 
 
 @transaction.atomic
-def keep_voting(
-    *, user: User, switches: Mapping[str, bool], keys: Mapping[str, str] | None = None
-) -> VotingPreferences:
-    """Keep how this account votes; what is not named stays as it was.
-
-    Args:
-        user: Whose preferences they are.
-        switches: Some of SWITCHES -> on or off.
-        keys: Action -> its only single key; missing actions get their usual ones, so an empty
-            mapping resets all. None leaves the keys alone. One of `SOMETIMES` that is missing
-            among others keeps its key: the page that was filled in had no such action.
-
-    Raises:
-        InvalidPreference: A switch or action is unknown, or two actions share a key.
-    """
-    if unknown := sorted(set(switches) - set(SWITCHES)):
-        raise InvalidPreference("switches", f"Unknown: {', '.join(unknown)}.")
+def keep_voting(user: User, switches: Mapping[str, bool]) -> None:
+    """Keep how this account votes; what is not named stays as it was."""
     person = keep_preference(user)
-    voting = {**person.preferences.get("voting", {}), **switches}
-    if keys is not None:
-        voting["keys"] = _changed_keys(voting.get("keys", {}), keys)
-    return read_voting(keep_preference(user, voting=voting).preferences)
-
-
-def _changed_keys(before: Mapping[str, str], keys: Mapping[str, str]) -> dict[str, str]:
-    """Return the keys that are not the usual first ones, in small letters."""
-    if unknown := sorted(set(keys) - set(USUAL_KEYS)):
-        raise InvalidPreference("keys", f"Unknown action: {', '.join(unknown)}.")
-    lower = {action: key.lower() for action, key in keys.items()}
-    for action, key in lower.items():
-        if len(key) != 1 or not key.isprintable() or key.isspace():
-            problem = _("“%(action)s” needs one character, not '%(key)s'.")
-            raise InvalidPreference(
-                "keys", problem % {"action": _(KEY_LABELS[action]), "key": key}
-            )
-    shown = {
-        action: lower.get(action, usual[0])
-        for action, usual in USUAL_KEYS.items()
-        if action in lower or action not in SOMETIMES
-    }
-    for key, times in Counter(shown.values()).items():
-        if times > 1:
-            both = ", ".join(_(KEY_LABELS[name]) for name, its in shown.items() if its == key)
-            problem = _("'%(key)s' would do two things: %(both)s.")
-            raise InvalidPreference("keys", problem % {"key": key, "both": both})
-    chosen = {action: key for action, key in lower.items() if key != USUAL_KEYS[action][0]}
-    used = {chosen.get(action, usual[0]) for action, usual in USUAL_KEYS.items()}
-    unseen = {
-        action: before[action]
-        for action in SOMETIMES
-        if keys and action in before and action not in keys and before[action] not in used
-    }
-    return chosen | unseen
-
-
-# --- Private -----------------------------------------------------------------------------------
+    keep_preference(user, voting={**person.preferences.get("voting", {}), **switches})
 
 
 def _check_role(role: str) -> None:

@@ -13,22 +13,14 @@ Votes that were grouped elsewhere go into `Comparisons` directly, with their `co
 """
 
 import math
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
-from arena.rating import models, remarks
-from arena.rating.chains import (
-    Diagnosis,
-    Status,
-    diagnose,
-    find_levels,
-    outer_bounds,
-    ranks_across,
-    standing_order,
-)
-from arena.rating.comparisons import Comparisons, count_pairs, restrict_to, tally
+from arena.rating import remarks
+from arena.rating.chains import Chains, Status, chains_among, diagnose, ranks_across
+from arena.rating.comparisons import Comparisons, IntArray, count_pairs, restrict_to, tally
 from arena.rating.lines import Line
 from arena.rating.logistic import Coefficient
 from arena.rating.parts import Rated, rate_part
@@ -162,36 +154,31 @@ def rate(
 
 def _rate(votes: Comparisons, rules: Rules) -> Leaderboard:
     counted = tally(votes)
-    present = np.flatnonzero(counted.sum(axis=1)).tolist()
-    counting = restrict_to(votes, present)
+    present = np.flatnonzero(counted.sum(axis=1))
+    counting = restrict_to(votes, present.tolist())
     # Online Elo's steps of at most K points stay finite whoever wins.
-    diagnosis = diagnose(
-        counting.shown, count_pairs(counting), bounded_anyway=rules.method is Method.ELO
-    )
-    if len(votes.names) == 1:
-        reason = f"There is only one contestant, {votes.shown[0]}: nobody to compare with."
-        diagnosis = replace(diagnosis, status=Status.ONE_CONTESTANT, explanation=(reason,))
-    chains = diagnosis.chains
+    is_bounded = rules.method is Method.ELO
+    chains = chains_among(len(present), count_pairs(counting), together=is_bounded)
+    status, reasons = diagnose(votes.shown, counting, chains)
     above = chains.above()
     parts = sorted(
-        (part for part in chains.parts() if len(part) > 1),
-        key=lambda part: (chains.group_of[part[0]], above[part[0]], part),
+        (members for members in chains.parts if len(members) > 1),
+        key=lambda members: (chains.group_of[members[0]], above[members[0]], members[0]),
     )
-    rated = [rate_part(restrict_to(counting, part), rules, diagnosis.status) for part in parts]
-    lines = _blank_lines(votes.names, counted.tolist(), present, diagnosis)
+    rated = [rate_part(restrict_to(counting, part.tolist()), rules) for part in parts]
+    lines = _blank_lines(votes.names, counted.tolist())
     for number, (part, found) in enumerate(zip(parts, rated, strict=True)):
-        _fill(lines, [present[member] for member in part], number, found)
-    if len(chains.sizes) > len(chains.groups()):
-        _rank_across(lines, present, counting, diagnosis, rules)
-    order = standing_order(chains, [lines[index] for index in present])
-    absent = sorted(set(range(len(lines))) - set(present))
-    whole = rated[0] if len(rated) == 1 and len(parts[0]) == len(present) else Rated()
-    separation = whole.separation and whole.separation.among(np.array(present), len(lines))
+        _fill(lines, present[part], number, found)
+    if chains.reaches.any():
+        _rank_across(lines, present, counting, chains, rules)
+    order = _standing_order(chains, [lines[index] for index in present])
+    absent = sorted(set(range(len(lines))) - set(present.tolist()))
+    whole = rated[0] if len(rated) == 1 and len(parts[0]) == len(present) else None
     return Leaderboard(
         lines=tuple(lines),
-        order=(*(present[place] for place in order), *absent),
-        status=_status(diagnosis, rated),
-        reasons=_unique(diagnosis.explanation, *(found.explanation for found in rated)),
+        order=(*present[order].tolist(), *absent),
+        status=_refine(status, rated),
+        reasons=_unique(reasons, *(found.explanation for found in rated)),
         warnings=_unique(*(found.warnings for found in rated)),
         method=rules.method,
         unit=rules.unit,
@@ -202,10 +189,12 @@ def _rate(votes: Comparisons, rules: Rules) -> Leaderboard:
         experts=len(np.unique(votes.expert)),
         scenarios=len(np.unique(votes.scenario)),
         tie_share=float(counted[:, 1].sum() / counted.sum()) if len(votes) else None,
-        tie_strength=whole.tie_strength,
+        tie_strength=whole.tie_strength if whole else None,
         degenerate_rounds=max((found.degenerate for found in rated), default=0),
-        separation=separation,
-        coefficients=whole.coefficients,
+        separation=whole.separation.among(present, len(lines))
+        if whole and whole.separation
+        else None,
+        coefficients=whole.coefficients if whole else (),
     )
 
 
@@ -213,25 +202,22 @@ def _unique(*sentences: tuple[str, ...]) -> tuple[str, ...]:
     return tuple(dict.fromkeys(sentence for some in sentences for sentence in some))
 
 
-def _status(diagnosis: Diagnosis, rated: list[Rated]) -> Status:
-    if diagnosis.status is Status.RATED:
-        if any(found.rating is None for found in rated):
-            return Status.UNBOUNDED
-        if any(found.lower is None for found in rated):
-            return Status.NO_INTERVALS
-        if any(found.is_open for found in rated):
-            return Status.OPEN_INTERVALS
-    return diagnosis.status
+def _refine(status: Status, rated: list[Rated]) -> Status:
+    """Return the status by what came out where all could be rated together."""
+    if status is not Status.RATED:
+        return status
+    if any(found.rating is None for found in rated):
+        return Status.UNBOUNDED
+    if any(found.lower is None for found in rated):
+        return Status.NO_INTERVALS
+    return Status.OPEN_INTERVALS if any(map(any, (x.note for x in rated))) else Status.RATED
 
 
 # --- Lines, filled part by part ------------------------------------------------------------------
 
 
-def _blank_lines(
-    names: tuple[str, ...], counted: list[list[int]], present: list[int], diagnosis: Diagnosis
-) -> list[Line]:
-    """The lines without ratings; whoever is alone in a part keeps the note that says why."""
-    notes = dict(zip(present, diagnosis.notes, strict=False))
+def _blank_lines(names: tuple[str, ...], counted: list[list[int]]) -> list[Line]:
+    """The lines without ratings."""
     return [
         Line(
             name=name,
@@ -240,55 +226,56 @@ def _blank_lines(
             ties=ties,
             losses=losses,
             part=-1,
-            note=notes.get(index, "") if wins + ties + losses else "no votes",
+            note="" if wins + ties + losses else "no votes",
         )
-        for index, (name, (wins, ties, losses)) in enumerate(zip(names, counted, strict=True))
+        for name, (wins, ties, losses) in zip(names, counted, strict=True)
     ]
 
 
-def _fill(lines: list[Line], members: list[int], number: int, found: Rated) -> None:
-    """Put the numbers of a part into its lines."""
-    columns = {column.name: getattr(found, column.name, None) for column in fields(Line)}
+def _fill(lines: list[Line], members: IntArray, number: int, found: Rated) -> None:
+    """Put the numbers of a part into its lines: NaN is no bound, 0 no rank."""
+    columns = ("rating", "lower", "upper", "rank", "rank_best", "rank_worst")
     for place, index in enumerate(members):
-        values: dict[str, Any] = {
-            name: _known(name, column[place].item())
-            for name, column in columns.items()
-            if column is not None
-        }
-        note = found.notes[place] if found.notes else ""
-        lines[index] = replace(lines[index], part=number, note=note, **values)
-
-
-def _known(column: str, value: float) -> float | None:
-    """None for a bound that is not a number and a withheld rank."""
-    missing = value == 0 if column.startswith("rank") else math.isnan(value)
-    return None if missing else value
+        values: dict[str, Any] = {}
+        for name in columns:
+            column = getattr(found, name)
+            value = None if column is None else column[place].item()
+            is_missing = value is None or math.isnan(value)
+            values[name] = None if is_missing or (name.startswith("rank") and not value) else value
+        lines[index] = replace(lines[index], part=number, note=found.note[place], **values)
 
 
 def _rank_across(
-    lines: list[Line],
-    present: list[int],
-    counting: Comparisons,
-    diagnosis: Diagnosis,
-    rules: Rules,
+    lines: list[Line], present: IntArray, counting: Comparisons, chains: Chains, rules: Rules
 ) -> None:
-    """Ranks over all parts that met, and what the votes say of those who are alone in theirs."""
-    levels = find_levels(counting, diagnosis.chains, rules.unit)
-    counted = [lines[index] for index in present]
-    bounds = np.array([(line.lower, line.upper) for line in counted], dtype=np.float64)
-    bounds -= models.MEAN_ELO
-    bounds[[line.part < 0 for line in counted]] = 0.0
-    inner = np.array([line.rank or 0 for line in counted])
-    ranks = ranks_across(diagnosis.chains, levels, inner, bounds[:, 0], bounds[:, 1]).tolist()
-    least, most = outer_bounds(diagnosis.chains, levels)
-    for place, (index, line) in enumerate(zip(present, counted, strict=True)):
-        rank = ranks[place] or None
-        note = remarks.note_with_rank(line.note, rank)
-        moved = replace(line, rank=rank, rank_best=None, rank_worst=None, note=note)
-        if line.rating is None and rules.method is Method.BRADLEY_TERRY:
-            moved = replace(
-                moved,
-                lower=_known("lower", models.MEAN_ELO + least[place].item()),
-                upper=_known("upper", models.MEAN_ELO + most[place].item()),
-            )
-        lines[index] = moved
+    """Put ranks over all parts that met into the lines, and why some are missing."""
+    inner = np.array([lines[index].rank or 0 for index in present])
+    ranks = ranks_across(counting, chains, rules.unit, inner).tolist()
+    has_higher = chains.above() > 0
+    has_lower = np.isin(chains.part_of, np.flatnonzero(chains.reaches.sum(axis=1)))
+    for place, (index, rank) in enumerate(zip(present, ranks, strict=True)):
+        line = lines[index]
+        note = line.note
+        if line.part < 0:
+            note = remarks.note_on_limits(has_higher=has_higher[place], has_lower=has_lower[place])
+        if not rank and "no rank" not in note:
+            note = f"{note}; {remarks.NO_RANK}" if note else remarks.NO_RANK
+        lines[index] = replace(line, rank=rank or None, rank_best=None, rank_worst=None, note=note)
+
+
+def _standing_order(chains: Chains, lines: list[Line]) -> list[int]:
+    """Return the contestants, best first, group by group.
+
+    Whoever scored stands above those who never scored back, and within a part the rating decides.
+    Who has neither rating nor rank comes last.
+    """
+    above = chains.above()
+
+    def place(number: int) -> tuple[Any, ...]:
+        line = lines[number]
+        is_nowhere = line.rating is None and line.rank is None
+        rating = -(line.rating or 0.0)
+        group, part = chains.group_of[number], chains.part_of[number]
+        return group, is_nowhere, above[number], part, rating, line.name
+
+    return sorted(range(len(lines)), key=place)

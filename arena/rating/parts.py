@@ -17,7 +17,6 @@ from arena.rating.bootstrap import (
     resample,
     rounds_to_draw,
 )
-from arena.rating.chains import Status
 from arena.rating.comparisons import BoolArray, Comparisons, FloatArray, IntArray, count_pairs
 from arena.rating.logistic import Coefficient, coefficients_of, fit_with_columns
 from arena.rating.models import Meetings, fit, resample_elo, to_elo
@@ -29,11 +28,11 @@ from arena.rating.ranking import (
     rank_sets,
     shown_ranks,
 )
-from arena.rating.rules import Intervals, Method, Rules, Unit
-from arena.rating.sandwich import NORMAL, Pulls, factor, pulls_of_model, spread_of
+from arena.rating.rules import Intervals, Method, Rules
+from arena.rating.sandwich import Pulls, pulls_of_model, spread_of
 
 _SAME = 1e-6
-"""Points. Rounds that all lie within this say nothing about the spread."""
+"""Points. Intervals that are narrower say nothing."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -45,7 +44,7 @@ class Rated:
     Attributes:
         lower, upper: NaN where the votes set no such bound.
         rank: 0 where it is withheld.
-        notes: Why bounds or ranks are missing; empty for who has all.
+        note: Why bounds or ranks are missing; empty for who has all.
         degenerate: Rounds that did not determine everybody.
     """
 
@@ -55,157 +54,142 @@ class Rated:
     rank: IntArray | None = None
     rank_best: IntArray | None = None
     rank_worst: IntArray | None = None
+    note: tuple[str, ...]
     separation: Separation | None = None
     tie_strength: float | None = None
     coefficients: tuple[Coefficient, ...] = ()
     degenerate: int = 0
-    notes: tuple[str, ...] = ()
     explanation: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
 
-    @property
-    def is_open(self) -> bool:
-        """Whether somebody has an interval without one of its ends, or none beside others'."""
-        return self.lower is not None and any(self.notes)
 
-
-def rate_part(votes: Comparisons, rules: Rules, status: Status) -> Rated:
-    """Rate contestants who have votes and can all be rated among each other.
-
-    Args:
-        votes: In which only they met.
-        rules: How.
-        status: Of the data; where every vote is a tie there are no intervals.
-    """
-    fitted = _fit_votes(votes, rules)
-    if fitted is None:
-        notes = (remarks.NOT_RATED,) * len(votes.names)
-        return Rated(explanation=(remarks.NO_DAVIDSON,), notes=notes)
+def rate_part(votes: Comparisons, rules: Rules) -> Rated:
+    """Rate contestants who have votes and can all be rated among each other."""
+    if rules.method is Method.ELO:
+        samples = resample_elo(votes, rounds=rules.rounds, seed=rules.seed)
+        point = _Point(rating=np.median(samples, axis=1))
+        rounds = RatedRounds.of_values(samples)
+    else:
+        fitted = _fit_votes(votes, rules)
+        if fitted is None:
+            note = (remarks.NOT_RATED,) * len(votes.names)
+            return Rated(note=note, explanation=(remarks.NO_DAVIDSON,))
+        point, rounds = fitted, _rate_rounds(votes, rules, fitted)
     plain = Rated(
-        rating=fitted.rating,
-        tie_strength=fitted.tie_strength,
-        coefficients=fitted.coefficients or (),
-        degenerate=fitted.rounds.degenerate,
+        rating=point.rating,
+        tie_strength=point.tie_strength,
+        coefficients=point.coefficients,
+        degenerate=rounds.degenerate,
+        note=(remarks.NO_INTERVAL,) * len(votes.names),
         warnings=(remarks.ELO_NOTE,) if rules.method is Method.ELO else (),
     )
-
-    def without_intervals(note: str, *explanation: str) -> Rated:
-        return replace(plain, notes=(note,) * len(votes.names), explanation=explanation)
-
-    if status is Status.ALL_TIES:
-        return without_intervals(remarks.ONLY_TIES)
-    values, reference = place_on_one_scale(fitted.rating, fitted.rounds)
-    bounds = percentile_interval(values)
-    closed = None
-    if rules.intervals is Intervals.CLOSED_FORM and fitted.pulls is not None:
-        closed = _closed_form(fitted.rating, fitted.pulls, rules, reference)
-    if _are_all_the_same(values if closed is None else closed.half_width[:, None] * [-1.0, 1.0]):
-        return without_intervals(remarks.NO_SPREAD, remarks.why_no_spread(rules))
-    if np.isnan(bounds).all():
-        reason = remarks.why_no_interval(votes.shown, rules, lost=fitted.rounds.degenerate)
-        return without_intervals(remarks.TOO_FEW, reason)
-    if closed is None:
-        found = _by_rounds(votes, rules, fitted, values, reference, bounds)
-    else:  # a bound is missing where the rounds leave it open
-        below, above = (np.where(np.isnan(bound), np.nan, closed.half_width) for bound in bounds)
-        found = replace(closed, lower=fitted.rating - below, upper=fitted.rating + above)
-    ranks = shown_ranks(found.lower, found.upper, average=float(fitted.rating[reference].mean()))
-    notes = remarks.notes_on_bounds(votes, rules.unit, found.lower, found.upper, ranks)
-    is_adjusted = fitted.coefficients is not None or not votes.covariates.size
+    values, reference = place_on_one_scale(point.rating, rounds)
+    found = _find_intervals(point, values, reference, rules)
+    if found is None or (votes.score == 0.5).all():
+        return replace(plain, explanation=(remarks.NO_INTERVALS,))
+    average = float(point.rating[reference].mean())
+    rank = shown_ranks(found.lower, found.upper, average=average)
+    has_lower, has_upper = ~np.isnan(found.lower), ~np.isnan(found.upper)
+    best, worst = rank_sets(above_by_bounds(found.above, found.lower, found.upper))
+    is_open = ~(has_lower & has_upper & (rank > 0))
+    is_adjusted = bool(point.coefficients) or not votes.covariates.size
     said = remarks.warnings(
         votes, rules=rules, rounds=values.shape[1], degenerate=plain.degenerate
     )
     return replace(
-        _with_intervals(plain, found),
-        rank=ranks,
-        notes=notes,
+        plain,
+        lower=found.lower,
+        upper=found.upper,
+        rank=rank,
+        rank_best=np.where(has_lower | has_upper, best, 0),
+        rank_worst=np.where(has_lower | has_upper, worst, 0),
+        note=tuple(
+            remarks.note_on_bounds(has_lower=lower, has_upper=upper, has_rank=ranked)
+            for lower, upper, ranked in zip(
+                has_lower.tolist(), has_upper.tolist(), (rank > 0).tolist(), strict=True
+            )
+        ),
+        separation=found.separation,
         explanation=(
             *(() if is_adjusted else (remarks.NOT_ADJUSTED,)),
-            *remarks.who_is_open(votes.shown, notes),
+            *((remarks.who_is_open(votes, is_open),) if is_open.any() else ()),
         ),
-        warnings=plain.warnings + said,
+        warnings=(*plain.warnings, *said),
     )
-
-
-def _are_all_the_same(values: FloatArray) -> bool:
-    """Whether no finite rating (C, B) differs from another one of the same contestant."""
-    highest = np.where(np.isfinite(values), values, -np.inf).max(axis=1, initial=-np.inf)
-    lowest = np.where(np.isfinite(values), values, np.inf).min(axis=1, initial=np.inf)
-    known = np.isfinite(highest)
-    return bool(known.any()) and bool((highest - lowest)[known].max() < _SAME)
 
 
 # --- Fits ----------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _Fitted:
-    """Ratings (C,) of the data and those of the rounds.
+class _Point:
+    """Ratings (C,) of the data, and what else the model says.
 
-    For intervals in closed form the rounds only say who is determined; their ratings are those of
-    the data. Without covariates, or where the votes do not determine what these are worth, there
-    are no coefficients.
+    Attributes:
+        answer: (K,) of `models.fit`; of votes with covariates none.
     """
 
     rating: FloatArray
-    rounds: RatedRounds
+    answer: FloatArray | None = None
     pulls: Pulls | None = None
     tie_strength: float | None = None
-    coefficients: tuple[Coefficient, ...] | None = None
+    coefficients: tuple[Coefficient, ...] = ()
 
 
-def _fit_votes(votes: Comparisons, rules: Rules) -> _Fitted | None:
+def _fit_votes(votes: Comparisons, rules: Rules) -> _Point | None:
     """None where the votes determine no ratings in Davidson's model."""
-    if rules.method is Method.ELO:
-        samples = resample_elo(votes, rounds=rules.rounds, seed=rules.seed)
-        rounds = RatedRounds.of_values(samples)
-        return _Fitted(rating=np.median(samples, axis=1), rounds=rounds)
+    if votes.covariates.size:
+        adjusted = fit_with_columns(votes, votes.covariates)
+        if adjusted is not None:
+            return _Point(
+                rating=to_elo(adjusted.strengths),
+                pulls=adjusted.pulls,
+                coefficients=coefficients_of(adjusted, rules.unit),
+            )
     counts = count_pairs(votes)
     met = Meetings(len(votes.names), counts)
     ties = counts.outcomes[:, 1].sum(keepdims=True).astype(np.float64)
     has_ties = rules.method is Method.DAVIDSON and 0 < ties[0] < votes.votes
-    coefficients = tie_strength = None
-    adjusted = fit_with_columns(votes, votes.covariates) if votes.covariates.size else None
-    if adjusted is not None:
-        rating, pulls = to_elo(adjusted.strengths), adjusted.pulls
-        coefficients = coefficients_of(adjusted, rules.unit)
-    else:
-        games, scores = counts.games[:, None], counts.scores[:, None]
-        answer = fit(met, games, scores, ties if has_ties else None)[:, 0]
-        if np.isnan(answer).any():
-            return None
-        rating, pulls = (
-            to_elo(answer[: met.contestants]),
-            pulls_of_model(votes, met, counts.games, answer),
-        )
-        tie_strength = float(np.exp(answer[-1])) if has_ties else None
+    games, scores = counts.games[:, None], counts.scores[:, None]
+    answer = fit(met, games, scores, ties if has_ties else None)[:, 0]
+    if np.isnan(answer).any():
+        return None
+    return _Point(
+        rating=to_elo(answer[: met.contestants]),
+        answer=answer,
+        pulls=pulls_of_model(votes, met, counts.games, answer),
+        tie_strength=float(np.exp(answer[-1])) if has_ties else None,
+    )
+
+
+def _rate_rounds(votes: Comparisons, rules: Rules, point: _Point) -> RatedRounds:
+    """Rate resampled votes.
+
+    For intervals in closed form the rounds only say who is determined; their ratings are those of
+    the data.
+    """
+    counts = count_pairs(votes)
+    met = Meetings(len(votes.names), counts)
+    is_closed = rules.intervals is Intervals.CLOSED_FORM
 
     def refit(rounds: Rounds, together: BoolArray | None) -> FloatArray:
-        if rules.intervals is Intervals.CLOSED_FORM:
-            return np.repeat(rating[:, None], rounds.games.shape[1], axis=1)
-        if not has_ties:
-            return to_elo(fit(met, rounds.games, rounds.scores, start=answer, together=together))
+        if is_closed:
+            return np.repeat(point.rating[:, None], rounds.games.shape[1], axis=1)
+        if point.tie_strength is None:
+            games, scores = rounds.games, rounds.scores
+            return to_elo(fit(met, games, scores, start=point.answer, together=together))
         is_fine = (rounds.ties > 0) & (rounds.ties < rounds.games.sum(axis=0))
         fine = rounds.chosen(np.flatnonzero(is_fine))
         inside = None if together is None else together[is_fine]
         found = np.full((met.contestants, len(is_fine)), np.nan)
         found[:, is_fine] = fit(
-            met, fine.games, fine.scores, fine.ties, start=answer, together=inside
+            met, fine.games, fine.scores, fine.ties, start=point.answer, together=inside
         )[:-1]
         return to_elo(found)
 
-    number = rules.rounds
-    if rules.intervals is Intervals.CLOSED_FORM:
-        number = rounds_to_draw(votes, counts, number)
+    number = rounds_to_draw(votes, counts, rules.rounds) if is_closed else rules.rounds
     blocks = resample(votes, counts, unit=rules.unit, rounds=number, seed=rules.seed)
-
-    return _Fitted(
-        rating=rating,
-        rounds=rate_rounds(votes, counts, blocks, refit),
-        pulls=pulls,
-        tie_strength=tie_strength,
-        coefficients=coefficients,
-    )
+    return rate_rounds(votes, counts, blocks, refit)
 
 
 # --- Intervals -----------------------------------------------------------------------------------
@@ -213,68 +197,48 @@ def _fit_votes(votes: Comparisons, rules: Rules) -> _Fitted | None:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _Intervals:
-    """Bounds (C,), NaN where open, and what is told apart."""
+    """Bounds (C,), NaN where open, and (C, C) whether the row is shown to be above the column."""
 
     lower: FloatArray
     upper: FloatArray
     above: BoolArray
-    half_width: FloatArray
     separation: Separation | None = None
 
 
-def _closed_form(
-    rating: FloatArray, pulls: Pulls, rules: Rules, reference: BoolArray
-) -> _Intervals:
-    """Student's t around the ratings; pairs of the reference are judged all at once."""
-    spread = spread_of(pulls, rules.unit, reference)
-    members = np.flatnonzero(reference)
-    judged = judge_pairs(
-        rating[members], spread.among(members), rounds=rules.rounds, seed=rules.seed
-    ).among(members, len(rating))
-    half = spread.half_widths()
-    return _Intervals(
-        lower=rating - half,
-        upper=rating + half,
-        above=judged.above,
-        half_width=half,
-        separation=judged,
-    )
+def _find_intervals(
+    point: _Point, values: FloatArray, reference: BoolArray, rules: Rules
+) -> _Intervals | None:
+    """None where the votes set no bound, or leave intervals without a width.
 
-
-def _by_rounds(
-    votes: Comparisons,
-    rules: Rules,
-    fitted: _Fitted,
-    values: FloatArray,
-    reference: BoolArray,
-    bounds: tuple[FloatArray, FloatArray],
-) -> _Intervals:
-    """Percentiles of the resampled rounds, widened by Student's t where clusters are few."""
-    few = remarks.few_clusters(votes, rules.unit)
-    wider = 1.0
-    if few and rules.unit is not Unit.TWO_WAY:
-        wider = factor(few) / NORMAL
-    lower, upper = (fitted.rating + wider * (bound - fitted.rating) for bound in bounds)
-    above = np.zeros((len(lower), len(lower)), dtype=bool)
-    members = np.flatnonzero(reference)
+    Args:
+        point: What the data say.
+        values: (C, B) the rounds on one scale.
+        reference: (C,) whom nearly every round determines; their pairs are judged all at once.
+        rules: By which.
+    """
+    rating, members = point.rating, np.flatnonzero(reference)
+    lower, upper = percentile_interval(values)
+    if np.isnan([lower, upper]).all():
+        return None
+    spread = None
+    if rules.intervals is Intervals.CLOSED_FORM and point.pulls is not None:
+        spread = spread_of(point.pulls, rules.unit, reference)
+        half = spread.half_widths()
+        # A bound is missing where the rounds leave it open.
+        lower = np.where(np.isnan(lower), np.nan, rating - half)
+        upper = np.where(np.isnan(upper), np.nan, rating + half)
+    width = upper - lower
+    if (~np.isnan(width)).any() and np.nanmax(width) < _SAME:
+        return None
+    if spread is not None:
+        separation = judge_pairs(
+            rating[members], spread.among(members), rounds=rules.rounds, seed=rules.seed
+        ).among(members, len(rating))
+        return _Intervals(lower=lower, upper=upper, above=separation.above, separation=separation)
+    above = np.zeros((len(rating), len(rating)), dtype=bool)
     samples = values[members]
     is_fine = np.asarray(np.isfinite(samples).all(axis=0))
     if 2 * is_fine.sum() >= len(is_fine):
-        apart = above_in_rounds(fitted.rating[members], samples[:, is_fine])
+        apart = above_in_rounds(rating[members], samples[:, is_fine])
         above[np.ix_(members, members)] = apart
-    return _Intervals(lower=lower, upper=upper, above=above, half_width=upper - lower)
-
-
-def _with_intervals(plain: Rated, found: _Intervals) -> Rated:
-    lower, upper = found.lower, found.upper
-    best, worst = rank_sets(above_by_bounds(found.above, lower, upper))
-    unbounded = np.isnan(lower) & np.isnan(upper)
-    best[unbounded] = worst[unbounded] = 0
-    return replace(
-        plain,
-        lower=lower,
-        upper=upper,
-        rank_best=best,
-        rank_worst=worst,
-        separation=found.separation,
-    )
+    return _Intervals(lower=lower, upper=upper, above=above)

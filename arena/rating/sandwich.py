@@ -24,10 +24,6 @@ from arena.rating.comparisons import TIE, BoolArray, Comparisons, FloatArray, In
 from arena.rating.models import ELO_PER_LOGIT, Meetings, chances, inverse_curvature
 from arena.rating.rules import Unit
 
-FEW_CLUSTERS = 20
-NORMAL = 1.959963984540054
-"""97.5 % of the normal distribution lie below."""
-
 MOST_PRIOR = 24.0
 """The others count at most like so many further clusters, however alike all contestants seem: one
 whom experts disagree about more is then still seen."""
@@ -158,14 +154,6 @@ def plain_covariance(pulls: Pulls, unit: Unit) -> FloatArray:
         for number, of_row, sign in clusters
     ]
     return without_negative_parts(np.asarray(sum(squares)))
-
-
-def factor(clusters: int | None) -> float:
-    """By how much to multiply a standard error for a 95 % interval.
-
-    Student's t of one less than `clusters` where these are few, else the normal's 1.96.
-    """
-    return NORMAL if clusters is None else float(t_quantile(clusters - 1))
 
 
 def without_negative_parts(matrix: FloatArray) -> FloatArray:

@@ -2,13 +2,14 @@
 
 import math
 import uuid
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from django.db.models import Case, Count, IntegerField, QuerySet, Value, When
+from django.db.models import QuerySet
 
-from augment.models import Augmentation, Contestant, Scenario, SceneUpload
+from augment.models import Augmentation, Contestant, Scenario, SceneUpload, UploadMoment
 from augment.services.scenarios.scenes import type_choices
 
 
@@ -25,20 +26,23 @@ OWN = "own"
 """The scenarios that are in no set of the catalogue."""
 
 
-def by_type(chosen: str = "", *, with_paraphrases: bool = True) -> list[TypeGroup]:
-    """Return what forms offer, in the order of the types; types without scenarios are left out.
+def scenarios_of(chosen: str = "", *, is_retired: bool = False) -> QuerySet[Scenario]:
+    """Return scenarios by type and slug, without the documents of their scenes.
 
     Args:
         chosen: A set of the catalogue, `own` for those in none; empty for all.
-        with_paraphrases: Whether those count that say another one in other words.
+        is_retired: Those that forms offer no more, instead of the others.
     """
-    offered = Scenario.objects.filter(retired_at=None).select_related("base_scene")
-    found = offered.defer("reference", "base_scene__document", "base_scene__recording")
+    rows = Scenario.objects.filter(retired_at__isnull=not is_retired).select_related("base_scene")
     if chosen:
-        found = found.filter(catalogue_set="" if chosen == OWN else chosen)
-    if not with_paraphrases:
-        found = found.filter(paraphrase_of=None)
-    return group_by_type(list(found))
+        rows = rows.filter(catalogue_set="" if chosen == OWN else chosen)
+    lean = rows.defer("reference", "base_scene__document", "base_scene__recording")
+    return lean.order_by("type", "slug")
+
+
+def by_type(chosen: str = "") -> list[TypeGroup]:
+    """Return what forms offer of a set, in the order of the types."""
+    return group_by_type(list(scenarios_of(chosen)))
 
 
 def group_by_type(rows: list[Scenario]) -> list[TypeGroup]:
@@ -50,29 +54,10 @@ def group_by_type(rows: list[Scenario]) -> list[TypeGroup]:
     return [group for group in groups if group.scenarios]
 
 
-def listed_scenarios(chosen: str, *, is_retired: bool) -> QuerySet[Scenario]:
-    """Return scenarios in the order of the types, without paraphrases and documents.
-
-    Args:
-        chosen: A set of the catalogue, `own` for those in none; empty for all.
-        is_retired: Those that forms offer no more, instead of the others.
-    """
-    rows = Scenario.objects.filter(paraphrase_of=None, retired_at__isnull=not is_retired)
-    if chosen:
-        rows = rows.filter(catalogue_set="" if chosen == OWN else chosen)
-    places = [When(type=name, then=Value(n)) for n, (name, _) in enumerate(type_choices())]
-    place = Case(*places, default=Value(len(places)), output_field=IntegerField())
-    lean = rows.select_related("base_scene").defer(
-        "reference", "base_scene__document", "base_scene__recording"
-    )
-    return lean.alias(place=place).order_by("place", "slug")
-
-
 def set_choices(chosen: str) -> list[dict[str, Any]]:
     """Return all scenarios first (named by the empty text), then the sets that there are."""
-    offered = Scenario.objects.filter(paraphrase_of=None, retired_at=None)
-    counted = offered.values_list("catalogue_set").annotate(number=Count("pk")).order_by()
-    numbers = {name or OWN: number for name, number in counted}
+    rows = scenarios_of().filter(paraphrase_of=None).order_by()
+    numbers = Counter(name or OWN for name in rows.values_list("catalogue_set", flat=True))
     present = {"": sum(numbers.values())} | {
         name: numbers[name] for name in (*Scenario.SETS, OWN) if numbers.get(name)
     }
@@ -112,23 +97,20 @@ def modification_lines(document: dict[str, Any] | None) -> list[dict[str, Any]]:
 
     Frame: ego frame, x forward and y left in metres.
     """
-    if document is None:
-        return []
-    changed = [("added", agent) for agent in document.get("add", ())]
-    changed += [("moved", agent) for agent in document.get("move", ())]
-    numbers = ("x_m", "y_m", "length_m", "width_m", "speed_mps")
+    parts = document or {}
+    changed = [("added", agent) for agent in parts.get("add", ())]
+    changed += [("moved", agent) for agent in parts.get("move", ())]
     lines = [
-        {
+        agent
+        | {
             "change": change,
             "agent": agent["id"],
             "kind": agent["type"].replace("_", " ").lower(),
             "heading_deg": math.degrees(agent["heading_rad"]),
-            "lane": agent.get("lane_id", ""),
-            **{name: agent.get(name) for name in numbers},
         }
         for change, agent in changed
     ]
-    removed = document.get("remove", ())
+    removed = parts.get("remove", ())
     return lines + [{"change": "removed", "agent": name, "x_m": None} for name in removed]
 
 
@@ -138,77 +120,40 @@ _AROUND_M = 35.0
 _LEAST_M = 90.0
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class StopDot:
-    """A moment that can be chosen; x and y are those of the drawing, None off the map."""
+def track_maps(upload: SceneUpload) -> list[dict[str, Any]]:
+    """Return every part of what was read: its moments, and the road under them as an SVG drawing.
 
-    number: int
-    item: str
-    frame: int
-    time_s: float | None
-    x: float | None = None
-    y: float | None = None
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class TrackMap:
-    """One part of a recording: its moments, and the road under them as an SVG drawing.
-
-    Attributes:
-        roads: The points of polylines.
-        box: The viewBox: metres, y down.
-        dot: Half the width of a dot.
+    `roads` and `way` are points of polylines, `box` is a viewBox (metres, y down), `dot` half the
+    width of a dot; `x` and `y` of a stop are None off the map.
     """
-
-    number: int
-    name: str
-    stops: list[StopDot]
-    roads: list[str]
-    box: str
-    dot: float
-
-    @property
-    def way(self) -> str:
-        """The ego's way, as the points of a polyline."""
-        return " ".join(f"{stop.x},{stop.y}" for stop in self.stops if stop.x is not None)
-
-
-def track_maps(upload: SceneUpload) -> list[TrackMap]:
-    """Return every part of what was read."""
     return [_map(number, track) for number, track in enumerate(upload.tracks)]
 
 
-def place_of(maps: list[TrackMap], *, item: str, frame: int) -> tuple[TrackMap, StopDot] | None:
-    """Return where a moment is among them."""
-    places = ((track, stop) for track in maps for stop in track.stops)
-    return next(
-        (place for place in places if (place[1].item, place[1].frame) == (item, frame)), None
-    )
+def place_of(maps: list[dict[str, Any]], moment: UploadMoment) -> list[dict[str, Any]]:
+    """Return the part and the stop that a moment is; empty for one that is not among them."""
+    places = ([track, stop] for track in maps for stop in track["stops"])
+    wanted = (moment.item, moment.frame)
+    return next((one for one in places if (one[1]["item"], one[1]["frame"]) == wanted), [])
 
 
-def _map(number: int, track: dict[str, Any]) -> TrackMap:
+def _map(number: int, track: dict[str, Any]) -> dict[str, Any]:
     places = [stop["place_m"] for stop in track["stops"]]
+    points = [(None, None) if place is None else (place[0], -place[1]) for place in places]
     stops = [
-        StopDot(
-            number=index,
-            item=stop["item"],
-            frame=stop["frame"],
-            time_s=stop["time_s"],
-            x=None if place is None else place[0],
-            y=None if place is None else -place[1],
-        )
-        for index, (stop, place) in enumerate(zip(track["stops"], places, strict=True))
+        stop | {"number": index, "x": x, "y": y}
+        for index, (stop, (x, y)) in enumerate(zip(track["stops"], points, strict=True))
     ]
-    placed = [(place[0], -place[1]) for place in places if place is not None] or [(0.0, 0.0)]
+    placed = [point for point in points if point[0] is not None] or [(0.0, 0.0)]
     xs, ys = zip(*placed, strict=True)
     width = max(max(xs) - min(xs) + 2 * _AROUND_M, _LEAST_M)
     height = max(max(ys) - min(ys) + 2 * _AROUND_M, width / 3.0)
     left, top = (max(xs) + min(xs) - width) / 2.0, (max(ys) + min(ys) - height) / 2.0
-    return TrackMap(
-        number=number,
-        name=track["name"],
-        stops=stops,
-        roads=[" ".join(f"{x},{-y}" for x, y in line) for line in track["roads_m"]],
-        box=f"{left:.1f} {top:.1f} {width:.1f} {height:.1f}",
-        dot=round(width / 110.0, 2),
-    )
+    return {
+        "number": number,
+        "name": track["name"],
+        "stops": stops,
+        "roads": [" ".join(f"{x},{-y}" for x, y in line) for line in track["roads_m"]],
+        "way": " ".join(f"{x},{y}" for x, y in points if x is not None),
+        "box": f"{left:.1f} {top:.1f} {width:.1f} {height:.1f}",
+        "dot": round(width / 110.0, 2),
+    }

@@ -12,7 +12,7 @@ from augment.models import BaseScene, Scenario
 from augment.services.events import log_event
 from augment.services.scenarios import editing
 from augment.services.scenarios.pictures import redraw
-from augment.services.scenarios.scenes import change_surroundings, check_slug, set_wording
+from augment.services.scenarios.scenes import change_surroundings, set_wording
 
 MOST_NAMED = 8
 FILE_TOO_LARGE = "arena.file_too_large"
@@ -79,17 +79,6 @@ def set_reference(scenario: Scenario, document: object, *, actor: User | None = 
     """
     _hold_unjudged(scenario)
     return editing.set_reference(scenario, document, actor=actor)
-
-
-@transaction.atomic
-def drop_reference(scenario: Scenario, *, actor: User | None = None) -> Scenario:
-    """Leave a scenario without a reference.
-
-    Raises:
-        Conflict: As above, or it has none.
-    """
-    _hold_unjudged(scenario)
-    return editing.drop_reference(scenario, actor=actor)
 
 
 def why_not_editable(scenario: Scenario) -> str:
@@ -160,33 +149,6 @@ def change_scenario(
         object_code=row.code,
         before=before,
         after=_state(row),
-    )
-    return row
-
-
-@transaction.atomic
-def rename_scene(scene: BaseScene, slug: str, *, actor: User | None = None) -> BaseScene:
-    """Give a scene that no scenario stands on another slug.
-
-    Raises:
-        InvalidDocument: It is no slug.
-        Conflict: It is taken, or a scenario stands on the scene.
-    """
-    row = BaseScene.objects.select_for_update().get(pk=scene.pk)
-    check_slug(slug, what="scene")
-    _refuse_needed(row, "renamed")
-    if BaseScene.objects.filter(slug=slug).exclude(pk=row.pk).exists():
-        raise Conflict(f"There is a scene called “{slug}” already; choose another slug.")
-    before, row.slug = row.slug, slug
-    row.document["name"] = slug
-    row.save(update_fields=["slug", "document"])
-    log_event(
-        actor=actor,
-        verb="rename",
-        object_kind="scene",
-        object_code=row.code,
-        before={"slug": before},
-        after={"slug": slug},
     )
     return row
 

@@ -10,7 +10,6 @@ urlpatterns: list[URLPattern] = [
     path("scenes/<uuid:code>/", uploads.scene_page, name="scene"),
     path("uploads/<uuid:code>/", uploads.upload_page, name="upload"),
     path("uploads/<uuid:code>/show/", uploads.show_moment, name="upload-show"),
-    path("uploads/<uuid:code>/again/", uploads.read_again, name="upload-again"),
     path("uploads/<uuid:code>/remove/", uploads.remove, name="upload-remove"),
     path("moments/<uuid:code>/keep/", uploads.keep_moment, name="moment-keep"),
     path("scenarios/", scenarios.scenarios_page, name="scenarios"),
@@ -18,7 +17,6 @@ urlpatterns: list[URLPattern] = [
     path("scenarios/bulk/", forms.bulk_page, name="scenarios-bulk"),
     path("scenes/<uuid:code>/new/", forms.new_scenario_page, name="scenario-new"),
     path("scenarios/<uuid:code>/prompts/", augmentations.prompts_page, name="prompts"),
-    path("scenarios/<uuid:code>/prompt.json", augmentations.prompt_file, name="prompt-file"),
     path(
         "scenarios/<uuid:code>/prompts/<int:number>.png",
         augmentations.prompt_image,
@@ -26,9 +24,6 @@ urlpatterns: list[URLPattern] = [
     ),
     path("scenarios/<uuid:code>/", scenarios.scenario_page, name="scenario"),
     path("scenarios/<uuid:code>/reference/", forms.reference_page, name="reference-edit"),
-    path(
-        "scenarios/<uuid:code>/reference/drop/", forms.drop_reference_page, name="reference-drop"
-    ),
     path("scenarios/<uuid:code>/check/", forms.check_change, name="edit-check"),
     path(
         "scenarios/<uuid:code>/delete/",
@@ -49,18 +44,12 @@ urlpatterns: list[URLPattern] = [
         {"kind": "scene"},
         name="scene-retired",
     ),
-    path("scenes/<uuid:code>/slug/", scenarios.rename_scene, name="scene-rename"),
     path("scenarios/<uuid:code>/edit/", forms.edit_page, name="scenario-edit"),
     path("scenarios/<uuid:code>/intent/fields/", forms.intent_page, name="intent-edit"),
     path("scenarios/<uuid:code>/intent/", scenarios.set_intent, name="set-intent"),
     path("scenarios/<uuid:code>/read/", scenarios.read_instruction, name="intent-read"),
     path("scenarios/<uuid:code>/intent.json", scenarios.intent_file, name="intent"),
     path("pictures/<slug:kind>/<uuid:code>.png", augmentations.picture, name="picture"),
-    path(
-        "contestants/<uuid:code>/prompts/",
-        augmentations.contestant_prompts,
-        name="contestant-prompts",
-    ),
     path("augmentations/<uuid:code>/", augmentations.augmentation_page, name="augmentation"),
     path("augmentations/<uuid:code>/correct/", forms.correct_page, name="correct"),
     path("augmentations/<uuid:code>/transcript.json", augmentations.transcript, name="transcript"),

@@ -2,8 +2,7 @@
 
 `python -m arena.serving.leash PARENT_PID -- PROGRAM [ARGUMENT ...]`
 
-Linux sends SIGKILL to this process when its parent ends, however it ends; the setting survives
-exec. It is a launcher of its own because a hook between fork and exec is unsafe in a process with
+It is a launcher of its own because a hook between fork and exec is unsafe in a process with
 threads. Elsewhere than on Linux the program just runs, and an orderly stop still ends it.
 """
 
@@ -15,17 +14,18 @@ import sys
 _PR_SET_PDEATHSIG = 1
 
 
-def main(arguments: list[str]) -> None:
-    """Become the program after `--`."""
-    parent, separator, *program = arguments
-    if separator != "--" or not program:
-        raise SystemExit(
-            "usage: python -m arena.serving.leash PARENT_PID -- PROGRAM [ARGUMENT ...]"
-        )
+def die_with_parent() -> None:
+    """Have Linux kill this process when its parent ends, however it ends; survives exec."""
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
-        if os.getppid() != int(parent):
-            raise SystemExit("the process that asked for this program is gone already")
+
+
+def main(arguments: list[str]) -> None:
+    """Become the program after `--`."""
+    parent, _, *program = arguments
+    die_with_parent()
+    if os.getppid() != int(parent):
+        raise SystemExit("the process that asked for this program is gone already")
     os.execvp(program[0], program)
 
 

@@ -1,12 +1,10 @@
 """Health checks of the database, the broker and the workers, for load balancers and operators."""
 
 import secrets
-import threading
-import time
-from collections.abc import Callable
 from dataclasses import dataclass
 
 from django.conf import settings
+from django.core.cache import cache
 from django.db import DatabaseError, connection
 from django.db.migrations.executor import MigrationExecutor
 
@@ -17,9 +15,6 @@ from augment.tasks import check_broker
 BROKER_WITHIN_S = 1.0
 HELD_FOR_S = 5.0
 """Probes need no account, so a request must stay cheap."""
-
-_is_prepared = threading.Event()
-"""Set once every migration was seen applied: they don't go away under a running process."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,14 +30,15 @@ class PartState:
 def look_at_database() -> PartState:
     """Return whether the database answers and has the tables of this release."""
     try:
-        missing = [] if _is_prepared.is_set() else find_unapplied_migrations()
+        # Migrations don't go away under a running process.
+        missing = [] if cache.get("is_prepared") else find_unapplied_migrations()
         with connection.cursor() as cursor:
             cursor.execute("SELECT 1")
     except DatabaseError as error:
         return PartState("database", False, "unreachable", str(error))
     if missing:
         return PartState("database", False, "unprepared", f"not applied: {', '.join(missing)}")
-    _is_prepared.set()
+    cache.set("is_prepared", True, timeout=None)
     return PartState("database", True, "ok")
 
 
@@ -78,47 +74,13 @@ def look_at_workers() -> PartState:
     return PartState("workers", True, "ok", f"{found.living} running")
 
 
-class HeldLook:
-    """A check whose result is cached for a while, so that many callers cost no more than one.
-
-    Args:
-        look: The check.
-        for_s: How long a result is cached, in seconds.
-        clock: A monotonic clock in seconds.
-    """
-
-    def __init__(
-        self,
-        look: Callable[[], PartState],
-        *,
-        for_s: float,
-        clock: Callable[[], float] = time.monotonic,
-    ) -> None:
-        self._look, self._for_s, self._clock = look, for_s, clock
-        self._lock = threading.Lock()
-        self._held: tuple[float, PartState] | None = None
-
-    def __call__(self) -> PartState:
-        """Return the result, at most `for_s` old; concurrent callers share one check."""
-        with self._lock:
-            if self._held is None or self._clock() - self._held[0] >= self._for_s:
-                state = self._look()
-                self._held = self._clock(), state
-            return self._held[1]
-
-    def forget(self) -> None:
-        """Drop the cached result."""
-        with self._lock:
-            self._held = None
-
-
-HELD = (HeldLook(look_at_broker, for_s=HELD_FOR_S), HeldLook(look_at_workers, for_s=HELD_FOR_S))
-PARTS: tuple[Callable[[], PartState], ...] = (look_at_database, *HELD)
-
-
 def look_at_parts() -> tuple[PartState, ...]:
-    """Return the state of every part, in the order of their dependencies."""
-    return tuple(look() for look in PARTS)
+    """Return the state of every part; broker and workers as they were at most HELD_FOR_S ago."""
+    others: tuple[PartState, ...] | None = cache.get("parts")
+    if others is None:
+        others = (look_at_broker(), look_at_workers())
+        cache.set("parts", others, timeout=HELD_FOR_S)
+    return (look_at_database(), *others)
 
 
 def opens_metrics(authorization: str | None) -> bool:

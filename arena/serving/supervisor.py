@@ -1,10 +1,9 @@
-"""Supervision of several programs: started and stopped together, restarted when they crash.
+"""Supervision of several programs: started in order, restarted when they crash, stopped together.
 
 A program that keeps crashing is restarted after growing delays while the others go on: a broken
 worker does not take the web server down.
 """
 
-import contextlib
 import os
 import signal
 import subprocess
@@ -13,17 +12,27 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
-from types import FrameType, MappingProxyType
+from types import FrameType
 
 from arena.errors import ArenaError
-from arena.serving.ledger import Ledger
 
 KEPT_LINES = 20
-STOP_POLL_S = 0.05
+POLL_S = 0.1
 READER_S = 5.0
 """How long its last lines are waited for; what it started may keep its output open."""
+
+STEADY_S = 60.0
+"""A program that ran this long before it crashed is restarted at once."""
+
+LONGEST_WAIT_S = 60.0
+CRASHES_ALLOWED = 3
+"""More crashes in a row than this count as a crash loop."""
+
+
+class ChildFailed(ArenaError):
+    """A program did not come up or keeps crashing; the text ends with its last lines."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -35,8 +44,6 @@ class Program:
         arguments: The command line.
         environment: What it needs beside the environment of the supervisor.
         is_ready: Asked until it says yes; it must not raise.
-        is_alive: Asked with its process id every ALIVE_EVERY_S while it runs; on no it is killed
-            and started again. It must not raise.
         ready_within_s: How long it may take to come up.
         grace_s: How long it may take to end after SIGTERM.
     """
@@ -45,35 +52,36 @@ class Program:
     arguments: tuple[str, ...]
     environment: Mapping[str, str] = field(default_factory=dict)
     is_ready: Callable[[], bool]
-    is_alive: Callable[[int], bool] = lambda pid: True
     ready_within_s: float = 60.0
     grace_s: float = 10.0
 
 
 class Child:
-    """A running program.
+    """A program and the process that runs it, or ran it until it crashed.
 
-    Args:
-        program: What to run.
-        say: Gets every line that the program prints.
-        environment: What every child of the supervisor has in its environment.
+    Attributes:
+        crashes: Crashes in a row, each soon after a start.
+        due_at: When it is restarted, in monotonic seconds; None while it runs.
     """
 
-    def __init__(
-        self,
-        program: Program,
-        say: Callable[[str, str], None],
-        environment: Mapping[str, str] = MappingProxyType({}),
-    ) -> None:
+    def __init__(self, program: Program, say: Callable[[str, str], None]) -> None:
         self.program = program
-        self._last_lines: deque[str] = deque(maxlen=KEPT_LINES)
+        self.crashes = 0
+        self.due_at: float | None = None
         self._say = say
+        self._last_lines: deque[str] = deque(maxlen=KEPT_LINES)
+        self.start()
+
+    def start(self) -> None:
+        """Run the program in a session of its own.
+
+        Ctrl-C reaches the supervisor alone, which then stops its children in order; and the whole
+        group can be killed when one of them does not listen.
+        """
         leash = (sys.executable, "-m", "arena.serving.leash", str(os.getpid()), "--")
-        # A session of its own: Ctrl-C reaches the supervisor alone, which then stops its children
-        # in order; and the whole group can be killed when one of them does not listen.
-        self._process = subprocess.Popen(
-            (*leash, *program.arguments),
-            env={**os.environ, "PYTHONUNBUFFERED": "1", **environment, **program.environment},
+        self.process = subprocess.Popen(
+            (*leash, *self.program.arguments),
+            env={**os.environ, "PYTHONUNBUFFERED": "1", **self.program.environment},
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
@@ -81,129 +89,77 @@ class Child:
             errors="replace",
             start_new_session=True,
         )
-        self._reader = threading.Thread(
-            target=self._read, name=f"{program.name} lines", daemon=True
-        )
+        self._started_at, self.due_at = time.monotonic(), None
+        self._reader = threading.Thread(target=self._read, daemon=True)
         self._reader.start()
-
-    @property
-    def pid(self) -> int:
-        """The process id."""
-        return self._process.pid
 
     @property
     def exit_code(self) -> int | None:
         """None while it runs."""
-        return self._process.poll()
+        return self.process.poll()
 
-    def last_words(self) -> list[str]:
-        """Its last lines; of one that has ended everything that it still had to say."""
+    def stop(self, is_hurried: Callable[[], bool]) -> None:
+        """Send SIGTERM, and when the grace is over or hurried SIGKILL to the whole group."""
+        self.process.terminate()
+        limit = time.monotonic() + self.program.grace_s
+        while self.exit_code is None and not is_hurried() and time.monotonic() < limit:
+            time.sleep(POLL_S)
+        self._kill()
+
+    def schedule_restart(self) -> None:
+        """Count the crash; the next start waits 0, 1, 2, 4, ... s after so many in a row."""
+        was_steady = time.monotonic() - self._started_at >= STEADY_S
+        self.crashes = 1 if was_steady else self.crashes + 1
+        wait_s = min(2.0 ** (self.crashes - 2), LONGEST_WAIT_S) if self.crashes > 1 else 0.0
+        self.due_at = time.monotonic() + wait_s
+        text = f"ended with exit code {self.exit_code}; starting it again in {wait_s:.0f} s"
+        self._say(self.program.name, text)
+        self._kill()
+
+    def failure(self, what: str) -> ChildFailed:
+        """Return an error that ends with the program's last lines."""
         if self.exit_code is not None:
             self._reader.join(timeout=READER_S)
-        return list(self._last_lines)
+        lines = "\n".join(f"    {line}" for line in self._last_lines)
+        return ChildFailed(f"{self.program.name} {what}. Its last lines:\n{lines}")
 
-    def ask_to_stop(self) -> None:
-        """Send SIGTERM, if it still runs."""
-        if self.exit_code is None:
-            self._process.terminate()
-
-    def stop(self, *, is_hurried: Callable[[], bool] = lambda: False) -> None:
-        """End it and whatever it started: SIGTERM, after the grace SIGKILL to the whole group.
-
-        Args:
-            is_hurried: Asked all the while; once it says yes, the grace is over.
-        """
-        self.ask_to_stop()
-        limit = time.monotonic() + self.program.grace_s
-        while self.exit_code is None and not is_hurried():
-            if time.monotonic() > limit:
-                self._say(self.program.name, f"did not end within {self.program.grace_s:.0f} s")
-                break
-            time.sleep(STOP_POLL_S)
-        self.kill()
-
-    def kill(self) -> None:
-        """End it and whatever it started at once."""
-        with contextlib.suppress(ProcessLookupError):  # nobody of the group is left: as wanted
-            os.killpg(self.pid, signal.SIGKILL)
-        self._process.wait()
+    def _kill(self) -> None:
+        with suppress(ProcessLookupError):  # nobody of the group is left: as wanted
+            os.killpg(self.process.pid, signal.SIGKILL)
+        self.process.wait()
         self._reader.join(timeout=READER_S)
 
     def _read(self) -> None:
-        assert self._process.stdout is not None
-        with self._process.stdout as lines:
+        assert self.process.stdout is not None
+        with self.process.stdout as lines:
             for line in lines:
                 self._last_lines.append(line.rstrip())
                 self._say(self.program.name, line.rstrip())
 
 
-POLL_S = 0.1
-LONG_GRACE_S = 30.0
-"""A program with a grace period of at least this is announced when it is stopped."""
-
-STEADY_S = 60.0
-"""A program that ran this long before it crashed is restarted at once."""
-
-LONGEST_WAIT_S = 60.0
-ALIVE_EVERY_S = 5.0
-CRASHES_ALLOWED = 3
-"""More crashes in a row than this count as a crash loop."""
-
-
-class ChildFailed(ArenaError):
-    """A program did not come up or keeps crashing; the text ends with its last lines."""
-
-
-@dataclass(slots=True)
-class Place:
-    """The state of one supervised program.
-
-    Attributes:
-        child: The process that runs it, or ran it until it crashed.
-        started_at: When that process was started, in seconds of the supervisor's clock.
-        crashes: Crashes in a row, each soon after a start.
-        due_at: When it is restarted; None while it runs.
-        asked_at: When its liveness was last checked.
-    """
-
-    child: Child
-    started_at: float
-    crashes: int = 0
-    due_at: float | None = None
-    asked_at: float = 0.0
-
-
-def wait_s(crashes: int) -> float:
-    """Return the delay before a restart after this many crashes in a row: 0, 1, 2, 4, ... 60 s."""
-    return min(2.0 ** min(crashes - 2, 10), LONGEST_WAIT_S) if crashes > 1 else 0.0
-
-
 class Supervisor:
-    """Start programs in order, restart what crashes or hangs, and stop all in reverse order.
+    """Start programs in order, restart what crashes, and stop all in reverse order.
 
     Args:
         programs: What to run; each is ready before the next one starts.
         say: Gets (name, line) for every line of a child and for what the supervisor does.
-        ledger: Where the children are written down, None for nowhere.
-        clock: Seconds that never run back.
     """
 
-    def __init__(
-        self,
-        programs: Sequence[Program],
-        say: Callable[[str, str], None],
-        *,
-        ledger: Ledger | None = None,
-        clock: Callable[[], float] = time.monotonic,
-    ) -> None:
+    def __init__(self, programs: Sequence[Program], say: Callable[[str, str], None]) -> None:
+        self.children: list[Child] = []
         self._programs = programs
         self._say = say
-        self._clock = clock
-        self._ledger = ledger
-        self._places: list[Place] = []
-        # A plain flag, polled: a signal handler may not take the lock of what it interrupts.
-        self._stopping = False
-        self._interrupts = 0
+        # A plain counter, polled: a signal handler may not take the lock of what it interrupts.
+        self._stops_asked = 0
+
+    @property
+    def is_stopping(self) -> bool:
+        """Whether a stop was requested."""
+        return self._stops_asked > 0
+
+    def ask_to_stop(self) -> None:
+        """Make `watch` return; asked again, `stop` waits for no grace."""
+        self._stops_asked += 1
 
     def start(self) -> None:
         """Start every program and wait until each is ready.
@@ -212,36 +168,28 @@ class Supervisor:
             ChildFailed: A program did not start; those before it are stopped.
         """
         for program in self._programs:
-            if self._stopping:
+            if self.is_stopping:
                 return
-            self._places.append(Place(self._child(program), started_at=self._clock()))
+            self.children.append(Child(program, self._say))
             try:
-                self._await_ready(self._places[-1].child)
+                self._await_ready(self.children[-1])
             except ChildFailed:
                 self.stop()
                 raise
 
     def watch(self) -> None:
         """Supervise until a stop is requested."""
-        while not self._stopping:
+        while not self.is_stopping:
             self.check()
             time.sleep(POLL_S)
 
     def check(self) -> None:
-        """Restart crashed programs that are due, and kill those that hang."""
-        for place in self._places:
-            if self._stopping:
-                return
-            if place.due_at is not None:
-                if self._clock() >= place.due_at:
-                    self._restart(place)
-            elif place.child.exit_code is not None:
-                self._handle_crash(place)
-            elif self._clock() - place.asked_at >= ALIVE_EVERY_S:
-                place.asked_at = self._clock()
-                if not place.child.program.is_alive(place.child.pid):
-                    self._say(place.child.program.name, "hangs; killing it")
-                    place.child.kill()
+        """Restart crashed programs that are due."""
+        for child in self.children:
+            if child.due_at is None and child.exit_code is not None:
+                child.schedule_restart()
+            elif child.due_at is not None and time.monotonic() >= child.due_at:
+                child.start()
 
     def insist_on_steadiness(self) -> None:
         """Raise if a program keeps crashing; for callers that wait for the programs' results.
@@ -249,44 +197,26 @@ class Supervisor:
         Raises:
             ChildFailed: A program keeps crashing; nothing is stopped.
         """
-        for place in self._places:
-            if place.crashes > CRASHES_ALLOWED:
-                raise self._failure(place.child, f"crashed {place.crashes} times in a row")
-
-    @property
-    def is_stopping(self) -> bool:
-        """Whether a stop was requested."""
-        return self._stopping
-
-    def ask_to_stop(self) -> None:
-        """Make `watch` return; safe to call from a signal handler."""
-        self._stopping = True
+        for child in self.children:
+            if child.crashes > CRASHES_ALLOWED:
+                raise child.failure(f"crashed {child.crashes} times in a row")
 
     def stop(self) -> None:
         """Stop every child, the last started first."""
-        self._stopping = True
-        while self._places:
-            child = self._places[-1].child
-            if child.program.grace_s >= LONG_GRACE_S and child.exit_code is None:
-                self._say(
-                    child.program.name,
-                    f"ends what is under way, at most {child.program.grace_s:.0f} s "
-                    "(Ctrl-C once more ends it at once)",
-                )
-            child.stop(is_hurried=lambda: self._interrupts > 1)
-            self._places.pop()
-        if self._ledger is not None:
-            self._ledger.close()
+        self._stops_asked = max(self._stops_asked, 1)
+        while self.children:
+            child = self.children.pop()
+            self._say(child.program.name, "ends what is under way (Ctrl-C ends it at once)")
+            child.stop(is_hurried=lambda: self._stops_asked > 1)
 
     @contextmanager
     def signals(self) -> Iterator[None]:
-        """Request a stop on Ctrl-C, SIGTERM and SIGHUP; a second one skips the grace."""
-        handled = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+        """Request a stop on Ctrl-C, SIGTERM and SIGHUP."""
 
         def handle(_number: int, _frame: FrameType | None) -> None:
-            self._interrupts += 1
             self.ask_to_stop()
 
+        handled = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
         before = {number: signal.signal(number, handle) for number in handled}
         try:
             yield
@@ -295,52 +225,10 @@ class Supervisor:
                 signal.signal(number, handler)
 
     def _await_ready(self, child: Child) -> None:
-        deadline = self._clock() + child.program.ready_within_s
-        while not self._stopping:
+        deadline = time.monotonic() + child.program.ready_within_s
+        while not self.is_stopping and not child.program.is_ready():
             if child.exit_code is not None:
-                raise self._failure(child, f"ended with exit code {child.exit_code}")
-            if child.program.is_ready():
-                return
-            if self._clock() > deadline:
-                waited = f"{child.program.ready_within_s:.0f} s"
-                raise self._failure(child, f"is not ready after {waited}")
+                raise child.failure(f"ended with exit code {child.exit_code}")
+            if time.monotonic() > deadline:
+                raise child.failure(f"is not ready after {child.program.ready_within_s:.0f} s")
             time.sleep(POLL_S)
-
-    def _handle_crash(self, place: Place) -> None:
-        """Count a crash and schedule the restart."""
-        name, code = place.child.program.name, place.child.exit_code
-        was_steady = self._clock() - place.started_at >= STEADY_S
-        place.crashes = 1 if was_steady else place.crashes + 1
-        self._schedule_restart(place, f"ended with exit code {code}")
-        place.child.kill()
-        if place.crashes == CRASHES_ALLOWED + 1:
-            self._say(name, "keeps crashing; everything else goes on without it")
-
-    def _schedule_restart(self, place: Place, what: str) -> None:
-        after_s = wait_s(place.crashes)
-        place.due_at = self._clock() + after_s
-        when = f"in {after_s:.0f} s" if after_s else "now"
-        self._say(place.child.program.name, f"{what}; starting it again {when}")
-
-    def _restart(self, place: Place) -> None:
-        try:
-            place.child = self._child(place.child.program)
-        except OSError as error:  # no memory, no process left: the next try may have them
-            place.crashes += 1
-            self._schedule_restart(place, f"could not be started ({error})")
-            return
-        place.started_at, place.due_at = self._clock(), None
-
-    def _child(self, program: Program) -> Child:
-        if self._ledger is None:
-            return Child(program, self._say)
-        child = Child(program, self._say, self._ledger.environment)
-        self._ledger.note(program.name, child.pid)
-        return child
-
-    @staticmethod
-    def _failure(child: Child, what: str) -> ChildFailed:
-        lines = (
-            "\n".join(f"    {line}" for line in child.last_words()) or "    (it printed nothing)"
-        )
-        return ChildFailed(f"{child.program.name} {what}. Its last lines:\n{lines}")

@@ -6,9 +6,7 @@ holds a connection and no thread. Threads of the worker get requests that are co
 body, and hand over answers that are kept for their reader.
 """
 
-import logging
 import os
-import resource
 import time
 from typing import Any
 
@@ -17,6 +15,8 @@ from waitress.channel import HTTPChannel
 from waitress.server import create_server
 from waitress.wasyncore import loop
 
+from arena.serving.leash import die_with_parent
+
 REQUEST_WITHIN_S = 30.0
 """So long a request may take to come in, and a second more for each BYTES_A_SECOND of it."""
 
@@ -24,74 +24,53 @@ BYTES_A_SECOND = 1_000
 IDLE_S = 60
 """So long a connection without a request is kept."""
 
-CONNECTIONS = 500
-"""So many a process holds; then those that wait the longest for their request make room."""
+CONNECTIONS = 250
+"""So many a process holds: each takes up to three of the 1024 files that are usual."""
 
 LARGEST_BODY = 64 * 1024 * 1024
 LARGEST_HEADER = 64 * 1024
 KEPT_ANSWER = 1024 * 1024 * 1024
 """So many bytes of one answer wait for a slow reader, beyond the first of them on disk."""
 
-_ROOM = 50
-_LOOK_EVERY_S = 1.0
-_FILES_EACH = 3
-_FILES_BESIDE = 200
-
 
 class Connection(HTTPChannel):  # type: ignore[misc] # Waitress has no types
-    """A connection that knows since when it waits, and for how much of a request."""
+    """A connection that knows when its request began, and how much of it came in."""
 
-    def __init__(self, *args: Any, **options: Any) -> None:
-        super().__init__(*args, **options)
-        self.waits_since = time.monotonic()
-        self.came_in = 0
+    began_at = 0.0
+    came_in = 0
 
     def received(self, data: bytes) -> bool:
         """Take what came in; Waitress's own reading."""
         if self.request is None:
-            self.waits_since, self.came_in = time.monotonic(), 0
+            self.began_at, self.came_in = time.monotonic(), 0
         self.came_in += len(data)
         return bool(super().received(data))
 
-    def service(self) -> None:
-        """Answer one request; from then on the next one is waited for."""
-        super().service()
-        self.waits_since, self.came_in = time.monotonic(), 0
+    def is_late(self, now: float) -> bool:
+        """Return whether the request that has begun should have been complete by now."""
+        allowed_s = REQUEST_WITHIN_S + self.came_in / BYTES_A_SECOND
+        return self.request is not None and now - self.began_at > allowed_s
 
     @property
-    def is_waiting(self) -> bool:
+    def is_idle(self) -> bool:
         """Whether nothing is to be done for it before more of a request comes in."""
         return not self.requests and not self.total_outbufs_len
-
-    def is_late(self, now: float) -> bool:
-        """Whether the request that has begun should have been complete by now."""
-        allowed_s = REQUEST_WITHIN_S + self.came_in / BYTES_A_SECOND
-        return self.request is not None and now - self.waits_since > allowed_s
 
 
 class BufferingWorker(Worker):  # type: ignore[misc] # gunicorn has no types
     """Waitress on gunicorn's sockets, with as many threads as gunicorn's setting says."""
 
-    def handle_exit(self, sig: int, frame: Any) -> None:
-        """Begin to end: what has come in is answered, nothing new is taken."""
-        super().handle_exit(sig, frame)
-        server = getattr(self, "_server", None)
-        if server is not None:
-            server.trigger.pull_trigger()
-
     def run(self) -> None:
         """Serve until gunicorn says stop, or is gone."""
-        _raise_file_limit()
-        # Its threads take turns at a queue on purpose: that it has an entry is no news.
-        logging.getLogger("waitress.queue").setLevel(logging.ERROR)
+        die_with_parent()
         self._map: dict[int, Any] = {}
-        self._server = create_server(
+        server = create_server(
             self.wsgi,
             map=self._map,
             sockets=[listening.sock for listening in self.sockets],
             threads=self.cfg.threads,
             backlog=self.cfg.backlog,
-            connection_limit=CONNECTIONS + _ROOM,
+            connection_limit=CONNECTIONS,
             channel_timeout=IDLE_S,
             cleanup_interval=5,
             max_request_header_size=LARGEST_HEADER,
@@ -103,61 +82,27 @@ class BufferingWorker(Worker):  # type: ignore[misc] # gunicorn has no types
             clear_untrusted_proxy_headers=False,
             ident=None,
         )
-        for listening in self._listening():
-            listening.channel_class = Connection
-        next_look = 0.0
+        listeners = [found for found in self._map.values() if hasattr(found, "channel_class")]
+        for listener in listeners:
+            listener.channel_class = Connection
         while self.alive and self.ppid == os.getppid():
             self._turn()
-            if time.monotonic() >= next_look:
-                make_room(self._connections(), now=time.monotonic())
-                next_look = time.monotonic() + _LOOK_EVERY_S
-        self._finish()
+        for listener in listeners:
+            listener.accepting = False
+            listener.socket.close()
+            self._map.pop(listener._fileno, None)
+        limit = time.monotonic() + self.cfg.graceful_timeout
+        while time.monotonic() < limit and not all(one.is_idle for one in self._connections()):
+            self._turn()
+        server.task_dispatcher.shutdown(timeout=1)
 
     def _turn(self) -> None:
         self.notify()
         loop(timeout=1.0, use_poll=True, map=self._map, count=1)
-
-    def _finish(self) -> None:
-        """Answer what came in before the end, within gunicorn's time for that."""
-        for listening in self._listening():
-            listening.accepting = False
-            listening.socket.close()
-            self._map.pop(listening._fileno, None)
-        limit = time.monotonic() + self.cfg.graceful_timeout
-        while time.monotonic() < limit and not all(
-            connection.is_waiting for connection in self._connections()
-        ):
-            self._turn()
-        self._server.task_dispatcher.shutdown(timeout=1)
-
-    def _listening(self) -> list[Any]:
-        return [found for found in list(self._map.values()) if hasattr(found, "channel_class")]
+        now = time.monotonic()
+        for connection in self._connections():
+            if connection.is_late(now):
+                connection.will_close = True
 
     def _connections(self) -> list[Connection]:
         return [found for found in list(self._map.values()) if isinstance(found, Connection)]
-
-
-def make_room(connections: list[Connection], *, now: float) -> None:
-    """Close whose request is late, and of too many those that wait the longest.
-
-    Args:
-        connections: All of a process.
-        now: Seconds of the clock that `waits_since` is of.
-    """
-    for connection in connections:
-        if connection.is_late(now):
-            connection.will_close = True
-    waiting = sorted(
-        (found for found in connections if found.is_waiting), key=lambda found: found.waits_since
-    )
-    for connection in waiting[: max(0, len(connections) - CONNECTIONS)]:
-        connection.will_close = True
-
-
-def _raise_file_limit() -> None:
-    """A connection takes up to three files: itself, a long request and a long answer."""
-    wanted = _FILES_EACH * (CONNECTIONS + _ROOM) + _FILES_BESIDE
-    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
-    if soft != resource.RLIM_INFINITY and soft < wanted:
-        highest = wanted if hard == resource.RLIM_INFINITY else min(wanted, hard)
-        resource.setrlimit(resource.RLIMIT_NOFILE, (highest, hard))

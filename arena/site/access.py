@@ -1,18 +1,19 @@
-"""Who may open which page, and signing in."""
+"""Who may open which page, and what becomes of an act that a service refuses."""
 
-import json
 from collections.abc import Callable
 from functools import wraps
-from typing import Any, Concatenate, ParamSpec, cast
+from typing import Concatenate, ParamSpec, cast
 
-from django.contrib.auth.forms import AuthenticationForm
-from django.contrib.auth.middleware import LoginRequiredMiddleware
+from django.contrib import messages
 from django.contrib.auth.models import User
 from django.core.exceptions import PermissionDenied
-from django.http import HttpRequest, HttpResponse, HttpResponseBase, QueryDict
-from django.shortcuts import render
+from django.http import HttpRequest, HttpResponse, HttpResponseBase
+from django.shortcuts import redirect
+from django.urls import NoReverseMatch
+from django.views.decorators.http import require_http_methods, require_safe
 
-from arena.people.queries import has_admin, role_of
+from arena.people.queries import role_of
+from augment.errors import AugmentError
 
 P = ParamSpec("P")
 View = Callable[Concatenate[HttpRequest, P], HttpResponseBase]
@@ -23,12 +24,13 @@ STAFF = (ADMIN, ANALYST)
 """Who may know which contestant made what."""
 
 BACKEND = "arena.people.queries.AccountBackend"
+FORM_METHODS = ["GET", "HEAD", "POST"]
 GONE = 410
 """The status of a link that is over."""
 
 
 def allow_only(*roles: str) -> Callable[[View[P]], View[P]]:
-    """Refuse other roles with 403; SignInMiddleware stops who is not signed in."""
+    """Refuse other roles with 403; Django's middleware stops who is not signed in."""
 
     def wrap(view: View[P]) -> View[P]:
         @wraps(view)
@@ -44,6 +46,51 @@ def allow_only(*roles: str) -> Callable[[View[P]], View[P]]:
     return wrap
 
 
+def page_for(*roles: str) -> Callable[[View[P]], View[P]]:
+    """Decorate a page that is only looked at."""
+    return lambda view: allow_only(*roles)(require_safe(view))
+
+
+def form_for(*roles: str) -> Callable[[View[P]], View[P]]:
+    """Decorate a page with a form that is sent to the same address."""
+    return lambda view: allow_only(*roles)(require_http_methods(FORM_METHODS)(view))
+
+
+def act_for(
+    *roles: str, back: str, asks_first: bool = False
+) -> Callable[[Callable[Concatenate[HttpRequest, P], HttpResponseBase | None]], View[P]]:
+    """Decorate a POST: what a service refuses becomes a message on the page it came from.
+
+    Args:
+        roles: Who may do it.
+        back: The name of that page, which has the same `code` in its address, or none. A view
+            that returns None leads there as well.
+        asks_first: Whether the address also shows a question before the act.
+    """
+
+    def wrap(view: Callable[Concatenate[HttpRequest, P], HttpResponseBase | None]) -> View[P]:
+        @wraps(view)
+        def act(request: HttpRequest, /, *args: P.args, **kwargs: P.kwargs) -> HttpResponseBase:
+            answer = None
+            try:
+                answer = view(request, *args, **kwargs)
+            except AugmentError as error:
+                messages.error(request, str(error))
+            return answer or _lead_to(back, kwargs.get("code"))
+
+        methods = FORM_METHODS if asks_first else ["POST"]
+        return allow_only(*roles)(require_http_methods(methods)(act))
+
+    return wrap
+
+
+def _lead_to(page: str, code: object) -> HttpResponse:
+    try:
+        return redirect(page, code=code)
+    except NoReverseMatch:
+        return redirect(page)
+
+
 def user_of(request: HttpRequest) -> User:
     """Return who is signed in, for a view that others can't reach."""
     return cast(User, request.user)
@@ -57,54 +104,3 @@ def keep_secret(answer: HttpResponse) -> HttpResponse:
     answer["Referrer-Policy"] = "strict-origin"
     answer["X-Robots-Tag"] = "noindex, nofollow"
     return answer
-
-
-KEPT = "kept_form"
-"""The field of the sign-in page that holds what was typed elsewhere."""
-
-_LEFT_OUT = ("csrfmiddlewaretoken", "password")
-
-
-class SignInMiddleware(LoginRequiredMiddleware):
-    """Ask who is not signed in to do so; the sign-in page keeps what they sent."""
-
-    def handle_no_permission(  # type: ignore[override]
-        self, request: HttpRequest, view_func: Callable[..., Any]
-    ) -> HttpResponseBase:
-        """Show the sign-in page in place of the answer to a typed form, else go there."""
-        if not request.POST:
-            return super().handle_no_permission(request, view_func)
-        context = {
-            "form": AuthenticationForm(request),
-            "next": request.get_full_path(),
-            KEPT: keep_form(request.POST),
-            "is_empty": not has_admin(),
-        }
-        return render(request, "login.html", context)
-
-
-def keep_form(sent: QueryDict) -> str:
-    """Return the fields of a form as text, without passwords."""
-    fields = {
-        name: values
-        for name, values in sent.lists()
-        if not any(word in name for word in _LEFT_OUT)
-    }
-    return json.dumps(fields)
-
-
-def read_form(kept: str) -> list[tuple[str, str]]:
-    """Return the names and values of what `keep_form` gave; nothing where it is not of ours."""
-    try:
-        fields = json.loads(kept)
-    except ValueError:
-        return []
-    if not isinstance(fields, dict):
-        return []
-    return [
-        (name, value)
-        for name, values in fields.items()
-        if isinstance(values, list)
-        for value in values
-        if isinstance(value, str)
-    ]

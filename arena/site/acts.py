@@ -1,20 +1,17 @@
 """Acts of pages: asking before them, telling what came of them, sending them to a worker."""
 
-from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager
+from collections.abc import Callable
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
-from functools import partial
-from typing import cast
 
 from django.contrib import messages
 from django.db import transaction
 from django.forms import BaseForm
 from django.http import HttpRequest, HttpResponse
 from django.shortcuts import render
-from django.utils.text import slugify
+from django.utils.text import capfirst, slugify
 
-from arena.errors import ArenaError
-from augment.errors import AugmentError, QueueFault
+from augment.errors import AugmentError, InvalidDocument, QueueFault
 
 SURE = "sure"
 """What the page's own button sends; without it nothing is done."""
@@ -29,26 +26,34 @@ TYPED, WHY = "typed", "why"
 LOOKS = 40
 """How often a page reloads itself while it waits for a worker."""
 
-REFUSALS = (ArenaError, AugmentError)
-"""What a service raises; its text is for whoever asked."""
 
+class _Refusals(AbstractContextManager[None, bool]):
+    def __init__(self, tell: Callable[[AugmentError], object]) -> None:
+        self._tell = tell
 
-@contextmanager
-def _told_by(tell: Callable[[str], object]) -> Iterator[None]:
-    try:
-        yield
-    except REFUSALS as error:
-        tell(str(error))
+    def __exit__(self, _kind: object, error: BaseException | None, _trace: object) -> bool:
+        if isinstance(error, AugmentError):
+            self._tell(error)
+        return isinstance(error, AugmentError)
 
 
 def refusals_told(request: HttpRequest) -> AbstractContextManager[None, bool]:
     """Show what a service refuses as a message on the next page."""
-    return cast(AbstractContextManager[None, bool], _told_by(partial(messages.error, request)))
+    return _Refusals(lambda error: messages.error(request, str(error)))
 
 
 def refusals_in(form: BaseForm, field: str | None = None) -> AbstractContextManager[None, bool]:
-    """Show what a service refuses as an error of the form."""
-    return cast(AbstractContextManager[None, bool], _told_by(partial(form.add_error, field)))
+    """Show what a service refuses as errors of the form, at the fields that they are about."""
+
+    def tell(error: AugmentError) -> None:
+        problems = error.problems if isinstance(error, InvalidDocument) else []
+        if not any(name in form.fields for name, _text in problems):
+            form.add_error(field, str(error))
+            return
+        for name, text in problems:
+            form.add_error(name if name in form.fields else field, capfirst(text))
+
+    return _Refusals(tell)
 
 
 def tell_errors(request: HttpRequest, form: BaseForm) -> None:

@@ -13,7 +13,7 @@ VOTER_VIEWS = frozenset(
     {
         *("home", "login", "logout", "language", "theme"),
         *("invitation", "enrol", "welcome", "password", "api-tokens", "api-token-revoke"),
-        *("vote", "vote-help", "vote-practice", "vote-skipped", "vote-report", "measures"),
+        *("vote", "vote-practice", "vote-skipped"),
         *("api-matchups", "api-preferences", "api-reports", "api-votes"),
     }
 )

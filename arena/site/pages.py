@@ -1,12 +1,11 @@
 """Home of each role with its first steps, the audit log, and what monitoring asks."""
 
-import json
 from collections.abc import Iterator
 from typing import Any
 
-from django import forms
 from django.contrib.auth.decorators import login_not_required
-from django.http import Http404, HttpRequest, HttpResponse, JsonResponse, StreamingHttpResponse
+from django.db.models import QuerySet
+from django.http import HttpRequest, HttpResponse, JsonResponse, StreamingHttpResponse
 from django.shortcuts import redirect, render
 from django.utils.http import url_has_allowed_host_and_scheme
 from django.views.decorators.http import require_POST, require_safe
@@ -14,7 +13,6 @@ from prometheus_client import CollectorRegistry, generate_latest
 from prometheus_client.exposition import CONTENT_TYPE_LATEST
 from prometheus_client.registry import Collector
 
-from arena.exports.formats import format_named
 from arena.jobs import queries
 from arena.models import Study
 from arena.people.pages import keep_language
@@ -22,15 +20,13 @@ from arena.people.queries import Language, Theme, role_of
 from arena.people.services import keep_preference
 from arena.results.queries.access import ResultsAccess, results_access
 from arena.serving.readiness import look_at_parts, opens_metrics
-from arena.site.access import ADMIN, allow_only, user_of
-from arena.site.exports import AUDIT_FORMATS
-from arena.site.forms import offer
+from arena.site.access import ADMIN, page_for, user_of
+from arena.site.exports import audit_csv
 from arena.site.language import use_english
-from arena.site.listing import read_page
-from arena.site.queries import MACHINE, actors, acts, distinct, read_gauges, take_inventory
+from arena.site.listing import Listing, read_listing, read_page
+from arena.site.queries import actors, distinct, read_gauges, take_inventory
 from arena.studies import queries as studies
 from arena.templatetags.results import label_of
-from augment.errors import UnknownName
 from augment.models import Event, GenerationJob
 from augment.services.running.progress import count_each
 
@@ -58,7 +54,7 @@ def home(request: HttpRequest) -> HttpResponse:
 
 def _expert(request: HttpRequest) -> HttpResponse:
     expert = user_of(request)
-    lines = studies.of_expert(expert)
+    lines = studies.progress_of(studies.listed_studies(expert), expert)
     closed = [line for line in lines if line.study.state == Study.State.CLOSED]
     is_open = [line for line in lines if line.study.state == Study.State.OPEN]
     context = {
@@ -76,7 +72,7 @@ def _expert(request: HttpRequest) -> HttpResponse:
 
 
 def _analyst(request: HttpRequest) -> HttpResponse:
-    lines = studies.of_studies()
+    lines = studies.progress_of(studies.listed_studies())
     context = {
         "running": [line for line in lines if line.study.state == Study.State.OPEN],
         "closed": [line for line in lines if line.study.state == Study.State.CLOSED],
@@ -90,61 +86,38 @@ def _admin(request: HttpRequest) -> HttpResponse:
         "inventory": inventory,
         "steps": list_steps(inventory),
         "jobs": count_each(list(GenerationJob.objects.all()[:LATEST_JOBS])),
-        "running": [line for line in studies.of_studies() if line.study.state == Study.State.OPEN],
+        "running": studies.progress_of(studies.listed_studies().filter(state=Study.State.OPEN)),
     }
     return render(request, "home/admin.html", context)
 
 
 STEPS = (
-    (
-        *("Load the catalogue", "scenarios", "Scenarios", "{scenarios} scenarios are here."),
-        "No scenario yet. What comes with the project is loaded by a button.",
-    ),
-    (
-        *("Have at least two contestants", "contestants", "Contestants"),
-        "{contestants} contestants are registered.",
-        "None yet. A model at an endpoint, or one of those that ask nobody.",
-    ),
-    (
-        *("Run a job", "job-new", "New job", "{done} augmentations are done."),
-        "A job lets contestants carry out the instructions of scenarios.",
-    ),
-    (
-        *("Open a study", "studies", "Studies", "{studies} so far, {studies_open} open now."),
-        "Experts compare two results of a scenario without knowing whose they are.",
-    ),
-    (
-        *("Let the experts vote", "studies", "Progress"),
-        "{votes:,} votes are saved; studies open: {studies_open}.",
-        "No vote yet.",
-    ),
-    (
-        *("Close and read the results", "studies", "Results", "{studies_closed} closed."),
-        "Results show once a study is closed.",
-    ),
+    # counted, needed, title, page, its button, what is said
+    ("scenarios", 1, "Load the catalogue", "scenarios", "Scenarios", "Scenarios here: {}."),
+    ("contestants", 2, "Have two contestants", "contestants", "Contestants", "Registered: {}."),
+    ("done", 1, "Run a job", "job-new", "New job", "Augmentations done: {}."),
+    ("studies", 1, "Open a study", "studies", "Studies", "Studies so far: {}."),
+    ("votes", 1, "Let the experts vote", "studies", "Progress", "Votes saved: {}."),
+    ("studies_closed", 1, "Close and read the results", "studies", "Results", "Closed: {}."),
 )
-"""From an empty installation to a rated table: a title, the page where it is done and its
-button, and what is said once there is something and before."""
+"""From an empty installation to a rated table."""
 
 
 def list_steps(counts: dict[str, int]) -> list[dict[str, Any]]:
     """Return the first steps of an admin, with what is done and what comes next."""
-    begun = ("scenarios", "contestants", "done", "studies", "votes", "studies_closed")
-    done = [counts[name] > 0 for name in begun]
-    done[1] = counts["contestants"] >= 2
-    done[4] = done[4] and counts["studies_open"] == 0
-    following = done.index(False) if False in done else None
-    return [
+    steps = [
         {
             "title": title,
             "link": link,
             "action": action,
-            "detail": there.format(**counts) if counts[begun[n]] else before,
-            "done": done[n],
-            "is_next": n == following,
+            "detail": text.format(counts[name]),
+            "done": counts[name] >= needed,
         }
-        for n, (title, link, action, there, before) in enumerate(STEPS)
+        for name, needed, title, link, action, text in STEPS
     ]
+    following = next((step for step in steps if not step["done"]), {})
+    following["is_next"] = True
+    return steps
 
 
 @require_POST
@@ -176,73 +149,39 @@ def _back(request: HttpRequest) -> HttpResponse:
 # --- The audit log -----------------------------------------------------------------------------
 
 
-class AuditForm(forms.Form):
-    """Which acts the log shows; what is empty filters nothing."""
-
-    actor = forms.ChoiceField(required=False, label="By")
-    verb = forms.ChoiceField(required=False, label="What")
-    kind = forms.ChoiceField(required=False, label="To")
-    object = forms.CharField(
-        required=False, max_length=120, label="Code, or name of a study", strip=True
-    )
-    since = forms.DateField(required=False, label="From", widget=forms.DateInput())
-    until = forms.DateField(required=False, label="To and with", widget=forms.DateInput())
-
-    def __init__(self, *args: Any, **kwargs: Any) -> None:
-        super().__init__(*args, **kwargs)
-        people = [(str(user.person.code), user.person.pseudonym) for user in actors()]
-        offered = {
-            "actor": [("", "anybody"), (MACHINE, "the machine"), *people],
-            "verb": [
-                ("", "anything"),
-                *((verb, label_of("verb_label", verb)) for verb in distinct("verb")),
-            ],
-            "kind": [("", "anything"), *((kind, kind) for kind in distinct("object_kind"))],
-        }
-        for name, choices in offered.items():
-            offer(self, name, choices)
-        for name in ("since", "until"):
-            self.fields[name].widget.input_type = "date"
-
-
-@allow_only(ADMIN)
-@require_safe
+@page_for(ADMIN)
 def audit_page(request: HttpRequest) -> HttpResponse:
     """A page of acts, the newest first."""
-    form = AuditForm(request.GET)
-    is_valid = form.is_valid()
-    page = read_page(request, acts(form.cleaned_data), size=ACTS_AT_ONCE)
-    context = {
-        "page": page,
-        "lines": [(event, _details(event)) for event in page],
-        "form": form,
-        "query": request.GET.urlencode(),
-    }
-    return render(request, "audit.html", context, status=200 if is_valid else 422)
+    listing, rows = _find_acts(request)
+    page = read_page(request, rows, size=ACTS_AT_ONCE)
+    context = {"page": page, "listing": listing, "query": request.GET.urlencode()}
+    return render(request, "audit.html", context)
 
 
-@allow_only(ADMIN)
-@require_safe
-def audit_file(request: HttpRequest, form: str) -> StreamingHttpResponse:
+@page_for(ADMIN)
+def audit_file(request: HttpRequest) -> StreamingHttpResponse:
     """All acts that the page's filters name, as a file that is sent while it is read."""
-    asked = AuditForm(request.GET)
-    try:
-        chosen = format_named(AUDIT_FORMATS, form)
-    except UnknownName as error:
-        raise Http404 from error
-    if not asked.is_valid():
-        raise Http404
+    _, rows = _find_acts(request)
     return StreamingHttpResponse(
-        chosen.parts(acts(asked.cleaned_data).iterator()),
-        content_type=chosen.content_type,
-        headers={"Content-Disposition": f'attachment; filename="audit.{chosen.suffix}"'},
+        audit_csv(rows.iterator()),
+        content_type="text/csv; charset=utf-8",
+        headers={"Content-Disposition": 'attachment; filename="audit.csv"'},
     )
 
 
-def _details(event: Event) -> str:
-    """Return what changed: before, an arrow, after."""
-    kept = [change for change in (event.before, event.after) if change]
-    return " → ".join(json.dumps(change, ensure_ascii=False) for change in kept)
+def _find_acts(request: HttpRequest) -> tuple[Listing, QuerySet[Event]]:
+    people: list[tuple[str, object]] = [
+        (str(user.person.code), user.person.pseudonym) for user in actors()
+    ]
+    verbs = [(verb, label_of("verb_label", verb)) for verb in distinct("verb")]
+    kinds = [(kind, kind) for kind in distinct("object_kind")]
+    listing = read_listing(
+        request, {"actor": ("By", people), "verb": ("What", verbs), "object_kind": ("To", kinds)}
+    )
+    rows = Event.objects.select_related("actor__person").order_by("-at", "-pk")
+    if actor := listing.chosen("actor"):
+        rows = rows.filter(actor__person__code=actor)
+    return listing, listing.narrow(rows, "object_code", by=["verb", "object_kind"])
 
 
 # --- Monitoring --------------------------------------------------------------------------------

@@ -1,13 +1,11 @@
 """Reads of the whole site: the log of acts, gauges for monitoring, counts, narrowed lists."""
 
 from collections.abc import Iterator, Mapping
-from datetime import datetime, time
 from typing import Any
 
 from django.apps import apps
 from django.contrib.auth.models import User
-from django.db.models import Count, Q, QuerySet, Sum
-from django.utils import timezone
+from django.db.models import Count, QuerySet, Sum
 from prometheus_client.core import GaugeMetricFamily
 
 from arena.models import Matchup, Study, Vote
@@ -22,39 +20,11 @@ from augment.models import (
 )
 from augment.services.running.workers import workforce
 
-MACHINE = "machine"
-"""Asked for as an actor: what nobody did but the machine itself."""
-
 CHECK_PERCENT = 2
 NANO = 1e9
 """Money is counted in whole nano-dollars."""
 
 # --- The log of acts ---------------------------------------------------------------------------
-
-
-def acts(asked: Mapping[str, Any]) -> QuerySet[Event]:
-    """Return acts, the newest first, with who did them.
-
-    Args:
-        asked: What is empty or missing filters nothing. `actor` is the code of a person, or
-            MACHINE; `object` a whole code or a study's name; `since` and `until` are days of
-            the installation's time zone, both included.
-    """
-    rows = Event.objects.select_related("actor__person").order_by("-at", "-pk")
-    if actor := asked.get("actor"):
-        who = Q(actor=None) if actor == MACHINE else Q(actor__person__code=actor)
-        rows = rows.filter(who)
-    if verb := asked.get("verb"):
-        rows = rows.filter(verb=verb)
-    if kind := asked.get("kind"):
-        rows = rows.filter(object_kind=kind)
-    if name := asked.get("object"):
-        codes = Study.objects.filter(name=name).values_list("code", flat=True)
-        rows = rows.filter(object_code__in=[name, *map(str, codes)])
-    for bound, edge, moment in (("since", "at__gte", time.min), ("until", "at__lte", time.max)):
-        if day := asked.get(bound):
-            rows = rows.filter(**{edge: timezone.make_aware(datetime.combine(day, moment))})
-    return rows
 
 
 def actors() -> list[User]:

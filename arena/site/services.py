@@ -8,18 +8,15 @@ goes can't be used again: the same request is asked, and paid, anew, and transcr
 words. Nothing of a job that is not over goes, and nothing that an unfinished study shows.
 """
 
-import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
-from datetime import datetime, timedelta
+from datetime import datetime
 from uuid import uuid4
 
 from django.apps import apps
 from django.contrib.auth.models import User
 from django.core.exceptions import ValidationError
 from django.db import models, transaction
-from django.db.models import Count, F, Q, QuerySet, Sum, TextField
-from django.db.models.functions import Cast, Coalesce, Length
+from django.db.models import F, Q, QuerySet
 
 from arena.errors import ArenaError
 from arena.jobs.services import NOTE_LENGTH
@@ -29,7 +26,7 @@ from arena.studies.services.experts import Complaint, check_complaint
 from arena.studies.services.opening import check_seed
 from arena.studies.services.planning import rules_of
 from arena.voting.services.casting import decision_of
-from augment.errors import AugmentError, Conflict, InvalidDocument
+from augment.errors import AugmentError, Conflict
 from augment.models import FAILED, Augmentation, GenerationJob, ModelCall, Work
 from augment.services import row_rules
 from augment.services.events import log_event
@@ -40,92 +37,9 @@ from augment.services.texts import check_picture_name, one_line
 BATCH = 200
 """So many calls are emptied in one transaction, so that nobody waits for long."""
 
-_AGE = re.compile(r"(\d{1,5})([dw])")
-_DAYS = {"d": 1, "w": 7}
 
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class TextLoss:
-    """What goes of one job, or of the readings of instructions where `job` is None.
-
-    Attributes:
-        calls: Whose messages go, and of these `answers` have an answer.
-        transcripts: Augmentations whose transcripts are without words afterwards.
-        characters: Of requests and answers.
-    """
-
-    job: GenerationJob | None
-    calls: int
-    answers: int
-    transcripts: int
-    characters: int
-
-
-def read_age(text: str) -> timedelta:
-    """Read an age as it is entered: 180d or 26w.
-
-    Raises:
-        InvalidDocument: It is none, or below a day.
-    """
-    found = _AGE.fullmatch(text.strip())
-    days = int(found[1]) * _DAYS[found[2]] if found else 0
-    if not days:
-        said = f"expected days or weeks as in 180d or 26w, not {text!r}"
-        raise InvalidDocument("age", [("", said)])
-    return timedelta(days=days)
-
-
-def foresee_losses(*, before: datetime) -> list[TextLoss]:
-    """Count what would go, job by job, the oldest first.
-
-    Args:
-        before: Calls that began earlier are old.
-    """
-    calls = _removable(before)
-    jobs = GenerationJob.objects.filter(
-        pk__in=calls.order_by().values("attempt__augmentation__job").distinct()
-    )
-    losses = [
-        _loss(job, calls.filter(attempt__augmentation__job=job))
-        for job in jobs.order_by("created_at", "pk")
-    ]
-    readings = calls.filter(reading__isnull=False)
-    return losses + ([_loss(None, readings)] if readings.exists() else [])
-
-
-def remove_old(
-    *, before: datetime, now: datetime, actor: User | None = None
-) -> Iterator[tuple[TextLoss, int]]:
-    """Empty old calls, job by job; each job with how many of its calls are done so far.
-
-    What is to go is logged first. Stopped halfway, it has emptied whole batches, and the next
-    run does the rest.
-
-    Raises:
-        Conflict: A job was resumed or a study opened meanwhile, so that some calls may not go.
-    """
-    for loss in foresee_losses(before=before):
-        whose = Q(reading__isnull=False)
-        if loss.job is not None:
-            whose = Q(attempt__augmentation__job=loss.job)
-        calls = _removable(before).filter(whose)
-        keys = list(calls.order_by("pk").values_list("pk", flat=True))
-        images = images_named_by(keys)
-        kind, code = ("reading", "all") if loss.job is None else ("job", loss.job.code)
-        names = ("calls", "answers", "transcripts", "characters")
-        counts = {"older_than": before.isoformat()} | {n: getattr(loss, n) for n in names}
-        log_event(actor=actor, verb="prune", object_kind=kind, object_code=code, after=counts)
-        for start in range(0, len(keys), BATCH):
-            _empty(keys[start : start + BATCH], before=before, now=now)
-            yield loss, min(start + BATCH, len(keys))
-        delete_unnamed(images)
-
-
-# --- Private -----------------------------------------------------------------------------------
-
-
-def _removable(before: datetime) -> QuerySet[ModelCall]:
-    """Return old calls with their words that no open job and no unfinished study needs."""
+def removable(before: datetime) -> QuerySet[ModelCall]:
+    """Return calls from before then with their words that no job or study under way needs."""
     unfinished = Matchup.objects.exclude(study__state=Study.State.CLOSED).order_by()
     shown = Augmentation.objects.filter(
         Q(pk__in=unfinished.values("left")) | Q(pk__in=unfinished.values("right"))
@@ -136,27 +50,35 @@ def _removable(before: datetime) -> QuerySet[ModelCall]:
     old = ModelCall.objects.filter(
         started_at__lt=before, settled_at__isnull=False, removed_at__isnull=True
     )
-    of_jobs_over = Q(attempt__isnull=True) | ~Q(attempt__augmentation__job__state__in=OPEN)
-    not_shown = Q(attempt__isnull=True) | ~Q(attempt__augmentation__in=shown)
-    return old.filter(of_jobs_over, not_shown).exclude(pk__in=sources)
+    return old.exclude(pk__in=ModelCall.objects.filter(kept).values("pk")).exclude(pk__in=sources)
 
 
-def _loss(job: GenerationJob | None, calls: QuerySet[ModelCall]) -> TextLoss:
-    long = Length(Cast("request", TextField())) + Coalesce(Length("answer"), 0)
-    found = calls.order_by().aggregate(
-        calls=Count("pk"),
-        answers=Count("pk", filter=Q(answer__isnull=False)),
-        transcripts=Count("attempt__augmentation", distinct=True),
-        characters=Coalesce(Sum(long), 0),
-    )
-    return TextLoss(job=job, **found)
+def remove_old(
+    *, before: datetime, now: datetime, actor: User | None = None
+) -> Iterator[tuple[int, int]]:
+    """Empty old calls in batches; yield how many are done, of how many.
+
+    It is logged first. Stopped halfway, it has emptied whole batches, and the next run does the
+    rest.
+
+    Raises:
+        Conflict: A job was resumed or a study opened meanwhile, so that some calls may not go.
+    """
+    keys = list(removable(before).order_by("pk").values_list("pk", flat=True))
+    images = images_named_by(keys)
+    counts = {"older_than": before.isoformat(), "calls": len(keys)}
+    log_event(actor=actor, verb="prune", object_kind="calls", object_code="all", after=counts)
+    for start in range(0, len(keys), BATCH):
+        _empty(keys[start : start + BATCH], before=before, now=now)
+        yield min(start + BATCH, len(keys)), len(keys)
+    delete_unnamed(images)
 
 
 @transaction.atomic
 def _empty(keys: list[int], *, before: datetime, now: datetime) -> None:
     """Remove messages and answers of a batch, locked so that no job is resumed meanwhile."""
     rows = list(ModelCall.objects.select_for_update().filter(pk__in=keys).order_by("pk"))
-    if _removable(before).filter(pk__in=keys).count() != len(keys):
+    if removable(before).filter(pk__in=keys).count() != len(keys):
         raise Conflict(
             "A job went on or a study was opened meanwhile; the rest is kept. Run it again."
         )
@@ -171,7 +93,7 @@ def _empty(keys: list[int], *, before: datetime, now: datetime) -> None:
 
 # --- Rules of rows that a backup or a study's folder brings -------------------------------------
 
-REFUSALS = (AugmentError, ArenaError, ValidationError, ValueError, KeyError, TypeError)
+REFUSALS = (AugmentError, ValidationError, ValueError, KeyError, TypeError)
 """What a rule raises."""
 
 
@@ -214,9 +136,8 @@ def check_row(row: models.Model) -> None:
 
 
 def _complaint_of(row: Report) -> Complaint:
-    mark = None if row.mark_x is None or row.mark_y is None else (row.mark_x, row.mark_y)
     side = row.side or Report.Side.BOTH  # reports from before it was asked name none
-    return Complaint(reason=row.reason, side=side, mark=mark, comment=row.comment)
+    return Complaint(reason=row.reason, side=side, comment=row.comment)
 
 
 def check_votes() -> None:

@@ -12,7 +12,7 @@ from arena.api.fields import Field, StrictSerializer, body_field
 from arena.api.views import ApiView, Given, PageQuery, operation, page_of
 from arena.models import Study
 from arena.people.queries import role_of
-from arena.studies.queries import StudyProgress, of_these, studies_seen_by
+from arena.studies.queries import StudyProgress, listed_studies, progress_of
 from arena.studies.services.opening import close_study, open_study
 from arena.studies.services.plan import PLAN_INPUTS, SWITCH_COLUMNS, StudyPlan
 
@@ -22,7 +22,7 @@ class StudyBody(StrictSerializer):
 
     def get_fields(self) -> dict[str, Field]:
         """Return a field for all that a plan asks for."""
-        return {one.name: body_field(one) for one in PLAN_INPUTS}
+        return {field.name: body_field(field) for field in PLAN_INPUTS}
 
 
 class StudyQuery(PageQuery):
@@ -37,7 +37,7 @@ class StudyDocument(serializers.Serializer[Any]):
     code = serializers.UUIDField(source="study.code")
     name = serializers.CharField(source="study.name")
     state = serializers.CharField(source="study.state")
-    planned = serializers.IntegerField(help_text="Pairs to be judged.")
+    planned = serializers.IntegerField(source="total", help_text="Pairs to be judged.")
     voted = serializers.IntegerField()
     skipped = serializers.IntegerField()
     left = serializers.IntegerField()
@@ -87,13 +87,12 @@ class StudiesView(ApiView):
 
         An expert gets their own with their own progress, staff all with everybody's.
         """
-        is_staff = role_of(self.user) in STAFF
-        expert = None if is_staff else self.user
+        expert = None if role_of(self.user) in STAFF else self.user
         return self.answer_page(
-            studies_seen_by(self.user, is_staff=is_staff),
+            listed_studies(expert),
             given,
             StudyDocument,
-            lines=lambda page: of_these(page, expert=expert),
+            lines=lambda page: progress_of(page, expert),
         )
 
     @operation(WholeStudyDocument, takes=StudyBody, status=201, name="openStudy")
@@ -139,5 +138,5 @@ def get_study(code: uuid.UUID) -> Study:
 
 
 def _progress(study: Study) -> StudyProgress:
-    (found,) = of_these([study])
-    return found
+    (line,) = progress_of([study])
+    return line

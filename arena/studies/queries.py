@@ -1,18 +1,15 @@
 """Reads of studies: which there are, how far their experts are, who takes part, drafts."""
 
-from collections import Counter, defaultdict
-from collections.abc import Sequence
+from collections.abc import Iterable
 from contextlib import suppress
 from dataclasses import dataclass
 from datetime import datetime, timedelta
-from itertools import combinations
-from statistics import median
 from typing import Any
 from uuid import UUID
 
 from django.contrib.auth.models import User
-from django.db.models import Count, Exists, F, Max, OuterRef, Q, QuerySet
-from django.db.models.functions import Greatest, Least, Length
+from django.db.models import BooleanField, Count, ExpressionWrapper, F, Max, Q, QuerySet
+from django.utils import timezone
 
 from arena.errors import NotYours
 from arena.models import (
@@ -26,16 +23,11 @@ from arena.models import (
     StudyDraft,
     Vote,
 )
+from arena.people.links import lets_in
 from arena.people.queries import experts, may_be_let_in, natural_order
-from arena.voting.queries.ballots import ExpertTally, tallies
+from arena.voting.queries.ballots import ExpertTally, VotingProgress, tallies
 from augment.errors import UnknownName
 from augment.models import Contestant, GenerationJob, Scenario
-
-LONGEST = 3
-"""How many instructions: which of them takes most lines depends on words and fonts."""
-
-_LONG = ("rules", "preregistration")
-"""Columns with a line for every picture of a study, which no progress needs."""
 
 # --- Studies -----------------------------------------------------------------------------------
 
@@ -50,12 +42,6 @@ def voting_study(*, expert: User, code: UUID | str) -> Study:
     if study is None:
         raise NotYours("You do not take part in this study.")
     return study
-
-
-def longest_instructions(study: Study) -> list[str]:
-    """Return the longest instructions of a study: each pair gets the room that they need."""
-    by_length = study.scenarios.order_by(Length("instruction").desc(), "pk")
-    return list(by_length.values_list("instruction", flat=True)[:LONGEST])
 
 
 def study_named(name_or_code: str) -> Study:
@@ -74,77 +60,53 @@ def study_named(name_or_code: str) -> Study:
     return study
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class StudyProgress:
-    """How many matchups of a study have a vote; those to be planned later count too.
+def expert_named(study: Study, username: str) -> User:
+    """Return an expert of a study.
 
-    Attributes:
-        voted: Matchups with a vote; `skipped` those that were skipped instead.
+    Raises:
+        UnknownName: Nobody who takes part is called so.
     """
+    expert = study.experts.filter(username=username).first()
+    if expert is None:
+        names = study.experts.values_list("username", flat=True)
+        raise UnknownName("expert of this study", username, sorted(names))
+    return expert
+
+
+def listed_studies(expert: User | None = None) -> QuerySet[Study]:
+    """Return every study, or those of one expert, without the columns that no list needs."""
+    studies = Study.objects.all() if expert is None else Study.objects.filter(experts=expert)
+    return studies.select_related("vote_file").defer("rules", "preregistration")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StudyProgress(VotingProgress):
+    """How many matchups of a study have a vote; those to be planned later count too."""
 
     study: Study
-    planned: int
-    voted: int
-    skipped: int
-
-    @property
-    def left(self) -> int:
-        """Matchups that still wait for a decision."""
-        return self.planned - self.voted - self.skipped
 
 
-def of_studies(studies: Sequence[Study] | None = None) -> list[StudyProgress]:
-    """Every study, or those that are given, the youngest first; four queries."""
-    rows = Study.objects.select_related("vote_file").defer(*_LONG)
-    if studies is not None:
-        rows = rows.filter(pk__in=[study.pk for study in studies])
-    return of_these(list(rows))
-
-
-def studies_seen_by(user: User, *, is_staff: bool) -> QuerySet[Study]:
-    """Staff see every study, an expert those that they were invited to."""
-    if is_staff:
-        return Study.objects.all()
-    return Study.objects.filter(experts=user)
-
-
-def of_these(studies: Sequence[Study], *, expert: User | None = None) -> list[StudyProgress]:
-    """Some studies in their order, counted over all experts or over one's own; three queries."""
+def progress_of(studies: Iterable[Study], expert: User | None = None) -> list[StudyProgress]:
+    """Count some studies in their order, over all experts or for one; two queries."""
+    studies = list(studies)
     matchups = Matchup.objects.filter(study__in=[study.pk for study in studies])
     if expert is not None:
         matchups = matchups.filter(expert=expert)
-    votes = Vote.objects.filter(matchup=OuterRef("pk"))
-    planned = _count(matchups)
-    # A matchup's first vote tells whether it has any, and stands in an index of its own.
-    decided = _count(matchups.filter(Exists(votes.filter(supersedes=None))))
-    skips = Vote.objects.filter(outcome=Vote.Outcome.SKIP, superseded_by=None).values("matchup")
-    skipped = _count(matchups.filter(pk__in=skips))
+    is_skip = Q(outcome=Vote.Outcome.SKIP)
+    current = Vote.objects.filter(matchup__in=matchups, superseded_by=None).order_by()
+    votes = current.values_list("matchup__study")
+    totals = dict(matchups.order_by().values_list("study").annotate(n=Count("pk")))
+    voted = dict(votes.exclude(is_skip).annotate(n=Count("pk")))
+    skipped = dict(votes.filter(is_skip).annotate(n=Count("pk")))
     return [
         StudyProgress(
             study=study,
-            planned=planned.get(study.pk, 0) + _planned_later(study, expert),
-            voted=decided.get(study.pk, 0) - skipped.get(study.pk, 0),
+            total=totals.get(study.pk, 0) + _planned_later(study, expert),
+            voted=voted.get(study.pk, 0),
             skipped=skipped.get(study.pk, 0),
         )
         for study in studies
     ]
-
-
-def of_expert(expert: User) -> list[StudyProgress]:
-    """The studies that an expert was invited to, counted over their own matchups."""
-    seen = studies_seen_by(expert, is_staff=False).defer(*_LONG)
-    return of_these(list(seen), expert=expert)
-
-
-def of_study(study: Study) -> StudyProgress:
-    """One study over all its experts."""
-    (line,) = of_these([study])
-    return line
-
-
-def _count(matchups: QuerySet[Matchup]) -> dict[int, int]:
-    counted = matchups.order_by().values("study").annotate(n=Count("pk"))
-    return dict(counted.values_list("study", "n"))
 
 
 def _planned_later(study: Study, expert: User | None) -> int:
@@ -152,89 +114,6 @@ def _planned_later(study: Study, expert: User | None) -> int:
     if expert is None:
         return sum(study.votes_to_plan.values())
     return int(study.votes_to_plan.get(expert.username, 0))
-
-
-# --- Coverage, which tells nothing of who wins -------------------------------------------------
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Covered:
-    """Something planned, and how much of it has a vote; a skip is none."""
-
-    name: str
-    planned: int
-    decided: int
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Coverage:
-    """How the plan of a study is spread, and how far it is judged.
-
-    Attributes:
-        contestants: In how many main matchups each one is shown.
-        fewest: The pair that is judged least.
-        kinds: Main matchups, hidden repeats and attention checks, named by their values.
-        identical: Pairs with identical pictures, which nobody is shown.
-        units: Units of the main matchups: a pair on one picture each.
-        shared: Those that two experts or more are to judge.
-    """
-
-    contestants: tuple[Covered, ...]
-    fewest: Covered | None
-    kinds: tuple[Covered, ...]
-    identical: int
-    units: int
-    shared: int
-
-
-def coverage(study: Study) -> Coverage:
-    """Count how the plan of a study is spread; three queries."""
-    names = dict(study.contestants.order_by("name").values_list("pk", "name"))
-    votes = Vote.objects.filter(matchup=OuterRef("pk"), superseded_by=None)
-    counted = (
-        study.matchups.order_by()
-        .annotate(has_vote=Exists(votes.exclude(outcome=Vote.Outcome.SKIP)))
-        .values("left__contestant", "right__contestant", "kind", "has_vote")
-        .annotate(n=Count("pk"))
-        .values_list("left__contestant", "right__contestant", "kind", "has_vote", "n")
-    )
-    planned: Counter[object] = Counter()
-    decided: Counter[object] = Counter()
-    for left, right, kind, has_vote, n in counted:
-        keys: list[object] = [kind]
-        if kind == Matchup.Kind.MAIN:
-            keys += [left, right, frozenset((left, right))]
-        for key in keys:
-            planned[key] += n
-            decided[key] += n * has_vote
-
-    def covered(name: str, key: object) -> Covered:
-        return Covered(name=name, planned=planned[key], decided=decided[key])
-
-    pairs = [
-        covered(f"{names[one]} / {names[other]}", frozenset((one, other)))
-        for one, other in combinations(names, 2)
-    ]
-    units, shared = shared_units(study)
-    return Coverage(
-        contestants=tuple(covered(name, pk) for pk, name in names.items()),
-        fewest=min(pairs, key=lambda pair: (pair.decided, pair.planned, pair.name), default=None),
-        kinds=tuple(
-            covered(kind.value, kind.value) for kind in Matchup.Kind if planned[kind.value]
-        ),
-        identical=len(study.rules.get("identical", ())),
-        units=units,
-        shared=shared,
-    )
-
-
-def shared_units(study: Study) -> tuple[int, int]:
-    """Return how many units the main matchups have, and how many two experts are to judge."""
-    mains = study.matchups.filter(kind=Matchup.Kind.MAIN).order_by()
-    sides = (Least("left", "right"), Greatest("left", "right"))
-    judged = mains.values(one=sides[0], other=sides[1]).annotate(n=Count("expert", distinct=True))
-    counts = list(judged.values_list("n", flat=True))
-    return len(counts), sum(number > 1 for number in counts)
 
 
 def reports_of(study: Study) -> QuerySet[Report]:
@@ -268,29 +147,17 @@ def find_drafts(search: str = "") -> QuerySet[StudyDraft]:
     return drafts.filter(entered__name__icontains=search) if search else drafts
 
 
-def missing_of(draft: StudyDraft) -> list[dict[str, str]]:
-    """Return what the draft chooses and nobody could choose now: field, name and why."""
-    offered = Contestant.objects.exclude(kind=Contestant.Kind.CHECK)
-    known = set(offered.values_list("slug", flat=True))
+def missing_of(draft: StudyDraft) -> list[str]:
+    """Return the names that the draft chooses and nobody could choose now."""
+    contestants = Contestant.objects.exclude(kind=Contestant.Kind.CHECK).filter(retired_at=None)
     choices = {
-        "contestants": set(offered.filter(retired_at=None).values_list("slug", flat=True)),
+        "contestants": set(contestants.values_list("slug", flat=True)),
         "experts": {user.username for user in experts()},
         "scenarios": set(Scenario.objects.values_list("slug", flat=True)),
         "jobs": {str(code) for code in GenerationJob.objects.values_list("code", flat=True)},
     }
-    reasons = {
-        "contestants": "there is no such contestant any more",
-        "experts": "no active expert has this name any more",
-        "scenarios": "there is no such scenario any more",
-        "jobs": "there is no such job any more",
-    }
-    retired = "the contestant was retired"
     return [
-        {
-            "field": field,
-            "name": name,
-            "why": retired if field == "contestants" and name in known else reasons[field],
-        }
+        name
         for field, allowed in choices.items()
         for name in draft.names_in(field)
         if name not in allowed
@@ -305,62 +172,35 @@ class ExpertLine:
     """One expert of a study, for the people who run it.
 
     Attributes:
-        seconds_per_vote: Median time that a pair was on screen, None before it was measured.
-        last_seen: The last vote in this study or the last sign-in, whichever is later.
         invitation: The newest link, None if there never was one.
         link: Its state, None without one.
+        has_live_link: Whether somebody can come in by it.
         may_be_invited: Whether a link may be made for this account.
     """
 
     tally: ExpertTally
-    seconds_per_vote: float | None
-    last_seen: datetime | None
     invitation: Invitation | None
     link: Invitation.State | None
+    has_live_link: bool
     may_be_invited: bool
 
-    @property
-    def has_live_link(self) -> bool:
-        """Whether somebody can come in by the newest link."""
-        return self.link in Invitation.ALIVE
 
-    @property
-    def left(self) -> int:
-        """Planned matchups without a vote."""
-        return self.tally.left
-
-
-def expert_lines(study: Study, now: datetime) -> list[ExpertLine]:
-    """Return one line per expert of the study, by pseudonym; a fixed number of queries.
-
-    Args:
-        study: Any, also a closed one.
-        now: For the states of the links.
-    """
-    shown: dict[int, list[int]] = defaultdict(list)
-    last_vote: dict[int, datetime] = {}
-    votes = Vote.objects.filter(matchup__study=study).order_by("at")
-    for expert, outcome, ms_visible, at in votes.values_list(
-        "expert", "outcome", "ms_visible", "at"
-    ).iterator(chunk_size=5000):
-        last_vote[expert] = at
-        if ms_visible is not None and outcome != Vote.Outcome.SKIP:
-            shown[expert].append(ms_visible)
-    invitations = study.invitations.select_related("invited_by").order_by("made_at", "pk")
-    newest = {row.expert_id: row for row in invitations}
+def expert_lines(study: Study) -> list[ExpertLine]:
+    """Return one line per expert of the study, by pseudonym."""
+    now = timezone.now()
+    invitations = study.invitations.select_related("expert__person").order_by("made_at", "pk")
+    newest = {row.expert_id: row for row in invitations.prefetch_related("expert__groups")}
+    is_cancelled = study.state == Study.State.CANCELLED
     lines = []
     for tally in tallies(study):
-        user = tally.expert
-        seen = [at for at in (last_vote.get(user.pk), user.last_login) if at is not None]
-        times, invitation = shown.get(user.pk), newest.get(user.pk)
+        invitation = newest.get(tally.expert.pk)
         lines.append(
             ExpertLine(
                 tally=tally,
-                seconds_per_vote=median(times) / 1000 if times else None,
-                last_seen=max(seen, default=None),
                 invitation=invitation,
-                link=invitation.state(now) if invitation else None,
-                may_be_invited=study.state != Study.State.CANCELLED and may_be_let_in(user),
+                link=None if invitation is None else invitation.state(now),
+                has_live_link=invitation is not None and lets_in(invitation),
+                may_be_invited=not is_cancelled and may_be_let_in(tally.expert),
             )
         )
     return lines
@@ -372,31 +212,20 @@ Voters = QuerySet[Any]
 """Of EnrolledVoter, with what is counted about each."""
 
 
-def enrolment_by_token(token: str) -> Enrolment:
-    """Return the enrolment of a link.
+def enrolled_voters(study: Study) -> Voters:
+    """Return everybody who ever took a place in a study; one query.
 
-    Raises:
-        NotYours: No link has this token.
+    Each has `planned`, `answered` and `skipped` (pairs; a skip is an answer as well),
+    `last_vote_at` and `is_done`.
     """
-    found = Enrolment.objects.select_related("study").filter(token=token).first()
-    if found is None:
-        raise NotYours("No study enrols by this link.")
-    return found
-
-
-def enrolled_voters(enrolment: Enrolment) -> Voters:
-    """Return everybody who ever took a place; one query.
-
-    Each has `planned`, `answered` and `skipped` (pairs; a skip is an answer as well) and
-    `last_vote_at`.
-    """
-    mine = Q(expert__matchups__study=enrolment.study_id)
+    mine = Q(expert__matchups__study=study)
     answered = mine & Q(expert__matchups__votes__isnull=False)
     skipped = mine & Q(
         expert__matchups__votes__outcome="skip", expert__matchups__votes__superseded_by=None
     )
+    is_done = Q(dropped_at=None, planned__gt=0, answered__gte=F("planned"))
     return (
-        EnrolledVoter.objects.filter(enrolment=enrolment)
+        EnrolledVoter.objects.filter(enrolment__study=study)
         .select_related("expert__person")
         .annotate(
             planned=Count("expert__matchups", filter=mine, distinct=True),
@@ -404,18 +233,19 @@ def enrolled_voters(enrolment: Enrolment) -> Voters:
             skipped=Count("expert__matchups", filter=skipped, distinct=True),
             last_vote_at=Max("expert__matchups__votes__at", filter=mine),
         )
+        .annotate(is_done=ExpressionWrapper(is_done, output_field=BooleanField()))
         .order_by("enrolled_at", "pk")
     )
 
 
-def find_unfinished(enrolment: Enrolment) -> Voters:
+def find_unfinished(study: Study) -> Voters:
     """Return who has a place and pairs without an answer."""
-    return enrolled_voters(enrolment).filter(dropped_at=None, answered__lt=F("planned"))
+    return enrolled_voters(study).filter(dropped_at=None, answered__lt=F("planned"))
 
 
 def find_silent(enrolment: Enrolment, *, now: datetime) -> Voters:
     """Return who is not done and was not heard for as long as the enrolment allows."""
-    unfinished = find_unfinished(enrolment)
+    unfinished = find_unfinished(enrolment.study)
     if enrolment.drop_out_after_h is None:
         return unfinished.none()
     since = now - timedelta(hours=enrolment.drop_out_after_h)
@@ -423,49 +253,13 @@ def find_silent(enrolment: Enrolment, *, now: datetime) -> Voters:
     return unfinished.filter(is_quiet, enrolled_at__lte=since)
 
 
-def has_free_place(enrolment: Enrolment) -> bool:
-    """Return whether somebody may still take a place."""
-    return enrolment.voters.filter(dropped_at=None).count() < enrolment.places
-
-
 def state_of(enrolment: Enrolment) -> dict[str, int]:
     """Count places, and what became of them."""
-    kept = enrolled_voters(enrolment).filter(dropped_at=None)
-    taken = kept.count()
+    voters = enrolled_voters(enrolment.study)
+    taken = voters.filter(dropped_at=None).count()
     return {
-        "places": enrolment.places,
         "taken": taken,
         "free": max(enrolment.places - taken, 0),
-        "done": kept.filter(planned__gt=0, answered__gte=F("planned")).count(),
-        "dropped": enrolment.voters.exclude(dropped_at=None).count(),
+        "done": voters.filter(is_done=True).count(),
+        "dropped": voters.exclude(dropped_at=None).count(),
     }
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class OwnEnrolment:
-    """What somebody who enrolled is told at the end.
-
-    Attributes:
-        completion_code: Empty unless every pair has an answer.
-        was_given_on: Whether the place went to somebody else after a long silence.
-    """
-
-    completion_code: str
-    was_given_on: bool
-
-
-def code_told(voter: Any) -> str:
-    """Return the completion code of one of `enrolled_voters`, empty before the last answer."""
-    is_done = voter.dropped_at is None and 0 < voter.planned <= voter.answered
-    return voter.completion_code if is_done else ""
-
-
-def own_enrolment(study: Study, expert: User) -> OwnEnrolment | None:
-    """Return what an enrolled expert is told; None for who did not come by an enrolment link."""
-    enrolment = Enrolment.objects.filter(study=study).first()
-    voter = enrolment and enrolled_voters(enrolment).filter(expert=expert).first()
-    if not voter:
-        return None
-    return OwnEnrolment(
-        completion_code=code_told(voter), was_given_on=voter.dropped_at is not None
-    )

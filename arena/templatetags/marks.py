@@ -101,25 +101,6 @@ def segments(by_state: dict[Augmentation.State, int]) -> list[dict[str, Any]]:
     return [segment for segment in bar if segment["width"]]
 
 
-@register.filter
-def rate(per_minute: float) -> str:
-    """How many a minute: a whole number where there are ten or more."""
-    return f"{per_minute:.0f}" if per_minute >= 9.95 else f"{per_minute:.1f}"
-
-
-@register.filter
-def duration(seconds: float) -> str:
-    """How long something will take, as coarse as such a forecast is."""
-    minutes = seconds / 60.0
-    if minutes < 1.0:
-        return "a minute"
-    if minutes < 90.0:
-        return f"{round(minutes)} min"
-    if minutes < 36.0 * 60.0:
-        return f"{minutes / 60.0:.1f} h"
-    return f"{minutes / 1440.0:.1f} days"
-
-
 @register.simple_tag
 def percent(part: int, whole: int) -> SafeString:
     """A share, rounded down so that 100 % means all."""

@@ -1,6 +1,5 @@
 """What an expert does: pairs, their pictures, votes, reports and preferences."""
 
-from collections.abc import Sequence
 from typing import Any
 
 from django.core.files.storage import default_storage
@@ -14,19 +13,20 @@ from rest_framework.response import Response
 from arena.api.access import ADMINS, EXPERTS
 from arena.api.fields import (
     CodeField,
+    Field,
     FlagField,
-    ShareField,
     StrictSerializer,
     TextField,
     WholeNumberField,
 )
 from arena.api.views import ApiView, FileView, Given, file_operation, operation
 from arena.errors import StudyNotOpen
-from arena.models import AIDS, OUTCOME_LETTERS, Matchup, Report, Study, Vote
+from arena.models import AIDS, OUTCOME_LETTERS, Report, Study, Vote
 from arena.people.services import keep_voting
 from arena.studies.queries import voting_study
 from arena.studies.services.experts import SIDES, Complaint, report
 from arena.studies.services.planning import next_pairs
+from arena.voting.queries.keys import SWITCHES, voting_switches
 from arena.voting.queries.showings import as_shown, picture_shown
 from arena.voting.services.casting import LONGEST_COMMENT, decision_of, receive_vote
 
@@ -42,13 +42,6 @@ class MatchupsQuery(StrictSerializer):
 
     study = serializers.UUIDField()
     n = serializers.IntegerField(min_value=1, max_value=MOST, default=AHEAD)
-
-
-class SidesDocument(serializers.Serializer[Any]):
-    """What changed, one sentence for each object."""
-
-    a = serializers.ListField(child=serializers.CharField())
-    b = serializers.ListField(child=serializers.CharField())
 
 
 class MatchupDocument(serializers.Serializer[Any]):
@@ -71,7 +64,6 @@ class MatchupDocument(serializers.Serializer[Any]):
         required=False,
         help_text="Which kinds of marks the two pictures hold; absent of pairs planned before.",
     )
-    text = SidesDocument(required=False, help_text="In studies that offer it.")
 
 
 class VoteBody(StrictSerializer):
@@ -101,7 +93,6 @@ class ReceivedDocument(serializers.Serializer[Any]):
     saved = serializers.IntegerField(help_text="Pairs with a vote.")
     skipped = serializers.IntegerField(help_text="Pairs that were skipped instead.")
     total = serializers.IntegerField()
-    minutes_left = serializers.IntegerField(allow_null=True)
     next = MatchupDocument(many=True)
 
 
@@ -112,14 +103,6 @@ class ReportBody(StrictSerializer):
     matchup = CodeField()
     reason = serializers.ChoiceField(choices=Report.Reason.choices)
     side = serializers.ChoiceField(choices=list(SIDES), required=False, default="both")
-    mark = serializers.ListField(
-        child=ShareField(),
-        required=False,
-        allow_null=True,
-        default=None,
-        min_length=2,
-        max_length=2,
-    )
     comment = TextField(required=False, allow_blank=True, default="", max_length=LONGEST_COMMENT)
 
 
@@ -132,22 +115,17 @@ class SavedDocument(serializers.Serializer[Any]):
 class PreferencesBody(StrictSerializer):
     """What changes; missing fields stay."""
 
-    single_keys = FlagField(required=False)
-    legend = FlagField(required=False)
-    keep_zoom = FlagField(required=False)
-    keys = serializers.DictField(child=TextField(max_length=8), required=False)
+    def get_fields(self) -> dict[str, Field]:
+        """Return a field for every switch."""
+        return {name: FlagField(required=False) for name in SWITCHES}
 
 
 class PreferencesDocument(serializers.Serializer[Any]):
     """All preferences."""
 
-    single_keys = serializers.BooleanField()
-    legend = serializers.BooleanField()
-    keep_zoom = serializers.BooleanField()
-    keys = serializers.DictField(
-        child=serializers.ListField(child=serializers.CharField()),
-        help_text="By action, its keys.",
-    )
+    def get_fields(self) -> dict[str, Field]:
+        """Return a field for every switch."""
+        return {name: serializers.BooleanField() for name in SWITCHES}
 
 
 class MatchupsView(ApiView):
@@ -184,16 +162,14 @@ class VotesView(ApiView):
         n, outcome = given.pop("n"), OUTCOMES[given.pop("outcome")]
         decision = decision_of(matchup_code=given.pop("matchup"), outcome=outcome, **given)
         received = receive_vote(expert=self.user, decision=decision, ahead=n)
-        now = received.state
-        coming: Sequence[Matchup] = received.coming
+        progress, coming = received.progress, received.coming
         if len(coming) < n:  # this vote may allow more pairs to be planned
-            coming = next_pairs(study=now.study, expert=self.user, n=n)
+            coming = next_pairs(study=received.study, expert=self.user, n=n)
         return Response(
             {
-                "saved": now.progress.voted,
-                "skipped": now.progress.skipped,
-                "total": now.progress.total,
-                "minutes_left": now.progress.minutes_left,
+                "saved": progress.voted,
+                "skipped": progress.skipped,
+                "total": progress.total,
                 "next": [as_shown(matchup) for matchup in coming],
             }
         )
@@ -210,12 +186,8 @@ class ReportsView(ApiView):
 
         The same key counts once, however often it arrives.
         """
-        mark = given["mark"]
         said = Complaint(
-            reason=given["reason"],
-            side=SIDES[given["side"]],
-            mark=None if mark is None else (mark[0], mark[1]),
-            comment=given["comment"],
+            reason=given["reason"], side=SIDES[given["side"]], comment=given["comment"]
         )
         report(expert=self.user, matchup_code=given["matchup"], key=given["key"], said=said)
         return {"saved": True}
@@ -232,8 +204,8 @@ class PreferencesView(ApiView):
 
         Answers with all of them.
         """
-        keys = given.pop("keys", None)
-        return keep_voting(user=self.user, switches=given, keys=keys).as_json()
+        keep_voting(self.user, given)
+        return voting_switches(self.user)
 
 
 class ShownPictureView(FileView):

@@ -6,11 +6,8 @@ Frame: ego frame of the scene. d is to the left of a lane's own direction, in me
 import math
 from collections.abc import Callable
 from functools import partial
-from itertools import pairwise
 
-import numpy as np
 import shapely
-from numpy.typing import ArrayLike, NDArray
 
 from augment.errors import CannotPlace
 from augment.geometry.frames import Pose, difference
@@ -20,13 +17,12 @@ from augment.scene.entities import (
     AgentType,
     AreaKind,
     Lane,
-    LaneConnector,
     Point,
     Scene,
     TrafficAgent,
     TurnType,
 )
-from augment.scene.intent import LaneChoice, Setting, Side
+from augment.scene.intent import LaneChoice, Side
 from augment.scene.lane_graph import AnyLane, LanePosition
 
 _STEP_M = 0.25
@@ -36,16 +32,6 @@ _WIDEST_M = 30.0
 _BESIDE_LANES_M = 4.0
 _ALONG_RAD = math.radians(30.0)
 _ONCOMING_WITHIN_M = 15.0
-_NEAR_M = 10.0
-_BEND_WITHIN_M, _BEND_RAD = 25.0, math.radians(1.5)
-"""Over 50 m of a straight road the direction changes by less."""
-_PARKED_WITHIN_M, _STANDS_BELOW_MPS = 12.0, 0.5
-_PARKED_TYPES = frozenset({AgentType.VEHICLE, AgentType.BUS})
-_PARKED_SIDES = {
-    Setting.BY_PARKED: (1.0, -1.0),
-    Setting.BY_PARKED_LEFT: (1.0,),
-    Setting.BY_PARKED_RIGHT: (-1.0,),
-}
 SIGNS = {Side.LEFT: 1.0, Side.RIGHT: -1.0}
 
 
@@ -88,16 +74,16 @@ class PlacingGround:
             raise CannotPlace("The ego stands on no lane of the map.")
         self.route, self.graph = route, route.graph
         self.kerb = Side(scene.traffic_side.value)
-        self._areas = {
-            kind: shapely.union_all(
+        self._drivable, self._walkways = (
+            shapely.union_all(
                 [
                     shapely.make_valid(shapely.Polygon(area.boundary_m))
                     for area in scene.areas
                     if area.kind is kind
                 ]
             )
-            for kind in AreaKind
-        }
+            for kind in (AreaKind.DRIVABLE, AreaKind.WALKWAY)
+        )
 
     def along(self, distance_m: float) -> LanePosition:
         """Return the place that far along the ego's lane (negative: back).
@@ -165,72 +151,10 @@ class PlacingGround:
             )
 
         lanes_m = self._scan(pose, side, 0.0, is_on_lane)
-        is_driven = partial(self.within, kind=AreaKind.DRIVABLE)
-        end_m = self._scan(pose, side, lanes_m, is_driven)
+        end_m = self._scan(pose, side, lanes_m, partial(_covers, self._drivable))
         return end_m if end_m - lanes_m <= _BESIDE_LANES_M else lanes_m
 
-    def within(self, points_m: ArrayLike, kind: AreaKind) -> bool:
-        """Return whether one of the points (..., 2) lies in an area of that kind."""
-        # What lies on an edge belongs to the area above it or to its right.
-        points = np.reshape(points_m, (-1, 2)) + 1e-9
-        return bool(shapely.contains_xy(self._areas[kind], points).any())
-
-    def fits(self, distance_m: float, path_m: NDArray[np.float64], setting: Setting) -> bool:
-        """Return whether a place along the lane, and what is walked there, are in a setting."""
-        in_junction = self._in_junction(distance_m)
-        match setting:
-            case Setting.OFF_CROSSWALK:
-                return not self.within(path_m, AreaKind.CROSSWALK)
-            case Setting.ON_CROSSWALK:
-                return self.within(path_m, AreaKind.CROSSWALK)
-            case Setting.IN_BEND:
-                return self._bends(distance_m)
-            case Setting.IN_INTERSECTION:
-                return in_junction
-            case Setting.AT_INTERSECTION:
-                near = (distance_m - _NEAR_M, distance_m + _NEAR_M)
-                return in_junction or any(map(self._in_junction, near))
-            case Setting.BEFORE_INTERSECTION:
-                return not self._crosses_junction(distance_m)
-            case Setting.AFTER_INTERSECTION:
-                return self._crosses_junction(distance_m) and not in_junction
-        return self._is_by_parked(distance_m, _PARKED_SIDES[setting])
-
     # Private
-
-    def _in_junction(self, distance_m: float) -> bool:
-        place = self.route.lane_position(distance_m)
-        if place is None:
-            return False
-        if self._areas[AreaKind.INTERSECTION].is_empty:
-            return isinstance(self.lane(place), LaneConnector)
-        return self.within((place.pose.x_m, place.pose.y_m), AreaKind.INTERSECTION)
-
-    def _crosses_junction(self, distance_m: float) -> bool:
-        """Whether an intersection lies between the ego and a place, or at the place."""
-        steps = max(2, int(abs(distance_m)))
-        return any(map(self._in_junction, np.linspace(0.0, distance_m, steps).tolist()))
-
-    def _bends(self, distance_m: float) -> bool:
-        steps = (-_BEND_WITHIN_M, 0.0, _BEND_WITHIN_M)
-        around = [self.route.lane_position(distance_m + step) for step in steps]
-        headings = [place.pose.heading_rad for place in around if place is not None]
-        turns = [abs(difference(after, before)) for before, after in pairwise(headings)]
-        return sum(turns) >= _BEND_RAD
-
-    def _is_by_parked(self, distance_m: float, sides: tuple[float, ...]) -> bool:
-        """Whether vehicles stand beside a place on the lane, on one of the sides."""
-        pose = self.along(distance_m).pose
-        for agent in self.scene.agents:
-            local = pose.pose_to_local(agent.pose)
-            if (
-                agent.type in _PARKED_TYPES
-                and abs(agent.speed_mps) <= _STANDS_BELOW_MPS
-                and math.hypot(local.x_m, local.y_m) <= _PARKED_WITHIN_M
-                and math.copysign(1.0, local.y_m) in sides
-            ):
-                return True
-        return False
 
     def _oncoming(self, pose: Pose) -> str | None:
         """The nearest way across the road that leads the other way."""
@@ -261,8 +185,13 @@ class PlacingGround:
         while across_m - end_m < _GAP_M and across_m < _WIDEST_M:
             across_m += _STEP_M
             point = pose.beside(SIGNS[side] * across_m)
-            if self.within(point, AreaKind.WALKWAY):
+            if _covers(self._walkways, point):
                 break
             if is_road(point):
                 end_m = across_m
         return end_m
+
+
+def _covers(area: shapely.Geometry, point: Point) -> bool:
+    """Return whether a point lies in an area; its lower and left edges belong to it."""
+    return bool(shapely.contains_xy(area, point[0] + 1e-9, point[1] + 1e-9))

@@ -16,13 +16,7 @@ from augment.baselines.placed_people import place_cones, place_walkers
 from augment.baselines.placed_vehicles import count_arrangements, place_crash, place_vehicles
 from augment.baselines.placing_ground import PlacingGround
 from augment.checks import Ground, Severity
-from augment.checks.lanes_across import (
-    LanesAcross,
-    find_picked,
-    list_absent,
-    resolve_anchors,
-    resolve_landmarks,
-)
+from augment.checks.lanes_across import LanesAcross, find_picked, list_absent, resolve_spots
 from augment.checks.registry import check_against_intent
 from augment.errors import CannotPlace
 from augment.geometry.frames import overlap
@@ -86,7 +80,7 @@ def place(scene: Scene, intent: Intent | None, *, seed: int = 0) -> Placement:
     absent = list_absent(intent, lanes)
     if absent:
         raise CannotPlace(f"Not in this scene: {', '.join(absent)}.")
-    resolved = resolve_landmarks(intent, lanes)
+    resolved = resolve_spots(intent, lanes)
     gone = [agent.id for pick in intent.removals for agent in find_picked(lanes, pick)]
     changes = Modification(removed=tuple(dict.fromkeys(gone)))
     sentences = [f"{name} is removed." for name in changes.removed]
@@ -99,7 +93,7 @@ def place(scene: Scene, intent: Intent | None, *, seed: int = 0) -> Placement:
         changes = replace(changes, moved=(*changes.moved, replace(moved[0], **same)))
         sentences.append(f"{agent.id} is moved. {sentence}")
     fitting = _Fitting(apply(scene, changes), intent.route, rng)
-    for added in resolve_anchors(resolved).requests:
+    for added in resolved.requests:
         agents, sentence = fitting.fit(added)
         fitting.added += agents
         sentences.append(sentence)
@@ -192,10 +186,6 @@ class _Fitting:
             if overlap(agent.box, other.box).depth_m > 0.0:
                 name = "the ego" if other is self._scene.ego else other.id or "what was added"
                 return f"{abs(distance_m):.1f} m from the ego it would stand in {name}.", 0
-        path_m = np.vstack([_path(agent) for agent in agents])
-        for setting in request.spot.settings:
-            if not self._place.fits(distance_m, path_m, setting):
-                return f"{abs(distance_m):.1f} m from the ego is not {setting}.", 0
         everyone = _numbered((*self.added, *agents), self._scene)
         before, own = everyone[: len(self.added)], everyone[len(self.added) :]
         ground = self._ground
@@ -233,12 +223,6 @@ def _shifts(wanted: Length) -> list[float]:
     tolerance_m = _SHIFT_ABOUT_M if wanted.is_approximate else _SHIFT_EXACT_M
     steps = range(1, int(tolerance_m / _SHIFT_STEP_M) + 1)
     return [0.0, *(sign * step * _SHIFT_STEP_M for step in steps for sign in (1.0, -1.0))]
-
-
-def _path(agent: TrafficAgent) -> np.typing.NDArray[np.float64]:
-    """Return where an agent stands or walks, a point (P, 2) about every half metre."""
-    start = np.array([agent.x_m, agent.y_m])
-    return np.linspace(start, agent.walk_to_m or start, 60 if agent.walk_to_m else 1)
 
 
 def _rounded(agent: TrafficAgent) -> TrafficAgent:

@@ -5,9 +5,9 @@ from collections.abc import Iterator, Sequence
 from itertools import combinations
 
 from augment.checks.bodies import end_of_walk, name_type
-from augment.checks.finding import Finding, FindingKind, find, side_of
-from augment.checks.parties import SPEED_MPS, SPEED_SHARE, Asked, apart_m, middle_of
-from augment.checks.situation import STOPPED_BELOW_MPS
+from augment.checks.finding import Finding, FindingKind, find
+from augment.checks.ground import STOPPED_BELOW_MPS
+from augment.checks.parties import SPEED_MPS, SPEED_SHARE, Asked, Bounds, apart_m, hold, middle_of
 from augment.geometry.frames import difference
 from augment.scene.entities import TrafficAgent
 from augment.scene.intent import Body, CrashRequest, Facing, Side, VehicleRequest, WalkRequest
@@ -24,19 +24,13 @@ def asked_count(asked: Asked) -> Iterator[Finding]:
     """What is missing, and what nobody asked for."""
     for party in asked.parties:
         here = party.everyone
+        belongs_m = None if here else middle_of(party.request.spot, asked.lanes)
         for role, number in party.missing:
-            counted = f"{role} is" if number == 1 else f"{role.plural} are"
-            yield find(
-                FindingKind.ASKED_COUNT,
-                False,
-                here,
-                f"{{missing:.0f}} {counted} asked for and not there.",
-                belongs_m=None if here else middle_of(party.request.spot, asked.lanes),
-                missing=float(number),
-            )
+            words = f"Asked for and not there: {role}, {number} of them."
+            yield find(FindingKind.ASKED_COUNT, False, here, words, belongs_m=belongs_m)
     for agent in asked.surplus:
         words = f"{{agents[0]}}, {name_type(agent.type)}, is more than was asked for."
-        yield find(FindingKind.ASKED_COUNT, False, [agent], words, surplus=1.0)
+        yield find(FindingKind.ASKED_COUNT, False, [agent], words)
 
 
 def asked_type(asked: Asked) -> Iterator[Finding]:
@@ -56,40 +50,28 @@ def asked_motion(asked: Asked) -> Iterator[Finding]:
         if wanted_mps is None:
             continue
         allowed_mps = max(SPEED_MPS, SPEED_SHARE * wanted_mps) if wanted_mps else STOPPED_BELOW_MPS
-        words = "{asked_mps:.1f} m/s is asked for" if wanted_mps else "it is to stand"
+        wanted = Bounds(wanted_mps, wanted_mps, allowed_mps)
         for agent in party.agents:
-            yield find(
-                FindingKind.ASKED_MOTION,
-                abs(agent.speed_mps - wanted_mps) <= allowed_mps,
-                [agent],
-                f"{{agents[0]}} moves at {{speed_mps:.1f}} m/s; {words}.",
-                speed_mps=agent.speed_mps,
-                asked_mps=wanted_mps,
-            )
-
-
-def find_unasked(asked: Asked) -> Iterator[Finding]:
-    """Agents of the scene that were moved or removed, and nobody asked for that."""
-    moved = [agent.id for agent in asked.modification.moved if agent.id not in asked.to_move]
-    removed = [name for name in asked.modification.removed if name not in asked.to_remove]
-    for names, done in ((moved, "moved"), (removed, "removed")):
-        words = f"{{agents[0]}} was in the scene and is {done}; nobody asked for that."
-        yield from (find(FindingKind.UNASKED, False, [name], words) for name in names)
+            what, kind = "The speed of {agents[0]}", FindingKind.ASKED_MOTION
+            yield hold(kind, [agent], what, agent.speed_mps, wanted, unit="m/s")
 
 
 def asked_changes(asked: Asked) -> Iterator[Finding]:
-    """Agents of the scene that are to be moved or removed, and were not."""
-    moved = {agent.id for agent in asked.modification.moved}
-    not_moved = sorted(asked.to_move - moved)
-    not_removed = sorted(asked.to_remove.difference(asked.modification.removed))
-    for names, wanted in ((not_moved, "moved"), (not_removed, "removed")):
-        words = f"{{agents[0]}} is to be {wanted} and is not."
-        yield from (find(FindingKind.ASKED_COUNT, False, [name], words) for name in names)
+    """Agents of the scene that are to be moved or removed and were not, or the reverse.
 
-
-def find_attempted(asked: Asked) -> Iterator[Finding]:
-    """Whatever is done about a wish that can't be met."""
-    touched = [agent.id for agent in asked.modification.changed] + [*asked.modification.removed]
+    What is done about a wish that can't be met is not asked for either.
+    """
+    change = asked.modification
+    moved, removed = {agent.id for agent in change.moved}, set(change.removed)
+    for names, kind, words in (
+        (asked.to_move - moved, FindingKind.ASKED_COUNT, "is to be moved and is not"),
+        (asked.to_remove - removed, FindingKind.ASKED_COUNT, "is to be removed and is not"),
+        (moved - asked.to_move, FindingKind.UNASKED, "is moved; nobody asked for that"),
+        (removed - asked.to_remove, FindingKind.UNASKED, "is removed; nobody asked for that"),
+    ):
+        for name in sorted(names):
+            yield find(kind, False, [name], f"{{agents[0]}} {words}.")
+    touched = [agent.id for agent in change.changed] + sorted(removed)
     if asked.unmet and touched:
         why = asked.unmet.replace("{", "{{").replace("}", "}}")
         words = f"The wish can't be met, and {{agents[0]}} is changed: {why}"
@@ -109,31 +91,27 @@ def asked_heading(asked: Asked) -> Iterator[Finding]:
             continue
         facing = request.facing or Facing.WITH_LANE
         wanted_deg = _FACING_DEG[facing] + request.turn_deg
-        words = f"facing {facing}{'' if request.facing else ', as nothing else is said,'}"
-        if request.turn_deg:
-            side = side_of(request.turn_deg)
-            words += f", turned {abs(request.turn_deg):g} degrees to the {side}"
+        wanted = Bounds(wanted_deg, wanted_deg, asked.tolerances.heading_deg)
         for agent in party.agents:
             band = asked.lanes.band(request.spot.lane, asked.ahead_m(agent))
             if band is None:
                 continue
-            turn_deg = math.degrees(difference(agent.heading_rad, band.tangent_rad))
-            turns = (turn_deg, turn_deg + 180.0) if facing is Facing.ACROSS else (turn_deg,)
-            off_deg = min(abs(_difference_deg(turn, wanted_deg)) for turn in turns)
-            yield find(
+            turn_rad = agent.heading_rad - band.tangent_rad
+            turns_rad = (turn_rad, turn_rad + math.pi) if facing is Facing.ACROSS else (turn_rad,)
+            turns_deg = [unwrap_deg(turn_rad, wanted_deg) for turn_rad in turns_rad]
+            yield hold(
                 FindingKind.ASKED_HEADING,
-                off_deg <= asked.tolerances.heading_deg,
                 [agent],
-                f"{{agents[0]}} is turned {{turn_deg:.0f}} degrees to the {side_of(turn_deg)} of "
-                f"its lane; {words} is asked for.",
-                turn_deg=turn_deg,
-                asked_deg=_difference_deg(wanted_deg, 0.0),
-                off_deg=off_deg,
+                "The turn of {agents[0]} to the left of its lane's direction",
+                min(turns_deg, key=wanted.off),
+                wanted,
+                unit="degrees",
             )
 
 
-def _difference_deg(one: float, other: float) -> float:
-    return math.degrees(difference(math.radians(one), math.radians(other)))
+def unwrap_deg(turn_rad: float, near_deg: float) -> float:
+    """Return a turn in degrees, as the number of it that is nearest to another."""
+    return near_deg + math.degrees(difference(turn_rad, math.radians(near_deg)))
 
 
 def asked_walk(asked: Asked) -> Iterator[Finding]:
@@ -148,62 +126,39 @@ def asked_walk(asked: Asked) -> Iterator[Finding]:
         request = party.request
         if not isinstance(request, WalkRequest):
             continue
-        found = [_crossing(asked, agent, request.start) for agent in party.agents]
-        yield from found
-        for agent, finding in zip(party.agents, found, strict=True):
-            if not finding.is_fault:
-                yield from _drift(asked, agent, request.drift_m)
-        if party.is_exact and not any(finding.is_fault for finding in found):
+        crossings = [_crossing(asked, agent, request.start) for agent in party.agents]
+        yield from crossings
+        for agent, crossing in zip(party.agents, crossings, strict=True):
+            end = end_of_walk(agent)
+            if request.drift_m is None or end is None or crossing.is_fault:
+                continue
+            drift_m = asked.route.locate(*end).ahead_m - asked.ahead_m(agent)
+            wanted = Bounds(request.drift_m, request.drift_m, asked.tolerances.drift_m)
+            what = "The way of {agents[0]} along the ego's lane while it crosses"
+            yield hold(FindingKind.ASKED_DISTANCE, [agent], what, drift_m, wanted)
+        if party.is_exact and not any(crossing.is_fault for crossing in crossings):
             yield from _in_file(asked, party.agents, request)
 
 
 def _crossing(asked: Asked, agent: TrafficAgent, side: Side | None) -> Finding:
-    """The first thing that is wrong about a walk; 1 is from the left, -1 from the right."""
+    """The first thing that is wrong about a walk; where the side is open it is its own."""
     place, end = asked.route.locate_agent(agent), end_of_walk(agent)
-    # Where the side is open it is that where the walk begins.
-    start = math.copysign(1.0, place.left_m)
-    if side is not None:
-        start = 1.0 if side is Side.LEFT else -1.0
-    across = math.sin(agent.heading_rad - place.tangent_rad)
-    end_left_m = None if end is None else asked.route.locate(*end).left_m
-    to_left_m = 0.0 if end_left_m is None else end_left_m - place.left_m
-    goes = math.copysign(1.0, to_left_m) if abs(to_left_m) > _ON_ROAD_M else 0.0
-    begins, ends = side_of(start), side_of(-start)
-    measured = {"start_left_m": place.left_m, "end_left_m": end_left_m}
-    looks_away = across * start > -_ALONG_SHARE
-    crosses = end_left_m is not None and end_left_m * start < 0.0
-    kind, fits = FindingKind.ASKED_CROSSING, False
-    if place.left_m * start < -_ON_ROAD_M and goes == start:
-        kind = FindingKind.ASKED_SIDE
-        words = f"crosses from the {ends} to the {begins}; from the {begins} is asked for."
-    elif looks_away or goes == start:
-        kind = FindingKind.ASKED_HEADING
-        verb = "looks" if looks_away else "walks"
-        words = f"{verb} away from its way to the {ends} side of the road."
-        measured["turn_deg"] = math.degrees(math.asin(across))
-    elif crosses and place.left_m * start > -_ON_ROAD_M:
-        fits, words = True, f"crosses the ego's way from the {begins}, as asked for."
+    if side is None:
+        side = Side.LEFT if place.left_m >= 0.0 else Side.RIGHT
+    # From here on, numbers to the side of the start are positive.
+    from_m = place.left_m * side.sign
+    to_m = math.nan if end is None else asked.route.locate(*end).left_m * side.sign
+    looks = math.sin(agent.heading_rad - place.tangent_rad) * side.sign
+    goes_back = to_m - from_m > _ON_ROAD_M
+    if from_m < -_ON_ROAD_M and goes_back:
+        kind, reason = FindingKind.ASKED_SIDE, "it crosses from the other side"
+    elif looks > -_ALONG_SHARE or goes_back:
+        kind, reason = FindingKind.ASKED_HEADING, "it looks or walks away from there"
     else:
-        words = f"does not cross the ego's way from the {begins} to the {ends}."
-    return find(kind, fits, [agent], f"{{agents[0]}} {words}", measured=measured)
-
-
-def _drift(asked: Asked, agent: TrafficAgent, wanted_m: float | None) -> Iterator[Finding]:
-    """How much further along the lane the walk ends than it begins."""
-    end = end_of_walk(agent)
-    if wanted_m is None or end is None:
-        return
-    drift_m = asked.route.locate(*end).ahead_m - asked.ahead_m(agent)
-    is_, wanted = ("further" if m >= 0.0 else "back" for m in (drift_m, wanted_m))
-    yield find(
-        FindingKind.ASKED_DISTANCE,
-        abs(drift_m - wanted_m) <= asked.tolerances.drift_m,
-        [agent],
-        f"The walk of {{agents[0]}} ends {{drift_m:.1f}} m {is_} along the lane; "
-        f"{{asked_m:.1f}} m {wanted} is asked for.",
-        drift_m=drift_m,
-        asked_m=wanted_m,
-    )
+        kind, reason = FindingKind.ASKED_CROSSING, "its walk ends elsewhere"
+    fits = kind is FindingKind.ASKED_CROSSING and to_m < 0.0 and from_m > -_ON_ROAD_M
+    words = f"{{agents[0]}} is to cross the ego's way from the {side}"
+    return find(kind, fits, [agent], f"{words}, as it does." if fits else f"{words}: {reason}.")
 
 
 def _in_file(
@@ -212,17 +167,10 @@ def _in_file(
     """How far behind the first one, who is furthest across, each of the others walks."""
     if not request.behind or request.start is None:
         return
-    sign = 1.0 if request.start is Side.LEFT else -1.0
-    first, *others = sorted(walkers, key=lambda one: sign * asked.left_m(one))
+    sign = request.start.sign
+    first, *others = sorted(walkers, key=lambda agent: sign * asked.left_m(agent))
     if any(apart_m(*pair) < first.length_m for pair in combinations(walkers, 2)):
         return  # who stands in another is a fault of its own
-    for other, wanted in zip(others, request.behind, strict=False):
-        gap_m = apart_m(first, other)
-        yield find(
-            FindingKind.ASKED_SPACING,
-            asked.fits_gap(gap_m, wanted),
-            [other, first],
-            "{agents[0]} is {gap_m:.1f} m from {agents[1]}; {asked_m:.1f} m is asked for.",
-            gap_m=gap_m,
-            asked_m=wanted.middle_m,
-        )
+    for other, gap in zip(others, request.behind, strict=False):
+        what, pair = "The distance of {agents[0]} from {agents[1]}", [other, first]
+        yield hold(FindingKind.ASKED_SPACING, pair, what, apart_m(first, other), asked.gap(gap))

@@ -1,4 +1,4 @@
-"""Whether boxes share ground, whether sizes and speeds are usual, and where walks lead."""
+"""Whether boxes share ground, sizes and speeds are usual, and walks are free."""
 
 import math
 from collections.abc import Iterator
@@ -6,7 +6,7 @@ from collections.abc import Iterator
 import shapely
 
 from augment.checks.finding import Finding, FindingKind, Severity, find
-from augment.checks.situation import STOPPED_BELOW_MPS, VEHICLES, ChangedScene, is_stopped
+from augment.checks.ground import STOPPED_BELOW_MPS, VEHICLES, ChangedScene, is_stopped
 from augment.geometry import frames
 from augment.scene.entities import AgentType, Point, TrafficAgent
 
@@ -24,8 +24,6 @@ FAR_OFF = 1.7
 """By this factor outside its range a size or speed is no longer unusual but wrong."""
 OVER_LIMIT = 1.5
 """By this factor above the limit of its lane a vehicle is too fast to be normal traffic."""
-CORRIDOR_M = 150.0
-"""How far ahead of the ego a walk is held against its lane."""
 ASSUMED_WALK_M = 30.0
 """How far a pedestrian without an end point is followed; the longest known walk is 28.8 m."""
 GRAZED_M = 0.1
@@ -66,25 +64,20 @@ def overlap(situation: ChangedScene) -> Iterator[Finding]:
     doubtful. People among themselves, also on bicycles: doubtful up to half. All others:
     doubtful up to 5 %. Above, wrong.
     """
+    ego_id = situation.ground.scene.ego.id
     for agent, other in situation.new_pairs():
-        sizes = (agent.length_m, agent.width_m), (other.length_m, other.width_m)
-        reach_m = sum(math.hypot(*size) for size in sizes) / 2.0 + TOUCH_M
-        if math.hypot(agent.x_m - other.x_m, agent.y_m - other.y_m) > reach_m:
-            continue
         shared = frames.overlap(situation.boxes[agent.id], situation.boxes[other.id])
         if shared.depth_m <= TOUCH_M:
             continue
         share = max(shared.share_of_first, shared.share_of_second)
-        is_ego = other.id == situation.ground.scene.ego.id
-        whom = "the ego" if is_ego else "{agents[1]}"
+        is_ego = other.id == ego_id
         yield find(
             FindingKind.OVERLAP,
             Severity.WRONG if is_ego else _overlap_severity(agent, other, share),
             [agent, other],
-            f"{{agents[0]}} and {whom} overlap by {{share_of_smaller:.0%}} of the smaller box, "
+            "{agents[0]} and {agents[1]} overlap by {share_of_smaller:.0%} of the smaller box, "
             "{depth_m:.2f} m deep.",
             share_of_smaller=share,
-            area_m2=shared.area_m2,
             depth_m=shared.depth_m,
         )
 
@@ -116,51 +109,47 @@ def size(situation: ChangedScene) -> Iterator[Finding]:
     for agent in situation.changed:
         length_m, width_m = agent.length_m, agent.width_m
         shortest, longest, narrowest, widest = USUAL_SIZES_M[agent.type]
-        off = max(
-            shortest / max(length_m, 1e-3),
-            length_m / longest,
-            narrowest / max(width_m, 1e-3),
-            width_m / widest,
+        factors = (
+            *(shortest / max(length_m, 1e-3), length_m / longest),
+            *(narrowest / max(width_m, 1e-3), width_m / widest),
         )
-        is_swapped = agent.type in _LONG and width_m > length_m
-        if off <= 1.0 and not is_swapped:
-            continue
-        words = f"which is unusual for {name_type(agent.type)}."
-        if is_swapped:
-            words = "wider than long: its length and width look swapped."
-        yield find(
-            FindingKind.SIZE,
-            Severity.WRONG if is_swapped or off > FAR_OFF else Severity.DOUBTFUL,
-            [agent],
-            f"{{agents[0]}} is {{length_m:.2f}} m long and {{width_m:.2f}} m wide, {words}",
-            length_m=length_m,
-            width_m=width_m,
-        )
+        is_swapped, words = agent.type in _LONG and width_m > length_m, "wider than long"
+        if not is_swapped:
+            words = f"unusual for {name_type(agent.type)}"
+        if is_swapped or max(factors) > 1.0:
+            is_wrong = is_swapped or max(factors) > FAR_OFF
+            yield find(
+                FindingKind.SIZE,
+                Severity.WRONG if is_wrong else Severity.DOUBTFUL,
+                [agent],
+                f"{{agents[0]}} is {{length_m:.2f}} m long and {{width_m:.2f}} m wide: {words}.",
+                length_m=length_m,
+                width_m=width_m,
+            )
 
 
 def speed(situation: ChangedScene) -> Iterator[Finding]:
-    """Doubtful above what is usual for the type or on its lane, or backwards; wrong far above.
+    """Doubtful above what is usual for the type or on its lane; wrong far above.
 
     A thing that can't move and does is wrong.
     """
     for agent in situation.changed:
-        off = abs(agent.speed_mps) / USUAL_MPS.get(agent.type, STOPPED_BELOW_MPS)
-        under, limit_mps = situation.under(agent), None
+        usual_mps = USUAL_MPS.get(agent.type, STOPPED_BELOW_MPS)
+        most_mps, under = usual_mps, situation.under[agent.id]
         if under is not None and agent.type in (AgentType.VEHICLE, AgentType.BUS):
             limit_mps = situation.ground.graph.lanes[under.lane_id].speed_limit_mps
-        severity = Severity.DOUBTFUL
-        if off > 1.0:
-            words = f"which is unusual for {name_type(agent.type)}."
-            if off > FAR_OFF or agent.type not in USUAL_MPS:
-                severity = Severity.WRONG
-        elif limit_mps is not None and agent.speed_mps > OVER_LIMIT * limit_mps:
-            words = f"where the limit is {limit_mps:.1f} m/s."
-        elif agent.speed_mps < -STOPPED_BELOW_MPS:
-            words = "backwards."
-        else:
+            most_mps = min(usual_mps, OVER_LIMIT * limit_mps) if limit_mps else usual_mps
+        if agent.speed_mps <= most_mps:
             continue
-        template = f"{{agents[0]}} moves at {{speed_mps:.1f}} m/s, {words}"
-        yield find(FindingKind.SPEED, severity, [agent], template, speed_mps=agent.speed_mps)
+        is_wrong = agent.type not in USUAL_MPS or agent.speed_mps > FAR_OFF * usual_mps
+        yield find(
+            FindingKind.SPEED,
+            Severity.WRONG if is_wrong else Severity.DOUBTFUL,
+            [agent],
+            f"{{agents[0]}} moves at {{speed_mps:.1f}} m/s; up to {most_mps:.1f} m/s are usual "
+            f"for {name_type(agent.type)} there.",
+            speed_mps=agent.speed_mps,
+        )
 
 
 def end_of_walk(agent: TrafficAgent) -> Point | None:
@@ -173,58 +162,15 @@ def end_of_walk(agent: TrafficAgent) -> Point | None:
     )
 
 
-def _walkers(situation: ChangedScene) -> Iterator[tuple[TrafficAgent, Point]]:
-    for agent in situation.changed:
-        end = end_of_walk(agent)
-        if agent.type is AgentType.PEDESTRIAN and end is not None:
-            yield agent, end
-
-
-def walk_crossing(situation: ChangedScene) -> Iterator[Finding]:
-    """A fact for every changed pedestrian who walks: where it crosses the ego's route, if it does.
-
-    Looked at is the route from the ego on.
-    """
-    route = situation.ground.route
-    corridor = None if route is None else route.corridor(CORRIDOR_M)
-    if corridor is None:
-        return
-    line, width_m = corridor
-    way = shapely.LineString(line.points_m)
-    for agent, end in _walkers(situation):
-        start = (agent.x_m, agent.y_m)
-        # Where walk and line run along each other they never cross.
-        parts = shapely.get_parts(shapely.intersection(way, shapely.LineString([start, end])))
-        points = parts[shapely.get_type_id(parts) == shapely.GeometryType.POINT]
-        stations_m = shapely.line_locate_point(way, points).tolist()
-        crosses_at_m = min(stations_m, default=None)
-        first, last = line.project(*start), line.project(*end)
-        if crosses_at_m is not None:
-            hands = ("left", "right") if first.d_m > last.d_m else ("right", "left")
-            words = f"crosses the ego's lane from {hands[0]} to {hands[1]}, "
-            words += "{crosses_at_m:.1f} m ahead of the ego along the lanes."
-        elif min(first.distance_m, last.distance_m) <= width_m / 2.0:
-            words = "starts or ends in the ego's lane and does not cross its middle."
-        else:
-            words = "does not cross the ego's lane."
-        assumed = "" if agent.walk_to_m is not None else ", keeping its heading,"
-        yield find(
-            FindingKind.WALK_CROSSING,
-            Severity.FACT,
-            [agent],
-            f"The walk of {{agents[0]}}{assumed} {words}",
-            crosses_at_m=crosses_at_m,
-            start_left_m=first.d_m,
-            end_left_m=last.d_m,
-        )
-
-
 def walk_blocked(situation: ChangedScene) -> Iterator[Finding]:
     """Doubtful for every changed pedestrian whose walk leads through something that stands.
 
     People are no obstacle to each other: they step aside.
     """
-    for agent, end in _walkers(situation):
+    for agent in situation.changed:
+        end = end_of_walk(agent)
+        if agent.type is not AgentType.PEDESTRIAN or end is None:
+            continue
         walk = shapely.LineString([(agent.x_m, agent.y_m), end])
         for other in situation.everyone:
             if not is_stopped(other) or other.type is AgentType.PEDESTRIAN:

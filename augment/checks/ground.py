@@ -1,33 +1,38 @@
-"""What the checks know about a scene before anybody changes it; made once, asked often.
+"""What the checks know about a scene before anybody changes it, and after.
 
-Frame: the scene's. Places relative to the ego go by its pose, wherever that is. W lanes, M
-segments of all their centrelines.
+Frame: the scene's. Places relative to the ego go by its pose, wherever that is.
 """
 
-from __future__ import annotations
-
-import heapq
 import math
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from augment.geometry.frames import difference
+from augment.geometry.frames import Box
 from augment.geometry.polyline import FloatArray
-from augment.scene.ego_route import REACH_M, EgoRoute
-from augment.scene.entities import Area, AreaKind, Scene
-from augment.scene.lane_graph import AnyLane, LaneGraph
+from augment.scene.ego_route import EgoRoute
+from augment.scene.entities import (
+    AgentType,
+    Area,
+    AreaKind,
+    Modification,
+    Scene,
+    TrafficAgent,
+    apply,
+)
+from augment.scene.lane_graph import AnyLane, Beside, LaneGraph, best_aligned
 
 SEAM_M = 0.3
 """A gap between two pieces of ground up to this long is a seam of the map, not an edge."""
-NEAR_M = 20.0
-"""How far beside a lane a point still has anything to do with it."""
-_JOINT_M = 0.5
-"""Where two lanes meet in a bend, a wedge beside the joint belongs to neither; it is as long."""
+VEHICLES = frozenset({AgentType.VEHICLE, AgentType.BUS, AgentType.EGO_VEHICLE})
+STOPPED_BELOW_MPS = 0.5
+CRASH_GAP_M = 1.5
+"""Between cars of one accident; those placed by hand for interPlan are up to 1.43 m apart."""
+_SMALLEST_M = 0.01
 _ROAD = (AreaKind.DRIVABLE, AreaKind.CARPARK, AreaKind.INTERSECTION)
 _WALKS = (AreaKind.WALKWAY, AreaKind.CROSSWALK)
 
@@ -98,11 +103,6 @@ class Surface:
         spans = (((shapely.get_coordinates(part) - start) @ step).tolist() for part in parts)
         return sorted((min(span), max(span)) for span in spans)
 
-    def distance_to_hull_m(self, x_m: float, y_m: float) -> float:
-        """Return the way from a point to the convex region around the surface, 0 inside."""
-        hull = shapely.MultiPoint(shapely.get_coordinates(self._pieces)).convex_hull
-        return math.inf if self.is_empty else float(hull.distance(shapely.Point(x_m, y_m)))
-
 
 def gaps_m(boxes_m: FloatArray) -> FloatArray:
     """Return the gap (N, N) between every two boxes with corners (N, 4, 2); 0 where they meet."""
@@ -135,116 +135,22 @@ def rings(areas: Sequence[Area]) -> NDArray[np.object_]:
     return made
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Beside:
-    """How a point lies beside one lane.
-
-    Attributes:
-        s_m: Along the centreline, within its ends.
-        d_m: To the left of the centreline (right is negative).
-        beyond_m: How far past one of the ends the point lies, 0 beside the lane.
-        distance_m: To the centreline.
-        tangent_rad: The direction of travel there.
-    """
-
-    lane_id: str
-    s_m: float
-    d_m: float
-    beyond_m: float
-    distance_m: float
-    tangent_rad: float
-    width_m: float
-
-    @property
-    def covers(self) -> bool:
-        """Whether the lane lies under the point."""
-        return abs(self.d_m) <= self.width_m / 2.0 and self.beyond_m <= _JOINT_M
-
-    @property
-    def off_m(self) -> float:
-        """From the edge of the lane to the point, 0 where the lane covers it."""
-        return 0.0 if self.covers else max(0.0, self.distance_m - self.width_m / 2.0)
-
-
-class LaneIndex:
-    """The lanes of one scene, laid out for a search by place."""
-
-    def __init__(self, lanes: Iterable[AnyLane]) -> None:
-        self._lanes = tuple(lanes)
-        lines = [lane.centerline for lane in self._lanes]
-        self._bounds = np.cumsum([0, *(len(line.points_m) - 1 for line in lines)])
-        self._halves_m = np.array([lane.width_m / 2.0 for lane in self._lanes])
-        if lines:
-            self._starts = np.concatenate([line.points_m[:-1] for line in lines])
-            steps = np.concatenate([np.diff(line.points_m, axis=0) for line in lines])
-            self._lengths = np.hypot(steps[:, 0], steps[:, 1])
-            self._directions = steps / self._lengths[:, None]
-            self._stations = np.concatenate([line.stations_m[:-1] for line in lines])
-
-    def beside(self, x_m: float, y_m: float) -> tuple[Beside, ...]:
-        """Return the point beside the lanes near it, in the order of the lanes.
-
-        Those are all whose edge is within `NEAR_M` of the point, else the nearest one.
-        """
-        if not self._lanes:
-            return ()
-        offset = np.array([x_m, y_m]) - self._starts
-        along = (offset * self._directions).sum(axis=1)
-        past = along - np.clip(along, 0.0, self._lengths)
-        left = self._directions[:, 0] * offset[:, 1] - self._directions[:, 1] * offset[:, 0]
-        distances = np.hypot(left, past)
-        edges_m = np.minimum.reduceat(distances, self._bounds[:-1]) - self._halves_m
-        places = []
-        for number in np.flatnonzero(edges_m <= max(NEAR_M, float(edges_m.min()))).tolist():
-            start, end = self._bounds[number : number + 2].tolist()
-            index = start + int(distances[start:end].argmin())
-            past_m, left_m = float(past[index]), float(left[index])
-            is_past_end = (past_m < 0.0 and index == start) or (past_m > 0.0 and index == end - 1)
-            distance_m = float(distances[index])
-            dx, dy = self._directions[index].tolist()
-            place = Beside(
-                lane_id=self._lanes[number].id,
-                s_m=float(self._stations[index] + along[index]) - past_m,
-                # On the outside of a bend the nearest place is a corner, which is past no end.
-                d_m=left_m if is_past_end else math.copysign(distance_m, left_m),
-                beyond_m=abs(past_m) if is_past_end else 0.0,
-                distance_m=distance_m,
-                tangent_rad=math.atan2(dy, dx),
-                width_m=self._lanes[number].width_m,
-            )
-            places.append(place)
-        return tuple(places)
-
-
-def best_aligned(beside: Iterable[Beside], heading_rad: float) -> Beside | None:
-    """Return of the lanes under a point the one that fits the heading, else the nearest."""
-
-    def misfit(place: Beside) -> tuple[int, float]:
-        turn_deg = math.degrees(abs(difference(place.tangent_rad, heading_rad)))
-        return round(turn_deg / 15.0), round(place.distance_m, 4)
-
-    return min((place for place in beside if place.covers), key=misfit, default=None)
-
-
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Ground:
-    """The lanes and surfaces of one scene, and the ego on them.
+    """The lanes and surfaces of one scene, laid out when they are first asked for.
 
     Attributes:
         scene: The scene before the change.
-        graph: What follows what.
-        lanes: Where every lane and connector lies.
+        graph: Its lanes and connectors.
     """
 
     scene: Scene
     graph: LaneGraph
-    lanes: LaneIndex
 
     @classmethod
-    def of(cls, scene: Scene) -> Ground:
-        """Return the ground of a scene; surfaces are laid out when they are first asked for."""
-        graph = LaneGraph(scene)
-        return cls(scene=scene, graph=graph, lanes=LaneIndex(graph.lanes.values()))
+    def of(cls, scene: Scene) -> "Ground":
+        """Return the ground of a scene."""
+        return cls(scene=scene, graph=LaneGraph(scene))
 
     def _areas(self, *kinds: AreaKind) -> list[Area]:
         return [area for area in self.scene.areas if area.kind in kinds]
@@ -274,31 +180,89 @@ class Ground:
         """The ego's path over lanes, None where the map has no lane for it."""
         return EgoRoute.of(self.scene, self.graph)
 
-    @cached_property
-    def starts_m(self) -> tuple[tuple[str, float], ...]:
-        """How far ahead of the ego lanes begin, measured along the lanes: id and metres.
 
-        Successors of the ego's lane are followed forwards, predecessors backwards, both up to
-        `REACH_M`. On a loop a lane comes twice: once ahead, once behind.
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ChangedScene:
+    """A scene after its change, with what several checks need worked out once.
+
+    Attributes:
+        ground: The scene before the change.
+        changed: The added and the moved agents, which the findings are about.
+        everyone: All agents after the change, the ego first.
+    """
+
+    ground: Ground
+    changed: tuple[TrafficAgent, ...]
+    everyone: tuple[TrafficAgent, ...]
+
+    @classmethod
+    def of(cls, ground: Ground, modification: Modification) -> "ChangedScene":
+        """Return the modification on its ground.
+
+        Raises:
+            InvalidModification: It does not fit the scene.
         """
-        if self.route is None:
-            return ()
-        ahead, behind = (self._reached(self.route, forwards=way) for way in (True, False))
-        return (*ahead.items(), *behind.items())
+        after = apply(ground.scene, modification)
+        return cls(ground=ground, changed=modification.changed, everyone=after.everyone)
 
-    def _reached(self, route: EgoRoute, *, forwards: bool) -> dict[str, float]:
-        """Dijkstra over whole lanes: the signed distance from the ego to each lane's start."""
-        lengths = {name: lane.centerline.length_m for name, lane in self.graph.lanes.items()}
-        starts_m: dict[str, float] = {}
-        queue = [(route.lane_s_m, route.lane_id, -route.lane_s_m)]
-        while queue:
-            _, here, begins_m = heapq.heappop(queue)
-            if here in starts_m:
-                continue
-            starts_m[here] = begins_m
-            following = self.graph.successors(here) if forwards else self.graph.predecessors(here)
-            for name in following:
-                next_m = begins_m + lengths[here] if forwards else begins_m - lengths[name]
-                if name not in starts_m and -REACH_M - lengths[name] < next_m < REACH_M:
-                    heapq.heappush(queue, (abs(next_m), name, next_m))
-        return starts_m
+    @cached_property
+    def boxes(self) -> dict[str, Box]:
+        """Everybody's box, by id; none is so small that it has no area to be shared."""
+        return {
+            agent.id: replace(
+                agent.box,
+                length_m=max(agent.length_m, _SMALLEST_M),
+                width_m=max(agent.width_m, _SMALLEST_M),
+            )
+            for agent in self.everyone
+        }
+
+    @cached_property
+    def under(self) -> dict[str, Beside | None]:
+        """The lane under each changed agent, by id; of several the one that fits its heading."""
+        return {
+            agent.id: best_aligned(
+                [place for place in self._beside[agent.id] if place.covers], agent.heading_rad
+            )
+            for agent in self.changed
+        }
+
+    @cached_property
+    def nearest(self) -> dict[str, Beside | None]:
+        """The lane whose edge is nearest to each changed agent, by id; None without lanes."""
+        return {
+            name: min(
+                places,
+                key=lambda place: (round(place.off_m, 4), round(place.distance_m, 4)),
+                default=None,
+            )
+            for name, places in self._beside.items()
+        }
+
+    @cached_property
+    def _beside(self) -> dict[str, tuple[Beside, ...]]:
+        graph = self.ground.graph
+        return {agent.id: graph.beside(agent.x_m, agent.y_m) for agent in self.changed}
+
+    def new_pairs(self) -> Iterator[tuple[TrafficAgent, TrafficAgent]]:
+        """Yield every pair with a changed agent in it, that one first, each once."""
+        done: set[str] = set()
+        for agent in self.changed:
+            done.add(agent.id)
+            yield from ((agent, other) for other in self.everyone if other.id not in done)
+
+    @cached_property
+    def crashed(self) -> frozenset[str]:
+        """Changed vehicles that stand so close to another changed one that they look crashed."""
+        cars = [agent for agent in self.changed if agent.type in VEHICLES and is_stopped(agent)]
+        if len(cars) < 2:
+            return frozenset()
+        gaps = gaps_m(np.array([self.boxes[car.id].corners_m for car in cars]))
+        np.fill_diagonal(gaps, np.inf)
+        near = gaps.min(axis=1) <= CRASH_GAP_M
+        return frozenset(car.id for car, is_near in zip(cars, near, strict=True) if is_near)
+
+
+def is_stopped(agent: TrafficAgent) -> bool:
+    """Return whether an agent stands."""
+    return abs(agent.speed_mps) < STOPPED_BELOW_MPS

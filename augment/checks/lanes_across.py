@@ -4,15 +4,13 @@ Lanes are its own, those left and right of it, and the oncoming one. Frames: the
 of `EgoRoute`: ahead along the route from the ego, left across it in its direction of travel.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 
 import numpy as np
 import shapely
 
-from augment.checks.ground import Beside, Ground, LaneIndex, best_aligned
+from augment.checks.ground import Ground
 from augment.geometry.frames import difference
 from augment.scene.ego_route import EgoRoute, RoutePosition
 from augment.scene.entities import (
@@ -33,10 +31,10 @@ from augment.scene.intent import (
     Pick,
     Relation,
     Request,
-    Side,
     Sight,
     Spot,
 )
+from augment.scene.lane_graph import Beside, best_aligned
 
 _SAME_LANE_M = 1.0
 """A lane whose centre is nearer than this is the same lane."""
@@ -64,10 +62,9 @@ class LanesAcross:
     """The ego's route, and the lanes that lie beside it at any station."""
 
     route: EgoRoute
-    lanes: LaneIndex
 
     @classmethod
-    def of(cls, ground: Ground, turn: TurnType = TurnType.STRAIGHT) -> LanesAcross | None:
+    def of(cls, ground: Ground, turn: TurnType = TurnType.STRAIGHT) -> "LanesAcross | None":
         """Return those of the ground's ego, None where the map has no lane for it.
 
         Args:
@@ -77,7 +74,7 @@ class LanesAcross:
         route = ground.route
         if turn is not TurnType.STRAIGHT:
             route = EgoRoute.of(ground.scene, ground.graph, turn=turn)
-        return None if route is None else cls(route=route, lanes=ground.lanes)
+        return None if route is None else cls(route=route)
 
     @property
     def kerb(self) -> float:
@@ -87,9 +84,9 @@ class LanesAcross:
     def band(self, choice: LaneChoice, ahead_m: float) -> Band | None:
         """Return the lane of that choice, None where there is none there."""
         tangent_rad = self.route.heading_at(ahead_m)
-        near = self.lanes.beside(*self.route.position(ahead_m))
+        near = self.route.graph.beside(*self.route.position(ahead_m))
         if choice is LaneChoice.OWN:
-            own = best_aligned(near, tangent_rad)
+            own = best_aligned([lane for lane in near if lane.covers], tangent_rad)
             if own is None:
                 return None
             return Band(left_m=0.0, width_m=own.width_m, tangent_rad=tangent_rad)
@@ -107,7 +104,7 @@ class LanesAcross:
             LateralTarget.KERB: self.kerb,
             LateralTarget.CENTRE_LINE: -self.kerb,
         }
-        return 0.0 if lateral is None else signs.get(lateral.target, 0.0)
+        return signs.get(lateral.target, 0.0) if lateral else 0.0
 
 
 def _band(lane: Beside, tangent_rad: float, choice: LaneChoice) -> Band | None:
@@ -149,53 +146,46 @@ def find_mark(lanes: LanesAcross, mark: MapPlace) -> float | None:
     return None
 
 
-def resolve_landmarks(intent: Intent, lanes: LanesAcross) -> Intent:
-    """Return the intent with distances from landmarks and marks as distances from the ego.
+def resolve_spots(intent: Intent, lanes: LanesAcross) -> Intent:
+    """Return the intent with every distance counted from the ego.
 
-    Where there is no such road user or place the distance is left open.
+    It is left open where what it is counted from is not there, or open itself.
     """
-    return replace(
-        intent,
-        requests=tuple(
-            replace(request, spot=_resolved(request.spot, lanes)) for request in intent.requests
-        ),
-        moves=tuple(replace(move, spot=_resolved(move.spot, lanes)) for move in intent.moves),
-    )
-
-
-def resolve_anchors(intent: Intent) -> Intent:
-    """The intent with every distance from the ego: anchors' distances are added up.
-
-    The anchor's own spot must come before it; its distance is open where the anchor's is.
-    """
-    spots: dict[str, Spot] = {}
-    resolved: list[Request] = []
+    named: dict[str, Spot] = {}
+    requests: list[Request] = []
     for request in intent.requests:
-        spot = request.spot
-        if spot.anchor is not None:
-            spot = from_ego(spot, spots[spot.anchor])
-        spots[request.name] = spot
-        resolved.append(replace(request, spot=spot))
-    return replace(intent, requests=tuple(resolved))
+        spot = _from_ego(request.spot, lanes, named)
+        named[request.name] = spot
+        requests.append(replace(request, spot=spot))
+    moves = tuple(replace(move, spot=_from_ego(move.spot, lanes, named)) for move in intent.moves)
+    return replace(intent, requests=tuple(requests), moves=moves)
 
 
-def from_ego(spot: Spot, anchor: Spot) -> Spot:
-    """A spot that counts from another, counted from the ego; open where either is."""
-    own, base = spot.span_m, anchor.span_m
+def _from_ego(spot: Spot, lanes: LanesAcross, named: dict[str, Spot]) -> Spot:
+    own, base, is_approximate = spot.span_m, None, False
+    if spot.anchor is not None:
+        anchor = named[spot.anchor]
+        base = anchor.span_m
+        is_approximate = anchor.distance is not None and anchor.distance.is_approximate
+    elif spot.landmark is not None or spot.mark is not None:
+        own = own or (0.0, 0.0)  # without a relation it is level with it
+        place_m = find_mark(lanes, spot.mark) if spot.mark else None
+        if spot.landmark is not None and (picked := find_picked(lanes, spot.landmark)):
+            place_m = lanes.route.locate_agent(picked[0]).ahead_m
+        base = None if place_m is None else (place_m, place_m)
+    else:
+        return spot
+    bare = replace(spot, anchor=None, landmark=None, mark=None, distance=None, relation=None)
     if own is None or base is None or not math.isfinite(sum((*own, *base))):
-        return replace(spot, anchor=None, distance=None, relation=None)
+        return bare
     low_m, high_m = own[0] + base[0], own[1] + base[1]
     is_ahead = low_m + high_m >= 0.0
-    is_approximate = any(one.distance and one.distance.is_approximate for one in (spot, anchor))
+    low_m, high_m = (low_m, high_m) if is_ahead else (-high_m, -low_m)
+    is_approximate |= spot.distance is not None and spot.distance.is_approximate
     return replace(
-        spot,
-        anchor=None,
+        bare,
         relation=Relation.AHEAD if is_ahead else Relation.BEHIND,
-        distance=Length(
-            low_m=low_m if is_ahead else -high_m,
-            high_m=high_m if is_ahead else -low_m,
-            is_approximate=is_approximate,
-        ),
+        distance=Length(low_m=low_m, high_m=high_m, is_approximate=is_approximate),
     )
 
 
@@ -205,17 +195,8 @@ def list_absent(intent: Intent, lanes: LanesAcross) -> tuple[str, ...]:
     picks = [spot.landmark for spot in spots if spot.landmark is not None]
     picks += [*(move.who for move in intent.moves), *intent.removals]
     marks = [spot.mark for spot in spots if spot.mark is not None]
-    absent = [name_of_pick(pick) for pick in picks if not find_picked(lanes, pick)]
+    absent = [str(pick) for pick in picks if not find_picked(lanes, pick)]
     return (*absent, *(str(mark) for mark in marks if find_mark(lanes, mark) is None))
-
-
-def name_of_pick(pick: Pick) -> str:
-    """Return a road user in a few words: "parked vehicle 2 on the left"."""
-    parts = [f"every {pick.kind}" if pick.every else f"{pick.kind} {pick.ordinal}"]
-    parts += [] if pick.side is None else [f"on the {pick.side}"]
-    parts += [] if pick.lane is None else [f"in the {pick.lane} lane"]
-    where = "ahead of" if pick.relation is Relation.AHEAD else "behind"
-    return " ".join([*parts, f"{where} the ego"])
 
 
 def _fits(lanes: LanesAcross, pick: Pick, agent: TrafficAgent, place: RoutePosition) -> bool:
@@ -231,8 +212,7 @@ def _fits(lanes: LanesAcross, pick: Pick, agent: TrafficAgent, place: RoutePosit
     }
     if not kinds[pick.kind] or abs(place.left_m) > _BESIDE_M:
         return False
-    sign = 1.0 if pick.side is Side.LEFT else -1.0
-    if pick.side is not None and sign * place.left_m <= _ON_A_SIDE_M:
+    if pick.side is not None and pick.side.sign * place.left_m <= _ON_A_SIDE_M:
         return False
     if pick.lane is None:
         return True
@@ -244,24 +224,6 @@ def _fits(lanes: LanesAcross, pick: Pick, agent: TrafficAgent, place: RoutePosit
     if band is None or turned_rad > _ALONG_RAD:
         return False
     return abs(place.left_m - band.left_m) <= band.width_m / 2.0
-
-
-def _resolved(spot: Spot, lanes: LanesAcross) -> Spot:
-    ahead_m = None
-    if spot.landmark is None and spot.mark is None:
-        return spot
-    if spot.mark is not None:
-        ahead_m = find_mark(lanes, spot.mark)
-    elif spot.landmark is not None and (picked := find_picked(lanes, spot.landmark)):
-        ahead_m = lanes.route.locate_agent(picked[0]).ahead_m
-    bare = replace(spot, landmark=None, mark=None)
-    if ahead_m is None:
-        return replace(bare, distance=None, relation=None)
-    where = Relation.AHEAD if ahead_m >= 0.0 else Relation.BEHIND
-    here = Spot(distance=Length(low_m=abs(ahead_m), high_m=abs(ahead_m)), relation=where)
-    if bare.relation is None:  # level with it
-        return replace(bare, distance=here.distance, relation=where)
-    return from_ego(bare, here)
 
 
 def _crosswalk_m(lanes: LanesAcross) -> float | None:

@@ -1,7 +1,7 @@
-"""What helps to measure a picture by eye: lines where something is asked for, rings, lane edges.
+"""What helps to measure a picture by eye: lines where something is asked for, and lane edges.
 
-In: the ground of a scene and what its instruction asks for. Out: lines and rings in the frame of
-the scene. No change to the scene and nobody's answer is known here, so they are the same whoever
+In: the ground of a scene and what its instruction asks for. Out: lines in the frame of the
+scene. No change to the scene and nobody's answer is known here, so they are the same whoever
 drew what.
 """
 
@@ -10,12 +10,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from augment.checks.ground import Ground
-from augment.checks.lanes_across import LanesAcross, resolve_anchors, resolve_landmarks
+from augment.checks.lanes_across import LanesAcross, resolve_spots
 from augment.geometry.frames import difference
 from augment.scene.entities import Point
 from augment.scene.intent import Intent, LaneChoice, Spot, WalkRequest
 
-RING_STEP_M = 10.0
 _BESIDE_M = 1.0
 """How far a line across the road reaches beyond the outer edges of the lanes it is about."""
 _WALK_M = 5.0
@@ -43,22 +42,6 @@ class MeasureLine:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class MeasureRing:
-    """A circle around the ego's centre: a distance in a straight line."""
-
-    centre_m: Point
-    radius_m: float
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Measures:
-    """All of one scenario."""
-
-    lines: tuple[MeasureLine, ...] = ()
-    rings: tuple[MeasureRing, ...] = ()
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class LaneEdges:
     """How far a point within a lane is from its edges; sides are those of the ego's direction."""
 
@@ -66,28 +49,17 @@ class LaneEdges:
     right_m: float
 
 
-def find_measures(ground: Ground, intent: Intent | None, *, reach_m: float) -> Measures:
-    """Return the lines and rings of a scenario.
+def find_measures(ground: Ground, intent: Intent | None) -> tuple[MeasureLine, ...]:
+    """Return the lines of a scenario; none without an intent or a lane under the ego.
 
     A line across the road lies so far along the ego's route as is asked for, one at each end of a
     range; a line along the lane lies so far from the lane's centre. What is asked for without a
     number has none.
-
-    Args:
-        ground: Of the scene before any change.
-        intent: What the instruction asks for; without it, or without a lane under the ego, there
-            are rings alone.
-        reach_m: The radius up to which rings are drawn.
     """
-    ego = (ground.scene.ego.x_m, ground.scene.ego.y_m)
-    rings = tuple(
-        MeasureRing(centre_m=ego, radius_m=number * RING_STEP_M)
-        for number in range(1, int(reach_m / RING_STEP_M) + 1)
-    )
     lanes = None if intent is None else LanesAcross.of(ground, intent.route)
     if intent is None or lanes is None:
-        return Measures(rings=rings)
-    counted = resolve_anchors(resolve_landmarks(intent, lanes))
+        return ()
+    counted = resolve_spots(intent, lanes)
     lines: list[MeasureLine] = []
     for part in (*counted.requests, *counted.moves):
         span_m = part.spot.span_m if part.spot.distance else None
@@ -95,7 +67,7 @@ def find_measures(ground: Ground, intent: Intent | None, *, reach_m: float) -> M
         beyond_m = _WALK_M if isinstance(part, WalkRequest) else _BESIDE_M
         lines += [_across(part.spot, lanes, ahead_m, beyond_m) for ahead_m in ends_m]
         lines += _along(part.spot, lanes, ends_m)
-    return Measures(lines=tuple(dict.fromkeys(lines)), rings=rings)
+    return tuple(dict.fromkeys(lines))
 
 
 def lane_edges_at(ground: Ground, x_m: float, y_m: float) -> LaneEdges | None:
@@ -106,7 +78,7 @@ def lane_edges_at(ground: Ground, x_m: float, y_m: float) -> LaneEdges | None:
     """
     connectors = {connector.id for connector in ground.scene.connectors}
     under = min(
-        (place for place in ground.lanes.beside(x_m, y_m) if place.covers),
+        (place for place in ground.graph.beside(x_m, y_m) if place.covers),
         key=lambda place: (place.lane_id in connectors, abs(place.d_m)),
         default=None,
     )

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
-from augment.checks.finding import Finding
+from augment.checks.finding import Finding, FindingKind, find
 from augment.checks.lanes_across import LanesAcross
 from augment.scene.ego_route import EgoRoute
 from augment.scene.entities import AgentType, Modification, Point, TrafficAgent
@@ -103,27 +103,22 @@ class Role(StrEnum):
     BUS = "bus"
     BICYCLE = "bicycle"
     WALKER = "pedestrian"
-    CONE = "cone"
+    CONE = "traffic cone"
     WORKER = "worker"
     BARRIER = "barrier"
     SIGN = "construction sign"
 
-    @property
-    def plural(self) -> str:
-        """Several of them."""
-        return "buses" if self is Role.BUS else f"{self}s"
-
     def suits(self, agent: TrafficAgent) -> bool:
         """Return whether an agent's type is right."""
-        if self is Role.BUS and agent.length_m < LONG_VEHICLE_M:
-            return agent.type is AgentType.BUS
+        if self is Role.BUS and agent.length_m >= LONG_VEHICLE_M:
+            return agent.type in _TYPES[Role.VEHICLE]
         return agent.type in _TYPES[self]
 
 
 _TYPES = {
     Role.VEHICLE: (AgentType.VEHICLE, AgentType.BUS),
     Role.CAR: (AgentType.VEHICLE,),
-    Role.BUS: (AgentType.BUS, AgentType.VEHICLE),
+    Role.BUS: (AgentType.BUS,),
     Role.BICYCLE: (AgentType.BICYCLE,),
     Role.WALKER: (AgentType.PEDESTRIAN,),
     Role.CONE: (AgentType.TRAFFIC_CONE,),
@@ -131,13 +126,7 @@ _TYPES = {
     Role.BARRIER: (AgentType.BARRIER,),
     Role.SIGN: (AgentType.CONSTRUCTION_SIGN,),
 }
-_ROLES = {
-    Body.BUS: Role.BUS,
-    Body.VEHICLE: Role.VEHICLE,
-    Body.BICYCLE: Role.BICYCLE,
-    Body.BARRIER: Role.BARRIER,
-    Body.CONSTRUCTION_SIGN: Role.SIGN,
-}
+_ROLES = {Body.VAN: Role.CAR, Body.TRUCK: Role.CAR}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -186,11 +175,8 @@ def match_to_requests(
     Returns:
         All parties, and the added agents that no request asks for.
     """
-    places = [
-        (number, role)
-        for number, request in enumerate(intent.requests)
-        for role in _roles(request, added)
-    ]
+    roles = [_roles(request, added) for request in intent.requests]
+    places = [(number, role) for number, some in enumerate(roles) for role in some]
     spots = [middle_of(request.spot, lanes) for request in intent.requests]
     near = sorted(
         (math.dist(spots[number], (agent.x_m, agent.y_m)), place, index)
@@ -206,11 +192,10 @@ def match_to_requests(
     surplus = tuple(agent for index, agent in enumerate(added) if index not in taken.values())
     parties = []
     for number, request in enumerate(intent.requests):
-        roles = {place: role for place, (owner, role) in enumerate(places) if owner == number}
-        answers = [(added[taken[place]], roles[place]) for place in roles if place in taken]
+        own = [place for place, (owner, _) in enumerate(places) if owner == number]
+        answers = [(added[taken[place]], places[place][1]) for place in own if place in taken]
         right = [(agent, role) for agent, role in answers if role.suits(agent)]
-        missing = [role for place, role in roles.items() if place not in taken]
-        main = next(iter(roles.values()))
+        missing = [places[place][1] for place in own if place not in taken]
         agents = [agent for agent, role in right if role is not Role.WORKER]
         agents.sort(key=lambda agent: abs(lanes.route.locate_agent(agent).ahead_m))
         party = Party(
@@ -219,23 +204,22 @@ def match_to_requests(
             workers=tuple(agent for agent, role in right if role is Role.WORKER),
             mistyped=tuple((agent, role) for agent, role in answers if not role.suits(agent)),
             missing=tuple((role, missing.count(role)) for role in dict.fromkeys(missing)),
-            spare=tuple(agent for agent in surplus if main.suits(agent)),
+            spare=tuple(agent for agent in surplus if roles[number][0].suits(agent)),
         )
         parties.append(party)
     return parties, surplus
 
 
-def _roles(request: Request, added: Sequence[TrafficAgent]) -> Iterator[Role]:
+def _roles(request: Request, added: Sequence[TrafficAgent]) -> list[Role]:
     """Whom a request needs; where its count is open, as many as there are, and at least one."""
     role = Role.WALKER if isinstance(request, WalkRequest) else Role.CONE
     if isinstance(request, VehicleRequest | CrashRequest):
-        role = _ROLES.get(request.body, Role.CAR)
+        role = _ROLES.get(request.body) or Role(request.body.value)
     count = request.count or max(sum(role.suits(agent) for agent in added), 1)
-    if isinstance(request, ConesRequest) and request.both_sides and request.count is not None:
-        count *= 2
-    yield from [role] * count
-    if isinstance(request, ConesRequest) and request.has_worker:
-        yield Role.WORKER
+    if not isinstance(request, ConesRequest):
+        return [role] * count
+    both = 2 if request.both_sides and request.count is not None else 1
+    return [role] * (count * both) + [Role.WORKER] * request.has_worker
 
 
 def middle_of(spot: Spot, lanes: LanesAcross) -> Point:
@@ -282,19 +266,72 @@ class Asked:
         """Return how far left of the ego's route an agent is."""
         return self.route.locate_agent(agent).left_m
 
-    def fits_gap(self, gap_m: float, wanted: Length) -> bool:
-        """Return whether two things are as far apart as is asked for."""
-        share = self.tolerances.spacing_share
-        allowed_m = max(self.tolerances.spacing_m, share * wanted.high_m)
-        return distance_outside(gap_m, wanted.low_m, wanted.high_m) <= allowed_m
+    def gap(self, wanted: Length) -> "Bounds":
+        """Return how far apart two things may be of which this is asked for."""
+        share_m = self.tolerances.spacing_share * wanted.high_m
+        return Bounds(wanted.low_m, wanted.high_m, max(self.tolerances.spacing_m, share_m))
 
 
 AskedCheck = Callable[[Asked], Iterator[Finding]]
 
 
-def distance_outside(value: float, low: float, high: float) -> float:
-    """Return how far a value is outside a range, 0 within it."""
-    return max(low - value, value - high, 0.0)
+@dataclass(frozen=True, slots=True)
+class Bounds:
+    """A range that a number is to be in, and how far outside of it the number may be."""
+
+    low: float
+    high: float
+    allowed: float
+
+    def off(self, value: float) -> float:
+        """Return how far a value is outside the range, 0 within it."""
+        return max(self.low - value, value - self.high, 0.0)
+
+    def holds(self, value: float) -> bool:
+        """Return whether a value is near enough."""
+        return self.off(value) <= self.allowed
+
+    def nearest(self, value: float) -> float:
+        """Return the value of the range that is nearest to one."""
+        return min(max(value, self.low), self.high)
+
+    def __str__(self) -> str:
+        if math.isinf(self.high - self.low):
+            return "at least 0" if self.low >= 0.0 else "at most 0"
+        return f"{self.low:.4g}" if self.low == self.high else f"{self.low:.4g} to {self.high:.4g}"
+
+
+def hold(
+    kind: FindingKind,
+    agents: Sequence[TrafficAgent],
+    what: str,
+    value: float,
+    wanted: Bounds,
+    *,
+    unit: str = "m",
+    belongs_m: Point | None = None,
+) -> Finding:
+    """Return what comes of holding a number against what is asked for.
+
+    Args:
+        kind: Of the finding.
+        agents: Whom it is about.
+        what: The number in words, with fields as `Finding` has them.
+        value: The number.
+        wanted: What it is to be.
+        unit: Of the number.
+        belongs_m: Where what was asked for would be.
+    """
+    words = f"{what} is {value:.2f} {unit}; {wanted} {unit} is asked for."
+    return find(
+        kind,
+        wanted.holds(value),
+        agents,
+        words,
+        belongs_m=belongs_m,
+        value=value,
+        off=wanted.off(value),
+    )
 
 
 def apart_m(one: TrafficAgent, other: TrafficAgent) -> float:

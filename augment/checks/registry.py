@@ -20,45 +20,33 @@ from augment.checks.asked_things import (
     asked_motion,
     asked_type,
     asked_walk,
-    find_attempted,
-    find_unasked,
 )
-from augment.checks.bodies import duplicate, overlap, size, speed, walk_blocked, walk_crossing
+from augment.checks.bodies import duplicate, overlap, size, speed, walk_blocked
 from augment.checks.finding import Finding, FindingKind, Severity
-from augment.checks.ground import Ground
-from augment.checks.lanes_across import (
-    LanesAcross,
-    find_picked,
-    resolve_anchors,
-    resolve_landmarks,
-)
+from augment.checks.ground import ChangedScene, Ground
+from augment.checks.lanes_across import LanesAcross, find_picked, resolve_spots
 from augment.checks.parties import USUAL, Asked, AskedCheck, Party, Tolerances, match_to_requests
 from augment.checks.places import (
-    degrees,
-    ego_offset,
+    Check,
     heading,
     lane,
     lane_distance,
     lane_named,
     off_road,
-    outside_map,
     walk_heading,
 )
-from augment.checks.situation import ChangedScene, Check
 from augment.scene.entities import Modification, Scene
 from augment.scene.intent import Intent, VehicleRequest
 
 CHECKS: tuple[Check, ...] = (
-    *(ego_offset, lane_distance, lane, lane_named, heading, degrees, walk_heading),
-    *(walk_crossing, walk_blocked, off_road, outside_map, overlap, duplicate, size, speed),
+    *(lane_distance, lane, lane_named, heading, walk_heading, walk_blocked),
+    *(off_road, overlap, duplicate, size, speed),
 )
 ASKED_CHECKS: tuple[AskedCheck, ...] = (
     *(asked_count, asked_type, asked_distance, asked_across, asked_heading, asked_crash),
-    *(asked_walk, asked_motion, asked_spacing, asked_changes, find_unasked, find_attempted),
+    *(asked_walk, asked_motion, asked_spacing, asked_changes),
 )
-_OF_PLACE = frozenset(
-    {FindingKind.HEADING, FindingKind.DEGREES, FindingKind.WALK_HEADING, FindingKind.OFF_ROAD}
-)
+_OF_PLACE = frozenset({FindingKind.HEADING, FindingKind.WALK_HEADING, FindingKind.OFF_ROAD})
 
 
 def findings(scene: Scene, modification: Modification) -> tuple[Finding, ...]:
@@ -117,7 +105,7 @@ def _asked(
     modification: Modification, intent: Intent, lanes: LanesAcross, tolerances: Tolerances
 ) -> Asked:
     """The modification with who answers what; a move is a request for one vehicle elsewhere."""
-    counted = resolve_anchors(resolve_landmarks(intent, lanes))
+    counted = resolve_spots(intent, lanes)
     parties, surplus = match_to_requests(counted, modification.added, lanes)
     moved = {agent.id: agent for agent in modification.moved}
     picked = [(move, agent.id) for move in counted.moves for agent in find_picked(lanes, move.who)]

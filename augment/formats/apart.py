@@ -5,6 +5,7 @@ recording comes here; the readers themselves run in the process alone, which unp
 """
 
 import os
+import re
 import shutil
 import stat
 import struct
@@ -113,7 +114,7 @@ class UntrustedInput:
 def _answer(request: dict[str, Any]) -> tuple[str, Any]:
     path, name, folder = Path(request["path"]), request["format"], Path(request["folder"])
     # Names without a place on this machine, as they are said in reasons.
-    if path.is_file() and _is_zip(path):
+    if path.is_file() and path.open("rb").read(4) == b"PK\x03\x04":
         (folder / path.stem).mkdir()
         unpack_zip(path, folder / path.stem)
         os.chdir(folder)
@@ -155,12 +156,9 @@ class ZipBounds:
 
 
 USUAL_BOUNDS = ZipBounds()
-
-
-def _is_zip(path: Path) -> bool:
-    """Whether a file begins as a zip with entries does; its name says nothing."""
-    with path.open("rb") as file:
-        return file.read(4) == b"PK\x03\x04"
+_ADDED = re.compile(r"(^|/)(__MACOSX/|\.DS_Store$|Thumbs\.db$)")
+"""What file managers add and nobody meant."""
+_USUAL = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
 
 
 def unpack_zip(path: Path, into: Path, *, bounds: ZipBounds = USUAL_BOUNDS) -> None:
@@ -178,8 +176,12 @@ def unpack_zip(path: Path, into: Path, *, bounds: ZipBounds = USUAL_BOUNDS) -> N
     place = ""
     try:
         with zipfile.ZipFile(path) as packed:
-            entries = [one for one in packed.infolist() if not one.is_dir() and _is_meant(one)]
-            _check_all(entries, bounds)
+            entries = [
+                one
+                for one in packed.infolist()
+                if not one.is_dir() and not _ADDED.search(one.filename)
+            ]
+            _check_entries(entries, bounds)
             for entry in entries:
                 place, file = repr(entry.filename[:80]), into / entry.filename
                 file.parent.mkdir(parents=True, exist_ok=True)
@@ -195,44 +197,25 @@ def unpack_zip(path: Path, into: Path, *, bounds: ZipBounds = USUAL_BOUNDS) -> N
     raise InvalidDocument(WHAT, [(place, problem)])
 
 
-def _is_meant(entry: zipfile.ZipInfo) -> bool:
-    """Whether it is not what file managers add and nobody meant."""
-    place = PurePosixPath(entry.filename)
-    return "__MACOSX" not in place.parts and place.name not in (".DS_Store", "Thumbs.db")
-
-
-def _check_all(entries: list[zipfile.ZipInfo], bounds: ZipBounds) -> None:
+def _check_entries(entries: list[zipfile.ZipInfo], bounds: ZipBounds) -> None:
     """Raise InvalidDocument where there are too many, or one of them may not be unpacked."""
     total = sum(entry.file_size for entry in entries)
-    problem = ""
-    if len(entries) > bounds.entries:
-        problem = f"holds more than {bounds.entries} entries"
-    elif total > bounds.bytes:
-        problem = f"unpacks to {total} bytes, at most {bounds.bytes} are read"
-    elif not entries:
-        problem = "holds no file"
-    if problem:
-        raise InvalidDocument(WHAT, [("", problem)])
+    if not 1 <= len(entries) <= bounds.entries or total > bounds.bytes:
+        text = f"holds {len(entries)} files of {total} bytes; it needs 1 to {bounds.entries}"
+        raise InvalidDocument(WHAT, [("", f"{text} of at most {bounds.bytes} together")])
     for entry in entries:
-        problem = _problem(entry)
+        name, place = entry.filename, PurePosixPath(entry.filename)
+        leads_out = place.is_absolute() or ".." in place.parts or not place.parts
+        is_odd = "\\" in name or ":" in name or not name.isprintable()
+        problem = ""
+        if leads_out or is_odd or len(place.parts) > _DEEPEST:
+            problem = "is no name within the folder"
+        elif stat.S_IFMT(entry.external_attr >> 16) not in (0, stat.S_IFREG, stat.S_IFDIR):
+            problem = "is a link or a special file"
+        elif entry.flag_bits & 0x1 or entry.compress_type not in _USUAL:
+            problem = "is encrypted, or packed in another way than the usual one"
         if problem:
-            raise InvalidDocument(WHAT, [(repr(entry.filename[:80]), problem)])
-
-
-def _problem(entry: zipfile.ZipInfo) -> str:
-    """What keeps an entry from being unpacked, empty for nothing."""
-    name, place = entry.filename, PurePosixPath(entry.filename)
-    if place.is_absolute() or ".." in place.parts or not place.parts:
-        return "is no name within the folder"
-    if "\\" in name or ":" in name or not name.isprintable() or len(place.parts) > _DEEPEST:
-        return "is no name within the folder"
-    if entry.flag_bits & 0x1:
-        return "is encrypted"
-    if stat.S_IFMT(entry.external_attr >> 16) not in (0, stat.S_IFREG, stat.S_IFDIR):
-        return "is a link or a special file"
-    if entry.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
-        return "is packed in another way than the usual one"
-    return ""
+            raise InvalidDocument(WHAT, [(repr(name[:80]), problem)])
 
 
 def find_input(folder: Path, readers: list[Reader]) -> tuple[Reader, Path]:

@@ -11,7 +11,6 @@ from collections import Counter
 from pathlib import Path
 from typing import Any, Final
 from xml.etree import ElementTree as ET
-from xml.parsers import expat
 
 import yaml
 
@@ -24,7 +23,6 @@ MOST_VALUES = 2_000_000
 MAX_CHARACTERS: Final = 4 * 1024 * 1024
 DEEPEST: Final = 20
 MOST_YAML_VALUES: Final = 300_000
-LONGEST_TEXT: Final = 1_000
 
 
 def _read_bytes(file: Path, what: str, most: int) -> bytes:
@@ -81,14 +79,11 @@ def read_json(file: Path, *, what: str) -> object:
 
 
 def _build_object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    made = dict(pairs)
-    if len(made) < len(pairs):
-        times = Counter(name for name, _ in pairs)
-        doubled = sorted(name for name, count in times.items() if count > 1)
-        shown = ", ".join(ascii(name[:40]) for name in doubled[:5])
-        rest = f" and {len(doubled) - 5} more" if len(doubled) > 5 else ""
-        raise ValueError(f"named twice in one object: {shown}{rest}")
-    return made
+    built = dict(pairs)
+    if len(built) < len(pairs):
+        names = Counter(name for name, _ in pairs)
+        raise ValueError(f"named twice in one object: {names.most_common(1)[0][0][:40]!a}")
+    return built
 
 
 def _check_texts(value: object) -> None:
@@ -126,30 +121,18 @@ def read_yaml(text: str, *, what: str) -> object:
     Raises:
         InvalidDocument: With line and column where YAML knows them.
     """
-    mark, problem = None, ""
+    if len(text) > MAX_CHARACTERS:
+        problem = f"{len(text)} characters; at most {MAX_CHARACTERS} are read"
+        raise InvalidDocument(what, [("", problem)])
     try:
-        if len(text) > MAX_CHARACTERS:
-            raise _NotPlain(None, f"{len(text)} characters; at most {MAX_CHARACTERS} are read")
         _check_events(text)
         return yaml.load(text, Loader=_PlainLoader)
-    except _NotPlain as fault:
-        mark, problem = fault.mark, str(fault)
     except yaml.MarkedYAMLError as fault:
-        mark, problem = fault.problem_mark, f"is no YAML: {fault.problem or fault.context}"
-    except yaml.YAMLError as fault:  # a character that no YAML may hold
-        problem = f"is no YAML: {' '.join(str(fault).split())}"
-    except ValueError as fault:  # a number that Python can't make
-        problem = f"has a value that can't be read: {fault}"
+        mark, problem = fault.problem_mark, f"{fault.problem or fault.context}"
+    except (yaml.YAMLError, ValueError) as fault:  # a character or number that can't be
+        mark, problem = None, " ".join(str(fault).split())
     place = "" if mark is None else f"line {mark.line + 1}, column {mark.column + 1}"
-    raise InvalidDocument(what, [(place, problem)])
-
-
-class _NotPlain(Exception):
-    """Valid YAML that is not read here."""
-
-    def __init__(self, mark: Any, problem: str) -> None:
-        self.mark = mark
-        super().__init__(problem)
+    raise InvalidDocument(what, [(place, f"is no plain YAML: {problem}")])
 
 
 _PLAIN_TAGS = frozenset(f"tag:yaml.org,2002:{kind}" for kind in ("bool", "int", "float", "null"))
@@ -165,15 +148,12 @@ class _PlainLoader(_BASE):  # type: ignore[misc]
     }
 
     def construct_mapping(self, node: Any, deep: bool = False) -> dict[str, Any]:
-        made: dict[str, Any] = {}
+        built: dict[str, Any] = {}
         for key, value in node.value:
-            if not isinstance(key, yaml.ScalarNode):
-                raise _NotPlain(key.start_mark, "a key is a text, not a list or a mapping")
-            if key.value in made:
-                text = f"the key {key.value[:40]!a} stands twice"
-                raise _NotPlain(key.start_mark, text)
-            made[key.value] = self.construct_object(value, deep=deep)
-        return made
+            if not isinstance(key, yaml.ScalarNode) or key.value in built:
+                raise _not_plain(key, "a key is a text, and stands once")
+            built[key.value] = self.construct_object(value, deep=deep)
+        return built
 
 
 def _check_events(text: str) -> None:
@@ -183,23 +163,17 @@ def _check_events(text: str) -> None:
         depth -= isinstance(event, yaml.CollectionEndEvent)
         if not isinstance(event, yaml.NodeEvent):
             continue
-        tag = getattr(event, "tag", None)
         values += 1
         depth += isinstance(event, yaml.CollectionStartEvent)
-        length = len(event.value) if isinstance(event, yaml.ScalarEvent) else 0
-        problem = ""
-        if isinstance(event, yaml.AliasEvent) or event.anchor is not None:
-            problem = "anchors and aliases (& and *) are not read here"
-        elif tag is not None:
-            problem = "tags (!) are not read here"
-        elif depth > DEEPEST:
-            problem = f"is nested more than {DEEPEST} levels deep"
-        elif values > MOST_YAML_VALUES:
-            problem = f"has more than {MOST_YAML_VALUES} values"
-        elif length > LONGEST_TEXT:
-            problem = f"a text of {length} characters; at most {LONGEST_TEXT} are read"
-        if problem:
-            raise _NotPlain(event.start_mark, problem)
+        if event.anchor is not None or getattr(event, "tag", None) is not None:
+            raise _not_plain(event, "anchors, aliases and tags (&, *, !) are not read")
+        if depth > DEEPEST or values > MOST_YAML_VALUES:
+            most = f"{DEEPEST} levels and {MOST_YAML_VALUES} values"
+            raise _not_plain(event, f"has more than {most}")
+
+
+def _not_plain(where: Any, problem: str) -> yaml.MarkedYAMLError:
+    return yaml.MarkedYAMLError(problem=problem, problem_mark=where.start_mark)
 
 
 # XML
@@ -211,24 +185,16 @@ def read_xml(path: Path, *, what: str) -> ET.Element:
     Raises:
         InvalidDocument: The file is not there, is no XML, or has a document type.
     """
-    parser = expat.ParserCreate()
-    parser.StartDoctypeDeclHandler = _refuse_doctype
     try:
-        block = path.read_bytes()
-        parser.Parse(block, True)
-        return ET.fromstring(block)
+        return ET.XML(path.read_bytes(), parser=ET.XMLParser(target=_NoDoctype()))
     except OSError as fault:
         problem = fault.strerror or str(fault)
-    except _Doctype:
-        problem = "declares a document type, which is not read"
-    except (expat.ExpatError, ET.ParseError, LookupError, ValueError) as fault:
-        problem = f"is no XML: {fault}"
+    except (ET.ParseError, LookupError, ValueError) as fault:
+        problem = f"is no XML that is read: {fault}"
     raise InvalidDocument(what, [(path.name, problem)])
 
 
-class _Doctype(Exception):
-    """The XML declares a document type."""
-
-
-def _refuse_doctype(*_: object) -> None:
-    raise _Doctype
+class _NoDoctype(ET.TreeBuilder):
+    def doctype(self, *_: object) -> None:
+        """Refuse a document type, in which all that is dangerous begins."""
+        raise ValueError("declares a document type")

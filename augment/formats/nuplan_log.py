@@ -12,17 +12,18 @@ import re
 import sqlite3
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from augment.errors import InvalidDocument
-from augment.formats.nuplan_map import WHAT, city_around, open_tables
-from augment.formats.reading import Log, LoggedTrack, Moment, Reading, frames_every, reading_at
-from augment.formats.road_map import FloatArray
-from augment.geometry.frames import Pose
+from augment.formats.nuplan_map import city_around, open_tables
+from augment.formats.reading import Log, LoggedTrack, Moment, Reader, frames_every, tracks_of
+from augment.formats.values import FloatArray, fault_at, look_up, read_finite
 from augment.scene.entities import EGO_LENGTH_M, EGO_WIDTH_M, AgentType, TrafficLight
 from augment.scene.recording import Note, SceneNoteKind
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 LICENCE = "nuPlan, CC BY-NC-SA 4.0"
 TAG = "tag:"
@@ -44,7 +45,7 @@ TYPE_OF = {
 LIGHT_OF = {"green": TrafficLight.GREEN, "yellow": TrafficLight.YELLOW, "red": TrafficLight.RED}
 
 
-class NuPlan:
+class NuPlan(Reader):
     """The reader of nuPlan's log databases."""
 
     name = "nuplan"
@@ -65,35 +66,37 @@ class NuPlan:
         for index in frames_every(times_s, every_s):
             yield Moment(item=tokens[index][0], time_s=times_s[index])
 
-    def read(self, path: Path, *, item: str | None, frame: int | None, name: str) -> Reading:
-        """The scene at one lidar_pc, and half a minute from there on."""
-        if frame:
-            raise _fault("frame", "a token names the frame itself; leave it out")
+    def logs(self, path: Path, item: str | None) -> Iterator[Log]:
+        """Half a minute from one lidar_pc on."""
         with open_tables(path) as base:
             place = base.execute("SELECT location, map_version, logfile FROM log").fetchone()
             if place is None:
-                raise _fault("log", "has no row")
+                raise fault_at("log", "has no row")
             location, version, logfile = (str(one or "")[:200] for one in place)
             token = _token(base, item)
-            log = _log(base, token)
-            lights, origin = _lights(base, token), log.ego_pose(0)
-            notes = list(_mission_notes(base, token, origin))
-        city = city_around(
-            _map_of(path, location, version),
-            location=location,
-            center_m=(origin.x_m, origin.y_m),
-            lights=lights,
-        )
-        return reading_at(
-            log,
-            0,
-            city,
-            name=name,
+            times_s, ego, tracks = _motion(base, token)
+            lights, notes = _lights(base, token), list(_tag_notes(base, token))
+        yield Log(
+            times_s=times_s,
+            ego=LoggedTrack(
+                name="ego",
+                type=AgentType.EGO_VEHICLE,
+                length_m=EGO_LENGTH_M,
+                width_m=EGO_WIDTH_M,
+                states=ego,
+            ),
+            tracks=[*tracks.values()],
+            map_at=lambda _: city_around(
+                _map_of(path, location, version),
+                location=location,
+                center_m=ego[0, :2],
+                lights=lights,
+            ),
             world=f"UTM of {location}",
-            provenance=f"nuPlan data set, log {logfile or path.stem}, lidar_pc {token}; {LICENCE}",
+            title=f"nuPlan data set, log {logfile or path.stem}, lidar_pc {token}",
             licence=LICENCE,
-            notes=notes,
             item=token,
+            notes=notes,
         )
 
 
@@ -113,42 +116,38 @@ def tokens_in(path: Path, tokens: Sequence[str]) -> tuple[str, ...]:
 # Private
 
 
-def _fault(place: str, text: str) -> InvalidDocument:
-    return InvalidDocument(WHAT, [(place, text)])
-
-
 def _map_of(path: Path, *names: str) -> Path:
     """The map of a log's city, which lies in a folder of its location or of its version."""
     for name in names:
         if not re.fullmatch(r"[\w.-]{0,60}", name):
-            raise _fault("log", f"{name[:40]!r} is no name of a map")
-    cities = dict.fromkeys(name for name in names if name.strip("."))
+            raise fault_at("log", f"{name[:40]!r} is no name of a map")
+    cities = [name for name in names if name.strip(".")]
     for folder in path.resolve().parents:
-        found = [
-            file for city in cities for file in sorted((folder / "maps" / city).glob("*/map.gpkg"))
-        ]
+        found = {file for city in cities for file in (folder / "maps" / city).glob("*/map.gpkg")}
         if len(found) > 1:
-            raise _fault(str(folder / "maps"), "has several maps of this city")
+            raise fault_at(str(folder / "maps"), "has several maps of this city")
         if found:
-            return found[0]
+            return found.pop()
     text = f"has no map of {names[0]} beside or above it: maps/{names[0]}/*/map.gpkg"
-    raise _fault(str(path), text)
+    raise fault_at(str(path), text)
 
 
 def _token(base: sqlite3.Connection, item: str | None) -> str:
     if item is not None and not item.startswith(TAG):
         if not re.fullmatch(r"[0-9a-f]{16}", item.lower()):
             problem = f"{item[:40]!r} is neither a token of 16 hex digits nor tag:TYPE"
-            raise _fault("item", problem)
+            raise fault_at("item", problem)
         return item.lower()
     tag, number = None if item is None else item.removeprefix(TAG), 0
     counted = re.fullmatch(r"(.+):(\d{1,9})", tag or "")
     if counted:
         tag, number = counted[1], int(counted[2])
-    found = _tokens(base, tag)
-    if number >= len(found):
-        raise _fault("item", f"{len(found)} frames have the tag {tag!r}, from 0 on; not {number}")
-    return found[number][0]
+    tokens = _tokens(base, tag)
+    if number >= len(tokens):
+        raise fault_at(
+            "item", f"{len(tokens)} frames have the tag {tag!r}, from 0 on; not {number}"
+        )
+    return tokens[number][0]
 
 
 def _tokens(base: sqlite3.Connection, tag: str | None) -> list[tuple[str, int]]:
@@ -160,9 +159,7 @@ def _tokens(base: sqlite3.Connection, tag: str | None) -> list[tuple[str, int]]:
         text, values = text.replace("ORDER", join), (tag,)
     rows = base.execute(text, values).fetchall()
     if not rows:
-        raise _fault(
-            "item", "the log has no frame" if tag is None else f"no frame has the tag {tag!r}"
-        )
+        raise fault_at("item", f"no frame has the tag {tag!r}" if tag else "the log has no frame")
     return [(str(token).lower(), _whole(time, "lidar_pc.timestamp")) for token, time in rows]
 
 
@@ -170,27 +167,19 @@ def _whole(value: object, place: str) -> int:
     if isinstance(value, str) and value.isdecimal() and len(value) <= 18:
         return int(value)
     if not isinstance(value, int):
-        raise _fault(place, f"{str(value)[:40]!r} is no whole number")
+        raise fault_at(place, f"{str(value)[:40]!r} is no whole number")
     return value
 
 
-def _numbers(rows: Sequence[Sequence[Any]], place: str) -> FloatArray:
-    """Finite numbers (R, C); NULL counts as 0."""
-    try:
-        made = np.array([[value or 0.0 for value in row] for row in rows], dtype=np.float64)
-    except (TypeError, ValueError, OverflowError):
-        raise _fault(place, "has a value that is no number") from None
-    if not np.isfinite(made).all():
-        raise _fault(place, "has a value that is not finite")
-    return made
-
-
-def _log(base: sqlite3.Connection, token: str) -> Log:
-    """What was recorded from a lidar_pc on, the first step being that lidar_pc."""
-    text = "SELECT timestamp FROM lidar_pc WHERE token = ?"
-    start = base.execute(text, (bytes.fromhex(token),)).fetchone()
+def _motion(
+    base: sqlite3.Connection, token: str
+) -> tuple[FloatArray, FloatArray, dict[str, LoggedTrack]]:
+    """Times, the ego's states and all tracks from a lidar_pc on, which is the first step."""
+    start = base.execute(
+        "SELECT timestamp FROM lidar_pc WHERE token = ?", (bytes.fromhex(token),)
+    ).fetchone()
     if start is None:
-        raise _fault("item", f"there is no lidar_pc {token}")
+        raise fault_at("item", f"there is no lidar_pc {token}")
     first = _whole(start[0], "lidar_pc.timestamp")
     rows = base.execute(
         "SELECT l.token, l.timestamp, e.x, e.y, e.qw, e.qx, e.qy, e.qz, e.vx, e.vy "
@@ -199,61 +188,50 @@ def _log(base: sqlite3.Connection, token: str) -> Log:
         (first, min(first, LATEST_US) + LASTS_US, MOST_FRAMES),
     ).fetchall()
     if not rows or rows[0][1] != first:
-        raise _fault("ego_pose", f"has no pose for lidar_pc {token}")
+        raise fault_at("ego_pose", f"has no pose for lidar_pc {token}")
     chosen = rows[:1]
     for row in rows[1:]:
         if row[1] - chosen[-1][1] >= STEP_US * 0.9:
             chosen.append(row)
-    x_m, y_m, qw, qx, qy, qz, vx, vy = _numbers([row[2:] for row in chosen], "ego_pose").T
+    x_m, y_m, qw, qx, qy, qz, vx, vy = _finite([row[2:] for row in chosen], "ego_pose").T
     yaw = np.arctan2(2.0 * (qw * qz + qx * qy), 1.0 - 2.0 * (qy * qy + qz * qz))
     x_m = x_m + REAR_AXLE_TO_CENTER_M * np.cos(yaw)
     y_m = y_m + REAR_AXLE_TO_CENTER_M * np.sin(yaw)
-    return Log(
-        what=WHAT,
-        times_s=np.array([(row[1] - first) * 1e-6 for row in chosen]),
-        ego=np.column_stack([x_m, y_m, yaw, np.hypot(vx, vy)]),
-        ego_length_m=EGO_LENGTH_M,
-        ego_width_m=EGO_WIDTH_M,
-        tracks=_tracks(base, {row[0]: step for step, row in enumerate(chosen)}),
-    )
+    times_s = np.array([(row[1] - first) * 1e-6 for row in chosen])
+    boxes = _boxes(base, [row[0] for row in chosen])
+    ego = np.column_stack([x_m, y_m, yaw, np.hypot(vx, vy)])
+    return times_s, ego, tracks_of(boxes, TYPE_OF, times_s)
 
 
-def _tracks(base: sqlite3.Connection, steps: dict[bytes, int]) -> tuple[LoggedTrack, ...]:
-    """All boxes of the chosen frames, without a join: a log has millions, and no index need be."""
+def _finite(rows: Sequence[Sequence[Any]], place: str) -> FloatArray:
+    """Finite numbers (R, C); NULL counts as 0."""
+    return read_finite([[value or 0.0 for value in row] for row in rows], place)
+
+
+def _boxes(base: sqlite3.Connection, frames: Sequence[bytes]) -> "pd.DataFrame":
+    """All boxes of the frames, without a join: a log has millions, and no index need be."""
+    import pandas as pd
+
     text = "SELECT t.token, c.name FROM track t JOIN category c ON c.token = t.category_token"
     kinds = dict(base.execute(text).fetchall())
-    marks = ", ".join("?" * len(steps))
-    boxes = base.execute(
+    rows = base.execute(
         "SELECT lidar_pc_token, track_token, x, y, yaw, vx, vy, length, width FROM lidar_box "
-        f"WHERE lidar_pc_token IN ({marks})",
-        list(steps),
+        f"WHERE lidar_pc_token IN ({', '.join('?' * len(frames))})",
+        list(frames),
     ).fetchall()
-    boxes = [box for box in boxes if kinds.get(box[1]) not in (None, "ego")]
-    numbers = _numbers([box[2:] for box in boxes], "lidar_box").reshape(-1, 7)
-    rows_of: dict[Any, list[int]] = {}
-    for row, box in enumerate(boxes):
-        rows_of.setdefault(box[1], []).append(row)
-    tracks = []
-    for track, rows in rows_of.items():
-        kind = kinds[track]
-        if kind not in TYPE_OF:
-            known = ", ".join(TYPE_OF)
-            raise _fault("category.name", f"unknown {str(kind)[:40]!r}; known: {known}")
-        mine = numbers[rows]
-        states = np.full((len(steps), 4), np.nan)
-        speeds_mps = np.hypot(mine[:, 3], mine[:, 4])
-        states[[steps[boxes[row][0]] for row in rows]] = np.column_stack([mine[:, :3], speeds_mps])
-        length_m, width_m = mine[0, 5:].tolist()
-        tracks.append(
-            LoggedTrack(
-                name=track.hex() if isinstance(track, bytes) else str(track),
-                type=TYPE_OF[kind],
-                length_m=length_m,
-                width_m=width_m,
-                states=states,
-            )
-        )
-    return tuple(tracks)
+    rows = [row for row in rows if kinds.get(row[1]) not in (None, "ego")]
+    for kind in {kinds[row[1]] for row in rows}:
+        look_up(TYPE_OF, kind, "category.name")
+    step_of = {frame: step for step, frame in enumerate(frames)}
+    values = _finite([row[2:] for row in rows], "lidar_box").reshape(-1, 7)
+    return pd.DataFrame(
+        values, columns=["x_m", "y_m", "heading_rad", "vx", "vy", "length_m", "width_m"]
+    ).assign(
+        step=[step_of[row[0]] for row in rows],
+        track=[row[1].hex() if isinstance(row[1], bytes) else str(row[1]) for row in rows],
+        kind=[kinds[row[1]] for row in rows],
+        speed_mps=np.hypot(values[:, 3], values[:, 4]),
+    )
 
 
 def _lights(base: sqlite3.Connection, token: str) -> dict[int, TrafficLight]:
@@ -266,24 +244,10 @@ def _lights(base: sqlite3.Connection, token: str) -> dict[int, TrafficLight]:
     }
 
 
-def _mission_notes(base: sqlite3.Connection, token: str, origin: Pose) -> Iterator[Note]:
-    """Route and goal of the scene that a lidar_pc belongs to, and its own tags."""
-    frame = (bytes.fromhex(token),)
-    text = (
-        "SELECT s.roadblock_ids, e.x, e.y FROM lidar_pc l JOIN scene s ON s.token = l.scene_token "
-        "LEFT JOIN ego_pose e ON e.token = s.goal_ego_pose_token WHERE l.token = ? LIMIT 1"
-    )
-    roadblocks, *goal = base.execute(text, frame).fetchone() or (None, None, None)
-    # Documented with commas, written with spaces.
-    route = tuple(filter(None, re.split(r"[\s,]+", str(roadblocks or "")[:20_000])))
-    if route:
-        yield Note(kind=SceneNoteKind.ROUTE, number=len(route), names=route[:100])
-    if goal[0] is not None:
-        ((x_m, y_m),) = origin.to_local(_numbers([goal], "ego_pose")).tolist()
-        yield Note(kind=SceneNoteKind.MISSION_GOAL, names=(f"{x_m:.1f}", f"{y_m:.1f}"))
+def _tag_notes(base: sqlite3.Connection, token: str) -> Iterator[Note]:
     text = (
         "SELECT DISTINCT type FROM scenario_tag WHERE lidar_pc_token = ? ORDER BY type LIMIT 100"
     )
-    tags = tuple(str(tag)[:80] for (tag,) in base.execute(text, frame))
+    tags = tuple(str(tag)[:80] for (tag,) in base.execute(text, (bytes.fromhex(token),)))
     if tags:
         yield Note(kind=SceneNoteKind.SCENARIO_TAGS, names=tags)

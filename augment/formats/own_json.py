@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from augment.errors import InvalidDocument
 from augment.formats.documents import read_json
-from augment.formats.reading import Moment, Reading
+from augment.formats.reading import Moment, Reader, Reading
+from augment.formats.values import fault_at
 from augment.formats.writing import Cell, LossReport, Written, write_each
 from augment.scene.codec import (
     SCENE_FORMAT,
@@ -28,11 +28,12 @@ from augment.scene.recording import Recording, Track
 _SEEN = (MotionSource.RECORDED, MotionSource.SIMULATED)
 
 
-class OwnJson:
+class OwnJson(Reader):
     """The reader of a scene document."""
 
     name = "json"
     title = "scene in the own JSON (file)"
+    has_items = False
 
     def recognises(self, path: Path) -> bool:
         """A JSON file that names the format."""
@@ -47,10 +48,8 @@ class OwnJson:
 
     def read(self, path: Path, *, item: str | None, frame: int | None, name: str) -> Reading:
         """The scene under another name."""
-        if frame:
-            raise InvalidDocument("scene", [("frame", f"a JSON scene has frame 0, not {frame}")])
-        if item is not None:
-            raise InvalidDocument("scene", [("item", f"a JSON scene has no parts, not {item!r}")])
+        if frame or item is not None:
+            raise fault_at("frame", "a JSON scene has no parts and frame 0 alone")
         scene = scene_from_document(read_json(path, what="scene"))
         return Reading(scene=replace(scene, name=name), recording=None)
 

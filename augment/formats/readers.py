@@ -64,17 +64,9 @@ def recognise(path: Path) -> Reader:
         raise InvalidDocument("input", [(str(path), fault.strerror or str(fault))]) from None
     if len(readers) == 1:
         return readers[0]
-    if not readers and _is_123d(path):
-        text = "looks like a 123D log, which is not read (docs/formats.md says why)"
-        raise InvalidDocument("input", [(str(path), text)])
     known = ", ".join(f"{reader.name}: {reader.title}" for reader in READERS.values())
     said = "none of the formats" if not readers else " and ".join(one.name for one in readers)
     raise InvalidDocument("input", [(str(path), f"looks like {said}; name one of {known}")])
-
-
-def _is_123d(path: Path) -> bool:
-    """A log that py123d converted has a table of its synchronised times."""
-    return (path / "sync.arrow").is_file() or path.suffix == ".arrow"
 
 
 EVERY_S = 0.5

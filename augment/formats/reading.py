@@ -1,26 +1,28 @@
 """What every reader is and gives: from a log and a map in their world frame to a scene.
 
-A reader knows one format of recorded data. It is pure: a path goes in, values come out, and what
-is wrong with the file is raised as `InvalidDocument`. `reading_at` does what all readers need
-once they know times, ego, tracks and map: who is near, in which order they are named, which lane
-lies under them. Metres are rounded to millimetres, so that documents can be read by people. T
-steps.
+A reader knows one format of recorded data and opens a path as `Log`s. What all need once times,
+ego, tracks and map are known is done here: who is near, in which order they are named, which lane
+lies under them. What is wrong with a file is raised as `InvalidDocument`. Metres are rounded to
+millimetres, so that documents can be read by people. T steps.
 """
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from augment.errors import InvalidDocument
-from augment.formats.road_map import FURTHEST_M, FloatArray, RoadMap
-from augment.formats.roads import RADIUS_M, MapExtract, road_around
+from augment.formats.road_map import RoadMap, complete_map
+from augment.formats.roads import RADIUS_M, road_around
+from augment.formats.values import FURTHEST, FloatArray, fault_at, read_finite
 from augment.geometry.frames import Pose, wrap
 from augment.scene.entities import LENGTH_WIDTH_M, AgentType, Origin, Scene, TrafficAgent
 from augment.scene.lane_graph import LaneGraph
-from augment.scene.recording import Note, Recording, SceneNoteKind, Track
+from augment.scene.recording import Note, Recording, SceneNoteKind, Track, agent_of
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 LONGEST_M = 100.0
 """No road user is longer."""
@@ -30,6 +32,8 @@ NEIGHBOURS = 2
 """Steps on either side that a speed is taken over: one alone shows the annotators' jitter."""
 _STANDING = (AgentType.TRAFFIC_CONE, AgentType.BARRIER, AgentType.CONSTRUCTION_SIGN)
 _HEADED = (AgentType.VEHICLE, AgentType.BUS, AgentType.BICYCLE)
+STATE = ("x_m", "y_m", "heading_rad", "speed_mps")
+"""The columns of a state."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -67,51 +71,20 @@ class Reading:
     moment: Moment = Moment()
 
 
-class Reader(Protocol):
-    """One format."""
-
-    name: str
-    """How the format is called where one is asked for."""
-    title: str
-    """What it is, for people."""
-
-    def recognises(self, path: Path) -> bool:
-        """Whether the file or folder looks like this format; nothing is raised."""
-
-    def moments(self, path: Path, *, every_s: float) -> Iterator[Moment]:
-        """What can be taken, in the source's order, `every_s` seconds apart.
-
-        Raises:
-            InvalidDocument: The input breaks its format.
-        """
-
-    def read(self, path: Path, *, item: str | None, frame: int | None, name: str) -> Reading:
-        """The scene at one moment.
-
-        Args:
-            path: The file or folder.
-            item: See `Moment`; None for the first.
-            frame: See `Moment`; None for the one that the format means, else 0.
-            name: The scene's slug.
-
-        Raises:
-            InvalidDocument: The input breaks its format, or has no such moment.
-        """
-
-
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class LoggedTrack:
     """One object.
 
     Attributes:
         name: Its id in the source; an order among those that are equally near.
+        length_m, width_m: What the source says, be it no size.
         states: (T, 4): x_m, y_m, heading_rad, speed_mps in the world frame; NaN where unseen.
     """
 
     name: str
     type: AgentType
-    length_m: float
-    width_m: float
+    length_m: float = 0.0
+    width_m: float = 0.0
     states: FloatArray
 
     @property
@@ -122,61 +95,165 @@ class LoggedTrack:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Log:
-    """What was recorded.
+    """One part of a recording: what moved, the map, and where it comes from.
 
     Attributes:
-        what: What the source is called in faults.
         times_s: (T,) ascending.
-        ego: (T, 4), as a track's states, of the ego's geometric centre.
+        ego: Its states are those of the ego's geometric centre.
+        map_at: The map with the lights of a frame, as far as the ego can see at least.
+        world: What the source's frame is called.
+        title: The data set and the part of it.
+        licence: What stands beside the title; none where it is empty.
+        is_free: Whether the licence allows commercial use.
+        item: Which part it is, see `Moment`.
+        frame: The one that the format means to be t0.
+        notes: What neither the tracks nor the map tell.
     """
 
-    what: str
     times_s: FloatArray
-    ego: FloatArray
-    ego_length_m: float
-    ego_width_m: float
-    tracks: tuple[LoggedTrack, ...]
+    ego: LoggedTrack
+    tracks: Sequence[LoggedTrack]
+    map_at: Callable[[int], RoadMap]
+    world: str
+    title: str
+    licence: str
+    is_free: bool = False
+    item: str | None = None
+    frame: int = 0
+    notes: Sequence[Note] = ()
 
-    def ego_pose(self, frame: int) -> Pose:
-        """Return where the ego is at a frame.
+    def moments(self, every_s: float) -> Iterator[Moment]:
+        """Yield the steps that far apart in which the ego is there."""
+        frames = np.flatnonzero(np.isfinite(self.ego.states).all(axis=1)).tolist()
+        times_s = self.times_s[frames].tolist()
+        for index in frames_every(times_s, every_s):
+            time_s = times_s[index] - times_s[0]
+            yield Moment(item=self.item, frame=frames[index], time_s=time_s)
+
+    def reading_at(self, frame: int, name: str) -> Reading:
+        """Return the scene at a frame, what was recorded from there on, and what is left open.
+
+        Args:
+            frame: What becomes t0.
+            name: The scene's slug.
 
         Raises:
-            InvalidDocument: There is no such frame, or no ego in it.
+            InvalidDocument: No such frame, no ego in it, a number that is none, or a part of the
+                map without a shape.
         """
-        frame_in(self.what, frame, len(self.times_s))
-        x_m, y_m, heading_rad, _ = self.ego[frame].tolist()
-        if not np.isfinite(self.ego[frame]).all():
-            raise InvalidDocument(self.what, [("frame", f"{frame} has no ego in it")])
+        origin = self._ego_pose(frame)
+        city, map_notes = complete_map(self.map_at(frame))
+        road = road_around(city, origin)
+        tracks = _tracks(self, frame, origin)
+        scene = Scene(
+            name=name,
+            ego=_ego(self.ego, frame),
+            traffic_side=road.traffic_side,
+            origin=Origin.at(origin, frame=self.world),
+            provenance=f"{self.title}, step {frame} of {len(self.times_s)}; {self.licence}",
+            agents=tuple(_agent(track) for track in tracks if _is_near(track)),
+            lanes=road.lanes,
+            connectors=road.connectors,
+            areas=road.areas,
+        )
+        notes = [*map_notes, *self.notes]
+        sizeless = sum(not track.has_size for track in self.tracks)
+        if sizeless:
+            kind = SceneNoteKind.SOME_BOX_SIZES
+            notes.append(Note(kind=kind, number=sizeless, of=len(self.tracks)))
+        here = self.ego.states[frame, :2]
+        away_m = [np.hypot(*(track.states[frame, :2] - here)) for track in self.tracks]
+        far = road.far + sum(bool(distance_m > RADIUS_M) for distance_m in away_m)
+        if far:
+            kind = SceneNoteKind.FAR_PARTS_LEFT_OUT
+            notes.append(Note(kind=kind, number=far, value=RADIUS_M))
+        if road.side_is_assumed:
+            side = (road.traffic_side.value,)
+            notes.append(Note(kind=SceneNoteKind.TRAFFIC_SIDE_ASSUMED, names=side))
+        if not self.is_free:
+            notes.append(Note(kind=SceneNoteKind.NON_COMMERCIAL, names=(self.licence,)))
+        return Reading(
+            scene=_on_lanes(scene),
+            recording=Recording(
+                times_s=np.round(self.times_s[frame:] - self.times_s[frame], 6),
+                ego=_local(self.ego.states[frame:], origin),
+                tracks=tracks,
+            ),
+            notes=tuple(notes),
+            moment=Moment(item=self.item, frame=frame),
+        )
+
+    def _ego_pose(self, frame: int) -> Pose:
+        steps = len(self.times_s)
+        if not 0 <= frame < steps:
+            raise fault_at("frame", f"{frame} is not there; there are 0 to {steps - 1}")
+        x_m, y_m, heading_rad, _ = self.ego.states[frame].tolist()
+        if not np.isfinite(self.ego.states[frame]).all():
+            raise fault_at("frame", f"{frame} has no ego in it")
         return Pose(x_m=x_m, y_m=y_m, heading_rad=wrap(heading_rad))
 
 
-def frame_in(what: str, frame: int, steps: int) -> int:
-    """Return the frame, where it is one of that many.
+class Reader:
+    """One format.
 
-    Raises:
-        InvalidDocument: It is not.
+    Attributes:
+        name: How the format is called where one is asked for.
+        title: What it is, for people.
+        has_items: Whether a path can hold several parts.
     """
-    if not 0 <= frame < steps:
-        allowed = f"this log has frames 0 to {steps - 1}" if steps else "this log has no frame"
-        raise InvalidDocument(what, [("frame", f"{frame} is not there; {allowed}")])
-    return frame
+
+    name: str
+    title: str
+    has_items = True
+
+    def recognises(self, path: Path) -> bool:
+        """Return whether the file or folder looks like this format; nothing is raised."""
+        raise NotImplementedError
+
+    def logs(self, path: Path, item: str | None) -> Iterator[Log]:
+        """Yield the part of that name, or all in the source's order for None.
+
+        Raises:
+            InvalidDocument: The input breaks its format, or has no such part.
+        """
+        raise NotImplementedError
+
+    def moments(self, path: Path, *, every_s: float) -> Iterator[Moment]:
+        """Yield what can be taken, in the source's order, `every_s` seconds apart.
+
+        Raises:
+            InvalidDocument: The input breaks its format.
+        """
+        for log in self.logs(path, None):
+            yield from log.moments(every_s)
+
+    def read(self, path: Path, *, item: str | None, frame: int | None, name: str) -> Reading:
+        """Return the scene at one moment.
+
+        Args:
+            path: The file or folder.
+            item: See `Moment`; None for the first.
+            frame: See `Moment`; None for the one that the format means.
+            name: The scene's slug.
+
+        Raises:
+            InvalidDocument: The input breaks its format, or has no such moment.
+        """
+        if item is not None and not self.has_items:
+            raise fault_at("item", f"there are no parts, {item!r} is not there")
+        log = next(self.logs(path, item), None)
+        if log is None:
+            raise fault_at("item", f"{str(item or 'a first part')[:60]!r} is not there")
+        return log.reading_at(log.frame if frame is None else frame, name)
 
 
-def frames_every(times_s: list[float], every_s: float) -> Iterator[int]:
+def frames_every(times_s: Sequence[float], every_s: float) -> Iterator[int]:
     """Yield the frames that lie at least `every_s` after the one before, the first among them."""
     last: float | None = None
     for frame, time_s in enumerate(times_s):
         if last is None or time_s - last >= every_s - 1e-6:
             last = time_s
             yield frame
-
-
-def moments_of(log: Log, every_s: float, item: str | None = None) -> Iterator[Moment]:
-    """Yield the steps of a log that far apart in which the ego is there."""
-    frames = np.flatnonzero(np.isfinite(log.ego).all(axis=1)).tolist()
-    times_s = log.times_s[frames].tolist()
-    for index in frames_every(times_s, every_s):
-        yield Moment(item=item, frame=frames[index], time_s=times_s[index] - times_s[0])
 
 
 def speeds(times_s: FloatArray, xy_m: FloatArray) -> FloatArray:
@@ -193,59 +270,40 @@ def speeds(times_s: FloatArray, xy_m: FloatArray) -> FloatArray:
     return np.divide(moved, apart, out=np.zeros(len(rows)), where=apart > 0.0)
 
 
-def reading_at(
-    log: Log,
-    frame: int,
-    city: RoadMap,
-    *,
-    name: str,
-    world: str,
-    provenance: str,
-    licence: str | None,
-    notes: Iterable[Note] = (),
-    item: str | None = None,
-) -> Reading:
-    """Return the scene at a frame, what was recorded from there on, what the source left open.
+def tracks_of(
+    table: "pd.DataFrame", types: Mapping[str, AgentType], times_s: FloatArray
+) -> dict[str, LoggedTrack]:
+    """Return the tracks in a table with a row for each object and step.
 
     Args:
-        log: The whole log.
-        frame: What becomes t0.
-        city: The map, as far as the ego can see at least.
-        name: The scene's slug.
-        world: What the source's frame is called.
-        provenance: Where it comes from and under which licence.
-        licence: One that forbids commercial use; None where there is none such.
-        notes: What neither the log nor the map tells.
-        item: Which part of the source it is.
-
-    Raises:
-        InvalidDocument: No such frame, no ego in it, a number that is none, or a part of the map
-            without a shape.
+        table: Columns `track` (its name), `kind` (a key of the types), `step`, `x_m`, `y_m`,
+            `heading_rad`, and where they are known `speed_mps`, `length_m` and `width_m`.
+        types: What the kinds are here.
+        times_s: (T,), by which speeds are taken from places where there is no such column.
     """
-    origin = log.ego_pose(frame)
-    road = road_around(city, origin)
-    tracks = _tracks(log, frame, origin)
-    scene = Scene(
-        name=name,
-        ego=_ego(log, frame),
-        traffic_side=road.traffic_side,
-        origin=Origin.at(origin, frame=world),
-        provenance=provenance,
-        agents=tuple(_agent(track) for track in tracks if _is_near(track)),
-        lanes=road.lanes,
-        connectors=road.connectors,
-        areas=road.areas,
-    )
-    return Reading(
-        scene=_on_lanes(scene),
-        recording=Recording(
-            times_s=np.round(log.times_s[frame:] - log.times_s[frame], 6),
-            ego=_local(log.ego[frame:], origin),
-            tracks=tracks,
-        ),
-        notes=(*city.notes, *notes, *_own_notes(log, frame, road, licence)),
-        moment=Moment(item=item, frame=frame),
-    )
+    if "speed_mps" not in table:
+        table = table.assign(speed_mps=np.nan)
+    states = read_finite(table[[*STATE[:3]]], "places")
+    speeds_mps = table["speed_mps"].to_numpy()
+    steps = table["step"].to_numpy()
+    tracks = {}
+    for name, every_row in table.groupby("track", observed=True).indices.items():
+        seen, first = np.unique(steps[every_row], return_index=True)
+        rows = np.asarray(every_row)[first]
+        own = np.column_stack([states[rows], speeds_mps[rows]])
+        if np.isnan(own[:, 3]).any():
+            own[:, 3] = speeds(times_s[seen], own[:, :2])
+        every = np.full((len(times_s), 4), np.nan)
+        every[seen] = own
+        lone = table.iloc[rows[0]]
+        tracks[str(name)] = LoggedTrack(
+            name=str(name),
+            type=types[lone["kind"]],
+            length_m=float(lone.get("length_m", 0.0)),
+            width_m=float(lone.get("width_m", 0.0)),
+            states=every,
+        )
+    return tracks
 
 
 # Private
@@ -256,11 +314,11 @@ def _tracks(log: Log, frame: int, origin: Pose) -> tuple[Track, ...]:
 
     Within one step the nearest comes first.
     """
-    for states in (log.ego, *(track.states for track in log.tracks)):
-        if (np.abs(states) > FURTHEST_M).any():
-            raise InvalidDocument(log.what, [("", f"has a number over {FURTHEST_M:.0e}")])
+    for one in (log.ego, *log.tracks):
+        if (np.abs(one.states) > FURTHEST).any():
+            raise fault_at(one.name, f"has a number over {FURTHEST:.0e}")
     met = []
-    ego = log.ego[frame:, :2]
+    ego = log.ego.states[frame:, :2]
     # Where the ego's way is not known, near is near to where it was.
     seen = np.isfinite(ego).all(axis=1)
     ego = ego[np.maximum.accumulate(np.where(seen, np.arange(len(ego)), 0))]
@@ -271,11 +329,11 @@ def _tracks(log: Log, frame: int, origin: Pose) -> tuple[Track, ...]:
             away_m = round(float(distances[near[0]]), 3)
             met.append((int(near[0]), away_m, track.name, track))
     met.sort(key=lambda item: item[:3])
-    made = []
+    tracks = []
     for number, (*_, track) in enumerate(met, start=2):
         own = track.length_m, track.width_m
         length_m, width_m = own if track.has_size else LENGTH_WIDTH_M[track.type]
-        made.append(
+        tracks.append(
             Track(
                 agent_id=f"Agent{number}",
                 type=track.type,
@@ -284,7 +342,7 @@ def _tracks(log: Log, frame: int, origin: Pose) -> tuple[Track, ...]:
                 states=_local(track.states[frame:], origin),
             )
         )
-    return tuple(made)
+    return tuple(tracks)
 
 
 def _local(states: FloatArray, origin: Pose) -> FloatArray:
@@ -292,40 +350,31 @@ def _local(states: FloatArray, origin: Pose) -> FloatArray:
     xy = np.round(origin.to_local(states[:, :2]), 3)
     turn = np.remainder(states[:, 2] - origin.heading_rad + np.pi, 2.0 * np.pi) - np.pi
     headings = np.round(np.where(turn == -np.pi, np.pi, turn), 4)
-    made = np.column_stack([xy, headings, np.round(states[:, 3], 3)])
-    made[~np.isfinite(made).all(axis=1)] = np.nan
-    return made
+    local = np.column_stack([xy, headings, np.round(states[:, 3], 3)])
+    local[~np.isfinite(local).all(axis=1)] = np.nan
+    return local
 
 
 def _is_near(track: Track) -> bool:
     return bool(np.hypot(*track.states[0, :2]) <= RADIUS_M)
 
 
-def _ego(log: Log, frame: int) -> TrafficAgent:
+def _ego(ego: LoggedTrack, frame: int) -> TrafficAgent:
     return TrafficAgent(
         id="Agent1",
         type=AgentType.EGO_VEHICLE,
         x_m=0.0,
         y_m=0.0,
         heading_rad=0.0,
-        width_m=round(log.ego_width_m, 3),
-        length_m=round(log.ego_length_m, 3),
-        speed_mps=round(float(log.ego[frame, 3]), 3),
+        width_m=round(ego.width_m, 3),
+        length_m=round(ego.length_m, 3),
+        speed_mps=round(float(ego.states[frame, 3]), 3),
     )
 
 
 def _agent(track: Track) -> TrafficAgent:
-    x_m, y_m, heading_rad, speed_mps = track.states[0].tolist()
-    return TrafficAgent(
-        id=track.agent_id,
-        type=track.type,
-        x_m=x_m,
-        y_m=y_m,
-        heading_rad=heading_rad,
-        width_m=track.width_m,
-        length_m=track.length_m,
-        speed_mps=0.0 if track.type in _STANDING else speed_mps,
-    )
+    agent = agent_of(track, track.states[0])
+    return replace(agent, speed_mps=0.0) if track.type in _STANDING else agent
 
 
 def _on_lanes(scene: Scene) -> Scene:
@@ -337,18 +386,3 @@ def _on_lanes(scene: Scene) -> Scene:
 
     agents = [place(one, one.heading_rad if one.type in _HEADED else None) for one in scene.agents]
     return replace(scene, ego=place(scene.ego, 0.0), agents=tuple(agents))
-
-
-def _own_notes(log: Log, frame: int, road: MapExtract, licence: str | None) -> Iterator[Note]:
-    sizeless = sum(not track.has_size for track in log.tracks)
-    if sizeless:
-        yield Note(kind=SceneNoteKind.SOME_BOX_SIZES, number=sizeless, of=len(log.tracks))
-    away_m = [np.hypot(*(track.states[frame, :2] - log.ego[frame, :2])) for track in log.tracks]
-    number = road.far + sum(bool(distance_m > RADIUS_M) for distance_m in away_m)
-    if number:
-        yield Note(kind=SceneNoteKind.FAR_PARTS_LEFT_OUT, number=number, value=RADIUS_M)
-    if road.side_is_assumed:
-        side = (road.traffic_side.value,)
-        yield Note(kind=SceneNoteKind.TRAFFIC_SIDE_ASSUMED, names=side)
-    if licence:
-        yield Note(kind=SceneNoteKind.NON_COMMERCIAL, names=(licence,))

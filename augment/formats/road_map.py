@@ -1,27 +1,24 @@
-"""What readers make of a source's map: segments and areas in its world frame, and their notes.
+"""What readers make of a source's map: segments and areas in its world frame.
 
 Also what maps leave open: the edges and widths of lanes that have lines beside them alone, and
 which segments lie in an intersection. P points of a lane.
 """
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
 from statistics import fmean
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 
+from augment.formats.values import FloatArray
 from augment.scene.entities import AreaKind, TrafficLight, TrafficSide, TurnType
 from augment.scene.recording import Note, SceneNoteKind
 
-FloatArray = NDArray[np.float64]
 Name = int | str
 
-FURTHEST_M = 1e8
-"""Nothing on earth is further from the origin of a map."""
-MOST_NAMED = 12
 NARROWEST_M, WIDEST_M, USUAL_M = 2.0, 8.0, 3.5
+_MOST_NAMED = 12
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -61,57 +58,50 @@ class RoadMap:
     """What a source's map holds, in its world frame.
 
     Attributes:
-        what, place: How faults call the source and the file.
+        place: How faults call the part of the file.
         side: Where the lanes do not tell on which side people drive.
         is_side_told: Whether the source itself says so, whatever the lanes look like.
-        notes: What the map does not say.
+        left_out: How many parts of which name have no place in a scene.
+        tells_crossings: Whether the source says what lies in an intersection; else the lines do.
     """
 
-    what: str
     place: str
     segments: tuple[Segment, ...]
     areas: tuple[tuple[AreaKind, FloatArray], ...] = ()
     side: TrafficSide = TrafficSide.RIGHT
     is_side_told: bool = False
-    notes: tuple[Note, ...] = ()
+    left_out: Mapping[str, int] = field(default_factory=dict)
+    tells_crossings: bool = True
 
 
-# Notes
-
-
-def map_notes(
-    segments: Sequence[Segment],
-    *,
-    assumed: int = 0,
-    there: Mapping[SceneNoteKind, bool],
-    counts: Mapping[SceneNoteKind, int],
-    left_out: Mapping[str, int],
-) -> tuple[Note, ...]:
-    """Return what a map does not say.
-
-    Args:
-        segments: Of the whole map.
-        assumed: How many widths are assumed.
-        there: By the note on what is not there, whether it is.
-        counts: Notes on what there is so many of, where it is not 0.
-        left_out: How many parts of which name have no place here.
-    """
-    total = len(segments)
-    unlimited = sum(segment.speed_limit_mps is None for segment in segments)
-    notes = []
-    if total and unlimited == total:
-        notes.append(Note(kind=SceneNoteKind.NO_SPEED_LIMITS))
-    elif unlimited:
+def complete_map(city: RoadMap) -> tuple[RoadMap, list[Note]]:
+    """Return a map whose segments have widths and intersections, and notes on what it lacks."""
+    segments = {one.name: one for one in city.segments}
+    if not city.tells_crossings:
+        for name in crossing_segments(segments):
+            segments[name] = replace(segments[name], crosses=True)
+    filled, assumed = fill_widths(segments)
+    total = len(filled)
+    unlimited = sum(one.speed_limit_mps is None for one in filled)
+    kinds = {kind for kind, _ in city.areas}
+    lacking = {
+        SceneNoteKind.NO_SPEED_LIMITS: total > 0 and unlimited == total,
+        SceneNoteKind.NO_CONNECTIVITY: not any(
+            one.successors or one.predecessors for one in filled
+        ),
+        SceneNoteKind.NO_INTERSECTIONS: not any(one.crosses for one in filled),
+        SceneNoteKind.NO_LIGHTS: all(one.light is TrafficLight.UNKNOWN for one in filled),
+        SceneNoteKind.NO_WALKWAYS: AreaKind.WALKWAY not in kinds,
+        SceneNoteKind.NO_DRIVABLE_AREAS: AreaKind.DRIVABLE not in kinds,
+    }
+    notes = [Note(kind=kind) for kind, is_lacking in lacking.items() if is_lacking]
+    if 0 < unlimited < total:
         notes.append(Note(kind=SceneNoteKind.SOME_SPEED_LIMITS, number=unlimited, of=total))
     if assumed:
         kind = SceneNoteKind.LANE_WIDTHS_ASSUMED
         notes.append(Note(kind=kind, number=assumed, of=total, value=USUAL_M))
-    return (
-        *notes,
-        *(Note(kind=kind) for kind, is_there in there.items() if not is_there),
-        *(Note(kind=kind, number=number) for kind, number in counts.items() if number),
-        *left_out_notes(SceneNoteKind.MAP_PARTS_LEFT_OUT, left_out),
-    )
+    notes += left_out_notes(SceneNoteKind.MAP_PARTS_LEFT_OUT, city.left_out)
+    return replace(city, segments=filled), notes
 
 
 def left_out_notes(kind: SceneNoteKind, counts: Mapping[str, int]) -> list[Note]:
@@ -119,7 +109,7 @@ def left_out_notes(kind: SceneNoteKind, counts: Mapping[str, int]) -> list[Note]
     names = tuple(sorted(name for name, number in counts.items() if number))
     if not names:
         return []
-    return [Note(kind=kind, number=sum(counts.values()), names=names[:MOST_NAMED])]
+    return [Note(kind=kind, number=sum(counts.values()), names=names[:_MOST_NAMED])]
 
 
 # Edges and widths
@@ -156,7 +146,7 @@ def width_of(line: FloatArray, left: FloatArray, right: FloatArray) -> float | N
     return None
 
 
-def fill_widths(segments: Iterable[Segment]) -> tuple[tuple[Segment, ...], int]:
+def fill_widths(segments: Mapping[Name, Segment]) -> tuple[tuple[Segment, ...], int]:
     """Give segments that have neither width nor boundaries one.
 
     In an intersection the mean width of its ends, if that is known, else a usual one.
@@ -164,23 +154,21 @@ def fill_widths(segments: Iterable[Segment]) -> tuple[tuple[Segment, ...], int]:
     Returns:
         The segments, and for how many of them the width is an assumption.
     """
-    by_name = {one.name: one for one in segments}
-    ends: dict[Name, list[float]] = {name: [] for name in by_name}
-    for before, options in following_of(by_name).items():
+    ends: dict[Name, list[float]] = {name: [] for name in segments}
+    for before, options in following_of(segments).items():
         for after in options:
             for name, end in ((before, after), (after, before)):
-                width_m = by_name[end].width_m
+                width_m = segments[end].width_m
                 if width_m is not None:
                     ends[name].append(width_m)
-    made, assumed = [], 0
-    for name, one in by_name.items():
+    filled, assumed = [], 0
+    for name, one in segments.items():
         if one.width_m is None and one.left is None:
             is_known = one.crosses and bool(ends[name])
-            width_m = round(fmean(ends[name]), 3) if is_known else USUAL_M
             assumed += not is_known
-            one = replace(one, width_m=width_m)
-        made.append(one)
-    return tuple(made), assumed
+            one = replace(one, width_m=round(fmean(ends[name]), 3) if is_known else USUAL_M)
+        filled.append(one)
+    return tuple(filled), assumed
 
 
 # Intersections
@@ -237,12 +225,12 @@ def crossing_segments(segments: Mapping[Name, Segment]) -> set[Name]:
     A segment of a fork or a merge does if its line crosses another's, unless both are of the same
     fork or merge; so does one that leads from a fork to a merge beside such a segment.
     """
-    names, lines = [], []
-    for name, segment in segments.items():
-        points = segment.centerline
-        if points is not None and len(points) >= 2 and np.isfinite(points).all():
-            names.append(name)
-            lines.append(shapely.LineString(points))
+    lines = {
+        name: shapely.LineString(one.centerline)
+        for name, one in segments.items()
+        if one.centerline is not None and len(one.centerline) >= 2
+    }
+    names = list(lines)
     following = following_of(segments)
     preceding: dict[Name, list[Name]] = {name: [] for name in segments}
     for before, options in following.items():
@@ -250,13 +238,13 @@ def crossing_segments(segments: Mapping[Name, Segment]) -> set[Name]:
             preceding[after].append(before)
     forked = {name: {b for b in preceding[name] if len(following[b]) > 1} for name in segments}
     merged = {name: {a for a in following[name] if len(preceding[a]) > 1} for name in segments}
-    rows = [row for row, name in enumerate(names) if forked[name] or merged[name]]
-    if not rows:
+    parting = [name for name in names if forked[name] or merged[name]]
+    if not parting:
         return set()
-    tree = shapely.STRtree(lines)
+    tree = shapely.STRtree([*lines.values()])
     inside: set[Name] = set()
-    for first, second in tree.query([lines[row] for row in rows], predicate="crosses").T:
-        one, other = names[rows[first]], names[second]
+    for first, second in tree.query([lines[name] for name in parting], predicate="crosses").T:
+        one, other = parting[first], names[second]
         joined = forked[one] & forked[other] or merged[one] & merged[other]
         if not joined and one not in following[other] and other not in following[one]:
             inside.add(one)

@@ -7,23 +7,15 @@ rounded to millimetres.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import shapely
 
-from augment.errors import InvalidDocument
-from augment.formats.road_map import (
-    FURTHEST_M,
-    FloatArray,
-    Name,
-    RoadMap,
-    Segment,
-    Way,
-    following_of,
-    ways_through,
-)
+from augment.formats.road_map import Name, RoadMap, Segment, Way, following_of, ways_through
+from augment.formats.values import FURTHEST, FloatArray, fault_at
 from augment.geometry.frames import Pose, difference
 from augment.geometry.polyline import Polyline
 from augment.scene.entities import Area, Lane, LaneConnector, TrafficLight, TrafficSide
@@ -33,7 +25,6 @@ RADIUS_M = 150.0
 """Map and agents further from the ego than this are left out."""
 SPACING_M = 2.0
 SAME_POINT_M = 0.05
-MOST_NAMED = 10
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -69,20 +60,15 @@ def road_around(city: RoadMap, ego: Pose) -> MapExtract:
     """Return the map around the ego's centre, which is given in the world frame.
 
     Raises:
-        InvalidDocument: A part has no shape; with the place and the reason of every fault.
+        InvalidDocument: A part has no shape.
     """
-    strips, problems = dict[Name, Strip](), []
+    strips = dict[Name, Strip]()
     for segment in city.segments:
         try:
             strip = _strip(segment, ego)
         except ValueError as fault:
-            problems.append((f"{city.place}.{segment.name}", str(fault)))
-        else:
-            strips |= {} if strip is None else {segment.name: strip}
-    if problems:
-        more = len(problems) - MOST_NAMED
-        rest = [(city.place, f"and {more} more")] if more > 0 else []
-        raise InvalidDocument(city.what, [*problems[:MOST_NAMED], *rest])
+            raise fault_at(f"{city.place}.{segment.name}", str(fault)) from None
+        strips |= {} if strip is None else {segment.name: strip}
     inside = {name for name, strip in strips.items() if strip.segment.crosses}
     plain = sorted(
         strips.keys() - inside, key=lambda name: (round(strips[name].distance_m, 3), name)
@@ -96,7 +82,7 @@ def road_around(city: RoadMap, ego: Pose) -> MapExtract:
         traffic_side=side or city.side,
         side_is_assumed=side is None,
         lanes=lanes,
-        connectors=_connectors(list(ways_through(following, inside)), strips, lane_ids),
+        connectors=_connectors(ways_through(following, inside), strips, lane_ids),
         areas=areas,
         far=len(city.segments) - len(strips) + len(city.areas) - len(areas),
     )
@@ -160,7 +146,7 @@ def _strip(segment: Segment, ego: Pose) -> Strip | None:
 
 def _local(points: FloatArray, ego: Pose) -> FloatArray:
     """Points (P, 2) in the ego frame, to the millimetre; NaN for what lies beyond the earth."""
-    return np.round(ego.to_local(np.where(np.abs(points) <= FURTHEST_M, points, np.nan)), 3)
+    return np.round(ego.to_local(np.where(np.abs(points) <= FURTHEST, points, np.nan)), 3)
 
 
 def _is_far(points: FloatArray) -> bool:
@@ -180,7 +166,7 @@ def _areas(city: RoadMap, ego: Pose) -> tuple[Area, ...]:
             ring = ring[:-1]
         if not np.isfinite(ring).all() or len(np.unique(ring, axis=0)) < 3:
             problem = f"has a {kind} area without an inside, or that is not finite"
-            raise InvalidDocument(city.what, [(city.place, problem)])
+            raise fault_at(city.place, problem)
         if _is_far(ring):
             continue
         distance_m = Polyline(np.vstack([ring, ring[:1]])).project(0.0, 0.0).distance_m
@@ -227,49 +213,47 @@ def _lane(
 
 
 def _connectors(
-    found: list[Way], strips: dict[Name, Strip], lane_ids: dict[Name, str]
+    ways: Iterable[Way], strips: dict[Name, Strip], lane_ids: dict[Name, str]
 ) -> tuple[LaneConnector, ...]:
     """Connectors, the nearest first; of equally near ones in the order of their names."""
-    ways = []
-    for way in found:
+    placed = []
+    for way in ways:
         line = _joined([strips[name].line for name in way.chain])
         ends = ["" if name is None else str(name).rjust(20) for name in (way.before, way.after)]
-        ways.append((round(line.project(0.0, 0.0).distance_m, 3), way.chain, ends, way, line))
-    ways.sort(key=lambda item: item[:3])
-    return tuple(
-        _connector(f"Connector{number}", way, line, strips, lane_ids)
-        for number, (*_, way, line) in enumerate(ways, start=1)
-    )
+        placed.append((round(line.project(0.0, 0.0).distance_m, 3), way.chain, ends, way, line))
+    placed.sort(key=lambda item: item[:3])
+    connectors = []
+    for number, (*_, way, line) in enumerate(placed, start=1):
+        chain = [strips[name] for name in way.chain]
+        before = None if way.before is None else strips[way.before]
+        connectors.append(
+            LaneConnector(
+                id=f"Connector{number}",
+                from_lane=None if way.before is None else lane_ids[way.before],
+                to_lane=None if way.after is None else lane_ids[way.after],
+                centerline=line,
+                **_along(chain, before, line),
+            )
+        )
+    return tuple(connectors)
 
 
-def _connector(
-    connector_id: str,
-    way: Way,
-    line: Polyline,
-    strips: dict[Name, Strip],
-    lane_ids: dict[Name, str],
-) -> LaneConnector:
-    chain = [strips[name] for name in way.chain]
+def _along(chain: Sequence[Strip], before: Strip | None, line: Polyline) -> dict[str, Any]:
+    """What the segments of a way say of it all along; the lane before may tell its light."""
     limits = [strip.segment.speed_limit_mps for strip in chain]
-    lengths = [strip.line.length_m for strip in chain]
-    # The first state along the way counts; the lane before may tell it for all.
-    entered = [] if way.before is None else [strips[way.before]]
-    lights = [strip.segment.light for strip in (*chain, *entered)]
+    lights = [strip.segment.light for strip in (*chain, *([] if before is None else [before]))]
     shown = [one for one in lights if one not in (TrafficLight.UNKNOWN, TrafficLight.NONE)]
     left = [strip.left for strip in chain if strip.left is not None]
     right = [strip.right for strip in chain if strip.right is not None]
-    return LaneConnector(
-        id=connector_id,
-        from_lane=None if way.before is None else lane_ids[way.before],
-        to_lane=None if way.after is None else lane_ids[way.after],
-        centerline=line,
-        width_m=round(float(np.average([strip.width_m for strip in chain], weights=lengths)), 3),
-        traffic_light=(*shown, lights[0])[0],
-        turn_type=(chain[0].segment.turn if len(chain) == 1 else None) or turn_type_of(line),
-        speed_limit_mps=max((limit for limit in limits if limit is not None), default=None),
-        left_boundary=_joined(left) if len(left) == len(chain) else None,
-        right_boundary=_joined(right) if len(right) == len(chain) else None,
-    )
+    lengths = [strip.line.length_m for strip in chain]
+    return {
+        "width_m": round(float(np.average([s.width_m for s in chain], weights=lengths)), 3),
+        "traffic_light": (*shown, lights[0])[0],
+        "turn_type": (chain[0].segment.turn if len(chain) == 1 else None) or turn_type_of(line),
+        "speed_limit_mps": max((limit for limit in limits if limit is not None), default=None),
+        "left_boundary": _joined(left) if len(left) == len(chain) else None,
+        "right_boundary": _joined(right) if len(right) == len(chain) else None,
+    }
 
 
 def _joined(lines: Sequence[Polyline]) -> Polyline:

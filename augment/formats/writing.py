@@ -3,7 +3,8 @@
 Frame of a cell: the ego frame of its scene.
 """
 
-from collections.abc import Callable, Iterable, Sequence
+from collections import defaultdict
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import date
 from functools import cached_property
@@ -14,7 +15,16 @@ from augment.errors import InvalidDocument
 from augment.formats.interplan.file import InterplanSource
 from augment.geometry.polyline import Polyline
 from augment.scene.codec import scene_to_document
-from augment.scene.entities import LaneConnector, Modification, ScenarioType, Scene, apply
+from augment.scene.entities import (
+    AgentType,
+    Area,
+    AreaKind,
+    LaneConnector,
+    Modification,
+    ScenarioType,
+    Scene,
+    apply,
+)
 from augment.scene.lane_graph import AnyLane
 from augment.scene.motion import SETS_OUT_WITHIN_M, Motion, MotionSource, Movement, motion_of
 from augment.scene.recording import Recording
@@ -110,17 +120,31 @@ class LossReport:
     """Gathers the losses of one cell while it is written."""
 
     def __init__(self, cell: Cell) -> None:
-        self._name = cell.name
+        self._cell = cell
         self.losses: list[Loss] = []
 
     def lose(self, text: str, *, changes_scene: bool = False) -> None:
-        """One line more."""
-        self.losses.append(Loss(cell=self._name, text=text, changes_scene=changes_scene))
+        """Add a line."""
+        self.losses.append(Loss(cell=self._cell.name, text=text, changes_scene=changes_scene))
 
     def lose_of(self, names: Sequence[str], text: str, *, changes_scene: bool = False) -> None:
-        """One line for all of these; none where there are none."""
+        """Add one line for all of these; none where there are none."""
         if names:
             self.lose(f"{', '.join(names)}: {text}", changes_scene=changes_scene)
+
+    def lose_types(self, texts: Mapping[AgentType, str]) -> None:
+        """Add one line for all agents of each of these types."""
+        for kind, text in texts.items():
+            others = [other.agent for other in self._cell.motion.others]
+            self.lose_of([agent.id for agent in others if agent.type is kind], text)
+
+    def lose_areas(self, areas: Iterable[Area], text: str) -> None:
+        """Add one line for all areas of a kind, which the text names by {}."""
+        by_kind: dict[AreaKind, list[str]] = defaultdict(list)
+        for area in areas:
+            by_kind[area.kind].append(area.id)
+        for kind, names in by_kind.items():
+            self.lose_of(names, text.format(kind))
 
 
 class CannotExpress(Exception):
@@ -217,6 +241,11 @@ def has_gaps(movement: Movement) -> bool:
     return bool((present[1:] & ~present[:-1]).sum() > (0 if present[0] else 1))
 
 
+def ways_of(scene: Scene) -> list[AnyLane]:
+    """Return lanes, then connectors."""
+    return [*scene.lanes, *scene.connectors]
+
+
 def bounds_of(way: AnyLane) -> tuple[Polyline, Polyline]:
     """The edges as the map has them, else half a width beside the centreline."""
     half_m = way.width_m / 2.0
@@ -243,11 +272,8 @@ def group_connectors(connectors: Iterable[LaneConnector]) -> list[list[LaneConne
     groups: list[tuple[set[str], list[LaneConnector]]] = []
     for connector in connectors:
         ends = {f"from {connector.from_lane}", f"to {connector.to_lane or connector.id}"}
-        members, others = [connector], []
-        for names, group in groups:
-            if names & ends:
-                ends, members = ends | names, [*group, *members]
-            else:
-                others.append((names, group))
-        groups = [*others, (ends, members)]
+        touching = [group for group in groups if group[0] & ends]
+        groups = [group for group in groups if not group[0] & ends]
+        members = [member for _, group in touching for member in group]
+        groups.append((ends.union(*(names for names, _ in touching)), [*members, connector]))
     return [members for _, members in groups]

@@ -5,7 +5,7 @@ from its first control point. N places, 4 control points.
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -20,11 +20,8 @@ CHORD_REACH_M = 0.75
 """A line's heading is read between the points this far before and past: a line of points has a
 kink at each of them, and what drives along it does not."""
 
-_INTERVALS = 32
-_KNOTS = np.linspace(0.0, 1.0, _INTERVALS + 1)
-_NODES, _WEIGHTS = (0.5 * part for part in np.polynomial.legendre.leggauss(5))
-_NODES = _NODES + 0.5
-_NEWTON_STEPS = 3
+_KNOTS = np.linspace(0.0, 1.0, 1001)
+"""Between these parameters a curve is taken as straight: a chord is some centimetres long."""
 _REFITS = 8
 _FIT_SAMPLES = (12, 120)
 _ERROR_EVERY_M = 0.05
@@ -61,7 +58,7 @@ class CubicBezier:
     @property
     def length_m(self) -> float:
         """The arc length from the first control point to the last."""
-        return float(self._lengths_m[-1])
+        return float(self._stations_m[-1])
 
     def points(self, t: FloatArray) -> FloatArray:
         """Return the points (N, 2) at the parameters (N,)."""
@@ -87,24 +84,7 @@ class CubicBezier:
 
     def parameters_at(self, stations_m: ArrayLike) -> FloatArray:
         """Return the parameters (N,) at the arc lengths (N,), which are clipped to the curve."""
-        lengths = self._lengths_m
-        stations = np.clip(np.asarray(stations_m, dtype=np.float64), 0.0, lengths[-1])
-        index = np.clip(np.searchsorted(lengths, stations, side="right") - 1, 0, _INTERVALS - 1)
-        low = _KNOTS[index]
-        wanted = stations - lengths[index]
-        steps = np.maximum(np.diff(lengths), 1e-12)
-        t = low + wanted / steps[index] / _INTERVALS
-        for _ in range(_NEWTON_STEPS):
-            speed = np.maximum(self._speeds(t), 1e-9)
-            t = t - (self._run(low, t) - wanted) / speed
-            t = np.clip(t, low, low + 1.0 / _INTERVALS)
-        return t
-
-    def length_to(self, t: float) -> float:
-        """Return the arc length from the first control point to the parameter."""
-        index = min(int(t * _INTERVALS), _INTERVALS - 1)
-        low, high = np.array([_KNOTS[index]]), np.array([t])
-        return float(self._lengths_m[index] + self._run(low, high)[0])
+        return np.interp(np.asarray(stations_m, dtype=np.float64), self._stations_m, _KNOTS)
 
     def pose_at(self, s_m: float, d_m: float = 0.0) -> Pose:
         """Return position and direction at s, d to the left; the ends are extended straight."""
@@ -115,17 +95,9 @@ class CubicBezier:
 
     def project(self, x_m: float, y_m: float) -> Projection:
         """Return the nearest place on the curve; of equally near ones the first."""
-        point = np.array([[x_m, y_m]])
-        gaps = self.points(_KNOTS) - point
-        guess = _KNOTS[[int(np.argmin((gaps * gaps).sum(axis=1)))]]
-        t = _nearest_parameters(self, point, guess)
-        ((dx, dy),) = point - self.points(t)
-        heading_rad = float(self.headings(t)[0])
-        left = math.cos(heading_rad) * dy - math.sin(heading_rad) * dx
-        distance = math.hypot(dx, dy)
-        return Projection(
-            s_m=self.length_to(float(t[0])), d_m=math.copysign(distance, left), distance_m=distance
-        )
+        place = Polyline(self.points(_KNOTS)).project(x_m, y_m)
+        heading_rad = float(self.headings(self.parameters_at([place.s_m]))[0])
+        return replace(place, heading_rad=heading_rad)
 
     @cached_property
     def _powers(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
@@ -134,19 +106,10 @@ class CubicBezier:
         return p0, 3.0 * (p1 - p0), 3.0 * (p0 - 2.0 * p1 + p2), p3 - p0 + 3.0 * (p1 - p2)
 
     @cached_property
-    def _lengths_m(self) -> FloatArray:
-        """The arc length at each knot, (K + 1,)."""
-        return np.concatenate([[0.0], np.cumsum(self._run(_KNOTS[:-1], _KNOTS[1:]))])
-
-    def _speeds(self, t: FloatArray) -> FloatArray:
-        steps = self.derivatives(t)
-        return np.asarray(np.hypot(steps[:, 0], steps[:, 1]), dtype=np.float64)
-
-    def _run(self, low: FloatArray, high: FloatArray) -> FloatArray:
-        """The arc lengths (N,) between parameters of one interval, by Gauss and Legendre."""
-        t = low[:, None] + (high - low)[:, None] * _NODES
-        speeds = self._speeds(t.ravel()).reshape(t.shape)
-        return np.asarray((high - low) * (speeds @ _WEIGHTS), dtype=np.float64)
+    def _stations_m(self) -> FloatArray:
+        """The arc length at each knot."""
+        steps = np.hypot(*np.diff(self.points(_KNOTS), axis=0).T)
+        return np.concatenate([[0.0], np.cumsum(steps)])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -182,7 +145,9 @@ def fit(
     t = shares
     curve = _least_squares(points, t, arms)
     for _ in range(_REFITS):
-        t = np.maximum.accumulate(_nearest_parameters(curve, points, t, steps=1))
+        along, gaps = curve.derivatives(t), curve.points(t) - points
+        share = (gaps * along).sum(axis=1) / np.maximum((along * along).sum(axis=1), 1e-12)
+        t = np.maximum.accumulate(np.clip(t - share, 0.0, 1.0))
         curve = _least_squares(points, t, arms)
     return curve
 
@@ -277,18 +242,3 @@ def _least_squares(
     if len(finishes) == 1:
         finishes = np.minimum(finishes, -1e-2)
     return CubicBezier([first, first + starts @ arms[0], last + finishes @ arms[1], last])
-
-
-def _nearest_parameters(
-    curve: CubicBezier, points: FloatArray, t: FloatArray, *, steps: int = 8
-) -> FloatArray:
-    """The parameters (N,) moved towards the curve's points nearest to `points` (N, 2)."""
-    for _ in range(steps):
-        along = curve.derivatives(t)
-        gaps = curve.points(t) - points
-        share = (gaps * along).sum(axis=1) / np.maximum((along * along).sum(axis=1), 1e-12)
-        moved = np.clip(t - share, 0.0, 1.0)
-        if np.abs(moved - t).max() < 1e-9:
-            break
-        t = moved
-    return t

@@ -104,6 +104,11 @@ def overlap(first: Box, second: Box) -> Overlap:
 
     The depth is the smallest overlap of their shadows on the four side directions.
     """
+    reach_m = math.hypot(first.length_m, first.width_m) + math.hypot(
+        second.length_m, second.width_m
+    )
+    if math.dist((first.pose.x_m, first.pose.y_m), (second.pose.x_m, second.pose.y_m)) > reach_m:
+        return APART
     one, other = first.corners_m, second.corners_m
     sides = np.concatenate([np.diff(one[:3], axis=0), np.diff(other[:3], axis=0)])
     axes = sides / np.hypot(sides[:, 0], sides[:, 1])[:, None]

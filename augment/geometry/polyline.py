@@ -20,11 +20,24 @@ FloatArray = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Projection:
-    """Where a point lies beside a line: along it, left of it (right is negative), and how far."""
+    """Where a point lies beside a line.
+
+    Attributes:
+        s_m: Along the line, within its ends.
+        d_m: The distance, negative right of the line.
+        heading_rad: The direction of travel there.
+        beyond_m: How far past one of the ends the point lies.
+    """
 
     s_m: float
     d_m: float
-    distance_m: float
+    heading_rad: float
+    beyond_m: float = 0.0
+
+    @property
+    def distance_m(self) -> float:
+        """From the line to the point."""
+        return abs(self.d_m)
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,20 +101,19 @@ class Polyline:
 
     def project(self, x_m: float, y_m: float) -> Projection:
         """The nearest place on the line; of equally near ones the first."""
-        starts = self.points_m[:-1]
-        lengths = np.diff(self.stations_m)
-        offset = np.array([x_m, y_m]) - starts
-        along = np.clip((offset * self._directions).sum(axis=1), 0.0, lengths)
-        gap = offset - along[:, None] * self._directions
-        distances = np.hypot(gap[:, 0], gap[:, 1])
+        offset = np.array([x_m, y_m]) - self.points_m[:-1]
+        along = (offset * self._directions).sum(axis=1)
+        past = along - np.clip(along, 0.0, np.diff(self.stations_m))
+        left = self._directions[:, 0] * offset[:, 1] - self._directions[:, 1] * offset[:, 0]
+        distances = np.hypot(left, past)
         index = int(np.argmin(distances))
-        direction = self._directions[index]
-        left = direction[0] * offset[index, 1] - direction[1] * offset[index, 0]
-        distance = float(distances[index])
+        past_m = float(past[index])
+        is_past_end = index == (0 if past_m < 0.0 else len(past) - 1)
         return Projection(
-            s_m=float(self.stations_m[index] + along[index]),
-            d_m=math.copysign(distance, left),
-            distance_m=distance,
+            s_m=float(self.stations_m[index] + along[index]) - past_m,
+            d_m=math.copysign(distances[index], left[index]),
+            heading_rad=math.atan2(*self._directions[index, ::-1].tolist()),
+            beyond_m=abs(past_m) if is_past_end else 0.0,
         )
 
     def resampled(self, spacing_m: float) -> Polyline:

@@ -14,10 +14,8 @@ import os
 import re
 import socket
 import time
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Callable, Collection, Mapping
 from contextlib import AbstractContextManager
-from datetime import UTC
-from email.utils import parsedate_to_datetime
 from typing import TYPE_CHECKING, Any
 from urllib.parse import urlsplit
 
@@ -36,11 +34,11 @@ from augment.llm.wire_transport import (
     ACCEPTED,
     CONNECT_TIMEOUT_S,
     LOOK_EVERY_S,
-    BadPacking,
     OutOfTime,
-    TooLong,
     Transport,
+    UnusableBody,
     Watch,
+    WireFault,
     watch_over,
 )
 
@@ -169,8 +167,22 @@ class OpenAIWire(AbstractContextManager["OpenAIWire"]):
             fault: ModelFault | Unwanted = fault_of_status(
                 error.status_code, error.body, wait_s, sent=document
             )
+        except Unwanted as why:
+            fault = Abandoned(why) if watch.has_written else why
+        except InvalidDocument as error:
+            fault = NotSent(error.problems[0][1])
+        except UnusableBody as error:
+            is_packed = "unpacked" in str(error)
+            fault = _unusable(str(error), retryable=is_packed)
+        except WireFault as error:
+            # Where nothing was written there is nothing to be billed.
+            kind = ModelFault if watch.has_written else NotSent
+            fault = kind(
+                f"the endpoint {error}" if isinstance(error, OutOfTime) else str(error),
+                retryable=True,
+            )
         except openai.OpenAIError as error:
-            fault = self._unanswered(error, watch)
+            fault = ModelFault(f"the request failed: {type(error).__name__}", retryable=False)
         except RecursionError:
             fault = _unusable("is nested too deeply to be read", status=None)
         except ValueError:
@@ -252,32 +264,6 @@ class OpenAIWire(AbstractContextManager["OpenAIWire"]):
             )
         return made
 
-    def _unanswered(self, error: BaseException, watch: Watch) -> ModelFault | Unwanted:
-        """Return the fault of a request that got no answer, or why nothing of it was sent."""
-        import openai
-
-        match watch.ended_by:
-            case Unwanted() as why:
-                return Abandoned(why) if watch.has_written else why
-            case OutOfTime():
-                limit = f"more than {self._timeout_s:g} s"
-                return _broken(f"the endpoint took too long to answer: {limit}", watch)
-            case TooLong():
-                size = f"{self._most_bytes / MEGABYTE:g} MB"
-                return _unusable(f"is longer than {size}", retryable=False)
-        inner = error
-        for inner in _causes(error):
-            if isinstance(inner, InvalidDocument):
-                return NotSent(inner.problems[0][1])
-            if isinstance(inner, BadPacking):
-                return _unusable(f"can't be unpacked: {inner}")
-        if isinstance(error, openai.APIConnectionError):
-            # Its text may hold parts of the request.
-            is_known = isinstance(inner, OSError) and inner.strerror
-            cause = inner.strerror if is_known else type(inner).__name__  # type: ignore[attr-defined]
-            return _broken(f"the connection failed: {cause}", watch)
-        return ModelFault(f"the request failed: {type(error).__name__}", retryable=False)
-
 
 def fault_of_status(
     status: int, body: object, wait_s: float | None, *, sent: Collection[str] = ()
@@ -352,21 +338,8 @@ def _client(
     )
 
 
-def _broken(message: str, watch: Watch) -> ModelFault:
-    """Return a fault that may pass; where nothing was written there is nothing to be billed."""
-    return (ModelFault if watch.has_written else NotSent)(message, retryable=True)
-
-
 def _unusable(what: str, *, retryable: bool = True, status: int | None = 200) -> ModelFault:
     return ModelFault(f"the endpoint's answer {what}", retryable=retryable, status=status)
-
-
-def _causes(error: BaseException) -> Iterator[BaseException]:
-    """Yield the error and what led to it, the innermost last."""
-    inner: BaseException | None = error
-    while inner is not None:
-        yield inner
-        inner = inner.__cause__ or inner.__context__
 
 
 def _refused(message: str, code: str, param: str, sent: Collection[str]) -> str | None:
@@ -383,19 +356,12 @@ def _refused(message: str, code: str, param: str, sent: Collection[str]) -> str 
 
 
 def _retry_after_s(headers: Mapping[str, str]) -> float | None:
-    """Return the wait that the headers (names in lower case) ask for, None for none."""
+    """Return the wait that the headers (names in lower case) ask for, None for none or a date."""
     for name, unit_s in (("retry-after-ms", 0.001), ("retry-after", 1.0)):
-        value = headers.get(name, "")
         try:
-            seconds = float(value) * unit_s
+            seconds = float(headers.get(name, "")) * unit_s
         except ValueError:
-            try:
-                at = parsedate_to_datetime(value)
-                # A date that names no zone is in UTC, as all are.
-                zoned = at if at.tzinfo is not None else at.replace(tzinfo=UTC)
-                seconds = zoned.timestamp() - time.time()
-            except (ValueError, OverflowError, TypeError, IndexError):
-                continue
+            continue
         if math.isfinite(seconds):
             return max(0.0, seconds)
     return None

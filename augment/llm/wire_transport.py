@@ -1,24 +1,20 @@
 """HTTP for the `openai` package that no server can hold up, swell or redirect.
 
 A call ends with its time, with too much in its answer, or when nobody wants it any more. A
-connection leads to the address that was checked. An answer is read whole, within a limit once
-unpacked.
+connection leads to the address that was checked. An answer is read whole, within a limit.
 """
 
 from __future__ import annotations
 
-import select
-import socket
 import ssl
-import threading
 import time
-import zlib
 from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import Future
 from contextlib import AbstractContextManager, contextmanager
 from contextvars import ContextVar
-from typing import TYPE_CHECKING, Any
+from threading import Thread
+from typing import TYPE_CHECKING
 
-from augment.errors import InvalidDocument, Unwanted
 from augment.llm.addresses import Resolve, addresses_of
 
 if TYPE_CHECKING:
@@ -28,29 +24,27 @@ if TYPE_CHECKING:
 LOOK_EVERY_S = 1.0
 """So often somebody who waits for an answer asks whether it is still wanted."""
 CONNECT_TIMEOUT_S = 10.0
-ACCEPTED = "gzip"
-"""What is asked for; it can be unpacked up to a limit."""
+ACCEPTED = "identity"
+"""Nothing is to come packed, for what it unpacks to has no bound."""
 
 # What may come beside a body: status, headers, the sizes of chunks. One header block of more
 # than 100 kB is refused by the HTTP parser anyway.
 _BESIDE_THE_BODY = 256 * 1024
 _AT_ONCE = 64 * 1024
 _SHORTEST_S = 0.001
-_GZIP = 31
 _MOST_CONNECTIONS = 100
-_UNPACKED_AWAY = (b"content-encoding", b"content-length", b"transfer-encoding")
 
 
-class OutOfTime(Exception):
+class WireFault(Exception):
+    """The call has no answer; the text says why and holds nothing of the request."""
+
+
+class OutOfTime(WireFault):
     """The call has had its time."""
 
 
-class TooLong(Exception):
-    """More came than an answer may have."""
-
-
-class BadPacking(Exception):
-    """A body is packed in a way that nobody asked for, or is broken."""
+class UnusableBody(WireFault):
+    """The body of a success is longer than an answer may be, or comes packed."""
 
 
 class Watch:
@@ -65,7 +59,6 @@ class Watch:
 
     Attributes:
         has_written: Whether anything was sent.
-        ended_by: Why it ended the call, None where it did not.
     """
 
     def __init__(
@@ -79,7 +72,7 @@ class Watch:
     ) -> None:
         self.most_bytes = most_bytes
         self.has_written = False
-        self.ended_by: OutOfTime | TooLong | Unwanted | None = None
+        self._longest_s = longest_s
         self._still_wanted, self._look_every_s, self._clock = still_wanted, look_every_s, clock
         self._ends_at = clock() + longest_s
         self._looks_at = clock() + look_every_s
@@ -94,32 +87,30 @@ class Watch:
         """
         now = self._clock()
         if now >= self._ends_at:
-            self.ended_by = OutOfTime()
-            raise self.ended_by
+            raise OutOfTime(f"took too long to answer: more than {self._longest_s:g} s")
         if now >= self._looks_at:
             self._looks_at = now + self._look_every_s
-            try:
-                self._still_wanted()
-            except Unwanted as why:
-                self.ended_by = why
-                raise
+            self._still_wanted()
         return max(min(self._ends_at, self._looks_at) - now, _SHORTEST_S)
 
-    def connect_s(self) -> float:
-        """Return how long a step on the way to a connection may take; raises as above."""
+    def left_s(self, most_s: float) -> float:
+        """Return how long one step may take that can't be interrupted; raises as above."""
         self.wait_s()
-        return max(min(self._ends_at - self._clock(), CONNECT_TIMEOUT_S), _SHORTEST_S)
+        return max(min(self._ends_at - self._clock(), most_s), _SHORTEST_S)
 
     def came(self, count: int) -> None:
         """Count bytes as they came over the network.
 
         Raises:
-            TooLong: They are more than any answer may have.
+            UnusableBody: They are more than any answer may have.
         """
         self._came += count
         if self._came > self.most_bytes + _BESIDE_THE_BODY:
-            self.ended_by = TooLong()
-            raise self.ended_by
+            raise self.too_long()
+
+    def too_long(self) -> UnusableBody:
+        """Return the fault of an answer beyond the limit."""
+        return UnusableBody(f"is longer than {self.most_bytes / 1e6:g} MB")
 
 
 _WATCH: ContextVar[Watch] = ContextVar("watch over this thread's call")
@@ -159,8 +150,7 @@ class Transport(AbstractContextManager["Transport"]):
         """Return the answer, read to its end.
 
         Raises:
-            httpx2.TransportError: There is none; what led to it is its cause. The package knows
-                errors of this kind alone.
+            WireFault, Unwanted, InvalidDocument: There is none.
         """
         import httpcore2
         import httpx2
@@ -181,12 +171,14 @@ class Transport(AbstractContextManager["Transport"]):
             finally:
                 answer.close()
         except (
-            *(OSError, OutOfTime, TooLong, BadPacking, Unwanted, InvalidDocument),
             *(httpcore2.NetworkError, httpcore2.ProtocolError, httpcore2.ProxyError),
-            httpcore2.TimeoutException,
+            *(httpcore2.TimeoutException, OSError),
         ) as error:
-            raise httpx2.TransportError(type(error).__name__) from error
-        headers = [entry for entry in answer.headers if entry[0].lower() not in _UNPACKED_AWAY]
+            # Its text may hold parts of the request.
+            cause = error.__cause__ or error.__context__ or error
+            reason = getattr(cause, "strerror", None) or type(error).__name__
+            raise WireFault(f"the connection failed: {reason}") from None
+        headers = [entry for entry in answer.headers if entry[0].lower() not in _OF_THE_TRANSFER]
         return httpx2.Response(answer.status, headers=headers, content=body)
 
     def __exit__(self, *fault: object) -> None:
@@ -197,56 +189,33 @@ class Transport(AbstractContextManager["Transport"]):
         self._pool.close()
 
 
-# Private
+# --- Private -----------------------------------------------------------------------------------
+
+_OF_THE_TRANSFER = (b"content-encoding", b"content-length", b"transfer-encoding")
 
 
 def _body_of(answer: httpcore2.Response) -> bytes:
-    """Read a body, unpacked; empty for an error whose body can't be read: its status says enough.
+    """Read a body; empty for an error whose body can't be read: its status says enough.
 
     Raises:
-        TooLong, OutOfTime, BadPacking: The body of a success can't be read.
+        OutOfTime, UnusableBody: The body of a success can't be read.
     """
-    watch = _WATCH.get()
-    packings = [
-        word
-        for name, value in answer.headers
-        if name.lower() == b"content-encoding"
-        for word in value.decode("latin-1").lower().replace(" ", "").split(",")
-        if word not in ("", "identity")
-    ]
+    watch, body = _WATCH.get(), bytearray()
+    packing = {name.lower(): value for name, value in answer.headers}.get(
+        b"content-encoding", b"identity"
+    )
     assert isinstance(answer.stream, Iterable)
     try:
-        return _unpack(answer.stream, packings, watch.most_bytes)
-    except (TooLong, OutOfTime, BadPacking) as fault:
-        watch.ended_by = None if isinstance(fault, BadPacking) else fault
+        if packing.lower() != b"identity":
+            raise UnusableBody(f"can't be unpacked: {packing.decode('latin-1')[:80]}")
+        for chunk in answer.stream:
+            body += chunk
+            if len(body) > watch.most_bytes:
+                raise watch.too_long()
+    except (OutOfTime, UnusableBody):
         if answer.status < 400:
             raise
-    watch.ended_by = None
-    return b""
-
-
-def _unpack(chunks: Iterable[bytes], packings: list[str], most_bytes: int) -> bytes:
-    """Return a body; never is more than so many bytes held, whatever it was packed from."""
-    if packings and packings not in (["gzip"], ["x-gzip"]):
-        raise BadPacking(", ".join(packings)[:80])
-    unpacker = zlib.decompressobj(_GZIP) if packings else None
-    body = bytearray()
-    for chunk in chunks:
-        while chunk:
-            room = most_bytes + 1 - len(body)
-            if unpacker is None:
-                part, chunk = chunk[:room], b""
-            else:
-                try:
-                    part = unpacker.decompress(chunk, room)
-                except zlib.error as error:
-                    raise BadPacking(f"{packings[0]}, broken") from error
-                chunk = unpacker.unconsumed_tail
-            body += part
-            if len(body) > most_bytes:
-                raise TooLong
-    if unpacker is not None and not unpacker.eof:
-        raise BadPacking(f"{packings[0]}, cut off")
+        return b""
     return bytes(body)
 
 
@@ -264,77 +233,61 @@ class _Network:
 
         Raises:
             InvalidDocument: One of its addresses is forbidden.
-            OSError: The name is unknown, or nobody listens.
+            OSError, httpcore2.ConnectError: The name is unknown, or nobody listens.
         """
-        problem: OSError = OSError(f"{host} has no address")
+        import httpcore2
+
+        problem: Exception = OSError(f"{host} has no address")
         for address in self._addresses(host):
+            limit_s = _WATCH.get().left_s(CONNECT_TIMEOUT_S)
             try:
-                sock = socket.create_connection((address, port), _WATCH.get().connect_s())
-            except OSError as error:
+                backend = httpcore2.SyncBackend()
+                return _Stream(backend.connect_tcp(address, port, timeout=limit_s))
+            except (httpcore2.ConnectError, httpcore2.ConnectTimeout) as error:
                 problem = error
-            else:
-                sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-                return _Stream(sock)
         raise problem
 
     def _addresses(self, host: str) -> list[str]:
         """Look the name up in a thread of its own, because a look can't be ended."""
-        outcomes: list[list[str] | InvalidDocument | OSError | UnicodeError] = []
+        addresses: Future[list[str]] = Future()
 
         def look() -> None:
             try:
-                outcomes.append(addresses_of(host, resolve=self._resolve, checks=self._checks))
-            except (InvalidDocument, OSError, UnicodeError) as error:
-                outcomes.append(error)
+                found = addresses_of(host, resolve=self._resolve, checks=self._checks)
+                addresses.set_result(found)
+            except Exception as error:
+                addresses.set_exception(error)
 
-        thread = threading.Thread(target=look, name="look up a name", daemon=True)
-        thread.start()
-        thread.join(_WATCH.get().connect_s())
-        if not outcomes:
-            raise TimeoutError(f"{host} could not be looked up in time")
-        if isinstance(outcomes[0], Exception):
-            raise outcomes[0]
-        return outcomes[0]
+        Thread(target=look, name="look up a name", daemon=True).start()
+        return addresses.result(_WATCH.get().left_s(CONNECT_TIMEOUT_S))
 
 
 class _Stream:
     """A connection that asks the watch of the running call before every wait."""
 
-    def __init__(self, sock: socket.socket) -> None:
-        self._socket = sock
+    def __init__(self, stream: httpcore2.NetworkStream) -> None:
+        self._stream = stream
+        self.close, self.get_extra_info = stream.close, stream.get_extra_info
 
     def read(self, max_bytes: int, timeout: float | None = None) -> bytes:
         """Return what came, as soon as anything has; nothing at the end."""
+        import httpcore2
+
         watch = _WATCH.get()
         while True:
-            self._socket.settimeout(watch.wait_s())
             try:
-                data = self._socket.recv(min(max_bytes, _AT_ONCE))
-            except TimeoutError:
+                data = self._stream.read(min(max_bytes, _AT_ONCE), watch.wait_s())
+            except httpcore2.ReadTimeout:
                 continue
             watch.came(len(data))
             return data
 
     def write(self, buffer: bytes, timeout: float | None = None) -> None:
         """Send all of it."""
-        import httpcore2
-
-        watch, rest = _WATCH.get(), memoryview(buffer)
-        while rest:
-            self._socket.settimeout(watch.wait_s())
-            try:
-                sent = self._socket.send(rest)
-            except TimeoutError:
-                continue
-            except OSError as error:
-                # After this error the answer is read: the server may have answered early.
-                raise httpcore2.WriteError(str(error)) from error
-            watch.has_written = True
-            rest = rest[sent:]
-
-    def close(self) -> None:
-        """Close the connection."""
-        self._socket.close()
+        watch = _WATCH.get()
+        limit_s = watch.left_s(float("inf"))
+        watch.has_written = True
+        self._stream.write(buffer, limit_s)
 
     def start_tls(
         self,
@@ -343,22 +296,5 @@ class _Stream:
         timeout: float | None = None,
     ) -> _Stream:
         """Return the same connection, encrypted."""
-        try:
-            self._socket.settimeout(_WATCH.get().connect_s())
-            return _Stream(ssl_context.wrap_socket(self._socket, server_hostname=server_hostname))
-        except (OSError, ValueError):
-            self.close()
-            raise
-
-    def get_extra_info(self, info: str) -> Any:
-        """Return what the pool asks about a connection."""
-        if info == "ssl_object" and isinstance(self._socket, ssl.SSLSocket):
-            return self._socket
-        if info == "is_readable":
-            # An idle connection that has something to say was closed, mostly.
-            if self._socket.fileno() < 0:
-                return True
-            poll = select.poll()
-            poll.register(self._socket, select.POLLIN)
-            return bool(poll.poll(0))
-        return None
+        limit_s = _WATCH.get().left_s(CONNECT_TIMEOUT_S)
+        return _Stream(self._stream.start_tls(ssl_context, server_hostname, limit_s))

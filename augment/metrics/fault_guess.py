@@ -9,7 +9,6 @@ __all__ = ["FaultClass", "first_guess"]
 _FOLLOWS_PLACE = frozenset(
     {
         FindingKind.OVERLAP,
-        FindingKind.WALK_CROSSING,
         FindingKind.WALK_BLOCKED,
         FindingKind.ASKED_CROSSING,
         FindingKind.LANE_NAMED,

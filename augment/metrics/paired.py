@@ -160,13 +160,11 @@ class Robustness:
         scenarios: How many those are.
         wordings: How many wordings they have together.
         within_m: The pooled standard deviation within a scenario.
-        median_range_m: The median over scenarios of the largest less the smallest value.
     """
 
     scenarios: int
     wordings: int
     within_m: float
-    median_range_m: float
 
 
 def measure_robustness(values: Mapping[str, Sequence[float]]) -> Robustness | None:
@@ -179,12 +177,8 @@ def measure_robustness(values: Mapping[str, Sequence[float]]) -> Robustness | No
     within_m = within_sd(several)
     if within_m is None:
         return None
-    return Robustness(
-        scenarios=len(several),
-        wordings=sum(len(wordings) for wordings in several),
-        within_m=within_m,
-        median_range_m=float(np.median([np.ptp(wordings) for wordings in several])),
-    )
+    wordings = sum(map(len, several))
+    return Robustness(scenarios=len(several), wordings=wordings, within_m=within_m)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -82,25 +82,19 @@ class FaultMark:
     belongs_m: Point | None = None
 
 
-def draw(
-    scene: Scene, modification: Modification, camera: Camera, *, labels: bool = False
-) -> bytes:
+def draw(scene: Scene, modification: Modification, camera: Camera) -> bytes:
     """Draw the scene after a change, as the bytes of a PNG.
 
     Args:
         scene: The scene before the change.
         modification: What changes; removed agents are gone, added and moved ones are marked.
         camera: The window that all pictures of a scenario share (`camera_for`).
-        labels: Whether ids, metres and faint outlines of what is gone are drawn, for reviewers
-            and analysts, never for a vote; such a picture has half as many pixels each way.
 
     Raises:
         InvalidModification: The change does not fit the scene.
     """
-    ground, taken = _paint_scene(scene, modification, camera, ghosts=labels)
-    if labels:
-        draw_labels(ground, apply(scene, modification), taken=taken)
-    return ground.png(halved=labels)
+    ground, _ = _paint_scene(scene, modification, camera, ghosts=False)
+    return ground.png()
 
 
 def draw_for_review(scene: Scene, modification: Modification, camera: Camera) -> tuple[bytes, ...]:

@@ -11,10 +11,7 @@ spread evenly over the curve's own arc length: the place 21.4 m along a lane is 
 every part of the program, and no distance is lost or gained at a joint.
 """
 
-from __future__ import annotations
-
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 
@@ -36,7 +33,6 @@ SHORTEST_PIECE_M = 1.0
 """Nothing is cut shorter: below it the points of a recorded line are its shape."""
 
 _CUTS_TRIED = 9
-_LOOSER = 1.03
 _END_SAMPLES = 21
 _END_M = 2.0 * CHORD_REACH_M
 _FREE_ENDS = ((False, False), (False, True), (True, False))
@@ -53,11 +49,11 @@ class Tolerance:
     position_m: float = 0.092
     heading_rad: float = math.radians(2.9)
 
-    def loosened(self, factor: float) -> Tolerance:
+    def loosened(self, factor: float) -> "Tolerance":
         """Return so many times as much."""
         return Tolerance(factor * self.position_m, factor * self.heading_rad)
 
-    def used_by(self, *pieces: LanePiece) -> float:
+    def used_by(self, *pieces: "LanePiece") -> float:
         """Return the largest share that the errors of pieces use up; above 1 it is too large."""
         return max(
             max(
@@ -150,17 +146,7 @@ def bezier_lane(line: Polyline, tolerance: Tolerance | None = None) -> BezierLan
     lanes in every augmentation of a scene: what was fitted lately is remembered.
     """
     allowed = tolerance or Tolerance()
-    # Pieces that may stay, and those that a cut is judged by; the first way needs fewest pieces
-    # and no long search.
-    ways = ((_loose_piece, _smooth_piece), (_smooth_piece,) * 2, (_loose_piece,) * 2)
-    found: list[list[LanePiece]] = []
-    # A cut is judged by what it leaves: where one aim leads nowhere, a looser one may.
-    for aim in (allowed, allowed.loosened(_LOOSER)):
-        for kept, tried in ways:
-            found.append(_cut(line, (0.0, line.length_m), aim, kept, tried))
-            if aim.used_by(*found[-1]) <= 1.0:
-                return BezierLane(pieces=tuple(found[-1]))
-    return BezierLane(pieces=tuple(min(found, key=lambda pieces: allowed.used_by(*pieces))))
+    return BezierLane(pieces=tuple(_cut(line, (0.0, line.length_m), allowed)))
 
 
 def straight_curve(start_m: ArrayLike, end_m: ArrayLike) -> CubicBezier:
@@ -185,30 +171,22 @@ def _letters(number: int) -> str:
     return ("" if before == 0 else _letters(before - 1)) + chr(ord("a") + last)
 
 
-_Fitting = Callable[[Polyline, _Span, Tolerance], LanePiece]
-
-
-def _cut(
-    line: Polyline, span: _Span, allowed: Tolerance, kept: _Fitting, tried: _Fitting
-) -> list[LanePiece]:
+def _cut(line: Polyline, span: _Span, allowed: Tolerance) -> list[LanePiece]:
     """The part of the line as the pieces that it takes to stay within the tolerance."""
     straight = _straight_piece(line, span)
     if STRAIGHT.used_by(straight) <= 1.0:
         return [straight]
-    whole = kept(line, span, allowed)
+    whole = _loose_piece(line, span, allowed)
     if allowed.used_by(whole) <= 1.0 or whole.length_m < 2.0 * SHORTEST_PIECE_M:
         return [whole]
-    halves = _best_halves(line, span, allowed, tried)
+    halves = _best_halves(line, span, allowed)
     strays = whole.error.position_m > allowed.position_m
     if not strays and allowed.used_by(*halves) >= allowed.used_by(whole):
         return [whole]
-    spans = [(half.start_m, half.end_m) for half in halves]
-    return [small for half in spans for small in _cut(line, half, allowed, kept, tried)]
+    return [piece for half in halves for piece in _cut(line, (half.start_m, half.end_m), allowed)]
 
 
-def _best_halves(
-    line: Polyline, span: _Span, allowed: Tolerance, piece_of: _Fitting
-) -> tuple[LanePiece, LanePiece]:
+def _best_halves(line: Polyline, span: _Span, allowed: Tolerance) -> tuple[LanePiece, LanePiece]:
     """The two pieces whose worse one is best, over a coarse row of cuts and then a fine one.
 
     Above all none may be off its place, for it would have to be cut again.
@@ -223,7 +201,7 @@ def _best_halves(
     for _ in range(2):
         cuts_m = np.linspace(low_m, high_m, _CUTS_TRIED)
         halves = [
-            (piece_of(line, (start_m, cut_m), allowed), piece_of(line, (cut_m, end_m), allowed))
+            (_piece(line, (start_m, cut_m)), _piece(line, (cut_m, end_m)))
             for cut_m in cuts_m.tolist()
         ]
         best = min(range(_CUTS_TRIED), key=lambda number: badness(halves[number]))
@@ -231,21 +209,14 @@ def _best_halves(
     return halves[best]
 
 
-def _smooth_piece(line: Polyline, span: _Span, allowed: Tolerance) -> LanePiece:
-    """One cubic with the line's heading at both of its ends."""
-    return _piece(line, span, fixed=(True, True))
-
-
 def _loose_piece(line: Polyline, span: _Span, allowed: Tolerance) -> LanePiece:
     """One cubic with the line's headings, or without where it comes closer so."""
-    smooth = _smooth_piece(line, span, allowed)
+    smooth = _piece(line, span)
     if allowed.used_by(smooth) <= 1.0:
         return smooth
-    free = [_piece(line, span, fixed=fixed) for fixed in _FREE_ENDS]
-    return min([smooth, *free], key=allowed.used_by)
+    return min([smooth, *(_piece(line, span, ends) for ends in _FREE_ENDS)], key=allowed.used_by)
 
 
-@lru_cache(maxsize=1024)  # where a cut leads nowhere, the next way to cut asks for the same
 def _straight_piece(line: Polyline, span: _Span) -> LanePiece:
     """The chord of a part of the line."""
     curve = straight_curve(*line.points_at(np.array(span)))
@@ -253,8 +224,8 @@ def _straight_piece(line: Polyline, span: _Span) -> LanePiece:
     return LanePiece(curve=curve, start_m=span[0], end_m=span[1], error=error, is_straight=True)
 
 
-@lru_cache(maxsize=1024)
-def _piece(line: Polyline, span: _Span, *, fixed: tuple[bool, bool]) -> LanePiece:
+def _piece(line: Polyline, span: _Span, fixed: tuple[bool, bool] = (True, True)) -> LanePiece:
+    """One cubic with the line's heading at the ends where that is fixed."""
     start_rad, end_rad = (
         _heading_of(line, s_m) if is_fixed else None
         for s_m, is_fixed in zip(span, fixed, strict=True)

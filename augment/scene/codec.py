@@ -12,9 +12,8 @@ from itertools import pairwise
 from typing import Annotated, Any
 
 import numpy as np
-from pydantic import Field, TypeAdapter
+from pydantic import BeforeValidator, Field, PlainSerializer, TypeAdapter
 
-from augment.errors import InvalidDocument
 from augment.scene.entities import AgentType, Modification, ScenarioType, Scene, TurnType
 from augment.scene.intent import CrashRequest, Intent, Length, WalkRequest
 from augment.scene.recording import Recording
@@ -22,8 +21,6 @@ from augment.scene.schema import CLOSED, Codec, Problem, Text, Yes, path
 
 EGO_ID = "Agent1"
 ENGLISH = "en"
-COLUMNS = ["x_m", "y_m", "heading_rad", "speed_mps"]
-"""What the four numbers of a recorded state are."""
 _ALWAYS_WRITTEN = ("requests", "kind", "body")
 
 
@@ -146,50 +143,18 @@ INTENT = Codec("intent", TypeAdapter(Intent), _intent_problems)
 scene_to_document, scene_from_document = SCENE.to_document, SCENE.from_document
 modification_to_document = MODIFICATION.to_document
 modification_from_document = MODIFICATION.from_document
+recording_to_document, recording_from_document = RECORDING.to_document, RECORDING.from_document
 intent_from_document, intent_from_parts = INTENT.from_document, INTENT.from_parts
-
-
-def recording_to_document(recording: Recording) -> dict[str, Any]:
-    """Return the recording as a JSON document; a step where one was not seen is null.
-
-    Raises:
-        InvalidDocument: The recording breaks a rule of the format.
-    """
-    document = {**RECORDING.frame, "columns": list(COLUMNS), **RECORDING.dump(recording)}
-    recording_from_document(document)
-    return document
-
-
-def recording_from_document(document: object) -> Recording:
-    """Return the recording that a JSON document describes.
-
-    Raises:
-        InvalidDocument: With the path and the reason of every fault.
-    """
-    columns = None
-    if isinstance(document, dict):
-        columns = document.get("columns")
-        document = {name: part for name, part in document.items() if name != "columns"}
-    recording = RECORDING.from_document(document)
-    if columns != COLUMNS:
-        text = f"expected {', '.join(COLUMNS)} in this order"
-        raise InvalidDocument("recording", [("columns", text)])
-    return recording
 
 
 def intent_to_document(intent: Intent) -> dict[str, Any]:
     """Return the intent as a JSON document; open parts and plain defaults are left out."""
-    return INTENT.frame | intent_to_parts(intent)
+    parts: dict[str, Any] = intent_to_parts(intent)
+    return INTENT.frame | parts
 
 
-def intent_to_parts(intent: Intent) -> dict[str, Any]:
-    """Return the requests, and whatever else the intent says."""
-    parts: dict[str, Any] = _written(intent)
-    return parts
-
-
-def _written(value: Any) -> Any:
-    """A value as a part of a document, without what is at its default."""
+def intent_to_parts(value: Any) -> Any:
+    """Return an intent, or what it is made of, as a part of a document without defaults."""
     if isinstance(value, Length):
         written: dict[str, Any] = {"low_m": value.low_m}
         if value.is_range:
@@ -198,11 +163,11 @@ def _written(value: Any) -> Any:
     if isinstance(value, Enum):
         return value.value
     if isinstance(value, tuple):
-        return [_written(part) for part in value]
+        return [intent_to_parts(part) for part in value]
     if not is_dataclass(value):
         return value
     return {
-        field.name: _written(part)
+        field.name: intent_to_parts(part)
         for field in fields(value)
         if (part := getattr(value, field.name)) != field.default or field.name in _ALWAYS_WRITTEN
     }
@@ -237,7 +202,7 @@ class CatalogueEntry:
 
     Attributes:
         scene: The name of its base scene.
-        language: Of the instruction.
+        language: Of the instruction; English goes without saying.
         instruction: What is to be changed, in the user's words.
         paraphrases: The same wish in other words, each to be answered by the same reference.
         keep_traffic: Whether the recorded traffic stays in the scene.
@@ -258,40 +223,17 @@ class CatalogueEntry:
     keep_traffic: Yes
     provenance: _Words
     notes: Text = ""
-    intent: Annotated[Intent | None, Field(exclude=True)] = None
-    reference: Annotated[Modification, Field(exclude=True)]
+    intent: Annotated[
+        Intent | None,
+        BeforeValidator(lambda given: given and intent_from_document(given)),
+        PlainSerializer(lambda intent: intent and intent_to_document(intent)),
+    ] = None
+    reference: Annotated[
+        Modification,
+        BeforeValidator(modification_from_document),
+        PlainSerializer(modification_to_document),
+    ]
 
 
 _ENTRY = Codec("scenario", TypeAdapter(CatalogueEntry))
-
-
-def entry_to_document(entry: CatalogueEntry) -> dict[str, Any]:
-    """Return the entry as a JSON document, the reference last because it is long.
-
-    English and an instruction without paraphrases go without saying.
-    """
-    return {
-        **_ENTRY.frame,
-        **_ENTRY.dump(entry),
-        "intent": None if entry.intent is None else intent_to_document(entry.intent),
-        "reference": modification_to_document(entry.reference),
-    }
-
-
-def entry_from_document(document: object) -> CatalogueEntry:
-    """Return the entry that a JSON document describes; whether it fits its scene is open.
-
-    Raises:
-        InvalidDocument: With the path and the reason of every fault.
-    """
-    if isinstance(document, dict):
-        document = dict(document)
-        for name, codec in (("reference", MODIFICATION), ("intent", INTENT)):
-            if document.get(name) is None:
-                continue
-            try:
-                document[name] = codec.from_document(document[name])
-            except InvalidDocument as fault:
-                problems = [(f"{name}.{place}", text) for place, text in fault.problems]
-                raise InvalidDocument("scenario", problems) from None
-    return _ENTRY.from_document(document)
+entry_to_document, entry_from_document = _ENTRY.to_document, _ENTRY.from_document

@@ -17,7 +17,6 @@ from augment.scene.lane_graph import LaneGraph, LanePosition
 
 REACH_M = 300.0
 """How far ahead of the ego and behind it the lanes are followed."""
-_SHORTEST_M = 1.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -111,26 +110,6 @@ class EgoRoute:
     def lane_position(self, ahead_m: float, left_m: float = 0.0) -> LanePosition | None:
         """The position on the lane that is so far ahead, None past the end of the lanes."""
         return self.graph.along(self.lane_id, self.lane_s_m, ahead_m, left_m, turn=self.turn)
-
-    def corridor(self, length_m: float) -> tuple[Polyline, float] | None:
-        """The route from the ego on over the lanes that begin within a length, and their width.
-
-        The width is the mean of the lanes. None where the route ends at the ego.
-        """
-        first = self.lane_ids.index(self.lane_id)
-        begins_m = (-self.lane_s_m, *self.ends_m[first:])
-        ahead = [
-            (name, end_m)
-            for name, begin_m, end_m in zip(
-                self.lane_ids[first:], begins_m, self.ends_m[first:], strict=False
-            )
-            if begin_m < length_m
-        ]
-        end_m = ahead[-1][1]
-        if end_m < _SHORTEST_M:
-            return None
-        width_m = sum(self.graph.lane(name).width_m for name, _ in ahead) / len(ahead)
-        return self.line.between(self.ego_s_m, self.ego_s_m + end_m), width_m
 
 
 def find_ego_lane(scene: Scene, graph: LaneGraph) -> str | None:

@@ -121,12 +121,22 @@ class Side(StrEnum):
         """The opposite side."""
         return Side.RIGHT if self is Side.LEFT else Side.LEFT
 
+    @property
+    def sign(self) -> float:
+        """Of numbers to that side: left is positive."""
+        return 1.0 if self is Side.LEFT else -1.0
+
 
 class Relation(StrEnum):
     """On which end of its anchor a distance is measured."""
 
     AHEAD = "ahead"
     BEHIND = "behind"
+
+    @property
+    def words(self) -> str:
+        """Between a place and what it is counted from."""
+        return "ahead of" if self is Relation.AHEAD else "behind"
 
 
 class LaneChoice(StrEnum):
@@ -181,6 +191,12 @@ class Pick:
         if self.every and self.ordinal != 1:
             raise ValueError("every one and one of a number contradict each other")
         return self
+
+    def __str__(self) -> str:
+        kind = f"every {self.kind}" if self.every else f"{self.kind} {self.ordinal}"
+        side = f", on its {self.side}" if self.side else ""
+        lane = f", in the {self.lane} lane" if self.lane else ""
+        return f"{kind} {self.relation.words} the ego{side}{lane}"
 
 
 MOST_REQUESTS = 20

@@ -3,20 +3,18 @@
 What is open makes no statement.
 """
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 
 from augment.scene.entities import TurnType
 from augment.scene.intent import (
     ConesRequest,
+    CrashedCar,
     CrashRequest,
     Facing,
     Intent,
-    LaneChoice,
     Lateral,
     Length,
-    Nearness,
-    Pick,
-    Relation,
+    Move,
     Request,
     Side,
     Spot,
@@ -25,60 +23,45 @@ from augment.scene.intent import (
 )
 
 _ROUTES = {TurnType.LEFT: "left", TurnType.RIGHT: "right", TurnType.U_TURN: "back"}
-_RELATIONS = {Relation.AHEAD: "ahead of", Relation.BEHIND: "behind"}
-_LANES = {
-    LaneChoice.OWN: "in the ego's lane",
-    LaneChoice.LEFT: "in the lane on the left",
-    LaneChoice.RIGHT: "in the lane on the right",
-    LaneChoice.ONCOMING: "in the oncoming lane",
+_FACTS = {
+    "shape": "in a {}",
+    "spacing": "{} from one to the next",
+    "reach_m": "over {:g} m along the lane",
+    "drift_m": "ends {:g} m further along the lane",
+    "is_file": "one behind the other",
+    "on_road": "the first is on the road already",
+    "ends_in_middle": "ends in the middle of the lane",
+    "both_sides": "as many along each boundary of the lane",
+    "has_worker": "with a worker",
+    "post": "the worker stands {}",
+    "post_side": "the worker is on the {} of them",
 }
-_NEARNESSES = {
-    Nearness.SLIGHTLY: "slightly",
-    Nearness.AT_EDGE: "at the edge of the lane",
-    Nearness.HALF_OUT: "half outside the lane",
-    Nearness.OUTSIDE: "outside the lane",
-}
-
-Rules = Iterable[tuple[object, str]]
-"""Statements, each with what must hold for it."""
+"""Fields that a request may have, and what a value of theirs says."""
 
 
 def list_statements(intent: Intent) -> tuple[str, ...]:
     """Return all that the intent says, in the order of its requests."""
-    made = [
-        f"{_thing(request)}: {fact}" for request in intent.requests for fact in _facts(request)
+    statements = [
+        f"{_name_thing(request)}: {fact}"
+        for request in intent.requests
+        for fact in _list_facts(request)
     ]
     for move in intent.moves:
-        facts = ["goes elsewhere", *_place_facts(move.spot)]
-        facts += _facing_facts(move.facing, move.turn_deg)
-        facts += _motion(move.speed_mps)
-        made += [f"{_picked(move.who)}: {fact}" for fact in facts]
-    made += [f"{_picked(removal)}: goes" for removal in intent.removals]
+        facts = ["goes elsewhere", *_list_place_facts(move.spot), *_list_pose_facts(move)]
+        statements += [f"{move.who}: {fact}" for fact in facts]
+    statements += [f"{removal}: goes" for removal in intent.removals]
     if intent.route in _ROUTES:
-        made.append(f"distances run along the way that turns {_ROUTES[intent.route]}")
+        statements.append(f"distances run along the way that turns {_ROUTES[intent.route]}")
     if intent.unmet:
-        made.append(f"can't be met: {intent.unmet}")
-    made += [f"not in any field: “{words}”" for words in intent.beyond]
-    return tuple(made)
+        statements.append(f"can't be met: {intent.unmet}")
+    statements += [f"not in any field: “{words}”" for words in intent.beyond]
+    return tuple(statements)
 
 
 # Private
 
 
-def _holding(rules: Rules) -> list[str]:
-    return [words for holds, words in rules if holds]
-
-
-def _picked(pick: Pick) -> str:
-    """Who is meant: "parked vehicle 2 ahead of the ego, on its left"."""
-    kind = f"every {pick.kind}" if pick.every else f"{pick.kind} {pick.ordinal}"
-    words = [f"{kind} {_RELATIONS[pick.relation]} the ego"]
-    words += [f"on its {pick.side}"] if pick.side else []
-    words += [_LANES[pick.lane]] if pick.lane else []
-    return ", ".join(words)
-
-
-def _thing(request: Request) -> str:
+def _name_thing(request: Request) -> str:
     match request:
         case VehicleRequest():
             thing = str(request.body)
@@ -91,106 +74,67 @@ def _thing(request: Request) -> str:
     return f"{thing} “{request.name}”" if request.name else thing
 
 
-def _facts(request: Request) -> Iterator[str]:
+def _list_facts(request: Request) -> Iterator[str]:
     if request.count is not None:
         yield f"number {request.count}"
-    yield from _place_facts(request.spot)
-    match request:
-        case VehicleRequest():
-            yield from _facing_facts(request.facing, request.turn_deg)
-            yield from _motion(request.speed_mps)
-            if request.spacing is not None:
-                yield f"{_length(request.spacing)} from one to the next"
-        case WalkRequest():
-            yield from _walk_facts(request)
-        case ConesRequest():
-            yield from _holding(_cone_rules(request))
-        case CrashRequest():
-            yield from _facing_facts(request.facing, 0.0)
-            yield from _crash_facts(request)
+    yield from _list_place_facts(request.spot)
+    yield from _list_pose_facts(request)
+    if isinstance(request, WalkRequest) and request.start is not None:
+        yield f"crosses from the {request.start} to the {request.start.other}"
+    if isinstance(request, ConesRequest) and request.start is not None:
+        yield f"begins at the {request.start} lane boundary"
+    for name, words in _FACTS.items():
+        value = getattr(request, name, None)
+        if value is not None and value is not False:
+            yield words.format(value)
+    for number, gap in enumerate(getattr(request, "behind", ()), start=2):
+        yield f"number {number} is {gap} behind the first"
+    for number, car in enumerate(getattr(request, "others", ()), start=2):
+        yield from (f"number {number} is {fact}" for fact in _list_car_facts(car))
 
 
-def _place_facts(spot: Spot) -> Iterator[str]:
-    anchor = "the ego" if spot.anchor is None else f"“{spot.anchor}”"
-    if spot.landmark is not None:
-        anchor = _picked(spot.landmark)
-    elif spot.mark is not None:
-        anchor = f"the {spot.mark}"
+def _list_car_facts(car: CrashedCar) -> Iterator[str]:
+    if car.bearing is not None:
+        yield f"{car.bearing} the one before"
+    if car.gap is not None:
+        yield f"{car.gap} from the one before"
+    if car.turn_deg is not None:
+        yield _name_turn(car.turn_deg, is_signed=car.is_signed)
+
+
+def _list_place_facts(spot: Spot) -> Iterator[str]:
     if spot.relation is not None:
-        length = "" if spot.distance is None else f"{_length(spot.distance)} "
-        yield f"{length}{_RELATIONS[spot.relation]} {anchor}"
+        anchor = f"“{spot.anchor}”" if spot.anchor else str(spot.landmark or "the ego")
+        anchor = f"the {spot.mark}" if spot.mark else anchor
+        length = "" if spot.distance is None else f"{spot.distance} "
+        yield f"{length}{spot.relation.words} {anchor}"
     if spot.lane is not None:
-        yield _LANES[spot.lane]
+        yield f"in the {spot.lane} lane"
     if spot.lateral is not None:
-        yield _lateral(spot.lateral)
+        yield _name_lateral(spot.lateral)
         if spot.lateral.on_shoulder:
             yield "partly on the shoulder"
     yield from (str(setting) for setting in spot.settings)
 
 
-def _lateral(lateral: Lateral) -> str:
-    if lateral.offset is not None:
-        return f"{_length(lateral.offset)} from the lane centre towards the {lateral.target}"
-    if lateral.nearness is not None:
-        return f"{_NEARNESSES[lateral.nearness]}, towards the {lateral.target}"
-    return f"at the {lateral.target}"
+def _name_lateral(lateral: Lateral) -> str:
+    if isinstance(lateral.offset, Length):
+        return f"{lateral.offset} from the lane centre towards the {lateral.target}"
+    nearness = f"{lateral.nearness}, " if lateral.nearness else ""
+    return f"{nearness}towards the {lateral.target}"
 
 
-def _walk_facts(request: WalkRequest) -> Iterator[str]:
-    if request.start is not None:
-        yield f"crosses from the {request.start} to the {request.start.other}"
-    yield from _motion(request.speed_mps)
-    if request.drift_m is not None:
-        where = "further" if request.drift_m >= 0.0 else "back"
-        yield f"ends {abs(request.drift_m):g} m {where} along the lane"
-    if request.is_file:
-        yield "one behind the other"
-    for number, gap in enumerate(request.behind, start=2):
-        yield f"number {number} is {_length(gap)} behind the first"
-    if request.on_road:
-        yield "the first is on the road already"
+def _list_pose_facts(request: Request | Move) -> Iterator[str]:
+    facing = getattr(request, "facing", None)
+    if facing is not None:
+        yield f"{'stands' if facing is Facing.ACROSS else 'faces'} {facing}"
+    if turn_deg := getattr(request, "turn_deg", 0.0):
+        yield _name_turn(turn_deg)
+    speed_mps = getattr(request, "speed_mps", None)
+    if speed_mps is not None:
+        yield f"moves at {speed_mps:g} m/s" if speed_mps else "stands"
 
 
-def _cone_rules(request: ConesRequest) -> Rules:
-    yield request.shape, f"in a {request.shape}"
-    if request.spacing is not None:
-        yield True, f"{_length(request.spacing)} from one to the next"
-    if request.reach_m is not None:
-        yield True, f"over {request.reach_m:g} m along the lane"
-    yield request.start, f"begins at the {request.start} lane boundary"
-    yield request.ends_in_middle, "ends in the middle of the lane"
-    yield request.both_sides, "as many along each boundary of the lane"
-    yield request.has_worker, "with a worker"
-    yield request.post, f"the worker stands {request.post}"
-    yield request.post_side, f"the worker is on the {request.post_side} of them"
-
-
-def _crash_facts(request: CrashRequest) -> Iterator[str]:
-    for number, car in enumerate(request.others, start=2):
-        if car.bearing is not None:
-            yield f"number {number} is {car.bearing} the one before"
-        if car.gap is not None:
-            yield f"number {number} is {_length(car.gap)} from the one before"
-        if car.turn_deg is not None:
-            either = f"turned {abs(car.turn_deg):g} degrees, to either side"
-            yield f"number {number} is {_turn(car.turn_deg) if car.is_signed else either}"
-
-
-def _facing_facts(facing: Facing | None, turn_deg: float) -> list[str]:
-    verb = "stands" if facing is Facing.ACROSS else "faces"
-    return _holding([(facing, f"{verb} {facing}"), (turn_deg, _turn(turn_deg))])
-
-
-def _turn(turn_deg: float) -> str:
-    return f"turned {abs(turn_deg):g} degrees to the {Side.LEFT if turn_deg > 0.0 else Side.RIGHT}"
-
-
-def _motion(speed_mps: float | None) -> list[str]:
-    if speed_mps is None:
-        return []
-    return [f"moves at {speed_mps:g} m/s" if speed_mps else "stands"]
-
-
-def _length(length: Length) -> str:
-    """The length, "about" only where it is one."""
-    return f"{length.low_m:g} to {length.high_m:g} m" if length.is_range else str(length)
+def _name_turn(turn_deg: float, *, is_signed: bool = True) -> str:
+    side = f"to the {Side.LEFT if turn_deg > 0.0 else Side.RIGHT}" if is_signed else "to a side"
+    return f"turned {abs(turn_deg):g} degrees {side}"

@@ -1,6 +1,6 @@
-"""Lanes and connectors as one graph: what lies under a point, what comes next, what turns where.
+"""Lanes and connectors as one graph: what lies beside a point, what comes next, what turns where.
 
-`AnyLane` is a lane or a lane connector; both are read by the four verbs of `Polyline`.
+`AnyLane` is a lane or a lane connector; both are read by the verbs of `Polyline`.
 Frame: ego frame of the scene; any one frame for turns and sides.
 """
 
@@ -11,7 +11,7 @@ from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
+import shapely
 
 from augment.errors import UnknownName
 from augment.geometry.frames import Pose, difference
@@ -27,6 +27,10 @@ ONCOMING_WITHIN_M = 8.0
 """Between centrelines: two lanes side by side, or with a narrow median between."""
 MOST_BESIDE = 200
 """Lanes that are looked at beside one; no road has as many."""
+NEAR_M = 20.0
+"""How far beside a lane a point still has anything to do with it."""
+_JOINT_M = 0.5
+"""Where two lanes meet in a bend, a wedge beside the joint belongs to neither; it is as long."""
 _TURN_ORDER = {TurnType.STRAIGHT: 0, TurnType.LEFT: 1, TurnType.RIGHT: 1, TurnType.U_TURN: 2}
 
 
@@ -41,8 +45,51 @@ class LanePosition:
     remaining_m: float
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Beside:
+    """How a point lies beside one lane.
+
+    Attributes:
+        s_m: Along the centreline, within its ends.
+        d_m: To the left of the centreline (right is negative).
+        beyond_m: How far past one of the ends the point lies, 0 beside the lane.
+        distance_m: To the centreline.
+        tangent_rad: The direction of travel there.
+    """
+
+    lane_id: str
+    s_m: float
+    d_m: float
+    beyond_m: float
+    distance_m: float
+    tangent_rad: float
+    width_m: float
+
+    @property
+    def covers(self) -> bool:
+        """Whether the lane lies under the point."""
+        return abs(self.d_m) <= self.width_m / 2.0 and self.beyond_m <= _JOINT_M
+
+    @property
+    def off_m(self) -> float:
+        """From the edge of the lane to the point, 0 where the lane covers it."""
+        return 0.0 if self.covers else max(0.0, self.distance_m - self.width_m / 2.0)
+
+
+def best_aligned(beside: Iterable[Beside], heading_rad: float | None) -> Beside | None:
+    """Return the lane that fits a heading best, in steps of 15 degrees; of equals the nearest."""
+
+    def misfit(place: Beside) -> tuple[int, float, str]:
+        turn_rad = 0.0
+        if heading_rad is not None:
+            turn_rad = abs(difference(place.tangent_rad, heading_rad))
+        return round(turn_rad / math.radians(15.0)), round(place.distance_m, 4), place.lane_id
+
+    return min(beside, key=misfit, default=None)
+
+
 class LaneGraph:
-    """The lanes of one scene, by id, with their successors and predecessors."""
+    """The lanes of one scene, by id, with their successors and predecessors, and by place."""
 
     def __init__(self, scene: Scene) -> None:
         lanes: list[AnyLane] = [*scene.lanes, *scene.connectors]
@@ -71,26 +118,26 @@ class LaneGraph:
 
     def successors(self, lane_id: str) -> tuple[str, ...]:
         """Return ids of what follows, straightest first by the turn from end to end."""
-
-        def bend(name: str) -> tuple[int, float]:
-            here, after = self.lanes[lane_id].centerline, self.lanes[name].centerline
-            turn = difference(after.heading_at(after.length_m), here.heading_at(here.length_m))
-            return self._turn_order(name), abs(turn)
-
-        return tuple(sorted(self._next[lane_id], key=bend))
+        return self._straightest(lane_id, self._next[lane_id], at_share=1.0)
 
     def predecessors(self, lane_id: str) -> tuple[str, ...]:
         """Return ids of what leads here, straightest first by the turn from start to start.
 
         Lanes that merge end alike: what tells them apart is how they got there.
         """
+        return self._straightest(lane_id, self._previous[lane_id], at_share=0.0)
+
+    def _straightest(self, lane_id: str, names: list[str], *, at_share: float) -> tuple[str, ...]:
+        def heading_rad(name: str) -> float:
+            line = self.lanes[name].centerline
+            return line.heading_at(at_share * line.length_m)
 
         def bend(name: str) -> tuple[int, float]:
-            here, before = self.lanes[lane_id].centerline, self.lanes[name].centerline
-            turn = difference(here.heading_at(0.0), before.heading_at(0.0))
-            return self._turn_order(name), abs(turn)
+            lane = self.lanes[name]
+            order = _TURN_ORDER[lane.turn_type] if isinstance(lane, LaneConnector) else 0
+            return order, abs(difference(heading_rad(name), heading_rad(lane_id)))
 
-        return tuple(sorted(self._previous[lane_id], key=bend))
+        return tuple(sorted(names, key=bend))
 
     def abreast(self, lane_id: str) -> tuple[str, ...]:
         """Return a lane and its neighbours of the same direction; a connector alone."""
@@ -106,23 +153,51 @@ class LaneGraph:
                     waiting.append(beside)
         return tuple(names)
 
+    def beside(self, x_m: float, y_m: float) -> tuple[Beside, ...]:
+        """Return how a point lies beside the lanes near it, else beside the nearest one.
+
+        They are in the order of the lanes.
+        """
+        point, lanes = shapely.Point(x_m, y_m), list(self.lanes.values())
+        reach_m = NEAR_M + max((lane.width_m for lane in lanes), default=0.0) / 2.0
+        near = self._lines.query(point, "dwithin", reach_m)
+        if not len(near):
+            near = self._lines.query_nearest(point, all_matches=False)
+        places = []
+        for lane in (lanes[number] for number in sorted(near.tolist())):
+            place = lane.centerline.project(x_m, y_m)
+            beyond_m = place.beyond_m
+            d_m = math.copysign(math.sqrt(place.distance_m**2 - beyond_m**2), place.d_m)
+            beside = Beside(
+                lane_id=lane.id,
+                s_m=place.s_m,
+                d_m=d_m if beyond_m else place.d_m,
+                beyond_m=beyond_m,
+                distance_m=place.distance_m,
+                tangent_rad=place.heading_rad,
+                width_m=lane.width_m,
+            )
+            places.append(beside)
+        return tuple(places)
+
+    @cached_property
+    def _lines(self) -> shapely.STRtree:
+        lines = [lane.centerline.points_m for lane in self.lanes.values()]
+        return shapely.STRtree([shapely.LineString(points) for points in lines])
+
     def under(self, x_m: float, y_m: float, heading_rad: float | None = None) -> str | None:
         """Return the lane whose width covers a point and none of whose ends the point is beyond.
 
         Of several it is the best aligned one, else the nearest.
         """
-        covering = []
-        for lane in self._boxed(x_m, y_m):
-            line = lane.centerline
-            place = line.project(x_m, y_m)
-            inside = 1e-9 < place.s_m < line.length_m - 1e-9
-            covers = place.distance_m <= lane.width_m / 2.0 and (inside or place.distance_m < 0.05)
-            turned = 0.0
-            if heading_rad is not None:
-                turn = abs(difference(line.heading_at(place.s_m), heading_rad))
-                turned = round(turn / math.radians(15.0))
-            covering += [(turned, place.distance_m, lane.id)] if covers else []
-        return min(covering)[2] if covering else None
+        covering = [
+            place
+            for place in self.beside(x_m, y_m)
+            if place.distance_m <= place.width_m / 2.0
+            and (place.beyond_m == 0.0 or place.distance_m < 0.05)
+        ]
+        best = best_aligned(covering, heading_rad)
+        return None if best is None else best.lane_id
 
     def nearest(
         self, x_m: float, y_m: float, *, among: Iterable[str] | None = None
@@ -189,21 +264,6 @@ class LaneGraph:
             total += self.lanes[following].centerline.length_m
         return route
 
-    def _boxed(self, x_m: float, y_m: float) -> list[AnyLane]:
-        """The lanes in whose box the point lies; all others are more than half a width away."""
-        lanes, (low, high) = list(self.lanes.values()), self._boxes
-        inside = ((low <= (x_m, y_m)) & ((x_m, y_m) <= high)).all(axis=1)
-        return [lanes[index] for index in np.flatnonzero(inside)]
-
-    @cached_property
-    def _boxes(self) -> NDArray[np.float64]:
-        """The lowest and the highest corner of the box around each lane (2, W, 2)."""
-        reach = np.array([lane.width_m / 2.0 + 0.1 for lane in self.lanes.values()])[:, None]
-        points = [lane.centerline.points_m for lane in self.lanes.values()]
-        low = np.array([line.min(axis=0) for line in points]).reshape(-1, 2)
-        high = np.array([line.max(axis=0) for line in points]).reshape(-1, 2)
-        return np.stack([low - reach, high + reach])
-
     def _choose(self, lane_id: str, turn: TurnType) -> str | None:
         options = self.successors(lane_id)
         wanted = [
@@ -212,10 +272,6 @@ class LaneGraph:
             if isinstance(lane := self.lanes[name], LaneConnector) and lane.turn_type is turn
         ]
         return next(iter(wanted or options), None)
-
-    def _turn_order(self, lane_id: str) -> int:
-        lane = self.lanes[lane_id]
-        return _TURN_ORDER[lane.turn_type] if isinstance(lane, LaneConnector) else 0
 
 
 def turn_type_of(line: Polyline) -> TurnType:
@@ -238,30 +294,19 @@ def traffic_side_of(lanes: Sequence[Lane]) -> TrafficSide | None:
         None where no two lanes of opposite directions lie side by side, or as many speak for
         either side.
     """
-    if not lanes:
-        return None
-    low = np.array([lane.centerline.points_m.min(axis=0) for lane in lanes]) - ONCOMING_WITHIN_M
-    high = np.array([lane.centerline.points_m.max(axis=0) for lane in lanes]) + ONCOMING_WITHIN_M
-    balance = 0
-    for lane in lanes:
-        middle = lane.centerline.pose_at(lane.centerline.length_m / 2.0)
-        here = np.array([middle.x_m, middle.y_m])
-        # Those whose surrounding rectangle comes near; of very many, the first.
-        near = np.flatnonzero(((low <= here) & (here <= high)).all(axis=1))[:MOST_BESIDE]
-        others = [lanes[index] for index in near if lanes[index] is not lane]
-        balance += _oncoming_side(middle, others)
+    lines = [lane.centerline for lane in lanes]
+    tree, balance = shapely.STRtree([shapely.LineString(line.points_m) for line in lines]), 0
+    for line in lines:
+        middle = line.pose_at(line.length_m / 2.0)
+        here = shapely.Point(middle.x_m, middle.y_m)
+        oncoming = []
+        for number in tree.query(here, "dwithin", ONCOMING_WITHIN_M)[:MOST_BESIDE].tolist():
+            place = lines[number].project(middle.x_m, middle.y_m)
+            turn = difference(place.heading_rad, middle.heading_rad)
+            oncoming += [(place.distance_m, place.d_m)] if abs(turn) > ONCOMING_ABOVE_RAD else []
+        if oncoming:
+            # The other lane runs against this one, so each sees the other on the same side.
+            balance += 1 if min(oncoming)[1] > 0.0 else -1
     if balance == 0:
         return None
     return TrafficSide.RIGHT if balance > 0 else TrafficSide.LEFT
-
-
-def _oncoming_side(middle: Pose, others: Iterable[Lane]) -> int:
-    """1 if the nearest oncoming lane is to the left of a lane's middle, -1 right, 0 none."""
-    nearest_m, side = ONCOMING_WITHIN_M, 0
-    for other in others:
-        place = other.centerline.project(middle.x_m, middle.y_m)
-        turn = difference(other.centerline.heading_at(place.s_m), middle.heading_rad)
-        if place.distance_m <= nearest_m and abs(turn) > ONCOMING_ABOVE_RAD:
-            # The other lane runs against this one, so each sees the other on the same side.
-            nearest_m, side = place.distance_m, 1 if place.d_m > 0.0 else -1
-    return side

@@ -5,7 +5,7 @@ Frame: the ego frame of t0 (the Scene's frame). T steps.
 
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,6 +47,7 @@ def _rows(array: NDArray[np.float64]) -> list[Any]:
 
 
 _Times = Annotated[NDArray[np.float64], _NumberList(_Number, least=1)]
+_Columns = tuple[Literal["x_m"], Literal["y_m"], Literal["heading_rad"], Literal["speed_mps"]]
 _States = Annotated[NDArray[np.float64], _NumberList(_State | None)]
 
 
@@ -71,6 +72,7 @@ class Recording:
     """The log from t0 on.
 
     Attributes:
+        columns: What the four numbers of a state are.
         times_s: (T,) seconds since t0, the first is 0.
         ego: (T, 4): x_m, y_m, heading_rad, speed_mps of the ego's geometric centre; NaN where
             nobody recorded it, but never at t0.
@@ -79,6 +81,7 @@ class Recording:
 
     __pydantic_config__ = CLOSED
 
+    columns: _Columns = ("x_m", "y_m", "heading_rad", "speed_mps")
     times_s: _Times
     ego: _States
     tracks: Annotated[tuple[Track, ...], Field(fail_fast=True, max_length=MOST_TRACKS)] = ()

@@ -6,16 +6,7 @@ from django.contrib.auth.models import User
 from django.db import transaction
 from django.utils import timezone
 
-from augment.models import (
-    Augmentation,
-    BaseScene,
-    Contestant,
-    Endpoint,
-    EndpointModel,
-    Event,
-    GenerationJob,
-    Scenario,
-)
+from augment.models import BaseScene, Contestant, EndpointModel, Event, GenerationJob, Scenario
 
 
 @transaction.atomic
@@ -48,34 +39,25 @@ def log_event(
     )
 
 
-_KINDS = {
-    Augmentation: "augmentation",
-    BaseScene: "scene",
-    Contestant: "contestant",
-    Endpoint: "endpoint",
-    EndpointModel: "model",
-    GenerationJob: "job",
-    Scenario: "scenario",
-}
-Logged = (
-    Augmentation | BaseScene | Contestant | Endpoint | EndpointModel | GenerationJob | Scenario
-)
+_KINDS = {BaseScene: "scene", EndpointModel: "model", GenerationJob: "job"}
+"""What the log calls rows whose own name is longer."""
+
 Retirable = TypeVar("Retirable", Contestant, Scenario, BaseScene)
 
 
 def log_change(
-    row: Logged,
+    row: Any,
     verb: str,
     actor: User | None = None,
     *,
     before: dict[str, Any] | None = None,
     after: dict[str, Any] | None = None,
 ) -> Event:
-    """Append one line about a row of augment; as `log_event`."""
+    """Append one line about a row with a public code; as `log_event`."""
     return log_event(
         actor=actor,
         verb=verb,
-        object_kind=_KINDS[type(row)],
+        object_kind=_KINDS.get(type(row)) or row._meta.verbose_name,
         object_code=row.code,
         before=before,
         after=after,

@@ -5,6 +5,7 @@ The route is the recorded one where there is a recording, else the straightest. 
 
 import math
 from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
 from functools import cached_property
 
 import numpy as np
@@ -16,10 +17,10 @@ from augment.checks.ground import rings, strips
 from augment.errors import CannotDrive
 from augment.geometry.frames import difference
 from augment.scene.ego_route import find_ego_lane
-from augment.scene.entities import AreaKind, LaneConnector, Scene, TrafficLight, TurnType
-from augment.scene.lane_graph import AnyLane, LaneGraph
+from augment.scene.entities import AreaKind, LaneConnector, Scene, TrafficLight
+from augment.scene.lane_graph import AnyLane, Beside, LaneGraph
 from augment.scene.recording import Recording
-from augment.simulation.path import Path, Region, dense
+from augment.simulation.path import SPACING_M, Path, Region, dense
 from augment.simulation.states import BoolArray, FloatArray, IntArray
 
 ROUTE_M = 600.0
@@ -64,15 +65,14 @@ def find_route(scene: Scene, graph: LaneGraph, recording: Recording | None) -> t
     return (*before[:1], *route)
 
 
-def beside_route(scene: Scene, graph: LaneGraph, route: tuple[str, ...]) -> frozenset[str]:
-    """Return the route's ways, their neighbours of the same direction, and what joins these."""
-    names = {beside for name in route for beside in graph.abreast(name)}
-    joining = {
-        connector.id
-        for connector in scene.connectors
-        if connector.from_lane in names and connector.to_lane in names
-    }
-    return frozenset(names | joining)
+def _spread(names: Sequence[str], following: Callable[[str], Sequence[str]]) -> Iterator[str]:
+    """Yield ways and what follows them, the fewest ways ahead first, each once."""
+    waiting, seen = list(names), set(names)
+    for name in waiting:  # grows on the way
+        yield name
+        fresh = [after for after in following(name) if after not in seen]
+        seen.update(fresh)
+        waiting += fresh
 
 
 def _ways_to_goal(scene: Scene, graph: LaneGraph, start: str) -> set[str]:
@@ -82,61 +82,39 @@ def _ways_to_goal(scene: Scene, graph: LaneGraph, start: str) -> set[str]:
         nearest = graph.nearest(*options.goal_m)
         ends = [] if nearest is None else [nearest[0]]
     elif options.goal is not None:
-        ends = _first_turn(graph, start, options.goal)
-    reaching = set(ends)
-    while ends:
-        ends = [name for end in ends for name in graph.predecessors(end) if name not in reaching]
-        reaching.update(ends)
-    return reaching
-
-
-def _first_turn(graph: LaneGraph, start: str, turn: TurnType) -> list[str]:
-    """The first connector of that turn on the ways from the start on, the fewest ways ahead."""
-    ahead, seen = [start], set[str]()
-    while ahead:
-        for name in ahead:
-            way = graph.lanes[name]
-            if isinstance(way, LaneConnector) and way.turn_type is turn:
-                return [name]
-        seen.update(ahead)
-        ahead = [name for way in ahead for name in graph.successors(way) if name not in seen]
-    return []
+        turns = {way.id for way in scene.connectors if way.turn_type is options.goal}
+        ends = [name for name in _spread([start], graph.successors) if name in turns][:1]
+    return set(_spread(ends, graph.predecessors))
 
 
 def _start(scene: Scene, graph: LaneGraph) -> str:
-    ego, own = scene.ego, find_ego_lane(scene, graph)
-    if own is not None:
-        beside = graph.lane(own).centerline.project(ego.x_m, ego.y_m)
+    ego, own, aligned = scene.ego, find_ego_lane(scene, graph), list[tuple[float, str]]()
+    for place in graph.beside(ego.x_m, ego.y_m):
         # A lane that the ego names but does not stand on leads it nowhere.
-        if beside.distance_m <= max(_NEAR_M, graph.lane(own).width_m / 2.0):
+        if place.lane_id == own and place.distance_m <= max(_NEAR_M, place.width_m / 2.0):
             return own
-    aligned = [
-        name
-        for name, way in graph.lanes.items()
-        for place in [way.centerline.project(ego.x_m, ego.y_m)]
-        if place.distance_m <= _NEAR_M
-        and abs(difference(way.centerline.heading_at(place.s_m), ego.heading_rad)) < _ALIGNED_RAD
-    ]
-    nearest = graph.nearest(ego.x_m, ego.y_m, among=aligned)
-    if nearest is None:
+        if place.distance_m <= _NEAR_M and _is_aligned(place, ego.heading_rad):
+            aligned.append((place.distance_m, place.lane_id))
+    if not aligned:
         raise CannotDrive(
             f"Scene {scene.name} can't be driven: no lane leads the ego's way within "
             f"{_NEAR_M:g} m of it."
         )
-    return nearest[0]
+    return min(aligned)[1]
+
+
+def _is_aligned(place: Beside, heading_rad: float) -> bool:
+    return abs(difference(place.tangent_rad, heading_rad)) < _ALIGNED_RAD
 
 
 def _driven(graph: LaneGraph, recording: Recording) -> Counter[str]:
     """How many moments of the recorded ego lie on each way, in its direction."""
-    counts = Counter[str]()
-    states = recording.ego[recording.ego_is_seen].tolist()
-    for lane_id, way in graph.lanes.items():
-        for x_m, y_m, heading_rad, _ in states:
-            place = way.centerline.project(x_m, y_m)
-            turn = difference(way.centerline.heading_at(place.s_m), heading_rad)
-            if place.distance_m <= way.width_m / 2.0 and abs(turn) < _ALIGNED_RAD:
-                counts[lane_id] += 1
-    return counts
+    return Counter(
+        place.lane_id
+        for x_m, y_m, heading_rad, _ in recording.ego[recording.ego_is_seen].tolist()
+        for place in graph.beside(x_m, y_m)
+        if place.distance_m <= place.width_m / 2.0 and _is_aligned(place, heading_rad)
+    )
 
 
 class Road:
@@ -146,6 +124,7 @@ class Road:
         graph: The lanes and connectors.
         names: Ids of the ways (W,), in the order of every array over ways.
         route: Ids of the ways that the ego is to take.
+        beside: These, their neighbours of the same direction, and what joins them.
         centreline: Their centrelines in one, with the run-out.
         end_m: Where on it the map ends; beyond reach where it goes on.
         red: Ids of the connectors whose light is red; nobody knows when it will change.
@@ -159,7 +138,10 @@ class Road:
         self.ways: list[AnyLane] = list(self.graph.lanes.values())
         self.index = {name: number for number, name in enumerate(self.names)}
         self.route = find_route(scene, self.graph, recording)
-        self.beside = beside_route(scene, self.graph, self.route)
+        abreast = {beside for name in self.route for beside in self.graph.abreast(name)}
+        self.beside = abreast | {
+            way.id for way in scene.connectors if {way.from_lane, way.to_lane} <= abreast
+        }
         self.red = frozenset(
             connector.id
             for connector in scene.connectors
@@ -167,12 +149,11 @@ class Road:
         )
         self.limits_mps = np.array([self._limit(way) for way in self.ways], dtype=np.float64)
         self._ends = not self.graph.successors(self.route[-1])
-        line = np.vstack([self.graph.lanes[name].centerline.points_m for name in self.route])
-        map_end_m = Path(dense(line)).length_m
+        on_map = self.path_over(self.route)
+        self.end_m, self.centreline = on_map.length_m, on_map
         if self._ends:
-            line = np.vstack([line, _straight_on(line)])  # repeats are dropped below
-        self.centreline = Path(dense(line))
-        self.end_m = map_end_m if self._ends else self.centreline.length_m
+            last = self.graph.lanes[self.route[-1]].centerline.points_m
+            self.centreline = self.path_over(self.route, run_out=_straight_on(last))
         ends = [self.graph.lanes[name].centerline.points_m[-1] for name in self.route]
         stations, _ = self.centreline.beside(np.array(ends))
         self._route_ends = np.maximum.accumulate(stations)
@@ -230,10 +211,22 @@ class Road:
         on_one = inside.all(axis=1).any(axis=-1) | both.all(axis=1).any(axis=-1)
         return np.asarray(on_one, dtype=np.bool_)
 
+    def path_over(
+        self,
+        names: Sequence[str],
+        *,
+        spacing_m: float = SPACING_M,
+        run_out: FloatArray | None = None,
+    ) -> Path:
+        """Return the centrelines of some ways in one, with a run-out (N, 2) at the end."""
+        lines = [self.graph.lanes[name].centerline.points_m for name in names]
+        lines += [] if run_out is None else [run_out]
+        return Path(dense(np.vstack(lines), spacing_m))
+
     def way_path(self, number: int) -> Path:
         """Return the centreline of one way, dense."""
         if number not in self._paths:
-            self._paths[number] = Path(dense(self.ways[number].centerline.points_m))
+            self._paths[number] = self.path_over([self.names[number]])
         return self._paths[number]
 
     @cached_property

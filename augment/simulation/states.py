@@ -9,6 +9,7 @@ them (separating axes), so touching counts as meeting.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 from typing import Any
@@ -96,17 +97,13 @@ class Kind(IntEnum):
     STATIC = 3
 
 
-_MOVABLE = {
+_KINDS = {
     AgentType.VEHICLE: Kind.VEHICLE,
     AgentType.BUS: Kind.VEHICLE,
     AgentType.BICYCLE: Kind.BICYCLE,
     AgentType.PEDESTRIAN: Kind.PEDESTRIAN,
 }
-
-
-def kinds_of(types: list[AgentType]) -> IntArray:
-    """Return the `Kind`s (A,) of agents' types; what can't move by itself is static."""
-    return np.array([_MOVABLE.get(one, Kind.STATIC) for one in types], dtype=np.int64)
+"""What can't move by itself is static."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -145,9 +142,16 @@ class Objects:
         return boxes
 
 
-NOBODY = Objects(
-    ids=(), kinds=np.zeros(0, dtype=np.int64), boxes=np.zeros((0, 5)), speeds_mps=np.zeros(0)
-)
+def objects_of(agents: Sequence[TrafficAgent]) -> Objects:
+    """Return agents as they stand in the scene."""
+    boxes = [(a.x_m, a.y_m, a.heading_rad, a.length_m, a.width_m) for a in agents]
+    kinds = [_KINDS.get(agent.type, Kind.STATIC) for agent in agents]
+    return Objects(
+        ids=tuple(agent.id for agent in agents),
+        kinds=np.array(kinds, dtype=np.int64),
+        boxes=np.array(boxes, dtype=np.float64).reshape(-1, 5),
+        speeds_mps=np.array([agent.speed_mps for agent in agents], dtype=np.float64),
+    )
 
 
 def join_objects(parts: list[Objects]) -> Objects:

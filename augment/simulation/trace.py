@@ -12,8 +12,7 @@ import shapely
 
 from augment.scene.entities import AreaKind
 from augment.simulation.drive import Drive
-from augment.simulation.metrics import OFF_ROAD_M, outside_m
-from augment.simulation.score import Score
+from augment.simulation.score import OFF_ROAD_M, Score, outside_m
 from augment.simulation.states import ACCELERATION, SPEED, STEP_S, FloatArray, Kind
 from augment.simulation.traffic import DriveSetting
 

@@ -2,7 +2,7 @@
 
 The speed and the curvature of the poses are fitted by regularised least squares. Both fits are
 nuPlan's, solved for the profile itself instead of its first value and its rates: the speed's
-normal matrix then holds no heading and is one constant, and the curvature's has three diagonals.
+normal matrix then holds no heading and is one constant.
 The bicycle moves about the rear axle; its pedals and its wheel lag. Shapes: (T, B), the moments
 first, because the tracker walks along them.
 """
@@ -112,50 +112,14 @@ def _speed_fit(count: int) -> FloatArray:
 
 
 def curvatures(poses: FloatArray, speed: FloatArray) -> FloatArray:
-    """Return the curvature profile (T-1, B) of poses (T, B, 3), given their speeds (T-1, B).
-
-    The symmetric systems of three diagonals are solved for all columns at once.
-    """
+    """Return the curvature profile (T-1, B) of poses (T, B, 3), given their speeds (T-1, B)."""
     way = speed * STEP_S
+    rates = np.diff(np.eye(len(way)), axis=0) / STEP_S
+    penalty = CURVATURE_RATE_PENALTY * rates.T @ rates
+    penalty[0, 0] += FIRST_CURVATURE_PENALTY
+    normal = penalty + np.eye(len(way)) * (way.T**2)[:, :, None]
     right = way * wrap_angles(np.diff(poses[..., HEADING], axis=0))
-    off = -CURVATURE_RATE_PENALTY / STEP_S**2
-    diagonal = way**2 - 2.0 * off
-    diagonal[0] += FIRST_CURVATURE_PENALTY + off
-    diagonal[-1] += off
-    upper, solved = np.empty_like(diagonal), np.empty_like(right)
-    upper[0] = off / diagonal[0]
-    solved[0] = right[0] / diagonal[0]
-    for row in range(1, len(diagonal)):
-        pivot = 1.0 / (diagonal[row] - off * upper[row - 1])
-        upper[row] = off * pivot
-        solved[row] = (right[row] - off * solved[row - 1]) * pivot
-    for row in range(len(diagonal) - 2, -1, -1):
-        solved[row] -= upper[row] * solved[row + 1]
-    return solved
-
-
-def _sums() -> tuple[FloatArray, FloatArray]:
-    """The constants of the horizon, from w_j = dt * v0 + dt^2 * j * a, in powers of v0 and a.
-
-    Returns:
-        plain (4, 3): sum w_j as (v0, a, 0), sum_k w_k sum_{j<k} w_j as (v0^2, v0 a, a^2),
-        and both again with a factor j on w_j; bends (5, HORIZON): what a curvature at j adds to
-        sum w_j k_j (v0, a) and to sum_k w_k sum_{j<k} w_j k_j (v0^2, v0 a, a^2).
-    """
-    steps = np.arange(HORIZON, dtype=np.float64)
-    speed, gain = np.full(HORIZON, STEP_S), STEP_S**2 * steps
-    after_speed = np.array([speed[j + 1 :].sum() for j in range(HORIZON)])
-    after_gain = np.array([gain[j + 1 :].sum() for j in range(HORIZON)])
-    squares = np.array(
-        [speed * after_speed, speed * after_gain + gain * after_speed, gain * after_gain]
-    )
-    once = np.array([speed.sum(), gain.sum(), 0.0])
-    once_j = np.array([(speed * steps).sum(), (gain * steps).sum(), 0.0])
-    plain = np.array([once, squares.sum(axis=1), once_j, (squares * steps).sum(axis=1)])
-    return plain, np.vstack([speed, gain, squares])
-
-
-_PLAIN, _BENDS = _sums()
+    return np.asarray(np.linalg.solve(normal, right.T[:, :, None])[:, :, 0].T, dtype=np.float64)
 
 
 class _Plan:
@@ -163,14 +127,11 @@ class _Plan:
 
     def __init__(self, poses: FloatArray, steps: int) -> None:
         speed = speeds(poses)
-        bend = curvatures(poses, speed)
         last = len(speed) - 1
         ahead = np.minimum(np.arange(steps)[:, None] + np.arange(HORIZON), last)
-        self._bends = np.einsum("qj,tjb->tqb", _BENDS, bend[ahead])
+        self._bends = curvatures(poses, speed)[ahead]
         self._wanted = speed[np.minimum(np.arange(steps) + HORIZON, last)]
-        here = poses[:steps]
-        self._cos, self._sin = np.cos(here[..., HEADING]), np.sin(here[..., HEADING])
-        self._poses = np.ascontiguousarray(here.transpose(0, 2, 1))
+        self._poses = np.ascontiguousarray(poses[:steps].transpose(0, 2, 1))
 
     def commands(
         self, step: int, state: FloatArray, wheelbase_m: float
@@ -186,22 +147,20 @@ class _Plan:
     def _steering_rate(
         self, step: int, state: FloatArray, pedals: FloatArray, wheelbase_m: float
     ) -> FloatArray:
+        """The rate (B,) that is best over the horizon, in which the errors go on by themselves."""
         pose, bends = self._poses[step], self._bends[step]
-        lateral = self._cos[step] * (state[Y] - pose[Y]) - self._sin[step] * (state[X] - pose[X])
+        cos, sin = np.cos(pose[HEADING]), np.sin(pose[HEADING])
+        lateral = cos * (state[Y] - pose[Y]) - sin * (state[X] - pose[X])
         heading = wrap_angles(state[HEADING] - pose[HEADING])
-        speed, steering = state[SPEED], state[STEERING] / wheelbase_m
-        powers = np.stack([speed * speed, speed * pedals, pedals * pedals])
-        once = _PLAIN[0, 0] * speed + _PLAIN[0, 1] * pedals
-        twice = _PLAIN[1] @ powers
-        bend_once = bends[0] * speed + bends[1] * pedals
-        bend_twice = (bends[2:] * powers).sum(axis=0)
-        free_lateral = lateral + heading * once + steering * twice - bend_twice
-        free_heading = wrap_angles(heading + steering * once - bend_once)
-        # The answer to a steering rate of 1 rad/s after the horizon.
-        unit = STEP_S / wheelbase_m
-        by_heading = unit * (_PLAIN[2, 0] * speed + _PLAIN[2, 1] * pedals)
-        by_lateral = unit * (_PLAIN[3] @ powers)
-        gain = LATERAL_WEIGHT * by_lateral * free_lateral
-        gain += HEADING_WEIGHT * by_heading * free_heading
+        # The errors, and how they answer to a steering rate of 1 rad/s.
+        by_lateral, by_heading = np.zeros(lateral.shape), np.zeros(lateral.shape)
+        for ahead in range(HORIZON):
+            way = (state[SPEED] + pedals * (ahead * STEP_S)) * STEP_S
+            lateral = lateral + way * heading
+            by_lateral += way * by_heading
+            heading = heading + way * (state[STEERING] / wheelbase_m - bends[ahead])
+            by_heading += way * (ahead * STEP_S / wheelbase_m)
+        gain = LATERAL_WEIGHT * by_lateral * lateral
+        gain += HEADING_WEIGHT * by_heading * wrap_angles(heading)
         cost = LATERAL_WEIGHT * by_lateral**2 + HEADING_WEIGHT * by_heading**2
         return np.asarray(-gain / (cost + STEERING_RATE_COST), dtype=np.float64)

@@ -1,6 +1,7 @@
 """Everybody but the ego through a drive: replayed, walking, driving or standing.
 
-D drivers, K pairs of a driver and an object in its way.
+D drivers, K pairs of a driver and an object in its way. Whoever moves has `objects()`, those who
+are there now, and `step(ego_box, everybody)`, which goes one step on.
 """
 
 from collections.abc import Sequence
@@ -11,21 +12,21 @@ import numpy as np
 
 from augment.scene.entities import AgentType, Modification, Scene, TrafficAgent, apply
 from augment.scene.recording import Recording, Track, agent_of
-from augment.simulation.path import Path, dense
+from augment.simulation.path import Path
 from augment.simulation.planning import Idm
 from augment.simulation.road import Road
 from augment.simulation.states import (
-    NOBODY,
     SPEED,
     STEP_S,
     EgoBody,
     FloatArray,
     IntArray,
+    Kind,
     Objects,
     corners,
     join_objects,
-    kinds_of,
     meet,
+    objects_of,
     radii,
 )
 
@@ -81,17 +82,6 @@ class DriveSetting:
         return apply(self.scene, self.modification)
 
 
-def objects_of(agents: Sequence[TrafficAgent]) -> Objects:
-    """Return agents as they stand in the scene."""
-    boxes = [(a.x_m, a.y_m, a.heading_rad, a.length_m, a.width_m) for a in agents]
-    return Objects(
-        ids=tuple(agent.id for agent in agents),
-        kinds=kinds_of([agent.type for agent in agents]),
-        boxes=np.array(boxes, dtype=np.float64).reshape(-1, 5),
-        speeds_mps=np.array([agent.speed_mps for agent in agents], dtype=np.float64),
-    )
-
-
 def lane_under(road: Road, agent: TrafficAgent) -> str | None:
     """Return the way under an agent that leads where it heads, None off every such way."""
     name = road.graph.under(agent.x_m, agent.y_m, agent.heading_rad)
@@ -110,7 +100,9 @@ class Walkers:
     0, so that a planner takes them for standing.
     """
 
-    def __init__(self, agents: Sequence[TrafficAgent], centreline: Path) -> None:
+    def __init__(
+        self, agents: Sequence[TrafficAgent], centreline: Path, ego_box: FloatArray
+    ) -> None:
         base = objects_of(agents)
         ends = np.array([agent.walk_to_m for agent in agents], dtype=np.float64).reshape(-1, 2)
         self._walks = ends - base.boxes[:, :2]
@@ -121,6 +113,7 @@ class Walkers:
         self._stations = centreline.beside(base.boxes[:, :2])[0]
         self._since = np.full(len(base), -1, dtype=np.int64)
         self._step = 0
+        self._wake(ego_box)
 
     def objects(self) -> Objects:
         """Return those who have set out."""
@@ -129,45 +122,59 @@ class Walkers:
         boxes[:, :2] += gone[:, None] * self._walks
         return replace(self._base, boxes=boxes).chosen(self._since >= 0)
 
-    def wake(self, ego_box: FloatArray) -> None:
-        """Let those set out whom the ego (5,) has come near to."""
+    def step(self, ego_box: FloatArray, everybody: Objects) -> None:
+        """Go on, and let those set out whom the ego (5,) has come near to."""
+        self._step += 1
+        self._wake(ego_box)
+
+    def _wake(self, ego_box: FloatArray) -> None:
         ego_m = self._centreline.station_of(ego_box)
         near = (self._stations - ego_m <= ACTIVE_WITHIN_M) & (self._since < 0)
         self._since[near] = self._step
 
-    def step(self) -> None:
+
+class Replay:
+    """Tracks, read every 0.1 s; who was not seen at a moment is not there.
+
+    Args:
+        recording: Its times need not be even; each step takes the nearest moment.
+        tracks: Those of the recording that are replayed.
+    """
+
+    def __init__(self, recording: Recording, tracks: Sequence[Track]) -> None:
+        self._tracks, self._times = tuple(tracks), recording.times_s
+        self.steps_left = round(float(self._times[-1]) / STEP_S)
+        self._step = 0
+
+    def agents(self) -> list[TrafficAgent]:
+        """Return those who are seen now, as agents."""
+        at = int(np.abs(self._times - self._step * STEP_S).argmin())
+        seen = [track for track in self._tracks if not np.isnan(track.states[at]).any()]
+        return [agent_of(track, track.states[at]) for track in seen]
+
+    def objects(self) -> Objects:
+        """Return those who are seen now."""
+        return objects_of(self.agents() if self.steps_left >= 0 else [])
+
+    def step(self, ego_box: FloatArray, everybody: Objects) -> None:
         """Go one step on."""
         self._step += 1
+        self.steps_left -= 1
 
 
-class _Lane:
-    """One driver's path along the lanes from where it starts, its limits and its red lights."""
+class StraightOn:
+    """Agents who stand or go straight on at their speed."""
 
-    def __init__(self, road: Road, agent: TrafficAgent) -> None:
-        name = lane_under(road, agent)
-        if name is None:
-            raise ValueError(f"{agent.id} is on no lane")
-        lanes = road.graph.lanes
-        start_m = lanes[name].centerline.project(agent.x_m, agent.y_m).s_m
-        route = road.graph.route(name, start_m + PATH_M)
-        self.path = Path(dense(np.vstack([lanes[way].centerline.points_m for way in route]), 1.0))
-        self.start_m = self.path.station_of(np.array([agent.x_m, agent.y_m]))
-        self._ends = np.cumsum([lanes[way].centerline.length_m for way in route])
-        limits = road.limits_mps[[road.index[way] for way in route]]
-        self._limits = np.where(np.isnan(limits), FALLBACK_MPS, limits)
-        if agent.type is AgentType.BICYCLE:
-            self._limits = np.full(len(route), agent.speed_mps)
-        red = [number for number, way in enumerate(route) if way in road.red]
-        self._stops = [float(self._ends[number - 1]) if number else 0.0 for number in red]
+    def __init__(self, agents: Sequence[TrafficAgent]) -> None:
+        self._objects = objects_of(agents)
 
-    def wish_mps(self, s_m: float) -> float:
-        """The speed that the driver wishes at s."""
-        here = int(np.searchsorted(self._ends, s_m, side="right"))
-        return float(self._limits[min(here + _KEPT_WAYS - 1, len(self._limits) - 1)])
+    def objects(self) -> Objects:
+        """Return all of them."""
+        return self._objects
 
-    def red_ahead(self, front_m: float) -> float:
-        """Where the next red stop line is, inf without one."""
-        return min((stop for stop in self._stops if stop >= front_m), default=np.inf)
+    def step(self, ego_box: FloatArray, everybody: Objects) -> None:
+        """Go one step on."""
+        self._objects = replace(self._objects, boxes=self._objects.later(np.array(STEP_S)))
 
 
 class LaneDrivers:
@@ -179,30 +186,40 @@ class LaneDrivers:
     """
 
     def __init__(self, agents: Sequence[TrafficAgent], road: Road) -> None:
-        self._sweep_s = 0.0
-        self._lanes = [_Lane(road, agent) for agent in agents]
-        self._base = objects_of(agents)
-        self.stations = np.array([lane.start_m for lane in self._lanes], dtype=np.float64)
-        self.speeds = self._base.speeds_mps.copy()
-        self._ends = np.array([lane.path.length_m for lane in self._lanes], dtype=np.float64)
-        # Poses (D, M, 3) at every whole metre, the last of each path repeated.
-        whole = np.arange(int(self._ends.max(initial=0.0)) + 2, dtype=np.float64)
-        samples = [lane.path.poses(whole) for lane in self._lanes]
-        self._samples = np.array(samples).reshape(len(agents), len(whole), 3)
+        self._base, self._sweep_s = objects_of(agents), 0.0
+        self.speeds = self._base.speeds_mps
+        routes = [_route_of(road, agent) for agent in agents]
+        paths = [road.path_over(route, spacing_m=1.0) for route in routes]
+        stations = [
+            path.station_of(box) for path, box in zip(paths, self._base.boxes, strict=True)
+        ]
+        self.stations = np.array(stations, dtype=np.float64)
+        self._ends = np.array([path.length_m for path in paths], dtype=np.float64)
+        # (D, M, 5) at every whole metre, the last of each path repeated: x, y, heading, the
+        # wished speed, and where the next red stop line is.
+        metres = np.arange(int(self._ends.max(initial=0.0)) + 2, dtype=np.float64)
+        tables = [_table_of(road, *row, metres) for row in zip(agents, routes, paths, strict=True)]
+        self._tables = np.array(tables).reshape(len(agents), len(metres), 5)
+        self._rows = np.arange(len(agents))
 
     def objects(self) -> Objects:
         """Return those who are still on the map."""
-        boxes = self._base.boxes.copy()
-        for row, lane in enumerate(self._lanes):
-            boxes[row, :3] = lane.path.poses(self.stations[row])
-        now = replace(self._base, boxes=boxes, speeds_mps=self.speeds.copy())
+        boxes, share = self._base.boxes.copy(), (self.stations % 1.0)[:, None]
+        boxes[:, :3] = (1.0 - share) * self._at(self.stations)[:, :3]
+        boxes[:, :3] += share * self._at(self.stations + 1.0)[:, :3]
+        now = replace(self._base, boxes=boxes, speeds_mps=self.speeds)
         return now.chosen(self.stations < self._ends)
 
-    def step(self, everybody: Objects) -> None:
+    def _at(self, stations: FloatArray) -> FloatArray:
+        """The rows (D, 5) of the tables at the whole metres before stations (D,)."""
+        metre = np.clip(stations.astype(np.int64), 0, self._tables.shape[1] - 1)
+        return np.asarray(self._tables[self._rows, metre])
+
+    def step(self, ego_box: FloatArray, everybody: Objects) -> None:
         """Go one step on, given all objects of this moment with the ego among them."""
         gap, leader_speed = self._leaders(everybody)
-        wishes = [lane.wish_mps(s) for lane, s in zip(self._lanes, self.stations, strict=True)]
-        pull = TRAFFIC_IDM.clipped(self.speeds, np.array(wishes), gap, leader_speed)
+        wishes = self._at(self.stations)[:, 3]
+        pull = TRAFFIC_IDM.clipped(self.speeds, wishes, gap, leader_speed)
         self.stations = self.stations + self.speeds * STEP_S
         self.speeds = np.maximum(self.speeds + pull * STEP_S, 0.0)
         self._sweep_s = SWEEP_S
@@ -211,10 +228,9 @@ class LaneDrivers:
         """Gap and speed along the path of each driver's leader, (D,) each; inf without one."""
         noses = self.stations + self._base.boxes[:, 3] / 2.0
         front = noses + self._sweep_s * self.speeds
-        stops = [lane.red_ahead(nose) for lane, nose in zip(self._lanes, noses, strict=True)]
-        gap, speed = np.array(stops) - front, np.zeros(len(front))
+        gap, speed = self._at(noses)[:, 4] - front, np.zeros(len(front))
         driver, other, hit = self._first_inside(*self._near(everybody), everybody, noses)
-        pose = self._samples[driver, hit]
+        pose = self._tables[driver, hit]
         tangent = np.stack([np.cos(pose[:, 2]), np.sin(pose[:, 2])], axis=1)
         offset = corners(everybody.boxes[other]) - pose[:, None, :2]
         gaps = hit + (offset * tangent[:, None, :]).sum(axis=-1).min(axis=1) - front[driver]
@@ -243,8 +259,8 @@ class LaneDrivers:
     ) -> tuple[IntArray, IntArray, IntArray]:
         """Driver, object, and the first sample of the driver's path inside the object, (K,)."""
         start = np.floor(noses[driver]).astype(np.int64)
-        at = np.minimum(start[:, None] + np.arange(int(_LOOK_M)), self._samples.shape[1] - 1)
-        points, box = self._samples[driver[:, None], at], everybody.boxes[other][:, None]
+        at = np.minimum(start[:, None] + np.arange(int(_LOOK_M)), self._tables.shape[1] - 1)
+        points, box = self._tables[driver[:, None], at], everybody.boxes[other][:, None]
         dx, dy = points[..., 0] - box[..., 0], points[..., 1] - box[..., 1]
         cos, sin = np.cos(box[..., 2]), np.sin(box[..., 2])
         margin = self._base.boxes[driver, None, 4] / 2.0
@@ -255,40 +271,35 @@ class LaneDrivers:
         return driver[hit], other[hit], first[hit]
 
 
-class Replay:
-    """Tracks, read every 0.1 s; who was not seen at a moment is not there.
-
-    Args:
-        recording: Its times need not be even; each step takes the nearest moment.
-        tracks: Those of the recording that are replayed.
-    """
-
-    def __init__(self, recording: Recording, tracks: Sequence[Track]) -> None:
-        self._tracks, self._times = tuple(tracks), recording.times_s
-        self._step, self._last_step = 0, round(float(self._times[-1]) / STEP_S)
-
-    def objects(self) -> Objects:
-        """Return those who are seen now."""
-        return NOBODY if self._step > self._last_step else objects_of(self.agents())
-
-    @property
-    def ends_now(self) -> bool:
-        """Whether this is the last step that was recorded."""
-        return self._step == self._last_step
-
-    def agents(self) -> list[TrafficAgent]:
-        """Return those who are seen now, as agents."""
-        at = int(np.abs(self._times - self._step * STEP_S).argmin())
-        seen = [track for track in self._tracks if not np.isnan(track.states[at]).any()]
-        return [agent_of(track, track.states[at]) for track in seen]
-
-    def step(self) -> None:
-        """Go one step on."""
-        self._step += 1
+def _route_of(road: Road, agent: TrafficAgent) -> list[str]:
+    """The ways that a driver follows from the one under it on."""
+    name = lane_under(road, agent)
+    if name is None:
+        raise ValueError(f"{agent.id} is on no lane")
+    start_m = road.graph.lanes[name].centerline.project(agent.x_m, agent.y_m).s_m
+    return road.graph.route(name, start_m + PATH_M)
 
 
-class _Crowd:
-    """Agents who go on by themselves: they stand, follow their lane by the IDM or go straight.
+def _table_of(
+    road: Road, agent: TrafficAgent, route: Sequence[str], path: Path, metres: FloatArray
+) -> FloatArray:
+    """One driver's row of `LaneDrivers`' tables, (M, 5)."""
+    ends = np.cumsum([road.graph.lanes[way].centerline.length_m for way in route])
+    limits = road.limits_mps[[road.index[way] for way in route]]
+    limits = np.where(np.isnan(limits), FALLBACK_MPS, limits)
+    if agent.type is AgentType.BICYCLE:
+        limits = np.full(len(route), agent.speed_mps)
+    way = np.searchsorted(ends, metres, side="right") + _KEPT_WAYS - 1
+    wishes = limits[np.minimum(way, len(route) - 1)]
+    stops = np.array([0.0, *ends])[:-1][[way in road.red for way in route]]
+    next_stop = np.append(stops, np.inf)[np.searchsorted(stops, metres)]
+    return np.column_stack([path.poses(metres), wishes, next_stop])
+
+
+def _set_moving(
+    agents: Sequence[TrafficAgent], road: Road, start_clear_of: FloatArray | None = None
+) -> list[StraightOn | LaneDrivers]:
+    """Let agents go on by themselves: they stand, follow their lane by the IDM or go straight.
 
     Args:
         agents: As they start.
@@ -296,42 +307,19 @@ class _Crowd:
         start_clear_of: The ego's box (5,): who starts in a collision on its lane is dropped, as
             in nuPlan; None to keep everybody.
     """
-
-    def __init__(
-        self,
-        agents: Sequence[TrafficAgent],
-        road: Road,
-        *,
-        start_clear_of: FloatArray | None = None,
-    ) -> None:
-        standing, driving, drifting = [], [], []
-        for agent in agents:
-            if agent.speed_mps <= 0.0:
-                standing.append(agent)
-            elif agent.type in _ON_LANES and lane_under(road, agent) is not None:
-                driving.append(agent)
-            else:
-                drifting.append(agent)
-        if start_clear_of is not None:
-            taken = np.vstack([start_clear_of[None], objects_of(standing).boxes])
-            clear = []
-            for agent in driving:
-                box = objects_of([agent]).boxes
-                if not meet(taken, np.broadcast_to(box, taken.shape)).any():
-                    clear.append(agent)
-                    taken = np.vstack([taken, box])
-            driving = clear
-        self._straight = objects_of(standing + drifting)
-        self._drivers = LaneDrivers(driving, road)
-
-    def objects(self) -> Objects:
-        """Return those who are still on the map."""
-        return join_objects([self._straight, self._drivers.objects()])
-
-    def step(self, everybody: Objects) -> None:
-        """Go one step on, given all objects of this moment with the ego among them."""
-        self._drivers.step(everybody)
-        self._straight = replace(self._straight, boxes=self._straight.later(np.array(STEP_S)))
+    standing = [agent for agent in agents if agent.speed_mps <= 0.0]
+    moving = [agent for agent in agents if agent.speed_mps > 0.0]
+    driving = [one for one in moving if one.type in _ON_LANES and lane_under(road, one)]
+    straight_on = StraightOn([*standing, *(one for one in moving if one not in driving)])
+    if start_clear_of is not None:
+        taken, clear = np.vstack([start_clear_of[None], objects_of(standing).boxes]), []
+        for agent in driving:
+            box = objects_of([agent]).boxes
+            if not meet(taken, np.broadcast_to(box, taken.shape)).any():
+                clear.append(agent)
+                taken = np.vstack([taken, box])
+        driving = clear
+    return [straight_on, LaneDrivers(driving, road)]
 
 
 class Traffic:
@@ -344,47 +332,42 @@ class Traffic:
     """
 
     def __init__(self, setting: DriveSetting, road: Road, body: EgoBody, ego: FloatArray) -> None:
+        self._body, self._road, ego_box = body, road, body.boxes(ego)
         replayed = _replayed(setting, road)
         names = {track.agent_id for track in replayed}
         own = [agent for agent in setting.after.agents if agent.id not in names]
-        self._body, self._road = body, road
-        self._replay = Replay(setting.recording, replayed) if setting.recording else None
-        walking = [agent for agent in own if agent.walk_to_m is not None]
-        self._walkers = Walkers(walking, road.centreline)
-        self._walkers.wake(body.boxes(ego))
         moving = [agent for agent in own if agent.walk_to_m is None]
-        self._crowds = [_Crowd(moving, road, start_clear_of=body.boxes(ego))]
+        walking = [agent for agent in own if agent.walk_to_m is not None]
+        self._movers: list[StraightOn | LaneDrivers | Walkers | Replay] = [
+            *_set_moving(moving, road, ego_box),
+            Walkers(walking, road.centreline, ego_box),
+        ]
+        self._replay = Replay(setting.recording, replayed) if setting.recording else None
+        self._movers += [self._replay] if self._replay else []
 
     def objects(self) -> Objects:
         """Return everybody who is there now."""
-        parts = [crowd.objects() for crowd in self._crowds]
-        parts.append(self._walkers.objects())
-        if self._replay is not None:
-            parts.append(self._replay.objects())
-        return join_objects(parts)
+        return join_objects([mover.objects() for mover in self._movers])
 
     def step(self, ego: FloatArray, objects: Objects) -> None:
         """Go one step on, given the ego's state (6,) and the objects of this moment."""
         ego_box = self._body.boxes(ego)
         me = Objects(
             ids=(EGO_ID,),
-            kinds=kinds_of([AgentType.VEHICLE]),
+            kinds=np.array([Kind.VEHICLE], dtype=np.int64),
             boxes=ego_box[None],
             speeds_mps=np.array([ego[SPEED]]),
         )
-        if self._replay is not None:
-            if self._replay.ends_now:
-                # Who hardly moves at the end stands from then on.
-                going_on = [
-                    replace(agent, speed_mps=0.0) if agent.speed_mps < STANDS_BELOW_MPS else agent
-                    for agent in self._replay.agents()
-                ]
-                self._crowds.append(_Crowd(going_on, self._road))
-            self._replay.step()
-        for crowd in self._crowds:
-            crowd.step(join_objects([objects, me]))
-        self._walkers.step()
-        self._walkers.wake(ego_box)
+        if self._replay is not None and self._replay.steps_left == 0:
+            # Who hardly moves at the end stands from then on.
+            going_on = [
+                replace(agent, speed_mps=0.0) if agent.speed_mps < STANDS_BELOW_MPS else agent
+                for agent in self._replay.agents()
+            ]
+            self._movers += _set_moving(going_on, self._road)
+        everybody = join_objects([objects, me])
+        for mover in self._movers:
+            mover.step(ego_box, everybody)
 
 
 def _replayed(setting: DriveSetting, road: Road) -> list[Track]:

@@ -1,12 +1,11 @@
 """How a contestant asks, beyond its model and its variant: a frozen value.
 
-None means: left open, so that the default counts, or what is known of the model. Names, checks,
-documents, labels and slugs all derive from the fields of `ContestantOptions`.
+None means: left open, so that the default counts, or what is known of the model.
 """
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import asdict, dataclass, replace
 from enum import StrEnum
 from typing import Any
 
@@ -21,7 +20,6 @@ EFFORTS = ("none", "minimal", "low", "medium", "high", "xhigh", "max")
 HIGHEST_SEED = 2**31 - 1
 MOST_SAMPLES = 100
 MOST_ROUNDS = 10
-_LIMITS = Limits()
 
 
 class ToolProtocol(StrEnum):
@@ -31,19 +29,17 @@ class ToolProtocol(StrEnum):
     NATIVE = "native"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Rule:
+@dataclass(frozen=True, slots=True)
+class Rule:
     """What is to know of an option besides its name.
 
     Attributes:
         words: A value in a name for people.
         slug: A value as a part of a slug.
         kind: What a value is.
-        least, most: The range of a number.
+        least, most: The range of a number; how long a text is.
         choices: The values of a text, where these are few.
-        pattern: What a text looks like, where there are no choices.
-        default: What counts where it is left open; None where nothing does.
-        without: Why a recipe has no use for it; empty where all have one.
+        without: Why a recipe may have no use for it; empty where all have one.
     """
 
     words: str
@@ -52,8 +48,6 @@ class _Rule:
     least: float = 0
     most: float = 0
     choices: tuple[str, ...] = ()
-    pattern: str = ""
-    default: object = None
     without: str = ""
 
     def read(self, value: Any) -> Any:
@@ -62,24 +56,50 @@ class _Rule:
         Raises:
             ValueError: It can't be; the text says what may be.
         """
-        is_number = isinstance(value, int | float) and not isinstance(value, bool)
         if self.choices:
             fits, allowed = value in self.choices, f"one of {', '.join(self.choices)}"
-        elif self.pattern:
-            fits = isinstance(value, str) and re.fullmatch(self.pattern, value) is not None
+        elif self.kind is str:
+            fits = isinstance(value, str) and re.fullmatch("[0-9a-f]{12}", value) is not None
             allowed = "twelve hexadecimal digits"
         else:
-            is_kind = self.kind is float or isinstance(value, int)
-            fits = is_number and is_kind and self.least <= value <= self.most
-            noun = "number" if self.kind is float else "whole number"
-            allowed = f"a {noun} from {self.least} to {self.most}"
+            kinds = (int, float) if self.kind is float else (int,)
+            is_kind = isinstance(value, kinds) and not isinstance(value, bool)
+            fits = is_kind and self.least <= value <= self.most
+            allowed = f"a{' whole' * (self.kind is int)} number from {self.least} to {self.most}"
         if not fits:
             raise ValueError(f"{value!r} must be {allowed}")
         return self.kind(value)
 
 
-def _option(words: str, slug: str, **rule: Any) -> Any:
-    return field(default=None, metadata={"rule": _Rule(words=words, slug=slug, **rule)})
+RULES = {
+    "temperature": Rule("temperature {:g}", "t{:g}", float, 0, 2),
+    "seed": Rule("seed {}", "s{}", most=HIGHEST_SEED - MOST_SAMPLES),
+    "reasoning_effort": Rule("effort {}", "{}-effort", str, choices=EFFORTS),
+    "max_output_tokens": Rule("answers to {} tokens", "{}-tokens", int, 1, 1_000_000),
+    "protocol": Rule(
+        "{} calls",
+        "{}",
+        ToolProtocol,
+        choices=tuple(ToolProtocol),
+        without="calls no function, so it has no protocol",
+    ),
+    "rounds": Rule(
+        "{} rounds", "{}-rounds", int, 1, MOST_ROUNDS, without="has no review, so it has one round"
+    ),
+    "accepted_from": Rule(
+        "content from {:g}",
+        "from-{:g}",
+        float,
+        1,
+        5,
+        without="has no text review, so nothing is rated",
+    ),
+    "radius_m": Rule("{:g} m", "{:g}m", float, 20, 300),
+    "prompt_version": Rule("prompts {}", "p{}", str, most=12),
+    "picture_px": Rule("pictures {} px", "{}px", int, 300, 2400, without="shows no picture"),
+}
+NAMES = tuple(RULES)
+_DEFAULTS: dict[str, Any] = {**asdict(Limits()), "protocol": ToolProtocol.PROMPT}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -101,53 +121,16 @@ class ContestantOptions:
         InvalidDocument: A value is out of its range.
     """
 
-    temperature: float | None = _option("temperature {:g}", "t{:g}", kind=float, least=0, most=2)
-    seed: int | None = _option("seed {}", "s{}", most=HIGHEST_SEED - MOST_SAMPLES)
-    reasoning_effort: str | None = _option("effort {}", "{}-effort", kind=str, choices=EFFORTS)
-    max_output_tokens: int | None = _option(
-        "answers to {} tokens",
-        "{}-tokens",
-        least=1,
-        most=1_000_000,
-        default=_LIMITS.max_output_tokens,
-    )
-    protocol: ToolProtocol | None = _option(  # noqa: RUF009
-        "{} calls",
-        "{}",
-        kind=ToolProtocol,
-        choices=tuple(ToolProtocol),
-        default=ToolProtocol.PROMPT,
-        without="calls no function, so it has no protocol",
-    )
-    rounds: int | None = _option(
-        "{} rounds",
-        "{}-rounds",
-        least=1,
-        most=MOST_ROUNDS,
-        default=_LIMITS.rounds,
-        without="has no review, so it has one round",
-    )
-    accepted_from: float | None = _option(
-        "content from {:g}",
-        "from-{:g}",
-        kind=float,
-        least=1,
-        most=5,
-        default=_LIMITS.accepted_from,
-        without="has no text review, so nothing is rated",
-    )
-    radius_m: float | None = _option(
-        "{:g} m", "{:g}m", kind=float, least=20, most=300, default=_LIMITS.radius_m
-    )
-    prompt_version: str | None = _option("prompts {}", "p{}", kind=str, pattern="[0-9a-f]{12}")
-    picture_px: int | None = _option(
-        "pictures {} px",
-        "{}px",
-        least=300,
-        most=2400,
-        default=_LIMITS.picture_px,
-        without="shows no picture",
-    )
+    temperature: float | None = None
+    seed: int | None = None
+    reasoning_effort: str | None = None
+    max_output_tokens: int | None = None
+    protocol: ToolProtocol | None = None
+    rounds: int | None = None
+    accepted_from: float | None = None
+    radius_m: float | None = None
+    prompt_version: str | None = None
+    picture_px: int | None = None
 
     def __post_init__(self) -> None:
         problems = []
@@ -184,7 +167,7 @@ class ContestantOptions:
         chosen = {
             name: value
             for name, value in self.to_document().items()
-            if name != "prompt_version" and value != RULES[name].default
+            if name != "prompt_version" and value != _DEFAULTS.get(name)
         }
         return chosen | ({"sample": sample} if sample > 1 else {})
 
@@ -198,10 +181,6 @@ class ContestantOptions:
         chosen = self.to_document().items()
         parts = [RULES[name].slug.format(value) for name, value in chosen]
         return "-".join(parts).lower().replace(".", "p")
-
-
-RULES: dict[str, _Rule] = {one.name: one.metadata["rule"] for one in fields(ContestantOptions)}
-NAMES = tuple(RULES)
 
 
 def options_from_document(document: Mapping[str, Any]) -> ContestantOptions:
@@ -231,13 +210,11 @@ def check_options(recipe: Recipe, options: ContestantOptions) -> None:
     Raises:
         InvalidDocument: One is chosen.
     """
-    allowed = names_for(recipe)
-    problems = [
-        (f"options.{name}", f"{recipe.slug} {RULES[name].without}")
-        for name in options.to_document()
-        if name not in allowed
-    ]
-    if problems:
+    useless = [name for name in options.to_document() if name not in names_for(recipe)]
+    if useless:
+        problems = [
+            (f"options.{name}", f"{recipe.slug} {RULES[name].without}") for name in useless
+        ]
         raise InvalidDocument("contestant", problems)
 
 
@@ -256,11 +233,11 @@ def complete_options(
     if "protocol" in usual:
         usual["protocol"] = ToolProtocol.NATIVE if native_tools is True else ToolProtocol.PROMPT
     usual["prompt_version"] = prompt_version
-    return options_from_document(usual | options.to_document())
+    return ContestantOptions(**usual | options.to_document())
 
 
 def recipe_with(recipe: Recipe, options: ContestantOptions) -> Recipe:
     """Return the recipe within the limits of these options."""
-    known = {one.name for one in fields(Limits)}
+    known = asdict(recipe.limits)
     chosen = {name: value for name, value in options.to_document().items() if name in known}
     return replace(recipe, limits=replace(recipe.limits, **chosen))

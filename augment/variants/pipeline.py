@@ -17,7 +17,7 @@ from enum import StrEnum
 from functools import cached_property, partial
 
 from augment.checks import Ground
-from augment.errors import ModelRefused, ReplyUnreadable, ReviewUnusable, UnknownName
+from augment.errors import ModelRefused, ReplyUnreadable, ReviewUnusable
 from augment.llm.client import ChatClient, Patience
 from augment.llm.messages import Message, Reply, Speaker, ToolChoice
 from augment.prompts import fill
@@ -28,7 +28,7 @@ from augment.prompts.vectors import changes_text
 from augment.scene.entities import Modification, Scene
 from augment.scene.intent import Intent
 from augment.variants.pose_tool import PoseTool
-from augment.variants.recipes import RECIPES, Keep, Recipe, Tools
+from augment.variants.recipes import Keep, Recipe, Tools
 from augment.variants.respondents import (
     ModelRole,
     NoteKind,
@@ -98,12 +98,8 @@ def run(
         sampling: What every request is sent with.
 
     Raises:
-        UnknownName: Nobody can run a recipe with these parts.
         ModelFault: The wire or the endpoint broke; the same run may succeed later if it says so.
     """
-    known = RECIPES.get(recipe.slug)
-    if known is None or replace(recipe, limits=known.limits) != known:
-        raise UnknownName("recipe", recipe.slug, sorted(RECIPES))
     respondents = Respondents(
         clients={**(others or {}), ModelRole.MODIFIER: modifier},
         transcript=transcript,
@@ -396,10 +392,7 @@ class _ToolDesk:
             problem = f"no call is left: {most.calls} are allowed. Answer with what you have."
         elif self.earlier.count(asked) >= most.identical_calls:
             self.is_over = True
-            problem = (
-                f"this very call was answered {most.identical_calls} times and its answer does "
-                "not change. Answer with what you have."
-            )
+            problem = f"this was answered {most.identical_calls} times. Answer with what you have."
         elif not problem and call.name != TOOL:
             problem = f"there is no function {call.name[:40]!r}; there is {TOOL}"
         if not self.is_over:

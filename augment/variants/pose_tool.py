@@ -4,28 +4,34 @@ In: a `Scene`, and the arguments of a call. Out: a `PoseOnLane`, which the model
 a `ToolError` whose sentence tells the model what was wrong.
 
 `pose_on_lane(lane, start, distance_m, lateral_m, object)` answers from the recorded centrelines,
-under the same short ids as the prompt shows; only control points that are none of the prompt's
-are a curve of their own. It follows the lanes across connectors, along the ego's route where they
-belong to it, else straightest first, and says which lane lies under the place and who stands
-there. Everything is computed from the scene before the change.
+under the same short ids as the prompt shows. It follows the lanes across connectors, along the
+ego's route where they belong to it, else straightest first, and says which lane lies under the
+place and who stands there. Everything is computed from the scene before the change.
 
 Frame: ego frame; s along the shown part of a lane, from where it begins.
 """
 
 import math
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
-from difflib import get_close_matches
+from collections.abc import Callable, Iterable
+from dataclasses import MISSING, dataclass, fields
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Annotated, Any
 
 import numpy as np
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    TypeAdapter,
+    ValidationError,
+)
 
 from augment.checks import Ground
 from augment.errors import ToolError
-from augment.geometry.bezier import CubicBezier, FitError
 from augment.geometry.frames import Box, Pose, overlap
-from augment.prompts.calls import PARAMETERS, TOOL
+from augment.prompts.calls import TOOL
 from augment.prompts.vectors import (
     DEFAULT_RADIUS_M,
     LaneCurve,
@@ -35,8 +41,8 @@ from augment.prompts.vectors import (
     short_names,
     shown_agents,
 )
-from augment.scene.bezier_lanes import BezierLane, LanePiece
 from augment.scene.entities import LENGTH_WIDTH_M, AgentType, Scene, TrafficAgent
+from augment.scene.schema import problems_of
 
 LANE_START = "lane"
 FURTHEST_M, WIDEST_M = 1000.0, 30.0
@@ -58,28 +64,26 @@ _TOUCH_M = 0.01
 _SEARCHED_M, _STEP_M = 50.0, 0.5
 _MOST_LISTED = 80
 
-AnyLine = LaneCurve | BezierLane
-"""What a call goes along: a shown lane, or a curve of the model's own."""
+_Several = (BeforeValidator(lambda value: value if isinstance(value, list) else [value]),)
+_Many = Field(min_length=1, max_length=MOST_PLACES)
+_Along = Annotated[float, Field(ge=-FURTHEST_M, le=FURTHEST_M)]
+_Aside = Annotated[float, Field(ge=-WIDEST_M, le=WIDEST_M)]
+_Kind = Annotated[str, Field(pattern=f"^({'|'.join(OBJECT_TYPES)})$"), AfterValidator(AgentType)]
 
 
-class AskedPlace(NamedTuple):
-    """One place of a call: metres from the start, to the left, and what is to stand there."""
+class _Call(BaseModel):
+    """The arguments of a call; one value counts as a list of it."""
 
-    distance_m: float
-    lateral_m: float
-    object_type: AgentType
+    model_config = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False)
+
+    lane: Any
+    start: str
+    distance_m: Annotated[list[_Along], *_Several, _Many]
+    lateral_m: Annotated[list[_Aside], *_Several, _Many] = [0.0]
+    object: Annotated[list[_Kind], *_Several, _Many] = [AgentType.VEHICLE]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class RoadSide:
-    """From the centre of a lane to what lies beside it, None without one within 30 m.
-
-    The edge of the road lies beyond all lanes, but before a carpark.
-    """
-
-    edge_m: float | None
-    carpark_m: float | None
-    walkway_m: float | None
+_CONTROL = TypeAdapter(list[tuple[_Along, _Along]], config=ConfigDict(allow_inf_nan=False))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -89,25 +93,30 @@ class PoseOnLane:
     Attributes:
         lane: The short id of the shown lane or connector under the place, None where there is
             none. Of several the one that the place was counted on.
-        width_m: None on a curve of the model's own.
-        left, right: The sides of the road, from the centre of that lane there.
-        taken_by: Short ids of those in whose place an object there would stand.
-        nearest_free_m: The distance of the nearest free place, None where there is none near.
+        taken_by: Short ids of those in whose place an object there would stand; None for nobody.
+        edge_left_m, edge_right_m: From the centre of that lane to the edge of the road, which lies
+            beyond all lanes, but before a carpark. None without one within 30 m.
+        carpark_left_m, carpark_right_m, walkway_left_m, walkway_right_m: To where these begin.
+        nearest_free_m: The distance of the nearest free place.
         start_lateral_m: How far left of the lane the starting agent is, None without one.
     """
 
     pose: Pose
     lane: str | None
+    taken_by: list[str] | None
     along_m: float
     remaining_m: float
-    width_m: float | None
-    left: RoadSide
-    right: RoadSide
-    next_lanes: tuple[str, ...]
-    route: tuple[str, ...]
-    taken_by: tuple[str, ...]
-    nearest_free_m: float | None
-    start_lateral_m: float | None
+    lane_width_m: float
+    edge_left_m: float | None
+    edge_right_m: float | None
+    next_lanes: list[str]
+    route: list[str]
+    carpark_left_m: float | None = None
+    carpark_right_m: float | None = None
+    walkway_left_m: float | None = None
+    walkway_right_m: float | None = None
+    nearest_free_m: float | None = None
+    start_lateral_m: float | None = None
 
     def to_document(self) -> dict[str, object]:
         """Return the answer under the names of the answer's block, rounded as the prompt is."""
@@ -116,27 +125,11 @@ class PoseOnLane:
             "y_m": _rounded(self.pose.y_m),
             "heading_rad": _rounded(self.pose.heading_rad, 3),
             "heading_deg": _rounded(math.degrees(self.pose.heading_rad), 1),
-            "lane": self.lane,
-            "taken_by": list(self.taken_by) or None,
-            "along_m": _rounded(self.along_m),
-            "remaining_m": _rounded(self.remaining_m),
-            "lane_width_m": _rounded(self.width_m),
-            "edge_left_m": _rounded(self.left.edge_m),
-            "edge_right_m": _rounded(self.right.edge_m),
-            "next_lanes": list(self.next_lanes),
-            "route": list(self.route),
         }
-        optional = {
-            "carpark_left_m": self.left.carpark_m,
-            "carpark_right_m": self.right.carpark_m,
-            "walkway_left_m": self.left.walkway_m,
-            "walkway_right_m": self.right.walkway_m,
-        }
-        document |= {name: _rounded(m) for name, m in optional.items() if m is not None}
-        if self.taken_by:
-            document["nearest_free_m"] = _rounded(self.nearest_free_m)
-        if self.start_lateral_m is not None:
-            document["start_lateral_m"] = _rounded(self.start_lateral_m)
+        for field in fields(self)[1:]:
+            value = getattr(self, field.name)
+            if value is not None or field.default is MISSING:
+                document[field.name] = _rounded(value) if isinstance(value, float) else value
         return document
 
 
@@ -149,7 +142,7 @@ class PoseTool:
 
     def pose_on_lane(
         self,
-        lane: str | CubicBezier,
+        lane: object,
         start: str,
         distance_m: float,
         lateral_m: float = 0.0,
@@ -158,7 +151,7 @@ class PoseTool:
         """Return the pose `distance_m` from the start along the lane, `lateral_m` to its left.
 
         Args:
-            lane: The short id of a lane, connector or piece, or a curve.
+            lane: The short id of a lane, connector or piece, or the control points of a piece.
             start: "lane" for its beginning, or an agent's id for the place beside that agent.
             distance_m: Along the direction of travel, on over connectors; negative goes back.
             lateral_m: To the left of the direction of travel, negative to the right.
@@ -168,33 +161,31 @@ class PoseTool:
             ToolError: Nobody knows the lane or the agent, the agent is not beside the lane, or
                 the lanes end before the distance does.
         """
-        line, begins_m = self._line(lane)
-        start_m, start_lateral_m = self._start(line, begins_m, start)
+        curve, begins_m = self._line(lane)
+        start_m, start_lateral_m = self._start(curve, begins_m, start)
 
         def pose_at(along_m: float) -> Pose:
-            passed, s_m = self._walk(line, start_m, along_m)
+            passed, s_m = self._walk(curve, start_m, along_m)
             return passed[-1].pose_at(s_m, lateral_m)
 
-        passed, s_m = self._walk(line, start_m, distance_m)
+        passed, s_m = self._walk(curve, start_m, distance_m)
         last = passed[-1]
         pose, centre = last.pose_at(s_m, lateral_m), last.pose_at(s_m)
-        counted = last if isinstance(last, LaneCurve) else None
         taken_by = self._taken_by(pose, object_type)
+        free_m = self._nearest_free_m(pose_at, object_type, distance_m) if taken_by else None
         return PoseOnLane(
             pose=pose,
-            lane=self._under(pose, counted, lateral_m),
+            lane=self._under(pose, last, lateral_m),
+            taken_by=taken_by or None,
             along_m=s_m,
             remaining_m=last.length_m - s_m,
-            width_m=None if counted is None else counted.width_m,
-            left=self._side(centre, math.pi / 2.0),
-            right=self._side(centre, -math.pi / 2.0),
-            next_lanes=() if counted is None else counted.after,
-            route=tuple(one.id for one in passed if isinstance(one, LaneCurve)),
-            taken_by=taken_by,
-            nearest_free_m=(
-                self._nearest_free_m(pose_at, object_type, distance_m) if taken_by else None
-            ),
+            lane_width_m=last.width_m,
+            next_lanes=list(last.after),
+            route=[one.id for one in passed],
+            nearest_free_m=free_m,
             start_lateral_m=start_lateral_m,
+            **self._side(centre, "left", math.pi / 2.0),
+            **self._side(centre, "right", -math.pi / 2.0),
         )
 
     def answer(self, arguments: object) -> dict[str, object]:
@@ -205,20 +196,22 @@ class PoseTool:
         and at each place that can't be.
         """
         try:
-            lane, start, places, is_list = _read_call(arguments)
-        except ToolError as fault:
-            return {"error": fault.problem}
-        answers: list[dict[str, object]] = []
-        for place in places:
-            try:
-                answers.append(self.pose_on_lane(lane, start, *place).to_document())
-            except ToolError as fault:
-                answers.append({"error": fault.problem})
-        if not is_list:
+            call = _Call.model_validate(arguments)
+        except ValidationError as fault:
+            return {"error": "; ".join(f"{place}: {text}" for place, text in problems_of(fault))}
+        lists: list[list[Any]] = [call.distance_m, call.lateral_m, call.object]
+        count = max(map(len, lists))
+        if any(len(values) not in (1, count) for values in lists):
+            return {"error": "make the lists equally long, or give one value for all places"}
+        # What is no list goes with each of the others.
+        places = list(zip(*(values * (count // len(values)) for values in lists), strict=True))
+        answers = [self._answer_at(call, *place) for place in places]
+        assert isinstance(arguments, dict)
+        if not any(isinstance(arguments.get(name), list) for name in _PLACES):
             return answers[0]
         answers = [
-            {"distance_m": place.distance_m, "lateral_m": place.lateral_m} | answer
-            for place, answer in zip(places, answers, strict=True)
+            {"distance_m": along_m, "lateral_m": aside_m} | answer
+            for (along_m, aside_m, _), answer in zip(places, answers, strict=True)
         ]
         shared = {
             name: value
@@ -245,14 +238,6 @@ class PoseTool:
         return short_names(self.scene)
 
     @cached_property
-    def _pieces(self) -> dict[str, tuple[LaneCurve, LanePiece]]:
-        return {
-            name: (curve, piece)
-            for curve in self.curves.values()
-            for name, piece in zip(curve.pieces, curve.lane.pieces, strict=True)
-        }
-
-    @cached_property
     def _ground(self) -> Ground:
         return Ground.of(self.scene)
 
@@ -262,23 +247,34 @@ class PoseTool:
         route = self._ground.route
         return frozenset(self._names.lanes[name] for name in (route.lane_ids if route else ()))
 
-    def _line(self, lane: str | CubicBezier) -> tuple[AnyLine, float]:
+    def _answer_at(
+        self, call: _Call, distance_m: float, lateral_m: float, object_type: AgentType
+    ) -> dict[str, object]:
+        try:
+            place = self.pose_on_lane(call.lane, call.start, distance_m, lateral_m, object_type)
+        except ToolError as fault:
+            return {"error": fault.problem}
+        return place.to_document()
+
+    def _line(self, lane: object) -> tuple[LaneCurve, float]:
         """Return what a call goes along, and from where on it."""
-        if isinstance(lane, CubicBezier):
-            for curve, piece in self._pieces.values():
-                if np.abs(piece.curve.control_m - lane.control_m).max() <= COPIED_WITHIN_M:
-                    return curve, piece.start_m
-            exact = FitError(position_m=0.0, heading_rad=0.0)
-            piece = LanePiece(curve=lane, start_m=0.0, end_m=lane.length_m, error=exact)
-            return BezierLane(pieces=(piece,)), 0.0
-        if lane in self.curves:
+        if isinstance(lane, str) and lane in self.curves:
             return self.curves[lane], 0.0
-        if lane in self._pieces:
-            curve, piece = self._pieces[lane]
-            return curve, piece.start_m
+        control = None
+        try:
+            control = None if isinstance(lane, str) else curve_from(_CONTROL.validate_python(lane))
+        except ValueError:
+            raise ToolError(TOOL, "lane must be an id, or the control points of a piece") from None
+        for curve in self.curves.values():
+            for name, piece in zip(curve.pieces, curve.lane.pieces, strict=True):
+                if name == lane or (
+                    control is not None
+                    and np.abs(piece.curve.control_m - control.control_m).max() <= COPIED_WITHIN_M
+                ):
+                    return curve, piece.start_m
         raise ToolError(TOOL, _unknown("lane", lane, self.curves))
 
-    def _start(self, line: AnyLine, begins_m: float, start: str) -> tuple[float, float | None]:
+    def _start(self, curve: LaneCurve, begins_m: float, start: str) -> tuple[float, float | None]:
         """Return where the distance starts, and how far left of the lane the agent there is."""
         if start == LANE_START:
             return begins_m, None
@@ -286,13 +282,12 @@ class PoseTool:
             problem = _unknown("agent", start, self.agents)
             raise ToolError(TOOL, f'{problem} Or start at "{LANE_START}", its beginning.')
         agent = self.agents[start]
-        place = line.project(agent.x_m, agent.y_m)
+        place = curve.project(agent.x_m, agent.y_m)
         is_before = place.s_m <= 1e-3
-        if not is_before and place.s_m < line.length_m - 1e-3:
-            return place.s_m, place.d_m
-        end = line.pose_at(place.s_m)
+        end = curve.pose_at(place.s_m)
         past_m = float(abs(end.to_local(np.array([[agent.x_m, agent.y_m]]))[0, 0]))
-        if past_m <= BESIDE_WITHIN_M:
+        is_beside = not is_before and place.s_m < curve.length_m - 1e-3
+        if is_beside or past_m <= BESIDE_WITHIN_M:
             return place.s_m, place.d_m
         where = "before the beginning" if is_before else "past the end"
         short = None if agent.lane_id is None else self._names.lanes.get(agent.lane_id)
@@ -304,26 +299,15 @@ class PoseTool:
         )
 
     def _walk(
-        self, line: AnyLine, start_m: float, distance_m: float
-    ) -> tuple[list[AnyLine], float]:
+        self, curve: LaneCurve, start_m: float, distance_m: float
+    ) -> tuple[list[LaneCurve], float]:
         """Return what is passed on the way, and s on the last of it."""
-        s_m = start_m + distance_m
-        if not isinstance(line, LaneCurve):
-            kept_m = min(max(s_m, 0.0), line.length_m)
-            if abs(s_m - kept_m) > _ROUNDING_M:
-                low, high = round(-start_m, 2) + 0.0, round(line.length_m - start_m, 2) + 0.0
-                raise ToolError(
-                    TOOL,
-                    f"this curve is {line.length_m:.2f} m long and no lane of the scene follows "
-                    f"it: from this start distance_m must be between {low:.2f} and {high:.2f}",
-                )
-            return [line], kept_m
-        passed = [line]
+        s_m, passed = start_m + distance_m, [curve]
         while s_m > passed[-1].length_m:
             here, over_m = passed[-1], s_m - passed[-1].length_m
             if not here.after:
                 _refuse_past_end(over_m, distance_m - over_m, passed, "end", "most")
-                return [*passed], here.length_m
+                return passed, here.length_m
             # The ego's route where it leads there, else straight on.
             routed = self._ego_route if here.id in self._ego_route else frozenset()
             following = next((name for name in here.after if name in routed), here.after[0])
@@ -332,41 +316,44 @@ class PoseTool:
         while s_m < 0.0:
             if not passed[-1].before:
                 _refuse_past_end(-s_m, distance_m - s_m, passed, "begin", "least")
-                return [*passed], 0.0
+                return passed, 0.0
             passed.append(self.curves[passed[-1].before[0]])
             s_m += passed[-1].length_m
-        return [*passed], s_m
+        return passed, s_m
 
-    def _under(self, pose: Pose, counted: LaneCurve | None, lateral_m: float) -> str | None:
+    def _under(self, pose: Pose, counted: LaneCurve, lateral_m: float) -> str | None:
         """Return the shown lane under a place: the one it was counted on, if that is."""
-        if counted is not None and abs(lateral_m) <= counted.width_m / 2.0:
+        if abs(lateral_m) <= counted.width_m / 2.0:
             return counted.id
         lane_id = self._ground.graph.under(pose.x_m, pose.y_m, pose.heading_rad)
         short = None if lane_id is None else self._names.lanes[lane_id]
         return short if short in self.curves else None
 
-    def _side(self, centre: Pose, turn_rad: float) -> RoadSide:
+    def _side(self, centre: Pose, side: str, turn_rad: float) -> dict[str, Any]:
         """Return the side of the road in the direction turned so far from a lane's own."""
         ground, ray = self._ground, (centre.x_m, centre.y_m, centre.heading_rad + turn_rad)
         carpark_m = ground.carparks.begins_m(*ray, FURTHEST_EDGE_M)
         edge_m = ground.road.reach_m(*ray, FURTHEST_EDGE_M)
         if carpark_m is not None and 0.0 < carpark_m < (math.inf if edge_m is None else edge_m):
             edge_m = carpark_m
-        walkway_m = ground.walkways.begins_m(*ray, FURTHEST_EDGE_M)
-        return RoadSide(edge_m=edge_m, carpark_m=carpark_m, walkway_m=walkway_m)
+        return {
+            f"edge_{side}_m": edge_m,
+            f"carpark_{side}_m": carpark_m,
+            f"walkway_{side}_m": ground.walkways.begins_m(*ray, FURTHEST_EDGE_M),
+        }
 
-    def _taken_by(self, pose: Pose, object_type: AgentType, gap_m: float = 0.0) -> tuple[str, ...]:
+    def _taken_by(self, pose: Pose, object_type: AgentType, gap_m: float = 0.0) -> list[str]:
         """Return the ids of those whose boxes an object would overlap, with a gap at its ends."""
         length_m, width_m = LENGTH_WIDTH_M[object_type]
         box = Box(pose=pose, length_m=length_m + 2.0 * gap_m, width_m=width_m)
         reach_m = math.hypot(box.length_m, box.width_m) / 2.0
-        return tuple(
+        return [
             name
             for name, agent in self.agents.items()
             if math.dist((pose.x_m, pose.y_m), (agent.x_m, agent.y_m))
             <= reach_m + math.hypot(agent.length_m, agent.width_m) / 2.0
             and overlap(box, agent.box).depth_m > _TOUCH_M
-        )
+        ]
 
     def _nearest_free_m(
         self, pose_at: Callable[[float], Pose], object_type: AgentType, distance_m: float
@@ -385,85 +372,7 @@ class PoseTool:
 
 # Private
 
-
-def _read_call(arguments: object) -> tuple[str | CubicBezier, str, tuple[AskedPlace, ...], bool]:
-    """Return lane, start and places of a call, and whether a list of places was asked for.
-
-    Raises:
-        ToolError: It can't be read; the sentence names the argument and what is allowed.
-    """
-    allowed = ", ".join(PARAMETERS)
-    if not isinstance(arguments, Mapping):
-        raise ToolError(TOOL, f"the arguments must be one JSON object with {allowed}")
-    unknown = [str(name)[:40] for name in arguments if name not in PARAMETERS]
-    if unknown:
-        raise ToolError(TOOL, f"there is no argument {unknown[0]!r}; there are {allowed}")
-    missing = [name for name in PARAMETERS[:3] if name not in arguments]
-    if missing:
-        raise ToolError(TOOL, f"{', '.join(missing)} must be given")
-    start = arguments["start"]
-    if not isinstance(start, str):
-        raise ToolError(TOOL, f'start must be "{LANE_START}" or the id of an agent')
-    given: dict[str, Any] = {"lateral_m": 0.0, "object": AgentType.VEHICLE.value} | dict(arguments)
-    lists: dict[str, list[Any]] = {
-        "distance_m": _numbers("distance_m", given["distance_m"], FURTHEST_M),
-        "lateral_m": _numbers("lateral_m", given["lateral_m"], WIDEST_M),
-        "object": _object_types(given["object"]),
-    }
-    count = max(len(values) for values in lists.values())
-    for name, values in lists.items():
-        if len(values) != count and isinstance(given[name], list):
-            longest = next(other for other in lists if len(lists[other]) == count)
-            raise ToolError(
-                TOOL,
-                f"{name} is a list of {len(values)} and {longest} one of {count}: make them "
-                "equally long, or give one value for all places",
-            )
-    # What is no list goes with each of the others.
-    along, aside, kinds = (values * (count // len(values)) for values in lists.values())
-    places = tuple(map(AskedPlace, along, aside, kinds))
-    is_list = any(isinstance(given[name], list) for name in lists)
-    return _lane(arguments["lane"]), start, places, is_list
-
-
-def _numbers(name: str, value: Any, limit: float) -> list[float]:
-    values = value if isinstance(value, list) else [value]
-    if not 1 <= len(values) <= MOST_PLACES:
-        raise ToolError(TOOL, f"{name} must be a number or a list of 1 to {MOST_PLACES} numbers")
-    for one in values:
-        # True is a number to Python, and an integer may be too large for a float.
-        if isinstance(one, bool) or not isinstance(one, int | float):
-            raise ToolError(TOOL, f"{name} must be a number, without quotes and without a unit")
-        if not (abs(one) <= limit and math.isfinite(one)):
-            raise ToolError(TOOL, f"{name} must be between {-limit:g} and {limit:g}")
-    return [float(one) for one in values]
-
-
-def _object_types(value: Any) -> list[AgentType]:
-    values = value if isinstance(value, list) else [value]
-    names = [kind.value for kind in OBJECT_TYPES]
-    if not 1 <= len(values) <= MOST_PLACES or any(one not in names for one in values):
-        raise ToolError(
-            TOOL,
-            f"object must be one of {', '.join(names)}, or a list of 1 to {MOST_PLACES} of them",
-        )
-    return [AgentType(one) for one in values]
-
-
-def _lane(value: Any) -> str | CubicBezier:
-    if isinstance(value, str):
-        return value
-    is_curve = isinstance(value, list) and len(value) in (2, 4)
-    if not is_curve or not all(isinstance(one, list) and len(one) == 2 for one in value):
-        raise ToolError(
-            TOOL,
-            "lane must be an id or four control points [[x, y], [x, y], [x, y], [x, y]], "
-            "or the two ends of a straight piece",
-        )
-    try:
-        return curve_from([_numbers("lane", point, FURTHEST_M) for point in value])
-    except ValueError as fault:
-        raise ToolError(TOOL, f"lane: {fault}") from None
+_PLACES = ("distance_m", "lateral_m", "object")
 
 
 def _refuse_past_end(
@@ -476,19 +385,14 @@ def _refuse_past_end(
     raise ToolError(
         TOOL,
         f"the lanes that are shown {side} {over_m:.2f} m short of that ({path}): from this start "
-        f"distance_m can be {round(possible_m, 2) + 0.0:.2f} at {bound}",
+        f"distance_m can be {_rounded(possible_m):.2f} at {bound}",
     )
 
 
-def _unknown(kind: str, name: str, known: Iterable[str]) -> str:
-    """Say that there is no such one, what may have been meant, and which there are."""
-    names = list(known)
-    close = get_close_matches(name[:40], names, n=1)
-    meant = f" Is {close[0]} meant?" if close else ""
-    more = f" and {len(names) - _MOST_LISTED} more" if len(names) > _MOST_LISTED else ""
-    return (
-        f"there is no {kind} {name[:40]!r}.{meant} Known: {', '.join(names[:_MOST_LISTED])}{more}."
-    )
+def _unknown(kind: str, name: object, known: Iterable[str]) -> str:
+    """Say that there is no such one, and which there are."""
+    listed = ", ".join([*known][:_MOST_LISTED])
+    return f"there is no {kind} {str(name)[:40]!r}. Known: {listed}."
 
 
 def _rounded(value: float | None, digits: int = 2) -> float | None:

@@ -6,10 +6,11 @@ decides. Geometric, our own: the deterministic checks speak, no model does; wher
 an intent they are held against it as well.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import partial
+from typing import Any
 
 from augment.checks import Ground, Severity
 from augment.checks.registry import check_against_intent
@@ -20,7 +21,7 @@ from augment.prompts.reply import read_questions, read_ratings, read_sight, read
 from augment.prompts.vectors import DEFAULT_RADIUS_M, short_names
 from augment.render.bev import draw_for_review
 from augment.render.camera import WIDTH_PX, camera_for
-from augment.scene.entities import Modification, Scene
+from augment.scene.entities import Lane, LaneConnector, Modification, Scene, TrafficAgent
 from augment.scene.intent import Intent
 from augment.variants.respondents import ModelRole, Respondents
 
@@ -235,7 +236,8 @@ def pictures(
     The ids are those of the engineer's vectors; the window depends on the scene and on what is
     reviewed, never on a reference.
     """
-    shown, change = _under_short_names(scene, modification)
+    names = short_names(scene)
+    shown, change = (_rename(one, names.agents | names.lanes) for one in (scene, modification))
     return draw_for_review(shown, change, camera_for(shown, change).at_width(width_px))
 
 
@@ -277,40 +279,13 @@ def _unusable(who: str) -> Iterator[None]:
         raise ReviewUnusable(f"{who} declined: {refused}") from refused
 
 
-def _under_short_names(scene: Scene, modification: Modification) -> tuple[Scene, Modification]:
-    """Return both under the ids that the prompts use."""
-    names = short_names(scene)
-
-    def lane_id(name: str | None) -> str | None:
-        return names.lanes.get(name or "")
-
-    shown = replace(
-        scene,
-        ego=replace(scene.ego, id=names.agents[scene.ego.id]),
-        agents=tuple(replace(agent, id=names.agents[agent.id]) for agent in scene.agents),
-        lanes=tuple(
-            replace(
-                lane,
-                id=names.lanes[lane.id],
-                left_neighbor=lane_id(lane.left_neighbor),
-                right_neighbor=lane_id(lane.right_neighbor),
-                successors=tuple(names.lanes[n] for n in lane.successors if n in names.lanes),
-            )
-            for lane in scene.lanes
-        ),
-        connectors=tuple(
-            replace(
-                connector,
-                id=names.lanes[connector.id],
-                from_lane=lane_id(connector.from_lane),
-                to_lane=lane_id(connector.to_lane),
-            )
-            for connector in scene.connectors
-        ),
-    )
-    change = Modification(
-        added=modification.added,
-        moved=tuple(replace(agent, id=names.agents[agent.id]) for agent in modification.moved),
-        removed=tuple(names.agents[name] for name in modification.removed),
-    )
-    return shown, change
+def _rename(value: Any, names: Mapping[str, str]) -> Any:
+    """Return a value of a scene with other ids wherever these stand in it."""
+    if isinstance(value, str):
+        return names.get(value, value)
+    if isinstance(value, tuple):
+        return tuple(_rename(one, names) for one in value)
+    if isinstance(value, Scene | Modification | TrafficAgent | Lane | LaneConnector):
+        parts = {part.name: getattr(value, part.name) for part in fields(value)}
+        return replace(value, **{name: _rename(part, names) for name, part in parts.items()})
+    return value

@@ -8,7 +8,7 @@ counts them too.
 import json
 import math
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from augment.llm.messages import Message
@@ -28,9 +28,6 @@ EXAMPLE_QUESTIONS = (
     "Between which grid lines is the centre of each blue object?",
 )
 """Shown to a viewer where no engineer has asked."""
-
-PROGRAM_TOKENS = 2_000
-"""What the program says between two answers: results of calls, problems, feedback."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -67,14 +64,6 @@ class CallRange:
     most: int
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class TokenUse:
-    """Tokens of one role in one augmentation."""
-
-    prompt: int
-    completion: int
-
-
 def shown_prompt(
     recipe: Recipe,
     role: ModelRole,
@@ -84,7 +73,6 @@ def shown_prompt(
     *,
     native_tools: bool = False,
     questions: Sequence[str] = EXAMPLE_QUESTIONS,
-    images: tuple[bytes, ...] | None = None,
 ) -> Shown:
     """Return what that role is asked first.
 
@@ -96,7 +84,6 @@ def shown_prompt(
         modification: What reviewers judge.
         native_tools: Whether the modifier calls natively.
         questions: What the viewer is asked.
-        images: What the viewer is shown, as `pictures` drew it before; None to draw it.
     """
     if role is ModelRole.MODIFIER:
         form = form_of(recipe, native_tools=native_tools)
@@ -106,8 +93,7 @@ def shown_prompt(
             tools=(json.dumps(fill.pose_tool().to_document()),) if native else (),
         )
     if role is ModelRole.VIEWER:
-        if images is None:
-            images = pictures(scene, modification, width_px=recipe.limits.picture_px)
+        images = pictures(scene, modification, width_px=recipe.limits.picture_px)
         return Shown(messages=fill.viewer_messages(questions, images))
     is_reviewer = role is ModelRole.REVIEWER
     messages = fill.reviewer_messages if is_reviewer else fill.engineer_messages
@@ -126,29 +112,3 @@ def calls_of(recipe: Recipe) -> dict[ModelRole, CallRange]:
     for role, asked in Counter(recipe.review.asks if recipe.review else ()).items():
         calls[role] = CallRange(least=asked, usual=asked, most=asked * rounds * again)
     return calls
-
-
-def most_tokens(recipe: Recipe, first: Mapping[ModelRole, int]) -> dict[ModelRole, TokenUse]:
-    """Return the tokens of conversations in which every answer reaches its length limit.
-
-    Args:
-        recipe: The variant.
-        first: At most so many tokens has the first prompt of each role.
-    """
-    limits = recipe.limits
-    # A cut-off answer is asked for again with twice the room.
-    longest = limits.max_output_tokens * (2 if limits.re_asks else 1)
-    turn = longest + PROGRAM_TOKENS
-    by_role = {}
-    for role, calls in calls_of(recipe).items():
-        # The modifier's conversation goes on through all rounds; a review is one of its own, and
-        # holds what the others said of the round.
-        talks, start = recipe.rounds, first[role] + turn
-        if role is ModelRole.MODIFIER:
-            talks, start = 1, first[role]
-        turns = calls.most // talks
-        by_role[role] = TokenUse(
-            prompt=talks * (turns * start + turn * turns * (turns - 1) // 2),
-            completion=calls.most * longest,
-        )
-    return by_role

@@ -1,4 +1,4 @@
-// Which key means what. Single keys can be changed or switched off; arrows, Backspace, Ctrl+Z and
+// Which key means what. Single keys can be switched off; arrows, Backspace, Ctrl+Z and
 // Esc always work.
 const ALWAYS = { ArrowLeft: "a", ArrowDown: "e", ArrowRight: "b", Backspace: "undo", Escape: "leave" };
 

@@ -43,13 +43,10 @@ export function replay(element) {
   }
 }
 
-const item = (line) => Object.assign(document.createElement("li"), { textContent: line });
-
-export function drawPair({ instruction, position, text: lists, legend }) {
+export function drawPair({ instruction, position, legend }) {
   for (const mark of at("legend").children) mark.hidden = Boolean(legend) && !legend.includes(mark.dataset.mark);
   at("instruction").textContent = instruction;
   document.title = document.title.replace(/\d+/, position);
-  for (const side in lists) at(`text-${side}`).replaceChildren(...lists[side].map(item));
 }
 
 export function drawReview(vote) {
@@ -99,19 +96,17 @@ export function drawSaved(waiting, isCut) {
   else late = setTimeout(tell, LATE_MS);
 }
 
-export function drawProgress({ saved, total, skipped, minutes_left: minutes }) {
+export function drawProgress({ saved, total, skipped }) {
   Object.assign(given, { saved, total });
   Object.assign(at("skipped"), { hidden: !skipped, textContent: text("skipped", skipped) });
   at("bar").value = saved;
-  at("minutes").textContent = minutes === null ? "" : text("minutes", Math.max(1, minutes));
   if (!at("saved").classList.contains("is-late")) drawSaved(0);
 }
 
 export function drawKeys() {
   body.classList.toggle("has-keys", preferences.single_keys);
   for (const hint of all("kbd[data-key]")) {
-    // An action of only some studies has no key where its usual one was chosen for another.
-    hint.textContent = preferences.keys[hint.dataset.key][0]?.toUpperCase();
+    hint.textContent = preferences.keys[hint.dataset.key][0].toUpperCase();
   }
 }
 
@@ -121,14 +116,12 @@ function press(name, isOn) {
 }
 
 export const toggleLegend = () => press("legend", !at("legend").classList.toggle("is-hidden"));
-export const toggleText = () => press("text", at("text").toggleAttribute("open"));
 
 // --- Panels: skip, report, comment, the account's menu ------------------------------------------
 
 let before = null;
 
-// The lists of the text description stay open beside everything else.
-const POP = "details[open]:not(.text)";
+const POP = "details[open]";
 
 export const openPop = () => document.querySelector(POP);
 

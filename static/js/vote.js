@@ -15,8 +15,6 @@ const ARROWS = { ArrowUp: [0, 1], ArrowDown: [0, -1], ArrowLeft: [-1, 0], ArrowR
 const { at, given, text } = page;
 const { preferences, urls } = given;
 const form = at("vote");
-// What was changed, in words; null where the study has no text.
-const lists = at("text");
 const field = form.elements.comment;
 // The votes, the latest first: {key, position, outcome, both_miss, comment, shown, pair}; the one
 // of them whose pair is on the screen again; the pair whose pictures are painted.
@@ -62,9 +60,7 @@ function paint(pair) {
   onScreen = pair;
   paintedAt = Infinity;
   lens.show(pair, preferences.keep_zoom);
-  if (lists?.open) lens.aids.add("text");
   page.drawPair(pair.shown);
-  form.elements.matchup.value = pair.shown.matchup;
   form.elements.report_side.value = "both";
   page.drawReview(review);
   field.value = (review ? review.comment : pair.draft) ?? "";
@@ -136,10 +132,8 @@ function leave() {
 function report(reason) {
   const { report_comment: told, report_side: side } = form.elements;
   const { matchup } = onScreen.shown;
-  const { mark = null } = onScreen;
-  outbox.add("reports", { key: page.freshKey(), matchup, reason, side: side.value, mark, comment: told.value.trim() });
+  outbox.add("reports", { key: page.freshKey(), matchup, reason, side: side.value, comment: told.value.trim() });
   told.value = "";
-  onScreen.mark = null;
   page.closePop();
 }
 
@@ -212,13 +206,11 @@ const actions = {
   zoom: () => lens.toggleZoom(),
   reset: () => lens.reset(),
   ruler: () => lens.rule(true),
-  text: () => lists && page.toggleText() && lens.aids.add("text"),
   replay: () => late(import("./vote-replay.js"), ({ toggleReplay }) => toggleReplay(lens.aids)),
-  measures: () => late(import("./vote-measures.js"), ({ toggle }) => toggle(lens)),
   blink: () => compare("blink", true),
   difference: () => compare("difference"),
   legend: () => ask(urls.preferences, { legend: page.toggleLegend() }),
-  help: () => import("./vote-help.js").then(({ showHelp }) => showHelp(), () => open(at("help-link").href)),
+  help: () => late(import("./vote-help.js"), ({ showHelp }) => showHelp()),
   again: () => pairs.fill(),
   close: page.closePop,
 };
@@ -244,8 +236,6 @@ addEventListener("keydown", (event) => {
   const { target, repeat, code } = event;
   if (document.querySelector("dialog[open]")) return;
   if (page.openPop()) return page.keyInPop(event);
-  // Where the lists have the focus, arrows scroll them.
-  if (lists?.contains(target) && code.startsWith("Arrow")) return;
   if (arrow(event)) return event.preventDefault();
   const action = actionOf(event, preferences);
   // Enter, held on a button, would click on and on.
@@ -272,7 +262,6 @@ form.addEventListener("submit", (event) => {
   else if (name === "report") report(value);
   else actions[page.ACTIONS[value]]?.();
 });
-at("report").addEventListener("toggle", () => late(import("./vote-report.js"), ({ aim }) => aim(lens)));
 form.addEventListener("input", () => page.drawComment(field.value));
 
 document.addEventListener("click", (event) => {

@@ -35,7 +35,7 @@ pytestmark = [pytest.mark.django_db, pytest.mark.urls("tests.api.urls")]
         ({"comment": "x" * 1001}, "comment"),
         ({"comment": 5}, "comment"),
         ({"aids": ["glasses"]}, "aids"),
-        ({"aids": ["text"]}, "aids"),
+        ({"aids": ["replay"]}, "aids"),
         ({"aids": "zoom"}, "aids"),
         ({"n": 0}, "n"),
         ({"n": 13}, "n"),

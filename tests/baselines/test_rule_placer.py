@@ -33,7 +33,6 @@ from augment.scene.intent import (
     LateralTarget,
     Nearness,
     Relation,
-    Setting,
     Shape,
     Side,
     Spot,
@@ -55,7 +54,7 @@ from tests.intents import (
     walk,
 )
 from tests.recorded import recorded
-from tests.scenes import curve, junction, scene, vehicle
+from tests.scenes import curve, scene, vehicle
 
 
 def added(shown: Scene, intent: Intent, *, seed: int = 0) -> tuple[TrafficAgent, ...]:
@@ -165,12 +164,6 @@ def on_shoulder(target: LateralTarget) -> Lateral:
         (three_lanes(), parked(lateral=on_shoulder(LateralTarget.KERB)), "another lane"),
         (scene(lanes=()), parked(), "stands on no lane"),
         (scene(), cones(90.0, 30, Shape.TAPER), "The lanes end"),
-        (scene(), crash(30.0, 2, settings=(Setting.IN_INTERSECTION,)), "not in the intersection"),
-        (
-            junction(),
-            walk(30.0, Side.LEFT, Setting.BEFORE_INTERSECTION),
-            "not before the intersection",
-        ),
         (scene(), cones(20.0, 5, Shape.TAPER, spacing=metres(0.2)), "stand in each other"),
     ],
 )

@@ -55,8 +55,7 @@ class Booth:
     def enter(self, **how: Any) -> Page:
         """A page of a browser that is signed in, a pair on it; `how` goes to the browser."""
         page = self.visit("eva", self.path, how)
-        if how.get("java_script_enabled", True):
-            ready(page)
+        ready(page)
         return page
 
     def visit(self, who: str, path: str, how: dict[str, Any]) -> Page:

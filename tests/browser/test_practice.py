@@ -1,4 +1,4 @@
-"""The practice round in a browser: with and without a script, on every size of window."""
+"""The practice round in a browser: on every size of window."""
 
 import pytest
 from django.contrib.auth.models import User
@@ -48,7 +48,7 @@ def practise(page: Page, booth: Booth) -> None:
 
 
 def test_practice_comes_first_and_only_once(wanted: Booth) -> None:
-    page = wanted.visit("eva", wanted.path, {"java_script_enabled": False})
+    page = wanted.visit("eva", wanted.path, {})
     practise(page, wanted)
     assert wanted.votes() == []
     page.goto(wanted.path)

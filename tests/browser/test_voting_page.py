@@ -1,4 +1,4 @@
-"""The voting page as it looks: fixed geometry, both themes, phones, and without a script."""
+"""The voting page as it looks: fixed geometry, both themes, and phones."""
 
 from typing import Any
 
@@ -6,7 +6,6 @@ import pytest
 from axe_playwright_python.sync_playwright import Axe
 from playwright.sync_api import Page, expect
 
-from arena.models import Report
 from arena.studies.services.opening import close_study
 from tests import study_rows
 from tests.browser.booth import PHONE, Booth, press, ready
@@ -41,8 +40,6 @@ def test_axe_finds_nothing_on_any_page_of_voting(booth: Booth) -> None:
     page.keyboard.press("h")
     expect(page.locator("#help[open]")).to_be_visible()
     assert faults(page) == [], "help"
-    page.goto(f"{booth.path}help/")
-    assert faults(page) == [], "help without a script"
     for matchup in study_rows.matchups_of(booth.study, "eva")[1:]:
         study_rows.vote(matchup)
     page.goto(booth.path)
@@ -105,31 +102,3 @@ def test_a_phone_shows_one_above_the_other_and_a_bar_to_tap(booth: Booth) -> Non
     expect(page.locator("#skipped")).to_have_text("Skipped: 1")
     expect(page.locator("#saved")).to_have_text("Saved 1. Nothing waiting.")
     assert booth.outcomes() == ["right", "skip"]
-
-
-def test_everything_but_looking_closely_goes_without_a_script(booth: Booth) -> None:
-    booth.study.allow_both_miss = True
-    booth.study.save()
-    page = booth.enter(java_script_enabled=False)
-    assert page.locator("kbd:visible").count() == 0
-    page.locator("#comment > summary").click()
-    page.get_by_role("textbox", name="Comment").fill("so so")
-    page.get_by_role("button", name="A is better").click()
-    page.get_by_role("button", name="Both miss it").click()
-    page.locator("#report > summary").click()
-    page.get_by_role("textbox", name="What is wrong, in your words").fill("a car floats")
-    page.get_by_role("button", name="Something is wrong with an image").click()
-    page.locator("#skip > summary").click()
-    page.get_by_role("button", name="Instruction unclear").click()
-    page.get_by_role("link", name="Undo").click()
-    page.get_by_role("button", name="B is better").click()
-    page.get_by_role("link", name="Change pair 1: A").click()
-    page.get_by_role("link", name="Back").click()
-    expect(page.locator("#place")).to_have_text("4")
-    page.get_by_role("link", name="Help").click()
-    expect(page.get_by_role("heading", name="How to vote")).to_be_visible()
-    votes = booth.votes()
-    assert [vote.outcome for vote in votes] == ["left", "equal", "right"]
-    assert votes[0].comment == "so so"
-    assert votes[1].both_miss
-    assert Report.objects.get().comment == "a car floats"

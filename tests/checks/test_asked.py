@@ -50,15 +50,7 @@ DRIVING = parked(30.0, speed_mps=8.0)
 ONCOMING = parked(20.0, lane=LaneChoice.ONCOMING)
 FILE = walk(20.0, Side.LEFT, count=2, is_file=True, behind=(metres(3.0),))
 SLANTED = walk(20.0, Side.LEFT, drift_m=8.0)
-NARROWED = cones(
-    20.0,
-    3,
-    Shape.TAPER,
-    start=Side.RIGHT,
-    ends_in_middle=True,
-    has_worker=True,
-    post_side=Side.RIGHT,
-)
+NARROWED = cones(20.0, 3, Shape.TAPER, start=Side.RIGHT, ends_in_middle=True, has_worker=True)
 
 ACROSS = (pedestrian("Agent2", 20.0, 6.0, (20.0, -3.0)),)
 CARS = (vehicle("Agent2", 20.0, 0.0), vehicle("Agent3", 24.5, 0.0, math.radians(40.0)))
@@ -148,7 +140,8 @@ def test_what_is_as_asked_for_has_no_fault(
         (FILE, (IN_FILE[0], replace(IN_FILE[1], y_m=5.5)), FindingKind.ASKED_SPACING),
         (SLANTED, (pedestrian("Agent2", 20.0, 6.0, (20.0, -3.0)),), FindingKind.ASKED_DISTANCE),
         (NARROWED, (*TAPER[:2], replace(TAPER[2], y_m=1.5), TAPER[3]), FindingKind.ASKED_ACROSS),
-        (NARROWED, (*TAPER[:3], replace(TAPER[3], y_m=2.0)), FindingKind.ASKED_SIDE),
+        (NARROWED, (*TAPER[:3], replace(TAPER[3], y_m=-7.0)), FindingKind.ASKED_SPACING),
+        (cones(20.0, 3, Shape.TAPER, start=Side.LEFT), TAPER[:3], FindingKind.ASKED_SIDE),
     ],
 )
 def test_what_is_not_as_asked_for_is_the_one_fault(
@@ -222,9 +215,9 @@ def test_a_finding_says_the_numbers() -> None:
         if one.kind is FindingKind.ASKED_DISTANCE
     )
     assert distance.severity is Severity.WRONG
-    assert distance.measured["off_m"] == pytest.approx(7.3)
+    assert distance.measured["off"] == pytest.approx(7.3)
     assert distance.sentence() == (
-        "Agent2 is 27.3 m ahead of the ego along its lane; 20 m ahead is asked for."
+        "The distance of Agent2 ahead along the ego's lane is 27.30 m; 20 m is asked for."
     )
 
 
@@ -327,7 +320,7 @@ def test_cones_around_a_sharp_bend_are_apart_along_the_lane() -> None:
     found = check_against_intent(Ground.of(bend), Modification(added=tuple(added)), line, AUTHORED)
     (spacing,) = [one for one in found if one.kind is FindingKind.ASKED_SPACING]
     assert not spacing.is_fault
-    assert spacing.measured["gap_m"] == pytest.approx(5.0, abs=0.1)
+    assert spacing.measured["value"] == pytest.approx(5.0, abs=0.1)
 
 
 SPOT = Spot(distance=Length(low_m=25.0, high_m=25.0), relation=Relation.AHEAD)

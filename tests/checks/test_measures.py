@@ -15,7 +15,7 @@ from augment.checks.lanes_across import (
     find_mark,
     find_picked,
     list_absent,
-    resolve_landmarks,
+    resolve_spots,
 )
 from augment.checks.measures import LaneEdges, MeasureLine, find_measures, lane_edges_at
 from augment.checks.registry import check_against_intent
@@ -33,6 +33,7 @@ from augment.scene.intent import (
     Sight,
     Spot,
     VehicleRequest,
+    WalkRequest,
 )
 from tests.checks.worlds import FIXTURES, references
 from tests.fixtures.shelf import whole_scene
@@ -44,8 +45,7 @@ STREET = Ground.of(scene())
 
 
 def lines(intent: Intent, ground: Ground = STREET) -> dict[str, MeasureLine]:
-    found = find_measures(ground, intent, reach_m=30.0)
-    return {label(one): one for one in found.lines}
+    return {label(one): one for one in find_measures(ground, intent)}
 
 
 def label(line: MeasureLine) -> str:
@@ -117,19 +117,9 @@ def test_on_a_bend_the_distance_runs_along_the_lane() -> None:
     assert math.dist(wanted, (25.0, 0.0)) > 1.0, "not straight ahead"
 
 
-def test_rings_stand_around_the_ego_every_ten_metres_and_need_no_intent() -> None:
-    found = find_measures(STREET, None, reach_m=35.0)
-    assert found.lines == ()
-    assert [(one.centre_m, one.radius_m) for one in found.rings] == [
-        ((0.0, 0.0), 10.0),
-        ((0.0, 0.0), 20.0),
-        ((0.0, 0.0), 30.0),
-    ]
-
-
-def test_without_a_lane_under_the_ego_there_are_rings_alone() -> None:
-    found = find_measures(Ground.of(scene(lanes=())), parked(25.0), reach_m=15.0)
-    assert (found.lines, len(found.rings)) == ((), 1)
+def test_there_are_no_lines_without_an_intent_or_a_lane_under_the_ego() -> None:
+    assert find_measures(STREET, None) == ()
+    assert find_measures(Ground.of(scene(lanes=())), parked(25.0)) == ()
 
 
 @pytest.mark.parametrize(
@@ -198,8 +188,7 @@ def test_every_scenario_of_the_catalogue_with_a_distance_has_its_line() -> None:
     for one in references():
         document = json.loads((FIXTURES / "scenarios" / f"{one.slug}.json").read_text())
         intent = intent_from_document(document["intent"])
-        found = find_measures(Ground.of(one.scene), intent, reach_m=10.0)
-        ahead_m = {line.ahead_m for line in found.lines}
+        ahead_m = {line.ahead_m for line in find_measures(Ground.of(one.scene), intent)}
         from_ego = (
             asked
             for request in intent.requests
@@ -276,7 +265,7 @@ def test_a_distance_from_a_landmark_becomes_one_from_the_ego() -> None:
     absent = replace(spot, landmark=Pick(kind=Sight.BUS))
     intent = Intent(requests=tuple(VehicleRequest(spot=one) for one in (spot, level, absent)))
     lanes = lanes_of("terrace-row")
-    spans = [one.spot.span_m for one in resolve_landmarks(intent, lanes).requests]
+    spans = [one.spot.span_m for one in resolve_spots(intent, lanes).requests]
     assert spans[0] == pytest.approx((-2.0, -2.0), abs=0.05)
     assert spans[1] == pytest.approx((-5.1, -5.1), abs=0.05)
     assert spans[2] is None
@@ -296,11 +285,11 @@ def test_who_is_to_be_moved_has_to_be_moved_there() -> None:
     wrong = replace(car, x_m=x_m, y_m=y_m)
     assert faults(intent, Modification(moved=(right,))) == []
     assert any(
-        "21 m ahead is asked for" in one for one in faults(intent, Modification(moved=(wrong,)))
+        "; 21 m is asked for" in one for one in faults(intent, Modification(moved=(wrong,)))
     )
     assert faults(intent, Modification()) == [f"{car.id} is to be moved and is not."]
     elsewhere = faults(intent, Modification(moved=(right, other)))
-    assert f"{other.id} was in the scene and is moved; nobody asked for that." in elsewhere
+    assert f"{other.id} is moved; nobody asked for that." in elsewhere
 
 
 def test_who_is_to_go_has_to_go_and_nobody_else() -> None:
@@ -320,3 +309,24 @@ def test_whatever_is_done_about_a_wish_that_can_t_be_met_is_wrong() -> None:
     assert faults(intent, Modification()) == []
     found = faults(intent, Modification(removed=(gone,)))
     assert f"The wish can't be met, and {gone} is changed: There is no tram {{here}}." in found
+
+
+@pytest.mark.parametrize(
+    ("bus_m", "relation", "distance", "wanted"),
+    [
+        (20.0, Relation.AHEAD, metres(6.0), (26.0, 26.0)),
+        (20.0, Relation.BEHIND, metres(6.0, 8.0), (12.0, 14.0)),
+        (20.0, Relation.BEHIND, metres(30.0), (-10.0, -10.0)),
+        (20.0, Relation.AHEAD, None, None),
+    ],
+)
+def test_a_distance_from_another_object_is_added_to_that_ones(
+    bus_m: float, relation: Relation, distance: Length | None, wanted: tuple[float, float] | None
+) -> None:
+    (bus,) = parked(bus_m).requests
+    named = VehicleRequest(spot=bus.spot, name="bus")
+    walker = WalkRequest(spot=Spot(anchor="bus", relation=relation, distance=distance))
+    lanes = LanesAcross.of(STREET)
+    assert lanes is not None
+    resolved = resolve_spots(Intent(requests=(named, walker)), lanes)
+    assert resolved.requests[1].spot.span_m == wanted

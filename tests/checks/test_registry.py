@@ -4,6 +4,7 @@ import math
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import replace
+from operator import attrgetter
 from pathlib import Path
 
 import pytest
@@ -11,8 +12,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from augment.checks import Finding, FindingKind, Severity, findings
-from augment.checks.ground import LaneIndex, best_aligned
-from augment.checks.registry import ASKED_CHECKS, CHECKS
 from augment.geometry.frames import Pose
 from augment.scene.entities import (
     AgentType,
@@ -23,7 +22,6 @@ from augment.scene.entities import (
     TrafficAgent,
     TrafficSide,
 )
-from augment.scene.lane_graph import LaneGraph
 from tests.checks.worlds import Reference, moved_agent, moved_scene, references, severities
 from tests.recorded import recorded
 from tests.scenes import cone, curve, junction, scene, vehicle
@@ -83,7 +81,7 @@ def test_no_modification_raises(world: Scene, change: Modification) -> None:
         changed.index(one.agents[0]) for one in found
     )
     for one in found:
-        assert all(value is None or math.isfinite(value) for value in one.measured.values())
+        assert all(map(math.isfinite, one.measured.values()))
         assert one.agents[0] in one.sentence()
         assert one.sentence().endswith(".")
 
@@ -100,7 +98,7 @@ def test_findings_do_not_ask_where_the_world_lies(
     here = findings(world, change)
     there = findings(moved_scene(world, frame), moved)
     assert _told(here) == _told(there)
-    for one, other in zip(_comparable(here), _comparable(there), strict=True):
+    for one, other in zip(here, there, strict=True):
         for name in one.measured.keys() - {"lane_heading_rad"}:
             assert other.measured[name] == pytest.approx(one.measured[name], abs=1e-5), name
 
@@ -120,13 +118,8 @@ def test_boxes_of_no_size_raise_nothing(size_m: float) -> None:
     assert {FindingKind.SIZE, FindingKind.OVERLAP} <= kinds
 
 
-def _comparable(found: tuple[Finding, ...]) -> list[Finding]:
-    """Without what is about the number of a heading, which a moved scene changes."""
-    return [one for one in found if one.kind is not FindingKind.DEGREES]
-
-
 def _told(found: tuple[Finding, ...]) -> list[object]:
-    return [(one.kind, one.severity, one.agents, one.lanes) for one in _comparable(found)]
+    return [(one.kind, one.severity, one.agents, one.lanes) for one in found]
 
 
 OFF = Finding(
@@ -134,68 +127,15 @@ OFF = Finding(
     severity=Severity.FACT,
     agents=("Agent2",),
     lanes=("42811-b",),
-    measured={"off_m": 7.28, "left_m": -9.0, "along_lanes_m": None},
-    template="{agents[0]} is {off_m:.1f} m off {lanes[0]}, {left_m:.1f} m to its right.",
+    measured={"off_m": 7.28},
+    template="{agents[0]} is {off_m:.1f} m off {lanes[0]}.",
 )
 
 
-def test_its_sentence_tells_sizes_and_leaves_signs_to_the_words() -> None:
-    assert OFF.sentence() == "Agent2 is 7.3 m off 42811-b, 9.0 m to its right."
-
-
 def test_its_sentence_calls_things_what_the_reader_calls_them() -> None:
-    assert OFF.sentence({"42811-b": "Lane3"}).startswith("Agent2 is 7.3 m off Lane3,")
-
-
-def test_a_name_with_braces_is_only_a_name() -> None:
-    assert OFF.sentence({"Agent2": "{lanes[0]}"}).startswith("{lanes[0]} is 7.3 m")
-
-
-def test_its_numbers_stay_what_they_are() -> None:
-    with pytest.raises(TypeError):
-        OFF.measured["off_m"] = 0.0  # type: ignore[index]
-    assert len({OFF, OFF}) == 1
-
-
-def test_every_kind_has_its_check() -> None:
-    asked = {check.__name__.removeprefix("find_") for check in ASKED_CHECKS} | {
-        FindingKind.ASKED_SIDE,
-        FindingKind.ASKED_CROSSING,
-    }
-    # They tell sides, headings, crossings and gaps; counts; and what nobody asked for.
-    asked -= {"asked_walk", "asked_crash", "asked_changes", "attempted"}
-    alone = {check.__name__ for check in CHECKS}
-    assert (alone | asked, alone & asked) == ({kind.value for kind in FindingKind}, set())
-
-
-GRAPHS = st.sampled_from([LaneGraph(made) for made in (scene(), curve(), junction())])
-PLACES = st.floats(-15.0, 50.0).map(lambda value: value + 0.00071)
-
-
-@given(GRAPHS, PLACES, PLACES)
-def test_a_point_lies_where_its_projection_says(graph: LaneGraph, x_m: float, y_m: float) -> None:
-    for one in LaneIndex(graph.lanes.values()).beside(x_m, y_m):
-        place = graph.lanes[one.lane_id].centerline.project(x_m, y_m)
-        assert abs(one.s_m - place.s_m) < 1e-9
-        assert abs(one.distance_m - place.distance_m) < 1e-9
-        if one.beyond_m == 0.0:
-            assert abs(one.d_m - place.d_m) < 1e-9
-
-
-@given(GRAPHS, PLACES, PLACES, st.floats(-3.1, 3.1))
-def test_the_same_way_lies_under_a_point(
-    graph: LaneGraph, x_m: float, y_m: float, heading_rad: float
-) -> None:
-    under = graph.under(x_m, y_m, heading_rad)
-    found = best_aligned(LaneIndex(graph.lanes.values()).beside(x_m, y_m), heading_rad)
-    if under is not None:
-        assert found is not None
-        assert found.lane_id == under or found.beyond_m > 0.0
-
-
-def test_a_map_without_ways_has_nothing_beside_a_point() -> None:
-    empty: Scene = scene(lanes=())
-    assert LaneIndex(LaneGraph(empty).lanes.values()).beside(0.0, 0.0) == ()
+    assert OFF.sentence() == "Agent2 is 7.3 m off 42811-b."
+    names = {"42811-b": "Lane3", "Agent2": "{lanes[0]}"}
+    assert OFF.sentence(names) == "{lanes[0]} is 7.3 m off Lane3."
 
 
 REFERENCES = references()
@@ -207,10 +147,6 @@ VEHICLES = [
     if one.modification.added[0].type in (AgentType.VEHICLE, AgentType.BUS)
     and one.slug not in FACING
 ]
-
-
-def _named(one: Reference) -> str:
-    return one.slug
 
 
 def _off_road(reference: Reference) -> TrafficAgent:
@@ -231,13 +167,13 @@ def _turned(reference: Reference) -> TrafficAgent:
     )
 
 
-@pytest.mark.parametrize("reference", REFERENCES, ids=_named)
+@pytest.mark.parametrize("reference", REFERENCES, ids=attrgetter("slug"))
 def test_a_reference_has_nothing_wrong(reference: Reference) -> None:
     asked_for = {(FindingKind.HEADING, Severity.DOUBTFUL)} if reference.slug in FACING else set()
     assert severities(findings(reference.scene, reference.modification)) == asked_for
 
 
-@pytest.mark.parametrize("reference", VEHICLES, ids=_named)
+@pytest.mark.parametrize("reference", VEHICLES, ids=attrgetter("slug"))
 @pytest.mark.parametrize(
     ("inject", "kind", "severity"),
     [
@@ -256,7 +192,7 @@ def test_an_injected_fault_is_named(
     assert (kind, severity) in severities(findings(reference.scene, alone))
 
 
-@pytest.mark.parametrize("reference", REFERENCES, ids=_named)
+@pytest.mark.parametrize("reference", REFERENCES, ids=attrgetter("slug"))
 def test_the_same_thing_twice_is_named(reference: Reference) -> None:
     added = reference.modification.added
     twin = replace(added[0], id="Agent99")
@@ -273,7 +209,7 @@ def test_the_same_thing_twice_is_named(reference: Reference) -> None:
 @pytest.mark.parametrize(
     "reference",
     [one for one in REFERENCES if one.modification.added[0].walk_to_m is not None],
-    ids=_named,
+    ids=attrgetter("slug"),
 )
 def test_a_pedestrian_who_walks_backwards_is_named(reference: Reference) -> None:
     turned = Modification(added=(_turned(reference),))
@@ -316,14 +252,8 @@ def test_most_recorded_vehicles_have_nothing_wrong(
 
 
 @pytest.mark.realdata
-def test_no_recorded_agent_is_outside_its_map_or_impossible(scenes: list[Scene]) -> None:
-    never = {
-        FindingKind.OUTSIDE_MAP,
-        FindingKind.SIZE,
-        FindingKind.SPEED,
-        FindingKind.DEGREES,
-        FindingKind.LANE_NAMED,
-    }
+def test_no_recorded_agent_is_impossible(scenes: list[Scene]) -> None:
+    never = {FindingKind.SIZE, FindingKind.SPEED, FindingKind.LANE_NAMED}
     for base in scenes:
         found = findings(base, Modification(moved=base.agents))
         assert [

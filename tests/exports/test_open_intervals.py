@@ -55,7 +55,7 @@ def test_tables_of_every_format_have_the_same_order_bounds_and_reasons(snapshot:
     for rows in (document, stored):
         assert [row["rank"] for row in rows] == RANKS
         assert [row["upper"] is None for row in rows] == [True, True, *[False] * 5]
-        assert [row["lower"] is None for row in rows] == [*[False] * 6, True]
+        assert [row["lower"] is None for row in rows] == [True, *[False] * 5, True]
     assert [line["rank"] for line in lines] == [str(rank or "") for rank in RANKS]
     for rows in (document, stored, lines):
         notes = {row["slug"]: row["note"] for row in rows if row["note"]}

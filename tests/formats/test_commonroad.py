@@ -117,8 +117,8 @@ def test_a_recorded_vehicle_can_be_the_ego(tmp_path: Path) -> None:
     assert reading.recording is not None
     assert reading.recording.ego[:, 0].tolist() == [0.0, 0.5]
     assert SceneNoteKind.NO_EGO_MOTION not in kinds(reading)
-    assert "name a vehicle as the ego by its id: 70" in fault_of(tmp_path, newer(more=""))
-    assert "72 is not there" in fault_of(tmp_path, newer(), "72")
+    assert read(tmp_path, newer(more="")).moment.item == "70"
+    assert "unknown '72'; known: 90, 70" in fault_of(tmp_path, newer(), "72")
 
 
 def test_the_older_dialect_has_its_own_limits_and_roles(tmp_path: Path) -> None:
@@ -170,12 +170,12 @@ OUTSIDE = '<!DOCTYPE x [<!ENTITY a SYSTEM "file:///etc/passwd">]><commonRoad>&a;
         ("<a>" * 200_000, "is no XML"),
         ("", "is no XML"),
         ("<commonRoad>", "is no XML"),
-        ("<osm/>", "begins with 'osm'"),
-        ('<commonRoad commonRoadVersion="2030c"/>', "version '2030c' is not known"),
+        ("<osm/>", "is 'osm' of version '', not commonRoad"),
+        ('<commonRoad commonRoadVersion="2030c"/>', "of version '2030c', not"),
         (newer().replace('timeStepSize="0.1"', 'timeStepSize="-1"'), "is no step"),
-        (newer().replace("<type>car<", "<type>zeppelin<"), "unknown type 'zeppelin'"),
-        (newer().replace("<color>red<", "<color>blue<"), "unknown colour 'blue'"),
-        (newer().replace("<x>-1.5</x>", "<x>nan</x>"), "got 'nan'"),
+        (newer().replace("<type>car<", "<type>zeppelin<"), "unknown 'zeppelin'"),
+        (newer().replace("<color>red<", "<color>blue<"), "unknown 'blue'"),
+        (newer().replace("<x>-1.5</x>", "<x>nan</x>"), "needs finite numbers"),
         (newer().replace("<x>-1.5</x>", "<x>1e999</x>"), "finite number"),
         (newer().replace('ref="3"', 'ref="three"'), "whole number, got 'three'"),
         (newer().replace("<exact>2</exact>", "<exact>1e7</exact>"), "a time step lies from"),

@@ -1,6 +1,5 @@
 import math
 from dataclasses import replace
-from typing import Any
 
 import pytest
 import yaml
@@ -19,7 +18,10 @@ from augment.scene.entities import (
     without_traffic,
 )
 from tests.fixtures.shelf import SLUGS, entry, shown_scene, whole_scene
+from tests.formats import cells
 from tests.formats.interplan_files import entries_of
+from tests.formats.round_trips import agent_changes
+from tests.scenes import cone, pedestrian, vehicle
 
 UNTOLD = (AgentType.BARRIER, AgentType.CONSTRUCTION_SIGN)
 """interPlan's file has no keys for them."""
@@ -127,8 +129,8 @@ def test_signs_and_barriers_are_named_as_left_out() -> None:
     slug = "roadworks-mill-junction"
     _, losses = write([cell(slug, *entry(slug).reference.added)])
     assert [loss.text.partition(": ")[2] for loss in losses if loss.changes_scene] == [
-        "there is no key for CONSTRUCTION_SIGN",
-        "there is no key for BARRIER",
+        "there is no key for a CONSTRUCTION_SIGN there",
+        "there is no key for a BARRIER there",
     ]
 
 
@@ -156,85 +158,10 @@ def test_several_of_one_scene_are_numbered_and_named_in_comments() -> None:
         write([same] * 101)
 
 
-def test_what_the_format_can_not_say_is_reported() -> None:
-    car = first("nudge-plane-tree-street")
-    walker = replace(first("jaywalker-plane-tree-street"), walk_to_m=None)
-    text, losses = write(
-        [
-            cell(
-                "jaywalker-plane-tree-street",
-                replace(car, id="Agent2", speed_mps=3.0),
-                replace(car, id="Agent3", length_m=9.0),
-                replace(car, id="Agent4", type=AgentType.BARRIER),
-                replace(walker, id="Agent5"),
-            )
-        ]
-    )
-    assert [(loss.text, loss.changes_scene) for loss in losses] == [
-        ("Agent2 moves at 3 m/s; there it stands", True),
-        (
-            "Agent2: its box of 4.8 x 2 m is not kept; it gets that of a removed vehicle, or "
-            "the ego's",
-            False,
-        ),
-        ("Agent3 is 9 m long and becomes a bus", True),
-        ("Agent3: its box of 9 x 2 m becomes 7.456 x 2.079 m", False),
-        ("Agent4 is left out: there is no key for BARRIER", True),
-        ("Agent5 has no end point; 11.5 m along its heading is taken", True),
-    ]
-    details = yaml.safe_load(text)["modification_details_dictionary"]
-    special = details[token_of("plane-tree-street")]["special_scenario"]["0"]
-    ((x0, y0, x1, y1, _),) = special["pedestrian"]
-    # Over the road of 10.2 m, from 0.8 m before its edge.
-    assert math.dist((x0, y0), (x1, y1)) == pytest.approx(11.5, abs=0.6)
-
-
-def walker(**changes: Any) -> TrafficAgent:
-    """Crosses the road over 10.7 m, at the pace that interPlan gives it."""
+def test_a_walk_of_no_length_becomes_a_step_along_the_heading() -> None:
     given = first("jaywalker-plane-tree-street")
-    end_m = (given.x_m, given.y_m + 10.7)
-    own: dict[str, Any] = {
-        "heading_rad": math.pi / 2,
-        "walk_to_m": end_m,
-        "speed_mps": 10.7 / 15.0,
-    }
-    return replace(given, **{**own, "length_m": 0.9, "width_m": 0.791, **changes})
-
-
-@pytest.mark.parametrize(
-    ("change", "said"),
-    [
-        ({}, []),
-        ({"length_m": 0.909}, []),
-        ({"length_m": 0.911}, ["its box of 0.911 x 0.791 m becomes 0.9 x 0.791 m"]),
-        ({"width_m": 0.5}, ["its box of 0.9 x 0.5 m becomes 0.9 x 0.791 m"]),
-        ({"speed_mps": 10.7 / 15.0 + 0.019}, []),
-        ({"speed_mps": 1.4}, ["walks 10.7 m at 1.4 m/s; there it takes 15 s, 0.71 m/s"]),
-        ({"heading_rad": math.pi / 2 + 0.0009}, []),
-        ({"heading_rad": math.pi / 2 + 0.0011}, ["looks 0.063 degrees away from its walk"]),
-        ({"heading_rad": math.pi}, ["looks 90 degrees away from its walk"]),
-    ],
-)
-def test_what_a_walk_loses_is_reported(change: dict[str, Any], said: list[str]) -> None:
-    _, losses = write([cell("jaywalker-plane-tree-street", walker(**change))])
-    assert len(losses) == len(said)
-    for loss, part in zip(losses, said, strict=True):
-        assert part in loss.text
-        assert not loss.changes_scene
-
-
-def test_a_walk_of_no_length_becomes_a_step_along_the_heading_and_is_reported() -> None:
-    given = walker()
     still = replace(given, walk_to_m=(given.x_m, given.y_m), speed_mps=0.0)
-    one = cell("jaywalker-plane-tree-street", still)
-    text, (loss,) = write([one])
-    assert "walks 0 m, which has no direction; a step of 1 m" in loss.text
-    assert loss.changes_scene
-    details = yaml.safe_load(text)["modification_details_dictionary"]
-    special = details[token_of("plane-tree-street")]["special_scenario"]["0"]
-    ((x0, y0, x1, y1, _),) = special["pedestrian"]
-    assert math.dist((x0, y0), (x1, y1)) == pytest.approx(1.0, abs=0.001)
-    back = read_again(one).modification.added[0]
+    back = read_again(cell("jaywalker-plane-tree-street", still)).modification.added[0]
     assert abs(difference(back.heading_rad, still.heading_rad)) < 0.001
     assert back.walk_to_m is None
 
@@ -282,3 +209,42 @@ modification_details_dictionary:
     assert file.left_out == ("key colour", "scenario_specifics")
     details = file.modification_details_dictionary[AB]
     assert details.left_out == ("spawn_in_intersection", "key weather")
+
+
+ODD = {
+    "box": replace(vehicle("Agent9", 30.0, 0.5, 0.1), length_m=5.2),
+    "velocity": replace(vehicle("Agent9", 30.0, 0.5), speed_mps=3.0),
+    "class": replace(vehicle("Agent9", 30.0, 0.5), length_m=9.0),
+    "missing": replace(cone("Agent9", 30.0, 0.5), type=AgentType.BARRIER),
+    "heading": replace(cone("Agent9", 30.0, 0.5), heading_rad=0.5),
+    "walk": pedestrian("Agent9", 30.0, -4.0),
+    "short walk": replace(pedestrian("Agent9", 30.0, -4.0, (30.0, -3.0)), speed_mps=1.0 / 15.0),
+    "fast walk": replace(pedestrian("Agent9", 30.0, -4.0, (30.0, 8.0)), speed_mps=2.0),
+    "askew walk": replace(
+        pedestrian("Agent9", 30.0, -4.0, (30.0, 8.0)), heading_rad=1.5, speed_mps=0.8
+    ),
+    "hurried worker": replace(pedestrian("Agent9", 30.0, -4.0), speed_mps=1.0),
+    "no length": pedestrian("Agent9", 30.0, -4.0, (30.0, -4.0)),
+    "another scene": vehicle("Agent9", 1_001.0, 0.5),
+}
+STILL_THERE = ("box", "heading", "fast walk", "askew walk")
+"""What changes no more than sizes, paces and where somebody looks."""
+
+
+@pytest.mark.parametrize("kind", [ScenarioType.CONSTRUCTION_ZONE, ScenarioType.JAYWALKER])
+@pytest.mark.parametrize("odd", list(ODD))
+def test_what_interplan_changes_has_a_line_with_its_name(odd: str, kind: ScenarioType) -> None:
+    given = cells.cell(added=(ODD[odd], cone("Agent10", 20.0, -1.0)), type=kind)
+    text, losses = write([given])
+    scene = without_traffic(given.scene)
+    (found,) = entries_of(text, {token_of(scene.name): scene})
+    wanted, got = given.modification.added, found.modification.added
+    assert len(got) == (1 if odd in ("missing", "another scene") else 2)
+    changed = {change.name for change in agent_changes(wanted, got)}
+    if odd != "walk" or kind is ScenarioType.JAYWALKER:
+        assert changed == {"Agent9"}
+    else:
+        assert changed == set()  # a worker who stands is what interPlan's step says
+    told = [loss.text for loss in losses if odd == "box" or "not kept" not in loss.text]
+    assert changed == {text.split()[0] for text in told}
+    assert any(loss.changes_scene for loss in losses) == bool(changed and odd not in STILL_THERE)

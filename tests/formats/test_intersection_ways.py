@@ -56,15 +56,19 @@ def test_no_other_lanes_do(names: Sequence[str]) -> None:
     assert crossing_segments({name: CROSSING[name] for name in names}) == set()
 
 
+def filled(*segments: Segment) -> tuple[tuple[Segment, ...], int]:
+    return fill_widths({one.name: one for one in segments})
+
+
 def test_an_assumed_width_inside_becomes_the_mean_of_its_ends() -> None:
     wide = replace(CROSSING["west in"], width_m=4.0)
     narrow = replace(CROSSING["north out"], width_m=3.0)
     left = replace(CROSSING["left"], crosses=True, width_m=None)
-    made, still = fill_widths([wide, left, narrow])
+    made, still = filled(wide, left, narrow)
     assert ([one.width_m for one in made], still) == ([4.0, 3.5, 3.0], 0)
-    made, still = fill_widths([left, replace(narrow, width_m=2.8)])
+    made, still = filled(left, replace(narrow, width_m=2.8))
     assert ([one.width_m for one in made], still) == ([2.8, 2.8], 0)
-    _, still = fill_widths([wide, replace(left, crosses=False)])
+    _, still = filled(wide, replace(left, crosses=False))
     assert still == 1, "a lane that lies in no intersection keeps what was assumed"
 
 

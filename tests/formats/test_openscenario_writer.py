@@ -96,42 +96,6 @@ def test_a_lane_lies_between_its_own_edges() -> None:
     assert np.array(widths) == pytest.approx(np.array([(0.0, 4.0), (30.0, 4.5)]), abs=0.01)
 
 
-@pytest.mark.parametrize("turn_m", [0.0, 1.0, 3.0])
-def test_a_file_states_how_far_its_edges_lie_beside_ours(turn_m: float) -> None:
-    """Measured anew from the file's numbers: edges that fan out, and a line with a corner."""
-    lane = Lane(
-        id="Lane1",
-        centerline=Polyline([(0.0, 0.0), (10.0, 0.0), (20.0, turn_m)]),
-        width_m=4.0,
-        left_boundary=Polyline([(0.0, 2.0), (10.0, 2.0), (13.0, 2.0 + turn_m), (20.0, 2.5)]),
-        right_boundary=Polyline([(0.0, -2.0), (20.0, -2.0)]),
-    )
-    if turn_m == 0.0:
-        lane = replace(lane, left_boundary=Polyline([(0.0, 2.0), (20.0, 2.0)]))
-    given = cell(replace(crossing(), lanes=(lane,), connectors=()), added=())
-    _, road_map = files(given)
-    (road,) = road_map.findall("road")
-    line = _sampled(road)
-    ways = np.gradient(line, axis=0)
-    normals = np.column_stack([-ways[:, 1], ways[:, 0]]) / np.hypot(*ways.T)[:, None]
-    stations = np.concatenate([[0.0], np.hypot(*np.diff(line, axis=0).T).cumsum()])
-    inner = _linear(road.findall(".//laneOffset"), "s", stations)  # driven on the left
-    outer = inner + _linear(road.findall(".//width"), "sOffset", stations)
-    off_m = 0.0
-    for edge, own in ((inner, lane.right_boundary), (outer, lane.left_boundary)):
-        assert own is not None
-        points = line + edge[:, None] * normals
-        off_m = max(off_m, *(own.project(x, y).distance_m for x, y in points.tolist()))
-        made = Polyline(points[np.append(True, np.hypot(*np.diff(points, axis=0).T) > 1e-9)])
-        off_m = max(off_m, *(made.project(x, y).distance_m for x, y in own.points_m.tolist()))
-    (stated,) = road_map.findall("header/userData[@code='scenario-arena/deviation-m']")
-    assert float(stated.attrib["value"]) == pytest.approx(off_m, abs=0.05)
-    assert (off_m > 0.3) == (turn_m > 0.0)
-    assert any(
-        f"up to {float(stated.attrib['value']):.2f} m beside ours" in x for x in lines(given)
-    )
-
-
 def test_left_hand_traffic_drives_left_of_the_line() -> None:
     for side, found, rule in (
         (TrafficSide.LEFT, "left", "LHT"),

@@ -39,7 +39,7 @@ def reading(realdata: Path, name: str) -> Reading:
         ("av2", 96, 62, 35, 22, 156),
         ("commonroad", 59, 18, 9, 0, 61),
         ("scenarionet", 46, 55, 61, 24, 81),
-        ("waymo", 66, 46, 83, 4, 81),
+        ("waymo", 67, 45, 83, 4, 81),
     ],
 )
 def test_all_that_a_file_holds_comes_in(

@@ -1,9 +1,11 @@
 """What every log has in common, however it was read."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from augment.formats.reading import Log, LoggedTrack, reading_at, speeds
+from augment.formats.reading import Log, LoggedTrack, speeds
 from augment.formats.road_map import RoadMap
 from augment.scene.entities import AgentType
 
@@ -23,13 +25,13 @@ def test_cones_never_move_however_their_boxes_jitter(kind: AgentType, speed_mps:
         name="a", type=kind, length_m=0.4, width_m=0.4, states=np.array([[5.0, 0.0, 0.0, 0.4]])
     )
     log = Log(
-        what="log",
         times_s=np.zeros(1),
-        ego=np.zeros((1, 4)),
-        ego_length_m=4.8,
-        ego_width_m=2.0,
+        ego=replace(jittering, type=AgentType.EGO_VEHICLE, states=np.zeros((1, 4))),
         tracks=(jittering,),
+        map_at=lambda _: RoadMap(place="map", segments=()),
+        world="world",
+        title="log",
+        licence="none",
     )
-    city = RoadMap(what="map", place="map", segments=())
-    found = reading_at(log, 0, city, name="a", world="w", provenance="p", licence=None)
+    found = log.reading_at(0, "a")
     assert [agent.speed_mps for agent in found.scene.agents] == [speed_mps]

@@ -59,8 +59,8 @@ def test_each_record_is_an_item_and_each_step_a_moment(file: Path) -> None:
     found = list(WaymoMotion().moments(file, every_s=0.2))
     assert [(one.item, one.frame) for one in found] == [("0", 0), ("0", 2), ("1", 0), ("1", 2)]
     assert read(file, "1").scene.origin.pose.x_m == 1021.0
-    assert "the file has no record 2" in fault_of(file, "2")
-    assert "no number of a record" in fault_of(file, "x")
+    for item in ("2", "x"):
+        assert f"item: {item!r} is not there" in fault_of(file, item)
     assert "frame: 3 is not there" in fault_of(file, frame=3)
 
 
@@ -87,13 +87,11 @@ def test_wrong_checksums_and_cut_off_files_are_refused(file: Path) -> None:
 @pytest.mark.parametrize(
     ("payload", "said"),
     [
-        (scenario(ego=5), "sdc_track_index: 5 is none of the 2 tracks"),
-        (scenario(track(9, 7, *[state(0, 0, 0, 0)] * 3)), "tracks[2].object_type: 7 is unknown"),
-        (scenario(track(9, 1, state(0, 0, 0, 0))), "tracks[2]: has 1 states for 3 times"),
-        (scenario(steps=0), "timestamps_seconds"),
+        (scenario(ego=5), "sdc_track_index: unknown '5'"),
+        (scenario(track(9, 7, *[state(0, 0, 0, 0)] * 3)), "tracks[2].object_type: unknown '7'"),
+        (scenario(track(9, 1, state(0, 0, 0, 0))), "track 000000000009: has 1 states for 3 times"),
         (b"", "timestamps_seconds"),
         (b"\x0b", "message: is broken"),
-        (scenario((5, b"\xff")), "scenario_id: is no plain text"),
     ],
 )
 def test_a_broken_message_says_what_is_wrong(tmp_path: Path, payload: bytes, said: str) -> None:

@@ -10,11 +10,9 @@ from tests.house.source import ROOT
 
 VOTER_MODULES = (
     *("arena/api/errors.py", "arena/models/votes.py", "arena/templatetags/shell.py"),
-    *("arena/voting/queries/showings.py", "arena/voting/queries/showings.py"),
-    *("arena/voting/queries/keys.py", "arena/people/services.py", "arena/people/links.py"),
-    *("arena/people/pages.py", "arena/voting/forms.py", "arena/voting/screen.py"),
+    *("arena/people/links.py", "arena/people/pages.py", "arena/voting/screen.py"),
     *("arena/studies/pages/experts.py", "arena/studies/services/taking_part.py"),
-    *("arena/voting/pages.py", "arena/voting/pages.py"),
+    "arena/voting/pages.py",
 )
 """Modules whose messages stand on pages that voters are shown."""
 

@@ -1,6 +1,5 @@
 """docs/features.md lists what the code offers, and what it keeps is there."""
 
-import ast
 import re
 from argparse import _SubParsersAction
 from collections.abc import Callable, Iterator
@@ -10,15 +9,12 @@ import pytest
 from django.core.management import get_commands, load_command_class
 from django.urls import URLPattern, URLResolver, get_resolver
 
+from arena.config.env import Environment
 from augment.formats.readers import READERS
 from augment.formats.writers import WRITERS
-from tests.house.source import PRODUCT, ROOT, walked
+from tests.house.source import PRODUCT, ROOT
 
-SETTING = re.compile(r"ARENA_[A-Z_]+|DATABASE_URL|REDIS_URL")
 READ_BY_BOTO3 = {"AWS_ACCESS_KEY_ID", "AWS_SECRET_ACCESS_KEY"}
-INTERNAL = {"ARENA_SERVED_BY"}
-"""What `serve` marks its children with; nobody sets it."""
-
 API = "api/v1/"
 
 
@@ -71,13 +67,7 @@ def commands() -> set[str]:
 
 
 def settings_read() -> set[str]:
-    strings = {
-        node.value
-        for _, nodes in walked()
-        for node in nodes
-        if isinstance(node, ast.Constant) and isinstance(node.value, str)
-    }
-    return READ_BY_BOTO3 | {name for name in strings if SETTING.fullmatch(name)} - INTERNAL
+    return READ_BY_BOTO3 | Environment.model_fields.keys()
 
 
 def formats() -> set[str]:

@@ -2,11 +2,10 @@
 
 from typing import Any
 
-from augment.models import Augmentation, Contestant
+from augment.models import Augmentation, Contestant, EndpointModel
 from augment.services.endpoints import contestants
 from augment.services.endpoints.contestants import ContestantRequest
 from augment.services.endpoints.known_endpoints import EndpointRequest, ensure_endpoint
-from augment.services.endpoints.known_models import tell_sight
 from augment.services.running import jobs, runner
 from augment.services.running.jobs import JobRequest
 from tests.jobs.rows import add_scenario
@@ -63,7 +62,7 @@ def add(server: Scripted, slug: str, variant: str = "otm", **options: object) ->
         ContestantRequest(slug=slug, variant=variant, endpoint="here", model="m", options=options)
     )
     assert made.endpoint is not None
-    tell_sight(endpoint=made.endpoint, model="m", sees=True)
+    EndpointModel.objects.filter(endpoint=made.endpoint, model="m").update(vision=True)
     return made
 
 

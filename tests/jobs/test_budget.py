@@ -329,7 +329,7 @@ def test_when_a_start_no_longer_counts_for_its_minute(
     assert (found if isinstance(found, float) else None) == wait_s
 
 
-def test_without_earlier_runs_it_is_a_guess_from_the_prompts() -> None:
+def test_without_earlier_runs_only_the_calls_are_known() -> None:
     add_llama(price="2")
     for number in range(4):
         add_scenario(f"street-{number}")
@@ -343,12 +343,7 @@ def test_without_earlier_runs_it_is_a_guess_from_the_prompts() -> None:
     (line,) = found.lines
     assert (found.rows, found.asking_rows, line.seen) == (8, 4, 0)
     assert line.calls == (4, 4, 8)
-    assert 4 * 1000 < line.tokens_in < 4 * 8000
-    assert line.tokens_out == 4 * 1200
-    assert line.usd is not None
-    assert line.usd_most is not None
-    assert line.usd == Decimal(2) * (line.tokens_in + line.tokens_out) / 10**6
-    assert line.usd_most > line.usd
+    assert (line.tokens_in, line.usd, found.unpriced) == (None, None, (line,))
 
 
 def test_after_a_run_it_is_what_was_used() -> None:

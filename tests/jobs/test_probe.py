@@ -12,6 +12,7 @@ from augment.llm.costs import least_tokens
 from augment.llm.messages import LengthName
 from augment.llm.questions import MARKER, Ability
 from augment.models import CallLease, Endpoint, EndpointModel, Event
+from augment.services.endpoints.known_models import model_at
 from augment.services.endpoints.probing import ProbeReport, probe
 from tests.llm.json_server import JsonServer, serving
 
@@ -84,7 +85,8 @@ def candidate(can: frozenset[str] = EVERYTHING, status: int = 200) -> Iterator[C
 
 
 def asked() -> ProbeReport:
-    return probe(label="local", model="m", patience=Patience(attempts=1))
+    known = model_at(endpoint=Endpoint.objects.get(), model="m")
+    return probe(known, patience=Patience(attempts=1))
 
 
 def row() -> EndpointModel:
@@ -95,8 +97,8 @@ def test_a_server_that_can_do_everything() -> None:
     with candidate():
         report = asked()
     assert {made.ability: made.has_it for made in report.findings} == dict.fromkeys(Ability, True)
-    assert (report.calls, report.refused, report.counts_tokens) == (7, [], True)
-    assert report.models_returned == ["m-2026"]
+    assert (report.calls, report.refused) == (7, [])
+    assert {made.model_returned for made in report.findings} == {"m-2026"}
     known = row()
     abilities = (known.native_tools, known.vision, known.json_schema, known.temperature)
     assert abilities == (True, True, True, True)
@@ -143,8 +145,6 @@ def test_a_limit_that_is_passed_over_is_sent_by_its_other_name() -> None:
 def test_the_stand_in_can_be_probed(model: str, lacks: Ability | None) -> None:
     with running() as server:
         Endpoint.objects.create(label="local", base_url=server.url, is_simulated=True)
-        report = probe(label="local", model=model)
+        report = probe(model_at(endpoint=Endpoint.objects.get(), model=model))
     found = {made.ability: made.has_it for made in report.findings}
     assert found == {ability: ability != lacks for ability in Ability}
-    assert report.counts_tokens
-    assert report.models_returned == [model]

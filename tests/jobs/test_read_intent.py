@@ -19,7 +19,6 @@ from augment.scene.codec import intent_to_document, intent_to_parts
 from augment.scene.intent import Shape
 from augment.services.endpoints.known_endpoints import EndpointRequest, ensure_endpoint
 from augment.services.running import intent_readings
-from augment.services.running.budget import Caps
 from augment.services.running.intent_readings import READINGS, plan_reading, read_intent
 from augment.services.scenarios.editing import accept_reading
 from tests.intents import cones, intents
@@ -37,19 +36,12 @@ def opened(client: ScriptedClient) -> Iterator[ChatClient]:
     yield client
 
 
-def reading(
-    *answers: str | Reply | ModelFault, caps: Caps | None = None, is_fresh: bool = True
-) -> IntentReading:
+def reading(*answers: str | Reply | ModelFault) -> IntentReading:
     if not Scenario.objects.exists():
         add_scenario("street", intent=None, intent_origin="")
         ensure_endpoint(EndpointRequest(label="here", base_url="http://127.0.0.1:1/v1"))
     return read_intent(
-        scenario="street",
-        endpoint="here",
-        model="m",
-        caps=caps or Caps(cap_calls=6),
-        is_fresh=is_fresh,
-        client=opened(ScriptedClient(answers)),
+        scenario="street", endpoint="here", model="m", client=opened(ScriptedClient(answers))
     )
 
 
@@ -82,15 +74,18 @@ def test_an_answer_that_breaks_the_schema_is_asked_for_once_more() -> None:
     assert reading(broken, GOOD).state == State.READ
     second = ModelCall.objects.get(number=2)
     assert "requests[0].cones.shape" in str(second.request)
+    ModelCall.objects.all().delete()  # an answer from the store would be read again
     failed = reading(broken.replace("zigzag", "spiral"), broken)
     assert (failed.state, failed.document) == (State.FAILED, None)
 
 
-def test_a_cap_ends_a_reading_before_the_call_that_would_pass_it() -> None:
-    made = reading("no block", caps=Caps(cap_calls=1))
+def test_a_cap_ends_a_reading_before_the_call_that_would_pass_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(intent_readings, "MOST_CALLS", 1)
+    made = reading("no block")
     assert (made.state, made.calls.count()) == (State.FAILED, 1)
     assert made.reason == "The cap is reached: 1 calls"
-    assert reading(caps=Caps(cap_tokens=100)).calls.count() == 0
 
 
 def test_a_broken_wire_is_a_failed_reading_with_a_sentence() -> None:
@@ -120,9 +115,10 @@ def test_the_command_reads_through_the_wire_shows_statements_and_accepts(tmp_pat
 
 
 def test_a_worker_asks_for_a_planned_reading_once() -> None:
-    add_scenario("street", intent=None, intent_origin="")
-    ensure_endpoint(EndpointRequest(label="here", base_url="http://127.0.0.1:1/v1"))
-    row = plan_reading(scenario="street", endpoint="here", model="m")
+    scenario = add_scenario("street", intent=None, intent_origin="")
+    request = EndpointRequest(label="here", base_url="http://127.0.0.1:1/v1")
+    endpoint = ensure_endpoint(request)
+    row = plan_reading(scenario=scenario, endpoint=endpoint, model="m")
     READINGS.perform(row.pk)  # nobody listens there
     row.refresh_from_db()
     assert row.state == State.FAILED

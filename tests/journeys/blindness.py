@@ -26,11 +26,11 @@ CHUNKS = {"IHDR", "PLTE", "tRNS", "IDAT", "IEND"}
 TELLING_HEADERS = ("ETag", "Last-Modified", "Content-Disposition")
 MATCHUP = {
     *("matchup", "position", "instruction", "a", "b", "original"),
-    *("px_per_m", "ego_px", "width", "height", "text", "legend"),
+    *("px_per_m", "ego_px", "width", "height", "legend"),
 }
-"""All that a matchup may say on the wire; its text has the fields a and b."""
+"""All that a matchup may say on the wire."""
 REPLY = {
-    *("saved", "skipped", "total", "minutes_left", "next"),
+    *("saved", "skipped", "total", "next"),
     *("error", "code", "message", "fields", "outcome"),
 }
 """All that may stand around it in a reply of the API."""

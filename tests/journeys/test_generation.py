@@ -189,14 +189,13 @@ def test_the_command_waits_for_the_job_and_reports(place: Machine, model: Waitin
         asked = model.asked
         place.must("add_contestant", "cloudy", *facts, *address)
         ended = place.manage("generate", *chosen)
-    assert said.splitlines()[-4:] == [
+    assert said.splitlines()[-3:] == [
         "Over.",
-        "contestant  done  unreadable  refused  failed",
-        "reference      3           0        0       0",
-        "waiting        3           0        0       0",
+        "reference: 3 done, 0 unreadable, 0 refused, 0 failed",
+        "waiting: 3 done, 0 unreadable, 0 refused, 0 failed",
     ]
     assert ended.returncode == 1
-    assert "failed 2 times: The environment variable NO_SUCH_API_KEY" in ended.stdout
+    assert "failed x 2: The environment variable NO_SUCH_API_KEY" in ended.stdout
     assert "2 failed" in ended.stderr
     assert model.asked == asked
 

@@ -1,10 +1,7 @@
 """The wire to servers that drip and swell: each ends in a named fault, and in time."""
 
-import gzip
 import json
 import time
-import tracemalloc
-import zlib
 from typing import Any
 
 import pytest
@@ -25,13 +22,6 @@ from tests.llm.recorder import GOOD
 ASKED = Request(model="m", messages=(Message(speaker=Speaker.USER, text="Hello"),))
 BODY = json.dumps(GOOD).encode()
 LIMIT_S = 0.25
-
-PACKED = (
-    head("Transfer-Encoding: chunked", "Content-Encoding: gzip")
-    + b"a\r\n\x1f\x8b\x08\0\0\0\0\0\0\0\r\n"
-)
-EMPTY_BLOCK = b"5\r\n\0\0\0\xff\xff\r\n"
-"""The beginning of a packed answer, and a piece that unpacks to nothing."""
 
 
 def ask(say: Say, *, reads: bool = True, asked: Request = ASKED, **settings: Any) -> Reply:
@@ -69,10 +59,9 @@ def message(**parts: object) -> dict[str, object]:
         drip(b"", b"HTTP/1.1 100 Continue\r\n\r\n"),
         drip(head("Content-Length: 100000"), b" "),
         drip(head("Transfer-Encoding: chunked"), b"1\r\n \r\n"),
-        drip(PACKED, EMPTY_BLOCK),
         drip(head("Connection: close"), b"\n"),
     ],
-    ids=["status", "headers", "continue", "body", "chunks", "packed", "until closed"],
+    ids=["status", "headers", "continue", "body", "chunks", "until closed"],
 )
 def test_a_call_has_a_total_time_however_the_answer_drips(say: Say) -> None:
     started = time.monotonic()
@@ -142,14 +131,9 @@ def test_a_call_that_nobody_wants_before_it_is_sent_is_not_sent() -> None:
 MOST = 20_000
 
 
-@pytest.mark.parametrize("packing", ["gzip", "identity"])
 @pytest.mark.parametrize(("beyond", "fits"), [(0, True), (1, False)])
-def test_an_answer_may_be_as_long_as_the_limit_and_no_longer(
-    packing: str, beyond: int, fits: bool
-) -> None:
-    body = BODY + b" " * (MOST - len(BODY) + beyond)
-    packed = gzip.compress(body) if packing == "gzip" else body
-    say = whole(packed, f"Content-Encoding: {packing}")
+def test_an_answer_may_be_as_long_as_the_limit_and_no_longer(beyond: int, fits: bool) -> None:
+    say = whole(BODY + b" " * (MOST - len(BODY) + beyond), "Content-Encoding: identity")
     if fits:
         assert ask(say, most_bytes=MOST).text == "Hi"
     else:
@@ -158,43 +142,24 @@ def test_an_answer_may_be_as_long_as_the_limit_and_no_longer(
         assert "longer than 0.02 MB" in str(broken)
 
 
-def test_a_small_answer_that_unpacks_to_a_large_one_is_never_held() -> None:
-    packer = zlib.compressobj(9, zlib.DEFLATED, 31)
-    bomb = packer.compress(bytes(40_000_000)) + packer.flush()
-    tracemalloc.start()
-    try:
-        broken = fault(whole(bomb, "Content-Encoding: gzip"), most_bytes=100_000)
-        _, peak = tracemalloc.get_traced_memory()
-    finally:
-        tracemalloc.stop()
-    assert "longer than 0.1 MB" in str(broken)
-    assert peak < 4_000_000
-
-
 @pytest.mark.parametrize(
     "say",
     [
         drip(head("Transfer-Encoding: chunked"), b"8000\r\n" + b"x" * 0x8000 + b"\r\n", every_s=0),
         drip(head("Connection: close"), b"x" * 0x8000, every_s=0),
         drip(b"", b"HTTP/1.1 100 Continue\r\n\r\n" * 1000, every_s=0),
-        drip(PACKED, EMPTY_BLOCK * 1000, every_s=0),
     ],
-    ids=["chunks", "until closed", "continue", "packed"],
+    ids=["chunks", "until closed", "continue"],
 )
 def test_an_answer_without_end_stops_at_the_limit(say: Say) -> None:
     broken = fault(say, most_bytes=200_000)
     assert "longer than 0.2 MB" in str(broken)
 
 
-@pytest.mark.parametrize("packing", ["br", "zstd", "gzip, gzip", "deflate"])
+@pytest.mark.parametrize("packing", ["br", "gzip", "gzip, gzip"])
 def test_a_packing_that_nobody_asked_for_is_named(packing: str) -> None:
     broken = fault(whole(BODY, f"Content-Encoding: {packing}"))
     assert f"can't be unpacked: {packing}" in str(broken)
-
-
-@pytest.mark.parametrize("packed", [gzip.compress(BODY)[:-12], b"nonsense", b""])
-def test_a_packed_answer_that_is_broken_is_named(packed: bytes) -> None:
-    assert "can't be unpacked: gzip" in str(fault(whole(packed, "Content-Encoding: gzip")))
 
 
 @pytest.mark.parametrize("deep", ["[" * 100_000, '{"a":' * 100_000, "[" * 90_000 + "]" * 90_000])
@@ -215,11 +180,7 @@ def test_json_that_nests_without_end_is_a_fault(deep: str) -> None:
         ("1e400", None),
         ("-inf", None),
         ("9" * 5000, None),
-        ("Wed, 21 Oct 2015 07:28:00 -0000", 0.0),
-        ("Wed, 21 Oct 99999 07:28:00 GMT", None),
-        ("Wed, 21 Oct 999999999999999999999999 07:28:00 GMT", None),
-        ("Mon, 01 Jan 0001 00:00:00 +2359", 0.0),
-        ("Wed, 21 Oct 2015 07:28:00 +999999999999999", None),
+        ("Wed, 21 Oct 2015 07:28:00 -0000", None),
         (",", None),
     ],
 )

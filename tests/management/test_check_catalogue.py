@@ -52,13 +52,13 @@ def test_a_reference_that_is_elsewhere_than_said_is_refused(folder: Path) -> Non
     with pytest.raises(CommandError) as fault:
         checked(folder)
     reasons = str(fault.value)
-    assert f"{CAR} is 24.0 m ahead of the ego along its lane; 21.5 m ahead is asked" in reasons
-    assert f"{CAR} is 1.00 m to the right of the centre of the ego's lane; 1.3 m" in reasons
+    assert f"{CAR} ahead along the ego's lane is 24.00 m; 21.5 m is asked for." in reasons
+    assert f"{CAR} to the left of the lane's centre is -1.00 m; -1.3 m is asked for." in reasons
 
 
 def test_a_reference_with_something_wrong_is_refused(folder: Path) -> None:
     edit(folder, lambda it: it["reference"]["add"][0].update(x_m=0.0, y_m=0.0))
-    with pytest.raises(CommandError, match=f"wrong: {CAR} and the ego overlap"):
+    with pytest.raises(CommandError, match=f"wrong: {CAR} and Agent1 overlap"):
         checked(folder)
 
 
@@ -78,5 +78,5 @@ def test_a_reference_may_be_half_a_metre_off_along_the_lane(
     if is_good:
         assert " good\n" in checked(folder)
     else:
-        with pytest.raises(CommandError, match=r"21\.5 m ahead is asked for"):
+        with pytest.raises(CommandError, match=r"21\.5 m is asked for"):
             checked(folder)

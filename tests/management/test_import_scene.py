@@ -36,8 +36,7 @@ def test_a_recorded_scene_is_imported_and_counted(tmp_path: Path) -> None:
         first == "Imported scene made: 3 agents, 5 lanes, 2 connectors, 2 areas besides the ego."
     )
     assert notes[0] == (
-        "  No speed limits in this source: "
-        "a drive assumes 15 m/s for the ego and 10 m/s for others."
+        "  No speed limits in this source: drives assume 15 m/s for the ego and 10 m/s for others."
     )
     assert "  1 bicycle lanes of the map were left out." in notes
     assert Event.objects.filter(verb="import", after__frame=2).exists()
@@ -48,7 +47,7 @@ def test_a_scene_of_the_own_format_is_imported(tmp_path: Path) -> None:
     file.write_text(json.dumps(scene_to_document(junction())))
     run("json", file, "--slug", "crossing")
     assert BaseScene.objects.get(slug="crossing").source == "json"
-    assert "There is a scene called 'crossing' already" in refused(
+    assert "The same scene is stored already, as 'crossing'" in refused(
         "json", file, "--slug", "crossing"
     )
     assert "JSON scene has frame 0, not 3" in refused("json", file, "--slug", "x", "--frame", 3)

@@ -93,17 +93,11 @@ def test_a_weak_team_has_a_lower_bound_where_its_points_hardly_ever_go_missing(
     assert ends(board.lines[team]) == bounds
 
 
-def test_who_won_or_lost_all_has_the_one_bound_that_there_is(board: Leaderboard) -> None:
-    champion, last = board.lines[CHAMPION], board.lines[LAST]
-    assert (champion.rating, last.rating) == (None, None)
-    assert (ends(champion), ends(last)) == ((True, False), (False, True))
-
-
-def test_teams_without_a_match_are_named_and_nobody_else_lacks_a_number(
+def test_who_won_or_lost_all_or_did_not_play_lacks_a_number_and_nobody_else(
     board: Leaderboard,
 ) -> None:
     bare = [line.name for line in board.lines if ends(line) == (False, False)]
-    assert bare == [f"team {number}" for number in range(LAST + 1, TEAMS)]
+    assert bare == [f"team {number}" for number in range(CHAMPION, TEAMS)]
 
 
 def test_ratings_and_widths_are_those_of_a_logistic_regression(

@@ -15,7 +15,6 @@ from arena.rating.models import ELO_PER_LOGIT, Meetings, to_elo
 from arena.rating.rules import Unit
 from arena.rating.sandwich import (
     Pulls,
-    factor,
     left_of_effect,
     plain_covariance,
     pulls_of_model,
@@ -33,7 +32,7 @@ def covariance(votes: Comparisons, unit: Unit) -> FloatArray:
 
 
 def half_widths(votes: Comparisons, unit: Unit) -> FloatArray:
-    return np.asarray(factor(None) * np.sqrt(covariance(votes, unit).diagonal()))
+    return np.asarray(1.959964 * np.sqrt(covariance(votes, unit).diagonal()))
 
 
 def pulls_of(votes: Comparisons) -> Pulls:
@@ -47,11 +46,6 @@ def test_students_t_is_scipys(degrees: float) -> None:
     assert t_quantile(degrees) == pytest.approx(theirs.ppf(0.975), rel=1e-6)
     values = np.array([0.0, 0.3, 1.0, 2.5, 6.0])
     assert t_above(values, degrees) == pytest.approx(theirs.sf(values), rel=1e-5, abs=1e-100)
-
-
-def test_the_factor_is_the_normals_where_clusters_are_many() -> None:
-    assert factor(None) == pytest.approx(scipy.stats.norm.ppf(0.975))
-    assert factor(9) == pytest.approx(2.306, abs=1e-3)
 
 
 @pytest.mark.parametrize("unit", [Unit.EXPERT, Unit.SCENARIO])

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from augment.render.bev import draw
+from augment.render.bev import draw, draw_for_review
 from augment.render.camera import camera_for
 from augment.render.road import scale_corner
 from augment.scene.entities import AgentType, Modification, TrafficAgent
@@ -57,9 +57,11 @@ def test_a_removed_agent_is_gone_without_a_trace_in_a_vote_and_a_ghost_for_revie
     scene = scenes.scene(agents=(scenes.vehicle("Agent2", 20.0, 0.0),))
     removed = Modification(removed=("Agent2",))
     assert draw(scene, removed, CAMERA) == draw_original(STREET, CAMERA)
-    assert draw(scene, removed, CAMERA, labels=True) != draw(
-        STREET, Modification(), CAMERA, labels=True
+    ghost, nothing = (
+        draw_for_review(base, change, CAMERA)
+        for base, change in ((scene, removed), (STREET, Modification()))
     )
+    assert ghost != nothing
 
 
 def test_cones_differ_from_people_in_shape() -> None:
@@ -113,7 +115,7 @@ def test_the_same_picture_has_the_same_bytes_and_no_metadata() -> None:
 
 def test_no_picture_leaves_a_trace_on_the_next_of_its_scene() -> None:
     before = draw_original(STREET, CAMERA)
-    draw(STREET, added(scenes.vehicle("New1", 20.0, 3.5)), CAMERA, labels=True)
+    draw(STREET, added(scenes.vehicle("New1", 20.0, 3.5)), CAMERA)
     assert draw_original(STREET, CAMERA) == before
     other = scenes.scene(agents=(scenes.vehicle("Agent2", 20.0, 0.0),))
     assert draw_original(other, CAMERA) != before

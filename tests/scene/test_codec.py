@@ -329,7 +329,7 @@ def test_a_recording_survives_the_way_through_json_exactly() -> None:
         ({"times_s": [0.0, 0.2, 0.2]}, "times_s[2]"),
         ({"times_s": [0.0, 0.1]}, "ego"),
         ({"ego": [[0.0, 0.0, 0.0, 1.0]]}, "ego"),
-        ({"columns": ["y_m", "x_m", "heading_rad", "speed_mps"]}, "columns"),
+        ({"columns": ["x_m", "y_m", "speed_mps", "heading_rad"]}, "columns[2]"),
         ({"version": 3}, "version"),
     ],
 )

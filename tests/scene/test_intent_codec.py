@@ -5,7 +5,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from augment.checks.lanes_across import resolve_anchors
 from augment.errors import InvalidDocument
 from augment.scene.codec import INTENT, intent_from_document, intent_to_document
 from augment.scene.intent import (
@@ -32,7 +31,6 @@ from augment.scene.intent import (
 )
 from augment.scene.intent_statements import list_statements
 from tests.fixtures.shelf import SLUGS, entry
-from tests.intents import metres, parked
 
 METRES = st.floats(0.0, 500.0)
 LENGTHS = st.builds(
@@ -186,29 +184,10 @@ def test_statements_are_short_and_name_what_they_are_about() -> None:
     assert [str(one) for one in list_statements(intent)] == [
         "bus: number 1",
         "bus: 20 m ahead of the ego",
-        "bus: in the ego's lane",
+        "bus: in the own lane",
         "bus: 1.1 m from the lane centre towards the left lane boundary",
         "bus: stands",
         "pedestrian: number 1",
         "pedestrian: 26 m ahead of the ego",
         "pedestrian: crosses from the left to the right",
     ]
-
-
-@pytest.mark.parametrize(
-    ("bus_m", "relation", "distance", "wanted"),
-    [
-        (20.0, Relation.AHEAD, metres(6.0), (26.0, 26.0)),
-        (20.0, Relation.BEHIND, metres(6.0, 8.0), (12.0, 14.0)),
-        (20.0, Relation.BEHIND, metres(30.0), (-10.0, -10.0)),
-        (20.0, Relation.AHEAD, None, None),
-    ],
-)
-def test_a_distance_from_another_object_is_added_to_that_ones(
-    bus_m: float, relation: Relation, distance: Length | None, wanted: tuple[float, float] | None
-) -> None:
-    (bus,) = parked(bus_m).requests
-    named = VehicleRequest(spot=bus.spot, name="bus")
-    walker = WalkRequest(spot=Spot(anchor="bus", relation=relation, distance=distance))
-    resolved = resolve_anchors(Intent(requests=(named, walker)))
-    assert resolved.requests[1].spot.span_m == wanted

@@ -252,21 +252,3 @@ def test_an_ego_off_every_lane_has_no_route() -> None:
 def test_where_lanes_part_the_route_goes_straight_on() -> None:
     assert route_of(junction()).lane_ids == ("Lane1", "Connector1", "Lane2")
     assert route_of(junction()).heading_at(60.0) == pytest.approx(0.0)
-
-
-def test_a_corridor_holds_the_lanes_that_begin_within_its_length() -> None:
-    lanes = (straight_lane("Own", -10.0, 30.0, "After"), straight_lane("After", 30.0, 80.0))
-    wide = (lanes[0], replace(lanes[1], width_m=4.5))
-    route = route_of(scene(ego=EGO, lanes=wide, agents=(), areas=()))
-    for length_m, end_m, width_m in ((30.0, 30.0, 3.5), (30.1, 80.0, 4.0)):
-        corridor = route.corridor(length_m)
-        assert corridor is not None
-        assert corridor[0].points_m[[0, -1], 0].tolist() == pytest.approx([0.0, end_m])
-        assert corridor[1] == pytest.approx(width_m)
-
-
-def test_there_is_no_corridor_where_the_lanes_end_at_the_ego() -> None:
-    lanes = (straight_lane("Own", -10.0, 0.5),)
-    route = route_of(scene(ego=EGO, lanes=lanes, agents=(), areas=()))
-    assert route.corridor(150.0) is None
-    assert math.isclose(route.ends_m[-1], 0.5)

@@ -1,4 +1,4 @@
-"""Who is signed in comes with the roles, by one query."""
+"""Who is signed in comes with the roles, by two queries."""
 
 import pytest
 from django.contrib.auth.models import Group, User
@@ -11,11 +11,11 @@ pytestmark = pytest.mark.django_db
 
 
 @pytest.mark.parametrize("role", ["expert", "analyst"])
-def test_an_account_comes_with_its_role_by_one_query(
+def test_an_account_comes_with_its_role_by_two_queries(
     role: str, django_assert_num_queries: DjangoAssertNumQueries
 ) -> None:
     person = create_person(username="eva", password=None, role=role)
-    with django_assert_num_queries(1):
+    with django_assert_num_queries(2):
         found = AccountBackend().get_user(person.pk)
         assert found == person
         assert found is not None

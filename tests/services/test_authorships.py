@@ -6,7 +6,7 @@ from django.core.management import CommandError, call_command
 
 from arena.errors import NotYours
 from arena.models import Authorship, Study
-from arena.people.links import mark_author, take_back_author
+from arena.people.links import mark_author
 from arena.studies.queries import authors_of
 from augment.errors import UnknownName
 from augment.models import Event
@@ -19,7 +19,8 @@ ACTS = ("mark author", "take back author")
 
 def test_a_mark_says_who_made_it_and_when_and_so_does_the_log(study: Study, eva: User) -> None:
     actor = User.objects.create(username="root")
-    row = mark_author(study=study, expert=eva, contestant="ann", actor=actor)
+    mark_author(study=study, expert=eva, contestant="ann", actor=actor)
+    row = Authorship.objects.get()
     assert (row.marked_by, row.contestant.slug) == (actor, "ann")
     logged = Event.objects.get(verb="mark author")
     assert (logged.actor, logged.object_code) == (actor, str(study.code))
@@ -40,10 +41,8 @@ def test_only_who_and_what_takes_part_can_be_marked(study: Study, eva: User) -> 
 def test_taking_back_is_logged_and_doing_it_twice_changes_nothing_more(
     study: Study, eva: User
 ) -> None:
-    row = mark_author(study=study, expert=eva, contestant="ann")
-    same = Authorship.objects.get()
-    take_back_author(authorship=row)
-    take_back_author(authorship=same)
+    for is_author in (True, True, False, False):
+        mark_author(study=study, expert=eva, contestant="ann", is_author=is_author)
     assert authors_of(study) == frozenset()
     assert [line.verb for line in Event.objects.filter(verb__in=ACTS).order_by("pk")] == [*ACTS]
 
@@ -61,7 +60,7 @@ def test_the_command_marks_and_takes_back(
     ]
     assert [line.actor for line in Event.objects.filter(verb__in=ACTS)] == [None, None]
     for names, sentence in (
-        (("ghost", "ann"), "Unknown expert 'ghost'. Known: eva, finn."),
+        (("ghost", "ann"), "Unknown expert of this study 'ghost'. Known: eva, finn."),
         (("eva", "zoe"), "Unknown contestant 'zoe'"),
     ):
         for more in ((), ("--take-back",)):

@@ -184,7 +184,7 @@ def test_every_problem_names_its_file_and_path_and_nothing_is_kept(folder: Path)
         load_catalogue(folder=folder)
     assert [path for path, _ in caught.value.problems] == [
         "scenes/other.json: name",
-        "scenarios/broken.json: reference.add[0].x_m",
+        "scenarios/broken.json: add[0].x_m",
         "scenarios/lost.json: scene",
     ]
     assert not BaseScene.objects.exists()

@@ -69,4 +69,3 @@ def test_what_varies_between_samples() -> None:
     assert second.displacement_m is not None
     assert second.displacement_m.values == pytest.approx((0.2, 0.5))
     assert first.usd is None
-    assert first.wrong is not None

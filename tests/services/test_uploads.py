@@ -9,7 +9,7 @@ from django.contrib.auth.models import User
 from django.core.files.base import ContentFile
 from django.core.files.storage import default_storage
 
-from augment.errors import Conflict, InvalidDocument
+from augment.errors import InvalidDocument
 from augment.models import BaseScene, Event, SceneUpload, UploadMoment
 from augment.services.scenarios import uploads
 from augment.services.scenarios import uploads as upload_moments
@@ -96,16 +96,6 @@ def test_what_can_not_be_read_is_told_and_leaves_no_scene(
     assert (row.state, row.tracks) == ("failed", [])
     assert reason in row.reason
     assert not BaseScene.objects.exists()
-
-
-def test_a_file_that_failed_is_read_again(log: bytes) -> None:
-    row = sent(log)
-    SceneUpload.objects.filter(pk=row.pk).update(state="failed", reason="2 workers were lost")
-    uploads.read_again(row)
-    row = read(row)
-    assert (row.state, row.reason) == ("read", "")
-    with pytest.raises(Conflict, match="did not fail"):
-        uploads.read_again(row)
 
 
 def test_the_same_scene_is_kept_once_and_a_taken_name_says_so(log: bytes) -> None:

@@ -44,9 +44,10 @@ def a_drive() -> Work:
 
 
 def a_reading() -> Work:
-    add_scenario("street")
-    ensure_endpoint(EndpointRequest(label="here", base_url="http://127.0.0.1:1/v1"))
-    return plan_reading(scenario="street", endpoint="here", model="m")
+    scenario = add_scenario("street")
+    request = EndpointRequest(label="here", base_url="http://127.0.0.1:1/v1")
+    endpoint = ensure_endpoint(request)
+    return plan_reading(scenario=scenario, endpoint=endpoint, model="m")
 
 
 def a_probe() -> Work:

@@ -2,15 +2,14 @@ import os
 import signal
 import subprocess
 import sys
-import threading
+import time
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 
 import psutil
 import pytest
 
-from arena.serving.supervisor import ALIVE_EVERY_S, ChildFailed, Program, Supervisor
+from arena.serving.supervisor import ChildFailed, Program, Supervisor
 from tests.processes import wait_until
 
 SLEEP = "import time; print('up', flush=True); time.sleep(600)"
@@ -53,7 +52,7 @@ def test_programs_start_in_order_and_stop_together() -> None:
     said = Said()
     supervisor = Supervisor([program("one", SLEEP), program("two", SLEEP)], said)
     supervisor.start()
-    children = [place.child.pid for place in supervisor._places]
+    children = [child.process.pid for child in supervisor.children]
     wait_until(lambda: ("two", "up") in said.lines, what="the second one is up")
     supervisor.stop()
     assert living(children) == []
@@ -69,120 +68,33 @@ def test_a_program_that_ends_while_starting_shows_its_last_lines_and_stops_the_o
     )
     with pytest.raises(ChildFailed, match=r"(?s)two ended with exit code 3.*no such table"):
         supervisor.start()
-    assert supervisor._places == []
+    assert supervisor.children == []
 
 
-def test_a_crashed_program_is_started_again() -> None:
-    said = Said()
-    supervisor = Supervisor([program("worker", SLEEP)], said)
+def test_a_crashed_program_is_started_again_and_waits_longer_each_time() -> None:
+    supervisor = Supervisor([program("web", SLEEP), program("worker", SLEEP)], said := Said())
     supervisor.start()
-    first = supervisor._places[0].child.pid
-    wait_until(lambda: ("worker", "up") in said.lines, what="the worker is up")
-    watcher = threading.Thread(target=supervisor.watch, daemon=True)
-    watcher.start()
-    os.kill(first, signal.SIGKILL)
-    wait_until(lambda: said.lines.count(("worker", "up")) == 2, what="it is up again")
-    # It may speak before the supervisor has put it into the place of the first.
-    wait_until(lambda: supervisor._places[0].child.pid != first, what="it has taken the place")
-    supervisor.ask_to_stop()
-    watcher.join()
-    supervisor.stop()
+    web, worker = supervisor.children
+    first, waits = web.process.pid, []
 
-
-class Clock:
-    """Seconds that go on when they are told to."""
-
-    now = 0.0
-
-    def __call__(self) -> float:
-        return self.now
-
-
-@pytest.fixture
-def clock() -> Clock:
-    return Clock()
-
-
-def crash(supervisor: Supervisor, place: int) -> None:
-    """Let the program of that place end, and let it be noticed."""
-    child = supervisor._places[place].child
-    os.kill(child.pid, signal.SIGKILL)
-    wait_until(lambda: child.exit_code is not None, what="it has crashed")
-    supervisor.check()
-
-
-def test_a_program_that_hangs_is_killed_and_started_again(clock: Clock) -> None:
-    hung: list[int] = []
-    sleeper = replace(program("worker", SLEEP), is_alive=lambda pid: pid not in hung)
-    supervisor = Supervisor([sleeper], said := Said(), clock=clock)
-    supervisor.start()
-    hung.append(first := supervisor._places[0].child.pid)
-    clock.now += ALIVE_EVERY_S
-    supervisor.check()  # asked, killed
-    assert not is_living(first)
-    supervisor.check()  # buried
-    supervisor.check()  # started again at once
-    second = supervisor._places[0].child.pid
-    assert second != first
-    assert is_living(second)
-    assert ("worker", "hangs; killing it") in said.lines
-    supervisor.stop()
-
-
-def test_who_keeps_crashing_waits_longer_each_time_and_the_others_live_on(clock: Clock) -> None:
-    said = Said()
-    supervisor = Supervisor([program("web", SLEEP), program("worker", SLEEP)], said, clock=clock)
-    supervisor.start()
-    web = supervisor._places[0].child.pid
-    waits = []
-    for _ in range(5):
-        crash(supervisor, 1)
-        crashed = supervisor._places[1]
-        assert crashed.due_at is not None
-        waits.append(crashed.due_at - clock.now)
-        if crashed.due_at > clock.now:
-            clock.now = crashed.due_at - 0.1
-            supervisor.check()
-            assert crashed.child.exit_code is not None, "not before its time"
-        clock.now = crashed.due_at
+    def is_up_again() -> bool:
         supervisor.check()
-        assert crashed.child.exit_code is None
-    assert waits == [0.0, 1.0, 2.0, 4.0, 8.0]
-    assert supervisor._places[0].child.pid == web
-    assert living([web]) == [web]
+        return worker.due_at is None
+
+    for _ in range(5):
+        os.kill(worker.process.pid, signal.SIGKILL)
+        wait_until(lambda: worker.exit_code is not None, what="it has crashed")
+        supervisor.check()
+        assert worker.due_at is not None
+        waits.append(round(worker.due_at - time.monotonic()))
+        worker.due_at -= waits[-1]
+        wait_until(is_up_again, what="it runs again")
+    assert waits == [0, 1, 2, 4, 8]
+    assert living([first]) == [first]
     assert ("worker", "ended with exit code -9; starting it again in 8 s") in said.lines
-    assert ("worker", "keeps crashing; everything else goes on without it") in said.lines
+    with pytest.raises(ChildFailed, match="worker crashed 5 times in a row"):
+        supervisor.insist_on_steadiness()
     supervisor.stop()
-
-
-DRAINS = """
-import os, signal, sys, time
-def drain(*_):
-    print("draining", flush=True)
-    while not os.path.exists(sys.argv[1]):
-        time.sleep(0.01)
-    print("drained", flush=True)
-    raise SystemExit(0)
-signal.signal(signal.SIGTERM, drain)
-print("up", flush=True)
-time.sleep(600)
-"""
-
-
-def draining(said: Said, may_end: Path) -> tuple[Supervisor, threading.Thread]:
-    """A supervisor that stops, whose program ends once a file is there."""
-    worker = Program(
-        name="worker",
-        arguments=(sys.executable, "-c", DRAINS, str(may_end)),
-        is_ready=lambda: ("worker", "up") in said.lines,
-        grace_s=600.0,
-    )
-    supervisor = Supervisor([worker], said)
-    supervisor.start()
-    stopping = threading.Thread(target=supervisor.stop, daemon=True)
-    stopping.start()
-    wait_until(lambda: ("worker", "draining") in said.lines, what="it was told to stop")
-    return supervisor, stopping
 
 
 def test_a_program_that_does_not_listen_is_killed_with_everything_it_started() -> None:
@@ -209,7 +121,7 @@ from arena.serving.supervisor import Child, Program
 sleep = (sys.executable, "-c", "import time; time.sleep(600)")
 child = Child(Program(name="one", arguments=sleep,
                       is_ready=lambda: True), print)
-open({str(pids)!r}, "w").write(str(child.pid))
+open({str(pids)!r}, "w").write(str(child.process.pid))
 time.sleep(600)
 """
     outer = subprocess.Popen([sys.executable, "-c", code])

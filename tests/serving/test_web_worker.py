@@ -13,9 +13,8 @@ from types import SimpleNamespace
 import pytest
 from waitress.adjustments import Adjustments
 
-from arena.serving import web_worker
 from arena.serving.probes import port_answers
-from arena.serving.web_worker import Connection, make_room
+from arena.serving.web_worker import Connection
 from tests.processes import Process, wait_until
 from tests.stack import free_port
 
@@ -91,59 +90,31 @@ def test_headers_of_proxies_are_left_to_the_settings(served: Served) -> None:
 
 
 @pytest.fixture
-def connections() -> Iterator[list[Connection]]:
-    """Three, none of which has sent anything."""
+def connection() -> Iterator[Connection]:
+    """One that has begun a request 100 s after the machine's start."""
     server = SimpleNamespace(active_channels={}, add_task=lambda _: None)
-    with ExitStack() as sockets:
-        made = []
-        for _ in range(3):
-            ours, theirs = socket.socketpair()
-            sockets.enter_context(ours)
-            sockets.enter_context(theirs)
-            made.append(Connection(server, ours, ("127.0.0.1", 1), Adjustments(), map={}))
+    ours, theirs = socket.socketpair()
+    with ours, theirs:
+        made = Connection(server, ours, ("127.0.0.1", 1), Adjustments(), map={})
+        made.received(b"POST / HTTP/1.1\r\nContent-Length: 900000\r\n\r\n")
+        made.began_at = 100.0
         yield made
 
 
-def closed(connections: list[Connection]) -> list[bool]:
-    return [bool(connection.will_close) for connection in connections]
-
-
 @pytest.mark.parametrize(
-    ("after_s", "is_closed"), [(29.0, False), (30.0, False), (30.1, True), (500.0, True)]
+    ("came_in", "after_s", "is_late"),
+    [
+        *((0, 29.0, False), (0, 30.0, False), (0, 30.1, True), (60, 60.0, True)),
+        *((29_999, 60.0, True), (30_000, 60.0, False)),
+    ],
 )
-def test_a_request_that_never_ends_is_closed(
-    connections: list[Connection], after_s: float, is_closed: bool
+def test_a_request_that_never_ends_is_closed_and_a_slow_line_is_not(
+    connection: Connection, came_in: int, after_s: float, is_late: bool
 ) -> None:
-    connections[0].received(b"GET / HT")
-    connections[0].waits_since, connections[0].came_in = 100.0, 0
-    make_room(connections, now=100.0 + after_s)
-    assert closed(connections) == [is_closed, False, False]
+    connection.came_in = came_in
+    assert connection.is_late(100.0 + after_s) == is_late
 
 
-def test_a_byte_a_second_does_not_keep_it_and_a_slow_line_does(
-    connections: list[Connection],
-) -> None:
-    for connection, came_in in zip(connections, (60, 29_999, 30_000), strict=True):
-        connection.received(b"POST / HTTP/1.1\r\nContent-Length: 900000\r\n\r\n")
-        connection.waits_since, connection.came_in = 100.0, came_in
-    make_room(connections, now=160.0)
-    assert closed(connections) == [True, True, False]
-
-
-def test_who_waits_the_longest_makes_room(
-    connections: list[Connection], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(web_worker, "CONNECTIONS", 2)
-    for connection, since in zip(connections, (102.0, 101.0, 103.0), strict=True):
-        connection.waits_since = since
-    make_room(connections, now=104.0)
-    assert closed(connections) == [False, True, False]
-
-
-def test_who_is_being_answered_never_makes_room(
-    connections: list[Connection], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(web_worker, "CONNECTIONS", 0)
-    connections[1].received(b"GET / HTTP/1.1\r\n\r\n")
-    make_room(connections, now=connections[1].waits_since + 3600.0)
-    assert closed(connections) == [True, False, True]
+def test_a_connection_without_a_request_is_never_late(connection: Connection) -> None:
+    connection.request = None
+    assert not connection.is_late(1e6)

@@ -27,12 +27,11 @@ from augment.scene.entities import (
 )
 from augment.scene.lane_graph import LaneGraph
 from augment.simulation.drive import ExpertKind, expert_of, run
-from augment.simulation.metrics import collisions, progress_ratio
 from augment.simulation.pdm_closed import ORIGINAL_OFFSETS_M, PdmClosed
 from augment.simulation.planners import IdmPlanner
 from augment.simulation.planning import Plan, Situation
 from augment.simulation.road import Road, find_route
-from augment.simulation.score import score_drive
+from augment.simulation.score import collisions, progress_ratio, score_drive
 from augment.simulation.states import EgoBody, X, Y
 from augment.simulation.traffic import DriveSetting
 from tests.properties import examples

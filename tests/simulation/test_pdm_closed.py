@@ -22,8 +22,15 @@ from augment.simulation.planners import PLANNER_IDM, planner_named
 from augment.simulation.planning import Idm, Plan, Situation, foresee
 from augment.simulation.proposal_scores import ProposalScores, score_proposals
 from augment.simulation.road import Road
-from augment.simulation.states import FloatArray, Kind, Objects, join_objects, start_state
-from augment.simulation.traffic import TRAFFIC_IDM, DriveSetting, LaneDrivers, objects_of
+from augment.simulation.states import (
+    FloatArray,
+    Kind,
+    Objects,
+    join_objects,
+    objects_of,
+    start_state,
+)
+from augment.simulation.traffic import TRAFFIC_IDM, DriveSetting, LaneDrivers
 from tests.fixtures.shelf import entry, shown_scene
 from tests.house.source import ROOT
 from tests.scenes import cone, pedestrian, vehicle
@@ -255,7 +262,7 @@ def test_traffic_settles_at_the_steady_gap_and_its_sweep() -> None:
             boxes=np.array([[leader_m, 0.0, 0.0, 4.8, 2.0]]),
             speeds_mps=np.array([5.0]),
         )
-        drivers.step(join_objects([drivers.objects(), leader]))
+        drivers.step(np.zeros(5), join_objects([drivers.objects(), leader]))
         leader_m += 0.5
     gap = leader_m - 2.4 - (drivers.objects().boxes[0, 0] + 2.4)
     # 4.6.5: the gap is measured from the sweep's end, so it grows by the swept way.

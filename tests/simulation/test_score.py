@@ -7,18 +7,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from augment.geometry.polyline import Polyline
-from augment.scene.entities import (
-    LaneConnector,
-    Modification,
-    ScenarioType,
-    Scene,
-    TrafficAgent,
-    TrafficLight,
-)
+from augment.scene.entities import Modification, ScenarioType, Scene, TrafficAgent
 from augment.simulation.drive import Expert, ExpertKind
-from augment.simulation.metrics import Metric, collisions, combine, red_lights
-from augment.simulation.score import Score, ScoreKind, criticality, score_drive
+from augment.simulation.score import (
+    Metric,
+    Score,
+    ScoreKind,
+    collisions,
+    combine,
+    criticality,
+    score_drive,
+)
 from augment.simulation.states import FloatArray
 from tests.scenes import cone, pedestrian, vehicle
 from tests.simulation.worlds import driven, states_along, street
@@ -166,11 +165,11 @@ def test_comfort_is_all_or_nothing(pull: float, expected: float) -> None:
 
 def test_multipliers_multiply_and_what_is_unknown_does_not_count() -> None:
     metrics = (
-        Metric(name="a", value=0.5),
-        Metric(name="b", value=None),
-        Metric(name="c", value=0.4, weight=5.0),
-        Metric(name="d", value=1.0, weight=1.0),
-        Metric(name="e", value=None, weight=100.0),
+        Metric("a", 0.5),
+        Metric("b", None),
+        Metric("c", 0.4, 5.0),
+        Metric("d", 1.0, 1.0),
+        Metric("e", None, 100.0),
     )
     assert combine(metrics) == pytest.approx(0.5 * (5.0 * 0.4 + 1.0) / 6.0)
 
@@ -227,24 +226,6 @@ def test_interplan_wants_the_furthest_obstacle_passed(
         modification=parked,
     )
     assert value(score, "ego_passed_obstacles") == expected
-
-
-@pytest.mark.parametrize("state", [TrafficLight.RED, TrafficLight.GREEN])
-def test_red_lights_count_only_where_asked_for(state: TrafficLight) -> None:
-    plain = street(60.0)
-    crossing = LaneConnector(
-        id="Connector1",
-        from_lane="Lane1",
-        to_lane=None,
-        centerline=Polyline([(60.0, 0.0), (400.0, 0.0)]),
-        width_m=3.5,
-        traffic_light=state,
-        speed_limit_mps=10.0,
-    )
-    drive = driven(states_along(STEADY), on=replace(plain, connectors=(crossing,)))
-    assert score_drive(drive, FAR).value == 1.0
-    wanted = 0.0 if state is TrafficLight.RED else 1.0
-    assert red_lights(drive).value == wanted
 
 
 def test_criticality_of_a_drive_towards_a_parked_car() -> None:

@@ -9,8 +9,16 @@ from augment.geometry.polyline import Polyline
 from augment.scene.entities import Lane, Scene, TrafficAgent
 from augment.simulation.drive import Drive
 from augment.simulation.road import Road
-from augment.simulation.states import HEADING, SPEED, EgoBody, FloatArray, Objects, X, Y
-from augment.simulation.traffic import objects_of
+from augment.simulation.states import (
+    HEADING,
+    SPEED,
+    EgoBody,
+    FloatArray,
+    Objects,
+    X,
+    Y,
+    objects_of,
+)
 from tests.scenes import EGO, scene
 
 BODY = EgoBody()

@@ -8,7 +8,7 @@ from django.utils import timezone
 from arena.errors import EnrolmentOver
 from arena.models import EnrolledVoter, Enrolment, Study
 from arena.people.services import create_person
-from arena.studies.queries import own_enrolment, state_of
+from arena.studies.queries import enrolled_voters, state_of
 from arena.studies.services.opening import close_study
 from arena.studies.services.taking_part import drop_silent, enrol, forget_identity, set_enrolment
 from augment.errors import Conflict
@@ -95,13 +95,9 @@ def test_who_read_an_older_text_reads_the_new_one_first(study: Study) -> None:
 
 def test_the_code_is_told_when_every_pair_has_an_answer(study: Study) -> None:
     voter = join(link(study), "w-1")
-    told = own_enrolment(study, voter.expert)
-    assert told is not None
-    assert told.completion_code == ""
+    assert not enrolled_voters(study).get().is_done
     answer(study, voter, 6)
-    told = own_enrolment(study, voter.expert)
-    assert told is not None
-    assert told.completion_code == voter.completion_code
+    assert enrolled_voters(study).get().is_done
     assert state_of(voter.enrolment)["done"] == 1
 
 
@@ -127,9 +123,8 @@ def test_a_drop_out_is_replaced_when_somebody_comes_and_keeps_the_votes(study: S
     second = join(enrolment, "w-2")
     assert study.matchups.filter(expert=first.expert).count() == 2
     assert study.matchups.filter(expert=second.expert).count() == 6
-    told = own_enrolment(study, first.expert)
-    assert told is not None
-    assert (told.was_given_on, told.completion_code) == (True, "")
+    told = enrolled_voters(study).get(expert=first.expert)
+    assert (told.dropped_at, told.is_done) == (later, False)
 
 
 def test_the_id_stands_in_no_log_and_goes_when_the_person_is_forgotten(study: Study) -> None:

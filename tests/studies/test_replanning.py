@@ -9,7 +9,7 @@ from django.contrib.auth.models import User
 from arena.errors import NotYours
 from arena.models import Study, Vote
 from arena.pairing.order import MAIN
-from arena.studies.queries import of_expert, of_study
+from arena.studies.queries import progress_of
 from arena.studies.services.experts import Complaint, report
 from arena.studies.services.planning import next_pairs, plan_batch
 from arena.studies.services.taking_part import hand_over
@@ -134,8 +134,8 @@ def test_the_last_share_is_planned_when_it_is_needed_and_counts_from_the_start()
     assert study.matchups.filter(expert=eva, kind="main").count() == 10
     assert study.votes_to_plan == {"eva": 10, "finn": 10}
     assert voting_progress(study=study, expert=eva).total == 21
-    assert [line.planned for line in of_expert(eva)] == [21]
-    assert (of_study(study).planned, tallies(study)[0].total) == (42, 21)
+    assert [line.total for line in progress_of(eva.studies.all(), eva)] == [21]
+    assert (progress_of([study])[0].total, tallies(study)[0].total) == (42, 21)
 
     for matchup in matchups_of(study, "eva"):
         vote(matchup)

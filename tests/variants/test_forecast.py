@@ -12,7 +12,7 @@ from augment.llm.messages import Reply, Request
 from augment.variants.pipeline import run
 from augment.variants.recipes import FC, OTM, RECIPES, TQA, VQA
 from augment.variants.respondents import ModelRole, RespondentClient
-from augment.variants.showing import CallRange, calls_of, most_tokens
+from augment.variants.showing import CallRange, calls_of
 from tests.fixtures.shelf import entry, shown_scene
 from tests.intents import intents
 from tests.variants.memory import MemoryTranscript
@@ -71,10 +71,3 @@ def test_the_calls_of_the_papers_variants() -> None:
     assert calls_of(TQA) == {MODIFIER: three_rounds, REVIEWER: three_rounds}
     twelve = CallRange(least=2, usual=2, most=12)
     assert calls_of(VQA) == {MODIFIER: three_rounds, ENGINEER: twelve, VIEWER: three_rounds}
-
-
-def test_the_most_tokens_of_one_answer_and_its_re_ask() -> None:
-    use = most_tokens(OTM, {MODIFIER: 5000})[MODIFIER]
-    turn = 2 * 8192 + 2000
-    assert use.prompt == 5000 + (5000 + turn)
-    assert use.completion == 2 * 2 * 8192

@@ -1,15 +1,14 @@
 import random
 from collections.abc import Iterable
-from dataclasses import replace
 
 import pytest
 
-from augment.errors import ModelFault, UnknownName
+from augment.errors import ModelFault
 from augment.llm.client import Patience
 from augment.llm.messages import Reply, Speaker
 from augment.prompts.fill import prompt_version
 from augment.variants.pipeline import Outcome, OutcomeStatus, run
-from augment.variants.recipes import OTM, TQA
+from augment.variants.recipes import OTM
 from augment.variants.respondents import RespondentClient
 from tests.llm.scripted import ScriptedClient
 from tests.scenes import scene
@@ -82,14 +81,3 @@ def test_the_transcript_has_the_answer_before_anybody_reads_it() -> None:
     with pytest.raises(KeyboardInterrupt):
         made.outcome()
     assert len(made.client.requests) == 1
-
-
-def test_a_recipe_that_nobody_can_run_is_refused() -> None:
-    with pytest.raises(UnknownName, match="tqa"):
-        run(
-            replace(OTM, slug="tqa", review=TQA.review),
-            scene=scene(),
-            instruction="Add a car.",
-            modifier=RespondentClient(client=ScriptedClient([]), model="m"),
-            transcript=MemoryTranscript(),
-        )

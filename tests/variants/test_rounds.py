@@ -131,5 +131,5 @@ def test_a_geometric_review_holds_the_modification_against_the_intent_where_ther
     play = Play("geo", [far, car(21.4)], intent=parked(21.4))
     assert (play.roles, play.x_m, play.outcome.is_accepted) == ("mm", 21.4, True)
     told = play.client.requests[1].messages[-1].text
-    assert "29.4 m ahead of the ego along its lane; 21.4 m ahead is asked for" in told
+    assert "ego's lane is 29.40 m; 21.4 m is asked for" in told
     assert Play("geo", [far]).outcome.is_accepted is True

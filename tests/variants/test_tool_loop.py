@@ -40,8 +40,8 @@ def test_calls_in_an_answer_are_answered_in_order_and_then_read_on() -> None:
         ('{"call": 3, "arguments": {}}', "has the form"),
         (call("nearest_lane"), "there is no function 'nearest_lane'; there is pose_on_lane"),
         (call(lane="Lane9"), "there is no lane 'Lane9'"),
-        (call(distance_m="21.4 m"), "distance_m must be a number"),
-        ('{"call": "pose_on_lane", "arguments": [1]}', "must be one JSON object"),
+        (call(distance_m="21.4 m"), "distance_m[0]: Input should be a valid number"),
+        ('{"call": "pose_on_lane", "arguments": [1]}', "Input should be a valid dictionary"),
         ('{"call": "pose_on_lane", "arguments": {"distance_m": NaN}}', "NaN is not a number"),
     ],
 )

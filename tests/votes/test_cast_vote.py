@@ -7,7 +7,7 @@ from django.db import IntegrityError, transaction
 from arena.errors import AlreadyDecided, InvalidVote, NotYours, StudyNotOpen, TooFast
 from arena.models import EarlyLook, Vote
 from arena.studies.services.opening import close_study
-from arena.voting.queries.ballots import current_votes, recent_votes, upcoming
+from arena.voting.queries.ballots import current_votes, own_votes, upcoming
 from arena.voting.services.casting import PACE_WINDOW, cast_vote, decision_of, receive_vote
 from augment.errors import Conflict
 from tests.study_rows import a_study, expert, matchups_of, vote
@@ -69,12 +69,12 @@ def test_a_change_is_appended_and_supersedes_the_current_vote() -> None:
     third = vote(matchup, "equal", supersedes=second.key)
     assert Vote.objects.count() == 3
     assert list(current_votes(study)) == [third]
-    assert [v.outcome for v in recent_votes(study=study, expert=matchup.expert)] == ["equal"]
+    assert list(own_votes(study, matchup.expert)) == [third]
 
 
 @pytest.mark.parametrize(
     ("outcome", "more", "named"),
-    [("equal", {"both_miss": True}, "both_miss"), ("right", {"aids": "text"}, "aids")],
+    [("equal", {"both_miss": True}, "both_miss"), ("right", {"aids": ["replay"]}, "aids")],
 )
 def test_a_changed_vote_is_held_against_the_studys_rules_as_a_first_one_is(
     outcome: str, more: dict[str, Any], named: str
@@ -157,7 +157,7 @@ def test_a_closed_study_takes_no_votes_but_knows_the_ones_it_has() -> None:
         ({"outcome": "equal", "both_miss": True}, "both_miss"),
         ({"outcome": "left", "comment": "x" * 1001}, "comment"),
         ({"outcome": "left", "aids": ["zoom", "glasses"]}, "aids"),
-        ({"outcome": "left", "aids": ["text"]}, "aids"),
+        ({"outcome": "left", "aids": ["replay"]}, "aids"),
     ],
 )
 def test_parts_that_do_not_go_together_are_refused_by_name(

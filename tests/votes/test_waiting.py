@@ -5,20 +5,17 @@ import subprocess
 import sys
 import threading
 from collections.abc import Iterator
-from concurrent.futures import Future, ThreadPoolExecutor, as_completed
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
-from django.contrib.auth.models import User
 from django.db import OperationalError, connection
-from django.urls import reverse
 from pytest_django import Settings
 
 from arena.errors import DatabaseBusy
-from arena.models import Matchup, Vote
+from arena.models import Vote
 from arena.voting.services import turns
-from arena.voting.services.casting import decision_of, receive_vote
 from tests.api.asking import body_for, error_of, post, signed_in
 from tests.held_lock import kept_busy
 from tests.house.source import ROOT
@@ -47,19 +44,6 @@ def test_a_vote_behind_a_long_writer_is_given_back_and_taken_later() -> None:
     assert refused["Retry-After"] == "2"
     assert not Vote.objects.exists()
     assert post(client, body).status_code == 200
-    assert Vote.objects.count() == 1
-
-
-def test_a_form_behind_a_long_writer_gets_a_page_that_says_so() -> None:
-    study = a_study()
-    matchup = matchups_of(study, "eva")[0]
-    client = signed_in("eva")
-    form = {"key": body_for(matchup)["key"], "matchup": matchup.code, "outcome": "left"}
-    with kept_busy():
-        refused = client.post(reverse("vote", args=[study.code]), form)
-    assert (refused.status_code, refused["Retry-After"]) == (503, "2")
-    assert "Busy for a moment" in refused.content.decode()
-    assert client.post(reverse("vote", args=[study.code]), form).status_code == 302
     assert Vote.objects.count() == 1
 
 
@@ -112,40 +96,6 @@ def test_a_vote_on_a_full_disk_is_given_back() -> None:
     error_of(refused, 503, "busy")
     assert refused["Retry-After"] == "2"
     assert not Vote.objects.exists()
-
-
-@only_sqlite
-def test_two_threads_wait_for_a_long_writer_and_the_others_are_free(
-    settings: Settings, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    settings.VOTE_WAIT_S = 60
-    monkeypatch.setattr(turns, "STUCK_S", 0.05)
-    study = a_study()
-    eva = User.objects.get(username="eva")
-    jobs = matchups_of(study, "eva")[:6]
-
-    def send(matchup: Matchup) -> str:
-        decision = decision_of(matchup_code=matchup.code, key=str(matchup.code), outcome="left")
-        try:
-            receive_vote(expert=eva, decision=decision)
-        except DatabaseBusy:
-            return "given back"
-        finally:
-            connection.close()
-        return "stored"
-
-    became: list[str] = []
-    with ThreadPoolExecutor(len(jobs)) as pool:
-        with kept_busy():
-            sent: list[Future[str]] = [pool.submit(send, job) for job in jobs]
-            for done in as_completed(sent):
-                became.append(done.result())
-                if len(became) == 4:
-                    break
-            assert became == ["given back"] * 4
-            assert sum(not job.done() for job in sent) == 2
-        assert sorted(job.result() for job in sent) == ["given back"] * 4 + ["stored"] * 2
-    assert Vote.objects.count() == 2
 
 
 @only_sqlite
@@ -204,9 +154,9 @@ def test_every_connection_of_a_web_server_waits_no_longer_than_a_vote(tmp_path: 
     said = subprocess.run(
         [sys.executable, "-c", program],
         cwd=ROOT,
-        env={**os.environ, "ARENA_VAR_DIR": str(tmp_path), "ARENA_VOTE_WAIT_S": "3"},
+        env={**os.environ, "ARENA_VAR_DIR": str(tmp_path)},
         capture_output=True,
         text=True,
         check=True,
     ).stdout
-    assert said == "3000\n"
+    assert said == "5000\n"

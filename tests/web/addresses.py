@@ -4,9 +4,9 @@ import uuid
 
 from django.urls import reverse
 
+from arena.models import Authorship
 from arena.people.links import invite, mark_author
 from arena.studies.services.drafts import keep_draft
-from arena.studies.services.experts import Complaint, report
 from augment.models import Endpoint, EndpointModel, SceneUpload, Simulation, UploadMoment
 from tests.web.cast import World
 
@@ -15,10 +15,6 @@ STRANGER = str(uuid.uuid4())
 
 def address(name: str, here: World) -> str:
     shown = here.study.matchups.filter(expert=here.expert).get(position=1)
-    if name == "report":
-        key, said = uuid.uuid4(), Complaint(reason="other")
-        report(expert=here.expert, matchup_code=shown.code, key=key, said=said)
-        return reverse(name, kwargs={"code": here.study.code, "key": key})
     arguments: dict[str, dict[str, object]] = {
         "person-link": {"code": here.expert.person.code},
         "person-change": {"code": here.expert.person.code},
@@ -26,7 +22,6 @@ def address(name: str, here: World) -> str:
         "api-token-revoke": {"code": STRANGER},
         "job": {"code": here.job.code},
         "contestant": {"code": here.augmentation.contestant.code},
-        "contestant-prompts": {"code": here.augmentation.contestant.code},
         "contestant-retired": {"code": here.augmentation.contestant.code},
         "job-progress": {"code": here.job.code},
         "job-retry": {"code": here.job.code},
@@ -52,9 +47,7 @@ def address(name: str, here: World) -> str:
         "reference-edit": {"code": here.augmentation.scenario.code},
         "scenario-new": {"code": here.augmentation.scenario.base_scene.code},
         "prompts": {"code": here.augmentation.scenario.code},
-        "prompt-file": {"code": here.augmentation.scenario.code},
         "prompt-image": {"code": here.augmentation.scenario.code, "number": 0},
-        "reference-drop": {"code": here.augmentation.scenario.code},
         "edit-check": {"code": here.augmentation.scenario.code},
         "correct": {"code": here.augmentation.code},
         "intent": {"code": here.augmentation.scenario.code},
@@ -62,14 +55,12 @@ def address(name: str, here: World) -> str:
         "intent-edit": {"code": here.augmentation.scenario.code},
         "scenario-retired": {"code": here.augmentation.scenario.code},
         "scene-retired": {"code": here.augmentation.scenario.base_scene.code},
-        "scene-rename": {"code": here.augmentation.scenario.base_scene.code},
         "scenario-edit": {"code": here.augmentation.scenario.code},
         "scenario-delete": {"code": here.augmentation.scenario.code},
         "scene-delete": {"code": here.augmentation.scenario.base_scene.code},
         "intent-read": {"code": here.augmentation.scenario.code},
         "picture": {"kind": "augmentation", "code": shown.left.code},
-        "audit-export": {"form": "csv"},
-        "results-export": {"code": here.study.code, "name": "votes", "form": "csv"},
+        "results-export": {"code": here.study.code, "form": "csv"},
         "study-file": {"code": here.study.code, "kind": "interplan"},
         "study-write": {"code": here.study.code, "kind": "interplan"},
         "results-vote": {"code": here.study.code, "vote": STRANGER},
@@ -78,7 +69,6 @@ def address(name: str, here: World) -> str:
         "rating-again": {"code": here.study.code, "rating": STRANGER},
         "matchup-image": {"token": shown.left_token},
         "replay": {"code": shown.code},
-        "measures": {"code": shown.code},
     }
     if name.startswith("endpoint") and name not in ("endpoints", "endpoint-new"):
         site, _ = Endpoint.objects.get_or_create(
@@ -106,12 +96,12 @@ def address(name: str, here: World) -> str:
         made = invite(study=here.study, expert=here.expert)
         arguments["revoke"] = {"code": made.invitation.code}
     if name == "author-back":
-        marked = mark_author(study=here.study, expert=here.expert, contestant="ann")
-        arguments["author-back"] = {"code": marked.code}
+        mark_author(study=here.study, expert=here.expert, contestant="ann")
+        arguments["author-back"] = {"code": Authorship.objects.get().code}
     own = (
         *("study", "preregistration", "experts", "invite", "author", "study-close"),
         *("study-cancel", "study-again"),
-        *("study-hand-over", "study-rate", "enrolment", "enrolment-voters", "enrolment-drop"),
+        *("study-hand-over", "study-rate", "enrolment", "enrolment-voters"),
     )
     results = ("results", "results-votes", "results-votes-file", "results-open")
     is_of_study = name in own + results or name.startswith("vote")

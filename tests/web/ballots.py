@@ -1,6 +1,4 @@
-"""What the tests of the voting page send and look at."""
-
-import uuid
+"""What the tests of the voting page look at."""
 
 from django.urls import reverse
 
@@ -15,7 +13,3 @@ def page(here: World) -> str:
 def following(here: World) -> Matchup:
     """What the expert judges next."""
     return here.study.matchups.filter(expert=here.expert, votes=None).earliest("position")
-
-
-def ballot(matchup: Matchup, outcome: str = "left", **more: object) -> dict[str, object]:
-    return {"key": uuid.uuid4(), "matchup": matchup.code, "outcome": outcome, **more}

@@ -34,7 +34,6 @@ PAGES: dict[str, tuple[int, int, int]] = {
     "contestants": (200, 200, 403),
     "contestant-new": (200, 403, 403),
     "contestant": (200, 200, 403),
-    "contestant-prompts": (302, 302, 403),
     "endpoints": (200, 200, 403),
     "endpoint-new": (200, 403, 403),
     "endpoint": (200, 200, 403),
@@ -56,7 +55,6 @@ PAGES: dict[str, tuple[int, int, int]] = {
     "scenario-edit": (200, 200, 403),
     "scenarios-bulk": (200, 200, 403),
     "prompts": (200, 200, 403),
-    "prompt-file": (200, 200, 403),
     "prompt-image": (404, 404, 403),  # a modifier is shown none
     "reference-edit": (200, 200, 403),
     "correct": (200, 200, 403),
@@ -80,13 +78,10 @@ PAGES: dict[str, tuple[int, int, int]] = {
     "results-export": (403, 403, 403),
     "study-file": (404, 404, 403),  # nothing was written yet
     "vote": (403, 403, 404),
-    "report": (200, 403, 403),
     "vote-practice": (403, 403, 404),
-    "vote-help": (403, 403, 404),
     "vote-skipped": (403, 403, 404),
     "matchup-image": (200, 403, 404),
     "replay": (404, 403, 404),  # the study plays no drives
-    "measures": (200, 403, 404),
 }
 ACTIONS: dict[str, tuple[int, int, int]] = {
     "job-retry": (302, 403, 403),
@@ -97,10 +92,8 @@ ACTIONS: dict[str, tuple[int, int, int]] = {
     "endpoint-probe": (302, 403, 403),
     "catalogue-load": (302, 403, 403),
     "scene-send": (302, 302, 403),
-    "reference-drop": (302, 302, 403),
     "edit-check": (422, 422, 403),
     "upload-show": (302, 302, 403),
-    "upload-again": (302, 302, 403),
     "upload-remove": (302, 404, 403),  # gone by then
     "moment-keep": (302, 302, 403),
     "job-simulate": (302, 403, 403),
@@ -116,7 +109,6 @@ ACTIONS: dict[str, tuple[int, int, int]] = {
     "set-intent": (302, 302, 403),
     "scenario-retired": (302, 403, 403),
     "scene-retired": (302, 403, 403),
-    "scene-rename": (302, 302, 403),
     "scenario-delete": (200, 403, 403),
     "scene-delete": (200, 403, 403),
     "intent-read": (302, 403, 403),
@@ -132,10 +124,8 @@ ACTIONS: dict[str, tuple[int, int, int]] = {
     "study-draft-discard": (200, 403, 403),
     "study-hand-over": (302, 403, 403),
     "labelling-close": (404, 403, 403),
-    "enrolment-drop": (404, 403, 403),
     "theme": (302, 302, 302),
     "language": (302, 302, 302),
-    "vote-report": (403, 403, 404),
 }
 OPEN_TO_THE_WORLD = {
     "login",

@@ -9,7 +9,7 @@ from arena.templatetags.marks import usd
 from augment.models import GenerationJob
 from augment.services.running import runner
 from augment.services.running.budget import Caps
-from tests.jobs.models import Model, add_llama, llama_job
+from tests.jobs.models import Model, llama_job
 from tests.jobs.rows import add_scenario, only_row
 from tests.web.cast import people, signed_in
 
@@ -67,19 +67,14 @@ def test_an_amount_is_short_and_honest(amount: Decimal | None, shown: str) -> No
 
 
 def test_an_estimate_launches_nothing_and_asks_for_no_name() -> None:
-    add_llama(price="1")
+    ran(llama_job(price="1"))
     add_scenario("street")
     sent = {"contestants": ["llama"], "scenarios": ["street"], "estimate": "1"}
     admin = signed_in(people()["admin"])
-    for cap, sentence in (
-        ("", "1–2"),
-        ("0.000001", "the job may stop early, after about 0 of 1 runs"),
-        ("0.02", "but not the worst case"),
-        ("100", "The cap covers the worst case."),
-    ):
+    for cap, sentence in (("", "1–2"), ("0.002", "the job may stop early")):
         answer = admin.post(reverse("job-new"), sent | {"cap_usd": cap})
         assert answer.status_code == 200
         shown = " ".join(answer.content.decode().split())
         assert sentence in shown
         assert "This field is required" not in shown
-    assert not GenerationJob.objects.exists()
+    assert GenerationJob.objects.count() == 1

@@ -49,7 +49,7 @@ def test_a_jobs_page_shows_the_error_of_every_contestant_and_marks_the_simulated
 
 def test_an_augmentations_page_says_what_is_wrong_with_it_and_how_far_it_is() -> None:
     shown = page_of(crash())
-    assert "Agent2 and the ego overlap by" in shown
+    assert "Agent2 and Agent1 overlap by" in shown
     assert "No object could be matched with the reference; 2 missing; 1 more" in shown
     assert "plain measurement" in shown
 

@@ -56,9 +56,6 @@ def test_a_drawn_reference_is_kept_and_shown(analyst: Client) -> None:
     here.refresh_from_db()
     assert here.reference is not None
     assert here.reference["add"][0]["lane_id"] == "Lane1"
-    analyst.post(reverse("reference-drop", args=[here.code]))
-    here.refresh_from_db()
-    assert here.reference is None
 
 
 def test_an_augmentation_is_corrected_and_both_say_so(analyst: Client) -> None:

@@ -8,7 +8,6 @@ from django.test import Client
 from django.urls import reverse
 
 from arena.models import Enrolment, Study
-from arena.studies.pages.experts import VOTER_COOKIE
 from arena.studies.services.taking_part import set_enrolment
 from tests.study_rows import a_study, matchups_of, vote
 from tests.web.cast import people, signed_in
@@ -55,30 +54,6 @@ def test_a_newcomer_votes_at_once_and_is_told_the_code_at_the_end(enrolment: Enr
     assert voter.completion_code in page
     again = client.get(reverse("enrol", args=[enrolment.token]))
     assert again["Location"] == reverse("vote", args=[study.code])
-
-
-def test_a_voter_whose_session_ended_goes_on_in_the_same_browser(enrolment: Enrolment) -> None:
-    client = Client()
-    join(client, enrolment)
-    voter, link = enrolment.voters.get(), reverse("enrol", args=[enrolment.token])
-    del client.cookies["sessionid"]
-    assert link in client.get(reverse("login")).content.decode()
-    Enrolment.objects.update(is_open=False)
-    assert "You take part already" in client.get(link).content.decode()
-    assert client.get(reverse("vote", args=[enrolment.study.code])).status_code == 302
-    client.post(link, {"again": "1"})
-    assert client.session["_auth_user_id"] == str(voter.expert_id)
-    assert client.get(reverse("vote", args=[enrolment.study.code])).status_code == 200
-
-
-def test_nobody_goes_on_as_a_voter_without_that_voter_s_browser(enrolment: Enrolment) -> None:
-    join(Client(), enrolment)
-    voter, link = enrolment.voters.get(), reverse("enrol", args=[enrolment.token])
-    stranger = Client()
-    stranger.cookies[VOTER_COOKIE] = str(voter.code)
-    assert "You take part already" not in stranger.get(link).content.decode()
-    stranger.post(link, {"again": "1"})
-    assert "_auth_user_id" not in stranger.session
 
 
 def test_a_voter_opens_nothing_but_the_own_study(enrolment: Enrolment) -> None:

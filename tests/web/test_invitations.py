@@ -79,19 +79,13 @@ def test_another_account_on_the_device_is_named_and_signed_out(study: Study) -> 
     assert who(client) == "eva"
 
 
-@pytest.mark.parametrize(
-    ("change", "words"),
-    [
-        ({"expires_at": timezone.now()}, "This link has expired"),
-        ({"revoked_at": timezone.now()}, "This link is no longer in use"),
-    ],
-)
-def test_a_link_that_is_over_says_so(study: Study, change: dict[str, object], words: str) -> None:
+@pytest.mark.parametrize("column", ["expires_at", "revoked_at"])
+def test_a_link_that_is_over_says_so(study: Study, column: str) -> None:
     client, url = Client(), link(study)
-    Invitation.objects.update(**change)
+    Invitation.objects.update(**{column: timezone.now()})
     for answer in (client.get(url), client.post(url)):
         assert answer.status_code == 410
-        assert words in text(answer.content)
+        assert "This link is no longer in use" in text(answer.content)
         assert answer.headers["Referrer-Policy"] == "strict-origin"
     assert who(client) is None
 
@@ -126,7 +120,7 @@ def test_taking_a_link_back_signs_out_who_came_in_by_it(study: Study) -> None:
     by_password = signed_in(User.objects.get(username="eva"))
     admin = signed_in(people()["admin"])
     answer = admin.post(reverse("revoke", args=[Invitation.objects.get().code]), follow=True)
-    assert "The link of Expert 1 was taken back." in text(answer.content)
+    assert "The link was taken back." in text(answer.content)
     vote = reverse("vote", args=[study.code])
     assert came.get(vote).status_code == 302
     assert by_password.get(vote).status_code == 200

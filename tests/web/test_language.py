@@ -55,11 +55,11 @@ def test_files_are_the_same_in_every_language() -> None:
 def test_voting_is_german() -> None:
     study = a_study()
     client = signed_in(study.experts.get(username="eva"))
-    for name in ("vote", "vote-help", "vote-skipped"):
+    for name in ("vote", "vote-skipped"):
         answer = client.get(reverse(name, args=[study.code]), **GERMAN)  # type: ignore[arg-type]
         assert answer.headers["Content-Language"] == "de"
         assert '<html lang="de"' in answer.content.decode()
-        assert "Hilfe" in answer.content.decode()
+        assert "Abmelden" in answer.content.decode()
 
 
 @pytest.mark.parametrize("address", ["/", "/jobs/", "/studies/new/", "/people/"])

@@ -56,7 +56,7 @@ def test_the_page_has_the_picture_drawn_and_shows_it_with_the_same_numbers(
     found = check_augmentation(row)
     assert found is not None
     assert after.count('class="number ') == len(found.faults) >= 2
-    assert [line.kind for line in found.faults][:2] == ["asked count", "asked type"]
+    assert [line.kind for line in found.faults][:2] == ["asked_count", "asked_type"]
     shown = analyst.get(picture)
     assert shown.getvalue()[:4] == b"\x89PNG"
     shown.close()

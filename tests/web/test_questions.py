@@ -49,8 +49,7 @@ def test_closing_a_study_asks_and_says_what_will_be_missing() -> None:
         assert asked.status_code == 200
         shown = text_of(asked)
         assert "Close the study “Round 1”?" in shown
-        assert "Votes given: 8. Pairs skipped: 1." in shown
-        assert "will be missing: 9. Experts who are not done: 1." in shown
+        assert "Votes given: 8. Pairs skipped: 1. Still planned: 9." in shown
         study.refresh_from_db()
         assert study.state == "open"
     admin.post(page, {"sure": "1"})

@@ -3,13 +3,12 @@
 import pytest
 from django.utils.translation import override
 
-from arena.errors import InvalidPreference
 from arena.models import Snapshot
-from arena.people.links import invite
-from arena.people.services import keep_voting
+from arena.people.links import invite, make_api_token
 from arena.results.queries.votes import Filters
 from arena.results.services.ratings import RATINGS, plan_snapshot
 from arena.studies.services.taking_part import hand_over
+from augment.errors import Conflict
 from augment.models import Event
 from augment.services.running import budget, jobs
 from augment.services.running.budget import Caps
@@ -22,13 +21,12 @@ pytestmark = pytest.mark.django_db
 
 def test_a_voter_is_refused_in_the_language_of_the_request() -> None:
     expert = study_rows.expert("eva")
-    twice = {"a": "s"}
-    with override("de"), pytest.raises(InvalidPreference) as german:
-        keep_voting(user=expert, switches={}, keys=twice)
-    with override("en"), pytest.raises(InvalidPreference) as english:
-        keep_voting(user=expert, switches={}, keys=twice)
-    assert str(german.value) == "„s“ würde zweierlei tun: A ist besser, Überspringen."
-    assert str(english.value) == "'s' would do two things: A is better, Skip."
+    with override("de"), pytest.raises(Conflict) as german:
+        make_api_token(owner=expert, name="x", role="expert", days=2)
+    with override("en"), pytest.raises(Conflict) as english:
+        make_api_token(owner=expert, name="x", role="expert", days=2)
+    assert str(german.value) != str(english.value)
+    assert str(english.value) == "A token works for 1, 7, 30, 90, 365 days, not 2."
 
 
 def test_nothing_that_is_stored_is_german() -> None:

@@ -11,7 +11,7 @@ from django.urls import reverse
 
 from arena.models import Study, StudyDraft
 from arena.pairing.plan import plan
-from arena.studies.services.drafts import change_draft, keep_draft
+from arena.studies.services.drafts import keep_draft
 from arena.studies.services.planning import rules_of
 from arena.studies.services.taking_part import forget_identity
 from tests import study_rows
@@ -66,7 +66,7 @@ def test_a_draft_keeps_every_field_as_it_stands(admin: Client) -> None:
         "repeats": "12.5",
         "checks": "99",
         "hypotheses": "ann above",
-        "allow_text": "on",
+        "allow_replay": "on",
         "samples": "all",
         "keep": "1",
     }
@@ -82,22 +82,9 @@ def test_a_draft_keeps_every_field_as_it_stands(admin: Client) -> None:
         assert ticked(shown, name) == sent[name], name
     page = shown.content.decode()
     assert '<option value="all" selected>' in page
-    assert 'name="allow_text" checked' in page
+    assert 'name="allow_replay" checked' in page
     assert 'name="practice" checked' not in page, "a switch that was off stays off"
     assert not Study.objects.exists()
-
-
-def test_a_draft_that_an_older_version_kept_is_read(admin: Client) -> None:
-    draft = keep_draft(entered={"name": "Round 1"})
-    for no_measures in (True, False):
-        draft.entered.pop("allow_measures", None)
-        draft.entered["no_measures"] = no_measures
-        draft.save()
-        shown = admin.get(page_of(draft)).content.decode()
-        assert ('name="allow_measures" checked' in shown) is not no_measures
-    saved = change_draft(draft=draft, entered={"name": "Round 1"}, revision=draft.revision)
-    assert (saved.revision, saved.entered["allow_measures"]) == (2, False)
-    assert "no_measures" not in saved.entered
 
 
 def test_a_draft_is_listed_and_no_expert_sees_it(admin: Client) -> None:
@@ -176,7 +163,6 @@ def a_rich_study() -> Study:
         "overlap": 10,
         "targets": ["ann 20", "bob 15", "cid 13"],
         "allow_both_miss": True,
-        "allow_measures": False,
         "hypotheses": ["ann above bob", "It is so."],
     }
     cast = study_rows.cast_of()
@@ -198,12 +184,5 @@ def test_the_settings_of_a_study_open_another_that_is_planned_the_same(admin: Cl
     kept = [{k: v for k, v in one.rules.items() if k not in apart} for one in (first, second)]
     assert kept[0] == kept[1]
     assert plan(rules_of(first)) == plan(rules_of(second))
-    for name in (
-        "allow_both_miss",
-        "allow_measures",
-        "allow_text",
-        "allow_replay",
-        "practice",
-        "allow_simulated",
-    ):
+    for name in ("allow_both_miss", "allow_replay", "practice", "allow_simulated"):
         assert getattr(first, name) == getattr(second, name), name

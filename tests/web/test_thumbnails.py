@@ -9,7 +9,7 @@ from django.urls import reverse
 from PIL import Image, UnidentifiedImageError
 from pytest_django import Settings
 
-from arena.config import env
+from arena.config.env import read_media
 from augment.render.bev import draw
 from augment.render.camera import camera_for
 from augment.render.canvas import shrink_png
@@ -32,7 +32,8 @@ def there(settings: Settings, monkeypatch: pytest.MonkeyPatch) -> Iterator[Bucke
     with bucket() as there:
         for name, value in there.environment.items():
             monkeypatch.setenv(name, value)
-        settings.STORAGES = {**settings.STORAGES, "default": env.media("ARENA_MEDIA_URL")}
+        media = read_media(there.environment["ARENA_MEDIA_URL"])
+        settings.STORAGES = {**settings.STORAGES, "default": media}
         yield there
 
 

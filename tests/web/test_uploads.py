@@ -79,6 +79,6 @@ def test_what_can_not_be_read_says_why(analyst: Client) -> None:
 def test_a_file_that_is_too_large_is_not_kept(analyst: Client, settings: LazySettings) -> None:
     settings.UPLOAD_MB = 1
     shown = send(analyst, b" " * 1_000_001)
-    assert "at most 1 MB are taken" in shown
+    assert "a file of at most 1 MB" in shown
     assert not SceneUpload.objects.exists()
     assert "Choose the moment" in send(analyst, STREET + b" " * (1_000_000 - len(STREET)))

@@ -77,7 +77,7 @@ def job_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         "shown_causes": progress.SHOWN,
     }
     if counts.is_moving:  # a page that reloads every two seconds measures nothing
-        context |= {"workforce": workforce(), "pace": progress.pace_of(counts)}
+        context["workforce"] = workforce()
     elif counts.total <= MEASURED_AT_ONCE or _ASK_TO_MEASURE & request.GET.keys():
         context |= _measure(request, job)
     else:
@@ -95,9 +95,7 @@ def _measure(request: HttpRequest, job: GenerationJob) -> dict[str, object]:
         "tool_calls": progress.tool_calls_by_contestant(job),
     }
     if job.samples > 1:
-        is_checked = request.GET.get("checks") == "1"
-        measured["repeats"] = repeatability(job, with_checks=is_checked)
-        measured["is_checked"] = is_checked
+        measured["repeats"] = repeatability(job)
     return measured
 
 

@@ -24,7 +24,7 @@ from augment.services.inputs import inputs_of, read_request, read_values
 from augment.services.running.choosing import find_obstacle, keys_missing
 from augment.services.running.estimates import JobEstimate, estimate
 from augment.services.running.jobs import JobRequest, JobScope, launch
-from augment.services.running.matrix import ChosenCells, add_cells, matrix_of, read_cells
+from augment.services.running.matrix import add_cells, matrix_of
 from augment.tasks import enqueue_job
 
 LONGEST_NAME = 120
@@ -41,10 +41,10 @@ class LaunchForm(ChoiceForm, OptionsForm):
         super().__init__(*args, **kwargs)
         self.models = models
         self.matrix = matrix_of(models)
-        keys = [cell.key for row in self.matrix for cell, obstacle in row.cells if not obstacle]
+        keys = [cell.key for row in self.matrix for cell in row.cells if not cell.obstacle]
         offer(self, "cells", [(key, key) for key in keys])
         self.fields["samples"].required = False
-        self.cells_chosen = ChosenCells()
+        self.cells_chosen: list[Contestant] = []
 
     def clean_samples(self) -> int:
         """Return 1 for an empty field."""
@@ -56,7 +56,7 @@ class LaunchForm(ChoiceForm, OptionsForm):
         if not (cleaned.get("contestants") or cleaned.get("cells")):
             self.add_error("contestants", "Choose at least one contestant.")
         with refusals_in(self):
-            self.cells_chosen = read_cells(
+            self.cells_chosen = find_cells(
                 cleaned.get("cells", []), read_values(OPTION_INPUTS, cleaned)
             )
         return cleaned
@@ -85,7 +85,7 @@ class LaunchForm(ChoiceForm, OptionsForm):
     def chosen_rows(self) -> list[Contestant]:
         """Return whoever is chosen, each once; those of cells may not be stored yet."""
         named = Contestant.objects.filter(slug__in=self.cleaned_data.get("contestants", []))
-        rows = [*named.select_related("endpoint"), *self.cells_chosen.contestants()]
+        rows = [*named.select_related("endpoint"), *self.cells_chosen]
         return list({row.slug: row for row in rows}.values())
 
     def estimated(self) -> JobEstimate | None:
@@ -160,10 +160,7 @@ def _estimated(request: HttpRequest, form: LaunchForm) -> HttpResponse:
     """Show the form as it came in, with what the job would use; nothing is launched."""
     more: dict[str, Any] = {}
     with refusals_in(form):
-        estimate, cap = form.estimated(), form.cleaned_data.get("cap_usd")
-        more = {"estimate": estimate, "cap_usd": cap}
-        if estimate is not None and cap is not None:
-            more["rows_within"] = estimate.rows_within(cap)
+        more = {"estimate": form.estimated(), "cap_usd": form.cleaned_data.get("cap_usd")}
     return _page(request, form, **more)
 
 

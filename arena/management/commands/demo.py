@@ -1,7 +1,6 @@
 """`manage.py demo`: the main job on the catalogue, unattended, then served."""
 
 import time
-from contextlib import nullcontext
 from functools import partial
 from typing import Any
 
@@ -12,8 +11,7 @@ from django.core.management.base import CommandError
 from arena.management import demo
 from arena.management.arguments import at_least
 from arena.management.commands.serve import INTERRUPTED
-from arena.serving.ledger import Ledger
-from arena.serving.stack import Web, background, hold_alone, remembered_address, web_server
+from arena.serving.stack import Web, background, hold_alone, web_server
 from arena.serving.supervisor import Supervisor
 from augment.services.terminal import TerminalCommand
 
@@ -54,10 +52,8 @@ class Command(TerminalCommand):
         call_command("prepare", verbosity=0)
         demo.prepare(self.stdout.write)
         scenarios = demo.scenarios_of(per_type)
-        supervisor = Supervisor(
-            [*background(concurrency=2), *server], self._keep, ledger=Ledger(settings.VAR_DIR)
-        )
-        with supervisor.signals(), remembered_address(web) if serve else nullcontext():
+        supervisor = Supervisor([*background(concurrency=2), *server], self._keep)
+        with supervisor.signals():
             try:
                 supervisor.start()
                 look = partial(_look_at, supervisor)

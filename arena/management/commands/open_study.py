@@ -7,7 +7,6 @@ from django.core.management.base import CommandParser
 
 from arena.models import Study
 from arena.site.queries import usual_checks
-from arena.studies.queries import shared_units
 from arena.studies.services.opening import open_study, preregistration_sha256
 from arena.studies.services.plan import PLAN_INPUTS, SAMPLES, StudyPlan
 from augment.services.inputs import add_options
@@ -27,7 +26,7 @@ class Command(TerminalCommand):
 
     def handle(self, *args: Any, **options: Any) -> None:
         """Open the study and say what was planned."""
-        given = {one.name: options[one.name] for one in PLAN_INPUTS}
+        given = {field.name: options[field.name] for field in PLAN_INPUTS}
         given |= {
             "contestants": resolve_contestants(options["contestants"]),
             "scenarios": resolve_scenarios(options["scenarios"]),
@@ -62,8 +61,6 @@ class Command(TerminalCommand):
             f"{kinds['main']} votes, {kinds['repeat']} hidden repeats, {kinds['check']} attention "
             f"checks; {sum(study.votes_to_plan.values())} votes are planned later."
         )
-        judged, shared = shared_units(study)
-        self.stdout.write(f"{shared} of {judged} pairs of a scenario are judged by two or more.")
         if rules["scenario_gap_kept"] < rules["scenario_gap"]:
             self.stdout.write(
                 f"A scenario comes again after {rules['scenario_gap_kept']} others instead of "

@@ -1,10 +1,12 @@
-"""`manage.py prune --older-than 180d`: remove what models were asked and answered long ago."""
+"""`manage.py prune --older-than 180`: remove what models were asked and answered long ago."""
 
+from datetime import timedelta
 from typing import Any
 
 from django.utils import timezone
 
-from arena.site.services import TextLoss, foresee_losses, read_age, remove_old
+from arena.management.arguments import at_least
+from arena.site.services import removable, remove_old
 from augment.services.terminal import TerminalCommand
 
 LOST = """Afterwards these answers can't be used again: the same request is asked, and paid, anew.
@@ -16,29 +18,20 @@ backup: take one first (manage.py backup FILE)."""
 class Command(TerminalCommand):
     """Say what would go; with --yes let it go."""
 
-    help = "Say which requests and answers of models are that old; with --yes remove them."
+    help = "Count the requests and answers of models that are that old; with --yes remove them."
 
     arguments = {
-        "--older-than": {"required": True, "metavar": "AGE", "help": "180d or 26w"},
+        "--older-than": {"required": True, "metavar": "DAYS", "type": at_least(1)},
         "--yes": {"action": "store_true", "help": "remove them; without it nothing is changed"},
     }
 
     def handle(self, *args: Any, **options: Any) -> None:
-        """Foresee, and remove where that is wanted."""
+        """Count, and remove where that is wanted."""
         now = timezone.now()
-        before = now - read_age(options["older_than"])
-        losses = foresee_losses(before=before)
-        self._tell(losses)
-        if options["yes"] and losses:
-            self._remove(before, now)
-
-    def _tell(self, losses: list[TextLoss]) -> None:
-        for loss in losses:
-            self.stdout.write(f"{_name(loss)}: {_said(loss)}")
-        if not losses:
-            self.stdout.write(
-                "Nothing is that old, or it belongs to a job or a study that goes on."
-            )
+        before = now - timedelta(days=options["older_than"])
+        number = removable(before).count()
+        if not number:
+            self.stdout.write("Nothing is that old, or it belongs to what goes on.")
             return
         self.stdout.write(f"\n{LOST}")
 

@@ -2,15 +2,13 @@
 
 from typing import Any
 
-from django.conf import settings
 from django.core.management import call_command
 from django.core.management.base import CommandError
 
 from arena.management.arguments import at_least
 from arena.management.demo import login_lines
 from arena.people.services import make_first_link_token
-from arena.serving.ledger import Ledger
-from arena.serving.stack import Web, background, hold_alone, remembered_address, web_server
+from arena.serving.stack import Web, background, hold_alone, web_server
 from arena.serving.supervisor import Supervisor
 from augment.services.terminal import TerminalCommand
 
@@ -37,7 +35,7 @@ class Command(TerminalCommand):
         """Run until somebody asks to stop."""
         web = Web(host=options["host"], port=options["port"], workers=options["web_workers"])
         try:
-            with hold_alone(self.stdout.write):
+            with hold_alone():
                 self._serve(web, options["concurrency"])
         except KeyboardInterrupt:  # before anything was started
             raise CommandError("Stopped before anything ran.", returncode=INTERRUPTED) from None
@@ -46,12 +44,8 @@ class Command(TerminalCommand):
     def _serve(self, web: Web, concurrency: int) -> None:
         server = web_server(web)
         call_command("prepare", verbosity=0)
-        supervisor = Supervisor(
-            [*background(concurrency=concurrency), server],
-            self._say,
-            ledger=Ledger(settings.VAR_DIR),
-        )
-        with supervisor.signals(), remembered_address(web):
+        supervisor = Supervisor([*background(concurrency=concurrency), server], self._say)
+        with supervisor.signals():
             try:
                 supervisor.start()
                 self.stdout.write(f"\nScenario Arena is at {web.address}  (Ctrl-C stops it)\n")

@@ -35,7 +35,7 @@ from arena.results.exports.tables import (
 )
 from arena.results.exports.votes import VOTE_FORMATS, vote_table
 from arena.results.services.vote_files import digest_of
-from arena.studies.services.opening import FILE_NAME, preregistration_bytes
+from arena.studies.services.opening import FILE_NAME
 from arena.studies.services.plan import Answered
 from augment.errors import UnknownName
 

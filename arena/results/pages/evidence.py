@@ -22,7 +22,7 @@ from arena.results.queries.votes import AUTOMATIC, COUNTED, is_imported
 from arena.site.access import STAFF, allow_only
 from arena.site.listing import page_asked
 from arena.site.pictures import sized_picture_response
-from arena.voting.queries.showings import describe_in_words, picture_of_side
+from arena.voting.queries.showings import picture_of_side
 from augment.services.scenarios.scenes import type_choices
 
 _ALL = ("", "all")
@@ -102,7 +102,6 @@ def single_vote_page(request: HttpRequest, code: uuid.UUID, vote: uuid.UUID) -> 
         "found": single,
         "vote": single.vote,
         "matchup": matchup,
-        "described": [describe_in_words(side) for side in matchup.descriptions or ()],
         "beside": neighbours(snapshot, form.search(), single.vote),
     }
     return render(request, "results/vote.html", context)

@@ -1,22 +1,18 @@
 """Pages of single augmentations and of the prompts that lead to them, with all pictures."""
 
-import json
 import re
 import uuid
 from typing import Any
-from urllib.parse import urlencode
 
 from django.http import Http404, HttpRequest, HttpResponse, HttpResponseBase, JsonResponse
-from django.shortcuts import get_object_or_404, redirect, render
-from django.urls import reverse
-from django.views.decorators.http import require_safe
+from django.shortcuts import get_object_or_404, render
 
 from arena.contestants.queries import asking_of
 from arena.scenarios.queries import modification_lines
-from arena.site.access import STAFF, allow_only
+from arena.site.access import STAFF, page_for
 from arena.site.acts import looks_again, send_later
 from arena.site.pictures import picture_response, sized_picture_response
-from augment.errors import AugmentError, UnknownName
+from augment.errors import AugmentError
 from augment.models import Augmentation, BaseScene, Contestant, Scenario, Simulation, UploadMoment
 from augment.services.endpoints.contestants import asking_contestants, preview_contestant
 from augment.services.endpoints.treatments import respondents_of
@@ -25,12 +21,11 @@ from augment.services.judging.findings import check_augmentation
 from augment.services.running.calls import IMAGES
 from augment.services.running.transcript_records import totals_of, transcript_of, tries_of
 from augment.services.scenarios.pictures import SceneView, reference_picture, scene_picture
-from augment.services.scenarios.prompts import Preview, list_choices, preview_prompt
-from augment.tasks import enqueue_marks, enqueue_prompts
+from augment.services.scenarios.prompts import Shown, list_recipes, preview_prompt, prompt_version
+from augment.tasks import enqueue_marks
 
 
-@allow_only(*STAFF)
-@require_safe
+@page_for(*STAFF)
 def augmentation_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Show one augmentation with everything that led to it."""
     augmentation = _augmentation(code)
@@ -61,8 +56,7 @@ def _augmentation(code: uuid.UUID) -> Augmentation:
     return get_object_or_404(rows.defer("scenario__base_scene__recording"), code=code)
 
 
-@allow_only(*STAFF)
-@require_safe
+@page_for(*STAFF)
 def transcript(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Answer with the whole record of an augmentation as one JSON file."""
     answer = JsonResponse(
@@ -73,8 +67,7 @@ def transcript(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     return answer
 
 
-@allow_only(*STAFF)
-@require_safe
+@page_for(*STAFF)
 def asked_image(request: HttpRequest, digest: str) -> HttpResponseBase:
     """Answer with an image that a language model was shown, by the hash in its request."""
     if not re.fullmatch(r"[0-9a-f]{64}", digest):
@@ -82,8 +75,7 @@ def asked_image(request: HttpRequest, digest: str) -> HttpResponseBase:
     return picture_response(f"{IMAGES}/{digest}.png")
 
 
-@allow_only(*STAFF)
-@require_safe
+@page_for(*STAFF)
 def picture(request: HttpRequest, kind: str, code: uuid.UUID) -> HttpResponseBase:
     """Answer with a picture by what it shows; experts' pictures have other addresses."""
     match kind:
@@ -111,21 +103,17 @@ def picture(request: HttpRequest, kind: str, code: uuid.UUID) -> HttpResponseBas
 # --- Prompts -----------------------------------------------------------------------------------
 
 
-@allow_only(*STAFF)
-@require_safe
+@page_for(*STAFF)
 def prompts_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Show the exact messages of a variant's role, with about how many tokens they are."""
     scenario, contestant = _scenario(code), _contestant(request)
-    problem, preview = "", Preview(shown=None)
+    problem, shown = "", None
     try:
-        preview = _preview(request, scenario)
+        shown = _preview(request, scenario)
     except AugmentError as error:
         problem = str(error)
-    look = looks_again(request, waits=preview.shown is None and not problem)
-    if look == 1:
-        send_later(request, enqueue_prompts, scenario.pk)
     role, variant = request.GET.get("role", "modifier"), request.GET.get("variant", "otm")
-    choices = list_choices()
+    choices = list_recipes()
     context = {
         "contestants": asking_contestants(),
         "contestant": contestant,
@@ -135,59 +123,25 @@ def prompts_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         "chosen": next((one for one in choices if one.slug == variant), None),
         "role": role,
         "is_native": "native" in request.GET,
-        "preview": preview,
-        "size": len(_written(preview).encode()),
+        "shown": shown,
+        "version": prompt_version(),
         "problem": problem,
         "query": request.GET.urlencode(),
-        "look": look,
     }
     return render(request, "scenarios/prompts.html", context)
 
 
-@allow_only(*STAFF)
-@require_safe
-def contestant_prompts(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
-    """Redirect to what a contestant would send for the chosen scenario, else the first one."""
-    contestant = get_object_or_404(Contestant, code=code)
-    rows = Scenario.objects.order_by("type", "slug")
-    if slug := request.GET.get("scenario"):
-        rows = rows.filter(slug=slug)
-    scenario = rows.only("code").first()
-    if scenario is None:
-        raise Http404
-    address = reverse("prompts", args=[scenario.code])
-    return redirect(f"{address}?{urlencode({'contestant': contestant.slug})}")
-
-
-@allow_only(*STAFF)
-@require_safe
-def prompt_file(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
-    """Answer with messages and tools as they would be sent, as JSON."""
-    scenario = _scenario(code)
-    try:
-        preview = _preview(request, scenario)
-    except UnknownName as error:
-        raise Http404 from error
-    except AugmentError as error:
-        return HttpResponse(str(error), status=422, content_type="text/plain; charset=utf-8")
-    if preview.shown is None:
-        raise Http404
-    answer = HttpResponse(_written(preview), content_type="application/json")
-    answer["Content-Disposition"] = f'attachment; filename="prompt-{scenario.slug}.json"'
-    return answer
-
-
-@allow_only(*STAFF)
-@require_safe
-def prompt_image(request: HttpRequest, code: uuid.UUID, number: int) -> HttpResponseBase:
+@page_for(*STAFF)
+def prompt_image(request: HttpRequest, code: uuid.UUID, number: int) -> HttpResponse:
     """Answer with a picture that the viewer of a variant would be shown."""
     try:
-        images = _preview(request, _scenario(code)).images
+        shown = _preview(request, _scenario(code))
     except AugmentError as error:
         raise Http404 from error
+    images = shown.messages[-1].images
     if number >= len(images):
         raise Http404
-    return picture_response(images[number])
+    return HttpResponse(images[number], content_type="image/png")
 
 
 def _scenario(code: uuid.UUID) -> Scenario:
@@ -213,7 +167,7 @@ def _how(contestant: Contestant | None, role: str) -> dict[str, Any]:
         return {}
 
 
-def _preview(request: HttpRequest, scenario: Scenario) -> Preview:
+def _preview(request: HttpRequest, scenario: Scenario) -> Shown:
     contestant, role = _contestant(request), request.GET.get("role", "modifier")
     if contestant is not None:
         return preview_contestant(scenario, contestant, role=role)
@@ -223,7 +177,3 @@ def _preview(request: HttpRequest, scenario: Scenario) -> Preview:
         role=role,
         native_tools="native" in request.GET,
     )
-
-
-def _written(preview: Preview) -> str:
-    return json.dumps(preview.to_document(), ensure_ascii=False)

@@ -1,26 +1,24 @@
-"""Pages of the catalogue: scenarios with their intents; retiring, renaming and deleting."""
+"""Pages of the catalogue: scenarios with their intents; retiring and deleting."""
 
 import uuid
 from typing import Any
 
 from django.contrib import messages
-from django.db import transaction
 from django.http import Http404, HttpRequest, HttpResponse, JsonResponse
 from django.shortcuts import get_object_or_404, redirect, render
 from django.urls import reverse
-from django.views.decorators.http import require_http_methods, require_POST, require_safe
 
 from arena.scenarios import queries, services
-from arena.site.access import ADMIN, STAFF, allow_only, user_of
+from arena.site.access import ADMIN, STAFF, act_for, form_for, page_for, user_of
 from arena.site.acts import Confirmation, ask, is_sure, looks_again, refusals_told, send_later
-from arena.site.forms import read_json
+from arena.site.forms import read_code, read_json
 from arena.site.listing import read_listing, read_page
 from augment.errors import Conflict
 from augment.models import BaseScene, EndpointModel, Scenario
 from augment.services.endpoints.contestants import ensure_builtin
 from augment.services.events import retire, take_back
 from augment.services.running.intent_readings import plan_reading
-from augment.services.scenarios.catalogue import CatalogueStep, load_catalogue
+from augment.services.scenarios.catalogue import load_catalogue
 from augment.services.scenarios.editing import (
     accept_reading,
     enter_intent,
@@ -38,14 +36,14 @@ LONGEST_FILE = 200_000
 JSON_STYLE = {"indent": 2, "ensure_ascii": False}
 
 
-@allow_only(*STAFF)
-@require_safe
+@page_for(*STAFF)
 def scenarios_page(request: HttpRequest) -> HttpResponse:
     """List scenarios of a set by type, with the reference where it was drawn."""
     chosen = queries.set_asked(request.GET.get("set"))
     choices = {"type": ("Type", type_choices()), "offered": ("In forms", [("retired", "retired")])}
     listing = read_listing(request, choices, keep=("set",))
-    found = queries.listed_scenarios(chosen, is_retired=bool(listing.chosen("offered")))
+    found = queries.scenarios_of(chosen, is_retired=bool(listing.chosen("offered")))
+    found = found.filter(paraphrase_of=None)
     found = listing.narrow(found, "slug", "instruction", "base_scene__slug", by=["type"])
     page = read_page(request, found, size=SCENARIOS_AT_ONCE)
     rows = list(page.object_list)
@@ -59,31 +57,20 @@ def scenarios_page(request: HttpRequest) -> HttpResponse:
     return render(request, "scenarios/list.html", context)
 
 
-@allow_only(ADMIN)
-@require_POST
-def load_scenarios(request: HttpRequest) -> HttpResponse:
+@act_for(ADMIN, back="scenarios")
+def load_scenarios(request: HttpRequest) -> None:
     """Load one set of the catalogue, all of it or nothing, and the built-in contestants."""
-    with refusals_told(request):
-        report = load_catalogue(
-            sets=[request.POST.get("set", "")],
-            with_paraphrases="wordings" in request.POST,
-            actor=user_of(request),
-        )
-        ensure_builtin()
-        messages.success(
-            request,
-            "Scenarios: {added} added, {changed} changed, {unchanged} as they were.".format(
-                **{step.value: report.scenarios[step] for step in CatalogueStep}
-            ),
-        )
-        if report.kept:
-            names = ", ".join(report.kept)
-            messages.warning(request, f"Kept as stored, because augmentations use them: {names}.")
-    return redirect("scenarios")
+    report = load_catalogue(
+        sets=[request.POST.get("set", "")],
+        with_paraphrases="wordings" in request.POST,
+        actor=user_of(request),
+    )
+    ensure_builtin()
+    counts = ", ".join(f"{number} {step.value}" for step, number in report.scenarios.items())
+    messages.success(request, f"Scenarios: {counts}.")
 
 
-@allow_only(*STAFF)
-@require_safe
+@page_for(*STAFF)
 def scenario_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Show one scenario: before and after the reference, and every other result."""
     rows = Scenario.objects.select_related("base_scene", "paraphrase_of")
@@ -119,8 +106,7 @@ def scenario_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
 # --- Intents -----------------------------------------------------------------------------------
 
 
-@allow_only(*STAFF)
-@require_safe
+@page_for(*STAFF)
 def intent_file(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Answer with the intent as its JSON document, to be edited and sent back."""
     scenario = get_object_or_404(Scenario, code=code)
@@ -131,52 +117,37 @@ def intent_file(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     return answer
 
 
-@allow_only(*STAFF)
-@require_POST
-def set_intent(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
+@act_for(*STAFF, back="scenario")
+def set_intent(request: HttpRequest, code: uuid.UUID) -> None:
     """Accept the last reading, or take the intent of the file that came along."""
     scenario = get_object_or_404(Scenario, code=code)
-    with refusals_told(request):
-        if "accept" in request.POST:
-            accept_reading(scenario=scenario.slug, actor=user_of(request))
-        else:
-            file = request.FILES.get("file")
-            if file is None:
-                raise Conflict("Choose a JSON file.")
-            if file.size is None or file.size > LONGEST_FILE:
-                raise Conflict("The file is too long for an intent.")
-            document = read_json(file.read(), otherwise="The file is no JSON.")
-            enter_intent(scenario=scenario.slug, document=document, actor=user_of(request))
-        messages.success(request, "The intent is set. It counts from now on.")
-    return redirect("scenario", code=code)
+    if "accept" in request.POST:
+        accept_reading(scenario=scenario.slug, actor=user_of(request))
+    else:
+        file = request.FILES.get("file")
+        if file is None or not file.size or file.size > LONGEST_FILE:
+            raise Conflict("Choose a JSON file; it may be too long for an intent.")
+        document = read_json(file.read(), otherwise="The file is no JSON.")
+        enter_intent(scenario=scenario.slug, document=document, actor=user_of(request))
+    messages.success(request, "The intent is set. It counts from now on.")
 
 
-@allow_only(ADMIN)
-@require_POST
-def read_instruction(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
+@act_for(ADMIN, back="scenario")
+def read_instruction(request: HttpRequest, code: uuid.UUID) -> None:
     """Have a worker ask a model to read the instruction; what it read waits on the page."""
     scenario = get_object_or_404(Scenario, code=code)
-    known = EndpointModel.objects.select_related("endpoint")
-    try:
-        reader = known.filter(code=uuid.UUID(request.POST.get("reader", ""))).first()
-    except ValueError:
-        reader = None
+    models = EndpointModel.objects.select_related("endpoint")
+    reader = models.filter(code=read_code(request.POST.get("reader", ""))).first()
     if reader is None:
-        messages.error(request, "Choose a model.")
-        return redirect("scenario", code=code)
-    with refusals_told(request), transaction.atomic():
-        reading = plan_reading(
-            scenario=scenario.slug,
-            endpoint=reader.endpoint.label,
-            model=reader.model,
-            actor=user_of(request),
-        )
-        send_later(request, enqueue_reading, reading.pk)
-        messages.success(request, f"{reader.model} reads it now.")
-    return redirect("scenario", code=code)
+        raise Conflict("Choose a model.")
+    reading = plan_reading(
+        scenario=scenario, endpoint=reader.endpoint, model=reader.model, actor=user_of(request)
+    )
+    send_later(request, enqueue_reading, reading.pk)
+    messages.success(request, f"{reader.model} reads it now.")
 
 
-# --- Retiring, renaming, deleting --------------------------------------------------------------
+# --- Retiring and deleting ---------------------------------------------------------------------
 
 
 def _find(kind: str, code: uuid.UUID) -> Scenario | BaseScene:
@@ -185,16 +156,17 @@ def _find(kind: str, code: uuid.UUID) -> Scenario | BaseScene:
     return get_object_or_404(BaseScene.objects.defer("recording", "document"), code=code)
 
 
-@allow_only(ADMIN)
-@require_http_methods(["GET", "HEAD", "POST"])
+@form_for(ADMIN)
 def delete(request: HttpRequest, code: uuid.UUID, kind: str) -> HttpResponse:
     """Delete a scenario or scene that nothing depends on, once that is confirmed."""
     row = _find(kind, code)
     if not is_sure(request):
         facts = ("Only what no job, study or scenario needs is deleted. There is no way back.",)
-        back = reverse(kind, args=[code])
         question = Confirmation(
-            title=f"Delete “{row.slug}”?", facts=facts, button="Delete", back=back
+            title=f"Delete “{row.slug}”?",
+            facts=facts,
+            button="Delete",
+            back=reverse(kind, args=[code]),
         )
         return ask(request, question)
     with refusals_told(request):
@@ -204,21 +176,10 @@ def delete(request: HttpRequest, code: uuid.UUID, kind: str) -> HttpResponse:
     return redirect(kind, code=code)
 
 
-@allow_only(ADMIN)
-@require_POST
+@act_for(ADMIN, back="scenarios")
 def set_retired(request: HttpRequest, code: uuid.UUID, kind: str) -> HttpResponse:
     """Retire a scenario or scene, or take that back."""
-    row: Any = _find(kind, code)
     change = take_back if request.POST.get("retired") == "no" else retire
+    row: Any = _find(kind, code)
     change(row, actor=user_of(request))
     return redirect(kind, code=code)
-
-
-@allow_only(*STAFF)
-@require_POST
-def rename_scene(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
-    """Give a scene without scenarios another slug."""
-    row = get_object_or_404(BaseScene.objects.only("code", "slug"), code=code)
-    with refusals_told(request):
-        services.rename_scene(row, request.POST.get("slug", "").strip(), actor=user_of(request))
-    return redirect("scene", code=code)

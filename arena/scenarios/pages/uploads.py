@@ -7,12 +7,12 @@ from django.db.models import Count
 from django.http import HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, redirect, render
 from django.urls import reverse
-from django.views.decorators.http import require_POST, require_safe
 
 from arena.scenarios import queries
 from arena.scenarios.services import was_too_large
-from arena.site.access import STAFF, allow_only, user_of
+from arena.site.access import STAFF, act_for, page_for, user_of
 from arena.site.acts import looks_again, refusals_told, send_later
+from arena.site.forms import read_code
 from augment.errors import Conflict
 from augment.models import BaseScene, SceneUpload, UploadMoment
 from augment.services.scenarios import uploads
@@ -24,8 +24,7 @@ UPLOADS_SHOWN = 20
 PARTS = ("agents", "lanes", "connectors", "areas")
 
 
-@allow_only(*STAFF)
-@require_safe
+@page_for(*STAFF)
 def scenes_page(request: HttpRequest) -> HttpResponse:
     """List every scene, the files that were sent, and the form to send another."""
     scenes = BaseScene.objects.defer("document", "recording", "notes")
@@ -39,8 +38,7 @@ def scenes_page(request: HttpRequest) -> HttpResponse:
     return render(request, "scenes/list.html", context)
 
 
-@allow_only(*STAFF)
-@require_safe
+@page_for(*STAFF)
 def scene_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Show one scene: drawn with and without its traffic, what is in it, its scenarios."""
     row = get_object_or_404(BaseScene, code=code)
@@ -64,48 +62,37 @@ def look_at(request: HttpRequest, scene: BaseScene, view: SceneView) -> dict[str
     return {"is_drawn": drawn, "look": look}
 
 
-@allow_only(*STAFF)
-@require_POST
+@act_for(*STAFF, back="scenes")
 def send_file(request: HttpRequest) -> HttpResponse:
     """Keep a recording and leave it to a worker."""
     file = request.FILES.get("file")
-    with refusals_told(request):
-        if was_too_large(request.META):
-            raise Conflict(
-                f"The file is too large: at most {uploads.most_megabytes()} MB are taken. A zip "
-                "may be smaller."
-            )
-        if file is None:
-            raise Conflict("Choose a file.")
-        row = uploads.keep_upload(
-            name=file.name or "",
-            content=file,
-            source=request.POST.get("format", ""),
-            actor=user_of(request),
+    if file is None or was_too_large(request.META):
+        raise Conflict(
+            f"Choose a file of at most {uploads.most_megabytes()} MB; a zip may be smaller."
         )
-        send_later(request, enqueue_upload, row.pk)
-        return redirect("upload", code=row.code)
-    return redirect("scenes")
+    row = uploads.keep_upload(
+        name=file.name or "",
+        content=file,
+        source=request.POST.get("format", ""),
+        actor=user_of(request),
+    )
+    send_later(request, enqueue_upload, row.pk)
+    return redirect("upload", code=row.code)
 
 
-@allow_only(*STAFF)
-@require_safe
+@page_for(*STAFF)
 def upload_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Show what a file is, what it holds, and the moment that somebody looks at."""
     row = get_object_or_404(SceneUpload.objects.select_related("uploaded_by"), code=code)
-    moment = None
-    try:
-        asked = uuid.UUID(request.GET.get("moment", ""))
-        moment = row.moments.select_related("scene").filter(code=asked).first()
-    except ValueError:
-        pass
+    asked = read_code(request.GET.get("moment", ""))
+    moment = row.moments.select_related("scene").filter(code=asked).first()
     waits = row.state in row.UNDER_WAY or (moment is not None and moment.state in moment.UNDER_WAY)
     maps = queries.track_maps(row)
     context = {
         "upload": row,
         "maps": maps,
         "moment": moment,
-        "chosen": moment and queries.place_of(maps, item=moment.item, frame=moment.frame),
+        "chosen": moment and queries.place_of(maps, moment),
         "notes": [] if moment is None else uploads.sentences_of(moment),
         "kept": row.moments.filter(state=UploadMoment.State.KEPT).select_related("scene"),
         "look": looks_again(request, waits=waits),
@@ -113,30 +100,24 @@ def upload_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     return render(request, "scenes/upload.html", context)
 
 
-@allow_only(*STAFF)
-@require_POST
+@act_for(*STAFF, back="upload")
 def show_moment(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Have one moment drawn by a worker."""
     row = get_object_or_404(SceneUpload, code=code)
-    with refusals_told(request):
-        try:
-            track, stop = (int(request.POST.get(name, "")) for name in ("track", "stop"))
-            if min(track, stop) < 0:
-                raise LookupError
-            chosen = row.tracks[track]["stops"][stop]
-        except (ValueError, LookupError):
-            raise Conflict("This recording has no such moment.") from None
-        moment, is_new = uploads.ask_for_moment(
-            row, item=chosen["item"], frame=chosen["frame"], actor=user_of(request)
-        )
-        if is_new:
-            send_later(request, enqueue_moment, moment.pk)
-        return _moment_page(moment)
-    return redirect("upload", code=code)
+    try:
+        track, stop = (int(request.POST.get(name, "")) for name in ("track", "stop"))
+        chosen = row.tracks[track]["stops"][stop]
+    except (ValueError, LookupError):
+        raise Conflict("This recording has no such moment.") from None
+    moment, is_new = uploads.ask_for_moment(
+        row, item=chosen["item"], frame=chosen["frame"], actor=user_of(request)
+    )
+    if is_new:
+        send_later(request, enqueue_moment, moment.pk)
+    return _moment_page(moment)
 
 
-@allow_only(*STAFF)
-@require_POST
+@act_for(*STAFF, back="scenes")
 def keep_moment(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Have a moment kept as a scene."""
     moment = get_object_or_404(UploadMoment.objects.select_related("upload"), code=code)
@@ -152,22 +133,9 @@ def _moment_page(moment: UploadMoment) -> HttpResponse:
     return redirect(f"{page}?moment={moment.code}#moment")
 
 
-@allow_only(*STAFF)
-@require_POST
-def read_again(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
-    """Have a file read once more that could not be read."""
-    row = get_object_or_404(SceneUpload, code=code)
-    with refusals_told(request):
-        uploads.read_again(row)
-        send_later(request, enqueue_upload, row.pk)
-    return redirect("upload", code=code)
-
-
-@allow_only(*STAFF)
-@require_POST
-def remove(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
+@act_for(*STAFF, back="scenes")
+def remove(request: HttpRequest, code: uuid.UUID) -> None:
     """Remove the file; the scenes that were kept stay."""
     row = get_object_or_404(SceneUpload, code=code)
     uploads.remove_upload(row, actor=user_of(request))
     messages.success(request, f"“{row.name}” is removed.")
-    return redirect("scenes")

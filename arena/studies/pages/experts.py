@@ -1,53 +1,40 @@
 """Experts of a study: progress, authors, links to invite and to enrol; forgetting somebody."""
 
 import uuid
-from typing import Any
+from typing import Any, cast
 
 from django import forms
 from django.contrib import messages
 from django.contrib.auth import login
 from django.contrib.auth.decorators import login_not_required
-from django.core import signing
-from django.http import Http404, HttpRequest, HttpResponse
+from django.contrib.auth.models import User
+from django.http import Http404, HttpRequest, HttpResponse, QueryDict
 from django.shortcuts import get_object_or_404, redirect, render
 from django.urls import reverse
-from django.utils import timezone
 from django.utils.translation import gettext as _
 from django.utils.translation import gettext_lazy
 from django.views.decorators.cache import never_cache
 from django.views.decorators.http import require_http_methods, require_POST, require_safe
 
-from arena.errors import EnrolmentOver, LinkOver, NotYours
+from arena.errors import EnrolmentOver, LinkOver
 from arena.exports.cells import csv_text
-from arena.models import Authorship, EnrolledVoter, Enrolment, Invitation, Study
+from arena.models import Authorship, Enrolment, Invitation, Study
 from arena.people import links
-from arena.people.pages import find_account, with_own_language
-from arena.people.queries import by_pseudonym, invitation_by_token, may_be_let_in
-from arena.site.access import ADMIN, BACKEND, GONE, allow_only, keep_secret, user_of
+from arena.people.pages import find_account, link_page, with_own_language
+from arena.site.access import ADMIN, BACKEND, GONE, allow_only, user_of
 from arena.site.acts import Confirmation, ask, is_sure, refusals_in, refusals_told, tell_errors
-from arena.site.forms import offer
 from arena.site.listing import read_page
-from arena.studies.queries import (
-    authorships_of,
-    code_told,
-    enrolled_voters,
-    enrolment_by_token,
-    expert_lines,
-    state_of,
-)
+from arena.studies.queries import authorships_of, enrolled_voters, expert_lines, state_of
 from arena.studies.services.taking_part import (
     LONGEST_CONSENT,
     LONGEST_ID,
-    drop_silent,
     enrol,
     forget_identity,
     set_enrolment,
 )
+from augment.models import Contestant
 
 SESSION_S = 30 * 24 * 3600
-LINK_COOKIE, VOTER_COOKIE, ENROLMENT_COOKIE = "arena_link", "arena_voter", "arena_enrolment"
-RETURN_S = 365 * 24 * 3600
-"""How long a browser knows who enrolled in it; its session ends before."""
 
 PAGE = 100
 ID_PARAMETERS = ("id", "worker", "workerId", "PROLIFIC_PID")
@@ -66,20 +53,15 @@ CONSENT = (
 class AuthorForm(forms.Form):
     """Which expert of the study made which of its contestants."""
 
-    expert = forms.ChoiceField(error_messages={"required": "Choose an expert."})
-    contestant = forms.ChoiceField(error_messages={"required": "Choose a contestant."})
+    expert = forms.ModelChoiceField(User.objects, to_field_name="username", empty_label="Choose …")
+    contestant = forms.ModelChoiceField(
+        Contestant.objects, to_field_name="slug", empty_label="Choose …"
+    )
 
-    def __init__(self, data: dict[str, Any] | None = None, *, study: Study) -> None:
+    def __init__(self, data: QueryDict | None = None, *, study: Study) -> None:
         super().__init__(data)
-        experts = by_pseudonym(study.experts.select_related("person"))
-        self.accounts = {str(user.person.code): user for user in experts}
-        named = [
-            (code, f"{user.person.pseudonym} ({user.get_username()})")
-            for code, user in self.accounts.items()
-        ]
-        made = study.contestants.order_by("name", "slug").values_list("slug", "name")
-        for name, offered in (("expert", named), ("contestant", [*made])):
-            offer(self, name, [("", "Choose …"), *offered])
+        for name, rows in (("expert", study.experts), ("contestant", study.contestants)):
+            cast("forms.ModelChoiceField[Any]", self.fields[name]).queryset = rows.all()
             self.fields[name].widget.attrs["class"] = "input"
 
 
@@ -125,7 +107,7 @@ class NewcomerForm(forms.Form):
 def experts_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Every expert of a study: progress, pace, quota, last seen, link, and who is an author."""
     study = get_object_or_404(Study, code=code)
-    lines = expert_lines(study, timezone.now())
+    lines = expert_lines(study)
     context = {
         "study": study,
         "lines": lines,
@@ -144,16 +126,14 @@ def mark(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     form = AuthorForm(request.POST, study=study)
     if not form.is_valid():
         tell_errors(request, form)
-        return redirect("experts", code=code)
-    expert, contestant = form.cleaned_data["expert"], form.cleaned_data["contestant"]
-    with refusals_told(request):
-        row = links.mark_author(
-            study=study,
-            expert=form.accounts[expert],
-            contestant=contestant,
-            actor=user_of(request),
+    else:
+        expert, contestant = form.cleaned_data["expert"], form.cleaned_data["contestant"]
+        links.mark_author(
+            study=study, expert=expert, contestant=contestant.slug, actor=user_of(request)
         )
-        messages.success(request, f"{_named(row)} is marked as author of {row.contestant.name}.")
+        messages.success(
+            request, f"{expert.person.pseudonym} is marked as author of {contestant.name}."
+        )
     return redirect("experts", code=code)
 
 
@@ -163,14 +143,15 @@ def take_back(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Remove one mark of authorship; it stays in the log."""
     rows = Authorship.objects.select_related("study", "expert__person", "contestant")
     row = get_object_or_404(rows, code=code)
-    links.take_back_author(authorship=row, actor=user_of(request))
-    done = f"{_named(row)} is not marked as author of {row.contestant.name} any more."
-    messages.success(request, done)
+    links.mark_author(
+        study=row.study,
+        expert=row.expert,
+        contestant=row.contestant.slug,
+        is_author=False,
+        actor=user_of(request),
+    )
+    messages.success(request, "The mark was taken back.")
     return redirect("experts", code=row.study.code)
-
-
-def _named(row: Authorship | Invitation) -> str:
-    return row.expert.person.pseudonym
 
 
 @allow_only(ADMIN)
@@ -207,19 +188,20 @@ def forget_person(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
 def invite_experts(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Make links, for one expert or for all without one, and show them this once."""
     study = get_object_or_404(Study, code=code)
-    lines = expert_lines(study, timezone.now())
     wanted = request.POST.get("expert")
-    if wanted:
-        chosen = [line for line in lines if str(line.tally.expert.person.code) == wanted]
-    else:
-        chosen = [line for line in lines if line.may_be_invited and not line.has_live_link]
+    chosen = [
+        line.tally.expert
+        for line in expert_lines(study)
+        if str(line.tally.expert.person.code) == wanted
+        or (not wanted and line.may_be_invited and not line.has_live_link)
+    ]
     if not chosen:
         messages.info(request, "Nobody was left to invite; no link was made.")
         return redirect("experts", code=study.code)
     made = []
     with refusals_told(request):
-        for line in chosen:
-            fresh = links.invite(study=study, expert=line.tally.expert, actor=user_of(request))
+        for expert in chosen:
+            fresh = links.invite(study=study, expert=expert, actor=user_of(request))
             address = request.build_absolute_uri(reverse("invitation", args=[fresh.token]))
             made.append({"invitation": fresh.invitation, "address": address})
         return render(request, "studies/links.html", {"study": study, "links": made})
@@ -232,64 +214,31 @@ def revoke_invitation(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Revoke one link; whoever came in by it is signed out."""
     invitation = get_object_or_404(Invitation.objects.select_related("study"), code=code)
     links.revoke(invitation=invitation, actor=user_of(request))
-    messages.success(request, f"The link of {_named(invitation)} was taken back.")
+    messages.success(request, "The link was taken back.")
     return redirect("experts", code=invitation.study.code)
 
 
-@login_not_required
-@never_cache
-@require_http_methods(["GET", "HEAD", "POST"])
+@link_page
 def invitation_page(request: HttpRequest, token: str) -> HttpResponse:
     """Who invited whom to what. Only the button signs in: mail scanners open links, too."""
-    try:
-        invitation = invitation_by_token(token)
-    except NotYours as error:
-        raise Http404 from error
-    context: dict[str, Any] = {"invitation": invitation, "host": _host(invitation)}
-    state = invitation.state(timezone.now())
-    if state in Invitation.ALIVE and may_be_let_in(invitation.expert):
-        if request.method != "POST":
-            return keep_secret(render(request, "invitation.html", context))
-        try:
-            return keep_secret(_let_in(request, token))
-        except LinkOver:  # it ended just now
-            state = invitation_by_token(token).state(timezone.now())
-    context["is_expired"] = state == Invitation.State.EXPIRED
-    return keep_secret(render(request, "invitation_over.html", context, status=GONE))
+    invitation = links.find_invitation(token)
+    if invitation is None:
+        raise Http404
+    if request.method == "POST":
+        invitation = links.accept(token=token)
+        is_open = invitation.study.state == Study.State.OPEN
+        answer = redirect("vote", code=invitation.study.code) if is_open else redirect("home")
+        _sign_in(request, invitation.expert)
+        request.session[links.SESSION_KEY] = str(invitation.code)
+        return with_own_language(answer, invitation.expert)
+    if not links.lets_in(invitation):
+        raise LinkOver
+    return render(request, "invitation.html", {"invitation": invitation})
 
 
-def _let_in(request: HttpRequest, token: str) -> HttpResponse:
-    invitation = links.accept(token=token)
-    login(request, invitation.expert, backend=BACKEND)
-    request.session[links.SESSION_KEY] = str(invitation.code)
+def _sign_in(request: HttpRequest, expert: User) -> None:
+    login(request, expert, backend=BACKEND)
     request.session.set_expiry(SESSION_S)
-    is_open = invitation.study.state == Study.State.OPEN
-    answer = redirect("vote", code=invitation.study.code) if is_open else redirect("home")
-    # Shown on the sign-in page alone, when this session is over.
-    _set_cookie(request, answer, LINK_COOKIE, token, lives_s=SESSION_S)
-    return with_own_language(answer, invitation.expert)
-
-
-def _set_cookie(
-    request: HttpRequest, answer: HttpResponse, name: str, value: str, *, lives_s: int, **at: str
-) -> None:
-    answer.set_cookie(
-        name,
-        value,
-        max_age=lives_s,
-        httponly=True,
-        secure=request.is_secure(),
-        samesite="Lax",
-        **at,
-    )
-
-
-def _host(invitation: Invitation) -> str | None:
-    """Return the name of who invited, None where the command did."""
-    by = invitation.invited_by
-    if by is None:
-        return None
-    return by.get_full_name() or (by.person.pseudonym if hasattr(by, "person") else by.username)
 
 
 # --- Enrolment ---------------------------------------------------------------------------------
@@ -300,64 +249,30 @@ def _host(invitation: Invitation) -> str | None:
 @require_http_methods(["GET", "HEAD", "POST"])
 def enrol_page(request: HttpRequest, token: str) -> HttpResponse:
     """What the study is, what one agrees to, and a form for the id; then the first pair."""
-    try:
-        enrolment = enrolment_by_token(token)
-    except NotYours as error:
-        raise Http404 from error
-    user = request.user
+    enrolment = get_object_or_404(Enrolment.objects.select_related("study"), token=token)
+    user, study = request.user, enrolment.study
     if user.is_authenticated and enrolment.voters.filter(expert=user).exists():
-        return redirect("vote", code=enrolment.study.code)
-    if (returning := _returning(request, enrolment)) is not None:
-        if "again" in request.POST:
-            return _sign_in(request, returning)
-        return render(request, "enrol_again.html", {"study": enrolment.study})
+        return redirect("vote", code=study.code)
     given = next((request.GET[name] for name in ID_PARAMETERS if name in request.GET), "")
     form = NewcomerForm(request.POST or None, initial={"external_id": given[:LONGEST_ID]})
-    is_over = not enrolment.is_open or enrolment.study.state != Study.State.OPEN
+    is_over = not enrolment.is_open or study.state != Study.State.OPEN
     if form.is_valid():
-        entered = form.cleaned_data
         with refusals_in(form, "external_id"):
             try:
                 voter = enrol(
                     token=token,
-                    external_id=entered["external_id"],
-                    agreed_sha256=entered["agreed_sha256"],
+                    external_id=form.cleaned_data["external_id"],
+                    agreed_sha256=form.cleaned_data["agreed_sha256"],
                 )
-                return _sign_in(request, voter)
+                _sign_in(request, voter.expert)
+                return redirect("vote", code=study.code)
             except EnrolmentOver:
                 is_over = True
         enrolment.refresh_from_db()
     if is_over:
-        return render(request, "enrol_over.html", {"study": enrolment.study}, status=GONE)
+        return render(request, "enrol_over.html", {"study": study}, status=GONE)
     context = {"enrolment": enrolment, "form": form}
     return render(request, "enrol.html", context, status=422 if form.errors else 200)
-
-
-def _sign_in(request: HttpRequest, voter: EnrolledVoter) -> HttpResponse:
-    """Show the first pair, and let this browser come back when its session is over."""
-    enrolment = voter.enrolment
-    login(request, voter.expert, backend=BACKEND)
-    request.session.set_expiry(SESSION_S)
-    answer = redirect("vote", code=enrolment.study.code)
-    proof = signing.dumps(str(voter.code), salt=VOTER_COOKIE)
-    page = reverse("enrol", args=[enrolment.token])
-    _set_cookie(request, answer, VOTER_COOKIE, proof, lives_s=RETURN_S, path=page)
-    _set_cookie(
-        request, answer, ENROLMENT_COOKIE, enrolment.token, lives_s=RETURN_S, path=reverse("login")
-    )
-    return answer
-
-
-def _returning(request: HttpRequest, enrolment: Enrolment) -> EnrolledVoter | None:
-    """Return who enrolled in this browser, None where the study takes no votes."""
-    try:
-        proof = request.COOKIES.get(VOTER_COOKIE, "")
-        code = signing.loads(proof, salt=VOTER_COOKIE, max_age=RETURN_S)
-    except signing.BadSignature:
-        return None
-    if enrolment.study.state != Study.State.OPEN:
-        return None
-    return enrolment.voters.filter(code=code, expert__is_active=True).first()
 
 
 @allow_only(ADMIN)
@@ -379,21 +294,10 @@ def enrolment_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         context |= {
             "address": request.build_absolute_uri(reverse("enrol", args=[enrolment.token])),
             "state": state_of(enrolment),
-            "page": read_page(request, enrolled_voters(enrolment), size=PAGE),
+            "page": read_page(request, enrolled_voters(study), size=PAGE),
         }
     status = 422 if form.errors else 200
     return render(request, "studies/enrolment.html", context, status=status)
-
-
-@allow_only(ADMIN)
-@require_POST
-def drop_out(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
-    """Free the places of all who were silent for too long, now."""
-    enrolment = get_object_or_404(Enrolment, study__code=code)
-    freed = drop_silent(enrolment=enrolment, actor=user_of(request))
-    text = "1 place is free again." if freed == 1 else f"{freed} places are free again."
-    messages.info(request, text)
-    return redirect("enrolment", code=code)
 
 
 @allow_only(ADMIN)
@@ -401,9 +305,9 @@ def drop_out(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
 @require_safe
 def voters_file(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Who is to be thanked or paid: ids, progress and completion codes, as CSV."""
-    enrolment = get_object_or_404(Enrolment, study__code=code)
+    study = get_object_or_404(Study, code=code, enrolment__isnull=False)
     return HttpResponse(
-        csv_text(COLUMNS, map(_line_of, enrolled_voters(enrolment))),
+        csv_text(COLUMNS, map(_line_of, enrolled_voters(study))),
         content_type="text/csv; charset=utf-8",
         headers={"Content-Disposition": 'attachment; filename="voters.csv"'},
     )
@@ -411,12 +315,11 @@ def voters_file(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
 
 def _line_of(voter: Any) -> tuple[object, ...]:
     times = (voter.enrolled_at, voter.last_vote_at, voter.dropped_at)
-    code = code_told(voter)
     return (
         voter.expert.person.pseudonym,
         voter.external_id,
         *(voter.planned, voter.answered, voter.skipped),
         *(None if at is None else at.isoformat() for at in times),
-        int(bool(code)),
-        code,
+        int(voter.is_done),
+        voter.completion_code if voter.is_done else "",
     )

@@ -1,7 +1,5 @@
 """Setting a study up by one form, over several sittings as a draft; or by a file of votes."""
 
-from __future__ import annotations
-
 import re
 import uuid
 from pathlib import Path
@@ -12,7 +10,7 @@ from django import forms
 from django.contrib import messages
 from django.contrib.auth.models import User
 from django.core.files.uploadedfile import UploadedFile
-from django.http import Http404, HttpRequest, HttpResponse, QueryDict
+from django.http import HttpRequest, HttpResponse, QueryDict
 from django.shortcuts import get_object_or_404, redirect, render
 from django.urls import reverse
 from django.views.decorators.http import require_http_methods, require_POST
@@ -32,7 +30,6 @@ from arena.studies.services import drafts
 from arena.studies.services.experts import has_practice
 from arena.studies.services.opening import open_study
 from arena.studies.services.plan import StudyPlan
-from augment.errors import AugmentError
 from augment.models import Contestant, GenerationJob
 
 KEEP = "keep"
@@ -40,9 +37,6 @@ KEEP = "keep"
 
 SUGGESTED = {"votes_per_expert": 40, "overlap": 10}
 """What a new form holds beside the defaults of a plan."""
-
-PLANNED = ("votes_per_expert", "repeats", "checks", "overlap")
-"""What the planning page hands on to a new study."""
 
 MOST_MB = 20
 """Some 200,000 votes, read while the page waits; more goes by `manage.py import_votes`."""
@@ -117,7 +111,7 @@ def draw_checks(request: HttpRequest) -> HttpResponse:
 def _set_up(request: HttpRequest, draft: StudyDraft | None) -> HttpResponse:
     if KEEP in request.POST:
         return _keep(request, draft)
-    form = _form(data=request.POST or None, initial=_initial(request, draft))
+    form = _form(data=request.POST or None, initial=_initial(draft))
     if form.is_valid() and not wants_to_change(request):
         with refusals_in(form):
             study_plan = form.study_plan()
@@ -139,24 +133,16 @@ def _open(request: HttpRequest, draft: StudyDraft | None, study_plan: StudyPlan)
 
 def _keep(request: HttpRequest, draft: StudyDraft | None) -> HttpResponse:
     """Save what stands in the form, whether it makes a study or not."""
-    actor, entered = user_of(request), _entered(request.POST)
-    try:
-        if draft is None:
-            kept = drafts.keep_draft(entered=entered, actor=actor)
-        else:
-            kept = drafts.change_draft(
-                draft=draft, entered=entered, revision=_revision(request), actor=actor
-            )
-    except AugmentError as error:
-        messages.error(request, str(error))
-        draft = draft and StudyDraft.objects.filter(pk=draft.pk).first()
-        form = _form(initial=entered)
-        if draft is None:
-            return _show(request, None, form, "", 422)
-        messages.info(request, "What you entered stands below; saving it again replaces theirs.")
-        return _show(request, draft, form, draft.revision, 409)
-    messages.success(request, "Saved as a draft: no expert sees it, and nothing is planned yet.")
-    return redirect("study-draft", code=kept.code)
+    entered = _entered(request.POST)
+    with refusals_told(request):
+        kept = drafts.keep_draft(
+            entered=entered, draft=draft, revision=_revision(request), actor=user_of(request)
+        )
+        messages.success(request, "Saved as a draft: no expert sees it, nothing is planned yet.")
+        return redirect("study-draft", code=kept.code)
+    # Shown with the revision of whoever was faster, so that saving again replaces theirs.
+    draft = draft and StudyDraft.objects.filter(pk=draft.pk).first()
+    return _show(request, draft, _form(initial=entered), draft.revision if draft else "", 409)
 
 
 def _show(
@@ -180,9 +166,9 @@ def _form(**given: Any) -> StudyForm:
 
 def _entered(posted: QueryDict) -> dict[str, object]:
     """Return the form as it came in; whole types are the scenarios that they have now."""
-    entered: dict[str, object] = {name: posted.get(name, "") for name in drafts.TEXTS}
-    entered |= {name: name in posted for name in drafts.SWITCHES}
-    entered |= {name: posted.getlist(name) for name in drafts.NAMES}
+    entered: dict[str, object] = posted.dict() | {
+        name: posted.getlist(name) for name in drafts.NAMES
+    }
     groups = [group for group in queries.by_type() if group.type in posted.getlist("types")]
     whole = [row.slug for group in groups for row in group.scenarios]
     return entered | {"scenarios": [*posted.getlist("scenarios"), *whole]}
@@ -193,62 +179,34 @@ def _revision(request: HttpRequest) -> int:
     return int(given) if given.isascii() and given.isdigit() and len(given) < 9 else 0
 
 
-def _initial(request: HttpRequest, draft: StudyDraft | None) -> dict[str, Any]:
-    """Return what the draft has, or what the address says of a study that somebody planned."""
+def _initial(draft: StudyDraft | None) -> dict[str, Any]:
+    """Return what the draft has, or what suits most studies."""
     if draft is not None:
-        return dict(drafts.entered_of(draft))
-    initial: dict[str, Any] = SUGGESTED | {"checks": usual_checks(), "practice": has_practice()}
-    initial |= {name: request.GET[name] for name in PLANNED if request.GET.get(name)}
-    if study := study_asked(request):
-        initial["contestants"] = list(study.contestants.values_list("slug", flat=True))
-        initial["scenarios"] = list(study.scenarios.values_list("slug", flat=True))
-        initial["experts"] = list(study.experts.values_list("username", flat=True))
-    return initial
-
-
-def study_asked(request: HttpRequest) -> Study | None:
-    """Return the study whose code the address names, if it names one; or answer 404."""
-    code = request.GET.get("study")
-    if not code:
-        return None
-    try:
-        wanted = uuid.UUID(code)
-    except ValueError:
-        raise Http404 from None
-    return get_object_or_404(Study.objects.select_related("vote_file"), code=wanted)
+        return dict(draft.entered)
+    return SUGGESTED | {"checks": usual_checks(), "practice": has_practice()}
 
 
 def _opening(study_plan: StudyPlan, draft: StudyDraft | None) -> Confirmation:
     """Ask whether to open the study, with what it would be in numbers.
 
     Raises:
-        ArenaError, AugmentError: It can't be opened.
+        AugmentError: It can't be opened.
     """
-    preview = drafts.preview_study(study_plan)
-    numbers: dict[str, object] = {**preview, "seconds": f"{preview['seconds']:g}"}
     facts = [
         "Experts: {experts}. Votes: {votes}. Contestants: {contestants}. Scenarios: {scenarios}.",
         "On top of the votes: hidden repeats {repeats}, attention checks {checks}.",
-        "Pairs of a scenario that are judged: {judged}; by two experts or more: {shared}.",
-        "Minutes for each expert: about {minutes}, at {seconds} s a pair.",
+        "Pairs that nobody can tell apart, settled as ties: {settled}.",
+        "Votes that are planned later, by those before: {later}.",
+        "Minutes for each expert: about {minutes}, at {seconds:g} s a pair.",
+        "Experts can vote at once. The rules can’t be changed afterwards.",
     ]
-    if preview["settled"]:
-        facts.append(
-            "Pairs that are settled as ties and shown to nobody: {settled}; within 0.15 m and 2° "
-            "in every object: {alike}, identical pictures among them. A tenth of those that are "
-            "alike and not identical is shown all the same."
-        )
-    if preview["later"]:
-        facts.append("Votes that are planned later, by those before: {later}.")
-    if study_plan.allow_simulated:
-        facts.append("What is simulated may take part; every page and file then says so.")
-    facts.append("Experts can vote at once. The rules can’t be changed afterwards.")
+    preview = drafts.preview_study(study_plan)
     page = ("New study", reverse("study-new"))
     if draft is not None:
         page = ("Draft", reverse("study-draft", args=[draft.code]))
     return Confirmation(
         title=f"Open the study “{study_plan.name}”?",
-        facts=tuple(fact.format(**numbers) for fact in facts),
+        facts=tuple(fact.format(**preview) for fact in facts),
         button="Open the study",
         back=page[1],
         is_final=False,
@@ -268,7 +226,7 @@ class VoteFileForm(forms.Form):
     )
     is_simulated = forms.BooleanField(required=False)
 
-    def clean_file(self) -> UploadedFile[bytes]:
+    def clean_file(self) -> "UploadedFile[bytes]":
         """Refuse a file that is too large for a page to wait for."""
         file: UploadedFile[bytes] = self.cleaned_data["file"]
         if (file.size or 0) > MOST_MB * 1_000_000:

@@ -15,10 +15,10 @@ from django.utils.text import slugify
 from django.views.decorators.http import require_http_methods, require_POST, require_safe
 
 from arena import tasks
-from arena.models import Report, Study, StudyFile
+from arena.models import Study, StudyFile
 from arena.people.queries import by_pseudonym, experts
 from arena.results.pages.rating_form import rate_or_send
-from arena.results.queries.access import ResultsAccess, latest_snapshot, results_access
+from arena.results.queries.access import ResultsAccess, results_access
 from arena.results.queries.votes import is_imported
 from arena.results.services.written_files import (
     SHOWS_RESULTS,
@@ -41,16 +41,10 @@ from arena.site.acts import (
 from arena.site.listing import read_listing, read_page
 from arena.studies import queries
 from arena.studies.forms import HandOverForm
-from arena.studies.services.opening import (
-    cancel_study,
-    close_study,
-    preregistration_bytes,
-    preregistration_sha256,
-)
-from arena.studies.services.plan import PLAN_INPUTS, hypotheses_of, plan_of
+from arena.studies.services.opening import cancel_study, close_study, preregistration_sha256
+from arena.studies.services.plan import PLAN_INPUTS, plan_of
 from arena.studies.services.taking_part import hand_over
 from arena.voting.queries.ballots import tallies
-from arena.voting.queries.showings import view_shown
 from augment.services.inputs import InputKind
 
 STUDIES_AT_ONCE = 25
@@ -65,11 +59,11 @@ def studies_page(request: HttpRequest) -> HttpResponse:
     """Studies with their bars, page by page; before the first ones the drafts."""
     states = [(DRAFT, "Draft"), *Study.State.choices]
     listing = read_listing(request, {"state": ("State", states)})
-    rows = listing.narrow(Study.objects.all(), "name", by=["state"])
+    rows = listing.narrow(queries.listed_studies(), "name", by=["state"])
     page = read_page(request, rows, size=STUDIES_AT_ONCE)
     shows_drafts = page.number == 1 and listing.chosen("state") in ("", DRAFT)
     context = {
-        "studies": queries.of_studies(list(page.object_list)),
+        "studies": queries.progress_of(page.object_list),
         "drafts": list(queries.find_drafts(listing.search)) if shows_drafts else [],
         "page": page,
         "listing": listing,
@@ -84,23 +78,21 @@ def study_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     study = _find_study(code)
     if is_imported(study):
         return redirect("results", code=code)
-    study_plan = plan_of(study)
+    study_plan, (line,) = plan_of(study), queries.progress_of([study])
+    long = (InputKind.TEXT, InputKind.NAMES, InputKind.LINES)
     context = {
-        "line": queries.of_study(study),
+        "line": line,
         "export": export_place(study, user_of(request)),
         "tallies": tallies(study),
-        "contestants": list(study.contestants.all()),
-        "scenario_count": study.scenarios.count(),
+        "contestants": study.contestants.all(),
         "rules": [
-            (one.label, one.shown(getattr(study_plan, one.name)))
-            for one in PLAN_INPUTS
-            if one.kind not in (InputKind.TEXT, InputKind.NAMES, InputKind.LINES)
+            (field.label, field.shown(getattr(study_plan, field.name)))
+            for field in PLAN_INPUTS
+            if field.kind not in long
         ],
-        "targets": study_plan.targets,
-        "coverage": queries.coverage(study),
-        "reports": list(queries.reports_of(study)),
+        "plan": study_plan,
+        "reports": queries.reports_of(study),
         "accounts": by_pseudonym(experts()),
-        "hypotheses": hypotheses_of(study),
         "frozen": preregistration_sha256(study),
     }
     return render(request, "studies/study.html", context)
@@ -115,12 +107,11 @@ def _find_study(code: uuid.UUID) -> Study:
 def preregistration_file(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """What was frozen at the opening, byte for byte."""
     study = get_object_or_404(Study, code=code)
-    content = preregistration_bytes(study)
-    if not content:
+    if not study.preregistration:
         raise Http404
     name = f"{slugify(study.name) or 'study'}-preregistration.json"
     return HttpResponse(
-        content,
+        study.preregistration.encode(),
         content_type="application/json",
         headers={"Content-Disposition": f'attachment; filename="{name}"'},
     )
@@ -193,21 +184,17 @@ def _handing_over(study: Study, giver: str, taken: dict[str, int]) -> Confirmati
         study,
         f"Hand over what {giver} has not judged?",
         *(f"Pairs that {name} takes: {number}." for name, number in taken.items()),
-        f"{giver} no longer sees them; votes that were given stay.",
-        "The pairs are planned anew for who takes them. This can’t be taken back.",
+        f"{giver} no longer sees them; votes that were given stay. This can’t be taken back.",
         button="Hand over",
     )
 
 
 def _closing(study: Study) -> Confirmation:
-    lines = tallies(study)
+    (line,) = queries.progress_of([study])
     return _question(
         study,
         f"Close the study “{study.name}”?",
-        f"Votes given: {sum(line.voted for line in lines)}. "
-        f"Pairs skipped: {sum(line.skips for line in lines)}.",
-        f"Planned votes that will be missing: {sum(line.left for line in lines)}. "
-        f"Experts who are not done: {sum(line.left > 0 for line in lines)}.",
+        f"Votes given: {line.voted}. Pairs skipped: {line.skipped}. Still planned: {line.left}.",
         "No more votes are taken. This can’t be taken back.",
         "Its results can be read then, also by its experts. To end it without any, cancel it.",
         button="Close the study",
@@ -215,16 +202,12 @@ def _closing(study: Study) -> Confirmation:
 
 
 def _cancelling(study: Study) -> Confirmation:
-    early = "Ratings that were made early are shown to nobody any more."
+    (line,) = queries.progress_of([study])
     return _question(
         study,
         f"Cancel the study “{study.name}”?",
-        "No more votes are taken, and the study is never rated: it has no results. "
-        "This can’t be taken back.",
-        *([early] if study.snapshots.exists() else []),
-        "Votes that stay and can be exported as votes: "
-        f"{sum(line.voted for line in tallies(study))}.",
-        "Experts read that it was cancelled and that nothing is left to do.",
+        "No more votes are taken, and nobody ever sees results. This can’t be taken back.",
+        f"Votes that stay and can be exported as votes: {line.voted}.",
         "To end it with results, close it instead. Its settings can be used again for another.",
         button="Cancel the study",
         phrase=study.name,
@@ -234,14 +217,8 @@ def _cancelling(study: Study) -> Confirmation:
 
 def _question(study: Study, title: str, *facts: str, button: str, **more: Any) -> Confirmation:
     back = reverse("study", args=[study.code])
-    return Confirmation(
-        title=title,
-        facts=facts,
-        button=button,
-        back=back,
-        crumbs=(("Studies", reverse("studies")), (study.name, back)),
-        **more,
-    )
+    crumbs = (("Studies", reverse("studies")), (study.name, back))
+    return Confirmation(title=title, facts=facts, button=button, back=back, crumbs=crumbs, **more)
 
 
 # --- Files -------------------------------------------------------------------------------------
@@ -249,32 +226,19 @@ def _question(study: Study, title: str, *facts: str, button: str, **more: Any) -
 
 def export_place(study: Study, user: User) -> dict[str, Any]:
     """Return what there is to take away: whether results may be read, and files with obstacles."""
-    access = results_access(user=user, study=study)
-    rows = study_files_of(study)
-    kinds = [StudyFile.Kind.STUDY] if is_imported(study) else list(StudyFile.Kind)
-    files = [
-        {
-            "kind": kind.value,
-            "label": str(kind.label),
-            "row": rows.get(kind.value),
-            "obstacle": _obstacle(study, kind, access),
-        }
-        for kind in kinds
-    ]
+    may_read = results_access(user=user, study=study) is ResultsAccess.FULL
+    rows, files = study_files_of(study), []
+    for kind in [StudyFile.Kind.STUDY] if is_imported(study) else StudyFile.Kind:
+        obstacle = why_not(study, kind)
+        if kind in SHOWS_RESULTS and not may_read:
+            obstacle = obstacle or "It shows results, which you have not opened."
+        files.append({"kind": kind, "row": rows.get(kind.value), "obstacle": obstacle})
     return {
-        "may_read": access is ResultsAccess.FULL,
-        "is_early": access is ResultsAccess.EARLY,
-        "is_rated": latest_snapshot(study) is not None,
+        "may_read": may_read,
         "is_imported": is_imported(study),
         "files": files,
         "is_waiting": any(row.is_waiting for row in rows.values()),
     }
-
-
-def _obstacle(study: Study, kind: StudyFile.Kind, access: ResultsAccess) -> str:
-    if kind in SHOWS_RESULTS and access is not ResultsAccess.FULL:
-        return why_not(study, kind) or "It shows results, which you have not opened."
-    return why_not(study, kind)
 
 
 @allow_only(*STAFF)
@@ -296,13 +260,10 @@ def ask_for_file(request: HttpRequest, code: uuid.UUID, kind: str) -> HttpRespon
 def download(request: HttpRequest, code: uuid.UUID, kind: str) -> FileResponse:
     """The newest one, once it is ready."""
     row = study_files_of(_study_for(request, code, kind)).get(kind)
-    if row is None or row.state != StudyFile.State.READY:
+    is_ready = row is not None and row.state == StudyFile.State.READY
+    if row is None or not is_ready or not default_storage.exists(row.stored):
         raise Http404
-    try:
-        content = default_storage.open(row.stored)
-    except FileNotFoundError:
-        raise Http404 from None
-    return FileResponse(content, as_attachment=True, filename=row.name)
+    return FileResponse(default_storage.open(row.stored), as_attachment=True, filename=row.name)
 
 
 def _study_for(request: HttpRequest, code: uuid.UUID, kind: str) -> Study:
@@ -314,43 +275,3 @@ def _study_for(request: HttpRequest, code: uuid.UUID, kind: str) -> Study:
     if kind in SHOWS_RESULTS and access is not ResultsAccess.FULL:
         raise PermissionDenied
     return study
-
-
-# --- Reports -----------------------------------------------------------------------------------
-
-
-@allow_only(ADMIN)
-@require_safe
-def report_page(request: HttpRequest, code: uuid.UUID, key: uuid.UUID) -> HttpResponse:
-    """One report, with both pictures as the expert saw them and the mark in them."""
-    study = get_object_or_404(Study, code=code)
-    report = get_object_or_404(queries.reports_of(study), key=key)
-    matchup, view = report.matchup, view_shown(report.matchup)
-    votes_here = study.experts.filter(pk=user_of(request).pk).exists()
-    is_blind = study.state == Study.State.OPEN and votes_here
-    mark = None
-    if report.mark_x is not None and report.mark_y is not None:
-        mark = (report.mark_x * view["width"], report.mark_y * view["height"])
-    sides = (
-        (Report.Side.LEFT, "A", matchup.left_token, matchup.left),
-        (Report.Side.RIGHT, "B", matchup.right_token, matchup.right),
-    )
-    pictures = [
-        {
-            "letter": letter,
-            "token": token,
-            "made": None if is_blind else made,
-            "is_named": report.side in (side, Report.Side.BOTH),
-            "mark": mark if report.side in (side, Report.Side.BOTH) else None,
-        }
-        for side, letter, token, made in sides
-    ]
-    context = {
-        "study": study,
-        "report": report,
-        "view": view,
-        "radius": view["width"] / 40,
-        "pictures": pictures,
-        "before": matchup.original_token if matchup.original_image else "",
-    }
-    return render(request, "studies/report.html", context)

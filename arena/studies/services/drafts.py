@@ -10,22 +10,19 @@ from django.contrib.auth.models import User
 from django.db import transaction
 
 from arena.models import Matchup, Study, StudyDraft
-from arena.studies.queries import shared_units
 from arena.studies.services.opening import open_study
-from arena.studies.services.outlook import StudyEstimate, usual_seconds
+from arena.studies.services.outlook import StudyEstimate
 from arena.studies.services.plan import LONGEST_NAME, PLAN_INPUTS, StudyPlan, plan_of
 from augment.errors import Conflict
-from augment.services.events import log_event
+from augment.services.events import log_change
 from augment.services.inputs import InputKind
 from augment.services.texts import make_storable
 
 Entered = dict[str, str | bool | list[str]]
 """Every field of the form: a text as it was typed, a switch, or names."""
 
-SWITCHES = tuple(one.name for one in PLAN_INPUTS if one.kind is InputKind.SWITCH)
-NAMES = tuple(one.name for one in PLAN_INPUTS if one.kind is InputKind.NAMES)
-FIELDS = tuple(one.name for one in PLAN_INPUTS)
-TEXTS = tuple(name for name in FIELDS if name not in (*SWITCHES, *NAMES))
+SWITCHES = tuple(field.name for field in PLAN_INPUTS if field.kind is InputKind.SWITCH)
+NAMES = tuple(field.name for field in PLAN_INPUTS if field.kind is InputKind.NAMES)
 
 
 def read_entered(given: Mapping[str, Any]) -> Entered:
@@ -33,70 +30,59 @@ def read_entered(given: Mapping[str, Any]) -> Entered:
 
     A number may be no number yet.
     """
-    entered: Entered = {name: make_storable(str(given.get(name, ""))) for name in TEXTS}
-    entered |= {name: bool(given.get(name, False)) for name in SWITCHES}
-    chosen = {name: dict.fromkeys(given.get(name, ())) for name in NAMES}
-    return entered | {name: [*map(make_storable, chosen[name])] for name in NAMES}
-
-
-def entered_of(draft: StudyDraft) -> Entered:
-    """Return what a draft holds, by the fields as they are named today."""
-    kept = dict(draft.entered)
-    if "no_measures" in kept:  # what `allow_measures` was called, the other way round
-        kept["allow_measures"] = not kept.pop("no_measures")
-    return kept
+    entered: Entered = {}
+    for name in (field.name for field in PLAN_INPUTS):
+        if name in SWITCHES:
+            entered[name] = bool(given.get(name, False))
+        elif name in NAMES:
+            entered[name] = [make_storable(one) for one in dict.fromkeys(given.get(name, ()))]
+        else:
+            entered[name] = make_storable(str(given.get(name, "")))
+    return entered
 
 
 @transaction.atomic
-def keep_draft(*, entered: Mapping[str, Any], actor: User | None = None) -> StudyDraft:
-    """Create a draft."""
-    draft = StudyDraft.objects.create(entered=read_entered(entered), changed_by=actor)
-    _log(draft, "draft", actor, after={"name": draft.name})
-    return draft
-
-
-@transaction.atomic
-def change_draft(
-    *, draft: StudyDraft, entered: Mapping[str, Any], revision: int, actor: User | None = None
+def keep_draft(
+    *,
+    entered: Mapping[str, Any],
+    draft: StudyDraft | None = None,
+    revision: int = 0,
+    actor: User | None = None,
 ) -> StudyDraft:
-    """Save a draft anew; what is as it was, is not written.
+    """Create a draft or save one anew.
 
     Args:
-        draft: Which.
         entered: All of it: a field that is not given is empty afterwards.
+        draft: Which; None makes a new one.
         revision: Of the draft that the changes were made to.
         actor: Who, for the log.
 
     Raises:
         Conflict: Somebody else saved or discarded it meanwhile.
     """
-    new = read_entered(entered)
-    held = _hold(draft, revision)
-    known = entered_of(held)
-    changed = sorted(name for name in FIELDS if known.get(name) != new[name])
-    if changed:
-        held.entered, held.changed_by = new, actor
-        held.revision += 1
-        held.save()
-        _log(held, "change draft", actor, after={"name": held.name, "fields": changed})
-    return held
+    if draft is None:
+        row, verb = StudyDraft(), "draft"
+    else:
+        row, verb = _hold(draft, revision), "change draft"
+        row.revision += 1
+    row.entered, row.changed_by = read_entered(entered), actor
+    row.save()
+    log_change(row, verb, actor, after={"name": row.name})
+    return row
 
 
 @transaction.atomic
 def discard_draft(*, draft: StudyDraft, actor: User | None = None) -> None:
-    """Remove a draft for good."""
-    held = StudyDraft.objects.select_for_update().filter(pk=draft.pk).first()
-    if held is None:
-        return
-    _log(held, "discard draft", actor, before={"name": held.name})
-    held.delete()
+    """Remove a draft for good; twice changes nothing."""
+    if StudyDraft.objects.filter(pk=draft.pk).delete()[0]:
+        log_change(draft, "discard draft", actor, before={"name": draft.name})
 
 
 @transaction.atomic
 def open_draft(
     study_plan: StudyPlan, *, draft: StudyDraft, revision: int, actor: User | None = None
 ) -> Study:
-    """Open the study, whose draft goes.
+    """Open the study that a draft has come to; the draft goes.
 
     Args:
         study_plan: What the draft has come to.
@@ -106,12 +92,12 @@ def open_draft(
 
     Raises:
         Conflict: Somebody else saved or discarded the draft meanwhile.
-        ArenaError, AugmentError: See `open_study`.
+        AugmentError: See `open_study`.
     """
-    held = _hold(draft, revision)
+    row = _hold(draft, revision)
     study = open_study(study_plan, actor=actor)
-    _log(held, "open draft", actor, after={"study": str(study.code)})
-    held.delete()
+    log_change(row, "open draft", actor, after={"study": str(study.code)})
+    row.delete()
     return study
 
 
@@ -150,38 +136,26 @@ def _as_entered(name: str, value: Any) -> Any:
 
 
 def _hold(draft: StudyDraft, revision: int) -> StudyDraft:
-    held = StudyDraft.objects.select_for_update().filter(pk=draft.pk).first()
-    if held is None:
-        raise Conflict("Somebody opened or discarded this draft meanwhile.")
-    if held.revision != revision:
-        raise Conflict("Somebody else saved this draft meanwhile; nothing of yours was kept.")
-    return held
-
-
-def _log(draft: StudyDraft, verb: str, actor: User | None, **kept: dict[str, Any]) -> None:
-    log_event(actor=actor, verb=verb, object_kind="study draft", object_code=draft.code, **kept)
-
-
-# --- Preview -----------------------------------------------------------------------------------
+    rows = StudyDraft.objects.select_for_update().filter(pk=draft.pk, revision=revision)
+    if (row := rows.first()) is None:
+        raise Conflict("Somebody else saved, opened or discarded this draft meanwhile.")
+    return row
 
 
 def preview_study(study_plan: StudyPlan) -> dict[str, float]:
     """Return what opening this study would make, in numbers; nothing is kept.
 
-    `later` of the votes are planned by those before, and repeats and checks come on top of them.
-    `judged` counts pairs of a scenario that somebody judges, `shared` those of two experts or
-    more; `settled` those that are settled as ties, `alike` the ones among them within the limits.
+    `later` of the votes are planned by those before, and repeats and checks come on top of them;
+    `settled` counts pairs that are settled as ties.
 
     Raises:
-        ArenaError, AugmentError: It can't be opened.
+        AugmentError: It can't be opened.
     """
     with transaction.atomic():
         study = open_study(study_plan)
         kinds = Counter(study.matchups.values_list("kind", flat=True))
-        later = sum(study.votes_to_plan.values())
-        judged, shared = shared_units(study)
-        experts = study.experts.count()
-        seconds = usual_seconds() or StudyEstimate().seconds
+        later, experts = sum(study.votes_to_plan.values()), study.experts.count()
+        seconds = StudyEstimate().seconds
         preview = {
             "experts": experts,
             "contestants": study.contestants.count(),
@@ -190,11 +164,8 @@ def preview_study(study_plan: StudyPlan) -> dict[str, float]:
             "later": later,
             "repeats": kinds[Matchup.Kind.REPEAT],
             "checks": kinds[Matchup.Kind.CHECK],
-            "judged": judged,
-            "shared": shared,
             "settled": len(study.rules["identical"]),
-            "alike": len(study.rules["alike"]),
-            "seconds": float(seconds),
+            "seconds": seconds,
             "minutes": round((kinds.total() + later) / experts * seconds / 60),
         }
         transaction.set_rollback(True)

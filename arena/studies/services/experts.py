@@ -32,9 +32,7 @@ Answer = PracticePair.Answer
 
 def is_due(study: Study, expert: User) -> bool:
     """Return whether the expert practises now: nothing is voted yet and a pair is unanswered."""
-    if not study.practice or study.state != Study.State.OPEN:
-        return False
-    if Vote.objects.filter(matchup__study=study, expert=expert).exists():
+    if not study.practice or Vote.objects.filter(matchup__study=study, expert=expert).exists():
         return False
     return any(not pair.answer for pair in practice_pairs(study, expert))
 
@@ -43,32 +41,36 @@ def is_due(study: Study, expert: User) -> bool:
 def practice_pairs(study: Study, expert: User) -> list[PracticePair]:
     """Return the expert's round, made when it is first asked for.
 
-    Scenarios that are not in the study come first, then the study's own; of each group one of
-    every type before a second one.
+    Scenarios that are not in the study come first; of each group one of every type comes before a
+    second one.
     """
     rows = PracticePair.objects.filter(study=study, expert=expert).order_by("position")
-    mine = rows.select_related("scenario__base_scene", "good", "broken")
-    kept = list(mine)
-    if kept or not study.practice or study.state != Study.State.OPEN:
-        return kept
-    # Two windows of one browser may ask at once.
-    Study.objects.select_for_update().get(pk=study.pk)
-    if not rows.exists():
-        PracticePair.objects.bulk_create(_draw_round(study, expert))
-    return list(mine.all())
+    rows = rows.select_related("scenario__base_scene", "good", "broken")
+    if study.practice and study.state == Study.State.OPEN and not rows.exists():
+        # Two windows of one browser may ask at once.
+        Study.objects.select_for_update().get(pk=study.pk)
+        if not rows.exists():
+            PracticePair.objects.bulk_create(_draw_round(study, expert))
+    return list(rows)
 
 
-@transaction.atomic
-def answer_practice(*, study: Study, expert: User, position: int, answer: str) -> None:
+def answer_practice(
+    *, study: Study, expert: User, position: str | None, answer: str | None
+) -> PracticePair:
     """Keep what an expert answered; the first answer to a pair stays.
 
     Raises:
-        InvalidVote: It is no answer.
+        InvalidVote: It is no answer, or there is no such pair.
         StudyNotOpen: The study is over.
     """
     if answer not in (Answer.LEFT, Answer.EQUAL, Answer.RIGHT):
         raise InvalidVote({"outcome": "It is none of the answers."})
-    _unanswered(study, expert).filter(position=position).update(answer=answer)
+    pairs = {str(pair.position): pair for pair in practice_pairs(study, expert)}
+    if position not in pairs:
+        raise InvalidVote({"pair": "It is no pair of the round."})
+    pair = pairs[position]
+    _unanswered(study, expert).filter(pk=pair.pk).update(answer=answer)
+    return pair
 
 
 def skip_practice(*, study: Study, expert: User) -> None:
@@ -91,8 +93,7 @@ def require_practice_pictures() -> None:
         raise NothingToPlan(
             "There is nothing to practise on yet: no scenario has a picture of its reference "
             "and a broken one. Generate the contestant reference and press “Draw missing "
-            "attention checks” on the page of a new study, or open it without a practice "
-            "round."
+            "attention checks” on the page of a new study, or open it without practice."
         )
 
 
@@ -104,20 +105,18 @@ def _unanswered(study: Study, expert: User) -> QuerySet[PracticePair]:
 
 def _draw_round(study: Study, expert: User) -> list[PracticePair]:
     own = set(study.scenarios.values_list("pk", flat=True))
-    others = Study.objects.filter(experts=expert, state=Study.State.OPEN)
-    seen = set(others.values_list("scenarios", flat=True)) - own
-    pairs = {pair[0].scenario_id: pair for pair in latest_pairs(Scenario.objects.all()).values()}
-    kinds = dict(Scenario.objects.filter(pk__in=pairs).values_list("pk", "type"))
+    shown = latest_pairs(Scenario.objects.all()).values()
+    pairs = {good.scenario_id: (good, broken) for good, broken in shown}
+    type_of = dict(Scenario.objects.filter(pk__in=pairs).values_list("pk", "type"))
     dice = random.Random(f"{study.seed} {UUID(str(expert.person.code)).int}")
     order = sorted(pairs)
     dice.shuffle(order)
-    types: Counter[tuple[int, str]] = Counter()
+    drawn: Counter[tuple[bool, str]] = Counter()
     ranked = []
     for number, pk in enumerate(order):
-        group = 2 if pk in own else int(pk in seen)
-        ranked.append((group, types[group, kinds[pk]], number, pk))
-        types[group, kinds[pk]] += 1
-    chosen = [pk for *_, pk in sorted(ranked)[:PAIRS]]
+        group = (pk in own, type_of[pk])
+        ranked.append((pk in own, drawn[group], number, pk))
+        drawn[group] += 1
     return [
         PracticePair(
             study=study,
@@ -128,7 +127,7 @@ def _draw_round(study: Study, expert: User) -> list[PracticePair]:
             broken=pairs[pk][1],
             good_is_left=dice.random() < 0.5,
         )
-        for position, pk in enumerate(chosen, start=1)
+        for position, (*_, pk) in enumerate(sorted(ranked)[:PAIRS], start=1)
     ]
 
 
@@ -137,19 +136,10 @@ def _draw_round(study: Study, expert: User) -> list[PracticePair]:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Complaint:
-    """What an expert reports.
-
-    Attributes:
-        reason: One of Report.Reason.
-        side: One of Report.Side.
-        mark: A place in the named pictures, as shares of their width and height from the upper
-            left corner; None without one.
-        comment: What is wrong.
-    """
+    """What an expert reports."""
 
     reason: str
     side: str = Report.Side.BOTH
-    mark: tuple[float, float] | None = None
     comment: str = ""
 
 
@@ -164,12 +154,9 @@ def report(*, expert: User, matchup_code: UUID | str, key: UUID, said: Complaint
 
     Raises:
         NotYours: The matchup is somebody else's or does not exist.
-        InvalidVote: Reason or side are unknown, the mark lies beside the pictures, or the comment
-            is too long.
         StudyNotOpen: The study is over.
         Conflict: The key belongs to another report.
     """
-    check_complaint(said)
     matchup = matchup_of(expert=expert, code=matchup_code)
     stored = Report.objects.filter(key=key).first()
     if stored is None:
@@ -182,14 +169,12 @@ def report(*, expert: User, matchup_code: UUID | str, key: UUID, said: Complaint
 
 
 def check_complaint(said: Complaint) -> None:
-    """Raise InvalidVote for parts that are unknown or too long."""
+    """Raise InvalidVote for parts that are unknown or too long, in rows from elsewhere."""
     wrong = {}
     if said.reason not in Report.Reason.values:
         wrong["reason"] = f"One of these is needed: {', '.join(Report.Reason.values)}."
     if said.side not in Report.Side.values:
         wrong["side"] = f"One of these is needed: {', '.join(Report.Side.values)}."
-    if said.mark is not None and not all(0 <= share <= 1 for share in said.mark):
-        wrong["mark"] = "Both numbers of a mark lie between 0 and 1."
     if len(said.comment) > LONGEST_COMMENT:
         wrong["comment"] = f"A comment has at most {LONGEST_COMMENT} characters."
     if wrong:
@@ -197,14 +182,11 @@ def check_complaint(said: Complaint) -> None:
 
 
 def _insert(matchup: Matchup, expert: User, key: UUID, said: Complaint) -> Report:
-    across, down = said.mark or (None, None)
     values = {
         "matchup": matchup,
         "expert": expert,
         "reason": said.reason,
         "side": said.side,
-        "mark_x": across,
-        "mark_y": down,
         "comment": make_storable(said.comment.strip()),
     }
     try:

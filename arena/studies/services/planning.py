@@ -33,13 +33,13 @@ from arena.studies.services.pictures import (
     with_picture,
     without_lost_checks,
 )
-from arena.studies.services.plan import log_study
 from arena.voting.queries.ballots import upcoming
 from arena.voting.queries.showings import LEGEND
 from arena.voting.services.casting import mark_served
 from arena.voting.services.shown_pictures import ScenarioFrame, find_frames, frames_shown, sides_of
 from augment.models import Augmentation, Scenario
-from augment.services.scenarios.pictures import descriptions, legend_of_scene, legends_of_changes
+from augment.services.events import log_change
+from augment.services.scenarios.pictures import legend_of_scene, legends_of_changes
 
 MOST_AHEAD = 12
 """The most matchups that a browser may ask for; with as many waiting no new batch is needed."""
@@ -147,13 +147,8 @@ def store(
     """
     by_name = {expert.username: expert for expert in experts}
     known = frames_shown(study, {scenario_of(one.scenario) for one in planned}) if batch else {}
-    scenarios = _scenarios(planned, cells, reads_scenes=study.allow_text or not known)
+    scenarios = _scenarios(planned, cells, reads_scenes=not known)
     frames = find_frames(planned, cells, scenarios, known)
-    texts = None
-    if study.allow_text:
-        shown = {cell.pk for one in planned for cell in sides_of(one, cells)}
-        by_key = {scenario.pk: scenario for scenario in scenarios.values()}
-        texts = descriptions(augmentations=shown, scenarios=by_key)
     views = _pair_views(planned, cells, scenarios, frames)
     rows = [
         Matchup(
@@ -167,7 +162,6 @@ def store(
             right_image=right.image,
             original_image=frames[one.scenario].original_image,
             view=view,
-            descriptions=texts and [texts[left.pk], texts[right.pk]],
             kind=one.kind,
             batch=batch,
             draw_probability=one.draw_probability,
@@ -326,7 +320,7 @@ def plan_batch(*, study: Study, expert: User) -> int:
             "last_vote": last_vote,
             "scenario_gap": gap,
         }
-        log_study(study, "plan batch", None, after=after)
+        log_change(study, "plan batch", None, after=after)
         return len(planned)
 
 

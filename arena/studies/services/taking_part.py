@@ -20,12 +20,12 @@ from arena.pairing.order import IntArray
 from arena.pairing.rules import Grid, place_of
 from arena.people.queries import experts as expert_accounts
 from arena.people.queries import forgotten_name
-from arena.people.services import check_may_change, create_person, log_person, sign_out
-from arena.studies.queries import enrolment_by_token, find_silent, find_unfinished, has_free_place
+from arena.people.services import SIGNED_IN, check_may_change, create_person, end_sessions
+from arena.studies.queries import expert_named, find_silent, find_unfinished
 from arena.studies.services.drafts import rename_in_drafts
-from arena.studies.services.plan import log_study
 from arena.studies.services.planning import Planning, planned_so_far, votes_left
 from augment.errors import Conflict, UnknownName
+from augment.services.events import log_change
 from augment.services.texts import one_line
 
 LONGEST_CONSENT, LONGEST_ID = 5_000, 120
@@ -61,10 +61,7 @@ def hand_over(
     study = Study.objects.select_for_update().get(pk=study.pk)
     if study.state != Study.State.OPEN:
         raise StudyNotOpen(f"The study '{study.name}' is {study.state}: nothing is handed over.")
-    giver = study.experts.filter(username=username).first()
-    if giver is None:
-        known_names = sorted(study.experts.values_list("username", flat=True))
-        raise UnknownName("expert of this study", username, known_names)
+    giver = expert_named(study, username)
     takers = _find_takers(study, username, to)
     names = [taker.username for taker in takers]
     planning, known = Planning.begin(study), planned_so_far(study)
@@ -86,7 +83,7 @@ def hand_over(
         study.save(update_fields=["votes_to_plan"])
     taken = {name: len(dealt[name]) + later[name] for name in names}
     withdrawn = [[row.position, row.kind, row.scenario.slug, *_slugs(row)] for row in rows]
-    log_study(
+    log_change(
         study,
         "hand over",
         actor,
@@ -190,7 +187,7 @@ def set_enrolment(
     }
     before = Enrolment.objects.filter(study=study).values(*values).first()
     enrolment, _ = Enrolment.objects.update_or_create(study=study, defaults=values)
-    log_study(study, "set enrolment", actor, before=before, after=values)
+    log_change(study, "set enrolment", actor, before=before, after=values)
     return enrolment
 
 
@@ -204,14 +201,13 @@ def enrol(*, token: str, external_id: str, agreed_sha256: str) -> EnrolledVoter:
         agreed_sha256: Of the text that they agreed to, as it was shown.
 
     Raises:
-        NotYours: No link has this token.
         EnrolmentOver: It is closed, the study too, or every place is taken.
         Conflict: The id is enrolled already, or another text was agreed to than holds now.
         InvalidDocument: The id is empty, too long or no line.
     """
     external_id = one_line("id", external_id, what="enrolment", longest=LONGEST_ID)
-    study = Study.objects.select_for_update().get(pk=enrolment_by_token(token).study_id)
-    enrolment = Enrolment.objects.get(study=study)
+    study = Study.objects.select_for_update().get(enrolment__token=token)
+    enrolment = study.enrolment
     if not enrolment.is_open or study.state != Study.State.OPEN:
         raise EnrolmentOver("This study takes on nobody any more.")
     if agreed_sha256 != enrolment.consent_sha256:
@@ -224,7 +220,8 @@ def enrol(*, token: str, external_id: str, agreed_sha256: str) -> EnrolledVoter:
             "who runs the study for a link of your own."
         )
         raise Conflict(text % {"id": external_id})
-    if not has_free_place(enrolment) and not drop_silent(enrolment=enrolment):
+    taken = enrolment.voters.filter(dropped_at=None).count()
+    if taken >= enrolment.places and not drop_silent(enrolment=enrolment):
         raise EnrolmentOver("Every place of this study is taken.")
     return _take_on(study, enrolment, external_id)
 
@@ -257,7 +254,7 @@ def _take_on(study: Study, enrolment: Enrolment, external_id: str) -> EnrolledVo
         "matchups": len(planned),
         "consent_sha256": voter.consent_sha256,
     }
-    log_study(study, "enrol", person, after=after)
+    log_change(study, "enrol", person, after=after)
     return voter
 
 
@@ -303,7 +300,7 @@ def give_up_places(*, expert: User, actor: User | None = None) -> None:
         state=Study.State.OPEN, pk__in=places.values("enrolment__study")
     )
     for study in list(studies.order_by("pk")):
-        for voter in find_unfinished(Enrolment.objects.get(study=study)).filter(expert=expert):
+        for voter in find_unfinished(study).filter(expert=expert):
             _drop(study, voter, at=timezone.now(), actor=actor)
 
 
@@ -312,7 +309,7 @@ def _drop(study: Study, voter: EnrolledVoter, *, at: datetime, actor: User | Non
     Matchup.objects.filter(pk__in=[row.pk for row in rows]).delete()
     EnrolledVoter.objects.filter(pk=voter.pk).update(dropped_at=at)
     after = {"study": str(study.code), "withdrawn": len(rows)}
-    log_person(voter.expert, "drop out", actor, after=after)
+    log_change(voter.expert.person, "drop out", actor, after=after)
 
 
 # --- Forgetting --------------------------------------------------------------------------------
@@ -344,8 +341,8 @@ def forget_identity(*, user: User, actor: User) -> None:
     rename_in_drafts(known_as, name)
     for failures in (AccessAttempt, AccessFailureLog, AccessLog):
         failures.objects.filter(username=known_as).delete()
-    sign_out(user)
-    log_person(user, "forget identity", actor)
+    end_sessions(SIGNED_IN, {str(user.pk)})
+    log_change(user.person, "forget identity", actor)
 
 
 def _rename_in_plans(known_as: str, name: str) -> None:

@@ -42,11 +42,6 @@ class Remembered(Generic[Kept]):
         return made
 
 
-def plan_and_votes(study: Study) -> Hashable:
-    """Another value whenever a matchup or a vote came in, of whatever study; two queries."""
-    return (study.code, _newest(Vote), _newest(Matchup))
-
-
 def plan_of(study: Study) -> Hashable:
     """Another value whenever a matchup came in; one query."""
     return (study.code, _newest(Matchup))

@@ -18,17 +18,13 @@ from django.utils import timezone
 
 from arena.errors import AlreadyDecided, InvalidVote, StudyNotOpen, TooFast
 from arena.models import AIDS, Matchup, Study, Vote
-from arena.voting.queries.ballots import VotingState, hold_matchup, upcoming, voting_state
+from arena.voting.queries.ballots import VotingProgress, hold_matchup, upcoming, voting_state
 from arena.voting.services.turns import in_turn
 from augment.errors import Conflict
-from augment.models import Event
-from augment.services.events import log_event
 from augment.services.texts import make_storable
 
 LONGEST_COMMENT = 1000
 PACE_WINDOW = timedelta(seconds=5)
-FLAG_AGAIN_AFTER = timedelta(minutes=1)
-"""An account that goes on voting too fast is written to the log this often, not for every try."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -51,14 +47,16 @@ class Received:
     """What came of a vote.
 
     Attributes:
-        state: The study and the expert's progress after it.
+        study: As it is now; columns that a vote does not need are loaded when asked for.
+        progress: The expert's, after the vote.
         coming: What is planned for the expert next, marked as served; nothing where the study
             has closed.
     """
 
     vote: Vote
-    state: VotingState
-    coming: tuple[Matchup, ...]
+    study: Study
+    progress: VotingProgress
+    coming: Sequence[Matchup]
 
 
 def decision_of(
@@ -136,7 +134,7 @@ def receive_vote(*, expert: User, decision: Decision, ahead: int = 0) -> Receive
     """Store what an expert's browser sent, at a pace that a person can keep.
 
     The limit (ARENA_VOTES_PER_S over five seconds) counts stored votes, so it holds for any
-    number of web processes. An account that breaks it is flagged in the log.
+    number of web processes.
 
     Args:
         expert: Whose vote it is.
@@ -145,15 +143,11 @@ def receive_vote(*, expert: User, decision: Decision, ahead: int = 0) -> Receive
 
     Raises:
         TooFast: The account votes faster than that; nothing was stored.
-        DatabaseBusy: It could not be written within ARENA_VOTE_WAIT_S; nothing was stored.
+        DatabaseBusy: It could not be written within VOTE_WAIT_S; nothing was stored.
         ArenaError: As in `cast_vote`.
         Conflict: As in `cast_vote`.
     """
-    try:
-        return _store(expert, decision, ahead)
-    except TooFast:
-        _flag(expert)
-        raise
+    return _store(expert, decision, ahead)
 
 
 def mark_served(*, matchups: Sequence[Matchup]) -> None:
@@ -200,14 +194,16 @@ def _write(expert: User, decision: Decision, ahead: int | None) -> Received:
         vote = _insert(matchup, expert, decision, _superseded(known, decision.supersedes))
     # Read after the lock, so that a study closed while we waited is seen as closed.
     since = timezone.now() - PACE_WINDOW
-    state = voting_state(study_pk=matchup.study_id, expert=expert, since=since)
+    study, progress, just_now = voting_state(study_pk=matchup.study_id, expert=expert, since=since)
     if is_new:
-        _check_allowed(decision, state, is_paced=ahead is not None)
+        _check_allowed(decision, study)
+        if ahead is not None and just_now > settings.VOTES_PER_S * PACE_WINDOW.total_seconds():
+            raise TooFast(math.ceil(PACE_WINDOW.total_seconds() / 2))
     coming: list[Matchup] = []
-    if ahead and state.study.state == Study.State.OPEN:
-        coming = upcoming(study=state.study, expert=expert, n=ahead)
+    if ahead and study.state == Study.State.OPEN:
+        coming = upcoming(study=study, expert=expert, n=ahead)
         mark_served(matchups=coming)
-    return Received(vote=vote, state=state, coming=tuple(coming))
+    return Received(vote=vote, study=study, progress=progress, coming=coming)
 
 
 def _insert(matchup: Matchup, expert: User, decision: Decision, old: Vote | None) -> Vote:
@@ -225,7 +221,7 @@ def _insert(matchup: Matchup, expert: User, decision: Decision, old: Vote | None
         comment=decision.comment,
         aids=decision.aids,
         supersedes=old,
-        is_simulated=matchup.by_machine,  # type: ignore[attr-defined]
+        is_simulated=matchup.expert.person.is_simulated,
         ms_visible=decision.ms_visible,
     )
     vote.save(force_insert=True)
@@ -258,30 +254,10 @@ def _check_open(study: Study) -> None:
         raise StudyNotOpen(f"The study {study.name!r} takes no votes: it is {study.state}.")
 
 
-def _check_allowed(decision: Decision, state: VotingState, *, is_paced: bool) -> None:
-    """Whether the study takes the vote that was just written; raising takes it back."""
-    study, used = state.study, decision.aids.split()
+def _check_allowed(decision: Decision, study: Study) -> None:
+    """Raise where the study does not take the vote that was just written, which takes it back."""
     _check_open(study)
     if decision.both_miss and not study.allow_both_miss:
         raise InvalidVote({"both_miss": "This study does not ask whether both miss."})
-    for aid, is_allowed, what in (
-        ("text", study.allow_text, "text description"),
-        ("replay", study.allow_replay, "drives to play"),
-        ("measures", study.allow_measures, "measures"),
-    ):
-        if aid in used and not is_allowed:
-            raise InvalidVote({"aids": f"This study has no {what}."})
-    if is_paced and state.just_now > settings.VOTES_PER_S * PACE_WINDOW.total_seconds():
-        raise TooFast(math.ceil(PACE_WINDOW.total_seconds() / 2))
-
-
-def _flag(expert: User) -> None:
-    flags = Event.objects.filter(actor=expert, verb="vote too fast")
-    if not flags.filter(at__gt=timezone.now() - FLAG_AGAIN_AFTER).exists():
-        log_event(
-            actor=expert,
-            verb="vote too fast",
-            object_kind="person",
-            object_code=expert.person.code,
-            after={"votes_per_s": settings.VOTES_PER_S, "over_s": PACE_WINDOW.total_seconds()},
-        )
+    if "replay" in decision.aids.split() and not study.allow_replay:
+        raise InvalidVote({"aids": "This study has no drives to play."})

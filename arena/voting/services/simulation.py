@@ -74,7 +74,7 @@ def _waiting(study: Study) -> Iterator[Matchup]:
     while True:
         yield from (
             study.matchups.filter(votes=None, expert__person__is_simulated=True)
-            .select_related("expert", "scenario", "left", "right")
+            .select_related("expert__person", "scenario", "left", "right")
             .order_by("expert__username", "position")
         )
         experts = study.experts.filter(person__is_simulated=True).order_by("username")

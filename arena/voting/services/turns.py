@@ -1,7 +1,6 @@
 """Writers of SQLite one after the other, in the order in which they came, and not for ever."""
 
 import fcntl
-import math
 import os
 import threading
 import time
@@ -17,9 +16,6 @@ from arena.errors import DatabaseBusy
 
 SUFFIX = "-turn"
 """What the file that writers queue at adds to the database's name."""
-
-STUCK_S = 1.0
-"""Where a writer is not through after so long, something long keeps the database to itself."""
 
 LOOK_EVERY_S = 0.001
 """How often a thread looks whether another process has left; one thread a process does."""
@@ -38,9 +34,6 @@ def in_turn(*, within_s: float | None = None) -> Iterator[None]:
     of others: with eight voters one vote in twenty took five times as long as the median. Who
     waits here is woken at once. Writers that come another way still meet SQLite's own lock.
 
-    With a limit, a process that gets no further lets two of its threads wait until the limit and
-    turns all others away after a second, so that its pages go on.
-
     Args:
         within_s: How long to wait at most for the turn and the database's locks together; None
             for as long as it takes.
@@ -54,7 +47,7 @@ def in_turn(*, within_s: float | None = None) -> Iterator[None]:
     limit = None if within_s is None else time.monotonic() + within_s
     try:
         if connection.vendor == "sqlite":
-            with _DOOR.held(limit), _turn(limit), _patience_until(limit):
+            with _turn(limit), _patience_until(limit):
                 yield
         else:
             yield  # web servers limit the waiting of their connections: arena.config.wsgi
@@ -85,60 +78,26 @@ def limit_waiting(connection: BaseDatabaseWrapper, within_s: float) -> None:
 # --- Private -----------------------------------------------------------------------------------
 
 
-class _Door:
-    """Where the threads of this process wait for each other."""
-
-    def __init__(self) -> None:
-        self._lock = threading.Lock()
-        self._patient = threading.Lock()
-        self._since = math.inf
-
-    @contextmanager
-    def held(self, limit: float | None) -> Iterator[None]:
-        """Keep the others out.
-
-        Raises:
-            DatabaseBusy: The limit came first, or one who is patient waits already.
-        """
-        if not self._lock.acquire(blocking=False):
-            self._wait(limit)
-        self._since = time.monotonic()
-        try:
-            yield
-        finally:
-            self._since = math.inf
-            self._lock.release()
-
-    def _wait(self, limit: float | None) -> None:
-        if limit is None:
-            self._lock.acquire()
-            return
-        is_patient = self._patient.acquire(blocking=False)
-        try:
-            while not self._lock.acquire(timeout=min(0.1, max(0.0, limit - time.monotonic()))):
-                now = time.monotonic()
-                if now >= limit or (not is_patient and now - self._since > STUCK_S):
-                    raise DatabaseBusy
-        finally:
-            if is_patient:
-                self._patient.release()
-
-
-_DOOR = _Door()
+_DOOR = threading.Lock()
 
 
 @contextmanager
 def _turn(limit: float | None) -> Iterator[None]:
-    """Keep other processes out."""
-    path = Path(str(connection.settings_dict["NAME"]) + SUFFIX)
-    with open(path, "ab", opener=_private) as turn:  # closed, it is free again, whatever happens
-        if limit is None:
-            fcntl.flock(turn, fcntl.LOCK_EX)
-        while limit is not None and not _locked(turn):
-            if time.monotonic() >= limit:
-                raise DatabaseBusy
-            time.sleep(LOOK_EVERY_S)
-        yield
+    """Keep out the other threads, which are woken at once, and then the other processes."""
+    if not _DOOR.acquire(timeout=-1 if limit is None else max(0.0, limit - time.monotonic())):
+        raise DatabaseBusy
+    try:
+        path = Path(str(connection.settings_dict["NAME"]) + SUFFIX)
+        with open(path, "ab", opener=_private) as turn:  # closed, it is free again
+            if limit is None:
+                fcntl.flock(turn, fcntl.LOCK_EX)
+            while limit is not None and not _locked(turn):
+                if time.monotonic() >= limit:
+                    raise DatabaseBusy
+                time.sleep(LOOK_EVERY_S)
+            yield
+    finally:
+        _DOOR.release()
 
 
 def _locked(turn: IO[bytes]) -> bool:

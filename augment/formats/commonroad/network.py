@@ -12,22 +12,13 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 
-from augment.errors import InvalidDocument
-from augment.formats.road_map import (
-    FURTHEST_M,
-    FloatArray,
-    RoadMap,
-    Segment,
-    crossing_segments,
-    map_notes,
-)
+from augment.formats.road_map import RoadMap, Segment
 from augment.formats.roads import midline
+from augment.formats.values import FURTHEST, FloatArray, fault_at, look_up, read_finite
 from augment.geometry.polyline import Polyline
 from augment.scene.entities import AreaKind, TrafficLight, TurnType
 from augment.scene.lane_graph import turn_type_of
-from augment.scene.recording import SceneNoteKind
 
-WHAT = "CommonRoad scenario"
 SPEED_SIGNS = frozenset({"274", "R2-1"})
 """The speed limit of Germany (and of Zamunda), and of the United States; values in m/s."""
 AREA_OF = {
@@ -37,7 +28,7 @@ AREA_OF = {
     "busStop": AreaKind.DRIVABLE,
     "parking": AreaKind.CARPARK,
 }
-LEFT_OUT = frozenset({"bicycleLane", "border", "restricted"})
+LEFT_OUT = {"bicycleLane": "bicycle lanes", "border": "borders", "restricted": "restricted lanes"}
 COLOURS = {
     "green": TrafficLight.GREEN,
     "yellow": TrafficLight.YELLOW,
@@ -54,15 +45,14 @@ class Light:
     """One light.
 
     Attributes:
-        cycle: Colour and steps, in order.
+        cycle: The colour of each step of a cycle.
         offset: The step at which the cycle begins.
         direction: "all", or words like "leftStraight".
     """
 
-    cycle: tuple[tuple[TrafficLight, int], ...]
+    cycle: tuple[TrafficLight, ...]
     offset: int
     direction: str
-    is_active: bool
 
     def holds_for(self, turn: TurnType | None) -> bool:
         """Return whether a way of that turn obeys this light."""
@@ -73,18 +63,12 @@ class Light:
 
     def state_at(self, step: int) -> TrafficLight:
         """Return the colour at a time step."""
-        steps = [colour for colour, duration in self.cycle for _ in range(duration)]
-        if not self.is_active or not steps:
+        if not self.cycle:
             return TrafficLight.UNKNOWN
-        return steps[(step - self.offset) % len(steps)]
+        return self.cycle[(step - self.offset) % len(self.cycle)]
 
 
 # Numbers and references
-
-
-def fault(place: str, text: str) -> InvalidDocument:
-    """Return the error of what is wrong, and where."""
-    return InvalidDocument(WHAT, [(place, text)])
 
 
 def whole(text: str | None, place: str) -> int:
@@ -93,13 +77,10 @@ def whole(text: str | None, place: str) -> int:
     Raises:
         InvalidDocument: It is none.
     """
-    try:
-        number = int((text or "").strip())
-    except ValueError:
-        raise fault(place, f"expected a whole number, got {(text or '')[:40]!r}") from None
-    if abs(number) > 10**15:
-        raise fault(place, f"{str(number)[:20]}... is too large")
-    return number
+    given = (text or "").strip()
+    if len(given) <= 15 and given.removeprefix("-").isdecimal():
+        return int(given)
+    raise fault_at(place, f"expected a whole number, got {given[:40]!r}")
 
 
 def real(text: str | None, place: str) -> float:
@@ -108,13 +89,12 @@ def real(text: str | None, place: str) -> float:
     Raises:
         InvalidDocument: It is none.
     """
-    given = text or ""
     try:
-        number = float(given.strip())
+        number = float(text or "")
     except ValueError:
         number = math.nan
-    if not abs(number) <= FURTHEST_M:
-        raise fault(place, f"expected a finite number up to {FURTHEST_M:.0e}, got {given[:40]!r}")
+    if not abs(number) <= FURTHEST:
+        raise fault_at(place, f"expected a finite number, got {(text or '')[:40]!r}")
     return number
 
 
@@ -124,17 +104,8 @@ def points_of(parent: Element, place: str) -> FloatArray:
     Raises:
         InvalidDocument: A coordinate is missing or no number.
     """
-    rows = [point_of(point, place) for point in parent.findall("point")]
-    return np.array(rows, dtype=np.float64).reshape(-1, 2)
-
-
-def point_of(point: Element, place: str) -> tuple[float, float]:
-    """Return x and y of a point.
-
-    Raises:
-        InvalidDocument: One is missing or no number.
-    """
-    return real(point.findtext("x"), place), real(point.findtext("y"), place)
+    points = parent.findall("point")
+    return read_finite([(one.findtext("x"), one.findtext("y")) for one in points], place, 2)
 
 
 def _references(parent: Element, name: str) -> tuple[int, ...]:
@@ -150,7 +121,7 @@ def network_of(root: Element, step: int) -> RoadMap:
     Raises:
         InvalidDocument: A lanelet, sign or light breaks the format.
     """
-    limits, other_signs = _limits(root)
+    limits, left_out = _limits(root)
     lights = dict(_light(element) for element in root.findall("trafficLight"))
     elements = {whole(one.get("id"), "lanelet"): one for one in root.findall("lanelet")}
     kinds = {
@@ -159,9 +130,13 @@ def network_of(root: Element, step: int) -> RoadMap:
     }
     lanelets = {key: _segment(key, one, limits) for key, one in elements.items()}
     inside = _inside(root, lanelets, {key for key in kinds if "intersection" in kinds[key]})
-    segments = []
+    segments, areas = [], []
     for key, one in lanelets.items():
-        if kinds[key] & (AREA_OF.keys() | LEFT_OUT):
+        for kind in sorted(kinds[key] & AREA_OF.keys())[:1]:
+            areas.append((AREA_OF[kind], np.vstack([one.left, one.right[::-1]])))  # type: ignore[list-item,index]
+        for kind in kinds[key] & LEFT_OUT.keys():
+            left_out[LEFT_OUT[kind]] += 1
+        if kinds[key] & (AREA_OF.keys() | LEFT_OUT.keys()):
             continue
         light, turn = TrafficLight.NONE, inside.get(key)
         if key in inside:  # its own light, or that of the lanelets before it
@@ -172,34 +147,12 @@ def network_of(root: Element, step: int) -> RoadMap:
             shown = [lights[n] for n in named if n in lights and lights[n].holds_for(turn)]
             light = shown[0].state_at(step) if shown else light
         segments.append(replace(one, crosses=key in inside, turn=turn, light=light))
-    if not inside:  # the dialect of 2018b has no intersections
-        crossing = crossing_segments({one.name: one for one in segments})
-        segments = [replace(one, crosses=one.name in crossing) for one in segments]
-    areas = tuple(
-        (AREA_OF[kind], np.vstack([one.left, one.right[::-1]]))
-        for key, one in lanelets.items()
-        for kind in sorted(kinds[key] & AREA_OF.keys())[:1]
-        if one.left is not None and one.right is not None
-    )
     return RoadMap(
-        what=WHAT,
         place="lanelet",
         segments=tuple(segments),
-        areas=areas,
-        notes=map_notes(
-            segments,
-            there={
-                SceneNoteKind.NO_INTERSECTIONS: any(one.crosses for one in segments),
-                SceneNoteKind.NO_WALKWAYS: AreaKind.WALKWAY in {kind for kind, _ in areas},
-            },
-            counts={
-                SceneNoteKind.LIGHTS_REPEATED: len(lights),
-                SceneNoteKind.BICYCLE_LANES_LEFT_OUT: sum(
-                    "bicycleLane" in one for one in kinds.values()
-                ),
-            },
-            left_out=other_signs,
-        ),
+        areas=tuple(areas),
+        left_out=left_out,
+        tells_crossings=bool(inside),  # the dialect of 2018b has no intersections
     )
 
 
@@ -222,20 +175,18 @@ def _limits(root: Element) -> tuple[dict[int, float], Counter[str]]:
 def _light(element: Element) -> tuple[int, Light]:
     light_id = whole(element.get("id"), "trafficLight")
     place = f"trafficLight {light_id}"
-    cycle = []
+    cycle: list[TrafficLight] = []
     for part in element.findall("cycle/cycleElement"):
-        colour = part.findtext("color", "").strip()
+        colour = look_up(COLOURS, part.findtext("color", "").strip(), place)
         steps = whole(part.findtext("duration"), f"{place}.duration")
-        if colour not in COLOURS:
-            raise fault(place, f"unknown colour {colour[:20]!r}; known: {', '.join(COLOURS)}")
         if not 0 <= steps <= 100_000:
-            raise fault(place, f"a duration of {steps} steps is none")
-        cycle.append((COLOURS[colour], steps))
+            raise fault_at(place, f"a duration of {steps} steps is none")
+        cycle += [colour] * steps
+    is_off = element.findtext("active", "").strip() == "false"
     return light_id, Light(
-        cycle=tuple(cycle),
+        cycle=() if is_off else tuple(cycle),
         offset=whole(element.findtext("cycle/timeOffset", "0"), f"{place}.timeOffset"),
         direction=element.findtext("direction", "").strip(),
-        is_active=element.findtext("active", "").strip() != "false",
     )
 
 
@@ -243,7 +194,7 @@ def _segment(key: int, element: Element, limits: dict[int, float]) -> Segment:
     place = f"lanelet {key}"
     left, right = element.find("leftBound"), element.find("rightBound")
     if left is None or right is None:
-        raise fault(place, "needs a leftBound and a rightBound")
+        raise fault_at(place, "needs a leftBound and a rightBound")
     edges = points_of(left, place), points_of(right, place)
     signs = _references(element, "trafficSignRef")
     known = [limits[sign] for sign in signs if sign in limits]
@@ -280,8 +231,7 @@ def _inside(
             if key not in lanelets or key in inside:
                 continue
             one = lanelets[key]
-            enters = set(one.predecessors) <= inside.keys()
-            if enters and one.successors and _bends(one):
+            if set(one.predecessors) <= inside.keys() and one.successors and _bends(one):
                 inside[key] = None
                 waiting.append(key)
     return inside

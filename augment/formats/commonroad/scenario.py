@@ -1,39 +1,24 @@
 """The reader of CommonRoad scenarios, 2018b and 2020a.
 
-`item` is the id of a planning problem or of a vehicle that becomes the ego; the first planning
-problem without one. `frame` is a time step; without one the step where the ego begins.
+`item` is the id of a planning problem or of a vehicle that becomes the ego; without one the first
+planning problem, else the first vehicle. `frame` is a time step; without one the step where the
+ego begins.
 """
 
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from xml.etree.ElementTree import Element
 
 import numpy as np
 
-from augment.formats.commonroad.network import (
-    WHAT,
-    fault,
-    network_of,
-    point_of,
-    points_of,
-    real,
-    whole,
-)
+from augment.formats.commonroad.network import network_of, points_of, real, whole
 from augment.formats.documents import read_xml
-from augment.formats.reading import (
-    LONGEST_GAP_S,
-    Log,
-    LoggedTrack,
-    Moment,
-    Reading,
-    frame_in,
-    frames_every,
-    reading_at,
-)
-from augment.formats.road_map import FloatArray, left_out_notes
-from augment.scene.entities import EGO_LENGTH_M, EGO_WIDTH_M, LENGTH_WIDTH_M, AgentType
+from augment.formats.reading import LONGEST_GAP_S, Log, LoggedTrack, Reader
+from augment.formats.road_map import left_out_notes
+from augment.formats.values import WHAT, FloatArray, fault_at, look_up
+from augment.scene.entities import EGO_LENGTH_M, EGO_WIDTH_M, AgentType
 from augment.scene.recording import Note, SceneNoteKind
 
 VERSIONS = ("2018b", "2020a")
@@ -53,7 +38,12 @@ TYPE_OF = {
     "pillar": AgentType.GENERIC_OBJECT,
     "unknown": AgentType.GENERIC_OBJECT,
 }
-SCENERY = frozenset({"building", "roadBoundary", "medianStrip", "median_strip", "vegetation"})
+SCENERY = frozenset(
+    {
+        *("building", "roadBoundary", "medianStrip", "median_strip", "vegetation"),
+        *("environmentObstacle", "phantomObstacle"),
+    }
+)
 """What stands beside the road and is no road user."""
 State = tuple[float, float, float, float]
 """x, y, heading, speed."""
@@ -64,29 +54,31 @@ class Obstacle:
     """An obstacle, or the ego of a planning problem.
 
     Attributes:
-        states: By time step, ascending; of what stands, one.
-        has_size: Whether the file tells its size.
+        size_m: Length and width, zeros where the file does not tell them.
+        states: By time step; of what stands, one.
     """
 
     id: int
     type: AgentType
-    length_m: float
-    width_m: float
+    size_m: tuple[float, float]
     states: dict[int, State]
     stands: bool = False
-    has_size: bool = True
 
-    def rows(self, steps: int) -> FloatArray:
-        """Return the states of each step (T, 4); what stands is there all the time."""
-        made = np.full((steps, 4), np.nan)
+    def track(self, steps: int) -> LoggedTrack:
+        """Return its states at each step; what stands is there all the time."""
+        states = np.full((steps, 4), np.nan)
         if self.stands:
-            made[:] = (*next(iter(self.states.values()))[:3], 0.0)
+            states[:] = (*next(iter(self.states.values()))[:3], 0.0)
         else:
-            made[list(self.states)] = list(self.states.values())
-        return made
+            states[list(self.states)] = list(self.states.values())
+        length_m, width_m = self.size_m
+        name = f"{self.id:018d}"
+        return LoggedTrack(
+            name=name, type=self.type, length_m=length_m, width_m=width_m, states=states
+        )
 
 
-class CommonRoad:
+class CommonRoad(Reader):
     """The reader of CommonRoad XML."""
 
     name = "commonroad"
@@ -99,69 +91,39 @@ class CommonRoad:
         with path.open("rb") as file:
             return b"<commonRoad" in file.read(4_000)
 
-    def moments(self, path: Path, *, every_s: float) -> Iterator[Moment]:
-        """Each planning problem at its start, and where there is none each vehicle over time."""
-        root, step_s = _root(path)
-        obstacles, _ = _obstacles(root)
-        problems = _problems(root)
-        for item in problems:
-            yield Moment(item=str(item), frame=min(_ego(root, obstacles, str(item)).states))
-        for one in [] if problems else obstacles.values():
-            if one.type is AgentType.VEHICLE and not one.stands:
-                steps = list(one.states)
-                times_s = [step * step_s for step in steps]
-                for index in frames_every(times_s, every_s):
-                    time_s = times_s[index] - times_s[0]
-                    yield Moment(item=str(one.id), frame=steps[index], time_s=time_s)
-
-    def read(self, path: Path, *, item: str | None, frame: int | None, name: str) -> Reading:
-        """The scene of one ego at one time step."""
+    def logs(self, path: Path, item: str | None) -> Iterator[Log]:
+        """One for each planning problem, and where there is none for each vehicle."""
         root, step_s = _root(path)
         obstacles, notes = _obstacles(root)
-        ego = _ego(root, obstacles, item)
-        steps = 1 + max((max(one.states) for one in obstacles.values()), default=0)
-        first = min(ego.states)
-        if first >= steps:
-            raise fault(f"planningProblem {ego.id}", "starts after the last recorded step")
-        frame = frame_in(WHAT, first if frame is None else frame, steps)
-        log = Log(
-            what=WHAT,
-            times_s=np.arange(steps, dtype=np.float64) * step_s,
-            ego=ego.rows(steps),
-            ego_length_m=ego.length_m,
-            ego_width_m=ego.width_m,
-            tracks=tuple(
-                LoggedTrack(
-                    name=f"{one.id:018d}",
-                    type=one.type,
-                    length_m=one.length_m,
-                    width_m=one.width_m,
-                    states=one.rows(steps),
-                )
-                for one in obstacles.values()
-                if one.id != ego.id
-            ),
-        )
-        if not ego.has_size:
-            notes.append(Note(kind=SceneNoteKind.EGO_SIZE_ASSUMED, value=EGO_LENGTH_M))
-            notes.append(Note(kind=SceneNoteKind.NO_EGO_MOTION))
+        problems = [_problem(element) for element in root.findall("planningProblem")]
+        vehicles = [one for one in obstacles if one.type is AgentType.VEHICLE and not one.stands]
+        egos = {str(one.id): one for one in (*problems, *vehicles)}
+        chosen = problems or vehicles
+        if item is not None:
+            chosen = [look_up(egos, item, "item")]
         if step_s > LONGEST_GAP_S:
             notes.append(Note(kind=SceneNoteKind.LONG_TIME_STEP, value=step_s))
+        steps = 1 + max((max(one.states) for one in (*obstacles, *chosen)), default=0)
         benchmark = root.get("benchmarkID", path.stem)[:80]
-        source = root.get("source", "").strip()[:200] or "no source named"
-        return reading_at(
-            log,
-            frame,
-            network_of(root, frame),
-            name=name,
-            world=f"CommonRoad scenario frame of {benchmark}",
-            provenance=(
-                f"CommonRoad scenario {benchmark}, ego {ego.id}, time step {frame}; {source}"
-            ),
-            licence=None,
-            notes=(*notes, Note(kind=SceneNoteKind.NO_DRIVABLE_AREAS)),
-            item=str(ego.id),
-        )
+        for ego in chosen:
+            is_problem = ego in problems
+            assumed = [
+                Note(kind=SceneNoteKind.EGO_SIZE_ASSUMED, value=EGO_LENGTH_M),
+                Note(kind=SceneNoteKind.NO_EGO_MOTION),
+            ]
+            yield Log(
+                times_s=np.arange(steps, dtype=np.float64) * step_s,
+                ego=ego.track(steps),
+                tracks=[one.track(steps) for one in obstacles if one is not ego],
+                map_at=lambda frame: network_of(root, frame),
+                world=f"CommonRoad scenario frame of {benchmark}",
+                title=f"CommonRoad scenario {benchmark}, ego {ego.id}",
+                licence=root.get("source", "").strip()[:200] or "no source named",
+                is_free=True,
+                item=str(ego.id),
+                frame=min(ego.states),
+                notes=[*notes, *(assumed if is_problem else [])],
+            )
 
 
 # Private
@@ -170,107 +132,63 @@ class CommonRoad:
 def _root(path: Path) -> tuple[Element, float]:
     """The file and the seconds between its steps."""
     root = read_xml(path, what=WHAT)
-    if root.tag != "commonRoad":
-        raise fault(path.name, f"begins with {root.tag[:40]!r}, not with 'commonRoad'")
     version = root.get("commonRoadVersion", "")
-    if version not in VERSIONS:
-        text = f"version {version[:20]!r} is not known; known: {', '.join(VERSIONS)}"
-        raise fault("commonRoadVersion", text)
+    if root.tag != "commonRoad" or version not in VERSIONS:
+        text = f"is {root.tag[:40]!r} of version {version[:20]!r}, not commonRoad of"
+        raise fault_at(path.name, f"{text} {' or '.join(VERSIONS)}")
     step_s = real(root.get("timeStepSize"), "timeStepSize")
     if not 0.001 <= step_s <= 10.0:
-        raise fault("timeStepSize", f"{step_s:g} s is no step from 0.001 to 10 s")
+        raise fault_at("timeStepSize", f"{step_s:g} s is no step from 0.001 to 10 s")
     return root, step_s
 
 
-def _problems(root: Element) -> dict[int, Element]:
-    problems = root.findall("planningProblem")
-    return {whole(one.get("id"), "planningProblem"): one for one in problems}
-
-
-def _ego(root: Element, obstacles: Mapping[int, Obstacle], item: str | None) -> Obstacle:
-    """The planning problem or vehicle of that id; the first planning problem when None."""
-    problems = _problems(root)
-    vehicles = {key: one for key, one in obstacles.items() if not one.stands}
-    if item is None and not problems:
-        text = "there is no planning problem; name a vehicle as the ego by its id"
-        raise fault("planningProblem", f"{text}: {_listed(vehicles)}")
-    number = next(iter(problems)) if item is None else whole(item, "item")
-    if number in problems:
-        step, state = _state(problems[number].find("initialState"), f"planningProblem {number}")
-        return Obstacle(
-            id=number,
-            type=AgentType.EGO_VEHICLE,
-            length_m=EGO_LENGTH_M,
-            width_m=EGO_WIDTH_M,
-            states={step: state},
-            has_size=False,
-        )
-    if number not in vehicles:
-        known = f"planning problems {_listed(problems)}; vehicles {_listed(vehicles)}"
-        raise fault("item", f"{number} is not there; there are {known}")
-    return vehicles[number]
-
-
-def _listed(names: Mapping[int, object]) -> str:
-    shown = ", ".join(str(name) for name in list(names)[:12]) or "none"
-    return shown + (f" and {len(names) - 12} more" if len(names) > 12 else "")
-
-
-def _obstacles(root: Element) -> tuple[dict[int, Obstacle], list[Note]]:
-    """What stands and drives by its id, and what is left out of it."""
-    found, left_out = {}, Counter[str]()
-    for element in root:
-        if element.tag in ("environmentObstacle", "phantomObstacle"):
-            left_out[element.tag] += 1
-        if element.tag not in ("dynamicObstacle", "staticObstacle", "obstacle"):
-            continue
-        place = f"obstacle {element.get('id', '')[:20]}"
-        kind = element.findtext("type", "").strip()
-        if kind in SCENERY:
-            left_out[kind] += 1
-        elif kind in TYPE_OF:
-            made = _obstacle(element, TYPE_OF[kind], place)
-            found[made.id] = made
-        else:
-            known = ", ".join([*TYPE_OF, *sorted(SCENERY)])
-            raise fault(place, f"unknown type {kind[:20]!r}; known: {known}")
-    notes = [*left_out_notes(SceneNoteKind.OBJECTS_LEFT_OUT, left_out)]
-    sizeless = sum(not one.has_size for one in found.values())
-    if sizeless:
-        notes.append(Note(kind=SceneNoteKind.SOME_BOX_SIZES, number=sizeless, of=len(found)))
-    return found, notes
-
-
-def _obstacle(element: Element, kind: AgentType, place: str) -> Obstacle:
-    elements = [element.find("initialState"), *element.findall("trajectory/state")]
-    states = sorted(_state(one, place) for one in elements)
-    size = _size(element, place)
-    length_m, width_m = size or LENGTH_WIDTH_M[kind]
-    is_static = element.tag == "staticObstacle" or element.findtext("role", "").strip() == "static"
+def _problem(element: Element) -> Obstacle:
+    number = whole(element.get("id"), "planningProblem")
+    step, state = _state(element.find("initialState"), f"planningProblem {number}")
     return Obstacle(
-        id=whole(element.get("id"), place),
-        type=kind,
-        length_m=length_m,
-        width_m=width_m,
-        states=dict(states),
-        stands=is_static,
-        has_size=size is not None,
+        id=number,
+        type=AgentType.EGO_VEHICLE,
+        size_m=(EGO_LENGTH_M, EGO_WIDTH_M),
+        states={step: state},
     )
+
+
+def _obstacles(root: Element) -> tuple[list[Obstacle], list[Note]]:
+    """What stands and drives, and what is left out of it."""
+    obstacles, left_out = [], Counter[str]()
+    for element in root:
+        kind = element.findtext("type", "").strip()
+        place = f"obstacle {element.get('id', '')[:20]}"
+        if not element.tag.lower().endswith("obstacle"):
+            continue
+        if kind in SCENERY or element.tag in SCENERY:
+            left_out[kind or element.tag] += 1
+            continue
+        elements = [element.find("initialState"), *element.findall("trajectory/state")]
+        role = element.findtext("role", "").strip()  # in 2018b
+        obstacles.append(
+            Obstacle(
+                id=whole(element.get("id"), place),
+                type=look_up(TYPE_OF, kind, place),
+                size_m=_size(element, place),
+                states=dict(sorted(_state(one, place) for one in elements)),
+                stands=element.tag == "staticObstacle" or role == "static",
+            )
+        )
+    return obstacles, left_out_notes(SceneNoteKind.OBJECTS_LEFT_OUT, left_out)
 
 
 def _state(element: Element | None, place: str) -> tuple[int, State]:
     """The time step, and where something is then."""
     if element is None:
-        raise fault(place, "needs an initialState")
-    position = element.find("position")
-    if position is None:
-        raise fault(place, "a state needs a position")
+        raise fault_at(place, "needs an initialState")
     heading_rad, step, speed_mps = (
         _value(element, name, place) for name in ("orientation", "time", "velocity")
     )
     if not 0.0 <= step <= MOST_STEPS:
-        raise fault(place, f"a time step lies from 0 to {MOST_STEPS}, not at {step:g}")
-    return round(step), (*_center(position, place), heading_rad, abs(speed_mps))
+        raise fault_at(place, f"a time step lies from 0 to {MOST_STEPS}, not at {step:g}")
+    x_m, y_m = _center(element, place).tolist()
+    return round(step), (x_m, y_m, heading_rad, abs(speed_mps))
 
 
 def _value(parent: Element, name: str, place: str) -> float:
@@ -283,28 +201,29 @@ def _value(parent: Element, name: str, place: str) -> float:
     return sum(real(text, f"{place}.{name}") for text in given) / len(given)
 
 
-def _center(position: Element, place: str) -> tuple[float, float]:
-    """The point, else the centre of the first shape."""
-    for where in ("point", "rectangle/center", "circle/center"):
-        point = position.find(where)
+def _center(state: Element, place: str) -> FloatArray:
+    """The point (2,) of a position, else the centre of its first shape."""
+    for parent in ("position", "position/polygon"):
+        given = state.find(parent)
+        points = np.empty((0, 2)) if given is None else points_of(given, place)
+        if len(points):
+            return np.asarray(points.mean(axis=0))
+    for name in ("position/rectangle/center", "position/circle/center"):
+        point = state.find(name)
         if point is not None:
-            return point_of(point, place)
-    polygon = position.find("polygon")
-    if polygon is not None and len(points := points_of(polygon, place)):
-        x_m, y_m = points.mean(axis=0).tolist()
-        return x_m, y_m
-    raise fault(place, "a position needs a point, or a shape with a centre")
+            return np.array([real(point.findtext(axis), place) for axis in "xy"])
+    raise fault_at(place, "a position needs a point, or a shape with a centre")
 
 
-def _size(element: Element, place: str) -> tuple[float, float] | None:
-    """Length and width of the first shape."""
-    for shape in element.findall("shape/*"):
-        if shape.tag == "rectangle":
-            return real(shape.findtext("length"), place), real(shape.findtext("width"), place)
-        if shape.tag == "circle":
-            diameter_m = 2.0 * real(shape.findtext("radius"), place)
-            return diameter_m, diameter_m
-        if shape.tag == "polygon" and len(points := points_of(shape, place)) >= 3:
-            length_m, width_m = np.ptp(points, axis=0).tolist()
-            return length_m, width_m
-    return None
+def _size(element: Element, place: str) -> tuple[float, float]:
+    """Length and width of the first shape, zeros where there is none."""
+    shape = element.find("shape/*")
+    if shape is None:
+        return 0.0, 0.0
+    if shape.tag == "polygon" and len(points := points_of(shape, place)):
+        length_m, width_m = np.ptp(points, axis=0).tolist()
+        return length_m, width_m
+    if shape.tag == "circle":
+        diameter_m = 2.0 * real(shape.findtext("radius"), place)
+        return diameter_m, diameter_m
+    return real(shape.findtext("length", "0"), place), real(shape.findtext("width", "0"), place)

@@ -19,7 +19,7 @@ from pydantic import BaseModel, ConfigDict, Field, Strict, ValidationError
 from augment.checks.ground import Ground
 from augment.errors import InvalidDocument
 from augment.escaping import escape_controls
-from augment.geometry.frames import Pose, wrap
+from augment.geometry.frames import wrap
 from augment.scene.density import ExtraAgent, spawn_traffic
 from augment.scene.entities import (
     LENGTH_WIDTH_M,
@@ -192,30 +192,39 @@ def read_entry(token: str, index: str | int, entry: SpecialScenario, scene: Scen
     Raises:
         InvalidDocument: An object is nowhere near the scene.
     """
-    placer = _Placer(scene, token, index)
-    origin = scene.origin.pose
+    ground, left_out = Ground.of(scene), list[str]()
+    added: list[TrafficAgent] = []
+
+    def place(x_m: float, y_m: float, key: str, number: int) -> Point:
+        x_m, y_m = _to_local(scene, x_m, y_m)
+        away_m = math.hypot(x_m, y_m)
+        if away_m > FURTHEST_FROM_EGO_M:
+            problem = (
+                f"is {away_m:.0f} m from the ego of scene {scene.name}; more than "
+                f"{FURTHEST_FROM_EGO_M:.0f} m means another scene or another frame"
+            )
+            raise InvalidDocument(WHAT, [(place_of(token, index, key, number), problem)])
+        return x_m, y_m
+
+    def add(kind: AgentType, point: Point, heading_rad: float, **more: Any) -> None:
+        number = len(scene.everyone) + 1 + len(added)
+        lane_id = ground.graph.under(*point, heading_rad)
+        added.append(_agent(number, kind, (*point, heading_rad), lane_id, **more))
+
     for kind, key in ((AgentType.VEHICLE, "stopped_vehicle"), (AgentType.BUS, "stopped_bus")):
         for number, (x_m, y_m, yaw_rad) in enumerate(getattr(entry, key)):
-            placer.place(x_m, y_m, key, number)
-            pose = Pose(x_m=x_m, y_m=y_m, heading_rad=wrap(yaw_rad))
-            placer.add(kind, origin.pose_to_local(pose))
+            heading_rad = wrap(wrap(yaw_rad) - scene.origin.pose.heading_rad)
+            add(kind, place(x_m, y_m, key, number), heading_rad)
     for number, cone in enumerate(entry.cones):
-        x_m, y_m = placer.place(*cone, "cones", number)
-        heading_rad = cone_heading(placer.ground, x_m, y_m)
-        placer.add(AgentType.TRAFFIC_CONE, Pose(x_m=x_m, y_m=y_m, heading_rad=heading_rad))
-    left_out: list[str] = []
-    for number, (from_x_m, from_y_m, to_x_m, to_y_m, iteration) in enumerate(entry.pedestrian):
-        x_m, y_m = placer.place(from_x_m, from_y_m, "pedestrian", number)
-        end_m = placer.place(to_x_m, to_y_m, "pedestrian", number)
-        walk_m = math.hypot(end_m[0] - x_m, end_m[1] - y_m)
-        way_rad = wrap(math.atan2(end_m[1] - y_m, end_m[0] - x_m))
-        walks = walk_m > STANDING_WALK_M
-        placer.add(
-            AgentType.PEDESTRIAN,
-            Pose(x_m=x_m, y_m=y_m, heading_rad=way_rad),
-            speed_mps=round(walk_m / WALK_S, 2) if walks else 0.0,
-            walk_to_m=end_m if walks else None,
-        )
+        point = place(*cone, "cones", number)
+        add(AgentType.TRAFFIC_CONE, point, cone_heading(ground, *point))
+    for number, (x_m, y_m, to_x_m, to_y_m, iteration) in enumerate(entry.pedestrian):
+        start = place(x_m, y_m, "pedestrian", number)
+        end = place(to_x_m, to_y_m, "pedestrian", number)
+        walk_m = math.dist(start, end)
+        way_rad = wrap(math.atan2(end[1] - start[1], end[0] - start[0]))
+        walk = {"speed_mps": round(walk_m / WALK_S, 2), "walk_to_m": end}
+        add(AgentType.PEDESTRIAN, start, way_rad, **(walk if walk_m > STANDING_WALK_M else {}))
         if walk_m < _STANDS_M:
             left_out.append(f"pedestrian {number} walks 0 m, which gives it no direction")
         if iteration is not None:
@@ -223,53 +232,30 @@ def read_entry(token: str, index: str | int, entry: SpecialScenario, scene: Scen
     return ReadEntry(
         id=f"{token}-s{index}",
         type=entry.type,
-        modification=Modification(added=tuple(placer.added)),
+        modification=Modification(added=tuple(added)),
         left_out=(*left_out, *(f"key {key}" for key in entry.model_extra or {})),
     )
 
 
-class _Placer:
-    """Puts what the file names into one scene's ego frame."""
-
-    def __init__(self, scene: Scene, token: str, index: str | int) -> None:
-        self._scene, self._entry = scene, (token, index)
-        self.ground = Ground.of(scene)
-        self.added: list[TrafficAgent] = []
-
-    def place(self, x_m: float, y_m: float, key: str, number: int) -> Point:
-        """Return a place of that row under that key, which must be near the ego."""
-        x_m, y_m = _to_local(self._scene, x_m, y_m)
-        away_m = math.hypot(x_m, y_m)
-        if away_m > FURTHEST_FROM_EGO_M:
-            problem = (
-                f"is {away_m:.0f} m from the ego of scene {self._scene.name}; more than "
-                f"{FURTHEST_FROM_EGO_M:.0f} m means another scene or another frame"
-            )
-            raise InvalidDocument(WHAT, [(place_of(*self._entry, key, number), problem)])
-        return x_m, y_m
-
-    def add(
-        self,
-        kind: AgentType,
-        pose: Pose,
-        *,
-        speed_mps: float = 0.0,
-        walk_to_m: Point | None = None,
-    ) -> None:
-        length_m, width_m = LENGTH_WIDTH_M[kind]
-        agent = TrafficAgent(
-            id=f"Agent{len(self._scene.everyone) + 1 + len(self.added)}",
-            type=kind,
-            x_m=pose.x_m,
-            y_m=pose.y_m,
-            heading_rad=pose.heading_rad,
-            width_m=width_m,
-            length_m=length_m,
-            speed_mps=speed_mps,
-            lane_id=self.ground.graph.under(pose.x_m, pose.y_m, pose.heading_rad),
-            walk_to_m=walk_to_m,
-        )
-        self.added.append(agent)
+def _agent(
+    number: int,
+    kind: AgentType,
+    pose: tuple[float, float, float],
+    lane_id: str | None,
+    **more: Any,
+) -> TrafficAgent:
+    length_m, width_m = LENGTH_WIDTH_M[kind]
+    return TrafficAgent(
+        id=f"Agent{number}",
+        type=kind,
+        x_m=pose[0],
+        y_m=pose[1],
+        heading_rad=pose[2],
+        width_m=width_m,
+        length_m=length_m,
+        lane_id=lane_id,
+        **({"speed_mps": 0.0} | more),
+    )
 
 
 def traffic_of(
@@ -417,14 +403,13 @@ class _Dumper(yaml.SafeDumper):
         return True
 
 
-def _represent_quoted(dumper: _Dumper, text: _Quoted) -> yaml.ScalarNode:
-    return dumper.represent_scalar("tag:yaml.org,2002:str", str(text), style='"')
-
-
 def _represent_list(dumper: _Dumper, items: list[Any]) -> yaml.SequenceNode:
     is_row = all(isinstance(item, (float, int, type(None))) for item in items)
     return dumper.represent_sequence("tag:yaml.org,2002:seq", items, flow_style=is_row)
 
 
-_Dumper.add_representer(_Quoted, _represent_quoted)
+_Dumper.add_representer(
+    _Quoted,
+    lambda dumper, text: dumper.represent_scalar("tag:yaml.org,2002:str", str(text), style='"'),
+)
 _Dumper.add_representer(list, _represent_list)

@@ -6,7 +6,7 @@ OpenSCENARIO XML 1.2.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from datetime import UTC, datetime, time
 from typing import Any, Final
 from xml.etree import ElementTree as ET
@@ -55,32 +55,25 @@ def write(cells: Sequence[Cell]) -> Written:
 
 
 def _write_one(cell: Cell, report: LossReport) -> dict[str, bytes]:
-    road_file = f"{cell.stem}.xodr"
-    road = map_of(cell, report)
-    scenario = _scenario(cell, road_file)
-    _report(cell, report)
-    return {road_file: road, f"{cell.stem}.xosc": scenario}
-
-
-def _scenario(cell: Cell, road_file: str) -> bytes:
     from scenariogeneration import xosc
 
-    motion = cell.motion
+    road_file, motion = f"{cell.stem}.xodr", cell.motion
+    files = {road_file: map_of(cell, report)}
     everyone = (motion.ego, *motion.others)
     entities = xosc.Entities()
-    for agent in everyone:
-        entities.add_scenario_object(agent.agent.id, _entity(xosc, agent.agent))
+    for one in everyone:
+        entities.add_scenario_object(one.agent.id, _entity(xosc, one.agent))
     board = xosc.StoryBoard(_init(xosc, everyone), _at(xosc, "end", float(motion.times_s[-1])))
-    maneuvers = [
-        (agent.agent.id, maneuver)
-        for agent in everyone
-        if (maneuver := _maneuver(xosc, cell, agent)) is not None
-    ]
-    for name, maneuver in maneuvers:
-        group = xosc.ManeuverGroup(f"{name} group")
-        group.add_actor(name)
-        group.add_maneuver(maneuver)
-        board.add_maneuver_group(group, _at(xosc, f"{name} start", 0.0))
+    for one in everyone:
+        name = one.agent.id
+        maneuver = xosc.Maneuver(f"{name} maneuver")
+        for event in _events(xosc, cell, one):
+            maneuver.add_event(event)
+        if maneuver.events:
+            group = xosc.ManeuverGroup(f"{name} group")
+            group.add_actor(name)
+            group.add_maneuver(maneuver)
+            board.add_maneuver_group(group, _at(xosc, f"{name} start", 0.0))
     scenario = xosc.Scenario(
         cell.name,
         "Scenario Arena",
@@ -95,27 +88,22 @@ def _scenario(cell: Cell, road_file: str) -> bytes:
     )
     root = scenario.get_element()
     ET.indent(root)
-    return f"<?xml version='1.0' encoding='UTF-8'?>\n{ET.tostring(root, 'unicode')}\n".encode()
+    text = f"<?xml version='1.0' encoding='UTF-8'?>\n{ET.tostring(root, 'unicode')}\n"
+    _report(cell, report)
+    return files | {f"{cell.stem}.xosc": text.encode()}
 
 
 def _entity(xosc: Any, agent: TrafficAgent) -> Any:
-    height_m = _HEIGHT_M.get(agent.type, _USUAL_HEIGHT_M)
-    box = xosc.BoundingBox(
-        agent.width_m, agent.length_m, height_m, _ahead_m(agent), 0.0, height_m / 2.0
-    )
+    height_m, ahead_m = _HEIGHT_M.get(agent.type, _USUAL_HEIGHT_M), _ahead_m(agent)
+    box = xosc.BoundingBox(agent.width_m, agent.length_m, height_m, ahead_m, 0.0, height_m / 2.0)
     if agent.type in _VEHICLES:
-        base_m = 2.0 * _ahead_m(agent)
-        return xosc.Vehicle(
-            agent.id,
-            getattr(xosc.VehicleCategory, _VEHICLES[agent.type]),
-            box,
-            xosc.Axle(0.5, 0.6, agent.width_m, base_m, 0.3),
-            xosc.Axle(0.0, 0.6, agent.width_m, 0.0, 0.3),
-            _FASTEST_MPS,
-            10.0,
-            10.0,
-            mass=_MASS_KG,
+        category = getattr(xosc.VehicleCategory, _VEHICLES[agent.type])
+        front, rear = (
+            xosc.Axle(steering, 0.6, agent.width_m, at_m, 0.3)
+            for steering, at_m in ((0.5, 2.0 * ahead_m), (0.0, 0.0))
         )
+        limits = (_FASTEST_MPS, 10.0, 10.0)
+        return xosc.Vehicle(agent.id, category, box, front, rear, *limits, mass=_MASS_KG)
     if agent.type is AgentType.PEDESTRIAN:
         return xosc.Pedestrian(agent.id, 80.0, xosc.PedestrianCategory.pedestrian, box)
     category = getattr(xosc.MiscObjectCategory, _THINGS[agent.type])
@@ -139,79 +127,64 @@ def _init(xosc: Any, everyone: Sequence[Movement]) -> Any:
     """Where and how fast everybody is at t0; who comes later is not there yet."""
     init = xosc.Init()
     now = xosc.TransitionDynamics(xosc.DynamicsShapes.step, xosc.DynamicsDimension.time, 0.0)
-    for agent in everyone:
-        if appears_later(agent):
+    for one in everyone:
+        if appears_later(one):
             continue
-        name, state = agent.agent.id, agent.states[0]
-        init.add_init_action(name, xosc.TeleportAction(_position(xosc, agent.agent, state)))
-        if agent.agent.type not in _THINGS:
+        name, state = one.agent.id, one.states[0]
+        init.add_init_action(name, xosc.TeleportAction(_position(xosc, one.agent, state)))
+        if one.agent.type not in _THINGS:
             init.add_init_action(name, xosc.AbsoluteSpeedAction(float(state[3]), now))
     return init
 
 
-def _maneuver(xosc: Any, cell: Cell, movement: Movement) -> Any | None:
-    """What somebody does: come, follow a trajectory, go. None for who stands throughout."""
-    agent, present = movement.agent, movement.is_present
-    waits = agent.walk_to_m is not None and cell.drive is None
-    walk = _walk(agent) if waits else None
-    if movement.stands and walk is None:
-        return None
-    maneuver = xosc.Maneuver(f"{agent.id} maneuver")
-    seen = np.flatnonzero(present)
-    times_s = cell.motion.times_s
-    if appears_later(movement):
-        first = movement.states[seen[0]]
-        action = xosc.AddEntityAction(agent.id, _position(xosc, agent, first))
-        maneuver.add_event(_event(xosc, f"{agent.id} comes", action, float(times_s[seen[0]])))
+def _events(xosc: Any, cell: Cell, movement: Movement) -> Iterator[Any]:
+    """What somebody does: come, follow a trajectory, go. Nothing for who stands throughout."""
+    agent, times_s = movement.agent, cell.motion.times_s
+    walk = None if agent.walk_to_m is None or cell.drive is not None else _walk(agent)
     if walk is not None:
-        maneuver.add_event(_walk_event(xosc, cell, agent, *walk))
-        return maneuver
-    rows = seen[np.isfinite(times_s[seen])]
-    if len(rows) > 1:
-        action = _follow(xosc, agent, times_s[rows], movement.states[rows], is_relative=False)
-        maneuver.add_event(_event(xosc, f"{agent.id} goes on", action, float(times_s[rows[0]])))
-    if rows[-1] < len(times_s) - 1:
-        gone_s = float(times_s[rows[-1] + 1])
+        yield _event(
+            xosc,
+            f"{agent.id} walks",
+            _follow(xosc, agent, *walk, is_relative=True),
+            _near(xosc, cell, agent),
+        )
+    if walk is not None or movement.stands:
+        return
+    seen = np.flatnonzero(movement.is_present)
+    first, last = int(seen[0]), int(seen[-1])
+    if first > 0:
+        action = xosc.AddEntityAction(agent.id, _position(xosc, agent, movement.states[first]))
+        yield _event(xosc, f"{agent.id} comes", action, float(times_s[first]))
+    if len(seen) > 1:
+        action = _follow(xosc, agent, times_s[seen], movement.states[seen], is_relative=False)
+        yield _event(xosc, f"{agent.id} goes on", action, float(times_s[first]))
+    if last < len(times_s) - 1:
         action = xosc.DeleteEntityAction(agent.id)
-        maneuver.add_event(_event(xosc, f"{agent.id} is gone", action, gone_s))
-    return maneuver
+        yield _event(xosc, f"{agent.id} is gone", action, float(times_s[last + 1]))
 
 
 def _walk(agent: TrafficAgent) -> tuple[FloatArray, FloatArray] | None:
     """Times from setting out on and states at the two ends; None for a walk of no length."""
-    assert agent.walk_to_m is not None
-    way = np.array(agent.walk_to_m) - (agent.x_m, agent.y_m)
-    length_m = float(np.hypot(*way))
-    pace_mps = walking_pace_mps(agent)
+    ends = np.array([(agent.x_m, agent.y_m), agent.walk_to_m], dtype=np.float64)
+    east_m, north_m = ends[1] - ends[0]
+    length_m, pace_mps = float(np.hypot(east_m, north_m)), walking_pace_mps(agent)
     if length_m < 1e-6 or pace_mps <= 0.0:
         return None
-    heading_rad = math.atan2(way[1], way[0])
-    ends = [(agent.x_m, agent.y_m), agent.walk_to_m]
-    states = np.array([(x, y, heading_rad, pace_mps) for x, y in ends], dtype=np.float64)
-    return np.array([0.0, length_m / pace_mps]), states
+    state = [math.atan2(north_m, east_m), pace_mps]
+    return np.array([0.0, length_m / pace_mps]), np.column_stack([ends, [state, state]])
 
 
-def _walk_event(
-    xosc: Any, cell: Cell, agent: TrafficAgent, times_s: FloatArray, states: FloatArray
-) -> Any:
-    near = xosc.EntityTrigger(
-        f"{agent.id} sees the ego",
-        0.0,
-        xosc.ConditionEdge.none,
-        xosc.RelativeDistanceCondition(
-            SETS_OUT_WITHIN_M,
-            xosc.Rule.lessThan,
-            xosc.RelativeDistanceType.euclidianDistance,
-            cell.after.ego.id,
-            freespace=False,
-        ),
-        agent.id,
+def _near(xosc: Any, cell: Cell, agent: TrafficAgent) -> Any:
+    """The moment at which the ego is near."""
+    distance = xosc.RelativeDistanceCondition(
+        SETS_OUT_WITHIN_M,
+        xosc.Rule.lessThan,
+        xosc.RelativeDistanceType.euclidianDistance,
+        cell.after.ego.id,
+        freespace=False,
     )
-    event = xosc.Event(f"{agent.id} walks", xosc.Priority.parallel)
-    event.add_trigger(near)
-    action = _follow(xosc, agent, times_s, states, is_relative=True)
-    event.add_action(f"{agent.id} walks action", action)
-    return event
+    name = f"{agent.id} sees the ego"
+    return xosc.EntityTrigger(name, 0.0, xosc.ConditionEdge.none, distance, agent.id)
 
 
 def _follow(
@@ -224,9 +197,10 @@ def _follow(
     return xosc.FollowTrajectoryAction(trajectory, xosc.FollowingMode.position, domain, 1, 0)
 
 
-def _event(xosc: Any, name: str, action: Any, at_s: float) -> Any:
+def _event(xosc: Any, name: str, action: Any, begins: Any) -> Any:
+    """An event that begins at a time or by a trigger."""
     event = xosc.Event(name, xosc.Priority.parallel)
-    event.add_trigger(_at(xosc, name, at_s))
+    event.add_trigger(_at(xosc, name, begins) if isinstance(begins, float) else begins)
     event.add_action(f"{name} action", action)
     return event
 
@@ -245,7 +219,6 @@ def _report(cell: Cell, report: LossReport) -> None:
     report_motion(cell, report, can_trigger=True)
     names = [other.agent.id for other in cell.motion.others if has_gaps(other)]
     report.lose_of(names, "goes and comes back; goes straight on in between")
-    for kind in (AgentType.TRAFFIC_CONE, AgentType.CONSTRUCTION_SIGN, AgentType.GENERIC_OBJECT):
-        names = [other.agent.id for other in cell.motion.others if other.agent.type is kind]
-        report.lose_of(names, f"a {kind} becomes an obstacle")
+    obstacles = [kind for kind, name in _THINGS.items() if name == "obstacle"]
+    report.lose_types({kind: f"a {kind} becomes an obstacle" for kind in obstacles})
     report.lose("heights, masses and axles are not known; usual ones are written")

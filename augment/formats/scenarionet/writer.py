@@ -6,26 +6,31 @@ description of the format in MetaDrive's `scenario_description.py` and `type.py`
 """
 
 import pickle
-import pickletools
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from augment.formats.writing import Cell, LossReport, Written, bounds_of, report_motion, write_each
+from augment.formats.writing import (
+    Cell,
+    LossReport,
+    Written,
+    bounds_of,
+    report_motion,
+    ways_of,
+    write_each,
+)
 from augment.scene.entities import (
     AgentType,
-    Area,
     AreaKind,
     Lane,
     LaneConnector,
     Scene,
     TrafficLight,
-    TurnType,
+    TrafficSide,
 )
-from augment.scene.lane_graph import AnyLane, LaneGraph, turn_type_of
+from augment.scene.lane_graph import LaneGraph, turn_type_of
 from augment.scene.motion import Movement
 
 VERSION = "scenario-arena 1"
@@ -43,13 +48,9 @@ _TYPES = {
     AgentType.CONSTRUCTION_SIGN: "TRAFFIC_OBJECT",
     AgentType.GENERIC_OBJECT: "TRAFFIC_OBJECT",
 }
-_SAME_TYPE = {
-    AgentType.VEHICLE,
-    AgentType.BICYCLE,
-    AgentType.PEDESTRIAN,
-    AgentType.TRAFFIC_CONE,
-    AgentType.BARRIER,
-    AgentType.GENERIC_OBJECT,
+_BECOMES = {
+    kind: f"a {kind} becomes a {_TYPES[kind]}"
+    for kind in (AgentType.BUS, AgentType.CONSTRUCTION_SIGN)
 }
 _LIGHTS = {
     TrafficLight.GREEN: "TRAFFIC_LIGHT_GREEN",
@@ -65,10 +66,6 @@ _HEIGHTS_M = {
     AgentType.BARRIER: 1.0,
 }
 _HEIGHT_M = 1.777
-_OLD_NAMES = {
-    "numpy._core.multiarray _reconstruct": "numpy.core.multiarray _reconstruct",
-    "numpy._core.multiarray scalar": "numpy.core.multiarray scalar",
-}
 
 
 def write(cells: Sequence[Cell]) -> Written:
@@ -94,7 +91,6 @@ def describe(cell: Cell, report: LossReport) -> dict[str, Any]:
     scene, motion = cell.after, cell.motion
     steps = len(motion.times_s)
     _report(cell, report)
-    tracks = {one.agent.id: _track(one) for one in (motion.ego, *motion.others)}
     return {
         "id": cell.stem,
         "version": VERSION,
@@ -113,10 +109,8 @@ def describe(cell: Cell, report: LossReport) -> dict[str, Any]:
             "tracks_to_predict": {},
             "traffic_side": scene.traffic_side.value,
             "provenance": scene.provenance,
-            "object_summary": {name: _summary(name, track) for name, track in tracks.items()},
-            "number_summary": {"num_objects": len(tracks)},
         },
-        "tracks": tracks,
+        "tracks": {one.agent.id: _track(one) for one in (motion.ego, *motion.others)},
         "dynamic_map_states": {
             connector.id: _light(connector, steps)
             for connector in scene.connectors
@@ -128,59 +122,32 @@ def describe(cell: Cell, report: LossReport) -> dict[str, Any]:
 
 def write_pickle(document: object) -> bytes:
     """The pickle, its names those of numpy 1."""
-    # Protocol 3 writes a name as a line of text, so that one can be put in place of another.
+    # Protocol 3 writes the module of a name as text, so that another can be put in its place.
     packed = pickle.dumps(document, protocol=3)
-    parts, done = [], 0
-    for code, name, start in pickletools.genops(packed):
-        if start is None or code.name != "GLOBAL" or name not in _OLD_NAMES:
-            continue
-        module, _, attribute = _OLD_NAMES[name].partition(" ")
-        parts += [packed[done:start], f"c{module}\n{attribute}\n".encode()]
-        done = start + len(f"c{name}\n")
-    return b"".join([*parts, packed[done:]])
+    return packed.replace(b"cnumpy._core.multiarray\n", b"cnumpy.core.multiarray\n")
 
 
 # Private
 
 
 def _report(cell: Cell, report: LossReport) -> None:
-    scene = cell.after
+    scene, connectors = cell.after, cell.after.connectors
     report_motion(cell, report)
-    for kind in AgentType:
-        if kind in _SAME_TYPE or kind is AgentType.EGO_VEHICLE:
-            continue
-        names = [other.agent.id for other in cell.motion.others if other.agent.type is kind]
-        report.lose_of(names, f"a {kind} becomes a {_TYPES[kind]}")
-    for area_kind in AreaKind:
-        if area_kind not in _AREAS:
-            names = [area.id for area in scene.areas if area.kind is area_kind]
-            report.lose_of(names, f"left out: there is no type for a {area_kind} area")
+    report.lose_types(_BECOMES)
+    text = "left out: there is no type for a {} area"
+    report.lose_areas([area for area in scene.areas if area.kind not in _AREAS], text)
     names = [agent.id for agent in scene.agents if agent.walk_to_m is not None]
     report.lose_of(names, "the walk is written as motion alone, not as its end point")
-    _report_map(scene, report)
-    if scene.traffic_side.value == "left":
+    odd = [one.id for one in connectors if one.turn_type is not turn_type_of(one.centerline)]
+    report.lose_of(odd, "the turn type is not said, and the line looks otherwise")
+    dark = [one.id for one in connectors if one.traffic_light is TrafficLight.NONE]
+    report.lose_of(dark, "that it has no light is not said")
+    if any(way.left_boundary or way.right_boundary for way in ways_of(scene)):
+        report.lose("the edges of lanes are written as outlines, not as a left and a right one")
+    if scene.traffic_side is TrafficSide.LEFT:
         report.lose("that people drive on the left stands in the metadata, where few stacks look")
     report.lose("heights are not known; those usual for the types are written")
     report.lose("the origin in the source's own frame is not written; the ego's place at t0 is 0")
-
-
-def _report_map(scene: Scene, report: LossReport) -> None:
-    for turn in TurnType:
-        names = [
-            connector.id
-            for connector in scene.connectors
-            if connector.turn_type is turn is not turn_type_of(connector.centerline)
-        ]
-        report.lose_of(names, f"the turn type {turn} is not said, and the line looks otherwise")
-    names = [
-        connector.id
-        for connector in scene.connectors
-        if connector.traffic_light is TrafficLight.NONE
-    ]
-    report.lose_of(names, "that it has no light is not said")
-    ways: list[AnyLane] = [*scene.lanes, *scene.connectors]
-    if any(way.left_boundary or way.right_boundary for way in ways):
-        report.lose("the edges of lanes are written as outlines, not as a left and a right one")
 
 
 def _track(movement: Movement) -> dict[str, Any]:
@@ -212,21 +179,6 @@ def _track(movement: Movement) -> dict[str, Any]:
     }
 
 
-def _summary(name: str, track: dict[str, Any]) -> dict[str, Any]:
-    valid = track["state"]["valid"]
-    seen = track["state"]["position"][valid, :2]
-    first = int(valid.argmax()) if valid.any() else len(valid)
-    gone = np.flatnonzero(~valid[first:])
-    return {
-        "type": track["type"],
-        "object_id": name,
-        "track_length": len(valid),
-        "moving_distance": float(np.hypot(*np.diff(seen, axis=0).T).sum()),
-        "valid_length": int(valid.sum()),
-        "continuous_valid_length": int(gone[0]) if len(gone) else len(valid) - first,
-    }
-
-
 def _light(connector: LaneConnector, steps: int) -> dict[str, Any]:
     start = connector.centerline.points_m[0]
     return {
@@ -246,40 +198,23 @@ def _light(connector: LaneConnector, steps: int) -> dict[str, Any]:
 def _map_features(scene: Scene) -> dict[str, dict[str, Any]]:
     graph = LaneGraph(scene)
     features: dict[str, dict[str, Any]] = {}
-    ways: list[AnyLane] = [*scene.lanes, *scene.connectors]
-    for way in ways:
-        is_lane = isinstance(way, Lane)
-        feature: dict[str, Any] = {
-            "type": "LANE_SURFACE_STREET" if is_lane else "LANE_SURFACE_UNSTRUCTURE",
-            "polyline": _raised(way.centerline.points_m),
-            "polygon": _polygon(way),
-            "width": np.tile([way.width_m / 2.0] * 2, (len(way.centerline.points_m), 1)),
+    for way in ways_of(scene):
+        points_m, (left, right) = way.centerline.points_m, bounds_of(way)
+        beside = (way.left_neighbor, way.right_neighbor) if isinstance(way, Lane) else (None, None)
+        features[way.id] = {
+            "type": "LANE_SURFACE_STREET" if isinstance(way, Lane) else "LANE_SURFACE_UNSTRUCTURE",
+            "polyline": np.column_stack([points_m, np.zeros(len(points_m))]),
+            "polygon": np.vstack([left.points_m, right.points_m[::-1]]),
+            "width": np.tile([way.width_m / 2.0] * 2, (len(points_m), 1)),
             "entry_lanes": list(graph.predecessors(way.id)),
             "exit_lanes": list(graph.successors(way.id)),
-            "left_neighbor": _named(way.left_neighbor) if isinstance(way, Lane) else [],
-            "right_neighbor": _named(way.right_neighbor) if isinstance(way, Lane) else [],
+            "left_neighbor": [name for name in beside[:1] if name],
+            "right_neighbor": [name for name in beside[1:] if name],
         }
         if way.speed_limit_mps is not None:
-            feature["speed_limit_kmh"] = way.speed_limit_mps * 3.6
-        features[way.id] = feature
+            features[way.id]["speed_limit_kmh"] = way.speed_limit_mps * 3.6
     for area in scene.areas:
         if area.kind in _AREAS:
-            features[area.id] = {"type": _AREAS[area.kind], "polygon": _ring(area)}
+            ring = np.array([*area.boundary_m], dtype=np.float64)
+            features[area.id] = {"type": _AREAS[area.kind], "polygon": ring}
     return features
-
-
-def _named(name: str | None) -> list[str]:
-    return [] if name is None else [name]
-
-
-def _raised(points_m: NDArray[np.float64]) -> NDArray[np.float64]:
-    return np.column_stack([points_m, np.zeros(len(points_m))])
-
-
-def _ring(area: Area) -> NDArray[np.float64]:
-    return np.array([*area.boundary_m], dtype=np.float64)
-
-
-def _polygon(way: AnyLane) -> NDArray[np.float64]:
-    left, right = bounds_of(way)
-    return np.vstack([left.points_m, right.points_m[::-1]])

@@ -7,8 +7,7 @@ payload's checksum (4); `scenario.proto` has the parts of the message that are r
 """
 
 import struct
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -16,44 +15,40 @@ import google_crc32c
 import numpy as np
 from google.protobuf.message import DecodeError
 
-from augment.errors import InvalidDocument
-from augment.formats.reading import Log, LoggedTrack, Moment, Reading, moments_of, reading_at
-from augment.formats.road_map import (
-    FURTHEST_M,
-    WIDEST_M,
+from augment.formats.reading import Log, LoggedTrack, Reader
+from augment.formats.road_map import WIDEST_M, RoadMap, Segment, edge_of, left_out_notes, width_of
+from augment.formats.values import (
     FloatArray,
-    Name,
-    RoadMap,
-    Segment,
-    crossing_segments,
-    edge_of,
-    fill_widths,
-    left_out_notes,
-    map_notes,
-    width_of,
+    fault_at,
+    look_up,
+    read_finite,
+    read_numbers,
+    read_times,
 )
 from augment.formats.waymo.scenario_pb2 import Scenario
 from augment.scene.entities import AgentType, AreaKind, TrafficLight
 from augment.scene.recording import SceneNoteKind
 
-WHAT = "Waymo Open Motion file"
 LICENCE = "Waymo Open Dataset licence, non-commercial use"
 UNSET = 0
 TYPE_OF = {
+    UNSET: AgentType.GENERIC_OBJECT,
     1: AgentType.VEHICLE,
     2: AgentType.PEDESTRIAN,
     3: AgentType.BICYCLE,
     4: AgentType.GENERIC_OBJECT,
 }
+AREA_OF = {"crosswalk": AreaKind.CROSSWALK, "driveway": AreaKind.DRIVABLE}
 BICYCLE_LANE = 3
 MPS_OF_MPH = 0.44704
 _RED, _YELLOW, _GREEN = TrafficLight.RED, TrafficLight.YELLOW, TrafficLight.GREEN
 LIGHT_OF = dict(enumerate((_RED, _YELLOW, _GREEN, _RED, _YELLOW, _GREEN, _RED, _YELLOW), start=1))
 """LANE_STATE_*: arrows and round lights alike; flashing ones as what they ask for."""
 _HEAD, _FOOT = struct.Struct("<QI"), struct.Struct("<I")
+_STATE = ("center_x", "center_y", "heading", "velocity_x", "velocity_y", "length", "width")
 
 
-class WaymoMotion:
+class WaymoMotion(Reader):
     """The reader of scenario TFRecords."""
 
     name = "waymo"
@@ -67,39 +62,36 @@ class WaymoMotion:
             head = file.read(_HEAD.size)
         return len(head) == _HEAD.size and masked_crc32c(head[:8]) == _HEAD.unpack(head)[1]
 
-    def moments(self, path: Path, *, every_s: float) -> Iterator[Moment]:
-        """Each record's steps."""
-        for number, payload in read_records(path):
-            yield from moments_of(_log(read_scenario(payload)), every_s, str(number))
-
-    def read(self, path: Path, *, item: str | None, frame: int | None, name: str) -> Reading:
-        """The scene at one step of one record."""
-        given = item or "0"
-        if not (given.isascii() and given.isdecimal() and len(given) < 10):
-            raise _fault("item", f"{item!r} is no number of a record, from 0")
-        for number, payload in read_records(path, only=int(given)):
+    def logs(self, path: Path, item: str | None) -> Iterator[Log]:
+        """One of each record."""
+        for number, payload in read_records(path, only=item):
             scenario = read_scenario(payload)
-            log, step = _log(scenario), scenario.current_time_index if frame is None else frame
-            unset = sum(track.object_type == UNSET for track in scenario.tracks)
-            return reading_at(
-                log,
-                step,
-                city_of(scenario, step),
-                name=name,
+            tracks = [_track(index, track) for index, track in enumerate(scenario.tracks)]
+            times_s = read_times(scenario.timestamps_seconds, "timestamps_seconds")
+            for one in tracks:
+                if len(one.states) != len(times_s):
+                    text = f"has {len(one.states)} states for {len(times_s)} times"
+                    raise fault_at(f"track {one.name}", text)
+            ego = look_up(dict(enumerate(tracks)), scenario.sdc_track_index, "sdc_track_index")
+            kinds = [track.object_type for track in scenario.tracks]
+            yield Log(
+                times_s=times_s,
+                ego=ego,
+                tracks=[
+                    one
+                    for one, kind in zip(tracks, kinds, strict=True)
+                    if one is not ego and kind != UNSET and np.isfinite(one.states).any()
+                ],
+                map_at=lambda frame, scenario=scenario: city_of(scenario, frame),  # type: ignore[misc]
                 world="Waymo Open Motion scenario frame",
-                provenance=(
-                    f"Waymo Open Motion data set, {path.name}, scenario {_id(scenario)}, step "
-                    f"{step} of {len(log.times_s)}; {LICENCE}"
-                ),
+                title=f"Waymo Open Motion data set, {path.name}, scenario {_id(scenario)}",
                 licence=LICENCE,
-                notes=left_out_notes(SceneNoteKind.OBJECTS_LEFT_OUT, {"TYPE_UNSET": unset}),
                 item=str(number),
+                frame=scenario.current_time_index,
+                notes=left_out_notes(
+                    SceneNoteKind.OBJECTS_LEFT_OUT, {"TYPE_UNSET": kinds.count(UNSET)}
+                ),
             )
-        raise _fault("item", f"the file has no record {given}")
-
-
-def _fault(place: str, text: str) -> InvalidDocument:
-    return InvalidDocument(WHAT, [(place, text)])
 
 
 # Records and messages
@@ -111,7 +103,7 @@ def masked_crc32c(block: bytes) -> int:
     return (((crc >> 15) | (crc << 17)) + 0xA282EAD8) & 0xFFFFFFFF
 
 
-def read_records(path: Path, *, only: int | None = None) -> Iterator[tuple[int, bytes]]:
+def read_records(path: Path, *, only: str | None = None) -> Iterator[tuple[int, bytes]]:
     """Yield each record's number and payload.
 
     Args:
@@ -121,227 +113,114 @@ def read_records(path: Path, *, only: int | None = None) -> Iterator[tuple[int, 
     Raises:
         InvalidDocument: A length, a checksum or the end of the file is wrong.
     """
-    number, place, size = 0, 0, path.stat().st_size
+    number, size = 0, path.stat().st_size
     with path.open("rb") as file:
-        while place < size:
+        while file.tell() < size:
             record = f"{path.name}: record {number}"
             head = file.read(_HEAD.size)
             if len(head) < _HEAD.size:
-                raise _fault(record, "is cut off in its length")
+                raise fault_at(record, "is cut off in its length")
             length, check = _HEAD.unpack(head)
             if masked_crc32c(head[:8]) != check:
-                raise _fault(record, "has a length with a wrong checksum")
-            end = place + _HEAD.size + length + _FOOT.size
+                raise fault_at(record, "has a length with a wrong checksum")
+            end = file.tell() + length + _FOOT.size
             if end > size:
-                raise _fault(record, f"is cut off: {end - size} bytes of it are missing")
-            if only in (None, number):
+                raise fault_at(record, f"is cut off: {end - size} bytes of it are missing")
+            if only in (None, str(number)):
                 payload = file.read(length)
                 (check,) = _FOOT.unpack(file.read(_FOOT.size))
                 if masked_crc32c(payload) != check:
-                    raise _fault(record, "has a payload with a wrong checksum")
+                    raise fault_at(record, "has a payload with a wrong checksum")
                 yield number, payload
-                if only is not None:
-                    return
             file.seek(end)
-            number, place = number + 1, end
+            number += 1
 
 
 def read_scenario(payload: bytes) -> Any:
     """Return the message of a record.
 
     Raises:
-        InvalidDocument: It is no Scenario.
+        InvalidDocument: It is none.
     """
     try:
         return Scenario.FromString(payload)
     except DecodeError as fault:
-        raise _fault("message", f"is broken: {fault}") from None
+        raise fault_at("message", f"is broken: {fault}") from None
 
 
 def _id(scenario: Any) -> str:
-    try:
-        text: str = scenario.scenario_id.decode("ascii")
-    except UnicodeDecodeError:
-        raise _fault("scenario_id", "is no plain text") from None
-    return text
+    return str(scenario.scenario_id[:100].decode("ascii", errors="replace"))
 
 
-def _log(scenario: Any) -> Log:
-    times_s = np.array(scenario.timestamps_seconds)
-    if not len(times_s) or not np.isfinite(times_s).all() or (np.diff(times_s) <= 0.0).any():
-        raise _fault("timestamps_seconds", "must be there and ascend")
-    ego_index = scenario.sdc_track_index
-    if not 0 <= ego_index < len(scenario.tracks):
-        text = f"{ego_index} is none of the {len(scenario.tracks)} tracks"
-        raise _fault("sdc_track_index", text)
-    tracks = []
-    for index, track in enumerate(scenario.tracks):
-        place, kind = f"tracks[{index}]", track.object_type
-        if len(track.states) != len(times_s):
-            raise _fault(place, f"has {len(track.states)} states for {len(times_s)} times")
-        if kind not in TYPE_OF and kind != UNSET:
-            raise _fault(f"{place}.object_type", f"{kind} is unknown; known: 0 to 4")
-        tracks.append(_track(track))
-    ego = tracks[ego_index]
-    return Log(
-        what=WHAT,
-        times_s=times_s - times_s[0],
-        ego=ego.states,
-        ego_length_m=ego.length_m,
-        ego_width_m=ego.width_m,
-        tracks=tuple(
-            made
-            for made, track in zip(tracks, scenario.tracks, strict=True)
-            if made is not ego and track.object_type != UNSET and np.isfinite(made.states).any()
-        ),
-    )
-
-
-def _track(track: Any) -> LoggedTrack:
+def _track(index: int, track: Any) -> LoggedTrack:
     """The track; boxes change a little from step to step, the usual one is taken."""
-    names = ("center_x", "center_y", "heading", "velocity_x", "velocity_y", "length", "width")
-    rows = [[getattr(state, name) for name in names] for state in track.states]
-    columns = np.array(rows, dtype=np.float64).reshape(-1, len(names))
+    kind = look_up(TYPE_OF, track.object_type, f"tracks[{index}].object_type")
+    rows = [[getattr(state, name) for name in _STATE] for state in track.states]
+    columns = read_numbers(rows, f"tracks[{index}]", len(_STATE))
     valid = np.array([state.valid for state in track.states], dtype=bool)
     states = np.column_stack([columns[:, :3], np.hypot(columns[:, 3], columns[:, 4])])
     states[~(valid & np.isfinite(states).all(axis=1))] = np.nan
-    length_m, width_m = (
-        np.median(columns[valid, 5:], axis=0).tolist() if valid.any() else (0.0, 0.0)
-    )
+    sizes_m = np.median(columns[valid, 5:], axis=0).tolist() if valid.any() else (0.0, 0.0)
     return LoggedTrack(
-        name=f"{track.id:012d}",
-        type=TYPE_OF.get(track.object_type, AgentType.GENERIC_OBJECT),
-        length_m=length_m,
-        width_m=width_m,
-        states=states,
+        name=f"{track.id:012d}", type=kind, length_m=sizes_m[0], width_m=sizes_m[1], states=states
     )
 
 
 # The map
 
 
-@dataclass(slots=True, kw_only=True)
-class MapFeatures:
-    """The map of a scenario, by the features' ids.
-
-    Attributes:
-        lanes: The messages, and lines: their middles (P, 2).
-        edges: Road lines and road edges (P, 2).
-        polygons: Crosswalks, speed bumps and driveways (P, 2) by these names.
-    """
-
-    lanes: dict[int, Any] = field(default_factory=dict)
-    lines: dict[int, FloatArray] = field(default_factory=dict)
-    edges: dict[int, FloatArray] = field(default_factory=dict)
-    polygons: list[tuple[str, FloatArray]] = field(default_factory=list)
-    stop_signs: int = 0
-
-
 def city_of(scenario: Any, frame: int) -> RoadMap:
     """Return the map with the lights of one step.
-
-    A lane lies in an intersection if it interpolates between others, if a light controls it, if
-    no line bounds it on either side while others begin where it begins or end where it ends, or
-    if it is of a fork or merge and crosses another lane.
 
     Raises:
         InvalidDocument: A point is nowhere on earth.
     """
-    features = _features(scenario)
-    lanes = {
-        key: lane
-        for key, lane in features.lanes.items()
-        if lane.type != BICYCLE_LANE and len(features.lines[key]) >= 2
-    }
+    lanes, edges, areas = dict[int, Any](), dict[int, FloatArray](), []
+    left_out = {"bicycle lanes": 0, "speed bumps": 0, "stop signs": 0}
+    for feature in scenario.map_features:
+        kind = feature.WhichOneof("feature_data")
+        if kind == "lane" and feature.lane.type == BICYCLE_LANE:
+            left_out["bicycle lanes"] += 1
+        elif kind == "lane" and len(feature.lane.polyline) >= 2:
+            lanes[feature.id] = feature.lane
+        elif kind in ("road_line", "road_edge"):
+            edges[feature.id] = _points(getattr(feature, kind).points)
+        elif kind in ("speed_bump", "stop_sign"):
+            left_out[f"{kind.replace('_', ' ')}s"] += 1
+        elif kind in AREA_OF:
+            polygon = _points(getattr(feature, kind).points)
+            if len(np.unique(polygon, axis=0)) >= 3:
+                areas.append((AREA_OF[kind], polygon))
     states = [step.lane_states for step in scenario.dynamic_map_states]
     lights = {one.lane: one.state for one in states[frame]} if frame < len(states) else {}
     controlled = {one.lane for step in states for one in step}
-    built: dict[Name, Segment] = {
-        key: _segment(features, key, lights.get(key, 0)) for key in lanes
-    }
-    crossing: set[Name] = {
-        key for key, lane in lanes.items() if lane.interpolating or key in controlled
-    }
-    crossing |= _unbounded_joints(lanes) | crossing_segments(built)
-    segments, assumed = fill_widths(
-        replace(one, crosses=key in crossing) for key, one in built.items()
-    )
-    bumps = sum(kind == "speed_bump" for kind, _ in features.polygons)
-    bicycle_lanes = sum(lane.type == BICYCLE_LANE for lane in features.lanes.values())
     return RoadMap(
-        what=WHAT,
         place="map_features",
-        segments=segments,
-        areas=tuple(
-            (AreaKind.CROSSWALK if kind == "crosswalk" else AreaKind.DRIVABLE, polygon)
-            for kind, polygon in features.polygons
-            if kind != "speed_bump" and len(np.unique(polygon, axis=0)) >= 3
+        segments=tuple(
+            _segment(key, lane, edges, lights.get(key, 0), key in controlled)
+            for key, lane in lanes.items()
         ),
-        notes=map_notes(
-            segments,
-            assumed=assumed,
-            there={
-                SceneNoteKind.NO_INTERSECTIONS: bool(crossing),
-                SceneNoteKind.NO_LIGHTS: bool(controlled),
-                SceneNoteKind.NO_WALKWAYS: False,
-            },
-            counts={SceneNoteKind.BICYCLE_LANES_LEFT_OUT: bicycle_lanes},
-            left_out={"speed bumps": bumps, "stop signs": features.stop_signs},
-        ),
+        areas=tuple(areas),
+        left_out=left_out,
+        tells_crossings=False,
     )
-
-
-def _features(scenario: Any) -> MapFeatures:
-    features = MapFeatures()
-    for feature in scenario.map_features:
-        kind = feature.WhichOneof("feature_data")
-        if kind == "lane":
-            features.lanes[feature.id] = feature.lane
-            features.lines[feature.id] = _points(feature.lane.polyline)
-        elif kind in ("road_line", "road_edge"):
-            features.edges[feature.id] = _points(getattr(feature, kind).points)
-        elif kind == "stop_sign":
-            features.stop_signs += 1
-        elif kind is not None:
-            features.polygons.append((kind, _points(getattr(feature, kind).points)))
-    return features
 
 
 def _points(points: Iterable[Any]) -> FloatArray:
-    made = np.array([(point.x, point.y) for point in points], dtype=np.float64).reshape(-1, 2)
-    if not (np.abs(made) <= FURTHEST_M).all():
-        text = f"has a point that is not finite or beyond {FURTHEST_M:.0e} m"
-        raise _fault("map_features", text)
-    return made
+    return read_finite([(point.x, point.y) for point in points], "map_features", 2)
 
 
-def _unbounded_joints(lanes: dict[int, Any]) -> set[Name]:
-    exits = {key: len(lane.exit_lanes) for key, lane in lanes.items()}
-    entries = {key: len(lane.entry_lanes) for key, lane in lanes.items()}
-    return {
-        key
-        for key, lane in lanes.items()
-        if not (lane.left_boundaries or lane.right_boundaries)
-        and (
-            any(exits.get(before, 0) > 1 for before in lane.entry_lanes)
-            or any(entries.get(after, 0) > 1 for after in lane.exit_lanes)
-        )
-    }
-
-
-def _segment(features: MapFeatures, key: int, light: int) -> Segment:
-    lane, line = features.lanes[key], features.lines[key]
+def _segment(
+    key: int, lane: Any, edges: Mapping[int, FloatArray], light: int, is_controlled: bool
+) -> Segment:
+    line = _points(lane.polyline)
     left, right = (
         edge_of(
             line,
             [
-                (
-                    part.lane_start_index,
-                    part.lane_end_index,
-                    features.edges[part.boundary_feature_id],
-                )
+                (part.lane_start_index, part.lane_end_index, edges[part.boundary_feature_id])
                 for part in boundaries
-                if part.boundary_feature_id in features.edges
+                if part.boundary_feature_id in edges
             ],
         )
         for boundaries in (lane.left_boundaries, lane.right_boundaries)
@@ -351,10 +230,11 @@ def _segment(features: MapFeatures, key: int, light: int) -> Segment:
     has_limit = np.isfinite(limit) and limit > 0.0
     return Segment(
         name=key,
+        crosses=lane.interpolating or is_controlled,
         centerline=line,
         left=left if is_whole else None,
         right=right if is_whole else None,
-        width_m=width_of(line, left, right) or _beside_m(features, key),
+        width_m=width_of(line, left, right),
         successors=tuple(lane.exit_lanes),
         predecessors=tuple(lane.entry_lanes),
         left_neighbors=tuple(one.feature_id for one in lane.left_neighbors),
@@ -370,17 +250,3 @@ def _is_whole_edge(line: FloatArray, edge: FloatArray) -> bool:
         return False
     is_near = np.hypot(*(edge - line).T).max() <= WIDEST_M
     return bool(is_near and np.hypot(*np.diff(edge, axis=0).T).sum() > 0.5)
-
-
-def _beside_m(features: MapFeatures, key: int) -> float | None:
-    """How far the lanes beside it are, which is as wide as a lane."""
-    lane, line = features.lanes[key], features.lines[key]
-    for neighbor in (*lane.left_neighbors, *lane.right_neighbors):
-        other = features.lines.get(neighbor.feature_id)
-        if other is not None and len(other) >= 2:
-            beside = edge_of(line, [(0, len(line), other)])
-            # `width_of` doubles what is known of one side: half the way to the lane beside.
-            width_m = width_of(line, (line + beside) / 2.0, np.full(line.shape, np.nan))
-            if width_m is not None:
-                return width_m
-    return None

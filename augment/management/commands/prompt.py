@@ -6,8 +6,9 @@ from typing import Any
 
 from django.core.management.base import CommandError
 
-from augment.prompts.fill import prompt_version
-from augment.services.scenarios.prompts import prompt_of
+from augment.errors import UnknownName
+from augment.models import Scenario
+from augment.services.scenarios.prompts import preview_prompt, prompt_version
 from augment.services.terminal import TerminalCommand
 from augment.variants.respondents import ModelRole
 
@@ -36,10 +37,14 @@ class Command(TerminalCommand):
 
     def handle(self, *args: Any, **options: Any) -> None:
         """Print the messages, then what is known about them."""
-        shown = prompt_of(
-            scenario=options["scenario"],
+        slug, rows = options["scenario"], Scenario.objects.select_related("base_scene")
+        scenario = rows.filter(slug=slug).first()
+        if scenario is None:
+            raise UnknownName("scenario", slug, list(rows.values_list("slug", flat=True)))
+        shown = preview_prompt(
+            scenario,
             variant=options["variant"],
-            role=ModelRole(options["role"]),
+            role=options["role"],
             native_tools=options["native_tools"],
         )
         pictures = [png for message in shown.messages for png in message.images]

@@ -1,6 +1,5 @@
 """Have a language model read what a scenario's instruction asks for, and accept what it read."""
 
-from argparse import ArgumentParser
 from pathlib import Path
 from typing import Any
 
@@ -10,9 +9,7 @@ from augment.formats.documents import read_json
 from augment.models import IntentReading
 from augment.scene.codec import intent_from_document
 from augment.scene.intent_statements import list_statements
-from augment.services.inputs import add_options, inputs_of, read_request
-from augment.services.running.budget import NO_CAPS, Caps
-from augment.services.running.intent_readings import USUAL_CAPS, read_intent
+from augment.services.running.intent_readings import read_intent
 from augment.services.scenarios.editing import accept_reading, enter_intent
 from augment.services.terminal import TerminalCommand
 
@@ -26,37 +23,26 @@ class Command(TerminalCommand):
         "or with --enter and a mended file."
     )
 
-    def add_arguments(self, parser: ArgumentParser) -> None:
-        """Who is asked, or what counts."""
-        parser.add_argument("scenario", help="a slug")
-        parser.add_argument("--endpoint", help="the label of an endpoint")
-        parser.add_argument("--model", help="the model id on the endpoint")
-        add_options(parser, inputs_of(Caps))
-        parser.add_argument("--fresh", action="store_true", help="ask anew what was answered")
-        parser.add_argument(
-            "--accept", action="store_true", help="let the last reading count from now on"
-        )
-        parser.add_argument(
-            "--enter", type=Path, metavar="FILE", help="let the intent of a file count instead"
-        )
+    arguments = {
+        "scenario": {"help": "a slug"},
+        "--endpoint": {"help": "the label of an endpoint"},
+        "--model": {"help": "the model id on the endpoint"},
+        "--accept": {"action": "store_true", "help": "let the last reading count from now on"},
+        "--enter": {
+            "type": Path,
+            "metavar": "FILE",
+            "help": "let the intent of a file count instead",
+        },
+    }
 
     def handle(self, *args: Any, **options: Any) -> None:
         """Do one of the three, and print the statements of what was read or counts now."""
         endpoint, model, slug = options["endpoint"], options["model"], options["scenario"]
-        asks = endpoint is not None or model is not None
+        asks = bool(endpoint and model)
         if asks + options["accept"] + (options["enter"] is not None) != 1:
             raise CommandError("Give one of: --endpoint with --model, --accept, --enter FILE.")
-        if asks and (endpoint is None or model is None):
-            raise CommandError("--endpoint and --model go together.")
         if asks:
-            caps = read_request(Caps, options)
-            reading = read_intent(
-                scenario=slug,
-                endpoint=endpoint,
-                model=model,
-                caps=USUAL_CAPS if caps == NO_CAPS else caps,
-                is_fresh=options["fresh"],
-            )
+            reading = read_intent(scenario=slug, endpoint=endpoint, model=model)
             if reading.state != IntentReading.State.READ:
                 raise CommandError(f"Nothing was read: {reading.reason}")
             document = reading.document

@@ -21,7 +21,7 @@ from augment.services.endpoints.treatments import (
 )
 from augment.services.events import log_change
 from augment.services.inputs import Input, InputKind, input_field
-from augment.services.scenarios.prompts import Preview, preview_prompt
+from augment.services.scenarios.prompts import preview_prompt
 from augment.services.scenarios.scenes import check_slug
 from augment.services.texts import one_line
 from augment.variants.options import (
@@ -33,6 +33,7 @@ from augment.variants.options import (
 )
 from augment.variants.recipes import RECIPES, Recipe, Tools, find_recipe, spell_variant
 from augment.variants.respondents import ModelRole
+from augment.variants.showing import Shown
 
 Kind = Contestant.Kind
 LONGEST_NAME = 120
@@ -57,7 +58,7 @@ OPTION_INPUTS = tuple(
         kind=_OPTION_KINDS.get(rule.kind, InputKind.CHOICE if rule.choices else InputKind.TEXT),
         label=name.replace("_", " ").capitalize(),
         least=rule.least,
-        most=12 if rule.pattern else rule.most,
+        most=rule.most,
         choices={word: word for word in rule.choices},
         default=None,
     )
@@ -153,7 +154,7 @@ def asking_contestants() -> list[Contestant]:
     return sorted(rows, key=lambda row: (row.retired_at is not None, row.name, row.pk))
 
 
-def preview_contestant(scenario: Scenario, contestant: Contestant, *, role: str) -> Preview:
+def preview_contestant(scenario: Scenario, contestant: Contestant, *, role: str) -> Shown:
     """Return the first messages to a role, as the contestant's options have them.
 
     Options are those of its first run; of one that has not run yet, those that it would run with

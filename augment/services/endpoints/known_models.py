@@ -13,7 +13,6 @@ from decimal import Decimal
 from importlib.metadata import version
 from typing import Any
 
-from django.contrib.auth.models import User
 from django.core.serializers.json import DjangoJSONEncoder
 from django.db import transaction
 from django.db.models import BigIntegerField, Case, Count, F, Q, Sum, When
@@ -117,21 +116,6 @@ def remember_refusal(*, endpoint: Endpoint, model: str, parameter: str) -> Model
             row, "learn", after={"endpoint": endpoint.label, "model": model, "refuses": parameter}
         )
     return after
-
-
-@transaction.atomic
-def tell_sight(*, endpoint: Endpoint, model: str, sees: bool, actor: User | None = None) -> None:
-    """Note what somebody knows of a model without asking it: whether it sees pictures."""
-    row = model_at(endpoint=endpoint, model=model)
-    before, row.vision = row.vision, sees
-    row.save(update_fields=["vision"])
-    log_change(
-        row,
-        "tell",
-        actor,
-        before={"vision": before},
-        after={"endpoint": endpoint.label, "model": model, "vision": sees},
-    )
 
 
 def facts_of(endpoint: Endpoint) -> dict[str, Any]:

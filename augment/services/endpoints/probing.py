@@ -16,12 +16,12 @@ from django.utils import timezone
 
 from augment.errors import Conflict, ModelFault, ParameterRefused
 from augment.llm.client import ChatClient, ModelProfile, Patience
-from augment.llm.costs import Price, cut_of, usd_of
+from augment.llm.costs import cut_of, usd_of
 from augment.llm.messages import LengthName, Reply, Request, shorten
 from augment.llm.questions import Ability, ProbeQuestion, questions_for
-from augment.models import Endpoint, EndpointModel, Probe
+from augment.models import EndpointModel, Probe
 from augment.services.endpoints.client import Queue, place_at, wire_to
-from augment.services.endpoints.known_models import model_at, price_of
+from augment.services.endpoints.known_models import price_of
 from augment.services.events import log_change
 from augment.services.texts import make_document_storable
 from augment.services.work import Lease, Settlement, WorkKind
@@ -75,22 +75,10 @@ class ProbeReport:
         """Return what was found of the ability, None where nothing was."""
         return next((made.has_it for made in self.findings if made.ability == ability), None)
 
-    @property
-    def counts_tokens(self) -> bool:
-        """Whether every answer came with its usage."""
-        answered = [made for made in self.findings if made.latency_s is not None]
-        return bool(answered) and all(made.prompt_tokens is not None for made in answered)
-
-    @property
-    def models_returned(self) -> list[str]:
-        """The model ids that the server named."""
-        return sorted({made.model_returned for made in self.findings if made.model_returned})
-
 
 def probe(
+    row: EndpointModel,
     *,
-    label: str,
-    model: str,
     actor: User | None = None,
     patience: Patience | None = None,
     on_finding: Callable[[ProbeFinding], None] = lambda finding: None,
@@ -98,38 +86,24 @@ def probe(
     """Ask the questions and store what they show.
 
     Args:
-        label: Of the endpoint.
-        model: The model id there.
+        row: The model.
         actor: Who wants it.
         patience: How faults that may pass are waited for.
         on_finding: Told what each question showed as soon as it is known.
 
     Raises:
-        Endpoint.DoesNotExist: There is no endpoint of that label.
         KeyNotAllowed, KeyMissing: The key's variable is not meant for keys, or not set here.
         ModelFault: The wire can't be opened.
     """
-    endpoint = Endpoint.objects.get(label=label)
-    row = model_at(endpoint=endpoint, model=model)
     report = ProbeReport(probed_at=timezone.now())
-    with wire_to(endpoint) as wire:
-        prober = _Prober(
-            client=wire,
-            endpoint=endpoint,
-            price=price_of(endpoint, model),
-            patience=patience or Patience(attempts=2),
-            profile=ModelProfile(
-                reasoning_effort=row.reasoning_effort, max_output_tokens=row.max_output_tokens
-            ),
-            context_tokens=row.context_tokens,
-        )
-        for question in questions_for(model):
+    with wire_to(row.endpoint) as wire:
+        prober = _Prober(client=wire, row=row, patience=patience or Patience(attempts=2))
+        for question in questions_for(row.model):
             report.findings.append(prober.ask(question))
             on_finding(report.findings[-1])
             if report.findings[0].latency_s is None:
                 break  # nobody answers: the other questions would say the same
-    report.refused = sorted(prober.profile.refused)
-    report.calls = prober.calls
+    report.refused, report.calls = sorted(prober.profile.refused), prober.calls
     costs = [made.cost_usd for made in report.findings if made.latency_s is not None]
     if costs and None not in costs:
         report.cost_usd = f"{sum(Decimal(cost) for cost in costs if cost):f}"
@@ -166,8 +140,7 @@ class Probes(WorkKind[Probe]):
             held.note(findings=row.findings)
 
         row.findings = []
-        model = row.model
-        probe(label=model.endpoint.label, model=model.model, actor=row.asked_by, on_finding=keep)
+        probe(row.model, actor=row.asked_by, on_finding=keep)
         return Settlement(state=Probe.State.DONE)
 
 
@@ -177,17 +150,16 @@ PROBES = Probes()
 # --- Private -----------------------------------------------------------------------------------
 
 
-@dataclass(slots=True, kw_only=True)
 class _Prober:
     """Asks within the endpoint's limits, and goes without what it was refused."""
 
-    client: ChatClient
-    endpoint: Endpoint
-    price: Price | None
-    patience: Patience
-    profile: ModelProfile
-    context_tokens: int | None
-    calls: int = 0
+    def __init__(self, *, client: ChatClient, row: EndpointModel, patience: Patience) -> None:
+        self._client, self._row, self._patience = client, row, patience
+        self._price = price_of(row.endpoint, row.model)
+        self.calls = 0
+        self.profile = ModelProfile(
+            reasoning_effort=row.reasoning_effort, max_output_tokens=row.max_output_tokens
+        )
 
     def ask(self, question: ProbeQuestion) -> ProbeFinding:
         ability = question.ability
@@ -200,7 +172,7 @@ class _Prober:
             refuses = fault.status in _REFUSALS and ability != Ability.ANSWERS
             has_it = False if refuses or ability == Ability.ANSWERS else None
             return ProbeFinding(ability=ability, has_it=has_it, note=_short(str(fault)))
-        cut = cut_of(request, reply, context_tokens=self.context_tokens)
+        cut = cut_of(request, reply, context_tokens=self._row.context_tokens)
         is_good = question.is_good(reply) if cut is None else False
         if ability == Ability.ANSWER_LIMIT and is_good is False:
             # Some servers pass over a parameter that they do not know instead of refusing it.
@@ -227,25 +199,25 @@ class _Prober:
         while True:
             request = self.profile.fitted(question.request)
             try:
-                with place_at(self.endpoint, Queue(longest_s=settings.LLM_QUEUE_S)):
+                with place_at(self._row.endpoint, Queue(longest_s=settings.LLM_QUEUE_S)):
                     self.calls += 1
-                    return request, self.client.complete(request)
+                    return request, self._client.complete(request)
             except ParameterRefused as refused:
                 if refused.parameter == question.parameter:
                     raise
                 self.profile = self.profile.without(refused.parameter)
             except ModelFault as fault:
-                wait_s = self.patience.wait_s(fault, attempt=attempt)
+                wait_s = self._patience.wait_s(fault, attempt=attempt)
                 if wait_s is None:
                     raise
-                self.patience.sleep(wait_s)
+                self._patience.sleep(wait_s)
                 attempt += 1
 
     def _cost_usd(self, reply: Reply) -> str | None:
         prompt, completion = reply.prompt_tokens, reply.completion_tokens
-        if self.price is None or prompt is None or completion is None:
+        if self._price is None or prompt is None or completion is None:
             return None
-        nano_usd = self.price.nano_usd(prompt_tokens=prompt, completion_tokens=completion)
+        nano_usd = self._price.nano_usd(prompt_tokens=prompt, completion_tokens=completion)
         return f"{usd_of(nano_usd):f}"
 
 

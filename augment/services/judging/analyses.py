@@ -1,8 +1,8 @@
 """What the rows of a job say of its contestants: lines, repeats, pairs, wordings, refusals."""
 
 from collections import defaultdict
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from itertools import chain
 from statistics import fmean, median
 
@@ -26,20 +26,6 @@ from augment.models import Augmentation, Contestant, GenerationJob
 from augment.services.endpoints.known_models import AUGMENTATION, Spending, sum_spending
 from augment.services.judging.displacement import Measured, of_job
 from augment.services.judging.findings import findings_of
-
-__all__ = [
-    "AugmentationLine",
-    "ContestantAnalysis",
-    "JobAnalysis",
-    "PairedComparison",
-    "RefusalScore",
-    "RepeatLine",
-    "Robustness",
-    "SampleSpread",
-    "analyse_job",
-    "augmentation_lines",
-    "repeatability",
-]
 
 State = Augmentation.State
 
@@ -115,7 +101,6 @@ class RepeatLine:
         within_m: The pooled standard deviation, within a scenario, of its mean displacement.
         missed: The share of the sample's answers that were unreadable or refused.
         usd: What the sample cost; None where no model was asked or a price is unknown.
-        wrong: Findings that are wrong for each augmentation that was checked.
     """
 
     slug: str
@@ -125,7 +110,6 @@ class RepeatLine:
     within_m: float | None
     missed: SampleSpread | None
     usd: SampleSpread | None
-    wrong: SampleSpread | None
 
     @property
     def missed_percent(self) -> SampleSpread | None:
@@ -155,41 +139,33 @@ def analyse_job(job: GenerationJob, *, seed: int = SEED) -> JobAnalysis:
     )
 
 
-def augmentation_lines(
-    job: GenerationJob, *, with_checks: bool = True
-) -> Iterator[AugmentationLine]:
-    """Yield every row of a job, by scenario, contestant and sample; three queries.
-
-    Args:
-        job: Whose rows.
-        with_checks: Whether the checks are run, which takes some milliseconds a row.
-    """
-    spent = sum_spending(Q(attempt__augmentation__job=job), by=AUGMENTATION)
-    scenes = {}
-    if with_checks:
-        rows = job.augmentations.select_related("scenario__base_scene")
-        scenes = {row.pk: row for row in rows.defer("scenario__base_scene__recording")}
-    for one in of_job(job):
-        wrong, doubtful = _count_faults(scenes[one.row.pk]) if with_checks else (None, None)
-        yield AugmentationLine(
-            row=one.row,
-            displacement=one.displacement,
-            spending=spent.get(one.row.pk),
-            wrong=wrong,
-            doubtful=doubtful,
-        )
+def augmentation_lines(job: GenerationJob) -> Iterator[AugmentationLine]:
+    """Yield every row of a job, by scenario, contestant and sample; three queries."""
+    rows = job.augmentations.select_related("scenario__base_scene")
+    scenes = {row.pk: row for row in rows.defer("scenario__base_scene__recording")}
+    for line in _lines(job):
+        wrong, doubtful = _count_faults(scenes[line.row.pk])
+        yield replace(line, wrong=wrong, doubtful=doubtful)
 
 
-def repeatability(job: GenerationJob, *, with_checks: bool = True) -> tuple[RepeatLine, ...]:
+def repeatability(job: GenerationJob) -> tuple[RepeatLine, ...]:
     """Return a line for each contestant, by slug; rows under way or failed don't count."""
     by_contestant: dict[str, list[AugmentationLine]] = defaultdict(list)
-    for line in augmentation_lines(job, with_checks=with_checks):
+    for line in _lines(job):
         if line.row.state in Augmentation.SHOWABLE:
             by_contestant[line.row.contestant.slug].append(line)
     return tuple(_repeat_line(lines) for _, lines in sorted(by_contestant.items()))
 
 
 # --- Private -----------------------------------------------------------------------------------
+
+
+def _lines(job: GenerationJob) -> Iterator[AugmentationLine]:
+    """Yield every row of a job with its displacement and cost, unchecked."""
+    spent = sum_spending(Q(attempt__augmentation__job=job), by=AUGMENTATION)
+    for one in of_job(job):
+        spending = spent.get(one.row.pk)
+        yield AugmentationLine(row=one.row, displacement=one.displacement, spending=spending)
 
 
 def _values_of(measured: Sequence[Measured]) -> dict[str, float]:
@@ -236,34 +212,31 @@ def _repeat_line(lines: Sequence[AugmentationLine]) -> RepeatLine:
     by_scenario: dict[int, list[float]] = defaultdict(list)
     for line in lines:
         by_sample[line.row.sample].append(line)
-        if (distance := _distance_m([line])) is not None:
-            by_scenario[line.row.scenario_id].append(distance)
-
-    def spread(value_of: Callable[[list[AugmentationLine]], float | None]) -> SampleSpread | None:
-        """None where a sample has no value: the rest would be another comparison."""
-        values = [value_of(by_sample[number]) for number in sorted(by_sample)]
-        return None if None in values else spread_of([v for v in values if v is not None])
-
+        if line.displacement is not None and line.displacement.mean_m is not None:
+            by_scenario[line.row.scenario_id].append(line.displacement.mean_m)
+    samples = [by_sample[number] for number in sorted(by_sample)]
     contestant = lines[0].row.contestant
     return RepeatLine(
         slug=contestant.slug,
         name=contestant.name,
         is_simulated=contestant.is_simulated,
-        displacement_m=spread(_distance_m),
+        displacement_m=_spread([_distance_m(sample) for sample in samples]),
         within_m=within_sd(by_scenario.values()),
-        missed=spread(lambda sample: fmean(line.row.state in MISSES for line in sample)),
-        usd=spread(_usd),
-        wrong=spread(lambda sample: _mean([one.wrong for one in sample if one.wrong is not None])),
+        missed=_spread([fmean(line.row.state in MISSES for line in one) for one in samples]),
+        usd=_spread([_usd(sample) for sample in samples]),
     )
 
 
-def _mean(values: Sequence[float]) -> float | None:
-    return fmean(values) if values else None
+def _spread(values: Sequence[float | None]) -> SampleSpread | None:
+    """Return None where a sample has no value: the rest would be another comparison."""
+    known = [value for value in values if value is not None]
+    return spread_of(known) if len(known) == len(values) else None
 
 
 def _distance_m(lines: Sequence[AugmentationLine]) -> float | None:
     measured = [line.displacement.distances_m for line in lines if line.displacement is not None]
-    return _mean(list(chain.from_iterable(measured)))
+    distances_m = list(chain.from_iterable(measured))
+    return fmean(distances_m) if distances_m else None
 
 
 def _usd(lines: Sequence[AugmentationLine]) -> float | None:

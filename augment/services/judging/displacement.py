@@ -5,49 +5,18 @@ from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from itertools import combinations
-from typing import NamedTuple
 
 from django.db.models import QuerySet
 
 from augment.errors import InvalidDocument, UnknownName
-from augment.metrics.displacement import (
-    CLASS_OF,
-    BoxSummary,
-    Displacement,
-    ObjectClass,
-    Summary,
-    are_alike,
-    displacement,
-    summarise,
-)
+from augment.metrics.displacement import CLASS_OF, ObjectClass, Summary, are_alike, displacement
+from augment.metrics.displacement import Displacement as Displacement
+from augment.metrics.displacement import summarise as summarise
 from augment.models import Augmentation, GenerationJob
 from augment.scene.codec import modification_from_document
 from augment.scene.entities import Modification, ScenarioType, TrafficAgent
-from augment.services.scenarios.scenes import reference_of, type_choices, type_rank
+from augment.services.scenarios.scenes import type_choices, type_rank
 from augment.variants.recipes import SPELLING, spell_variant
-
-__all__ = [
-    "NO_VARIANT",
-    "PLACED_EXACTLY",
-    "VARIANTS",
-    "BoxSummary",
-    "By",
-    "DisplacedObject",
-    "Displacement",
-    "Group",
-    "MatchState",
-    "Measured",
-    "ObjectPosition",
-    "Unmeasured",
-    "alike_pairs",
-    "groups",
-    "objects_of",
-    "of_augmentation",
-    "of_job",
-    "of_rows",
-    "summarise",
-    "types_named",
-]
 
 State = Augmentation.State
 
@@ -118,14 +87,6 @@ class MatchState(StrEnum):
     SURPLUS = "surplus"
 
 
-class ObjectPosition(NamedTuple):
-    """An object's id and the centre of its box."""
-
-    id: str
-    x_m: float
-    y_m: float
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DisplacedObject:
     """One object of one augmentation, in the ego frame.
@@ -139,8 +100,8 @@ class DisplacedObject:
     row: Augmentation
     standing: MatchState
     object_class: ObjectClass
-    reference: ObjectPosition | None
-    generated: ObjectPosition | None
+    reference: TrafficAgent | None
+    generated: TrafficAgent | None
     distance_m: float | None
 
 
@@ -175,27 +136,34 @@ def groups(
     cells: defaultdict[tuple[int, str, str, str], list[Measured]] = defaultdict(list)
     for one in measured:
         if one.displacement is not None and (types is None or one.row.scenario.type in types):
+            rank, heading = _group_of(one.row, by)
             contestant = one.row.contestant
-            cells[*_place(one.row, by), contestant.name.lower(), contestant.slug].append(one)
-    made = []
-    for _, cell in sorted(cells.items()):
-        row = cell[0].row
-        headings = {
-            By.TYPE: row.scenario.get_type_display(),
-            By.VARIANT: spell_variant(row.contestant.variant) or NO_VARIANT,
-            By.CONTESTANT: row.contestant.name,
-        }
-        group = Group(
-            heading=headings[by],
-            contestant=row.contestant.name,
-            slug=row.contestant.slug,
-            model=row.contestant.model,
-            variant=row.contestant.variant,
-            is_simulated=row.contestant.is_simulated,
-            summary=summarise([one.displacement for one in cell if one.displacement is not None]),
-        )
-        made.append(group)
-    return made
+            cells[rank, heading.lower(), contestant.name.lower(), contestant.slug].append(one)
+    return [_sum_up(cell, by) for _, cell in sorted(cells.items())]
+
+
+def _group_of(row: Augmentation, by: By) -> tuple[int, str]:
+    """Return a rank and a heading: variants as the paper has them, combinations, then none."""
+    if by is By.TYPE:
+        return type_rank(row.scenario.type), row.scenario.get_type_display()
+    if by is By.CONTESTANT:
+        return 0, row.contestant.name
+    known, variant = list(SPELLING), row.contestant.variant.lower()
+    rank = known.index(variant) if variant in known else len(known) + (not variant)
+    return rank, spell_variant(row.contestant.variant) or NO_VARIANT
+
+
+def _sum_up(cell: Sequence[Measured], by: By) -> Group:
+    row = cell[0].row
+    return Group(
+        heading=_group_of(row, by)[1],
+        contestant=row.contestant.name,
+        slug=row.contestant.slug,
+        model=row.contestant.model,
+        variant=row.contestant.variant,
+        is_simulated=row.contestant.is_simulated,
+        summary=summarise([one.displacement for one in cell if one.displacement is not None]),
+    )
 
 
 def types_named(names: Sequence[str]) -> tuple[str, ...]:
@@ -222,21 +190,19 @@ def objects_of(job: GenerationJob) -> Iterator[DisplacedObject]:
     for one in of_job(job):
         if one.displacement is None:
             continue
-        is_done = one.row.state == State.DONE
-        wanted = _by_id(reference_of(one.row.scenario))
-        placed = _by_id(modification_from_document(one.row.modification) if is_done else None)
+        wanted, placed = (
+            {agent.id: agent for agent in change.changed} if change else {}
+            for change in (_read(one.row.scenario.reference), _answer_of(one.row))
+        )
         found = one.displacement
         for standing, reference_id, generated_id, distance_m in (
             *((MatchState.MATCHED, m.reference, m.generated, m.distance_m) for m in found.matches),
             *((MatchState.MISSING, name, "", None) for name in found.missing),
             *((MatchState.SURPLUS, "", name, None) for name in found.surplus),
         ):
-            agents = [wanted.get(reference_id), placed.get(generated_id)]
-            reference, generated = (
-                None if agent is None else ObjectPosition(agent.id, agent.x_m, agent.y_m)
-                for agent in agents
-            )
-            agent = next(agent for agent in agents if agent is not None)
+            reference, generated = wanted.get(reference_id), placed.get(generated_id)
+            agent = reference or generated
+            assert agent is not None
             yield DisplacedObject(
                 row=one.row,
                 standing=standing,
@@ -293,41 +259,26 @@ def _measure(rows: Iterable[Augmentation]) -> list[Measured]:
     measured = []
     for row in rows:
         if row.scenario_id not in references:
-            try:
-                references[row.scenario_id] = reference_of(row.scenario)
-            except InvalidDocument:
-                references[row.scenario_id] = None
-        reference = references[row.scenario_id]
+            references[row.scenario_id] = _read(row.scenario.reference)
+        reference, answer = references[row.scenario_id], _answer_of(row)
         if row.state not in Augmentation.SHOWABLE:
             measured.append(Measured(row=row, why_not=Unmeasured.UNFINISHED))
         elif reference is None:
             measured.append(Measured(row=row, why_not=Unmeasured.NO_REFERENCE))
+        elif answer is None and row.state == State.DONE:
+            measured.append(Measured(row=row, why_not=Unmeasured.UNREADABLE_ROW))
         else:
-            measured.append(_measure_against(row, reference))
+            measured.append(Measured(row=row, displacement=displacement(answer, reference)))
     return measured
 
 
-def _measure_against(row: Augmentation, reference: Modification) -> Measured:
-    generated = None
-    if row.state == State.DONE:
-        try:
-            generated = modification_from_document(row.modification)
-        except InvalidDocument:
-            return Measured(row=row, why_not=Unmeasured.UNREADABLE_ROW)
-    return Measured(row=row, displacement=displacement(generated, reference))
+def _answer_of(row: Augmentation) -> Modification | None:
+    return _read(row.modification) if row.state == State.DONE else None
 
 
-def _place(row: Augmentation, by: By) -> tuple[int, str]:
-    """Return what sorts the groups: variants as the paper has them, combinations, then none."""
-    if by is By.TYPE:
-        return type_rank(row.scenario.type), row.scenario.type
-    if by is By.CONTESTANT:
-        return 0, ""
-    known, variant = list(SPELLING), row.contestant.variant.lower()
-    if not variant:
-        return len(known) + 1, ""
-    return known.index(variant) if variant in known else len(known), variant
-
-
-def _by_id(change: Modification | None) -> dict[str, TrafficAgent]:
-    return {} if change is None else {agent.id: agent for agent in change.changed}
+def _read(document: object) -> Modification | None:
+    """Return a stored modification, None where there is none that can be read."""
+    try:
+        return None if document is None else modification_from_document(document)
+    except InvalidDocument:
+        return None

@@ -6,66 +6,36 @@ vote; the name of one says what is on it, so one that no longer fits the finding
 
 import hashlib
 import json
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
 from django.core.files.storage import default_storage
 
-from augment.checks import Finding, FindingKind, Ground, Severity
-from augment.checks.finding import FaultClass
-from augment.checks.measures import LaneEdges, MeasureLine, Measures, find_measures, lane_edges_at
+from augment.checks import Finding as Finding
+from augment.checks import FindingKind as FindingKind
+from augment.checks import Ground, Severity
+from augment.checks.finding import FaultClass as FaultClass
+from augment.checks.measures import LaneEdges as LaneEdges
+from augment.checks.measures import MeasureLine as MeasureLine
+from augment.checks.measures import find_measures, lane_edges_at
 from augment.checks.registry import check_against_intent
 from augment.errors import InvalidDocument, InvalidModification
 from augment.metrics.fault_guess import first_guess
 from augment.models import Augmentation, Scenario
 from augment.render.bev import FaultMark, draw_annotated
-from augment.scene.codec import EGO_ID, modification_from_document, modification_to_document
+from augment.scene.codec import EGO_ID as EGO_ID
+from augment.scene.codec import modification_from_document, modification_to_document
 from augment.scene.entities import Scene
 from augment.services.scenarios.editing import editable_scene, read_edit, snap
 from augment.services.scenarios.pictures import camera_of, store_as
 from augment.services.scenarios.scenes import intent_of, scene_of
 
-__all__ = [
-    "EGO_ID",
-    "Checked",
-    "FaultClass",
-    "Finding",
-    "FindingKind",
-    "FindingLine",
-    "LaneEdges",
-    "MeasureLine",
-    "check_augmentation",
-    "check_edit",
-    "draw_marked",
-    "findings_of",
-    "guess_faults",
-    "lane_edges_of",
-    "measures_of",
-]
-
 _LOOK = 2
 """Raised whenever the marked pictures look different."""
 
-_ORDER = (Severity.WRONG, Severity.DOUBTFUL)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class FindingLine:
-    """One finding.
-
-    Attributes:
-        severity: "wrong", "doubtful" or "fact".
-        kind: What was measured, in words: "off road".
-        fault: The class of fault that it speaks for, empty for a fact.
-        finding: In full; its sentence calls agents by their ids in the modification.
-    """
-
-    severity: str
-    kind: str
-    fault: str
-    finding: Finding
+_ORDER = (Severity.WRONG, Severity.DOUBTFUL, Severity.FACT)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -73,6 +43,7 @@ class Checked:
     """All findings about a change, the worst first.
 
     Attributes:
+        findings: Their sentences call agents by their ids in the modification.
         problem: Why nothing could be checked, empty where it was.
         is_against_intent: Whether the scenario has an intent that it was held against.
         picture: The name of the picture that shows the faults by their numbers, empty without.
@@ -80,7 +51,7 @@ class Checked:
         modification: Of an edit, the document as it would be kept; None where it can't be.
     """
 
-    lines: tuple[FindingLine, ...] = ()
+    findings: tuple[Finding, ...] = ()
     is_against_intent: bool = False
     picture: str = ""
     is_drawn: bool = False
@@ -88,18 +59,20 @@ class Checked:
     modification: dict[str, Any] | None = None
 
     @property
-    def faults(self) -> list[FindingLine]:
+    def faults(self) -> list[Finding]:
         """What is wrong or doubtful, in the order of the numbers in the picture."""
-        return [line for line in self.lines if line.severity != Severity.FACT]
+        return [finding for finding in self.findings if finding.is_fault]
 
     @property
-    def facts(self) -> list[FindingLine]:
+    def facts(self) -> list[Finding]:
         """Plain measurements."""
-        return [line for line in self.lines if line.severity == Severity.FACT]
+        return [finding for finding in self.findings if not finding.is_fault]
 
 
 def findings_of(row: Augmentation) -> tuple[Finding, ...]:
-    """Return the findings about a row that has a modification, its scenario and scene loaded.
+    """Return the findings about a row that has a modification, the worst first.
+
+    Its scenario and scene are loaded.
 
     Raises:
         InvalidDocument: The stored scene, intent or modification can't be read.
@@ -107,7 +80,7 @@ def findings_of(row: Augmentation) -> tuple[Finding, ...]:
     """
     modification = modification_from_document(row.modification)
     ground = Ground.of(scene_of(row.scenario))
-    return check_against_intent(ground, modification, intent_of(row.scenario))
+    return _worst_first(check_against_intent(ground, modification, intent_of(row.scenario)))
 
 
 def check_augmentation(row: Augmentation) -> Checked | None:
@@ -120,7 +93,7 @@ def check_augmentation(row: Augmentation) -> Checked | None:
         return Checked(problem=str(error))
     name = _marked_name(row, findings)
     return Checked(
-        lines=_lines(findings),
+        findings=findings,
         is_against_intent=row.scenario.intent is not None,
         picture=name,
         is_drawn=bool(name) and default_storage.exists(name),
@@ -145,7 +118,7 @@ def check_edit(scenario: Scenario, document: object, *, snapped: str = "") -> Ch
         return Checked(problem=str(error))
     return Checked(
         modification=modification_to_document(modification),
-        lines=_lines(findings),
+        findings=_worst_first(findings),
         is_against_intent=intent is not None,
     )
 
@@ -184,7 +157,7 @@ def draw_marked(*, augmentation_pk: int) -> str:
             is_wrong=fault.severity is Severity.WRONG,
             belongs_m=fault.belongs_m,
         )
-        for number, fault in enumerate(_faults(findings), start=1)
+        for number, fault in enumerate((one for one in findings if one.is_fault), start=1)
     ]
     png = draw_annotated(
         scene_of(row.scenario),
@@ -197,17 +170,15 @@ def draw_marked(*, augmentation_pk: int) -> str:
     return name
 
 
-def measures_of(scenario: Scenario, *, reach_m: float) -> Measures:
-    """Return the lines and rings that help to measure a scenario's pictures, in their frame.
+def measures_of(scenario: Scenario) -> tuple[MeasureLine, ...]:
+    """Return the lines that help to measure a scenario's pictures, in their frame.
 
-    Args:
-        scenario: With its scene; no augmentation of it is looked at.
-        reach_m: The radius up to which rings are drawn.
+    No augmentation of the scenario is looked at.
 
     Raises:
         InvalidDocument: The stored scene or intent can't be read.
     """
-    return find_measures(_ground_of(scenario), intent_of(scenario), reach_m=reach_m)
+    return find_measures(_ground_of(scenario), intent_of(scenario))
 
 
 def lane_edges_of(scenario: Scenario, x_m: float, y_m: float) -> LaneEdges | None:
@@ -232,27 +203,13 @@ def _ground(scene: Scene) -> Ground:
     return Ground.of(scene)
 
 
-def _faults(findings: Sequence[Finding]) -> list[Finding]:
-    """Return the faults in the order of their numbers: the wrong ones, then the doubtful."""
-    return [fault for severity in _ORDER for fault in findings if fault.severity is severity]
-
-
-def _lines(findings: Sequence[Finding]) -> tuple[FindingLine, ...]:
-    facts = [finding for finding in findings if not finding.is_fault]
-    return tuple(
-        FindingLine(
-            severity=finding.severity.value,
-            kind=finding.kind.value.replace("_", " "),
-            fault=finding.fault.value if finding.is_fault else "",
-            finding=finding,
-        )
-        for finding in (*_faults(findings), *facts)
-    )
+def _worst_first(findings: Iterable[Finding]) -> tuple[Finding, ...]:
+    return tuple(sorted(findings, key=lambda finding: _ORDER.index(finding.severity)))
 
 
 def _marked_name(row: Augmentation, findings: Sequence[Finding]) -> str:
     """Return the name of the row's marked picture, drawn or not; empty without a fault."""
-    faults = _faults(findings)
+    faults = [finding for finding in findings if finding.is_fault]
     if not faults:
         return ""
     shown = {

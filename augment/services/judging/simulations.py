@@ -18,7 +18,6 @@ from augment.scene.entities import Modification
 from augment.services.scenarios.scenes import reference_of, scene_of, type_of
 from augment.services.work import Lease, Settlement, WorkKind
 from augment.simulation.drive import Drive, expert_of, run
-from augment.simulation.metrics import red_lights
 from augment.simulation.planners import NAMED, PDM_CLOSED, planner_named
 from augment.simulation.planning import Planner
 from augment.simulation.road import Road
@@ -158,7 +157,6 @@ def document_of(drove: Drive, scores: dict[ScoreKind, Score]) -> dict[str, Any]:
         "recorded_s": None if drove.recorded_s is None else round(drove.recorded_s, 1),
         "outlasts_recording": drove.outlasts_recording,
         "emergency_brake_steps": sum(plan.braking for plan in drove.plans),
-        "red_light_compliance": red_lights(drove).value,
         "expert": {"kind": score.expert.kind.value, "progress_m": score.expert.progress_m},
         "collisions": [
             {
@@ -171,10 +169,7 @@ def document_of(drove: Drive, scores: dict[ScoreKind, Score]) -> dict[str, Any]:
         ],
         "criticality": criticality(drove, score.collisions),
         "metrics": {
-            kind.value: [
-                {name: getattr(metric, name) for name in ("name", "value", "weight", "parts")}
-                for metric in found.metrics
-            ]
+            kind.value: [asdict(metric) for metric in found.metrics]
             for kind, found in scores.items()
         },
     }

@@ -9,23 +9,18 @@ import re
 from collections import Counter, defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass
-from datetime import datetime, timedelta
 from typing import Any
 
 from django.db.models import Count, F, Max, Q, QuerySet
 from django.db.models.functions import Substr
 
 from augment.errors import UnknownName
-from augment.models import Attempt, Augmentation, GenerationJob, ModelCall, TranscriptNote
-from augment.services.clock import database_now
+from augment.models import Attempt, Augmentation, GenerationJob, TranscriptNote
 from augment.variants.respondents import NoteKind
 
 State = Augmentation.State
 
 OUTCOMES = tuple(state for state in State if state not in Augmentation.UNDER_WAY)
-
-WINDOW = timedelta(minutes=5)
-"""What ended within it tells the rate."""
 
 GROUPED = (State.FAILED, State.UNREADABLE, State.REFUSED)
 
@@ -98,21 +93,6 @@ class JobCounts:
     def is_moving(self) -> bool:
         """Whether anything will change by itself: not where all that is left is held."""
         return (self.running if self.is_held else self.under_way) > 0
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Pace:
-    """The rate of a job that moves.
-
-    Attributes:
-        rows_per_minute: Augmentations that ended; None where none has for a while.
-        calls_per_minute: Calls to language models that ended.
-        left_s: Until all is settled at that rate; None where nothing new is started.
-    """
-
-    rows_per_minute: float | None
-    calls_per_minute: float
-    left_s: float | None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -190,30 +170,6 @@ def cells_of(job: GenerationJob) -> QuerySet[Augmentation]:
     """Return the augmentations with scenarios and contestants, without long documents."""
     documents = ("modification", "scenario__reference")
     return job.augmentations.select_related("scenario", "contestant").defer(*documents)
-
-
-def pace_of(counts: JobCounts, *, now: datetime | None = None) -> Pace:
-    """Return the rate of a job from what ended within the last minutes.
-
-    Args:
-        counts: The job.
-        now: The database's time, looked up where it is not given.
-    """
-    now = now or database_now()
-    since = max(now - WINDOW, counts.job.created_at)
-    minutes = max((now - since).total_seconds(), 1.0) / 60.0
-    rows = Attempt.objects.filter(
-        augmentation__job=counts.job, finished_at__gt=since, outcome__in=OUTCOMES
-    ).count()
-    calls = ModelCall.objects.filter(
-        attempt__augmentation__job=counts.job, settled_at__gt=since, sent_at__isnull=False
-    ).count()
-    is_going_on = rows and counts.under_way and not counts.is_held
-    return Pace(
-        rows_per_minute=rows / minutes if rows else None,
-        calls_per_minute=calls / minutes,
-        left_s=60.0 * counts.under_way * minutes / rows if is_going_on else None,
-    )
 
 
 def cause_of(reason: str) -> str:

@@ -167,17 +167,6 @@ def workforce() -> Workforce:
     return Workforce(living=len(living), not_recovered_since=worked_at[last.pk], fault=last.fault)
 
 
-def is_silent(*, pid: int, for_s: float) -> bool:
-    """Return whether the newest worker of that process id has given no sign of life for so long.
-
-    A worker that has not been heard yet, or has ended, is not silent.
-    """
-    newest = Worker.objects.filter(name=worker_name(pid)).order_by("-pk").first()
-    if newest is None or newest.ended_at:
-        return False
-    return database_now() - newest.seen_at > timedelta(seconds=for_s)
-
-
 # --- Whether this process is to stop -----------------------------------------------------------
 
 

@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from django.conf import settings
 from django.contrib.auth.models import User
@@ -27,7 +27,7 @@ from augment.scene.codec import (
 )
 from augment.scene.entities import CatalogueSet, Scene, without_traffic
 from augment.scene.intent import IntentOrigin
-from augment.services.events import log_event
+from augment.services.events import log_change
 from augment.services.scenarios.scenes import (
     add_scenario,
     check_reference,
@@ -65,17 +65,14 @@ def read_catalogue(folder: Path) -> tuple[dict[str, Scene], list[CatalogueEntry]
     for entry in entries.values():
         at, scene = f"scenarios/{entry.slug}.json", scenes.get(entry.scene)
         if scene is None:
-            known = ", ".join(scenes) or "none"
-            text = f"{entry.scene!r} is not in the folder; known: {known}"
+            text = f"{entry.scene!r} is not in the folder; known: {', '.join(scenes) or 'none'}"
             problems.append((f"{at}: scene", text))
             continue
         try:
             shown = scene if entry.keep_traffic else without_traffic(scene)
             check_reference(shown, entry.reference)
-        except InvalidModification as fault:
+        except (InvalidModification, InvalidDocument) as fault:
             problems.append((f"{at}: reference", str(fault)))
-        except InvalidDocument as fault:
-            problems += [(f"{at}: reference.{path}", text) for path, text in fault.problems]
     if problems:
         raise InvalidDocument("catalogue", problems)
     return scenes, list(entries.values())
@@ -84,7 +81,7 @@ def read_catalogue(folder: Path) -> tuple[dict[str, Scene], list[CatalogueEntry]
 def _read_files(
     folder: Path, parse: Callable[[object], Read], key: str, problems: Problems
 ) -> dict[str, Read]:
-    """What the files of a folder hold, by their names; what can't be read becomes problems."""
+    """Return what the files of a folder hold, by their names; faults go to the problems."""
     found = {}
     for file in sorted(folder.glob("*.json")):
         at = f"{folder.name}/{file.name}"
@@ -92,14 +89,12 @@ def _read_files(
             made = parse(read_json(file, what=folder.name.removesuffix("s")))
             name = getattr(made, key)
             check_slug(name, what="catalogue", key=key)
+            if name != file.stem:
+                text = f"expected {file.stem!r} as the file is called, got {name!r}"
+                raise InvalidDocument("catalogue", [(key, text)])
+            found[name] = made
         except InvalidDocument as fault:
             problems += [(f"{at}: {path}" if path else at, text) for path, text in fault.problems]
-            continue
-        if name != file.stem:
-            text = f"expected {file.stem!r} as the file is called, got {name!r}"
-            problems.append((f"{at}: {key}", text))
-        else:
-            found[name] = made
     return found
 
 
@@ -200,16 +195,16 @@ def _store_scene(scene: Scene, actor: User | None) -> CatalogueStep:
             f"There is a scene called {row.slug!r} already, from the source {row.source!r}; "
             "the catalogue does not replace it."
         )
-    if not is_new and row.document == document:
-        return CatalogueStep.UNCHANGED
     if not is_new:
+        if row.document == document:
+            return CatalogueStep.UNCHANGED
         is_augmented = Augmentation.objects.filter(scenario__base_scene=row).exists()
         if is_augmented or row.scenarios.filter(catalogue_set="").exists():
             return CatalogueStep.KEPT
         BaseScene.objects.filter(pk=row.pk).update(**wanted)
         row.scenarios.update(original_image="")
-    verb = "add" if is_new else "change"
-    _log(actor, verb, "scene", row, slug=row.slug, source=SOURCE)
+    after = {"slug": row.slug, "source": SOURCE}
+    log_change(row, "add" if is_new else "change", actor, after=after)
     return CatalogueStep.ADDED if is_new else CatalogueStep.CHANGED
 
 
@@ -217,20 +212,19 @@ def _store_scenario(
     entry: CatalogueEntry, which: CatalogueSet, original: Scenario | None, actor: User | None
 ) -> CatalogueStep:
     row = Scenario.objects.filter(slug=entry.slug).select_related("base_scene").first()
-    reference = modification_to_document(entry.reference)
     intent = None if entry.intent is None else intent_to_document(entry.intent)
+    said: dict[str, Any] = {
+        "type": entry.type.value,
+        "instruction": entry.instruction.strip(),
+        "reference": modification_to_document(entry.reference),
+        "keep_traffic": entry.keep_traffic,
+        "intent": intent,
+    }
     own = {"catalogue_set": which.value, "language": entry.language, "paraphrase_of": original}
     if row is None:
+        origin = IntentOrigin.AUTHORED
         row = add_scenario(
-            scene=entry.scene,
-            type=entry.type.value,
-            instruction=entry.instruction,
-            slug=entry.slug,
-            reference=reference,
-            intent=intent,
-            intent_origin=IntentOrigin.AUTHORED,
-            keep_traffic=entry.keep_traffic,
-            actor=actor,
+            scene=entry.scene, slug=entry.slug, **said, intent_origin=origin, actor=actor
         )
         Scenario.objects.filter(pk=row.pk).update(**own)
         return CatalogueStep.ADDED
@@ -239,15 +233,9 @@ def _store_scenario(
             f"There is a scenario called {row.slug!r} already that is not the catalogue's; "
             "the catalogue does not replace it."
         )
-    wanted = own | {
-        "base_scene": BaseScene.objects.get(slug=entry.scene),
-        "type": entry.type.value,
-        "instruction": entry.instruction.strip(),
-        "reference": reference,
-        "keep_traffic": entry.keep_traffic,
-        "intent": intent,
-        "intent_origin": "" if intent is None else IntentOrigin.AUTHORED.value,
-    }
+    wanted = own | said
+    wanted["base_scene"] = BaseScene.objects.get(slug=entry.scene)
+    wanted["intent_origin"] = "" if intent is None else IntentOrigin.AUTHORED.value
     changed = sorted(name for name, value in wanted.items() if getattr(row, name) != value)
     if not changed:
         return CatalogueStep.UNCHANGED
@@ -257,11 +245,5 @@ def _store_scenario(
         return CatalogueStep.KEPT
     image = {"original_image": ""} if seen else {}
     Scenario.objects.filter(pk=row.pk).update(**wanted, **image)
-    _log(actor, "change", "scenario", row, slug=row.slug, changed=changed)
+    log_change(row, "change", actor, after={"slug": row.slug, "changed": changed})
     return CatalogueStep.CHANGED
-
-
-def _log(
-    actor: User | None, verb: str, kind: str, row: BaseScene | Scenario, **after: object
-) -> None:
-    log_event(actor=actor, verb=verb, object_kind=kind, object_code=row.code, after=after)

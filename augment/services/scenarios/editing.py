@@ -155,19 +155,6 @@ def set_reference(scenario: Scenario, document: object, *, actor: User | None = 
     return _set(row, "set reference", actor, reference=modification_to_document(modification))
 
 
-@transaction.atomic
-def drop_reference(scenario: Scenario, *, actor: User | None = None) -> Scenario:
-    """Leave a scenario without a reference.
-
-    Raises:
-        Conflict: The scenario is the catalogue's, or has none.
-    """
-    row = _locked(scenario.slug, "reference")
-    if row.reference is None:
-        raise Conflict(f"'{row.slug}' has no reference.")
-    return _set(row, "set reference", actor, reference=None)
-
-
 # Intents
 
 

@@ -6,8 +6,7 @@ request in its row, that of the whole beside all rows. The codec reads what they
 
 import json
 import math
-from collections.abc import Iterator, Mapping
-from copy import deepcopy
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -36,7 +35,6 @@ REST = "rest"
 """The field of a row for what the others don't hold, as JSON."""
 
 FIELDS = (*CHOICES, REST)
-TEXTS = ("anchor", "name")
 MOST_REQUESTS = 20
 
 Row = dict[str, str]
@@ -44,18 +42,13 @@ Row = dict[str, str]
 
 NEW_ROW: Row = dict.fromkeys(FIELDS, "") | {"relation": "ahead", "count": "1"}
 
-_PATHS: dict[str, tuple[str, ...]] = {
+_NUMBERS = ("count", "distance_m", "distance_to_m", "speed_mps")
+_WITHIN = {
     "distance_m": ("spot", "distance", "low_m"),
     "distance_to_m": ("spot", "distance", "high_m"),
     **{name: ("spot", name) for name in ("relation", "anchor", "lane")},
-    **{name: (name,) for name in ("count", "body", "speed_mps", "start", "shape", "name")},
 }
-_ONLY_OF = {
-    "body": ("vehicles", "crash"),
-    "speed_mps": ("vehicles", "walk"),
-    "start": ("walk", "cones"),
-    "shape": ("cones",),
-}
+"""Where fields stand that are not of the request itself."""
 _HEAD = {"format": "scenario-arena/intent", "version": 1}
 
 
@@ -73,11 +66,11 @@ class IntentFields:
 
 
 def intent_of_fields(given: IntentFields) -> dict[str, Any] | None:
-    """The intent document of what was filled in; None where nothing was.
+    """Return the intent document of what was filled in; None where nothing was.
 
     Raises:
-        InvalidDocument: A number is none, a field is of another kind, what stands beside the
-            fields is no JSON object, or all together make no intent.
+        InvalidDocument: A number is none, what stands beside the fields is no JSON object, or
+            all together make no intent.
     """
     rows = [(n, row) for n, row in enumerate(given.rows) if row.get("kind") or row.get(REST)]
     rest = _object(given.rest, REST)
@@ -86,15 +79,12 @@ def intent_of_fields(given: IntentFields) -> dict[str, Any] | None:
     if len(rows) > MOST_REQUESTS:
         problem = f"{len(rows)} are too many for the fields, at most {MOST_REQUESTS}"
         raise InvalidDocument("intent", [("requests", problem)])
-    problems = [problem for n, row in rows for problem in _misplaced(n, row)]
-    if problems:
-        raise InvalidDocument("intent", problems)
-    document = _HEAD | rest | {"requests": [_request(n, row) for n, row in rows]}
+    document = _HEAD | rest | {"requests": [_request(f"requests[{n}]", row) for n, row in rows]}
     return intent_to_document(intent_from_document(document))
 
 
 def fields_of_intent(document: object) -> IntentFields:
-    """The fields that `intent_of_fields` makes the same intent of.
+    """Return the fields that `intent_of_fields` makes the same intent of.
 
     Raises:
         InvalidDocument: It is no intent.
@@ -108,78 +98,54 @@ def fields_of_intent(document: object) -> IntentFields:
 # --- Private -----------------------------------------------------------------------------------
 
 
-def _row(request: Mapping[str, Any]) -> Row:
-    rest = deepcopy(dict(request))
-    row = dict.fromkeys(FIELDS, "") | {"kind": rest.pop("kind")}
-    for name, path in _PATHS.items():
-        if name in _ONLY_OF and row["kind"] not in _ONLY_OF[name]:
-            continue
-        *way, last = path
-        held: Any = rest
+def _row(request: dict[str, Any]) -> Row:
+    """Take what the fields hold out of a request; what is left becomes JSON."""
+    row = dict.fromkeys(FIELDS, "")
+    for name in CHOICES:
+        *way, last = _WITHIN.get(name, (name,))
+        part: Any = request
         for step in way:
-            held = held.get(step, {})
-        if last in held:
-            row[name] = _text(held.pop(last))
-    row[REST] = _json(_pruned(rest))
+            part = part.get(step, {})
+        value = part.pop(last, "")
+        row[name] = value if isinstance(value, str) else repr(value).removesuffix(".0")
+    row[REST] = _json(_pruned(request))
     return row
 
 
-def _request(number: int, row: Mapping[str, str]) -> dict[str, Any]:
-    at = f"requests[{number}]"
-    found = _object(row.get(REST, ""), f"{at}.{REST}") | {"kind": row.get("kind", "")}
-    for name, path in _PATHS.items():
-        value = _value(row, name, at)
-        if value is None:
+def _request(at: str, row: Mapping[str, str]) -> dict[str, Any]:
+    request = _object(row.get(REST, ""), f"{at}.{REST}")
+    for name in CHOICES:
+        text = row.get(name, "").strip()
+        if not text:
             continue
-        *way, last = path
-        held = found
+        *way, last = _WITHIN.get(name, (name,))
+        part: Any = request
         for step in way:
-            held = held.setdefault(step, {})
-            if not isinstance(held, dict):
+            part = part.setdefault(step, {})
+            if not isinstance(part, dict):
                 raise InvalidDocument("intent", [(f"{at}.{step}", "must be an object")])
-        held[last] = value
-    if "distance" in found.get("spot", {}):
-        found["spot"].setdefault("relation", "ahead")
-    return found
+        part[last] = _number(text, f"{at}.{name}") if name in _NUMBERS else text
+    if "distance" in request.get("spot", {}):
+        request["spot"].setdefault("relation", "ahead")
+    return request
 
 
-def _misplaced(number: int, row: Mapping[str, str]) -> Iterator[tuple[str, str]]:
-    """Fields that a request of this kind has no use for."""
-    kind = row.get("kind", "")
-    if kind not in KINDS:
-        yield f"requests[{number}].kind", f"{kind[:40]!r} is none of {', '.join(KINDS)}"
-        return
-    for name, kinds in _ONLY_OF.items():
-        if row.get(name) and kind not in kinds:
-            yield f"requests[{number}].{name}", f"is for {' and '.join(kinds)}, not for {kind}"
-
-
-def _value(row: Mapping[str, str], name: str, at: str) -> str | float | None:
-    text = row.get(name, "").strip()
-    if not text:
-        return None
-    if CHOICES[name] or name in TEXTS:
-        return text
+def _number(text: str, path: str) -> float:
     try:
         number = float(text)
     except ValueError:
         number = math.nan
     if not math.isfinite(number):
-        problem = f"{text[:40]!r} is no number"
-        raise InvalidDocument("intent", [(f"{at}.{name}", problem)])
-    return int(number) if name == "count" and number.is_integer() else number
-
-
-def _text(value: str | float) -> str:
-    return value if isinstance(value, str) else repr(value).removesuffix(".0")
+        raise InvalidDocument("intent", [(path, f"{text[:40]!r} is no number")])
+    return int(number) if path.endswith(".count") and number.is_integer() else number
 
 
 def _pruned(value: dict[str, Any]) -> dict[str, Any]:
-    """Without objects that nothing is left of."""
-    found = {
+    """Return it without objects that nothing is left of."""
+    parts = {
         name: _pruned(part) if isinstance(part, dict) else part for name, part in value.items()
     }
-    return {name: part for name, part in found.items() if part != {}}
+    return {name: part for name, part in parts.items() if part != {}}
 
 
 def _json(value: dict[str, Any]) -> str:
@@ -187,12 +153,10 @@ def _json(value: dict[str, Any]) -> str:
 
 
 def _object(text: str, path: str) -> dict[str, Any]:
-    if not text.strip():
-        return {}
     try:
-        found = json.loads(text)
+        value = json.loads(text) if text.strip() else {}
     except (ValueError, RecursionError):
-        raise InvalidDocument("intent", [(path, "is no JSON")]) from None
-    if not isinstance(found, dict):
+        value = None
+    if not isinstance(value, dict):
         raise InvalidDocument("intent", [(path, "must be a JSON object")])
-    return found
+    return value

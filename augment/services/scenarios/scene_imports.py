@@ -2,8 +2,8 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import count
 from pathlib import Path
-from typing import Any
 
 from django.contrib.auth.models import User
 from django.db import IntegrityError, transaction
@@ -59,15 +59,12 @@ def import_scene(
         Conflict: The slug is taken, or the same scene is stored already.
     """
     check_slug(slug, what="scene")
-    _refuse_taken(slug)
-    name, reading = UntrustedInput(path=path, format=source).read(
-        item=item, frame=frame, name=slug
-    )
-    document = scene_to_document(reading.scene)
-    same = _same(document)
-    if same is not None:
-        raise Conflict(f"The same scene is stored already, as {same.slug!r}.")
-    return _keep(reading, document, source=name, path=path, slug=slug, actor=actor)
+    recorded = UntrustedInput(path=path, format=source)
+    name, reading = recorded.read(item=item, frame=frame, name=slug)
+    row, is_new = keep_reading(reading, source=name, path=path, actor=actor)
+    if not is_new:
+        raise Conflict(f"The same scene is stored already, as {row.slug!r}.")
+    return row
 
 
 def import_log(
@@ -97,24 +94,20 @@ def import_log(
     """
     check_slug(f"{slug}-1", what="scene")
     log = UntrustedInput(path=path, format=source)
-    number = 0
+    names = _list_free(slug)
+    name = next(names)
     for moment in log.moments(every_s=every_s)[:limit]:
-        number, name = _free(slug, number)
         format_name, reading = log.read(item=moment.item, frame=moment.frame, name=name)
-        document = scene_to_document(reading.scene)
-        same = _same(document)
-        if same is not None:
-            number -= 1
-            yield ImportedMoment(moment=moment, row=same, is_new=False)
-            continue
-        row = _keep(reading, document, source=format_name, path=path, slug=name, actor=actor)
-        yield ImportedMoment(moment=moment, row=row, is_new=True)
+        row, is_new = keep_reading(reading, source=format_name, path=path, actor=actor)
+        yield ImportedMoment(moment=moment, row=row, is_new=is_new)
+        if is_new:
+            name = next(names)
 
 
 def keep_reading(
     reading: Reading, *, source: str, path: Path, actor: User | None = None
 ) -> tuple[BaseScene, bool]:
-    """The row of a scene that was read under its name, and whether it is new.
+    """Return the row of a scene that was read under its name, and whether it is new.
 
     Where the same scene is stored already, under whatever name, that row.
 
@@ -122,46 +115,13 @@ def keep_reading(
         Conflict: Another scene has the name.
     """
     document = scene_to_document(reading.scene)
-    same = _same(document)
+    digest = content_hash(document)
+    rows = BaseScene.objects.defer("document", "recording")
+    same = rows.filter(content_hash=digest).first()
     if same is not None:
         return same, False
-    slug = reading.scene.name
-    return _keep(reading, document, source=source, path=path, slug=slug, actor=actor), True
-
-
-# Private
-
-
-def _refuse_taken(slug: str) -> None:
-    if BaseScene.objects.filter(slug=slug).exists():
-        raise Conflict(f"There is a scene called {slug!r} already; choose another slug.")
-
-
-def _same(document: dict[str, Any]) -> BaseScene | None:
-    rows = BaseScene.objects.defer("document", "recording")
-    return rows.filter(content_hash=content_hash(document)).first()
-
-
-def _free(slug: str, number: int) -> tuple[int, str]:
-    """The next number whose name is free."""
-    while True:
-        number += 1
-        name = f"{slug[: SLUG_LENGTH - 8].strip('-')}-{number}"
-        if not BaseScene.objects.filter(slug=name).exists():
-            return number, name
-
-
-@transaction.atomic
-def _keep(
-    reading: Reading,
-    document: dict[str, Any],
-    *,
-    source: str,
-    path: Path,
-    slug: str,
-    actor: User | None,
-) -> BaseScene:
-    recording = reading.recording
+    slug, recording, moment = reading.scene.name, reading.recording, reading.moment
+    after = {"slug": slug, "source": source, "path": path.name, "frame": moment.frame}
     try:
         with transaction.atomic():
             row = BaseScene.objects.create(
@@ -169,27 +129,25 @@ def _keep(
                 document=document,
                 recording=None if recording is None else recording_to_document(recording),
                 source=source,
-                source_item=reading.moment.item or "",
+                source_item=moment.item or "",
                 provenance=reading.scene.provenance,
                 notes=notes_to_document(reading.notes),
-                content_hash=content_hash(document),
+                content_hash=digest,
             )
-    except IntegrityError:  # somebody else was faster
+            item = {} if moment.item is None else {"item": moment.item}
+            log_change(row, "import", actor, after=after | item)
+    except IntegrityError:
         raise Conflict(f"There is a scene called {slug!r} already; choose another slug.") from None
-    after = {"slug": slug, "source": source, "path": path.name, "frame": reading.moment.frame}
-    if reading.moment.item is not None:
-        after["item"] = reading.moment.item
-    log_change(row, "import", actor, after=after)
-    return row
+    return row, True
 
 
 def notes_of(scene: BaseScene) -> list[str]:
-    """Every loss and assumption of a stored scene, as a sentence."""
-    return [said_of(note) for note in notes_from_document(scene.notes)]
+    """Return every loss and assumption of a stored scene, as a sentence."""
+    return [sentence_of(note) for note in notes_from_document(scene.notes)]
 
 
-def said_of(note: Note) -> str:
-    """A loss or assumption as a sentence."""
+def sentence_of(note: Note) -> str:
+    """Return a loss or assumption as a sentence."""
     values = {
         "number": note.number or 0,
         "of": note.of or 0,
@@ -201,98 +159,48 @@ def said_of(note: Note) -> str:
     return _TEXTS[note.kind] % values
 
 
+def _list_free(slug: str) -> Iterator[str]:
+    """Yield the numbered names that no scene has."""
+    for number in count(1):
+        name = f"{slug[: SLUG_LENGTH - 8].strip('-')}-{number}"
+        if not BaseScene.objects.filter(slug=name).exists():
+            yield name
+
+
+_Kind = SceneNoteKind
 _TEXTS: dict[SceneNoteKind, str] = {
-    SceneNoteKind.NO_SPEED_LIMITS: (
-        "No speed limits in this source: a drive assumes %(ego)s m/s for the ego and %(others)s"
-        " m/s for others."
-    ),
-    SceneNoteKind.SOME_SPEED_LIMITS: (
-        "%(number)s of %(of)s lanes have no speed limit: a drive assumes %(ego)s m/s for the ego"
-        " and %(others)s m/s for others there."
-    ),
-    SceneNoteKind.SPEED_LIMITS_IGNORED: (
-        "The speed limit of %(number)s lanes is a constant %(value)s m/s that means nothing; it"
-        " was left out."
-    ),
-    SceneNoteKind.NO_LIGHTS: (
-        "No traffic lights in this source: their state is unknown everywhere."
-    ),
-    SceneNoteKind.NO_WALKWAYS: "No sidewalks in this source.",
-    SceneNoteKind.NO_DRIVABLE_AREAS: (
-        "No drivable areas in this source: what can be driven on is the lanes alone."
-    ),
-    SceneNoteKind.NO_CONNECTIVITY: (
-        "This source does not say which lane leads to which: no lane has a successor."
-    ),
-    SceneNoteKind.NO_INTERSECTIONS: (
-        "No intersections in this source: where lanes part, they are lanes, not connectors, and"
-        " have neither turn type nor light."
-    ),
-    SceneNoteKind.NO_BOX_SIZES: (
-        "No box sizes in this source: every object has the usual size of its class."
-    ),
-    SceneNoteKind.SOME_BOX_SIZES: (
-        "%(number)s of %(of)s objects have no box size: the usual size of their class was taken."
-    ),
-    SceneNoteKind.EGO_SIZE_ASSUMED: (
-        "The ego's size is not in this source: %(value)s m long was assumed."
-    ),
-    SceneNoteKind.EGO_SIZE_SWAPPED: (
-        "The ego's length and width were swapped in this source; they were put right."
-    ),
-    SceneNoteKind.NO_EGO_MOTION: (
-        "The ego's own motion was not recorded: a drive is measured against an IDM drive."
-    ),
-    SceneNoteKind.SPEEDS_DIFFERENCED: (
-        "No speeds in this source: they were taken from the recorded places."
-    ),
-    SceneNoteKind.LANE_WIDTHS_ASSUMED: (
-        "%(number)s of %(of)s lanes have no boundaries on both sides: where nothing beside them"
-        " told the width, %(value)s m was assumed."
-    ),
-    SceneNoteKind.TRAFFIC_SIDE_ASSUMED: (
-        "No two oncoming lanes lie side by side: that people drive on the %(names)s is what the"
-        " place says."
-    ),
-    SceneNoteKind.BICYCLE_LANES_LEFT_OUT: ("%(number)s bicycle lanes of the map were left out."),
-    SceneNoteKind.OBJECTS_LEFT_OUT: (
-        "%(number)s objects were left out, which no class here fits: %(names)s."
-    ),
-    SceneNoteKind.CLASSES_MERGED: ("Finer classes of this source count as ours: %(names)s."),
-    SceneNoteKind.MAP_PARTS_LEFT_OUT: (
-        "%(number)s parts of the map have no place here and were left out: %(names)s."
-    ),
-    SceneNoteKind.FAR_PARTS_LEFT_OUT: (
-        "Parts of the map and objects more than %(value)s m from the ego were left out."
-    ),
-    SceneNoteKind.LIGHTS_REPEATED: (
-        "%(number)s lights are programmed, not recorded: their state is that of the cycle at t0."
-    ),
-    SceneNoteKind.BOUNDARIES_TURNED: (
-        "%(number)s boundaries ran against their lane and were turned."
-    ),
-    SceneNoteKind.TURN_TYPES_CORRECTED: (
-        "The turn type of %(number)s connectors contradicts their shape; the shape was believed."
-    ),
-    SceneNoteKind.LONG_TIME_STEP: (
-        "Steps of this recording lie %(value)s s apart; a drive looks between them."
-    ),
-    SceneNoteKind.ROUTE: (
-        "The source's route leads over %(number)s roadblocks: %(names)s. A drive follows the"
-        " recorded way instead."
-    ),
-    SceneNoteKind.ROUTE_NOT_IN_MAP: (
-        "%(number)s of %(of)s roadblocks of the route are not in the map: %(names)s."
-    ),
-    SceneNoteKind.MISSION_GOAL: (
-        "The mission's goal lies %(names)s m ahead of the ego and to its left; no drive is"
-        " measured by it."
-    ),
-    SceneNoteKind.SCENARIO_TAGS: ("Scenario tags of this moment: %(names)s."),
-    SceneNoteKind.INTERPLAN_LEFT_OUT: (
-        "What interPlan says besides and is not used here: %(names)s."
-    ),
-    SceneNoteKind.NON_COMMERCIAL: (
-        "The data's licence, %(names)s, does not allow commercial use."
-    ),
+    _Kind.NO_SPEED_LIMITS: "No speed limits in this source: drives assume %(ego)s m/s for the "
+    "ego and %(others)s m/s for others.",
+    _Kind.SOME_SPEED_LIMITS: "%(number)s of %(of)s lanes have no speed limit: drives assume "
+    "%(ego)s m/s for the ego and %(others)s m/s for others there.",
+    _Kind.SPEED_LIMITS_IGNORED: "%(number)s speed limits of %(value)s m/s were left out.",
+    _Kind.NO_LIGHTS: "No traffic lights in this source.",
+    _Kind.NO_WALKWAYS: "No sidewalks in this source.",
+    _Kind.NO_DRIVABLE_AREAS: "No drivable areas in this source: only lanes can be driven on.",
+    _Kind.NO_CONNECTIVITY: "No lane of this source has a successor.",
+    _Kind.NO_INTERSECTIONS: "No intersections in this source: no turn types, no lights.",
+    _Kind.NO_BOX_SIZES: "No box sizes in this source: the usual ones of each class were taken.",
+    _Kind.SOME_BOX_SIZES: "%(number)s of %(of)s objects got the usual size of their class.",
+    _Kind.EGO_SIZE_ASSUMED: "The ego is assumed to be %(value)s m long.",
+    _Kind.EGO_SIZE_SWAPPED: "The ego's length and width were swapped and put right.",
+    _Kind.NO_EGO_MOTION: "The ego's motion was not recorded: drives are measured by an IDM drive.",
+    _Kind.SPEEDS_DIFFERENCED: "Speeds were taken from the recorded places.",
+    _Kind.LANE_WIDTHS_ASSUMED: "%(number)s of %(of)s lanes have no boundaries on both sides: "
+    "%(value)s m wide where no neighbour tells.",
+    _Kind.TRAFFIC_SIDE_ASSUMED: "That people drive on the %(names)s is what the place says.",
+    _Kind.BICYCLE_LANES_LEFT_OUT: "%(number)s bicycle lanes of the map were left out.",
+    _Kind.OBJECTS_LEFT_OUT: "%(number)s objects of no known class were left out: %(names)s.",
+    _Kind.CLASSES_MERGED: "Finer classes of this source count as ours: %(names)s.",
+    _Kind.MAP_PARTS_LEFT_OUT: "%(number)s parts of the map were left out: %(names)s.",
+    _Kind.FAR_PARTS_LEFT_OUT: "What is more than %(value)s m from the ego was left out.",
+    _Kind.LIGHTS_REPEATED: "%(number)s lights are programmed: their state is the cycle's at t0.",
+    _Kind.BOUNDARIES_TURNED: "%(number)s boundaries ran against their lane and were turned.",
+    _Kind.TURN_TYPES_CORRECTED: "%(number)s turn types were corrected by the connectors' shape.",
+    _Kind.LONG_TIME_STEP: "Steps lie %(value)s s apart; a drive looks between them.",
+    _Kind.ROUTE: "The source's route leads over %(number)s roadblocks: %(names)s; not used.",
+    _Kind.ROUTE_NOT_IN_MAP: "%(number)s of %(of)s roadblocks are not in the map: %(names)s.",
+    _Kind.MISSION_GOAL: "The mission's goal lies %(names)s m ahead and to the left; not used.",
+    _Kind.SCENARIO_TAGS: "Scenario tags of this moment: %(names)s.",
+    _Kind.INTERPLAN_LEFT_OUT: "What interPlan says besides and is not used here: %(names)s.",
+    _Kind.NON_COMMERCIAL: "The data's licence, %(names)s, does not allow commercial use.",
 }

@@ -29,7 +29,7 @@ from augment.scene.entities import Modification
 from augment.scene.recording import notes_from_document, notes_to_document
 from augment.services.events import log_event
 from augment.services.scenarios.pictures import store_as
-from augment.services.scenarios.scene_imports import keep_reading, said_of
+from augment.services.scenarios.scene_imports import keep_reading, sentence_of
 from augment.services.scenarios.scenes import check_slug
 from augment.services.work import Lease, Settlement, WorkKind
 
@@ -72,17 +72,13 @@ def keep_upload(
     """
     if source:
         reader_of(source)
-    digest, size = hashlib.sha256(), 0
-    content.seek(0)
-    for piece in content.chunks():
-        digest.update(piece)
-        size += len(piece)
-    if not size:
+    if not content.size:
         raise Conflict("The file is empty.")
+    content.seek(0)
     row = SceneUpload(
         name=plain_name(name),
-        size_bytes=size,
-        digest=digest.hexdigest(),
+        size_bytes=content.size,
+        digest=hashlib.file_digest(content, "sha256").hexdigest(),
         asked_format=source,
         uploaded_by=actor,
     )
@@ -91,7 +87,7 @@ def keep_upload(
     try:
         with transaction.atomic():
             row.save(force_insert=True)
-            _log(row, "upload", actor, size_bytes=size, digest=row.digest)
+            _log(row, "upload", actor, size_bytes=row.size_bytes, digest=row.digest)
     except BaseException:
         default_storage.delete(row.stored)
         raise
@@ -106,16 +102,6 @@ def remove_upload(row: SceneUpload, actor: User | None = None) -> None:
     row.delete()
     for name in filter(None, names):
         transaction.on_commit(partial(default_storage.delete, name))
-
-
-def read_again(row: SceneUpload) -> None:
-    """Let a failed upload wait once more.
-
-    Raises:
-        Conflict: It did not fail.
-    """
-    if not row.wait_again():
-        raise Conflict(f"“{row.name}” did not fail.")
 
 
 @contextmanager
@@ -247,7 +233,7 @@ MOMENTS = Moments()
 
 def sentences_of(row: UploadMoment) -> list[str]:
     """Return what the source left open at this moment."""
-    return [said_of(note) for note in notes_from_document((row.report or {}).get("notes", []))]
+    return [sentence_of(note) for note in notes_from_document((row.report or {}).get("notes", []))]
 
 
 def _report(reading: Reading) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""interPlan's files as somebody with a grudge writes them: each is our own error, with a place."""
+"""Documents as somebody with a grudge writes them: each is our own error, with a place."""
 
 import math
 from functools import cache
@@ -11,16 +11,52 @@ from hypothesis import strategies as st
 from augment.errors import InvalidDocument
 from augment.formats.documents import (
     DEEPEST,
-    LONGEST_TEXT,
     MAX_CHARACTERS,
+    MOST_YAML_VALUES,
+    read_json,
     read_yaml,
     read_yaml_file,
 )
-from augment.formats.documents import MOST_YAML_VALUES as MOST_VALUES
 from augment.formats.interplan.file import FURTHEST_FROM_EGO_M
 from augment.scene.entities import Scene, without_traffic
 from tests.fixtures.shelf import whole_scene
 from tests.formats.interplan_files import entries_of
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        (b"", "is not JSON"),
+        (b"\xff\xfe\x00", "is not JSON"),
+        (b'{"a": 1, "b": 2, "a": 3}', "named twice in one object: 'a'"),
+        (b'{"a": 1, "\\u001b[2J": 2, "\\u001b[2J": 3}', r"in one object: '\\x1b\[2J'"),
+        (b"[" * 100_000, "is nested too deeply"),
+        (b'{"a": ' + b"9" * 5000 + b"}", "is not JSON"),
+        (b'{"a": "\\u0000"}', "NUL"),
+    ],
+)
+def test_broken_json_is_named(tmp_path: Path, text: bytes, sentence: str) -> None:
+    file = tmp_path / "scene.json"
+    file.write_bytes(text)
+    with pytest.raises(InvalidDocument, match=rf"scene\.json: .*{sentence}"):
+        read_json(file, what="scene")
+
+
+def test_a_file_that_is_not_there_is_named(tmp_path: Path) -> None:
+    with pytest.raises(InvalidDocument, match=r"gone\.json: No such file"):
+        read_json(tmp_path / "gone.json", what="scene")
+
+
+def test_many_doubled_names_are_found_in_one_pass(tmp_path: Path) -> None:
+    # A megabyte; counting each name among all took 133 s, so a hung test is the failure.
+    file = tmp_path / "scene.json"
+    pairs = [f'"{number % 40_000:05}": 1' for number in range(80_000)]
+    file.write_text("{" + ",".join(pairs) + "}")
+    with pytest.raises(InvalidDocument, match="'00000'"):
+        read_json(file, what="scene")
+
+
+# YAML, of which interPlan's file is the one with a shape of its own
 
 TOKEN = "00000000000000ab"
 TOP = "modification_details_dictionary"
@@ -42,51 +78,35 @@ def special(body: str, index: str = '"0"') -> str:
 
 
 HOSTILE = [
-    ("", "expected a mapping with interPlan's keys, got NoneType"),
     ("- 1", "expected a mapping with interPlan's keys, got list"),
-    ("just text", "expected a mapping with interPlan's keys, got str"),
-    ("a: [\n", "line 2, column 1: is no YAML"),
-    ("a: 1\n--- \nb: 2", "line 2, column 1: is no YAML"),
-    ("a: \x1b[2J", "is no YAML: unacceptable character"),
+    ("a: [\n", "line 2, column 1: is no plain YAML"),
+    ("a: 1\n--- \nb: 2", "line 2, column 1: is no plain YAML"),
+    ("a: \x1b[2J", "unacceptable character"),
     ("accel_max: 1.0", f"{TOP}: is missing"),
-    (f"{TOP}: ", f"{TOP}: Input should be a valid dictionary"),
-    (f"{TOP}: {{}}", "holds no special scenario"),
     (f'{TOP}: {{"{TOKEN}": {{}}}}', "holds no special scenario"),
-    (f"{TOP}: {{12345678: {{}}}}", "should match pattern"),
     (f"{TOP}: {{1234567e: {{}}}}", "should match pattern"),
     (f'{TOP}: {{"../../etc/passwd": {{}}}}', "should match pattern"),
     (special("", index='"../0"'), "should match pattern"),
     (special("", index="100"), "should match pattern"),
-    (special("", index="true"), "should match pattern"),
     (special("").replace("jaywalking_pedestrian", "parade"), "Input should be 'approaching"),
     (special("cones: [[1]]"), "cones[0][1]: is missing"),
-    (special("cones: [[1, 2, 3]]"), "cones[0]"),
     (special("cones: {a: 1}"), "cones: Input should be a valid list"),
-    (special("cones: null"), "cones: Input should be a valid list"),
     (special('cones: [["1", 2]]'), "cones[0][0]: Input should be a valid number, got '1'"),
     (special("cones: [[true, 2]]"), "cones[0][0]: Input should be a valid number, got True"),
     (special("cones: [[.nan, 2]]"), "cones[0][0]: Input should be a finite number, got nan"),
-    (special("cones: [[.inf, 2]]"), "cones[0][0]: Input should be a finite number, got inf"),
     (special("cones: [[1.0e+300, 2]]"), "cones[0][0]: Input should be less than"),
-    (special(f"cones: [[{'9' * 400}, 2]]"), "cones[0][0]: "),
-    (special(f"cones: [[{'9' * 5000}, 2]]"), "a text of 5000 characters"),
-    (special("stopped_vehicle: [[0, 0, 1.0e+9]]"), "stopped_vehicle[0][2]: Input should be less"),
-    (special("pedestrian: [[0, 0, 1, 1, 2.5]]"), "pedestrian[0][4]"),
+    (special(f"cones: [[{'9' * 5000}, 2]]"), "is no plain YAML: Exceeds the limit"),
     (special("pedestrian: [[0, 0, 1, 1, -1]]"), "pedestrian[0][4]"),
     (special(f"cones: [{', '.join(['[0, 0]'] * 1001)}]"), "cones: List should have at most 1000"),
-    (special("cones: [[0, 9000]]"), "cones[0]: is "),
-    (special("type: avoid_crashed_cars"), "the key 'type' stands twice"),
-    (f"{TOP}: {{}}\n{TOP}: {{}}", "line 2, column 1: the key"),
-    ("? [a, b]\n: 1", "line 1, column 3: a key is a text"),
-    (LAUGHS, "line 1, column 5: anchors and aliases"),
-    ("a: &b {c: *b}", "anchors and aliases"),
-    ("a: {b: 1}\nc: {<<: *a}", "anchors and aliases"),
-    ("a: !!python/object/apply:os.system [ls]", "line 1, column 4: tags (!) are not read"),
-    ("a: !!binary aGk=", "tags (!) are not read"),
-    ("[" * 100_000, "nested more than"),
-    ("{a: " * 100_000, "nested more than"),
-    ("- " * 100_000, "nested more than"),
-    (f"a: [{'1,' * (MOST_VALUES + 1)}]", f"has more than {MOST_VALUES} values"),
+    (special("type: avoid_crashed_cars"), "a key is a text, and stands once"),
+    ("? [a, b]\n: 1", "line 1, column 3: is no plain YAML: a key is a text"),
+    (LAUGHS, "line 1, column 5: is no plain YAML: anchors, aliases"),
+    ("a: {b: 1}\nc: {<<: *a}", "anchors, aliases"),
+    ("a: !!python/object/apply:os.system [ls]", "anchors, aliases and tags"),
+    ("a: !!binary aGk=", "anchors, aliases and tags"),
+    ("[" * 100_000, f"has more than {DEEPEST} levels"),
+    ("- " * 100_000, f"has more than {DEEPEST} levels"),
+    (f"a: [{'1,' * (MOST_YAML_VALUES + 1)}]", f"and {MOST_YAML_VALUES} values"),
     ("#" * (MAX_CHARACTERS + 1), "characters; at most"),
     ("a: \ud800", ""),
 ]
@@ -105,14 +125,7 @@ def test_a_hostile_file_is_our_own_error_and_says_where(text: str, said: str) ->
         st.sampled_from(
             [
                 *"[]{}&*!|>?:-,#%@`\"' \n",
-                "a",
-                "1",
-                ".nan",
-                "<<: ",
-                TOP,
-                "0x",
-                "2020-99-99",
-                "1:1:1",
+                *("a", "1", ".nan", "<<: ", TOP, "0x", "2020-99-99", "1:1:1"),
             ]
         )
     ).map("".join)
@@ -128,7 +141,6 @@ def test_no_text_breaks_the_reader(text: str) -> None:
     ("text", "value"),
     [
         ("a: 2020-01-01", {"a": "2020-01-01"}),
-        ("a: 2020-99-99", {"a": "2020-99-99"}),
         ("a: {<<: 1}", {"a": {"<<": 1}}),
         ("a: 1.5e-3", {"a": 0.0015}),
         ("a: [1, -2.5, null, true, text]", {"a": [1, -2.5, None, True, "text"]}),
@@ -138,13 +150,11 @@ def test_plain_values_are_read_and_nothing_is_made_a_date(text: str, value: obje
     assert read_yaml(text, what="file") == value
 
 
-def test_depth_and_length_have_a_last_value_that_is_read() -> None:
+def test_depth_has_a_last_value_that_is_read() -> None:
     deepest = "[" * DEEPEST + "]" * DEEPEST
     assert read_yaml(deepest, what="file") is not None
-    assert read_yaml("x" * LONGEST_TEXT, what="file") == "x" * LONGEST_TEXT
-    for text in (f"[{deepest}]", "x" * (LONGEST_TEXT + 1)):
-        with pytest.raises(InvalidDocument):
-            read_yaml(text, what="file")
+    with pytest.raises(InvalidDocument):
+        read_yaml(f"[{deepest}]", what="file")
 
 
 @pytest.mark.parametrize(("away_m", "is_read"), [(-0.5, True), (0.5, False)])
@@ -166,7 +176,4 @@ def test_a_large_file_is_refused_unread(tmp_path: Path) -> None:
     with file.open("wb") as out:
         out.truncate(MAX_CHARACTERS + 1)
     with pytest.raises(InvalidDocument, match=r"large\.yaml: 4194305 bytes; at most 4194304"):
-        read_yaml_file(file, what="interPlan file")
-    file.write_bytes(b"\xff\xfe")
-    with pytest.raises(InvalidDocument, match=r"large\.yaml: is not UTF-8"):
         read_yaml_file(file, what="interPlan file")
