@@ -83,7 +83,7 @@ def test_what_goes_on_keeps_everything() -> None:
     study = study_rows.a_study()
     study.matchups.filter(pk=study_rows.matchups_of(study, "eva")[0].pk).update(left=rows[0])
     ModelCall.objects.filter(attempt__augmentation=rows[1]).update(started_at=timezone.now())
-    assert ": 1 requests" in prune()
+    assert "answers: 1" in prune()
     for state in (*GenerationJob.HELD, GenerationJob.State.RUNNING):
         GenerationJob.objects.filter(pk=job.pk).update(state=state)
         assert "Nothing is that old" in prune(), state
@@ -95,7 +95,7 @@ def test_what_goes_on_keeps_everything() -> None:
     assert set(kept) == {rows[0].pk, rows[1].pk}
     Study.objects.filter(pk=study.pk).update(state=Study.State.CLOSED)
     age()
-    assert ": 2 requests" in prune()
+    assert "answers: 2" in prune()
 
 
 def test_the_source_of_an_answer_that_an_open_study_shows_stays() -> None:

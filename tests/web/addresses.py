@@ -60,7 +60,7 @@ def address(name: str, here: World) -> str:
         "scene-delete": {"code": here.augmentation.scenario.base_scene.code},
         "intent-read": {"code": here.augmentation.scenario.code},
         "picture": {"kind": "augmentation", "code": shown.left.code},
-        "results-export": {"code": here.study.code, "form": "csv"},
+        "results-export": {"code": here.study.code, "name": "votes", "form": "csv"},
         "study-file": {"code": here.study.code, "kind": "interplan"},
         "study-write": {"code": here.study.code, "kind": "interplan"},
         "results-vote": {"code": here.study.code, "vote": STRANGER},

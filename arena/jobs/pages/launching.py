@@ -24,7 +24,7 @@ from augment.services.inputs import inputs_of, read_request, read_values
 from augment.services.running.choosing import find_obstacle, keys_missing
 from augment.services.running.estimates import JobEstimate, estimate
 from augment.services.running.jobs import JobRequest, JobScope, launch
-from augment.services.running.matrix import add_cells, matrix_of
+from augment.services.running.matrix import add_cells, find_cells, matrix_of
 from augment.tasks import enqueue_job
 
 LONGEST_NAME = 120

@@ -41,7 +41,7 @@ class Command(TerminalCommand):
         """Run the demo; a fault of any step ends it with a sentence."""
         web = Web(host=options["host"], port=options["port"])
         try:
-            with hold_alone(self.stdout.write):
+            with hold_alone():
                 self._run(web, options["per_type"], serve=not options["no_serve"])
         except KeyboardInterrupt:
             raise CommandError(STOPPED, returncode=INTERRUPTED) from None

@@ -33,21 +33,7 @@ class Command(TerminalCommand):
         if not number:
             self.stdout.write("Nothing is that old, or it belongs to what goes on.")
             return
-        self.stdout.write(f"\n{LOST}")
-
-    def _remove(self, before: Any, now: Any) -> None:
-        for loss, done in remove_old(before=before, now=now):
-            self.stdout.write(f"{_name(loss)}: {done:,} of {loss.calls:,} are removed")
-
-
-def _name(loss: TextLoss) -> str:
-    if loss.job is None:
-        return "Readings of instructions"
-    return f"Job {loss.job.name!r} of {loss.job.created_at:%Y-%m-%d}"
-
-
-def _said(loss: TextLoss) -> str:
-    return (
-        f"{loss.calls:,} requests and {loss.answers:,} answers, "
-        f"{loss.characters / 1e6:.1f} MB of text, {loss.transcripts:,} transcripts"
-    )
+        self.stdout.write(f"Requests with their answers: {number:,}\n\n{LOST}")
+        if options["yes"]:
+            for done, of in remove_old(before=before, now=now):
+                self.stdout.write(f"{done:,} of {of:,} are removed")

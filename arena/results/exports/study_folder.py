@@ -28,7 +28,7 @@ from arena.results.services.stored_rows import (
     label_of,
 )
 from arena.site.services import UNFINISHED
-from arena.studies.services.opening import FILE_NAME, preregistration_bytes, preregistration_sha256
+from arena.studies.services.opening import FILE_NAME, preregistration_sha256
 from augment.models import Augmentation, GenerationJob
 from augment.services.running.transcript_records import record_of, tries_by_augmentation
 
@@ -253,7 +253,7 @@ def _files_for_people(closure: Closure) -> Iterator[File]:
         closure.contestants.select_related("endpoint"), key=lambda row: str(row.slug)
     )
     yield "contestants.json", _json([_document(row, _CONTESTANT) for row in contestants])
-    if frozen := preregistration_bytes(study):
+    if frozen := study.preregistration.encode():
         yield FILE_NAME, frozen
     named = closure.named_scenarios.select_related("base_scene", "paraphrase_of")
     scenarios = sorted(named, key=lambda row: str(row.slug))

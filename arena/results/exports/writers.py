@@ -179,7 +179,7 @@ def bundle_files(snapshot: Snapshot) -> dict[str, bytes]:
     files["pairs.csv"] = _pairs_csv(results)
     files["types.csv"] = _types_csv(results)
     files["raters.csv"] = csv_of(RATERS, results.trust.raters)
-    if frozen := preregistration_bytes(snapshot.study):
+    if frozen := snapshot.study.preregistration.encode():
         files[FILE_NAME] = frozen
     if table.hypotheses:
         files["hypotheses.csv"] = csv_of(HYPOTHESES, table.hypotheses)
