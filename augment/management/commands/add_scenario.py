@@ -1,6 +1,5 @@
 """Put an instruction to a stored scene."""
 
-from argparse import ArgumentParser
 from pathlib import Path
 from typing import Any
 
@@ -27,41 +26,33 @@ class Command(TerminalCommand):
 
     help = "Add a scenario: a scene, its type, an instruction and, if given, a reference."
 
-    def add_arguments(self, parser: ArgumentParser) -> None:
-        """Say what the command takes."""
-        types = ", ".join(member.value for member in ScenarioType)
-        parser.add_argument(
-            "--file",
-            type=Path,
-            help="many at once, all or none: .csv with a line of names, or .yaml with a list; "
+    arguments = {
+        "--file": {
+            "type": Path,
+            "help": "many at once, all or none: .csv with a line of names, or .yaml with a list; "
             f"{', '.join(NEEDED)}, and {', '.join(OPTIONAL)} where they are known",
-        )
-        parser.add_argument("--scene", help="the slug of a stored scene")
-        parser.add_argument("--type", help=f"one of {types}, or a slug of your own")
-        parser.add_argument("--instruction", help="what is to be changed")
-        parser.add_argument(
-            "--slug", help="the scenario's name; made up from the others if absent"
-        )
-        parser.add_argument(
-            "--reference", type=Path, metavar="FILE", help="a modification in the own JSON"
-        )
-        parser.add_argument(
-            "--intent",
-            type=Path,
-            metavar="FILE",
-            help="what the instruction asks for, see docs/catalogue.md",
-        )
-        parser.add_argument(
-            "--keep-traffic", action="store_true", help="keep the recorded traffic in the scene"
-        )
-        parser.add_argument(
-            "--density",
-            choices=[one.value for one in TrafficDensity],
-            help="spawn traffic in place of the recorded one",
-        )
-        parser.add_argument(
-            "--goal", choices=[one.value for one in GOALS], help="where the ego's way turns"
-        )
+        },
+        "--scene": {"help": "the slug of a stored scene"},
+        "--type": {"help": f"one of {', '.join(ScenarioType)}, or a slug of your own"},
+        "--instruction": {"help": "what is to be changed"},
+        "--slug": {"help": "the scenario's name; made up from the others if absent"},
+        "--reference": {
+            **{"type": Path, "metavar": "FILE", "help": "a modification in the own JSON"}
+        },
+        "--intent": {
+            **{"type": Path, "metavar": "FILE"},
+            "help": "what the instruction asks for, see docs/catalogue.md",
+        },
+        "--keep-traffic": {
+            "action": "store_true",
+            "help": "keep the recorded traffic in the scene",
+        },
+        "--density": {
+            "choices": list(TrafficDensity),
+            "help": "spawn traffic in place of the recorded one",
+        },
+        "--goal": {"choices": list(GOALS), "help": "where the ego's way turns"},
+    }
 
     def handle(self, *args: Any, **options: Any) -> None:
         """Add, and say under which name."""
