@@ -22,7 +22,7 @@ from augment.models import GenerationJob
 from augment.services.judging.analyses import analyse_job, augmentation_lines, repeatability
 from augment.services.judging.displacement import By
 from augment.services.judging.simulations import SCORES
-from augment.services.running.progress import tool_calls_by_augmentation
+from augment.services.running.progress import tool_calls
 
 
 def _count(name: str) -> Callable[[Any], int | None]:
@@ -134,7 +134,7 @@ def repeat_sheet(job: GenerationJob) -> Sheet:
 
 def tool_call_sheet(job: GenerationJob) -> Sheet:
     """Return the calls of a job's contestants to their function, one row an augmentation."""
-    lines = tool_calls_by_augmentation(job)
+    lines = tool_calls(job)
     return sheet_of(lines, TOOL_CALLS, name="tool-calls", key="augmentations")
 
 
