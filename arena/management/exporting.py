@@ -186,10 +186,7 @@ def _write_modifications(options: Chosen, say: Say) -> ExportedFile:
 def _write_scenarios(options: Chosen, say: Say) -> ExportedFile:
     """Write all scenarios of a job as a zip of files, and tell what is lost on the way."""
     exported = scenario_export.export_job(
-        find_job(options["job"]),
-        file_format=options["format"],
-        contestant=options["contestant"],
-        motion=options["motion"],
+        find_job(options["job"]), file_format=options["format"], contestant=options["contestant"]
     )
     written = exported.written
     told = {"Left out": exported.missing, "Refused": written.refused, "Lost": written.losses}
