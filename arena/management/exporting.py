@@ -302,12 +302,6 @@ KINDS: dict[str, ExportKind] = {
         "what a job made, in a standard format",
         _write_scenarios,
         _format([*scenario_export.FORMATS, "OUT is a folder"], required=True, default=None)
-        | _option(
-            "--motion",
-            f"{scenario_export.RECORDED}, or the planner whose finished drives say what "
-            "everybody does",
-            default=scenario_export.RECORDED,
-        )
         | _CONTESTANT,
     ),
 }
