@@ -61,8 +61,9 @@ def _code(name: str, word: str, here: World) -> object:
             )
             return drive.code
         case "uploads" | "moments":
-            given = {"name": "log.zip", "size_bytes": 1, "state": "failed"}
-            upload, _ = SceneUpload.objects.get_or_create(**given)
+            upload, _ = SceneUpload.objects.get_or_create(
+                name="log.zip", size_bytes=1, state="failed"
+            )
             moment, _ = UploadMoment.objects.get_or_create(upload=upload)
             return upload.code if word == "uploads" else moment.code
         case "invitations":
@@ -72,7 +73,7 @@ def _code(name: str, word: str, here: World) -> object:
             return Authorship.objects.get().code
         case "d":
             return here.study.matchups.filter(expert=here.expert).get(position=1).code
-    rows = {
+    rows: dict[str, Any] = {
         "people": here.expert.person,
         "jobs": here.job,
         "label": here.job,
