@@ -127,7 +127,7 @@ ACTIONS: dict[str, tuple[int, int, int]] = {
     "study-close": (200, 403, 403),
     "study-cancel": (200, 403, 403),
     "study-again": (302, 403, 403),
-    "study-draft-discard": (200, 403, 403),
+    "study-draft-discard": (302, 403, 403),
     "study-hand-over": (302, 403, 403),
     "labelling-close": (404, 403, 403),
     "theme": (302, 302, 302),
@@ -164,7 +164,7 @@ def test_every_action_is_for_the_roles_of_the_table() -> None:
 
 ASKS_FIRST = {
     **{"scenario-delete": 200, "scene-delete": 200},
-    **{"study-close": 200, "study-cancel": 200, "study-draft-discard": 200, "job-cancel": 200},
+    **{"study-close": 200, "study-cancel": 200, "job-cancel": 200},
     "labelling-close": 404,
 }
 """What a GET of them answers: a question, which changes nothing; here nobody labels."""
