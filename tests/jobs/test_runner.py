@@ -178,9 +178,9 @@ def test_simulated_errors_of_an_earlier_version_run_no_more() -> None:
 
 @pytest.fixture(autouse=True)
 def _going_on() -> Iterator[None]:
-    workers.withdraw_stop()
+    workers.stopping.clear()
     yield
-    workers.withdraw_stop()
+    workers.stopping.clear()
 
 
 def only(job: GenerationJob) -> tuple[Augmentation, list[ModelCall]]:
@@ -191,7 +191,7 @@ def only(job: GenerationJob) -> tuple[Augmentation, list[ModelCall]]:
 
 def test_no_row_is_claimed_any_more_and_its_message_goes_back() -> None:
     row = only_row(launch())
-    workers.request_stop()
+    workers.stopping.set()
     with pytest.raises(Reject) as caught:
         tasks.work.run("augmentation", row.pk)
     assert caught.value.requeue
@@ -203,7 +203,7 @@ def test_no_row_is_claimed_any_more_and_its_message_goes_back() -> None:
 def test_where_nothing_was_sent_the_row_goes_back_unpaid() -> None:
     job = llama_job()
     assert runner.work_on(
-        augmentation_pk=only_row(job).pk, connect=Model(waiting=workers.request_stop)
+        augmentation_pk=only_row(job).pk, connect=Model(waiting=workers.stopping.set)
     )
     row, calls = only(job)
     assert (row.state, row.sent_at, row.claim) == (State.QUEUED, None, None)
@@ -216,12 +216,12 @@ def test_where_nothing_was_sent_the_row_goes_back_unpaid() -> None:
 def test_an_answer_before_the_stop_is_not_asked_for_again() -> None:
     """It can't be read, so the model is asked once more: by whoever takes the row next."""
     job = llama_job()
-    unreadable = Model(lambda _: reply("no answer at all"), looking_on=workers.request_stop)
+    unreadable = Model(lambda _: reply("no answer at all"), looking_on=workers.stopping.set)
     assert runner.work_on(augmentation_pk=only_row(job).pk, connect=unreadable)
     row, calls = only(job)
     assert row.state == State.QUEUED
     assert len(calls) == 1
-    workers.withdraw_stop()
+    workers.stopping.clear()
     assert runner.work_on(augmentation_pk=row.pk, connect=Wire(GOOD))
     row, calls = only(job)
     assert row.state == State.DONE
@@ -239,7 +239,7 @@ def test_who_waits_for_a_place_gives_up_the_wait() -> None:
 
     def sleep(seconds: float) -> None:
         looks.append(seconds)
-        workers.request_stop()
+        workers.stopping.set()
 
     queue = Queue(longest_s=600.0, still_wanted=workers.insist_on_going_on, sleep=sleep)
     with (
