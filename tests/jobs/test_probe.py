@@ -7,7 +7,6 @@ from typing import Any
 import pytest
 
 from augment.fake_llm.server import running
-from augment.llm.client import Patience
 from augment.llm.costs import least_tokens
 from augment.llm.messages import LengthName
 from augment.llm.questions import MARKER, Ability
@@ -86,7 +85,7 @@ def candidate(can: frozenset[str] = EVERYTHING, status: int = 200) -> Iterator[C
 
 def asked() -> ProbeReport:
     known = model_at(endpoint=Endpoint.objects.get(), model="m")
-    return probe(known, patience=Patience(attempts=1))
+    return probe(known)
 
 
 def row() -> EndpointModel:
