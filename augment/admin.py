@@ -9,7 +9,7 @@ from augment.models import BaseScene, Contestant, Endpoint, Scenario
 
 
 @admin.register(BaseScene, Contestant, Endpoint, Scenario)
-class MadeElsewhere(admin.ModelAdmin):  # type: ignore[type-arg]
+class MadeElsewhere(admin.ModelAdmin):
     """Rows that services make and change, because they check what they are given and log it."""
 
     exclude = ("document", "recording", "reference")

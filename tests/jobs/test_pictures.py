@@ -1,4 +1,3 @@
-import hashlib
 import os
 import subprocess
 import threading
@@ -17,7 +16,6 @@ from augment.services.scenarios.pictures import original_picture, store
 from tests.jobs.models import Wire, llama_job, ran
 from tests.variants.playing import GOOD
 
-NAME = f"bev/{hashlib.sha256(b'png').hexdigest()}.png"
 WORKERS = 4
 
 

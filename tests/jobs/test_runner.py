@@ -12,18 +12,11 @@ from augment import tasks
 from augment.errors import Conflict, LeaseLost
 from augment.llm.messages import Reply
 from augment.models import Augmentation, Contestant, GenerationJob, ModelCall
-from augment.scene.codec import (
-    intent_to_document,
-    modification_from_document,
-    modification_to_document,
-)
+from augment.scene.codec import modification_from_document, modification_to_document
 from augment.scene.entities import Modification
-from augment.scene.intent import Intent
-from augment.services.endpoints import contestants
 from augment.services.running import jobs, runner, workers
 from augment.services.running.jobs import JobRequest
 from augment.services.running.runner import AUGMENTATIONS
-from tests.intents import parked
 from tests.jobs.models import Model, Wire, llama_job, ran, reply
 from tests.jobs.rows import INSTRUCTION, TWO_CONES, add_kind, add_scenario, launch, only_row
 from tests.variants.playing import GOOD
@@ -126,16 +119,6 @@ def test_a_reference_that_does_not_fit_is_a_failure_with_a_sentence() -> None:
     row = ran(one_job(Contestant.Kind.REFERENCE, reference=gone))
     assert row.state == State.FAILED
     assert row.reason.startswith("The modification does not fit the scene: Agent9")
-
-
-PARKED = parked(22.0)
-
-
-def quantised(slug: str, intent: Intent) -> Augmentation:
-    add_scenario(f"street-{slug}", intent=intent_to_document(intent))
-    contestants.ensure_builtin()
-    job = jobs.launch(JobRequest(name="Q", contestants=[slug], scenarios=[f"street-{slug}"]))
-    return ran(only_row(job))
 
 
 def test_simulated_errors_of_an_earlier_version_run_no_more() -> None:
