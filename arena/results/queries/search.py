@@ -1,10 +1,8 @@
 """Which votes of a rating somebody looks for: what stands in an address, and the rows it finds."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
-from typing import Any
+from typing import Any, Self
 
 from django.db.models import Exists, OuterRef, Q, QuerySet
 
@@ -49,12 +47,10 @@ PARTS = {
     "checks": "Attention checks answered",
     "passed": "Attention checks passed",
     "checks_skipped": "Attention checks skipped",
-    "shared": "On what others judged as well",
 }
 ORDERS = {
     "disputed": "Most disputed",
     "lost": "Most often beaten",
-    "faults": "Most faults",
     "scenario": "Scenarios by name",
 }
 MARKS = {
@@ -79,27 +75,21 @@ class VoteSearch:
     Attributes:
         contestant, opponent: Slugs of who was shown.
         scenario: A slug, and `type` the type of scenarios.
-        sample: Its number, in a study that shows every sample on its own.
         expert: The code of a judge.
         outcome: Of OUTCOMES; won, tied and lost are seen from the contestant.
         part: Of PARTS: what a number of the results stands for.
         mark: Of MARKS.
-        comment: Words in the expert's comment.
-        aid: What the expert looked with.
         order: Of ORDERS: what comes first; empty is the order in which the votes were given.
     """
 
     contestant: str = ""
     opponent: str = ""
     scenario: str = ""
-    sample: str = ""
     type: str = ""
     expert: str = ""
     outcome: str = ""
     part: str = ""
     mark: str = COUNTED
-    comment: str = ""
-    aid: str = ""
     order: str = ""
 
     def as_query(self) -> dict[str, str]:
@@ -108,7 +98,7 @@ class VoteSearch:
         return {name: text for name, text in values.items() if text != _DEFAULTS[name]}
 
     @classmethod
-    def of_query(cls, query: Mapping[str, str]) -> VoteSearch:
+    def of_query(cls, query: Mapping[str, str]) -> Self:
         """What `as_query` wrote; other words of the address are somebody else's."""
         return cls(**{name: query[name] for name in _DEFAULTS if query.get(name)})
 
@@ -120,13 +110,7 @@ def find_votes(snapshot: Snapshot, search: VoteSearch) -> QuerySet[Vote]:
         return rows.none()
     if search.expert:
         rows = rows.filter(expert__in=users_of([search.expert]).values())
-    words = {
-        "matchup__scenario__slug": search.scenario,
-        "matchup__right__sample": search.sample,  # both sides show the same one
-        "matchup__scenario__type": search.type,
-        "comment__icontains": search.comment,
-        "aids__contains": search.aid,  # no aid's name is part of another's
-    }
+    words = {"matchup__scenario__slug": search.scenario, "matchup__scenario__type": search.type}
     rows = rows.filter(**{path: word for path, word in words.items() if word})
     if search.outcome == "both_miss":
         rows = rows.filter(both_miss=True)
@@ -143,7 +127,7 @@ def find_lines(snapshot: Snapshot, search: VoteSearch) -> QuerySet[ImportedVote]
     filters = Filters.of_document(snapshot.filters)
     lines = marked_lines(snapshot.study, filters, snapshot.last_vote)
     rows: QuerySet[ImportedVote] = _by_mark(lines, search.mark)
-    if search.type or search.part or search.comment:
+    if search.type or search.part:
         return rows.none()
     words = {"judge": search.expert, "item": search.scenario}
     rows = rows.filter(**{name: word for name, word in words.items() if word})
@@ -152,7 +136,7 @@ def find_lines(snapshot: Snapshot, search: VoteSearch) -> QuerySet[ImportedVote]
 
 def is_found(tie: Judged, search: VoteSearch) -> bool:
     """Whether a tie on a pair that nobody can tell apart is looked for."""
-    if search.comment or search.part or search.aid or search.sample:
+    if search.part:
         return False
     marks = {EVERY: True, LEFT_OUT: tie.mark not in (COUNTED, AUTOMATIC_TIE)}
     return (
@@ -238,18 +222,6 @@ def _alike(rows: QuerySet[Vote], snapshot: Snapshot) -> QuerySet[Vote]:
     )
 
 
-def _shared(rows: QuerySet[Vote], snapshot: Snapshot) -> QuerySet[Vote]:
-    """Votes on what another expert's vote that counts is on as well."""
-    others = marked_votes(snapshot).filter(
-        Q(mark=COUNTED), matchup__scenario=OuterRef("matchup__scenario")
-    )
-    others = others.exclude(expert=OuterRef("expert"))
-    left, right = "shown_left__contestant", "shown_right__contestant"
-    alike = others.filter(**{left: OuterRef(left), right: OuterRef(right)})
-    turned = others.filter(**{left: OuterRef(right), right: OuterRef(left)})
-    return rows.filter(Exists(alike) | Exists(turned))
-
-
 _PARTS: dict[str, Callable[[QuerySet[Vote], Snapshot], QuerySet[Vote]]] = {
     "commented": lambda rows, _: rows.exclude(comment=""),
     "fast": lambda rows, _: rows.filter(ms_visible__lt=FAST_MS),
@@ -257,7 +229,6 @@ _PARTS: dict[str, Callable[[QuerySet[Vote], Snapshot], QuerySet[Vote]]] = {
     "repeats": _repeats,
     "alike": _alike,
     "checks": lambda rows, _: rows.filter(matchup__kind=CHECK, outcome__in=RATED),
-    "shared": _shared,
     "passed": lambda rows, _: rows.filter(
         matchup__kind=CHECK, winner__contestant__kind=Contestant.Kind.REFERENCE
     ),
