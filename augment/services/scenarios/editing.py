@@ -86,10 +86,10 @@ def snap(scenario: Scenario, modification: Modification, agent_id: str) -> Modif
     """
     _, graph = _read_scene(scenario.pk, scene_key(scenario))
 
-    def snapped(agents: tuple[TrafficAgent, ...]) -> tuple[TrafficAgent, ...]:
-        return tuple(_snapped(one, graph) if one.id == agent_id else one for one in agents)
-
-    added, moved = snapped(modification.added), snapped(modification.moved)
+    added, moved = (
+        tuple(_snapped(one, graph) if one.id == agent_id else one for one in agents)
+        for agents in (modification.added, modification.moved)
+    )
     return replace(modification, added=added, moved=moved)
 
 
@@ -115,11 +115,11 @@ def _on_its_lane(agent: TrafficAgent, graph: LaneGraph) -> TrafficAgent:
 
 def _snapped(agent: TrafficAgent, graph: LaneGraph) -> TrafficAgent:
     lane_id = graph.under(agent.x_m, agent.y_m, agent.heading_rad)
-    if lane_id is None:
-        nearest = graph.nearest(agent.x_m, agent.y_m)
-        if nearest is None or nearest[1].distance_m > _SNAP_WITHIN_M:
-            return agent
+    nearest = graph.nearest(agent.x_m, agent.y_m)
+    if lane_id is None and nearest is not None and nearest[1].distance_m <= _SNAP_WITHIN_M:
         lane_id = nearest[0]
+    if lane_id is None:
+        return agent
     line = graph.lane(lane_id).centerline
     pose = line.pose_at(line.project(agent.x_m, agent.y_m).s_m)
     heading_rad = pose.heading_rad

@@ -80,21 +80,22 @@ def import_interplan(
     file = file_of(read_yaml_file(_modification_file_in(folder), what=WHAT))
     by_token = file.modification_details_dictionary
     wanted = {token: one for token, one in by_token.items() if one.special_scenario}
-    for text in file.left_out:
+    left_out = [
+        f"base token {token}, without a special scenario"
+        for token in by_token
+        if token not in wanted
+    ]
+    for text in (*file.left_out, *left_out):
         yield ImportStep(StepKind.LEFT_OUT, f"Left out: {text}.")
-    for token in by_token.keys() - wanted.keys():
-        text = f"Left out: base token {token}, which has no special scenario."
-        yield ImportStep(StepKind.LEFT_OUT, text)
     logs: dict[str, Path] = {}
     paths = sorted((data or folder).rglob("*.db"))
     for number, path in enumerate(paths, start=1):
-        tokens: tuple[str, ...] = ()
         try:
             tokens = UntrustedInput(path=path, format=NuPlan.name).tokens(list(wanted))
             found = f"{len(tokens)} base tokens"
+            logs = dict.fromkeys(tokens, path) | logs
         except InvalidDocument as fault:
             found = str(fault)
-        logs = dict.fromkeys(tokens, path) | logs
         yield ImportStep(StepKind.LOG, f"Log {number} of {len(paths)}, {path.name}: {found}")
     for token, details in wanted.items():
         if token in logs:
@@ -104,23 +105,17 @@ def import_interplan(
 
 
 def _modification_file_in(folder: Path) -> Path:
-    """The one modification file in a folder, whatever it is called."""
-    if folder.is_file():
-        return folder
-    if not folder.is_dir():
-        raise InvalidDocument(WHAT, [(str(folder), "is not a folder")])
-    candidates = [*sorted(folder.rglob("*.yaml")), *sorted(folder.rglob("*.yml"))]
+    """Return the one modification file in a folder, whatever it is called."""
     files = [
         file
-        for file in candidates
+        for file in ([folder] if folder.is_file() else sorted(folder.rglob("*.y*ml")))
         if file.is_file()
         and file.stat().st_size <= MAX_CHARACTERS
         and _KEY.encode() in file.read_bytes()
     ]
     if len(files) != 1:
-        named = ", ".join(str(file.relative_to(folder)) for file in files[:5])
-        text = f"holds {len(files)} YAML files with {_KEY}, there must be one: {named}"
-        raise InvalidDocument(WHAT, [(str(folder), text.rstrip(": "))])
+        problem = f"{len(files)} YAML files with {_KEY} are there; there must be one"
+        raise InvalidDocument(WHAT, [(str(folder), problem)])
     return files[0]
 
 

@@ -51,9 +51,8 @@ def type_choices() -> list[tuple[str, str]]:
 
 
 def type_label(name: str) -> str:
-    """What people read for a type; a type that nobody knows is its own label."""
-    known = type_of(name)
-    return dict(type_choices()).get(name, name) if known is None else known.label
+    """Return what people read for a type; a type that nobody knows is its own label."""
+    return dict(type_choices()).get(name, name)
 
 
 def type_of(name: str) -> ScenarioType | None:
@@ -67,32 +66,19 @@ def type_rank(name: str) -> int:
     return known.index(name) if name in known else len(known)
 
 
-def check_type(name: str) -> None:
-    """Refuse what can't be a scenario type.
+def label_for(name: str) -> str:
+    """Return the label that a scenario of this type is stored with: empty for one of the five.
 
     Raises:
         InvalidDocument: It is neither one of the five nor a slug.
     """
     if type_of(name) is not None:
-        return
+        return ""
     if len(name) > LONGEST_TYPE or not re.fullmatch(r"[a-z0-9]+([_-][a-z0-9]+)*", name):
         known = ", ".join(one.value for one in ScenarioType)
-        rule = (
-            f"one of {known}, or a slug of your own: lower-case letters, digits and single _ or "
-            f"-, at most {LONGEST_TYPE}"
-        )
-        raise InvalidDocument("scenario", [("type", f"{name!r} must be {rule}")])
-
-
-def _label_for(name: str) -> str:
-    """Return the label that a scenario of this type is stored with: empty for one of the five.
-
-    Raises:
-        InvalidDocument: The slug of a type of one's own can't be.
-    """
-    check_type(name)
-    if type_of(name) is not None:
-        return ""
+        rule = f"one of {known}, or lower-case letters, digits and single _ or -"
+        problem = f"{name!r} must be {rule}, at most {LONGEST_TYPE}"
+        raise InvalidDocument("scenario", [("type", problem)])
     before = Scenario.objects.filter(type=name).values_list("type_label", flat=True).first()
     return before or re.sub(r"[_-]", " ", name).capitalize()
 
@@ -207,7 +193,7 @@ def set_wording(scenario: Scenario, instruction: str, type: str) -> None:
         InvalidDocument: The type or the instruction breaks its format.
     """
     check_prose("instruction", instruction, what="scenario", longest=INSTRUCTION_LENGTH)
-    scenario.type, scenario.type_label = type, _label_for(type)
+    scenario.type, scenario.type_label = type, label_for(type)
     scenario.instruction_is_generated &= scenario.instruction == instruction.strip()
     scenario.instruction = instruction.strip()
 
