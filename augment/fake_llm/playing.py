@@ -8,6 +8,7 @@ Frame: ego frame.
 import json
 import math
 import re
+import struct
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -201,10 +202,10 @@ def _fenced(words: str, block: object) -> str:
 
 def _describe_picture(request: ChatRequest) -> str:
     """Tell a viewer's questions what picture there is, and nothing that it can't see."""
-    sizes = [image.size_px for message in request.messages for image in message.images]
-    if not sizes:
+    pictures = [png for message in request.messages for png in message.images]
+    if not pictures:
         return "There is no picture."
-    width, height = sizes[-1]
+    width, height = struct.unpack_from(">II", pictures[-1], 16)  # behind the PNG's signature
     count = len(re.findall(r"^[0-9]+\. ", request.messages[-1].text, re.MULTILINE)) or 1
     lines = [f"1. The picture has {width} x {height} pixels; more I cannot see."]
     return "\n".join(lines + [f"{number}. cannot see" for number in range(2, count + 1)])
