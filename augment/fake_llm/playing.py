@@ -323,10 +323,10 @@ def _bend(task: Task, right: Modification, heard: Heard) -> Modification:
     rng = careless.dice(_all_told(task, heard))
     if careless.is_unreadable(rng):
         return right
-    if heard.called or heard.may_call:
-        return careless.bend(task.scene, right, rng, careless.SPARED_BY_TOOL).modification
-    laid = careless.lay_straight(task.scene, right)
-    return careless.bend(task.scene, laid, rng).modification
+    has_tool = heard.called or heard.may_call
+    shown = right if has_tool else careless.lay_straight(task.scene, right)
+    spared = careless.SPARED_BY_TOOL if has_tool else frozenset()
+    return careless.bend(task.scene, shown, rng, spared)[0]
 
 
 def _mumble(task: Task, text: str, heard: Heard) -> str:
@@ -339,13 +339,12 @@ def _overlook(task: Task) -> list[Problem]:
     return problems_of(task) if careless.dice(task.prompt).random() < 0.5 else []
 
 
-def _learn(task: Task, right: Modification, heard: Heard) -> Modification:
-    """Place too far at first, right after feedback."""
-    return right if heard.feedback else careless.too_far(task.scene, right)
-
-
 GOOD = Character()
 CARELESS = Character(hear=_mishear, bend=_bend, spoil=_mumble, judge=_overlook)
-LEARNING = Character(bend=_learn)
+LEARNING = Character(
+    bend=lambda task, right, heard: (
+        right if heard.feedback else careless.too_far(task.scene, right)
+    )
+)
 STUBBORN = Character(bend=lambda task, right, _: careless.too_far(task.scene, right))
 LOOPING = Character(never_stops=True)
