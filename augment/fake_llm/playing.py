@@ -35,6 +35,7 @@ _VEHICLES = frozenset({AgentType.VEHICLE, AgentType.BUS})
 _RATINGS = ("compliance", "realism", "logical_consistency")
 
 Problem = dict[str, str]
+_Bend = Callable[[sight.Task, Modification, sight.Heard], Modification]
 Answer = tuple[str, Calls]
 """A text, native calls of functions, or both."""
 
@@ -52,9 +53,7 @@ class Character:
     """
 
     hear: Callable[[sight.Task, sight.Heard], Intent | None] = lambda task, _: task.intent
-    bend: Callable[[sight.Task, Modification, sight.Heard], Modification] = lambda task, right, _: (
-        right
-    )
+    bend: _Bend = lambda task, right, _: right
     spoil: Callable[[sight.Task, str, sight.Heard], str] = lambda task, text, _: text
     judge: Callable[[sight.Task], list[Problem]] = lambda task: problems_of(task)
     never_stops: bool = False
