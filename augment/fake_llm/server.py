@@ -14,9 +14,8 @@ from dataclasses import replace
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any
 
-from augment.fake_llm import careless, playing
+from augment.fake_llm import careless, playing, wire
 from augment.fake_llm.sight import Intents, knows_nothing
-from augment.fake_llm import wire
 
 WINDOW_TOKENS = 2048
 """The context window of `fake-cuts-context`."""
