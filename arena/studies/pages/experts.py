@@ -286,7 +286,7 @@ def enrolment_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     form = EnrolmentForm(request.POST or None, initial=rules)
     if form.is_valid():
         with refusals_in(form):
-            set_enrolment(study=study, actor=user_of(request), **form.cleaned_data)
+            set_enrolment(study=study, rules=form.cleaned_data, actor=user_of(request))
             messages.success(request, "Saved. What the link says holds from now on.")
             return redirect("enrolment", code=code)
     context: dict[str, Any] = {"study": study, "enrolment": enrolment, "form": form}

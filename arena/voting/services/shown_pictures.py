@@ -227,10 +227,11 @@ def _refuse_mixed(cells: Cells) -> None:
     options: defaultdict[str, set[str]] = defaultdict(set)
     for (_, contestant), row in cells.items():
         options[contestant].add(json.dumps(row.options, sort_keys=True))
+    jobs = ", ".join(sorted({row.job.name for row in cells.values()}))
     if mixed := sorted(slug for slug, ways in options.items() if len(ways) > 1):
         raise Conflict(
-            f"The pictures of {', '.join(mixed)} were made with different options. Name the jobs "
-            "whose augmentations the study is to show, or run it anew."
+            f"The pictures of {', '.join(mixed)} were made with different options, in the jobs "
+            f"{jobs}. Name the jobs whose augmentations the study is to show, or run them anew."
         )
 
 
