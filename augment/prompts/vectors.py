@@ -27,7 +27,7 @@ from augment.geometry.frames import Pose
 from augment.geometry.polyline import Projection
 from augment.prompts.extent import boundary_near, extent_of, shown_spans
 from augment.scene import entities
-from augment.scene.bezier_lanes import bezier_lane, piece_ids, straight_curve
+from augment.scene.bezier_lanes import LanePiece, bezier_lane, piece_ids, straight_curve
 from augment.scene.lane_graph import AnyLane, LaneGraph
 
 SPACING_M = 5.0
