@@ -89,14 +89,7 @@ def _asked(
     picked = [(move, agent.id) for move in counted.moves for agent in find_picked(lanes, move.who)]
     for move, name in picked:
         if name in moved:
-            request = VehicleRequest(
-                spot=move.spot,
-                facing=move.facing,
-                turn_deg=move.turn_deg,
-                speed_mps=move.speed_mps,
-                count=1,
-            )
-            parties.append(Party(request=request, agents=(moved[name],)))
+            parties.append(Party(request=move.vehicle_request, agents=(moved[name],)))
     gone = [agent.id for pick in intent.removals for agent in find_picked(lanes, pick)]
     return Asked(
         modification=modification,
