@@ -197,10 +197,8 @@ def report_motion(cell: Cell, report: LossReport, *, can_trigger: bool = False) 
         can_trigger: Whether the format can let people set out when the ego comes near.
     """
     motion = cell.motion
-    if motion.ego.source is MotionSource.HELD_SPEED:
-        report.lose("the ego was not recorded; it is let hold its speed along its lane")
-    elif motion.ego.source is MotionSource.STANDING:
-        report.lose("the ego was not recorded; it stands, as it does at t0")
+    if motion.ego.source in _ASSUMED:
+        report.lose(f"the ego was not recorded; {_ASSUMED[motion.ego.source]}")
     elif cell.drive is None and cell.recording is not None:
         unseen = ~cell.recording.ego_is_seen
         if unseen.any():
@@ -211,23 +209,18 @@ def report_motion(cell: Cell, report: LossReport, *, can_trigger: bool = False) 
     names = [other.agent.id for other in motion.others if other.source is MotionSource.HELD_SPEED]
     report.lose_of(names, "not recorded; let hold the speed of t0 along the lane, or straight on")
     walkers = [other for other in motion.others if other.agent.walk_to_m is not None]
-    if cell.drive is not None:
-        return
-    names = [walker.agent.id for walker in walkers if walker.stands]
-    report.lose_of(
-        names,
-        f"has a walk but stands: the ego never comes within {SETS_OUT_WITHIN_M:g} m",
-        changes_scene=True,
-    )
-    if can_trigger:
-        return
-    for walker in walkers:
-        if not walker.stands:
-            at_s = motion.times_s[int((walker.states[:, 3] > 0.0).argmax())]
-            report.lose(
-                f"{walker.agent.id} sets out {at_s:g} s after t0, whatever the ego does; "
-                f"with us it does when the ego is within {SETS_OUT_WITHIN_M:g} m"
-            )
+    if cell.drive is None:
+        waiting = [walker.agent.id for walker in walkers if walker.stands]
+        text = f"has a walk but stands: the ego never comes within {SETS_OUT_WITHIN_M:g} m"
+        report.lose_of(waiting, text, changes_scene=True)
+        walking = [walker.agent.id for walker in walkers if not walker.stands and not can_trigger]
+        report.lose_of(walking, "sets out at a fixed time, not when the ego comes near")
+
+
+_ASSUMED = {
+    MotionSource.HELD_SPEED: "it is let hold its speed along its lane",
+    MotionSource.STANDING: "it stands, as it does at t0",
+}
 
 
 def appears_later(movement: Movement) -> bool:

@@ -168,7 +168,7 @@ def test_a_map_that_no_road_can_follow_is_refused() -> None:
     assert made.files == {}
     assert [str(one) for one in made.refused] == [
         "bent: Lane9 turns too sharply between two points for a smooth road",
-        "bare: OpenDRIVE needs at least one road, and this scene has no lane",
+        "bare: OpenDRIVE needs at least one road, and there is no lane",
     ]
 
 

@@ -37,7 +37,7 @@ def reading(realdata: Path, name: str) -> Reading:
     ("name", "lanes", "connectors", "agents", "areas", "steps"),
     [
         ("av2", 96, 62, 35, 22, 156),
-        ("commonroad", 59, 18, 9, 0, 61),
+        ("commonroad", 63, 18, 9, 0, 61),
         ("scenarionet", 46, 55, 61, 24, 81),
         ("waymo", 67, 45, 83, 4, 81),
     ],
