@@ -85,16 +85,6 @@ def test_what_is_not_finite_is_refused_and_the_rest_is_written(form: str) -> Non
     check_finite_files(written)
 
 
-def test_a_gap_is_crossed_and_after_the_last_step_the_ego_goes_on() -> None:
-    before, recording = recorded_street()
-    recording.ego[5:8] = np.nan
-    recording.ego[20:] = np.nan
-    made = cell(before, recording=recording, added=())
-    assert made.motion.ego.states[:, 0] == pytest.approx(8.0 * made.motion.times_s)
-    lines = [loss.text for loss in writer_named("commonroad")([made]).losses]
-    assert any("not recorded at 14 of 31 steps" in line for line in lines)
-
-
 def test_a_drive_that_nobody_recorded_is_not_in_our_own_json() -> None:
     before, recording = recorded_street()
     recording.ego[1:] = np.nan

@@ -137,24 +137,6 @@ def test_tags_are_notes(log: Path) -> None:
     assert notes[SceneNoteKind.SCENARIO_TAGS].names == ("high_magnitude_speed",)
 
 
-def test_feature_ids_may_be_texts_and_logs_may_name_the_city_otherwise(log: Path) -> None:
-    (file,) = log.parent.glob("maps/*/*/map.gpkg")
-    wanted = scene_to_document(read(log).scene)
-    for name, change in (
-        (file, "UPDATE lanes_polygons SET left_boundary_fid = '' || left_boundary_fid"),
-        (file, "UPDATE lane_connectors SET exit_lane_fid = 1.0"),
-        (log, "UPDATE log SET location = 'one-north'"),
-    ):
-        base = sqlite3.connect(name)
-        base.execute(change)
-        base.commit()
-        base.close()
-    found = scene_to_document(read(log).scene)
-    for made in (wanted, found):
-        made.pop("origin")
-    assert found == wanted
-
-
 def test_every_frame_with_a_tag_can_be_taken(log: Path) -> None:
     base = sqlite3.connect(log)
     row = (token(5001), token(115), "high_magnitude_speed", None)
@@ -167,12 +149,6 @@ def test_every_frame_with_a_tag_can_be_taken(log: Path) -> None:
     assert "2 frames have the tag 'high_magnitude_speed', from 0 on; not 2" in fault_of(
         log, "tag:high_magnitude_speed:2"
     )
-
-
-def test_moments_are_tokens(log: Path) -> None:
-    found = [one.item for one in NuPlan().moments(log, every_s=0.5)]
-    assert found == [token(100).hex(), token(110).hex(), token(120).hex()]
-    assert NuPlan().recognises(log)
 
 
 def test_what_is_not_there_is_named(log: Path, tmp_path: Path) -> None:
@@ -233,9 +209,3 @@ def test_a_broken_map_says_what_is_wrong(log: Path, change: str, said: str) -> N
     base.commit()
     base.close()
     assert said in fault_of(log)
-
-
-def test_what_is_no_database_is_refused(tmp_path: Path) -> None:
-    file = tmp_path / "made.db"
-    file.write_bytes(b"SQLite format 3\0" + b"x" * 5000)
-    assert "can't be read as a database" in fault_of(file)

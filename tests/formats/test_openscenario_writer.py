@@ -172,26 +172,6 @@ def test_a_map_that_no_road_can_follow_is_refused() -> None:
     ]
 
 
-def test_what_is_lost_has_a_line() -> None:
-    said = lines(cell(crossing(), added=OF_EACH_TYPE))
-    for words in (
-        "Connector1, Connector2: the map has no lights",
-        "Area1, Area2, Area3: areas are left out",
-        "turn types are not said",
-        "a TRAFFIC_CONE becomes an obstacle",
-        "heights, masses and axles",
-        "the ego was not recorded",
-    ):
-        assert any(words in line for line in said), (words, said)
-    fork = replace(crossing(), connectors=())
-    fork = replace(fork, lanes=(replace(fork.lanes[0], successors=("Lane2",)), *fork.lanes[1:]))
-    assert any("Lane1 to Lane2: not joined" in line for line in lines(cell(fork, added=())))
-
-
-def test_the_same_cells_give_the_same_bytes() -> None:
-    assert write([cell()]).files == write([cell()]).files
-
-
 def _sampled(road: ET.Element) -> np.ndarray:
     """The reference line from the file's own numbers, by the standard's formula."""
     found = []

@@ -11,7 +11,6 @@ from augment.formats.readers import recognise
 from augment.formats.reading import Reading
 from augment.geometry.frames import difference
 from augment.scene.codec import recording_to_document, scene_from_document, scene_to_document
-from augment.scene.entities import TrafficLight, TrafficSide
 from augment.scene.lane_graph import LaneGraph
 from tests.recorded import recorded
 
@@ -72,20 +71,6 @@ def test_moving_vehicles_head_where_their_lane_leads(realdata: Path, name: str) 
                 aligned.append(abs(turn) < math.radians(30.0))
     assert len(aligned) >= 15
     assert np.mean(aligned) >= 0.95
-
-
-def test_lights_show_the_programmes_state_at_the_start(realdata: Path) -> None:
-    # Both pairs at step 0: 410 steps into a cycle of 400 green, 30 yellow; and 910, in the red.
-    scene = reading(realdata, "commonroad").scene
-    lights = [connector.traffic_light for connector in scene.connectors]
-    assert lights.count(TrafficLight.YELLOW) == 9
-    assert lights.count(TrafficLight.RED) == 9
-    assert {lane.speed_limit_mps for lane in scene.lanes} == {11.176, 15.6464}
-
-
-def test_people_drive_on_the_right_in_all_of_these_places(realdata: Path) -> None:
-    sides = {reading(realdata, name).scene.traffic_side for name in FILES}
-    assert sides == {TrafficSide.RIGHT}
 
 
 def test_the_ego_is_as_fast_as_the_data_sets_notes_say(realdata: Path) -> None:

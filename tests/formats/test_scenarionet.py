@@ -6,8 +6,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from augment.errors import InvalidDocument
 from augment.formats.reading import Reading
@@ -16,7 +14,6 @@ from augment.formats.scenarionet.unpickling import read_pickle
 from augment.scene.codec import scene_to_document
 from augment.scene.entities import AreaKind, TrafficLight, TrafficSide, TurnType
 from augment.scene.recording import SceneNoteKind
-from tests.properties import examples
 
 
 def moving(x: float, speed: float, steps: int = 3, **fields: object) -> dict[str, Any]:
@@ -183,22 +180,6 @@ def test_odd_descriptions_are_refused(tmp_path: Path, change: dict[str, Any], sa
     if "sdc_id" not in made["metadata"]:
         made["metadata"] = description()["metadata"]
     assert said in fault_of(store(tmp_path, made))
-
-
-@given(st.data())
-@examples(60)
-def test_any_change_of_a_pickle_is_read_or_refused(
-    tmp_path_factory: pytest.TempPathFactory, data: st.DataObject
-) -> None:
-    block = bytearray(pickle.dumps(description(), protocol=4))
-    for _ in range(data.draw(st.integers(1, 5))):
-        block[data.draw(st.integers(0, len(block) - 1))] = data.draw(st.integers(0, 255))
-    file = tmp_path_factory.getbasetemp() / "changed.pkl"
-    file.write_bytes(block[: data.draw(st.integers(0, len(block)))] or bytes(block))
-    try:
-        scene_to_document(read(file).scene)
-    except InvalidDocument:
-        return
 
 
 def test_nothing_is_opened_to_recognise_it(tmp_path: Path) -> None:
