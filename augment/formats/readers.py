@@ -51,22 +51,43 @@ def reader_of(name: str) -> Reader:
 
 
 def recognise(path: Path) -> Reader:
-    """The reader of the format that a file or folder looks like.
+    """Return the reader of the format that a file or folder looks like.
 
     Raises:
         InvalidDocument: There is nothing, or it looks like none of the formats, or like several.
     """
     if not path.exists():
         raise InvalidDocument("input", [(str(path), "is not there")])
-    try:
-        readers = [reader for reader in READERS.values() if reader.recognises(path)]
-    except OSError as fault:
-        raise InvalidDocument("input", [(str(path), fault.strerror or str(fault))]) from None
-    if len(readers) == 1:
-        return readers[0]
-    known = ", ".join(f"{reader.name}: {reader.title}" for reader in READERS.values())
-    said = "none of the formats" if not readers else " and ".join(one.name for one in readers)
-    raise InvalidDocument("input", [(str(path), f"looks like {said}; name one of {known}")])
+    return find_input(path, list(READERS.values()), is_deep=False)[0]
+
+
+def find_input(path: Path, readers: list[Reader], *, is_deep: bool) -> tuple[Reader, Path]:
+    """Return what one of the readers takes, and which: the path, or what lies in it.
+
+    Args:
+        path: A file or folder.
+        readers: Who may read it.
+        is_deep: Whether it may lie in the folder, level by level.
+
+    Raises:
+        InvalidDocument: Nothing is in one of the formats, or several things are.
+    """
+    level = [path]
+    while level:
+        found = [
+            (reader, one) for one in sorted(level) for reader in readers if reader.recognises(one)
+        ]
+        if len(found) == 1:
+            return found[0]
+        if found:
+            names = [
+                f"{one.relative_to(path.parent)} ({reader.name})" for reader, one in found[:5]
+            ]
+            text = f"holds {len(found)} recordings, one is needed: {', '.join(names)}"
+            raise InvalidDocument("input", [("", text)])
+        level = [below for one in level if is_deep and one.is_dir() for below in one.iterdir()]
+    known = ", ".join(f"{reader.name}: {reader.title}" for reader in readers)
+    raise InvalidDocument("input", [(str(path), f"nothing in it is {known}")])
 
 
 EVERY_S = 0.5

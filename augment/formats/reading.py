@@ -200,15 +200,21 @@ class Reader:
         name: How the format is called where one is asked for.
         title: What it is, for people.
         has_items: Whether a path can hold several parts.
+        suffix, marker: What its files end in, and what stands near their beginning.
     """
 
     name: str
     title: str
     has_items = True
+    suffix = ""
+    marker = b""
 
     def recognises(self, path: Path) -> bool:
         """Return whether the file or folder looks like this format; nothing is raised."""
-        raise NotImplementedError
+        if path.suffix.lower() != self.suffix or not path.is_file():
+            return False
+        with path.open("rb") as file:
+            return self.marker in file.read(10_000)
 
     def logs(self, path: Path, item: str | None) -> Iterator[Log]:
         """Yield the part of that name, or all in the source's order for None.

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from augment.errors import InvalidDocument
-from augment.formats.apart import ZipBounds, find_input, unpack_zip
-from augment.formats.readers import READERS
+from augment.formats.apart import ZipBounds, unpack_zip
+from augment.formats.readers import READERS, find_input
 from tests.formats.av2_logs import write_log
 
 SMALL = ZipBounds(entries=20, bytes=3_000_000)
@@ -37,7 +37,7 @@ def test_a_log_folder_comes_out_as_it_went_in(tmp_path: Path) -> None:
     into = tmp_path / "into"
     into.mkdir()
     unpack_zip(folder_as_zip(tmp_path / "log.zip", log), into)
-    reader, path = find_input(into, list(READERS.values()))
+    reader, path = find_input(into, list(READERS.values()), is_deep=True)
     assert (reader.name, path) == ("av2", into / "log")
     for file in (one for one in log.rglob("*") if one.is_file()):
         assert (into / "log" / file.relative_to(log)).read_bytes() == file.read_bytes()
@@ -116,5 +116,5 @@ def flagged(path: Path, bit: int) -> Path:
 def test_several_recordings_are_named_and_nothing_is_chosen(tmp_path: Path) -> None:
     for name in ("one", "two"):
         write_log(tmp_path / "into" / name)
-    with pytest.raises(InvalidDocument, match=r"holds 2 recordings.*one \(av2\), two \(av2\)"):
-        find_input(tmp_path / "into", list(READERS.values()))
+    with pytest.raises(InvalidDocument, match=r"into/one \(av2\), into/two \(av2\)"):
+        find_input(tmp_path / "into", list(READERS.values()), is_deep=True)

@@ -163,8 +163,8 @@ def test_what_is_nowhere_near_its_scene_is_refused(away_m: float, is_read: bool)
     x_m = pose.x_m + FURTHEST_FROM_EGO_M + away_m
     text = special(f"cones: [[{pose.x_m}, {pose.y_m}], [{x_m}, {pose.y_m}]]")
     if is_read:
-        (entry,) = entries_of(text, {TOKEN: scene()})
-        far = entry.modification.added[1]
+        ((found, _),) = entries_of(text, {TOKEN: scene()})
+        far = found.added[1]
         assert math.hypot(far.x_m, far.y_m) == pytest.approx(999.5)
     else:
         with pytest.raises(InvalidDocument, match=r"cones\[1\]: is 100[01] m from the ego"):

@@ -137,20 +137,6 @@ def test_tags_are_notes(log: Path) -> None:
     assert notes[SceneNoteKind.SCENARIO_TAGS].names == ("high_magnitude_speed",)
 
 
-def test_every_frame_with_a_tag_can_be_taken(log: Path) -> None:
-    base = sqlite3.connect(log)
-    row = (token(5001), token(115), "high_magnitude_speed", None)
-    base.execute("INSERT INTO scenario_tag VALUES (?, ?, ?, ?)", row)
-    base.commit()
-    base.close()
-    for item, wanted in (("", 110), (":0", 110), (":1", 115)):
-        found = read(log, f"tag:high_magnitude_speed{item}").moment.item
-        assert found == token(wanted).hex()
-    assert "2 frames have the tag 'high_magnitude_speed', from 0 on; not 2" in fault_of(
-        log, "tag:high_magnitude_speed:2"
-    )
-
-
 def test_what_is_not_there_is_named(log: Path, tmp_path: Path) -> None:
     assert "there is no lidar_pc 00000000000003e7" in fault_of(log, token(999).hex())
     assert "neither a token of 16 hex digits" in fault_of(log, "x")

@@ -83,13 +83,7 @@ class CommonRoad(Reader):
 
     name = "commonroad"
     title = "CommonRoad scenario, 2018b or 2020a (XML file)"
-
-    def recognises(self, path: Path) -> bool:
-        """An XML file that begins as the format does."""
-        if path.suffix.lower() != ".xml" or not path.is_file():
-            return False
-        with path.open("rb") as file:
-            return b"<commonRoad" in file.read(4_000)
+    suffix, marker = ".xml", b"<commonRoad"
 
     def logs(self, path: Path, item: str | None) -> Iterator[Log]:
         """One for each planning problem, and where there is none for each vehicle."""

@@ -17,7 +17,6 @@ from augment.formats.interplan.file import (
     MOST_ENTRIES,
     OBJECTS,
     InterplanSource,
-    ReadEntry,
     SpecialScenario,
     config_of,
     read_entry,
@@ -26,7 +25,14 @@ from augment.formats.interplan.file import (
 )
 from augment.formats.writing import Cell, Loss, LossReport, Written
 from augment.geometry.frames import difference, wrap
-from augment.scene.entities import AgentType, Point, ScenarioType, TrafficAgent, without_traffic
+from augment.scene.entities import (
+    AgentType,
+    Modification,
+    Point,
+    ScenarioType,
+    TrafficAgent,
+    without_traffic,
+)
 
 BUS_LENGTH_M = 7.0
 """A vehicle from here on is written as a bus: clearly longer than any car."""
@@ -125,12 +131,12 @@ class _Entry:
         """Whether the change is the one that stands in interPlan's file."""
         if self.source.index is None:
             return False
-        return self._read(self.source.entry).modification == self.cell.modification
+        return self._read(self.source.entry) == self.cell.modification
 
-    def _read(self, entry: Mapping[str, Any]) -> ReadEntry:
+    def _read(self, entry: Mapping[str, Any]) -> Modification:
         scene = without_traffic(self.cell.scene)
         special = SpecialScenario.model_validate(entry)
-        return read_entry(self.token, self.source.index or "0", special, scene)
+        return read_entry(self.token, self.source.index or "0", special, scene)[0]
 
     def written(self) -> dict[str, Any]:
         """InterPlan's keys, those without objects left out."""
@@ -156,7 +162,7 @@ class _Entry:
             self._lose(f"{agent.id} is left out: there is no key for a {agent.type} there")
         rows = {key: [self._row(key, agent) for agent in by_key[key]] for key in OBJECTS}
         objects = {key: lists for key, lists in rows.items() if lists}
-        there = self._read({"type": self.kind.value, **objects}).modification.added
+        there = self._read({"type": self.kind.value, **objects}).added
         here = [agent for key in OBJECTS for agent in by_key[key]]
         for agent, found in zip(here, there, strict=True):
             for text, changes_scene in _changes(agent, found):

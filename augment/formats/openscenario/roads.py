@@ -39,9 +39,7 @@ def map_of(cell: Cell, report: LossReport) -> bytes:
 
     scene = cell.after
     if not writing.ways_of(scene):
-        raise writing.CannotExpress(
-            "OpenDRIVE needs at least one road, and there is no lane"
-        )
+        raise writing.CannotExpress("OpenDRIVE needs at least one road, and there is no lane")
     roads = {way.id: _Road.of(way, n) for n, way in enumerate(writing.ways_of(scene), start=1)}
     connecting = [one for one in scene.connectors if _is_connecting(one, roads)]
     groups = dict(enumerate(writing.group_connectors(connecting), start=_FIRST_JUNCTION))

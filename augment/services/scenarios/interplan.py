@@ -36,7 +36,6 @@ from augment.models import BaseScene, Scenario
 from augment.scene.codec import intent_to_document, modification_to_document
 from augment.scene.entities import Scene, SceneOptions, without_traffic
 from augment.scene.intent import IntentOrigin
-from augment.scene.recording import Note, SceneNoteKind
 from augment.services.scenarios.scene_imports import keep_reading
 from augment.services.scenarios.scenes import add_scenario
 
@@ -80,8 +79,6 @@ def import_interplan(
     file = file_of(read_yaml_file(_modification_file_in(folder), what=WHAT))
     by_token = file.modification_details_dictionary
     wanted = {token: one for token, one in by_token.items() if one.special_scenario}
-    for text in file.left_out:
-        yield ImportStep(StepKind.LEFT_OUT, f"Left out: {text}.")
     for token in by_token.keys() - wanted.keys():
         text = f"Left out: base token {token}, which has no special scenario."
         yield ImportStep(StepKind.LEFT_OUT, text)
@@ -134,9 +131,6 @@ def _keep_token(token: str, file: File, log: Path, actor: User | None) -> Iterat
     try:
         recorded = UntrustedInput(path=log, format=NuPlan.name)
         source, reading = recorded.read(item=token, frame=None, name=f"interplan-{token}")
-        if details.left_out:
-            note = Note(kind=SceneNoteKind.INTERPLAN_LEFT_OUT, names=details.left_out)
-            reading = replace(reading, notes=(*reading.notes, note))
         row, _ = keep_reading(reading, source=source, path=log, actor=actor)
     except AugmentError as fault:
         yield from _skip_all(token, details, str(fault))
@@ -172,23 +166,23 @@ def _keep_entry(
     row: BaseScene, scene: Scene, entry: SpecialScenario, kept: dict[str, Any], actor: User | None
 ) -> ImportStep:
     token, slug = row.source_item, f"{row.slug}-s{kept['index']}"
-    read = read_entry(token, kept["index"], entry, scene)
-    left_out = f"; left out: {', '.join(read.left_out)}" if read.left_out else ""
-    if Scenario.objects.filter(slug=slug, base_scene=row, type=read.type.value).exists():
-        return ImportStep(StepKind.OLD, f"{read.id}: {slug} was there already{left_out}")
+    reference, losses = read_entry(token, kept["index"], entry, scene)
+    name, left_out = f"{token}-s{kept['index']}", f"; left out: {', '.join(losses)}" * bool(losses)
+    if Scenario.objects.filter(slug=slug, base_scene=row, type=entry.type.value).exists():
+        return ImportStep(StepKind.OLD, f"{name}: {slug} was there already{left_out}")
     density, goal = options_of(entry.config)
     details = Details.model_validate(kept["details"])
-    traffic = traffic_of(entry, details, scene, seed=token, clear_of=read.modification.added)
+    traffic = traffic_of(entry, details, scene, seed=token, clear_of=reference.added)
     goal_m = goal_place(kept, goal or "", scene)
     options = SceneOptions(density=density, goal=goal, goal_m=goal_m)
     driven = replace(scene, agents=traffic, options=options)
-    instruction, intent = describe_reference(read.type, read.modification, driven)
+    instruction, intent = describe_reference(entry.type, reference, driven)
     add_scenario(
         scene=row.slug,
-        type=read.type.value,
+        type=entry.type.value,
         instruction=instruction,
         slug=slug,
-        reference=modification_to_document(read.modification),
+        reference=modification_to_document(reference),
         intent=None if intent is None else intent_to_document(intent),
         intent_origin=IntentOrigin.DERIVED,
         density=density,
@@ -197,4 +191,4 @@ def _keep_entry(
         interplan=kept,
         actor=actor,
     )
-    return ImportStep(StepKind.NEW, f"{read.id}: {slug}{left_out}")
+    return ImportStep(StepKind.NEW, f"{name}: {slug}{left_out}")
