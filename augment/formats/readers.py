@@ -87,7 +87,7 @@ def find_input(path: Path, readers: list[Reader], *, is_deep: bool) -> tuple[Rea
             raise InvalidDocument("input", [("", text)])
         level = [below for one in level if is_deep and one.is_dir() for below in one.iterdir()]
     known = ", ".join(f"{reader.name}: {reader.title}" for reader in readers)
-    raise InvalidDocument("input", [(str(path), f"nothing in it is {known}")])
+    raise InvalidDocument("input", [(str(path), f"looks like none of the formats: {known}")])
 
 
 EVERY_S = 0.5
