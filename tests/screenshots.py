@@ -97,9 +97,7 @@ def _shots() -> list[Shot]:
         Shot(name="home-of-an-analyst", who="analyst", path="/"),
         Shot(name="home-of-an-admin", who="admin", path="/"),
     ]
-    for name in sorted(
-        PAGES.keys() - ACTIONS.keys() - {"home", "report", "drive", "results-vote"}
-    ):
+    for name in sorted(PAGES.keys() - ACTIONS.keys() - {"home", "drive", "results-vote"}):
         who = "expert" if name in VOTES_HERE else "admin"
         here = voted if name in (*VOTES_HERE, *OPEN_HERE) else rated
         shots.append(Shot(name=name, who=who, path=address(name, here)))

@@ -104,13 +104,6 @@ class NumberField(_OfType, serializers.FloatField):
         return number
 
 
-class ShareField(NumberField):
-    """A JSON number from 0 to 1."""
-
-    def __init__(self, **kwargs: Any) -> None:
-        super().__init__(min_value=0, max_value=1, **kwargs)
-
-
 LONGEST_NAME = 150
 MOST_NAMES = 5_000
 LONGEST_LINE = 500

@@ -221,10 +221,7 @@ def _write_modifications(options: Chosen, say: Say) -> ExportedFile:
 def _write_scenarios(options: Chosen, say: Say) -> ExportedFile:
     """Write all scenarios of a job as a zip of files, and tell what is lost on the way."""
     exported = scenario_export.export_job(
-        find_job(options["job"]),
-        file_format=options["format"],
-        contestant=options["contestant"],
-        motion=options["motion"],
+        find_job(options["job"]), file_format=options["format"], contestant=options["contestant"]
     )
     written = exported.written
     for loss in exported.missing:
@@ -345,11 +342,6 @@ KINDS: dict[str, ExportKind] = {
             "--format": {
                 "required": True,
                 "help": f"one of {', '.join(scenario_export.FORMATS)}; OUT is a folder",
-            },
-            "--motion": {
-                "default": scenario_export.RECORDED,
-                "help": f"{scenario_export.RECORDED}, or the planner whose finished drives say "
-                "what everybody does",
             },
             "--contestant": _CONTESTANT,
         },

@@ -136,9 +136,8 @@ def check_row(row: models.Model) -> None:
 
 
 def _complaint_of(row: Report) -> Complaint:
-    mark = None if row.mark_x is None or row.mark_y is None else (row.mark_x, row.mark_y)
     side = row.side or Report.Side.BOTH  # reports from before it was asked name none
-    return Complaint(reason=row.reason, side=side, mark=mark, comment=row.comment)
+    return Complaint(reason=row.reason, side=side, comment=row.comment)
 
 
 def check_votes() -> None:

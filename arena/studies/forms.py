@@ -77,7 +77,7 @@ class PlanningForm(forms.Form):
 
     def __init__(self, *args: Any, **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)
-        self.fields |= {one.name: form_field(one) for one in ESTIMATE_INPUTS}
+        self.fields |= {field.name: form_field(field) for field in ESTIMATE_INPUTS}
 
     def clean(self) -> dict[str, Any]:
         """Refuse more ties than contestants so far apart can have."""

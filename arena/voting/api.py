@@ -5,6 +5,7 @@ from typing import Any
 from django.core.files.storage import default_storage
 from django.http import Http404, HttpResponse
 from django.http.response import HttpResponseBase
+from django.shortcuts import get_object_or_404
 from rest_framework import serializers
 from rest_framework.permissions import IsAuthenticated
 from rest_framework.request import Request
@@ -13,8 +14,8 @@ from rest_framework.response import Response
 from arena.api.access import ADMINS, EXPERTS
 from arena.api.fields import (
     CodeField,
+    Field,
     FlagField,
-    ShareField,
     StrictSerializer,
     TextField,
     WholeNumberField,
@@ -23,10 +24,9 @@ from arena.api.views import ApiView, FileView, Given, file_operation, operation
 from arena.errors import StudyNotOpen
 from arena.models import AIDS, OUTCOME_LETTERS, Report, Study, Vote
 from arena.people.services import keep_voting
-from arena.studies.queries import voting_study
 from arena.studies.services.experts import SIDES, Complaint, report
 from arena.studies.services.planning import next_pairs
-from arena.voting.queries.keys import voting_switches
+from arena.voting.queries.keys import SWITCHES, voting_switches
 from arena.voting.queries.showings import as_shown, picture_shown
 from arena.voting.services.casting import LONGEST_COMMENT, decision_of, receive_vote
 
@@ -103,14 +103,6 @@ class ReportBody(StrictSerializer):
     matchup = CodeField()
     reason = serializers.ChoiceField(choices=Report.Reason.choices)
     side = serializers.ChoiceField(choices=list(SIDES), required=False, default="both")
-    mark = serializers.ListField(
-        child=ShareField(),
-        required=False,
-        allow_null=True,
-        default=None,
-        min_length=2,
-        max_length=2,
-    )
     comment = TextField(required=False, allow_blank=True, default="", max_length=LONGEST_COMMENT)
 
 
@@ -123,17 +115,17 @@ class SavedDocument(serializers.Serializer[Any]):
 class PreferencesBody(StrictSerializer):
     """What changes; missing fields stay."""
 
-    single_keys = FlagField(required=False)
-    legend = FlagField(required=False)
-    keep_zoom = FlagField(required=False)
+    def get_fields(self) -> dict[str, Field]:
+        """Return a field for every switch."""
+        return {name: FlagField(required=False) for name in SWITCHES}
 
 
 class PreferencesDocument(serializers.Serializer[Any]):
     """All preferences."""
 
-    single_keys = serializers.BooleanField()
-    legend = serializers.BooleanField()
-    keep_zoom = serializers.BooleanField()
+    def get_fields(self) -> dict[str, Field]:
+        """Return a field for every switch."""
+        return {name: serializers.BooleanField() for name in SWITCHES}
 
 
 class MatchupsView(ApiView):
@@ -148,7 +140,7 @@ class MatchupsView(ApiView):
 
         An empty list when all is done.
         """
-        study = voting_study(expert=self.user, code=given["study"])
+        study = get_object_or_404(self.user.studies, code=given["study"])
         if study.state != Study.State.OPEN:
             raise StudyNotOpen(f"The study {study.name!r} takes no votes: it is {study.state}.")
         matchups = next_pairs(study=study, expert=self.user, n=given["n"])
@@ -194,12 +186,8 @@ class ReportsView(ApiView):
 
         The same key counts once, however often it arrives.
         """
-        mark = given["mark"]
         said = Complaint(
-            reason=given["reason"],
-            side=SIDES[given["side"]],
-            mark=None if mark is None else (mark[0], mark[1]),
-            comment=given["comment"],
+            reason=given["reason"], side=SIDES[given["side"]], comment=given["comment"]
         )
         report(expert=self.user, matchup_code=given["matchup"], key=given["key"], said=said)
         return {"saved": True}

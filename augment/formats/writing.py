@@ -42,7 +42,6 @@ class Cell:
         stem: The name of its files, without an ending.
         made_on: When the change was made, for formats that ask for a date.
         recording: What was recorded after t0, None where nothing was.
-        drive: A simulated drive, which then says what everybody does instead of the recording.
         source: Where the scenario comes from in nuPlan and interPlan, None where it does not.
     """
 
@@ -54,7 +53,6 @@ class Cell:
     stem: str = "scenario"
     made_on: date = date(1970, 1, 1)
     recording: Recording | None = None
-    drive: Motion | None = None
     source: InterplanSource | None = None
 
     @cached_property
@@ -69,8 +67,6 @@ class Cell:
     @cached_property
     def motion(self) -> Motion:
         """What everybody does after t0."""
-        if self.drive is not None:
-            return self.drive
         moved = [agent.id for agent in self.modification.moved]
         return motion_of(
             self.after,

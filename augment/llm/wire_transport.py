@@ -15,6 +15,7 @@ from contextvars import ContextVar
 from threading import Thread
 from typing import TYPE_CHECKING
 
+from augment.errors import InvalidDocument
 from augment.llm.addresses import Resolve, addresses_of
 
 if TYPE_CHECKING:
@@ -255,7 +256,7 @@ class _Network:
             try:
                 found = addresses_of(host, resolve=self._resolve, checks=self._checks)
                 addresses.set_result(found)
-            except Exception as error:
+            except (InvalidDocument, OSError, UnicodeError) as error:
                 addresses.set_exception(error)
 
         Thread(target=look, name="look up a name", daemon=True).start()

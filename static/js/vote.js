@@ -132,10 +132,8 @@ function leave() {
 function report(reason) {
   const { report_comment: told, report_side: side } = form.elements;
   const { matchup } = onScreen.shown;
-  const { mark = null } = onScreen;
-  outbox.add("reports", { key: page.freshKey(), matchup, reason, side: side.value, mark, comment: told.value.trim() });
+  outbox.add("reports", { key: page.freshKey(), matchup, reason, side: side.value, comment: told.value.trim() });
   told.value = "";
-  onScreen.mark = null;
   page.closePop();
 }
 
@@ -264,7 +262,6 @@ form.addEventListener("submit", (event) => {
   else if (name === "report") report(value);
   else actions[page.ACTIONS[value]]?.();
 });
-at("report").addEventListener("toggle", () => late(import("./vote-report.js"), ({ aim }) => aim(lens)));
 form.addEventListener("input", () => page.drawComment(field.value));
 
 document.addEventListener("click", (event) => {

@@ -19,7 +19,6 @@ def test_a_report_is_kept_once_and_changes_no_vote(study: Study) -> None:
         "matchup": str(matchup.code),
         "reason": "picture_wrong",
         "side": "B",
-        "mark": [0.25, 1],
         "comment": "The truck is cut off.",
     }
     for _ in range(2):
@@ -27,7 +26,7 @@ def test_a_report_is_kept_once_and_changes_no_vote(study: Study) -> None:
         assert (answer.status_code, answer.json()) == (200, {"saved": True})
     kept = Report.objects.get()
     assert (kept.matchup, kept.reason, kept.comment) == (matchup, body["reason"], body["comment"])
-    assert (kept.side, kept.mark_x, kept.mark_y) == ("right", 0.25, 1.0)
+    assert kept.side == "right"
     assert not Vote.objects.exists()
 
 
@@ -38,10 +37,6 @@ def test_a_report_is_kept_once_and_changes_no_vote(study: Study) -> None:
         ("eva", {"reason": "dull"}, 422, "invalid"),
         ("eva", {"comment": "x" * 1001}, 422, "invalid"),
         ("eva", {"side": "left"}, 422, "invalid"),
-        ("eva", {"mark": [0.5]}, 422, "invalid"),
-        ("eva", {"mark": [0.5, 1.01]}, 422, "invalid"),
-        ("eva", {"mark": [-0.01, 0.5]}, 422, "invalid"),
-        ("eva", {"mark": ["0.5", True]}, 422, "invalid"),
         ("eva", {"vote": 1}, 422, "invalid"),
     ],
 )

@@ -10,7 +10,7 @@ from django.db import connection
 from django.db.models import Q
 
 from augment.models import Augmentation, GenerationJob, ModelCall
-from augment.services.running import budget, jobs, runner
+from augment.services.running import jobs, runner
 from augment.services.running.budget import Caps
 from augment.services.running.progress import count_rows
 from augment.services.running.runner import AUGMENTATIONS
@@ -103,8 +103,7 @@ def test_eight_workers_stay_below_the_cap_and_resume_pays_for_nothing_twice(kind
     asked_before = len(model.requests)
     check_the_books(job)
 
-    budget.raise_cap(job, caps=ALL[kind])
-    jobs.resume(job)
+    jobs.resume(job, higher=ALL[kind])
     run_all(job, model, watcher)
 
     assert job.state == GenerationJob.State.FINISHED

@@ -128,7 +128,7 @@ def test_a_paused_job_starts_nothing_and_what_is_in_flight_keeps_its_result() ->
     jobs.finish_if_over()
     job = jobs.resume(job)
     assert job.state == Job.RUNNING
-    assert Event.objects.get(verb="resume").before == {"state": "paused"}
+    assert Event.objects.get(verb="resume").before == {"state": "paused", "cap": "nothing"}
     assert AUGMENTATIONS.find_unsent(older_than=timedelta(0)) == [second.pk, third.pk]
     first.refresh_from_db()
     assert first.state == State.DONE

@@ -34,7 +34,6 @@ def test_the_messages_are_printed_as_they_would_be_sent() -> None:
         (("street-1", "otm", "--role", "viewer"), "Nobody plays the viewer in otm"),
         (("street-1", "zero-shot"), "Unknown variant 'zero-shot'"),
         (("street-1", "otm", "--native-tools"), "The modifier of otm calls no function"),
-        (("street-1", "otm", "--picture", "out.png"), "Only the viewer is shown a picture"),
         (("nowhere", "otm"), "Unknown scenario 'nowhere'. Known: street-1."),
     ],
 )

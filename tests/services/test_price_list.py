@@ -12,9 +12,10 @@ OPENAI = "https://api.openai.com/v1"
 def test_a_listed_model_has_a_price_and_a_source() -> None:
     found = listed_price(base_url=OPENAI, model="gpt-4o", now=NOW)
     assert found is not None
-    assert (found.in_usd, found.out_usd) == (Decimal("2.5"), Decimal(10))
-    assert found.source.startswith("genai-prices 0.")
-    assert found.source.endswith(": openai/gpt-4o")
+    in_usd, out_usd, source = found
+    assert (in_usd, out_usd) == (Decimal("2.5"), Decimal(10))
+    assert source.startswith("genai-prices 0.")
+    assert source.endswith(": openai/gpt-4o")
 
 
 def test_a_price_is_that_of_its_day() -> None:
@@ -23,7 +24,7 @@ def test_a_price_is_that_of_its_day() -> None:
     prices = [
         listed_price(base_url=google, model="gemini-3.8-flash", now=day) for day in (NOW, later)
     ]
-    assert [price and price.in_usd for price in prices] == [Decimal("0.75"), Decimal("1.5")]
+    assert [price and price[0] for price in prices] == [Decimal("0.75"), Decimal("1.5")]
 
 
 @pytest.mark.parametrize(

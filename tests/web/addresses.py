@@ -7,7 +7,6 @@ from django.urls import reverse
 from arena.models import Authorship
 from arena.people.links import invite, mark_author
 from arena.studies.services.drafts import keep_draft
-from arena.studies.services.experts import Complaint, report
 from augment.models import Endpoint, EndpointModel, SceneUpload, Simulation, UploadMoment
 from tests.web.cast import World
 
@@ -16,10 +15,6 @@ STRANGER = str(uuid.uuid4())
 
 def address(name: str, here: World) -> str:
     shown = here.study.matchups.filter(expert=here.expert).get(position=1)
-    if name == "report":
-        key, said = uuid.uuid4(), Complaint(reason="other")
-        report(expert=here.expert, matchup_code=shown.code, key=key, said=said)
-        return reverse(name, kwargs={"code": here.study.code, "key": key})
     arguments: dict[str, dict[str, object]] = {
         "person-link": {"code": here.expert.person.code},
         "person-change": {"code": here.expert.person.code},
@@ -112,7 +107,7 @@ def address(name: str, here: World) -> str:
     own = (
         *("study", "preregistration", "experts", "invite", "author", "study-close"),
         *("study-cancel", "study-again"),
-        *("study-hand-over", "study-rate", "enrolment", "enrolment-voters", "enrolment-drop"),
+        *("study-hand-over", "study-rate", "enrolment", "enrolment-voters"),
     )
     results = ("results", "results-votes", "results-votes-file", "results-open")
     is_of_study = name in own + results or name.startswith("vote")

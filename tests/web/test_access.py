@@ -84,7 +84,6 @@ PAGES: dict[str, tuple[int, int, int]] = {
     "study-file": (404, 404, 403),  # nothing was written yet
     "results-chart": (403, 403, 403),
     "vote": (403, 403, 404),
-    "report": (200, 403, 403),
     "vote-practice": (403, 403, 404),
     "vote-skipped": (403, 403, 404),
     "matchup-image": (200, 403, 404),
@@ -128,10 +127,9 @@ ACTIONS: dict[str, tuple[int, int, int]] = {
     "study-close": (200, 403, 403),
     "study-cancel": (200, 403, 403),
     "study-again": (302, 403, 403),
-    "study-draft-discard": (200, 403, 403),
+    "study-draft-discard": (302, 403, 403),
     "study-hand-over": (302, 403, 403),
     "labelling-close": (404, 403, 403),
-    "enrolment-drop": (404, 403, 403),
     "theme": (302, 302, 302),
     "language": (302, 302, 302),
 }
@@ -166,7 +164,7 @@ def test_every_action_is_for_the_roles_of_the_table() -> None:
 
 ASKS_FIRST = {
     **{"scenario-delete": 200, "scene-delete": 200},
-    **{"study-close": 200, "study-cancel": 200, "study-draft-discard": 200, "job-cancel": 200},
+    **{"study-close": 200, "study-cancel": 200, "job-cancel": 200},
     "labelling-close": 404,
 }
 """What a GET of them answers: a question, which changes nothing; here nobody labels."""

@@ -42,7 +42,7 @@ def test_cancelling_needs_the_name_and_says_how_it_differs_from_closing(
     assert page in admin.get(reverse("study", args=[study.code])).content.decode()
     asked = text_of(admin.get(page))
     assert "Cancel the study “Round 1”?" in asked
-    assert "never rated" in asked
+    assert "nobody ever sees results" in asked
     assert "exported as votes: 3." in asked
     assert "To end it with results, close it instead." in asked
     for typed in ("", "Round", "round 12"):
@@ -97,7 +97,7 @@ def test_closed_and_cancelled_exclude_each_other(study: Study) -> None:
     cancel_study(study=study)
     assert cancel_study(study=study).state == "cancelled"
     assert Event.objects.filter(verb="cancel").count() == 1
-    with pytest.raises(StudyNotOpen, match="was cancelled"):
+    with pytest.raises(StudyNotOpen, match="is cancelled already"):
         close_study(study=study)
     Study.objects.update(state="closed")
     with pytest.raises(StudyNotOpen, match="is closed"):

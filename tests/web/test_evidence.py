@@ -1,7 +1,6 @@
 """The orders of the grid of evidence, what stands beside its pictures, and the contact sheet."""
 
 import re
-import uuid
 from pathlib import Path
 
 import pytest
@@ -9,7 +8,7 @@ from django.core.management import call_command
 from django.test import Client
 from django.urls import reverse
 
-from arena.models import FaultLabel, LabellingRound, LabelTask, Snapshot, Study, Vote
+from arena.models import Snapshot, Vote
 from arena.results.queries.evidence import neighbours, vote_page
 from arena.results.queries.scores import VoteScore, read_evidence
 from arena.results.queries.search import VoteSearch
@@ -119,18 +118,6 @@ def test_the_picture_that_lost_most_comes_first(rated: Snapshot) -> None:
     assert sum(score.losses for score in scores) == standing.losses
 
 
-def test_pictures_with_faults_come_first(rated: Snapshot, analyst: Client) -> None:
-    search = VoteSearch(contestant="bob", order="faults")
-    rows = Augmentation.objects.filter(contestant__slug="bob").order_by("scenario__slug")
-    for number, row in enumerate(rows[:3]):
-        _label(row, faulty=number == 2)
-    places = [vote.scenario for vote in vote_page(rated, search, 1)]
-    assert list(dict.fromkeys(places))[:3] == ["place-2", "place-0", "place-1"]
-    assert "1 of 1 expert found faults" in first_card(
-        grid(analyst, rated, contestant="bob", order="faults")
-    )
-
-
 def test_votes_by_scenario_are_walked_through_in_that_order(rated: Snapshot) -> None:
     search = VoteSearch(order="scenario")
     listed = [vote for number in (1, 2) for vote in vote_page(rated, search, number)]
@@ -140,18 +127,6 @@ def test_votes_by_scenario_are_walked_through_in_that_order(rated: Snapshot) -> 
     beside = neighbours(rated, search, middle)
     assert (beside.before, beside.place, beside.after) == (listed[4].code, 6, listed[6].code)
     assert neighbours(rated, VoteSearch(mark="skip"), middle).place is None
-
-
-def _label(row: Augmentation, *, faulty: bool) -> None:
-    study = Study.objects.get()
-    expert = study.experts.order_by("pk")[0]
-    labelling = LabellingRound.objects.create(name=str(uuid.uuid4()), job=row.job, seed=1)
-    task = LabelTask.objects.create(
-        labelling=labelling, expert=expert, position=1, augmentation=row
-    )
-    FaultLabel.objects.create(
-        augmentation=row, expert=expert, task=task, position=faulty, heading=False, logic=False
-    )
 
 
 def test_the_command_writes_the_whole_sheet(rated: Snapshot, tmp_path: Path) -> None:

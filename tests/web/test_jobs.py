@@ -75,7 +75,7 @@ def test_a_job_is_paused_says_what_still_runs_and_is_resumed() -> None:
     job.refresh_from_db()
     assert job.state == GenerationJob.State.RUNNING
     assert (
-        "is paused or stopped"
+        "be resumed"
         in admin.post(reverse("job-resume", args=[job.code]), follow=True).content.decode()
     )
 

@@ -10,7 +10,7 @@ from arena.results.services.ratings import RATINGS, plan_snapshot
 from arena.studies.services.taking_part import hand_over
 from augment.errors import Conflict
 from augment.models import Event
-from augment.services.running import budget, jobs
+from augment.services.running import jobs
 from augment.services.running.budget import Caps
 from augment.services.running.jobs import JobRequest
 from tests import study_rows
@@ -42,7 +42,8 @@ def test_nothing_that_is_stored_is_german() -> None:
                 cap_tokens=900,
             )
         )
-        budget.raise_cap(capped, caps=Caps(cap_calls=50))
+        jobs.pause(capped)
+        jobs.resume(capped, higher=Caps(cap_calls=50))
         rows.leased(rows.only_row(job)).settle(rows.failed(), now=rows.NOON)
         invite(study=study, expert=study.experts.get(username="eva"))
         hand_over(study=study, username="eva", to=["finn"])
@@ -51,8 +52,9 @@ def test_nothing_that_is_stored_is_german() -> None:
     snapshot.refresh_from_db()
     assert snapshot.state == Snapshot.State.FAILED
     assert snapshot.reason.startswith("Unknown expert 'nobody'. Known: ")
-    raised = Event.objects.get(verb="raise cap")
-    assert raised.before == {"cap": "5 calls, 900 tokens"}
-    assert raised.after == {"cap": "50 calls, 900 tokens"}
+    raised = Event.objects.get(verb="resume")
+    assert raised.before == {"state": "paused", "cap": "5 calls, 900 tokens"}
+    assert raised.after is not None
+    assert raised.after["cap"] == "50 calls, 900 tokens"
     kept = " ".join(str((line.before, line.after)) for line in Event.objects.all())
     assert not any(word in kept for word in ("Aufrufe", "Studie", "„", "unbekannt"))

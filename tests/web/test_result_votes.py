@@ -78,7 +78,7 @@ def test_every_number_leads_to_as_many_votes(
         promised |= links_of(shown.content.decode())
     assert len(promised) > 50
     parts = set(re.findall(r"part=(\w+)", " ".join(promised)))
-    assert {"alike", "shared"} <= parts
+    assert {"alike", "repeats"} <= parts
     wrong = {}
     for address, number in promised.items():
         answer = analyst.get(address)

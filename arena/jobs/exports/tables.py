@@ -15,7 +15,7 @@ from arena.exports.formats import NUMBER, TEXT, WHOLE, YES_NO, Format, formats, 
 from augment.models import GenerationJob
 from augment.services.judging.analyses import JobAnalysis, augmentation_lines, repeatability
 from augment.services.judging.displacement import objects_of
-from augment.services.running.progress import tool_calls_by_augmentation
+from augment.services.running.progress import tool_calls
 
 Value = str | Callable[[Any], object]
 Columns = Mapping[str, tuple[Value, str]]
@@ -260,7 +260,7 @@ def repeat_sheet(job: GenerationJob) -> Sheet:
 
 def tool_call_sheet(job: GenerationJob) -> Sheet:
     """Return the calls of a job's contestants to their function, one row an augmentation."""
-    rows = read_columns(tool_calls_by_augmentation(job), TOOL_CALLS, digits=4)
+    rows = read_columns(tool_calls(job), TOOL_CALLS, digits=4)
     return Sheet(name="tool-calls", key="augmentations", columns=TOOL_CALLS, rows=rows)
 
 

@@ -22,7 +22,7 @@ from augment.services.inputs import read_request
 from augment.services.judging.analyses import repeatability
 from augment.services.judging.scenario_export import FORMATS
 from augment.services.running import jobs, progress
-from augment.services.running.budget import Caps, costs_of
+from augment.services.running.budget import Caps, count_unpriced
 from augment.services.running.workers import workforce
 from augment.tasks import enqueue_job
 
@@ -71,7 +71,7 @@ def job_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     )
     context: dict[str, object] = {
         "counts": counts,
-        "costs": costs_of(job),
+        "unpriced": count_unpriced(job),
         "grid": grid_part(job, part),
         "failures": progress.failure_groups(job),
         "shown_causes": progress.SHOWN,
@@ -92,7 +92,7 @@ def _measure(request: HttpRequest, job: GenerationJob) -> dict[str, object]:
         "scenario_files": [(form, files.get(form)) for form in FORMATS],
         "displacement": displacement_section(request, job),
         "driving": driving_section(request, job),
-        "tool_calls": progress.tool_calls_by_contestant(job),
+        "has_tool_calls": bool(progress.tool_calls(job)),
     }
     if job.samples > 1:
         measured["repeats"] = repeatability(job)

@@ -5,14 +5,13 @@ from typing import Any
 
 from django.core.management.base import CommandError, CommandParser
 
-from arena.models import Study
+from arena.studies.queries import study_named
 from arena.studies.services.outlook import (
     ESTIMATE_INPUTS,
     Prospect,
     StudyEstimate,
     foretell,
     known_of,
-    usual_seconds,
 )
 from augment.errors import AugmentError
 from augment.services.inputs import add_options, check_bounds
@@ -28,13 +27,13 @@ class Command(TerminalCommand):
         """The design; whatever is left open is taken from the study, else guessed."""
         parser.add_argument("--like", metavar="STUDY", help="name of a study to take numbers from")
         add_options(parser, ESTIMATE_INPUTS)
-        parser.set_defaults(**dict.fromkeys(one.name for one in ESTIMATE_INPUTS))
+        parser.set_defaults(**dict.fromkeys(field.name for field in ESTIMATE_INPUTS))
 
     def handle(self, *args: Any, **options: Any) -> None:
         """Say what it takes."""
-        names = [one.name for one in ESTIMATE_INPUTS]
+        names = [field.name for field in ESTIMATE_INPUTS]
         given = {name: options[name] for name in names if options[name] is not None}
-        known = self._known(options["like"])
+        known = known_of(study_named(options["like"])) if options["like"] else {}
         estimate = StudyEstimate(**known | given)
         try:
             check_bounds(estimate)
@@ -50,15 +49,6 @@ class Command(TerminalCommand):
             found = goal.prospect
             text = goal.obstacle if found is None else _line(found, estimate.power)
             self.stdout.write(f"{goal.text}: {text}")
-
-    def _known(self, name: str | None) -> dict[str, Any]:
-        if name is None:
-            seconds = usual_seconds()
-            return {} if seconds is None else {"seconds": seconds}
-        study = Study.objects.filter(name=name).first()
-        if study is None:
-            raise CommandError(f"There is no study named {name!r}.")
-        return known_of(study).values
 
 
 def _line(found: Prospect, power: float) -> str:

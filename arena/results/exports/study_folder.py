@@ -28,7 +28,7 @@ from arena.results.services.stored_rows import (
     label_of,
 )
 from arena.site.services import UNFINISHED
-from arena.studies.services.opening import FILE_NAME, preregistration_bytes, preregistration_sha256
+from arena.studies.services.opening import FILE_NAME, preregistration_sha256
 from augment.models import Augmentation, Contestant, GenerationJob, Scenario
 from augment.services.running.transcript_records import record_of, tries_by_augmentation
 
@@ -259,7 +259,7 @@ def _files_for_people(closure: Closure) -> Iterator[File]:
     rows = contestants.distinct().select_related("endpoint")
     documents = [_contestant(row) for row in sorted(rows, key=lambda row: row.slug)]
     yield "contestants.json", _json(documents)
-    if frozen := preregistration_bytes(study):
+    if frozen := study.preregistration.encode():
         yield FILE_NAME, frozen
     places = Scenario.objects.filter(jobs__in=jobs) | study.scenarios.all()
     related = places.distinct().select_related("base_scene", "paraphrase_of")

@@ -25,7 +25,7 @@ from arena.results.exports.tables import (
 )
 from arena.results.exports.votes import VOTE_FORMATS, vote_table
 from arena.results.services.vote_files import digest_of
-from arena.studies.services.opening import FILE_NAME, preregistration_bytes
+from arena.studies.services.opening import FILE_NAME
 from arena.studies.services.plan import Answered
 
 MANIFEST = "manifest.json"
@@ -161,7 +161,7 @@ def bundle_files(snapshot: Snapshot) -> dict[str, bytes]:
     files["pairs.csv"] = _pairs_csv(results)
     files["types.csv"] = _types_csv(results)
     files["raters.csv"] = _raters_csv(results)
-    frozen = preregistration_bytes(snapshot.study)
+    frozen = snapshot.study.preregistration.encode()
     if frozen:
         files[FILE_NAME] = frozen
     if table.hypotheses:

@@ -1,14 +1,12 @@
 """The votes behind a number of a rating, with their pictures: pages of them, all, or a single one.
 
 In: a snapshot and what is looked for. Out: votes with the mark that says why one does not count.
-The database finds them, so that a page costs the same for any number.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
-from functools import cached_property
-from typing import overload
+from typing import Any
 from uuid import UUID
 
 from django.core.paginator import Page, Paginator
@@ -16,13 +14,10 @@ from django.core.paginator import Page, Paginator
 from arena.models import ImportedVote, Report, Snapshot, Vote
 from arena.results.queries.scores import (
     Evidence,
-    Faults,
-    PictureKey,
+    Pair,
+    Picture,
     VoteScore,
-    pair_key,
-    rating_key,
     read_evidence,
-    read_faults,
     sort_votes,
 )
 from arena.results.queries.search import EVERY, VoteSearch, find_lines, find_votes, is_found
@@ -37,7 +32,6 @@ from arena.results.queries.votes import (
     is_imported,
     settled_ties,
 )
-from arena.voting.queries.remembering import Remembered
 from augment.models import Augmentation
 
 PER_PAGE = 25
@@ -64,7 +58,6 @@ class ShownSide:
     augmentation: UUID | None = None
     sample: int = 0
     score: VoteScore | None = None
-    faults: Faults | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -77,7 +70,6 @@ class ListedVote:
         judge: The pseudonym as the rating kept it, empty where nobody decided.
         kind: Of the matchup, or `automatic` or `imported`.
         matchup: The code of the showing.
-        sides: Left and right.
         outcome: left, equal, right or skip.
         reason: Why it was skipped.
         mark: Why it does not count, or that it does.
@@ -95,7 +87,8 @@ class ListedVote:
     kind: str
     matchup: UUID | None = None
     position: int | None = None
-    sides: tuple[ShownSide, ShownSide]
+    left: ShownSide
+    right: ShownSide
     outcome: str
     both_miss: bool = False
     reason: str = ""
@@ -107,14 +100,9 @@ class ListedVote:
     pair: VoteScore | None = None
 
     @property
-    def left(self) -> ShownSide:
-        """Who was shown on the left."""
-        return self.sides[0]
-
-    @property
-    def right(self) -> ShownSide:
-        """Who was shown on the right."""
-        return self.sides[1]
+    def sides(self) -> tuple[ShownSide, ShownSide]:
+        """Left and right."""
+        return self.left, self.right
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -149,19 +137,33 @@ class Neighbours:
 # --- Lists of votes ----------------------------------------------------------------------------
 
 
-def vote_page(snapshot: Snapshot, search: VoteSearch, number: int) -> Page[ListedVote]:
-    """One page with the numbers beside its pictures; beyond the last is the last."""
-    return Paginator(_Found(snapshot, search), PER_PAGE).get_page(number)
+def vote_page(snapshot: Snapshot, search: VoteSearch, number: int) -> Page[Any]:
+    """One page of listed votes with the numbers beside their pictures; the last beyond it."""
+    imported = is_imported(snapshot.study)
+    found: Any = find_lines(snapshot, search) if imported else _find_all(snapshot, search)
+    page: Page[Any] = Paginator(found, PER_PAGE).get_page(number)
+    shown = list(page.object_list)
+    page.object_list = (
+        [_list_line(line) for line in shown]
+        if imported
+        else _list_votes(shown, snapshot, read_evidence(snapshot))
+    )
+    return page
 
 
 def each_vote(snapshot: Snapshot, search: VoteSearch) -> Iterator[ListedVote]:
     """All that are looked for, in the order of their pages."""
-    return iter(_Found(snapshot, search))
+    if is_imported(snapshot.study):
+        yield from map(_list_line, find_lines(snapshot, search).iterator(CHUNK))
+        return
+    found = _find_all(snapshot, search)
+    for start in range(0, len(found), CHUNK):
+        yield from _list_votes(found[start : start + CHUNK], snapshot, Evidence({}, {}))
 
 
 def neighbours(snapshot: Snapshot, search: VoteSearch, vote: Vote) -> Neighbours:
     """The votes before and after one among those that are looked for."""
-    keys = [pk for pk, _ in _Found(snapshot, search).keys]
+    keys = [pk for pk, _ in sort_votes(snapshot, search)]
     if vote.pk not in keys:
         return Neighbours(total=len(keys))
     place = keys.index(vote.pk)
@@ -176,19 +178,13 @@ def neighbours(snapshot: Snapshot, search: VoteSearch, vote: Vote) -> Neighbours
 def vote_in(snapshot: Snapshot, code: UUID) -> SingleVote | None:
     """The vote of that code if it was given before the rating; six queries at most."""
     rows = find_votes(snapshot, VoteSearch(mark=EVERY)).filter(key=code)
-    vote = (
-        rows.select_related(
-            "matchup__scenario",
-            "expert__person",
-            "supersedes",
-            "shown_left__contestant",
-            "shown_right__contestant",
-        )
-        .defer(
-            "matchup__scenario__reference", "shown_left__modification", "shown_right__modification"
-        )
-        .first()
+    related = rows.select_related(
+        *("matchup__scenario", "expert__person", "supersedes"),
+        *("shown_left__contestant", "shown_right__contestant"),
     )
+    vote = related.defer(
+        "matchup__scenario__reference", "shown_left__modification", "shown_right__modification"
+    ).first()
     if vote is None:
         return None
     later = Vote.objects.filter(supersedes=vote, pk__lte=snapshot.last_vote or 0)
@@ -210,63 +206,23 @@ def count_settled(snapshot: Snapshot) -> int:
     return snapshot.votes_counted - counted_votes(snapshot).count()
 
 
-class _Found(Sequence[ListedVote]):
-    """What is looked for: rows of the database, then the pairs that nobody can tell apart."""
+# --- Private -----------------------------------------------------------------------------------
 
-    def __init__(self, snapshot: Snapshot, search: VoteSearch) -> None:
-        self._snapshot, self._search = snapshot, search
-        self._lines = find_lines(snapshot, search) if is_imported(snapshot.study) else None
-        ties = _settled_ties(snapshot) if self._lines is None else []
-        self._ties = [tie for tie in ties if is_found(tie, search)]
 
-    def __len__(self) -> int:
-        return self._stored + len(self._ties)
-
-    @overload
-    def __getitem__(self, place: int) -> ListedVote: ...
-
-    @overload
-    def __getitem__(self, place: slice) -> list[ListedVote]: ...
-
-    def __getitem__(self, place: int | slice) -> ListedVote | list[ListedVote]:
-        """The votes from one place up to another, from 0, with what is known of their pictures."""
-        if isinstance(place, int):
-            return self[place : place + 1][0]
-        if self._lines is not None:
-            return [_list_line(line) for line in self._lines[place]]
-        listed = _list_votes(self.keys[place], self._snapshot, with_evidence=True)
-        start, stop, _ = place.indices(len(self))
-        ties = self._ties[max(start - self._stored, 0) : max(stop - self._stored, 0)]
-        return listed + _list_ties(ties, self._snapshot)
-
-    def __iter__(self) -> Iterator[ListedVote]:
-        """All of them; what is found is found once, whatever its number."""
-        if self._lines is not None:
-            yield from map(_list_line, self._lines.iterator(CHUNK))
-            return
-        for start in range(0, self._stored, CHUNK):
-            yield from _list_votes(self.keys[start : start + CHUNK], self._snapshot)
-        yield from _list_ties(self._ties, self._snapshot)
-
-    @cached_property
-    def keys(self) -> list[tuple[int, str]]:
-        """Every vote that is looked for, with its mark; a rating's votes never change."""
-        if self._lines is not None:
-            return []
-        if self._search.order == "faults":  # labels are given later
-            return sort_votes(self._snapshot, self._search)
-        key = (*rating_key(self._snapshot), self._search)
-        return _FOUND.get(key, lambda: sort_votes(self._snapshot, self._search))
-
-    @cached_property
-    def _stored(self) -> int:
-        return len(self.keys) if self._lines is None else self._lines.count()
+def _find_all(snapshot: Snapshot, search: VoteSearch) -> list[tuple[int, str] | Judged]:
+    """Keys and marks of the rows, then the ties on pairs that nobody was shown."""
+    study, filters = snapshot.study, Filters.of_document(snapshot.filters)
+    ties: list[Judged] = []
+    if study.rules.get("identical"):
+        votes = current_votes(study, filters, snapshot.last_vote)
+        ties = [tie for tie in settled_ties(study, votes, filters) if is_found(tie, search)]
+    return [*sort_votes(snapshot, search), *ties]
 
 
 def _list_votes(
-    marks: Sequence[tuple[int, str]], snapshot: Snapshot, *, with_evidence: bool = False
+    found: Sequence[tuple[int, str] | Judged], snapshot: Snapshot, evidence: Evidence
 ) -> list[ListedVote]:
-    """The rows of these keys with their marks, in their order; two more queries with evidence."""
+    """Votes in their order; two queries."""
     related = (
         *("matchup__scenario", "expert__person"),
         *("shown_left__contestant", "shown_right__contestant"),
@@ -275,19 +231,17 @@ def _list_votes(
         *("matchup__view", "matchup__descriptions", "matchup__scenario__reference"),
         *("matchup__scenario__intent", "shown_left__modification", "shown_right__modification"),
     )
-    rows = Vote.objects.select_related(*related).defer(*unread)
-    votes = rows.in_bulk([pk for pk, _ in marks])
-    evidence, faults = Evidence(pictures={}, pairs={}), {}
-    if with_evidence:
-        evidence = read_evidence(snapshot)
-        shown = {pk for vote in votes.values() for pk in (vote.shown_left_id, vote.shown_right_id)}
-        faults = read_faults(shown)
-    return [_list_vote(votes[pk], mark, snapshot, evidence, faults) for pk, mark in marks]
+    ties = [one for one in found if isinstance(one, Judged)]
+    keys = [one for one in found if not isinstance(one, Judged)]
+    rows = Vote.objects.select_related(*related).defer(*unread).in_bulk([pk for pk, _ in keys])
+    names = dict(snapshot.standings.values_list("slug", "name")) if ties else {}
+    return [
+        *(_list_vote(rows[pk], mark, snapshot, evidence) for pk, mark in keys),
+        *(_list_tie(tie, names) for tie in ties),
+    ]
 
 
-def _list_vote(
-    vote: Vote, mark: str, snapshot: Snapshot, evidence: Evidence, faults: Mapping[int, Faults]
-) -> ListedVote:
+def _list_vote(vote: Vote, mark: str, snapshot: Snapshot, evidence: Evidence) -> ListedVote:
     matchup, scenario = vote.matchup, vote.matchup.scenario
     has_samples = snapshot.study.shows_all_samples
 
@@ -301,8 +255,7 @@ def _list_vote(
             is_simulated=who.is_simulated,
             augmentation=shown.code,
             sample=sample,
-            score=evidence.pictures.get(PictureKey(scenario.pk, sample, who.pk)),
-            faults=faults.get(shown.pk),
+            score=evidence.pictures.get(Picture(scenario.pk, sample, who.pk)),
         )
 
     left, right = side("left", vote.shown_left), side("right", vote.shown_right)
@@ -318,7 +271,8 @@ def _list_vote(
         kind=matchup.kind,
         matchup=matchup.code,
         position=matchup.position,
-        sides=(left, right),
+        left=left,
+        right=right,
         outcome=vote.outcome,
         both_miss=vote.both_miss,
         reason=vote.reason,
@@ -327,67 +281,38 @@ def _list_vote(
         comment=vote.comment,
         is_simulated=vote.is_simulated,
         mark=mark,
-        pair=evidence.pairs.get(pair_key(scenario.pk, right.sample, contestants)),
+        pair=evidence.pairs.get(Pair.of(scenario.pk, right.sample, *contestants)),
     )
 
 
-def _list_ties(ties: Sequence[Judged], snapshot: Snapshot) -> list[ListedVote]:
-    """Pairs that nobody was shown; one query where there are any."""
-    names = dict(snapshot.standings.values_list("slug", "name")) if ties else {}
-    return [
-        ListedVote(
-            scenario=tie.item,
-            type=tie.type,
-            kind=AUTOMATIC,
-            outcome=tie.outcome,
-            mark=tie.mark,
-            sides=(_name_side("left", tie.left, names), _name_side("right", tie.right, names)),
-        )
-        for tie in ties
-    ]
+def _list_tie(tie: Judged, names: Mapping[str, str]) -> ListedVote:
+    """A pair that nobody was shown."""
+    return ListedVote(
+        scenario=tie.item,
+        type=tie.type,
+        kind=AUTOMATIC,
+        left=ShownSide(place="left", won=False, slug=tie.left, name=names[tie.left]),
+        right=ShownSide(place="right", won=False, slug=tie.right, name=names[tie.right]),
+        outcome=tie.outcome,
+        mark=tie.mark,
+    )
 
 
 def _list_line(line: ImportedVote) -> ListedVote:
-    outcome = IMPORTED_OUTCOMES[line.outcome]
+    outcome, first, second = IMPORTED_OUTCOMES[line.outcome], line.first, line.second
     return ListedVote(
         line=line.line,
         judge=line.judge,
         scenario=line.item,
         kind=IMPORTED,
-        sides=(
-            _name_side("left", line.first, won=outcome == "left"),
-            _name_side("right", line.second, won=outcome == "right"),
-        ),
+        left=ShownSide(place="left", won=outcome == "left", slug=first, name=first),
+        right=ShownSide(place="right", won=outcome == "right", slug=second, name=second),
         outcome=outcome,
         both_miss=line.outcome == ImportedVote.Outcome.BOTH_BAD,
         mark=line.mark,  # type: ignore[attr-defined]
     )
 
 
-def _name_side(
-    place: str, slug: str, names: Mapping[str, str] | None = None, *, won: bool = False
-) -> ShownSide:
-    return ShownSide(place=place, won=won, slug=slug, name=(names or {}).get(slug, slug))
-
-
 def _judge_of(vote: Vote, snapshot: Snapshot) -> str:
     person = vote.expert.person
     return snapshot.results.judges.get(str(person.code), person.pseudonym)
-
-
-# --- Private -----------------------------------------------------------------------------------
-
-_FOUND: Remembered[list[tuple[int, str]]] = Remembered(3)
-_TIES: Remembered[list[Judged]] = Remembered(3)
-
-
-def _settled_ties(snapshot: Snapshot) -> list[Judged]:
-    """The ties on pairs that nobody was shown, as the rating's votes give them."""
-    study, filters = snapshot.study, Filters.of_document(snapshot.filters)
-    if not study.rules.get("identical"):
-        return []
-
-    def read() -> list[Judged]:
-        return settled_ties(study, current_votes(study, filters, snapshot.last_vote), filters)
-
-    return _TIES.get(rating_key(snapshot), read)

@@ -1,19 +1,15 @@
-"""What the votes of a rating say of its pictures: scores, disagreement, fault labels, orders."""
+"""What the votes of a rating say of its pictures and pairs, and which votes come first by that."""
 
-from __future__ import annotations
-
-import json
 from collections import defaultdict
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
-from django.db.models import Count, F, Max, Q, QuerySet, Value
+from django.db.models import Count, F, Max, QuerySet, Value
 
-from arena.models import FaultLabel, Matchup, Snapshot, Vote
+from arena.models import Matchup, Snapshot, Vote
 from arena.results.queries.search import VoteSearch, find_votes
 from arena.results.queries.votes import counted_votes
-from arena.voting.queries.remembering import Remembered, plan_types
 from augment.models import Contestant
 
 
@@ -24,14 +20,6 @@ class VoteScore:
     wins: int = 0
     ties: int = 0
     losses: int = 0
-
-    def __add__(self, other: VoteScore) -> VoteScore:
-        """Both together."""
-        return VoteScore(
-            wins=self.wins + other.wins,
-            ties=self.ties + other.ties,
-            losses=self.losses + other.losses,
-        )
 
     @property
     def votes(self) -> int:
@@ -53,14 +41,7 @@ class VoteScore:
         return far / (n * (n - 1) / 2)
 
 
-class Faults(NamedTuple):
-    """How many experts looked for faults in a picture, and how many found some."""
-
-    labels: int = 0
-    faulty: int = 0
-
-
-class PictureKey(NamedTuple):
+class Picture(NamedTuple):
     """A contestant's picture of a scenario; `sample` is 0 unless each is judged on its own."""
 
     scenario: int
@@ -68,7 +49,7 @@ class PictureKey(NamedTuple):
     contestant: int
 
 
-class PairKey(NamedTuple):
+class Pair(NamedTuple):
     """Two pictures of a scenario, the contestant of the lower key first."""
 
     scenario: int
@@ -76,13 +57,18 @@ class PairKey(NamedTuple):
     low: int
     high: int
 
+    @classmethod
+    def of(cls, scenario: int, sample: int, one: int, other: int) -> "Pair":
+        """Return the pair, whoever was shown on the left."""
+        return cls(scenario, sample, min(one, other), max(one, other))
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+
+@dataclass(frozen=True, slots=True)
 class Evidence:
     """The scores of a rating's pictures, and of its pairs as seen from the lower contestant."""
 
-    pictures: Mapping[PictureKey, VoteScore]
-    pairs: Mapping[PairKey, VoteScore]
+    pictures: dict[Picture, VoteScore]
+    pairs: dict[Pair, VoteScore]
 
 
 class PictureShown(NamedTuple):
@@ -93,18 +79,16 @@ class PictureShown(NamedTuple):
 
 
 def read_evidence(snapshot: Snapshot) -> Evidence:
-    """Count the votes of a rating by picture and by pair; two queries, one the next time."""
-    return _EVIDENCE.get(rating_key(snapshot), lambda: _count_evidence(snapshot))
-
-
-def read_faults(augmentations: Collection[int]) -> dict[int, Faults]:
-    """Return the fault labels of those pictures that have some; one query."""
-    fault = Q(position=True) | Q(heading=True) | Q(logic=True)
-    rows = FaultLabel.objects.filter(augmentation__in=augmentations).order_by()
-    counted = rows.values_list("augmentation").annotate(
-        labels=Count("pk"), faulty=Count("pk", filter=fault)
-    )
-    return {pk: Faults(labels, faulty) for pk, labels, faulty in counted}
+    """Count the votes of a rating by picture and by pair; one query."""
+    pictures: defaultdict[Picture, VoteScore] = defaultdict(VoteScore)
+    pairs: defaultdict[Pair, VoteScore] = defaultdict(VoteScore)
+    for count in _count_votes(counted_votes(snapshot), snapshot):
+        pair = Pair.of(count.scenario, count.sample, count.left, count.right)
+        pairs[pair] = count.add_to(pairs[pair], pair.low)
+        for contestant in (count.left, count.right):
+            picture = Picture(count.scenario, count.sample, contestant)
+            pictures[picture] = count.add_to(pictures[picture], contestant)
+    return Evidence(dict(pictures), dict(pairs))
 
 
 def pictures_by_scenario(
@@ -117,7 +101,7 @@ def pictures_by_scenario(
     for count in _count_votes(rows, snapshot):
         for contestant in (count.left, count.right):
             key = (count.scenario, contestant)
-            scores[key] += count.score_of(contestant)
+            scores[key] = count.add_to(scores[key], contestant)
             shown[key] = max(shown[key], count.matchup)
     related = Matchup.objects.select_related("left__contestant", "right__contestant")
     unread = ("left__modification", "right__modification", "descriptions")
@@ -133,28 +117,39 @@ def pictures_by_scenario(
     return pictures
 
 
-def rating_key(snapshot: Snapshot) -> tuple[Any, ...]:
-    """What the votes of a rating and their types are known by; one query."""
-    filters = json.dumps(snapshot.filters)
-    return snapshot.code, snapshot.last_vote, filters, plan_types(snapshot.study)
-
-
 def sort_votes(snapshot: Snapshot, search: VoteSearch) -> list[tuple[int, str]]:
     """Return keys and marks of the votes looked for, in the order that the search asks for."""
     rows = find_votes(snapshot, search)
     if not search.order:
         return list(rows.order_by("pk").values_list("pk", F("mark")))
+    wanted = Contestant.objects.filter(slug=search.contestant).values_list("pk", flat=True).first()
+    evidence = read_evidence(snapshot)
+
+    def place(row: tuple[Any, ...]) -> tuple[Any, ...]:
+        pk, _, slug, scenario, sample, *contestants = row
+        pair = Pair.of(scenario, sample, *contestants)
+        if search.order == "scenario":
+            return slug, pair, pk
+        if search.order == "disputed":
+            score = evidence.pairs.get(pair, VoteScore())
+            return -score.disagreement, -score.votes, slug, pair, pk
+        pictures = [
+            Picture(scenario, sample, contestant)
+            for contestant in contestants
+            if wanted in (None, contestant)
+        ]
+        scores = [(evidence.pictures.get(picture, VoteScore()), picture) for picture in pictures]
+        worst = min((-score.lost_share, -score.votes, picture) for score, picture in scores)
+        return (*worst, pk)
+
     columns = rows.values_list(
         *("pk", F("mark"), "matchup__scenario__slug", "matchup__scenario", _sample_of(snapshot)),
-        *("shown_left__contestant", "shown_right__contestant", "shown_left", "shown_right"),
+        *("shown_left__contestant", "shown_right__contestant"),
     )
-    votes = list(map(_Sortable._make, columns))
-    return [(vote.pk, vote.mark) for vote in sorted(votes, key=_sort_key(votes, snapshot, search))]
+    return [(pk, mark) for pk, mark, *_ in sorted(columns, key=place)]
 
 
 # --- Private -----------------------------------------------------------------------------------
-
-_EVIDENCE: Remembered[Evidence] = Remembered(3)
 
 
 class _Count(NamedTuple):
@@ -168,15 +163,16 @@ class _Count(NamedTuple):
     number: int
     matchup: int
 
-    def score_of(self, contestant: int) -> VoteScore:
-        """The votes as one of the two sees them."""
+    def add_to(self, score: VoteScore, contestant: int) -> VoteScore:
+        """Return a score with these votes, as one of the two sees them."""
         if self.outcome == "equal":
-            return VoteScore(ties=self.number)
-        won = (self.outcome == "left") == (self.left == contestant)
-        return VoteScore(wins=self.number) if won else VoteScore(losses=self.number)
+            return replace(score, ties=score.ties + self.number)
+        if (self.outcome == "left") == (self.left == contestant):
+            return replace(score, wins=score.wins + self.number)
+        return replace(score, losses=score.losses + self.number)
 
 
-def _count_votes(rows: QuerySet[Vote], snapshot: Snapshot) -> Iterable[_Count]:
+def _count_votes(rows: QuerySet[Vote], snapshot: Snapshot) -> Iterator[_Count]:
     grouped = rows.values_list(
         *("matchup__scenario", _sample_of(snapshot)),
         *("shown_left__contestant", "shown_right__contestant", "outcome"),
@@ -184,78 +180,6 @@ def _count_votes(rows: QuerySet[Vote], snapshot: Snapshot) -> Iterable[_Count]:
     return map(_Count._make, grouped.annotate(number=Count("pk"), shown=Max("matchup")))
 
 
-def _count_evidence(snapshot: Snapshot) -> Evidence:
-    pictures: defaultdict[PictureKey, VoteScore] = defaultdict(VoteScore)
-    pairs: defaultdict[PairKey, VoteScore] = defaultdict(VoteScore)
-    for count in _count_votes(counted_votes(snapshot), snapshot):
-        both = (count.left, count.right)
-        pair = pair_key(count.scenario, count.sample, both)
-        pairs[pair] += count.score_of(pair.low)
-        for contestant in both:
-            picture = PictureKey(count.scenario, count.sample, contestant)
-            pictures[picture] += count.score_of(contestant)
-    return Evidence(pictures=dict(pictures), pairs=dict(pairs))
-
-
 def _sample_of(snapshot: Snapshot) -> F | Value:
     """Which sample both sides show where every one is judged on its own, else 0."""
     return F("matchup__right__sample") if snapshot.study.shows_all_samples else Value(0)
-
-
-def pair_key(scenario: int, sample: int, contestants: tuple[int, int]) -> PairKey:
-    """The key of a pair, whoever was shown on the left."""
-    return PairKey(scenario, sample, min(contestants), max(contestants))
-
-
-class _Sortable(NamedTuple):
-    """What of a vote says its place among others."""
-
-    pk: int
-    mark: str
-    slug: str
-    scenario: int
-    sample: int
-    left: int
-    right: int
-    left_row: int
-    right_row: int
-
-    @property
-    def pair(self) -> PairKey:
-        return pair_key(self.scenario, self.sample, (self.left, self.right))
-
-
-def _sort_key(
-    votes: Sequence[_Sortable], snapshot: Snapshot, search: VoteSearch
-) -> Callable[[_Sortable], tuple[Any, ...]]:
-    if search.order == "scenario":
-        return lambda vote: (vote.slug, vote.pair, vote.pk)
-    evidence = read_evidence(snapshot)
-
-    def by_disagreement(vote: _Sortable) -> tuple[Any, ...]:
-        score = evidence.pairs.get(vote.pair, VoteScore())
-        return (-score.disagreement, -score.votes, vote.slug, vote.pair, vote.pk)
-
-    if search.order == "disputed":
-        return by_disagreement
-    wanted = Contestant.objects.filter(slug=search.contestant).values_list("pk", flat=True).first()
-    faults: Mapping[int, Faults] = {}
-    if search.order == "faults":
-        faults = read_faults({row for vote in votes for row in (vote.left_row, vote.right_row)})
-
-    def rank_picture(key: PictureKey, row: int) -> tuple[Any, ...]:
-        if search.order == "faults":
-            labels, faulty = faults.get(row, Faults())
-            return (-faulty / labels, -labels, key) if labels else (1.0, 0, key)
-        score = evidence.pictures.get(key)
-        return (-score.lost_share, -score.votes, key) if score else (1.0, 0, key)
-
-    def by_worst_picture(vote: _Sortable) -> tuple[Any, ...]:
-        ranks = [
-            rank_picture(PictureKey(vote.scenario, vote.sample, contestant), row)
-            for contestant, row in ((vote.left, vote.left_row), (vote.right, vote.right_row))
-            if wanted in (None, contestant)
-        ]
-        return (*min(ranks), vote.pk)
-
-    return by_worst_picture

@@ -1,10 +1,8 @@
 """Which votes of a rating somebody looks for: what stands in an address, and the rows it finds."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
-from typing import Any
+from typing import Any, Self
 
 from django.db.models import Exists, OuterRef, Q, QuerySet
 
@@ -49,12 +47,10 @@ PARTS = {
     "checks": "Attention checks answered",
     "passed": "Attention checks passed",
     "checks_skipped": "Attention checks skipped",
-    "shared": "On what others judged as well",
 }
 ORDERS = {
     "disputed": "Most disputed",
     "lost": "Most often beaten",
-    "faults": "Most faults",
     "scenario": "Scenarios by name",
 }
 MARKS = {
@@ -108,7 +104,7 @@ class VoteSearch:
         return {name: text for name, text in values.items() if text != _DEFAULTS[name]}
 
     @classmethod
-    def of_query(cls, query: Mapping[str, str]) -> VoteSearch:
+    def of_query(cls, query: Mapping[str, str]) -> Self:
         """What `as_query` wrote; other words of the address are somebody else's."""
         return cls(**{name: query[name] for name in _DEFAULTS if query.get(name)})
 
@@ -238,18 +234,6 @@ def _alike(rows: QuerySet[Vote], snapshot: Snapshot) -> QuerySet[Vote]:
     )
 
 
-def _shared(rows: QuerySet[Vote], snapshot: Snapshot) -> QuerySet[Vote]:
-    """Votes on what another expert's vote that counts is on as well."""
-    others = marked_votes(snapshot).filter(
-        Q(mark=COUNTED), matchup__scenario=OuterRef("matchup__scenario")
-    )
-    others = others.exclude(expert=OuterRef("expert"))
-    left, right = "shown_left__contestant", "shown_right__contestant"
-    alike = others.filter(**{left: OuterRef(left), right: OuterRef(right)})
-    turned = others.filter(**{left: OuterRef(right), right: OuterRef(left)})
-    return rows.filter(Exists(alike) | Exists(turned))
-
-
 _PARTS: dict[str, Callable[[QuerySet[Vote], Snapshot], QuerySet[Vote]]] = {
     "commented": lambda rows, _: rows.exclude(comment=""),
     "fast": lambda rows, _: rows.filter(ms_visible__lt=FAST_MS),
@@ -257,7 +241,6 @@ _PARTS: dict[str, Callable[[QuerySet[Vote], Snapshot], QuerySet[Vote]]] = {
     "repeats": _repeats,
     "alike": _alike,
     "checks": lambda rows, _: rows.filter(matchup__kind=CHECK, outcome__in=RATED),
-    "shared": _shared,
     "passed": lambda rows, _: rows.filter(
         matchup__kind=CHECK, winner__contestant__kind=Contestant.Kind.REFERENCE
     ),

@@ -28,7 +28,6 @@ from arena.studies.queries import authorships_of, enrolled_voters, expert_lines,
 from arena.studies.services.taking_part import (
     LONGEST_CONSENT,
     LONGEST_ID,
-    drop_silent,
     enrol,
     forget_identity,
     set_enrolment,
@@ -287,7 +286,7 @@ def enrolment_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     form = EnrolmentForm(request.POST or None, initial=rules)
     if form.is_valid():
         with refusals_in(form):
-            set_enrolment(study=study, actor=user_of(request), **form.cleaned_data)
+            set_enrolment(study=study, rules=form.cleaned_data, actor=user_of(request))
             messages.success(request, "Saved. What the link says holds from now on.")
             return redirect("enrolment", code=code)
     context: dict[str, Any] = {"study": study, "enrolment": enrolment, "form": form}
@@ -299,16 +298,6 @@ def enrolment_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         }
     status = 422 if form.errors else 200
     return render(request, "studies/enrolment.html", context, status=status)
-
-
-@allow_only(ADMIN)
-@require_POST
-def drop_out(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
-    """Free the places of all who were silent for too long, now."""
-    enrolment = get_object_or_404(Enrolment, study__code=code)
-    freed = drop_silent(enrolment=enrolment, actor=user_of(request))
-    messages.info(request, f"Places that are free again: {freed}.")
-    return redirect("enrolment", code=code)
 
 
 @allow_only(ADMIN)

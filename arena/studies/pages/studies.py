@@ -15,7 +15,7 @@ from django.utils.text import slugify
 from django.views.decorators.http import require_http_methods, require_POST, require_safe
 
 from arena import tasks
-from arena.models import Report, Study, StudyFile
+from arena.models import Study, StudyFile
 from arena.people.queries import by_pseudonym, experts
 from arena.results.pages.rating_form import rate_or_send
 from arena.results.queries.access import ResultsAccess, results_access
@@ -45,7 +45,6 @@ from arena.studies.services.opening import cancel_study, close_study, preregistr
 from arena.studies.services.plan import PLAN_INPUTS, plan_of
 from arena.studies.services.taking_part import hand_over
 from arena.voting.queries.ballots import tallies
-from arena.voting.queries.showings import view_shown
 from augment.services.inputs import InputKind
 
 STUDIES_AT_ONCE = 25
@@ -137,11 +136,17 @@ def hand_over_pairs(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         tell_errors(request, form)
         return redirect("study", code=code)
     giver, takers = form.cleaned_data["giver"], form.cleaned_data["takers"]
-    with refusals_told(request), transaction.atomic():
+    if not is_sure(request):
+        question = _question(
+            study,
+            f"Hand over what {giver} has not judged?",
+            f"It is shared out among: {', '.join(takers)}.",
+            f"{giver} no longer sees it; votes that were given stay. This can’t be taken back.",
+            button="Hand over",
+        )
+        return ask(request, question)
+    with refusals_told(request):
         taken = hand_over(study=study, username=giver, to=takers, actor=user_of(request))
-        if not is_sure(request):  # it was only tried
-            transaction.set_rollback(True)
-            return ask(request, _handing_over(study, giver, taken))
         shares = ", ".join(f"{name} {votes}" for name, votes in taken.items())
         messages.success(request, f"Handed over: {shares}.")
     return redirect("study", code=code)
@@ -178,16 +183,6 @@ def cancel(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         cancel_study(study=study, why=request.POST.get(WHY, ""), actor=user_of(request))
         messages.success(request, "Cancelled. Its votes stay.")
     return redirect("study", code=code)
-
-
-def _handing_over(study: Study, giver: str, taken: dict[str, int]) -> Confirmation:
-    return _question(
-        study,
-        f"Hand over what {giver} has not judged?",
-        *(f"Pairs that {name} takes: {number}." for name, number in taken.items()),
-        f"{giver} no longer sees them; votes that were given stay. This can’t be taken back.",
-        button="Hand over",
-    )
 
 
 def _closing(study: Study) -> Confirmation:
@@ -276,40 +271,3 @@ def _study_for(request: HttpRequest, code: uuid.UUID, kind: str) -> Study:
     if kind in SHOWS_RESULTS and access is not ResultsAccess.FULL:
         raise PermissionDenied
     return study
-
-
-# --- Reports -----------------------------------------------------------------------------------
-
-
-@allow_only(ADMIN)
-@require_safe
-def report_page(request: HttpRequest, code: uuid.UUID, key: uuid.UUID) -> HttpResponse:
-    """One report, with both pictures as the expert saw them and the mark in them."""
-    study = get_object_or_404(Study, code=code)
-    report = get_object_or_404(queries.reports_of(study), key=key)
-    matchup, view = report.matchup, view_shown(report.matchup)
-    votes_here = study.experts.filter(pk=user_of(request).pk).exists()
-    is_blind = study.state == Study.State.OPEN and votes_here
-    sides = (
-        (Report.Side.LEFT, "A", matchup.left_token, matchup.left),
-        (Report.Side.RIGHT, "B", matchup.right_token, matchup.right),
-    )
-    context = {
-        "study": study,
-        "report": report,
-        "view": view,
-        "radius": view["width"] / 40,
-        "pictures": [
-            {
-                "letter": letter,
-                "token": token,
-                "made": None if is_blind else made,
-                "is_named": report.side in (side, Report.Side.BOTH),
-            }
-            for side, letter, token, made in sides
-        ],
-        "before": matchup.original_token if matchup.original_image else "",
-    }
-    if report.mark_x is not None and report.mark_y is not None:
-        context["mark"] = (report.mark_x * view["width"], report.mark_y * view["height"])
-    return render(request, "studies/report.html", context)

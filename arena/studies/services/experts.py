@@ -136,16 +136,10 @@ def _draw_round(study: Study, expert: User) -> list[PracticePair]:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Complaint:
-    """What an expert reports, as the API has read it.
-
-    Attributes:
-        mark: A place in the named pictures, as shares of their width and height from the upper
-            left corner; None without one.
-    """
+    """What an expert reports."""
 
     reason: str
     side: str = Report.Side.BOTH
-    mark: tuple[float, float] | None = None
     comment: str = ""
 
 
@@ -181,8 +175,6 @@ def check_complaint(said: Complaint) -> None:
         wrong["reason"] = f"One of these is needed: {', '.join(Report.Reason.values)}."
     if said.side not in Report.Side.values:
         wrong["side"] = f"One of these is needed: {', '.join(Report.Side.values)}."
-    if said.mark is not None and not all(0 <= share <= 1 for share in said.mark):
-        wrong["mark"] = "Both numbers of a mark lie between 0 and 1."
     if len(said.comment) > LONGEST_COMMENT:
         wrong["comment"] = f"A comment has at most {LONGEST_COMMENT} characters."
     if wrong:
@@ -190,14 +182,11 @@ def check_complaint(said: Complaint) -> None:
 
 
 def _insert(matchup: Matchup, expert: User, key: UUID, said: Complaint) -> Report:
-    across, down = said.mark or (None, None)
     values = {
         "matchup": matchup,
         "expert": expert,
         "reason": said.reason,
         "side": said.side,
-        "mark_x": across,
-        "mark_y": down,
         "comment": make_storable(said.comment.strip()),
     }
     try:

@@ -78,11 +78,11 @@ def open_study(study_plan: StudyPlan, *, actor: User | None = None) -> Study:
     """
     name = one_line("name", study_plan.name, what="study")
     if Study.objects.filter(name=name).exists():
-        raise _taken(name)
+        raise Conflict(f"There is a study named '{name}' already.")
     check_seed(study_plan.seed)
     contestants, scenarios = _contestants(study_plan), _scenarios(study_plan)
     accounts = {user.username: user for user in expert_accounts()}
-    experts = _named("expert", study_plan.experts, accounts)
+    experts = find_named("expert", study_plan.experts, accounts)
     has_simulated = _check_simulated(study_plan, contestants, experts)
     shown = choose_pictures(
         contestants,
@@ -96,7 +96,7 @@ def open_study(study_plan: StudyPlan, *, actor: User | None = None) -> Study:
     cells = broken | shown.cells
     frozen = _frozen(study_plan, rules, planned, shown, alike_shown)
     if study_plan.allow_replay:
-        frozen["replays"] = asdict(replays_of(cells))
+        frozen["replays"] = replays_of(cells)
     study = _insert(name, frozen, study_plan, rules, has_simulated)
     study.contestants.set(contestants)
     study.scenarios.set(scenarios)
@@ -104,7 +104,8 @@ def open_study(study_plan: StudyPlan, *, actor: User | None = None) -> Study:
     store(study, planned.matchups, cells, experts)
     if study.practice:
         require_practice_pictures()
-    study.preregistration = _as_text(_preregistration(study))
+    text = json.dumps(_preregistration(study), indent=1, ensure_ascii=False, sort_keys=True)
+    study.preregistration = text + "\n"
     study.save(update_fields=["preregistration"])
     after = {"name": study.name, "matchups": len(planned.matchups), "seed": study.seed}
     log_change(study, "open", actor, after=after)
@@ -119,19 +120,20 @@ def check_seed(seed: int) -> None:
 
 def _contestants(study_plan: StudyPlan) -> list[Contestant]:
     rateable = Contestant.objects.exclude(kind=Contestant.Kind.CHECK).select_related("endpoint")
-    return _named("contestant", study_plan.contestants, {row.slug: row for row in rateable})
+    return find_named("contestant", study_plan.contestants, {row.slug: row for row in rateable})
 
 
 def _scenarios(study_plan: StudyPlan) -> list[Scenario]:
     known = {row.slug: row for row in Scenario.objects.only("slug")}
-    chosen = _named("scenario", study_plan.scenarios, known)
+    chosen = find_named("scenario", study_plan.scenarios, known)
     # Locked, so that no picture is drawn anew between its choice and the opening.
     rows = Scenario.objects.filter(pk__in=[row.pk for row in chosen])
     list(rows.select_for_update(no_key=True).order_by("pk").values_list("pk"))
     return chosen
 
 
-def _named(kind: str, names: Iterable[str], known: dict[str, Any]) -> list[Any]:
+def find_named(kind: str, names: Iterable[str], known: dict[str, Any]) -> list[Any]:
+    """Return what has these names, sorted by them; raise UnknownName for one that is not known."""
     for name in names:
         if name not in known:
             raise UnknownName(kind, name, sorted(known))
@@ -167,7 +169,7 @@ def _rules(
     if wanted := round(shares["check_share"] * study_plan.votes_per_expert):
         shows_all = study_plan.samples is SampleRule.ALL
         checks, broken = check_pictures(scenarios, windows_of(entries), shows_all=shows_all)
-        require_checks(checks, scenarios, wanted=wanted)
+        require_checks(checks, wanted=wanted)
     alike = () if study_plan.show_alike else alike_pairs(cells)
     alike_shown = draw_shown(alike, entries, seed=study_plan.seed)
     appearances, pair_votes = read_targets(study_plan.targets)
@@ -203,7 +205,7 @@ def _frozen(
         "alike_shown": [list(pair) for pair in alike_shown],
         # Kept where it departs from the default, so that the settings can be used again.
         **({"show_alike": True} if study_plan.show_alike else {}),
-        "hypotheses": [one.as_document() for one in hypotheses],
+        "hypotheses": [asdict(hypothesis) for hypothesis in hypotheses],
         "samples": study_plan.samples.value,
         "jobs": [{"code": str(job.code), "name": job.name} for job in shown.jobs],
         "options": dict(sorted(shown.options.items())),
@@ -214,34 +216,23 @@ def _insert(
     name: str, frozen: dict[str, Any], study_plan: StudyPlan, rules: PlanRules, has_simulated: bool
 ) -> Study:
     switches = {column: getattr(study_plan, column) for column in SWITCH_COLUMNS}
-    switches["allow_simulated"] = has_simulated
     later = rules.votes_later
     try:
         with transaction.atomic():
             return Study.objects.create(
                 name=name,
-                state=Study.State.OPEN,
                 votes_per_expert=rules.votes_per_expert,
                 seed=rules.seed,
                 rules=frozen,
                 votes_to_plan=dict.fromkeys(rules.experts, later) if later else {},
                 opened_at=timezone.now(),
-                **switches,
+                **switches | {"allow_simulated": has_simulated},
             )
     except IntegrityError:  # taken since it was looked up
-        raise _taken(name) from None
-
-
-def _taken(name: str) -> Conflict:
-    return Conflict(f"There is a study named '{name}' already.")
+        raise Conflict(f"There is a study named '{name}' already.") from None
 
 
 # --- Preregistration ---------------------------------------------------------------------------
-
-
-def preregistration_bytes(study: Study) -> bytes:
-    """Return the file that was frozen at the opening, empty where there was none."""
-    return study.preregistration.encode()
 
 
 def preregistration_sha256(study: Study) -> str:
@@ -319,10 +310,6 @@ def _plan_document(study: Study) -> dict[str, Any]:
     }
 
 
-def _as_text(document: dict[str, Any]) -> str:
-    return json.dumps(document, indent=1, ensure_ascii=False, sort_keys=True) + "\n"
-
-
 # --- The end -----------------------------------------------------------------------------------
 
 
@@ -333,11 +320,6 @@ def close_study(*, study: Study, actor: User | None = None) -> Study:
     Raises:
         StudyNotOpen: The study was cancelled.
     """
-    study = Study.objects.select_for_update().get(pk=study.pk)
-    if study.state == Study.State.CLOSED:
-        return study
-    if study.state != Study.State.OPEN:
-        raise StudyNotOpen(f"The study '{study.name}' was cancelled: there is nothing to close.")
     return _end(study, Study.State.CLOSED, "close", actor)
 
 
@@ -358,21 +340,18 @@ def cancel_study(*, study: Study, why: str = "", actor: User | None = None) -> S
     """
     if why := why.strip():
         check_prose("why", why, what="study", longest=LONGEST_WHY)
-    study = Study.objects.select_for_update().get(pk=study.pk)
-    if study.state == Study.State.CANCELLED:
-        return study
-    if study.state != Study.State.OPEN:
-        raise StudyNotOpen(
-            f"The study '{study.name}' is closed: it has results and can't be cancelled."
-        )
     return _end(study, Study.State.CANCELLED, "cancel", actor, **({"why": why} if why else {}))
 
 
 def _end(study: Study, state: Study.State, verb: str, actor: User | None, **more: str) -> Study:
+    study = Study.objects.select_for_update().get(pk=study.pk)
+    if study.state == state:
+        return study
+    if study.state != Study.State.OPEN:
+        raise StudyNotOpen(f"The study '{study.name}' is {study.state} already.")
     # A vote holds its matchup's row until it is stored: no vote arrives after the end.
     list(study.matchups.select_for_update().order_by("pk").values_list("pk", flat=True))
-    study.state = state
-    study.closed_at = timezone.now()
+    study.state, study.closed_at = state, timezone.now()
     study.save(update_fields=["state", "closed_at"])
     before = {"state": Study.State.OPEN.value}
     log_change(study, verb, actor, before=before, after={"state": state.value, **more})

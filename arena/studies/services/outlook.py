@@ -14,7 +14,6 @@ from bisect import bisect_left
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from statistics import median
 from typing import Any
 
 import numpy as np
@@ -22,7 +21,7 @@ from django.contrib.auth.models import User
 from django.db.models import Count, Max, Min
 from scipy.special import ndtr, ndtri
 
-from arena.models import Snapshot, Study, Vote
+from arena.models import Snapshot, Study
 from arena.rating.comparisons import LEVEL, FloatArray, t_quantile
 from arena.rating.influence import estimate_effects
 from arena.rating.models import ELO_PER_LOGIT
@@ -277,39 +276,10 @@ def _gap_found(estimate: StudyEstimate, covariance: FloatArray, degrees: float) 
 # --- What past votes say -------------------------------------------------------------------------
 
 
-LAST_VOTES = 2000
-FEWEST_VOTES = 20
-"""With fewer timed votes a pace is a guess."""
-LONGEST_S = 120.0
-"""Somebody who takes longer has left the room."""
+def known_of(study: Study, reader: User | None = None) -> dict[str, Any]:
+    """Return what a study says of the next one like it, by the fields of StudyEstimate.
 
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Known:
-    """What a study says of the next one like it.
-
-    Attributes:
-        values: By the fields of StudyEstimate; only what is known.
-        from_results: Whether spread, ties and effects are among them.
-    """
-
-    values: dict[str, Any]
-    from_results: bool = False
-
-
-def usual_seconds(study: Study | None = None) -> float | None:
-    """Return the median time of a vote, of a study or of all; None where too few were timed."""
-    votes = Vote.objects.filter(is_simulated=False, ms_visible__isnull=False)
-    if study is not None:
-        votes = votes.filter(matchup__study=study)
-    times = list(votes.order_by("-pk").values_list("ms_visible", flat=True)[:LAST_VOTES])
-    if len(times) < FEWEST_VOTES:
-        return None
-    return round(median(min(ms / 1000.0, LONGEST_S) for ms in times if ms is not None), 1)
-
-
-def known_of(study: Study, reader: User | None = None) -> Known:
-    """Return what a study says; nothing of its results where the reader may not see them.
+    Nothing of its results where the reader may not see them.
 
     Args:
         study: Any.
@@ -323,7 +293,6 @@ def known_of(study: Study, reader: User | None = None) -> Known:
         "contestants": study.contestants.count(),
         "experts": study.experts.count(),
         "scenarios": study.scenarios.count(),
-        "seconds": usual_seconds(study),
         **{name: round(100 * study.rules.get(share, 0), 2) for name, share in shares.items()},
     }
     values = {name: value for name, value in values.items() if value}
@@ -331,8 +300,7 @@ def known_of(study: Study, reader: User | None = None) -> Known:
     if reader is not None:
         may_read = results_access(user=reader, study=study) is ResultsAccess.FULL
     snapshot = latest_snapshot(study) if may_read else None
-    results = {} if snapshot is None else _of_results(snapshot)
-    return Known(values=values | results, from_results=bool(results))
+    return values if snapshot is None else values | _of_results(snapshot)
 
 
 def _of_results(snapshot: Snapshot) -> dict[str, Any]:

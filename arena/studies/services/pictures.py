@@ -18,9 +18,6 @@ Pair = tuple[Augmentation, Augmentation]
 Cells = dict[tuple[str, str], Augmentation]
 """By place (a scenario, or one sample of it) and contestant, the augmentation that is shown."""
 
-MOST_NAMED = 8
-"""So many missing pictures are named, the others counted."""
-
 
 def find_showable(scenarios: Iterable[Scenario]) -> QuerySet[Augmentation]:
     """Return every augmentation of these scenarios that has a picture to judge."""
@@ -46,22 +43,6 @@ def with_picture(row: Augmentation, is_wanted: Callable[[str], bool]) -> Augment
         return None
     row.image = image
     return row
-
-
-def refuse_missing(
-    contestants: list[Contestant], scenarios: list[Scenario], cells: Collection[tuple[str, str]]
-) -> None:
-    """Raise NothingToPlan where a contestant has no picture of a scenario."""
-    missing = [
-        f"{contestant.slug} on {scenario.slug}"
-        for contestant in contestants
-        for scenario in scenarios
-        if (scenario.slug, contestant.slug) not in cells
-    ]
-    if missing:
-        more = len(missing) - MOST_NAMED
-        names = ", ".join(missing[:MOST_NAMED]) + (f" and {more} more" if more > 0 else "")
-        raise NothingToPlan(f"There is no picture yet of {names}. Generate them first.")
 
 
 def windows_of(entries: Iterable[Entry]) -> dict[str, str]:
@@ -128,31 +109,14 @@ def check_pictures(
     return tuple(checks), cells
 
 
-def require_checks(checks: Collection[Check], scenarios: list[Scenario], *, wanted: int) -> None:
-    """Raise NothingToPlan, with what to do, where there are too few attention checks.
-
-    Args:
-        checks: That there are.
-        scenarios: Of the study; an expert sees at most one check of each.
-        wanted: How many each expert is to see.
-    """
+def require_checks(checks: Collection[Check], *, wanted: int) -> None:
+    """Raise NothingToPlan where there are fewer attention checks than each expert is to see."""
     if len(checks) >= wanted:
         return
-    ready = {scenario_of(check.scenario) for check in checks}
-    with_reference = Scenario.objects.filter(
-        pk__in=[row.pk for row in scenarios], reference__isnull=False
-    )
-    possible = len(ready | set(with_reference.values_list("slug", flat=True)))
-    if possible >= wanted:
-        raise NothingToPlan(
-            f"Attention checks wanted for each expert: {wanted}; scenarios with pictures for "
-            f"one: {len(checks)}. Generate the contestant reference and press “Draw missing "
-            "attention checks” on the page of a new study, then open it; or ask for 0 %."
-        )
     raise NothingToPlan(
-        f"Attention checks wanted for each expert: {wanted}; each needs a scenario of its "
-        f"own with a reference, and the study has {possible}. Ask for "
-        "fewer, or choose more scenarios."
+        f"Attention checks wanted for each expert: {wanted}; scenarios with pictures for one: "
+        f"{len(checks)}. Generate the contestant reference and press “Draw missing attention "
+        "checks” on the page of a new study; or ask for fewer, or choose more scenarios."
     )
 
 

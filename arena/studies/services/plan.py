@@ -1,7 +1,7 @@
 """What somebody expects of a study, written down before its first vote, and what came of it."""
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any, Self
@@ -29,10 +29,6 @@ class Hypothesis:
 
     text: str
     above: tuple[str, str] | None = None
-
-    def as_document(self) -> dict[str, Any]:
-        """For JSON."""
-        return {"text": self.text, "above": None if self.above is None else list(self.above)}
 
 
 class HypothesisVerdict(StrEnum):
@@ -72,27 +68,24 @@ def read_hypotheses(lines: Sequence[str], contestants: Sequence[str]) -> tuple[H
             twice, or there are too many.
     """
     texts = [" ".join(line.split()) for line in lines if line.strip()]
-    if len(texts) > MOST or len(set(texts)) < len(texts):
-        raise NothingToPlan(f"At most {MOST} hypotheses, each once, are allowed.")
-    return tuple(_read_hypothesis(text, contestants) for text in texts)
-
-
-def _read_hypothesis(text: str, contestants: Sequence[str]) -> Hypothesis:
-    if len(text) > LONGEST:
-        raise NothingToPlan(f"A hypothesis has at most {LONGEST} signs: “{text[:40]}…”.")
-    match = _PAIR.fullmatch(text)
-    if match is None:
-        return Hypothesis(text=text)
-    better, other = match.groups()
-    for slug in (better, other):
-        if slug not in contestants:
-            allowed = ", ".join(sorted(contestants))
+    if (
+        len(texts) > MOST
+        or len(set(texts)) < len(texts)
+        or max(map(len, texts), default=0) > LONGEST
+    ):
+        raise NothingToPlan(
+            f"At most {MOST} hypotheses of at most {LONGEST} signs, each once, are allowed."
+        )
+    hypotheses = []
+    for text in texts:
+        match = _PAIR.fullmatch(text)
+        above = None if match is None else (match[1], match[2])
+        if above and (above[0] == above[1] or not set(above) <= set(contestants)):
             raise NothingToPlan(
-                f"“{text}”: {slug} is no contestant of this study; allowed are {allowed}."
+                f"“{text}”: it takes two of the contestants {', '.join(sorted(contestants))}."
             )
-    if better == other:
-        raise NothingToPlan(f"“{text}” names one contestant twice.")
-    return Hypothesis(text=text, above=(better, other))
+        hypotheses.append(Hypothesis(text=text, above=above))
+    return tuple(hypotheses)
 
 
 def hypotheses_of(study: Study) -> tuple[Hypothesis, ...]:
@@ -105,35 +98,35 @@ def hypotheses_of(study: Study) -> tuple[Hypothesis, ...]:
 
 def answer_hypotheses(snapshot: Snapshot) -> tuple[Answered, ...]:
     """Return what a rating says of each of the study's hypotheses."""
-    hypotheses = hypotheses_of(snapshot.study)
-    if not hypotheses:
-        return ()
     ratings = dict(snapshot.standings.values_list("slug", "rating"))
     board = snapshot.results.board
-    p_values = {frozenset((one.a, one.b)): one.p for one in board.p_values or ()}
+    p_values = {frozenset((pair.a, pair.b)): pair.p for pair in board.p_values or ()}
     answers = []
-    for hypothesis in hypotheses:
+    for hypothesis in hypotheses_of(snapshot.study):
         if hypothesis.above is None:
             answers.append(Answered(hypothesis=hypothesis))
             continue
-        better, other = hypothesis.above
-        high, low = ratings.get(better), ratings.get(other)
-        verdict = HypothesisVerdict.UNDECIDED
-        if board.above is None:
-            verdict = HypothesisVerdict.NOT_JUDGED
-        elif (better, other) in board.above:
-            verdict = HypothesisVerdict.HELD
-        elif (other, better) in board.above:
-            verdict = HypothesisVerdict.CONTRADICTED
+        high, low = (ratings.get(slug) for slug in hypothesis.above)
         answers.append(
             Answered(
                 hypothesis=hypothesis,
-                verdict=verdict,
+                verdict=_verdict(hypothesis.above, board.above),
                 difference=None if high is None or low is None else high - low,
-                p=p_values.get(frozenset((better, other))),
+                p=p_values.get(frozenset(hypothesis.above)),
             )
         )
     return tuple(answers)
+
+
+def _verdict(
+    pair: tuple[str, str], above: Collection[tuple[str, str]] | None
+) -> HypothesisVerdict:
+    if above is None:
+        return HypothesisVerdict.NOT_JUDGED
+    if pair in above:
+        return HypothesisVerdict.HELD
+    is_other_way = (pair[1], pair[0]) in above
+    return HypothesisVerdict.CONTRADICTED if is_other_way else HypothesisVerdict.UNDECIDED
 
 
 # --- What is asked for -------------------------------------------------------------------------
@@ -244,11 +237,11 @@ class StudyPlan:
     @classmethod
     def read(cls, given: Mapping[str, Any]) -> Self:
         """Make a plan of what a door has parsed: lists, and words for choices."""
-        found: dict[str, Any] = {
+        values: dict[str, Any] = {
             name: tuple(value) if isinstance(value, list) else value
             for name, value in given.items()
         }
-        return cls(**found | {"samples": SampleRule(given.get("samples", SampleRule.ONE))})
+        return cls(**values | {"samples": SampleRule(given.get("samples", SampleRule.ONE))})
 
     @property
     def shares(self) -> dict[str, Any]:

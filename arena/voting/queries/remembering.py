@@ -47,11 +47,6 @@ def plan_of(study: Study) -> Hashable:
     return (study.code, _newest(Matchup))
 
 
-def plan_types(study: Study) -> Hashable:
-    """Another value whenever a scenario of the study is given another type; one query."""
-    return tuple(study.scenarios.order_by("pk").values_list("pk", "type"))
-
-
 def _newest(rows: type[Vote] | type[Matchup]) -> Hashable:
     found = rows.objects.aggregate(number=Count("pk"), last=Max("pk"))
     return (found["number"], found["last"])

@@ -14,12 +14,15 @@ from arena.errors import NothingToPlan
 from arena.models import Matchup, Study
 from arena.pairing.plan import PlannedMatchup
 from arena.pairing.rules import place_of, scenario_of
-from arena.studies.services.pictures import MOST_NAMED, Cells, find_showable, refuse_missing
+from arena.studies.services.pictures import Cells, find_showable
 from arena.voting.queries.showings import VIEW_OF_OLD
 from augment.errors import Conflict
 from augment.models import Augmentation, Contestant, GenerationJob, Scenario, Simulation
 from augment.services.judging.simulations import Options
 from augment.services.scenarios.pictures import camera_of, view_of, window_of
+
+MOST_NAMED = 8
+"""So many missing pictures are named, the others counted."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,7 +43,7 @@ def find_frames(
     places: dict[str, Scenario],
     shown_before: FramesShown,
 ) -> dict[str, ScenarioFrame]:
-    """By scenario; both sides of every pair are drawn in one window, or nothing is planned.
+    """Return frames by place; both sides of every pair are drawn in one window.
 
     Args:
         planned: What is to be shown.
@@ -67,7 +70,7 @@ def find_frames(
 
 
 def frames_shown(study: Study, scenarios: Iterable[str]) -> FramesShown:
-    """Those of the first showing of each scenario; without the scene before, it is none.
+    """Return those of the first showing of each scenario; without the scene before, it is none.
 
     To read a scene takes longer than all else that planning for one more expert does.
     """
@@ -87,7 +90,7 @@ def frames_shown(study: Study, scenarios: Iterable[str]) -> FramesShown:
 
 
 def _frame(place: Scenario, window: str, cell: Augmentation) -> ScenarioFrame:
-    """As the pictures need it, whatever version drew them: today's window, or one shown before.
+    """Return what a picture needs, whatever version drew it: today's window, or one before.
 
     Raises:
         NothingToPlan: Nobody knows any more where metres lie in such a picture.
@@ -118,7 +121,7 @@ def _other_windows(scenarios: list[str]) -> NothingToPlan:
 
 
 def sides_of(one: PlannedMatchup, cells: Cells) -> tuple[Augmentation, Augmentation]:
-    """What is shown on the left and on the right."""
+    """Return what is shown on the left and on the right."""
     return cells[one.scenario, one.left], cells[one.scenario, one.right]
 
 
@@ -131,6 +134,10 @@ class SampleRule(StrEnum):
 
     ONE = "one"
     ALL = "all"
+
+
+Latest = dict[tuple[str, str], dict[int, Augmentation]]
+"""By scenario and contestant, the augmentation of each sample that finished last."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -156,7 +163,7 @@ def choose_pictures(
     rule: SampleRule = SampleRule.ONE,
     jobs: Sequence[GenerationJob] = (),
 ) -> StudyPictures:
-    """The augmentation that finished last of each scenario, contestant and sample that is shown.
+    """Return the augmentation that finished last of each scenario, contestant and sample shown.
 
     Args:
         contestants: Who takes part.
@@ -169,26 +176,22 @@ def choose_pictures(
         NothingToPlan: Pictures are missing; the text names them.
         Conflict: A contestant's pictures were made with different options.
     """
-    found = find_showable(scenarios).filter(contestant__in=contestants)
+    rows = find_showable(scenarios).filter(contestant__in=contestants)
     if jobs:
-        found = found.filter(job__in=jobs)
-    rows = found.select_related("scenario", "contestant", "job")
-    latest: defaultdict[tuple[str, str], dict[int, Augmentation]] = defaultdict(dict)
+        rows = rows.filter(job__in=jobs)
+    rows = rows.select_related("scenario", "contestant", "job")
+    latest: Latest = defaultdict(dict)
     for row in rows.order_by(F("finished_at").asc(nulls_first=True), "pk"):
         latest[row.scenario.slug, row.contestant.slug][row.sample] = row
-    if rule is SampleRule.ONE:
-        cells = {
-            key: samples[sorted(samples)[draw_sample(seed, key[0], len(samples))]]
-            for key, samples in latest.items()
-        }
-    else:
-        _refuse_missing_samples(latest, contestants)
-        cells = {
-            (place_of(scenario, sample), contestant): row
-            for (scenario, contestant), samples in latest.items()
-            for sample, row in samples.items()
-        }
-    refuse_missing(contestants, scenarios, latest)
+    _refuse_missing(latest, contestants, scenarios, rule)
+    cells: Cells = {}
+    for (scenario, contestant), samples in latest.items():
+        if rule is SampleRule.ONE:
+            drawn = sorted(samples)[draw_sample(seed, scenario, len(samples))]
+            cells[scenario, contestant] = samples[drawn]
+        else:
+            for sample, row in samples.items():
+                cells[place_of(scenario, sample), contestant] = row
     _refuse_mixed(cells)
     used = {row.job_id: row.job for row in cells.values()}
     return StudyPictures(
@@ -200,8 +203,40 @@ def choose_pictures(
     )
 
 
+def _refuse_missing(
+    latest: Latest, contestants: list[Contestant], scenarios: list[Scenario], rule: SampleRule
+) -> None:
+    """Raise NothingToPlan where a picture is missing, of a scenario or of one of its samples."""
+    missing = []
+    for scenario in sorted(row.slug for row in scenarios):
+        shown = {who.slug: latest.get((scenario, who.slug), {}) for who in contestants}
+        wanted = {sample for samples in shown.values() for sample in samples}
+        for slug, samples in shown.items():
+            if not samples:
+                missing.append(f"{slug} on {scenario}")
+            elif rule is SampleRule.ALL:
+                lacking = sorted(wanted - samples.keys())
+                missing += [f"{slug} on {scenario}, sample {sample}" for sample in lacking]
+    if missing:
+        more = len(missing) - MOST_NAMED
+        names = ", ".join(missing[:MOST_NAMED]) + (f" and {more} more" if more > 0 else "")
+        raise NothingToPlan(f"There is no picture yet of {names}. Generate them first.")
+
+
+def _refuse_mixed(cells: Cells) -> None:
+    options: defaultdict[str, set[str]] = defaultdict(set)
+    for (_, contestant), row in cells.items():
+        options[contestant].add(json.dumps(row.options, sort_keys=True))
+    jobs = ", ".join(sorted({row.job.name for row in cells.values()}))
+    if mixed := sorted(slug for slug, ways in options.items() if len(ways) > 1):
+        raise Conflict(
+            f"The pictures of {', '.join(mixed)} were made with different options, in the jobs "
+            f"{jobs}. Name the jobs whose augmentations the study is to show, or run them anew."
+        )
+
+
 def draw_sample(seed: int, scenario: str, samples: int) -> int:
-    """Which of so many samples of a scenario a study shows, from 0.
+    """Return which of so many samples of a scenario a study shows, from 0.
 
     The first eight bytes of the SHA-256 of "seed/scenario", modulo the number of samples: the same
     for every contestant that has as many.
@@ -210,26 +245,17 @@ def draw_sample(seed: int, scenario: str, samples: int) -> int:
     return int.from_bytes(digest[:8], "big") % samples
 
 
-Way = tuple[str, str, bool]
+Way = tuple[Any, ...]
 """Planner, offsets, whether recorded traffic reacts."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Replays:
-    """How the drives were driven that a study plays, and of which scenarios, by slug."""
+def replays_of(cells: Cells) -> dict[str, Any]:
+    """Return how the drives were driven that a study plays, and of which scenarios, by slug.
 
-    planner: str
-    offsets: str
-    is_reactive: bool
-    scenarios: list[str]
-
-
-def replays_of(cells: Cells) -> Replays:
-    """The scenarios of which every picture that takes part was driven in one and the same way.
-
-    A pair with a drive on one side alone would tell who was driven, and so who made it; so would
-    a missing one where only attention checks lack it. Of several ways the one with most scenarios
-    is taken, then the usual one.
+    Those are the scenarios of which every picture that takes part was driven in one and the same
+    way. A pair with a drive on one side alone would tell who was driven, and so who made it; so
+    would a missing one where only attention checks lack it. Of several ways the one with most
+    scenarios is taken, then the usual one.
 
     Raises:
         NothingToPlan: There is no such scenario; the text names what was not driven.
@@ -241,10 +267,8 @@ def replays_of(cells: Cells) -> Replays:
     drives = Simulation.objects.filter(
         augmentation__in={cell.pk for cell in cells.values()}, state=Simulation.State.DONE
     )
-    for planner, offsets, is_reactive, picture in drives.values_list(
-        "planner", "offsets", "is_reactive", "augmentation"
-    ):
-        driven[planner, offsets, is_reactive].add(picture)
+    for *way, picture in drives.values_list("planner", "offsets", "is_reactive", "augmentation"):
+        driven[tuple(way)].add(picture)
     whole = {
         way: sorted(slug for slug, shown in pictures.items() if shown <= known)
         for way, known in driven.items()
@@ -256,55 +280,8 @@ def replays_of(cells: Cells) -> Replays:
         named = ", ".join(f"{who} on {where}" for where, who in missing[:MOST_NAMED])
         raise NothingToPlan(
             "No scenario can be played: each needs a drive of every picture that takes part. "
-            f"Not driven: {named}; {len(missing)} in all. Simulate their jobs first, or open the "
-            "study without drives."
+            f"Not driven: {named}; {len(missing)} in all. Simulate their jobs first."
         )
-    planner, offsets, is_reactive = best
-    return Replays(
-        planner=planner, offsets=offsets, is_reactive=is_reactive, scenarios=whole[best]
-    )
-
-
-# --- Private -----------------------------------------------------------------------------------
-
-
-def _refuse_missing_samples(
-    latest: dict[tuple[str, str], dict[int, Augmentation]], contestants: list[Contestant]
-) -> None:
-    """Do nothing where everybody has a picture of every sample of a scenario."""
-    wanted: defaultdict[str, set[int]] = defaultdict(set)
-    for (scenario, _), samples in latest.items():
-        wanted[scenario] |= samples.keys()
-    missing = [
-        f"{who.slug} on {scenario}, sample {sample}"
-        for who in contestants
-        for scenario, samples in sorted(wanted.items())
-        if (scenario, who.slug) in latest
-        for sample in sorted(samples - latest[scenario, who.slug].keys())
-    ]
-    if missing:
-        raise NothingToPlan(
-            "All samples are to be shown, and there is no picture of "
-            f"{', '.join(missing[:8])}. Generate them, or show one sample of each scenario."
-        )
-
-
-def _refuse_mixed(cells: Cells) -> None:
-    by_contestant: defaultdict[str, list[Augmentation]] = defaultdict(list)
-    for row in cells.values():
-        by_contestant[row.contestant.slug].append(row)
-    for slug, rows in sorted(by_contestant.items()):
-        if len({json.dumps(row.options, sort_keys=True) for row in rows}) == 1:
-            continue
-        names = sorted({name for row in rows for name in row.options or {}})
-        differing = [
-            name
-            for name in names
-            if len({json.dumps((row.options or {}).get(name)) for row in rows}) > 1
-        ]
-        raise Conflict(
-            f"The pictures of {slug} were made with different options "
-            f"({', '.join(differing) or 'unknown'}), in the jobs "
-            f"{', '.join(sorted({row.job.name for row in rows}))}. Name the jobs whose "
-            "augmentations the study is to show, or run it anew."
-        )
+    return dict(zip(("planner", "offsets", "is_reactive"), best, strict=True)) | {
+        "scenarios": whole[best]
+    }

@@ -1,23 +1,15 @@
 """Put an instruction to a stored scene."""
 
-from argparse import ArgumentParser
 from pathlib import Path
 from typing import Any
 
 from django.core.management.base import CommandError
 
 from augment.errors import InvalidDocument
+from augment.formats.documents import read_json
 from augment.models.scenes import GOALS
 from augment.scene.entities import ScenarioType, TrafficDensity
-from augment.services.scenarios.bulk import (
-    NEEDED,
-    OPTIONAL,
-    PARTS,
-    WHAT,
-    add_rows,
-    read_part,
-    read_rows,
-)
+from augment.services.scenarios.bulk import DOCUMENTS, NEEDED, OPTIONAL, WHAT, add_rows
 from augment.services.scenarios.scenes import add_scenario
 from augment.services.terminal import TerminalCommand
 
@@ -27,41 +19,33 @@ class Command(TerminalCommand):
 
     help = "Add a scenario: a scene, its type, an instruction and, if given, a reference."
 
-    def add_arguments(self, parser: ArgumentParser) -> None:
-        """Say what the command takes."""
-        types = ", ".join(member.value for member in ScenarioType)
-        parser.add_argument(
-            "--file",
-            type=Path,
-            help="many at once, all or none: .csv with a line of names, or .yaml with a list; "
+    arguments = {
+        "--file": {
+            "type": Path,
+            "help": "many at once, all or none: .csv with a line of names, or .yaml with a list; "
             f"{', '.join(NEEDED)}, and {', '.join(OPTIONAL)} where they are known",
-        )
-        parser.add_argument("--scene", help="the slug of a stored scene")
-        parser.add_argument("--type", help=f"one of {types}, or a slug of your own")
-        parser.add_argument("--instruction", help="what is to be changed")
-        parser.add_argument(
-            "--slug", help="the scenario's name; made up from the others if absent"
-        )
-        parser.add_argument(
-            "--reference", type=Path, metavar="FILE", help="a modification in the own JSON"
-        )
-        parser.add_argument(
-            "--intent",
-            type=Path,
-            metavar="FILE",
-            help="what the instruction asks for, see docs/catalogue.md",
-        )
-        parser.add_argument(
-            "--keep-traffic", action="store_true", help="keep the recorded traffic in the scene"
-        )
-        parser.add_argument(
-            "--density",
-            choices=[one.value for one in TrafficDensity],
-            help="spawn traffic in place of the recorded one",
-        )
-        parser.add_argument(
-            "--goal", choices=[one.value for one in GOALS], help="where the ego's way turns"
-        )
+        },
+        "--scene": {"help": "the slug of a stored scene"},
+        "--type": {"help": f"one of {', '.join(ScenarioType)}, or a slug of your own"},
+        "--instruction": {"help": "what is to be changed"},
+        "--slug": {"help": "the scenario's name; made up from the others if absent"},
+        "--reference": {
+            **{"type": Path, "metavar": "FILE", "help": "a modification in the own JSON"}
+        },
+        "--intent": {
+            **{"type": Path, "metavar": "FILE"},
+            "help": "what the instruction asks for, see docs/catalogue.md",
+        },
+        "--keep-traffic": {
+            "action": "store_true",
+            "help": "keep the recorded traffic in the scene",
+        },
+        "--density": {
+            "choices": list(TrafficDensity),
+            "help": "spawn traffic in place of the recorded one",
+        },
+        "--goal": {"choices": list(GOALS), "help": "where the ego's way turns"},
+    }
 
     def handle(self, *args: Any, **options: Any) -> None:
         """Add, and say under which name."""
@@ -74,9 +58,11 @@ class Command(TerminalCommand):
         names = ("scene", "type", "instruction", "slug", "keep_traffic")
         given = {name: options[name] for name in names}
         given |= {name: options[name] or "" for name in ("density", "goal")}
-        for name, what in PARTS.items():
-            file = options[name]
-            given[name] = None if file is None else read_part(file, what)
+        for name, what in DOCUMENTS.items():
+            if (file := options[name]) is not None:
+                given[name] = read_json(file, what=what)
+                if given[name] is None:
+                    raise InvalidDocument(what, [(file.name, "holds null")])
         scenario = add_scenario(**given)
         with_reference = "with" if scenario.reference is not None else "without"
         with_intent = "" if scenario.intent is None else ", with its intent"
@@ -88,10 +74,15 @@ class Command(TerminalCommand):
         given = [f"--{name.replace('_', '-')}" for name in (*NEEDED, *OPTIONAL) if options[name]]
         if given:
             raise CommandError(f"--file says all of it; it goes without {', '.join(given)}.")
-        report = add_rows(read_rows(options["file"]), folder=options["file"].parent)
+        file: Path = options["file"]
+        try:
+            content = file.read_bytes()
+        except OSError as fault:
+            raise CommandError(f"{file} can't be read: {fault.strerror}.") from None
+        report = add_rows(file.name, content)
         problems = [
             (f"row {row.number}.{path}" if path else f"row {row.number}", text)
-            for row in report.faults
+            for row in report.rows
             for path, text in row.problems
         ]
         if problems:

@@ -1,11 +1,10 @@
 """Hold the catalogue's references against their intents, the checks and the camera."""
 
-from argparse import ArgumentParser
 from typing import Any
 
 from django.core.management.base import CommandError
 
-from augment.management.arguments import add_folder_argument, add_set_argument, sets_of
+from augment.management.arguments import FOLDER, sets_argument, sets_of
 from augment.services.scenarios.catalogue_check import check_catalogue
 from augment.services.terminal import TerminalCommand
 
@@ -18,10 +17,7 @@ class Command(TerminalCommand):
         "of its instruction and fits into its picture; exit status 1 with reasons otherwise."
     )
 
-    def add_arguments(self, parser: ArgumentParser) -> None:
-        """Where the catalogue is."""
-        add_folder_argument(parser)
-        add_set_argument(parser, default="all")
+    arguments = {**FOLDER, **sets_argument("all")}
 
     def handle(self, *args: Any, **options: Any) -> None:
         """Print a line for each scenario, then the reasons."""

@@ -2,8 +2,6 @@
 
 from typing import Any
 
-from django.core.management.base import CommandParser
-
 from augment.services.running.choosing import resolve_scenarios
 from augment.services.scenarios.pictures import draw_checks
 from augment.services.terminal import TerminalCommand
@@ -18,9 +16,7 @@ class Command(TerminalCommand):
         "hide attention checks among their pairs."
     )
 
-    def add_arguments(self, parser: CommandParser) -> None:
-        """Which scenarios."""
-        parser.add_argument("scenarios", nargs="+", metavar="SLUG", help="or: all, or: catalogue")
+    arguments = {"scenarios": {"nargs": "+", "metavar": "SLUG", "help": "or: all, or: catalogue"}}
 
     def handle(self, *args: Any, **options: Any) -> None:
         """Draw what is missing and say how many there are."""

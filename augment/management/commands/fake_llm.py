@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
-from django.core.management.base import CommandError, CommandParser
+from django.core.management.base import CommandError
 
 from augment.fake_llm.server import MODELS, running
 from augment.services.scenarios.prompts import StoredIntents
@@ -25,11 +25,11 @@ class Command(TerminalCommand):
     )
     requires_system_checks = ()
 
-    def add_arguments(self, parser: CommandParser) -> None:
-        """Where to listen, and how slowly to answer."""
-        parser.add_argument("--port", type=int, default=8099, help="0 takes a free one")
-        parser.add_argument("--host", default="127.0.0.1")
-        parser.add_argument("--latency", type=float, default=0.0, help="seconds before an answer")
+    arguments = {
+        "--port": {"type": int, "default": 8099, "help": "0 takes a free one"},
+        "--host": {"default": "127.0.0.1"},
+        "--latency": {"type": float, "default": 0.0, "help": "seconds before an answer"},
+    }
 
     def handle(self, *args: Any, **options: Any) -> None:
         """Serve until SIGINT or SIGTERM."""

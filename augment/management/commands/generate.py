@@ -16,7 +16,7 @@ from augment.services.running.budget import limit_of
 from augment.services.running.choosing import resolve_contestants, resolve_scenarios
 from augment.services.running.estimates import ContestantEstimate, JobEstimate, estimate
 from augment.services.running.jobs import JobRequest
-from augment.services.running.progress import contestant_lines, count_rows, failure_groups
+from augment.services.running.progress import count_rows, failure_groups
 from augment.services.running.workers import workforce
 from augment.services.terminal import TerminalCommand
 from augment.tasks import check_broker, enqueue_job
@@ -108,12 +108,10 @@ class Command(TerminalCommand):
         self.stdout.write("Over.")
 
     def report(self, job: GenerationJob) -> None:
-        """Print the outcomes by contestant and the failures; exit code 1 if any failed."""
-        for line in contestant_lines(job):
-            numbers = ", ".join(
-                f"{line[state]} {state}" for state in (*Augmentation.SHOWABLE, "failed")
-            )
-            self.stdout.write(f"{line['slug']}: {numbers}")
+        """Print the outcomes and the causes of failure; exit code 1 if any failed."""
+        counts = count_rows(job).by_state
+        states = (*Augmentation.SHOWABLE, Augmentation.State.FAILED)
+        self.stdout.write(", ".join(f"{counts[state]} {state}" for state in states))
         groups = failure_groups(job)
         failed = [group for group in groups if group.state == Augmentation.State.FAILED]
         for group in failed:

@@ -1,6 +1,5 @@
 """Make scenarios of interPlan's special scenarios, where nuPlan's logs are at hand."""
 
-from argparse import ArgumentParser
 from collections import Counter
 from pathlib import Path
 from typing import Any
@@ -21,17 +20,13 @@ class Command(TerminalCommand):
         "is there already stays, so it can be repeated."
     )
 
-    def add_arguments(self, parser: ArgumentParser) -> None:
-        """Say what the command takes."""
-        parser.add_argument(
-            "folder", type=Path, help="holds interPlan's modification file (YAML) somewhere"
-        )
-        parser.add_argument(
-            "--nuplan",
-            type=Path,
-            metavar="FOLDER",
-            help="holds nuPlan's .db files and maps/ somewhere; default: the same folder",
-        )
+    arguments = {
+        "folder": {"type": Path, "help": "holds interPlan's modification file (YAML) somewhere"},
+        "--nuplan": {
+            **{"type": Path, "metavar": "FOLDER"},
+            "help": "holds nuPlan's .db files and maps/ somewhere; default: the same folder",
+        },
+    }
 
     def handle(self, *args: Any, **options: Any) -> None:
         """Import one by one, and say each."""

@@ -1,10 +1,9 @@
 """Bring a recorded or written scene into the database."""
 
-from argparse import ArgumentParser
-from pathlib import Path
 from typing import Any
 
 from augment.formats.readers import READERS
+from augment.management.arguments import SOURCE
 from augment.services.scenarios.scene_imports import import_scene, notes_of
 from augment.services.terminal import TerminalCommand
 
@@ -16,28 +15,21 @@ class Command(TerminalCommand):
         f"{reader.name}, {reader.title}" for reader in READERS.values()
     )
 
-    def add_arguments(self, parser: ArgumentParser) -> None:
-        """Say what the command takes."""
-        parser.add_argument(
-            "source",
-            nargs="?",
-            metavar="FORMAT",
-            help=f"what PATH holds: {' or '.join(READERS)}; recognised when not given",
-        )
-        parser.add_argument("path", type=Path, help="the file or folder")
-        parser.add_argument(
-            "--frame",
-            type=int,
-            help="the step that becomes t0, from 0 (default: what the format means, else 0)",
-        )
-        parser.add_argument(
-            "--item",
-            help="which part of a file with several: the number of a record, a planning problem, "
-            "a lidar_pc token (default: the first)",
-        )
-        parser.add_argument(
-            "--slug", required=True, help="the scene's name: lower-case letters, digits, hyphens"
-        )
+    arguments = {
+        **SOURCE,
+        "--frame": {
+            "type": int,
+            "help": "the step that becomes t0, from 0 (default: what the format means, else 0)",
+        },
+        "--item": {
+            "help": "which part of a file with several: the number of a record, a planning "
+            "problem, a lidar_pc token (default: the first)"
+        },
+        "--slug": {
+            "required": True,
+            "help": "the scene's name: lower-case letters, digits, hyphens",
+        },
+    }
 
     def handle(self, *args: Any, **options: Any) -> None:
         """Import, and say what came in and what the source left open."""

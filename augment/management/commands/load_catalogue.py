@@ -1,9 +1,8 @@
 """Bring the catalogue's scenes and scenarios into the database."""
 
-from argparse import ArgumentParser
 from typing import Any
 
-from augment.management.arguments import add_folder_argument, add_set_argument, sets_of
+from augment.management.arguments import FOLDER, sets_argument, sets_of
 from augment.services.scenarios.catalogue import CatalogueStep, load_catalogue
 from augment.services.terminal import TerminalCommand
 
@@ -16,15 +15,14 @@ class Command(TerminalCommand):
         "Running it again changes nothing."
     )
 
-    def add_arguments(self, parser: ArgumentParser) -> None:
-        """Where the catalogue is."""
-        add_folder_argument(parser)
-        add_set_argument(parser, default="paper")
-        parser.add_argument(
-            "--paraphrases",
-            action="store_true",
-            help="also every paraphrase, as a scenario beside the one that it says anew",
-        )
+    arguments = {
+        **FOLDER,
+        **sets_argument("paper"),
+        "--paraphrases": {
+            "action": "store_true",
+            "help": "also every paraphrase, as a scenario beside the one that it says anew",
+        },
+    }
 
     def handle(self, *args: Any, **options: Any) -> None:
         """Load it and say what that changed."""

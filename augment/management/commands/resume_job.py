@@ -1,8 +1,8 @@
 """Let a job that is paused or stopped at its cap go on."""
 
-from argparse import ArgumentParser
 from typing import Any
 
+from django.core.management.base import CommandParser
 from django.db import transaction
 
 from augment.services.inputs import add_options, inputs_of, read_request
@@ -22,7 +22,7 @@ class Command(TerminalCommand):
         "where they are given. What was answered already is not asked again."
     )
 
-    def add_arguments(self, parser: ArgumentParser) -> None:
+    def add_arguments(self, parser: CommandParser) -> None:
         """The job and its new caps."""
         parser.add_argument("job", help="its name or its code")
         add_options(parser, inputs_of(Caps))

@@ -5,9 +5,10 @@ goes to that host. So only variables that are meant for keys may be named: `*_AP
 ARENA_KEY_VARIABLES lists.
 """
 
+import json
 import os
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 from urllib.parse import urlsplit
@@ -15,12 +16,14 @@ from urllib.parse import urlsplit
 from django.conf import settings
 from django.contrib.auth.models import User
 from django.core.exceptions import ValidationError
+from django.core.serializers.json import DjangoJSONEncoder
 from django.db import transaction
+from django.forms import model_to_dict
 
 from augment.errors import Conflict, InvalidDocument, KeyMissing, KeyNotAllowed, UnknownName
 from augment.llm.addresses import check_base_url
 from augment.models import Endpoint, EndpointModel
-from augment.services.endpoints.known_models import facts_of, model_at
+from augment.services.endpoints.known_models import model_at
 from augment.services.events import log_change
 from augment.services.inputs import InputKind, check_bounds, input_field
 from augment.services.scenarios.scenes import check_slug
@@ -87,8 +90,9 @@ def add_endpoint(request: EndpointRequest, actor: User | None = None) -> Endpoin
     check_slug(request.label, what="endpoint", key="label")
     if Endpoint.objects.filter(label=request.label).exists():
         raise Conflict(f"There is an endpoint “{request.label}” already; choose another label.")
-    row = Endpoint.objects.create(**check_facts(request))
-    log_change(row, "add", actor, after=facts_of(row))
+    given = check_facts(request)
+    row = Endpoint.objects.create(**given)
+    log_change(row, "add", actor, after=_facts(row, given))
     return row
 
 
@@ -132,11 +136,7 @@ def change_endpoint(
             f"The key in {facts.key_variable} of endpoint {row.label!r} went to {move[0]} and "
             f"would go to {move[1]}. Say that it may, if that is meant."
         )
-    before = facts_of(row)
-    for name, value in wanted.items():
-        setattr(row, name, value)
-    row.save(update_fields=list(wanted))
-    _log_change(row, before, actor)
+    _change(row, wanted, "endpoint", actor)
     if move is not None:
         after = {"server": move[1], "key_variable": row.key_variable}
         log_change(row, "move key", actor, before={"server": move[0]}, after=after)
@@ -174,11 +174,10 @@ def add_model(endpoint: Endpoint, *, model: str, actor: User | None = None) -> E
         Conflict: The endpoint has it already.
     """
     model = one_line("model", model, what="endpoint")
-    before = facts_of(endpoint)
     if endpoint.models.filter(model=model).exists():
         raise Conflict(f"{endpoint.label} has the model {model} already.")
     row = model_at(endpoint=endpoint, model=model)
-    _log_change(endpoint, before, actor)
+    log_change(row, "add", actor, after=_facts(row, ("model", *MODEL_FACTS)))
     return row
 
 
@@ -198,16 +197,7 @@ def change_model(
     """
     rows = EndpointModel.objects.select_for_update(of=("self",)).select_related("endpoint")
     row = rows.get(pk=row.pk)
-    before = facts_of(row.endpoint)
-    for name in MODEL_FACTS:
-        setattr(row, name, facts[name])
-    try:
-        row.full_clean(validate_unique=False, validate_constraints=False)
-    except ValidationError as error:
-        texts = [(name, str(text)) for name, said in error.message_dict.items() for text in said]
-        raise InvalidDocument("model", texts) from None
-    row.save(update_fields=list(MODEL_FACTS))
-    _log_change(row.endpoint, before, actor)
+    _change(row, {name: facts[name] for name in MODEL_FACTS}, "model", actor)
     return row
 
 
@@ -311,7 +301,29 @@ def _server(base_url: str) -> str:
     return f"{scheme}://{(parts.hostname or '').rstrip('.')}:{port}"
 
 
-def _log_change(endpoint: Endpoint, before: dict[str, Any], actor: User | None) -> None:
-    after = facts_of(endpoint)
-    if after != before:
-        log_change(endpoint, "change", actor, before=before, after=after)
+def _change(
+    row: Endpoint | EndpointModel, facts: Mapping[str, Any], what: str, actor: User | None
+) -> None:
+    """Write facts into a row, and a line into the log where they are new.
+
+    Raises:
+        InvalidDocument: A fact can't be.
+    """
+    before = _facts(row, facts)
+    for name, value in facts.items():
+        setattr(row, name, value)
+    try:
+        row.full_clean(validate_unique=False, validate_constraints=False)
+    except ValidationError as error:
+        texts = [(name, str(text)) for name, said in error.message_dict.items() for text in said]
+        raise InvalidDocument(what, texts) from None
+    row.save(update_fields=list(facts))
+    if (after := _facts(row, facts)) != before:
+        log_change(row, "change", actor, before=before, after=after)
+
+
+def _facts(row: Endpoint | EndpointModel, names: Iterable[str]) -> dict[str, Any]:
+    """Return columns for the log; dates and decimals as texts, for a number would lose digits."""
+    values = model_to_dict(row, list(names))
+    document: dict[str, Any] = json.loads(json.dumps(values, cls=DjangoJSONEncoder))
+    return document

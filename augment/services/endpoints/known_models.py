@@ -4,16 +4,12 @@ Unknown stays unknown, never zero. Listed prices come with the package genai-pri
 the network: they are as new as the installed version.
 """
 
-import json
 import re
-from collections.abc import Collection
 from dataclasses import dataclass
 from datetime import datetime
 from decimal import Decimal
 from importlib.metadata import version
-from typing import Any
 
-from django.core.serializers.json import DjangoJSONEncoder
 from django.db import transaction
 from django.db.models import BigIntegerField, Case, Count, F, Q, Sum, When
 from django.db.models.functions import Coalesce
@@ -26,25 +22,6 @@ from augment.services.events import log_change
 
 AUGMENTATION = "attempt__augmentation"
 CONTESTANT = "attempt__augmentation__contestant"
-
-_LIMITS = (
-    *("label", "base_url", "key_variable", "is_simulated"),
-    *("max_concurrency", "requests_per_minute"),
-)
-_KNOWN = (
-    *("model", "model_class", "native_tools", "vision", "json_schema", "temperature"),
-    *("refused_parameters", "reasoning_effort", "context_tokens", "max_output_tokens"),
-    *("price_in_usd", "price_out_usd", "price_as_of", "price_source"),
-)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ListedPrice:
-    """USD per million tokens of the prompt and of the answer, and where that is written."""
-
-    in_usd: Decimal
-    out_usd: Decimal
-    source: str
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -75,29 +52,20 @@ class Spending:
 def model_at(*, endpoint: Endpoint, model: str) -> EndpointModel:
     """Return what is known of the model at the endpoint; a new row knows its listed price."""
     row, made = EndpointModel.objects.get_or_create(endpoint=endpoint, model=model)
-    now = timezone.now()
-    listed = None
     if made and not endpoint.is_simulated:
+        now = timezone.now()
         listed = listed_price(base_url=endpoint.base_url, model=model, now=now)
-    if listed is not None:
-        row.price_in_usd, row.price_out_usd = listed.in_usd, listed.out_usd
-        row.price_as_of, row.price_source = now.date(), listed.source
-        row.save()
+        if listed is not None:
+            row.price_in_usd, row.price_out_usd, row.price_source = listed
+            row.price_as_of = now.date()
+            row.save()
     return row
 
 
 def profile_of(*, endpoint: Endpoint, model: str) -> ModelProfile:
     """Return what the model takes, as far as its row knows."""
-    return profiles_at({(endpoint.pk, model)})[endpoint.pk, model]
-
-
-def profiles_at(asked: Collection[tuple[int, str]]) -> dict[tuple[int, str], ModelProfile]:
-    """Return what models take by the endpoint's primary key and the model; one query at most."""
-    rows = EndpointModel.objects.filter(
-        endpoint__in={pk for pk, _ in asked}, model__in={model for _, model in asked}
-    )
-    known = {(row.endpoint_id, row.model): _profile(row) for row in rows}
-    return {key: known.get(key, ModelProfile()) for key in asked}
+    row = EndpointModel.objects.filter(endpoint=endpoint, model=model).first()
+    return ModelProfile() if row is None else _profile(row)
 
 
 @transaction.atomic
@@ -118,15 +86,6 @@ def remember_refusal(*, endpoint: Endpoint, model: str, parameter: str) -> Model
     return after
 
 
-def facts_of(endpoint: Endpoint) -> dict[str, Any]:
-    """Return the endpoint and its models as they are stored now, ready for the log."""
-    facts: dict[str, Any] = dict(Endpoint.objects.values(*_LIMITS).get(pk=endpoint.pk))
-    facts["models"] = list(endpoint.models.order_by("model").values(*_KNOWN))
-    # Dates and decimals become texts; a decimal as a number would lose digits.
-    document: dict[str, Any] = json.loads(json.dumps(facts, cls=DjangoJSONEncoder))
-    return document
-
-
 def price_of(endpoint: Endpoint, model: str) -> Price | None:
     """Return the price of a model at an endpoint, None where it is unknown."""
     row = EndpointModel.objects.filter(endpoint=endpoint, model=model).first()
@@ -135,12 +94,13 @@ def price_of(endpoint: Endpoint, model: str) -> Price | None:
     return Price(prompt_usd=row.price_in_usd, completion_usd=row.price_out_usd)
 
 
-def listed_price(*, base_url: str, model: str, now: datetime) -> ListedPrice | None:
-    """Return what the model costs at that address at that time, None where the list is silent.
+def listed_price(
+    *, base_url: str, model: str, now: datetime
+) -> tuple[Decimal, Decimal, str] | None:
+    """Return USD per million tokens in and out and where that is written; None where it is not.
 
     The vendor is told by the address alone: a model of the same name on somebody else's server
-    has another price. Where long prompts cost more, the price is that of short ones and the
-    source says up to how many tokens.
+    has another price. Where long prompts cost more, the price is that of short ones.
     """
     import genai_prices
 
@@ -154,9 +114,10 @@ def listed_price(*, base_url: str, model: str, now: datetime) -> ListedPrice | N
     except (LookupError, ValueError):
         return None
     prices = vars(price.model_price)
-    in_usd, out_usd = prices.get("input_mtok"), prices.get("output_mtok")
-    tiers = getattr(in_usd, "tiers", None)
-    in_usd, out_usd = getattr(in_usd, "base", in_usd), getattr(out_usd, "base", out_usd)
+    in_usd, out_usd = (
+        getattr(prices.get(name), "base", prices.get(name))
+        for name in ("input_mtok", "output_mtok")
+    )
     if not (isinstance(in_usd, Decimal) and isinstance(out_usd, Decimal)):
         return None
     # The vendor's pattern has to end with the host: api.vendor.com.others.net is not theirs.
@@ -164,9 +125,7 @@ def listed_price(*, base_url: str, model: str, now: datetime) -> ListedPrice | N
     if match is None or base_url[match.end() :][:1] not in {"", "/", ":"}:
         return None
     source = f"genai-prices {version('genai-prices')}: {price.provider.id}/{price.model.id}"
-    if tiers:
-        source += f", prompts up to {tiers[0].start} tokens"
-    return ListedPrice(in_usd=in_usd, out_usd=out_usd, source=source[:200])
+    return in_usd, out_usd, source[:200]
 
 
 def sum_spending(which: Q, *, by: str) -> dict[int, Spending]:

@@ -6,7 +6,7 @@ a mixture. So what was known of its models at its first run is kept with it, rol
 is the whole set of its options: what was chosen when it was added, and the defaults of then.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -18,7 +18,7 @@ from augment.llm.client import ModelProfile
 from augment.llm.messages import LengthName
 from augment.models import Augmentation, Contestant, Endpoint, EndpointModel, ModelCall
 from augment.prompts.fill import prompt_version
-from augment.services.endpoints.known_models import price_of, profile_of, profiles_at
+from augment.services.endpoints.known_models import price_of, profile_of
 from augment.services.events import log_change
 from augment.variants.options import (
     NAMES,
@@ -174,43 +174,25 @@ def respondents_of(contestant: Contestant) -> dict[ModelRole, Respondent]:
         UnknownName: Its variant is none of ours any more.
         Conflict: An endpoint that it names is gone.
     """
-    return respondents_of_each([contestant])[contestant.pk]
-
-
-def respondents_of_each(
-    contestants: Sequence[Contestant],
-) -> dict[int, dict[ModelRole, Respondent]]:
-    """Return the same of several, by primary key; one query where their endpoints are read."""
-    labels = {role["endpoint"] for row in contestants for role in row.roles.values()}
-    rows = Endpoint.objects.filter(label__in=labels) if labels else ()
-    endpoints = {row.label: row for row in rows}
-    playing: dict[int, dict[ModelRole, Respondent]] = {}
-    for row in contestants:
-        roles: dict[ModelRole, Respondent] = {}
-        if row.endpoint is not None:
-            own = Respondent(endpoint=row.endpoint, model=row.model)
-            roles = dict.fromkeys(find_recipe(row.variant).roles, own)
-            for name, chosen in row.roles.items():
-                endpoint = endpoints.get(chosen["endpoint"])
-                if endpoint is None:
-                    raise Conflict(
-                        f"The {name} of {row.slug} sits at endpoint '{chosen['endpoint']}', "
-                        "which does not exist any more."
-                    )
-                roles[ModelRole(name)] = Respondent(endpoint=endpoint, model=chosen["model"])
-        playing[row.pk] = roles
-    return playing
+    if contestant.endpoint is None:
+        return {}
+    own = Respondent(endpoint=contestant.endpoint, model=contestant.model)
+    roles = dict.fromkeys(find_recipe(contestant.variant).roles, own)
+    for name, chosen in contestant.roles.items():
+        endpoint = Endpoint.objects.filter(label=chosen["endpoint"]).first()
+        if endpoint is None:
+            raise Conflict(
+                f"The {name} of {contestant.slug} sits at endpoint '{chosen['endpoint']}', "
+                "which does not exist any more."
+            )
+        roles[ModelRole(name)] = Respondent(endpoint=endpoint, model=chosen["model"])
+    return roles
 
 
 def list_unpriced_models(contestants: Iterable[Contestant]) -> list[str]:
     """Return the models without a price that contestants ask, as "model at endpoint"."""
-    unpriced = {
-        str(respondent)
-        for row in contestants
-        for respondent in respondents_of(row).values()
-        if price_of(respondent.endpoint, respondent.model) is None
-    }
-    return sorted(unpriced)
+    asked = {one for row in contestants for one in respondents_of(row).values()}
+    return sorted(str(one) for one in asked if price_of(one.endpoint, one.model) is None)
 
 
 def options_of(contestant: Contestant) -> ContestantOptions:
@@ -239,31 +221,16 @@ def left_out(contestant: Contestant) -> dict[str, list[str]]:
     Raises:
         Conflict: An endpoint that it names is gone.
     """
-    return left_out_of_each([contestant])[contestant.pk]
-
-
-def left_out_of_each(contestants: Sequence[Contestant]) -> dict[int, dict[str, list[str]]]:
-    """Return the same of several, by primary key, in two queries at most."""
     # Never of what is completed at the first run: no default of ours is one of these.
-    chosen = {
-        row.pk: _REFUSABLE & (row.frozen_options or row.options).keys() for row in contestants
+    chosen = _REFUSABLE & (contestant.frozen_options or contestant.options).keys()
+    if not chosen:
+        return {}
+    sends = contestant.sends or {
+        role.value: _document_of(profile_of(endpoint=one.endpoint, model=one.model))
+        for role, one in respondents_of(contestant).items()
     }
-    not_run = [row for row in contestants if chosen[row.pk] and not row.sends]
-    playing = respondents_of_each(not_run)
-    asked = {(one.endpoint.pk, one.model) for roles in playing.values() for one in roles.values()}
-    profiles = profiles_at(asked)
-    left: dict[int, dict[str, list[str]]] = {}
-    for row in contestants:
-        sends = row.sends or {
-            role.value: _document_of(profiles[one.endpoint.pk, one.model])
-            for role, one in playing.get(row.pk, {}).items()
-        }
-        refused = {
-            role: sorted(chosen[row.pk] & set(sent["refused"]))
-            for role, sent in sorted(sends.items())
-        }
-        left[row.pk] = {role: names for role, names in refused.items() if names}
-    return left
+    refused = {role: sorted(chosen & set(sent["refused"])) for role, sent in sends.items()}
+    return {role: names for role, names in sorted(refused.items()) if names}
 
 
 def loosen_unanswered(contestants: Iterable[Contestant]) -> None:

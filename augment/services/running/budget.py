@@ -13,12 +13,11 @@ from decimal import Decimal
 from enum import StrEnum
 from typing import Any
 
-from django.contrib.auth.models import User
 from django.db import transaction
-from django.db.models import Count, F, Q
+from django.db.models import F, Q
 
 from augment.errors import Conflict, ModelFault, NotSent
-from augment.llm.costs import Price, WorstCase, nano_usd_of, usd_of
+from augment.llm.costs import Price, WorstCase, nano_usd_of
 from augment.llm.messages import Reply
 from augment.models import Contestant, GenerationJob, ModelCall
 from augment.services.clock import Moment
@@ -36,7 +35,6 @@ _COUNTED = (
     *("reserved_tokens", "reserved_nano_usd"),
     *("spent_tokens", "cost_nano_usd", "settled_at", "sent_at"),
 )
-_PAID = Q(served_from=None, sent_at__isnull=False, settled_at__isnull=False)
 
 
 class Room(StrEnum):
@@ -106,30 +104,6 @@ class Caps:
 
 
 NO_CAPS = Caps()
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class JobCosts:
-    """The calls of a job by what is known of their cost: an unknown cost is not zero.
-
-    Attributes:
-        paid: Calls that were sent and ended; those from the store are not among them.
-        priced: Paid calls that used something whose price is known.
-        unpriced: Paid calls whose price is unknown.
-        estimated: Paid calls that count with their worst case, because usage is unknown.
-        cached: Calls that were answered from the store.
-    """
-
-    paid: int
-    priced: int
-    unpriced: int
-    estimated: int
-    cached: int
-
-    @property
-    def is_money_unknown(self) -> bool:
-        """Whether nothing can be said about money."""
-        return self.unpriced > 0 == self.priced
 
 
 @transaction.atomic(savepoint=False)
@@ -249,14 +223,12 @@ def used_by_fault(fault: ModelFault, *, worst: WorstCase, price: Price | None) -
 
 def limit_of(job: GenerationJob) -> str:
     """Return the caps of a job as a person reads them."""
-    parts = []
-    if job.cap_nano_usd is not None:
-        parts.append(f"{usd_of(job.cap_nano_usd).normalize():f} USD")
-    if job.cap_calls is not None:
-        parts.append(f"{job.cap_calls} calls")
-    if job.cap_tokens is not None:
-        parts.append(f"{job.cap_tokens} tokens")
-    return ", ".join(parts) or "nothing"
+    caps = {
+        "USD": None if job.cap_usd is None else f"{job.cap_usd.normalize():f}",
+        "calls": job.cap_calls,
+        "tokens": job.cap_tokens,
+    }
+    return ", ".join(f"{cap} {unit}" for unit, cap in caps.items() if cap is not None) or "nothing"
 
 
 def check_caps(caps: Caps, contestants: Sequence[Contestant]) -> dict[str, int]:
@@ -275,47 +247,26 @@ def check_caps(caps: Caps, contestants: Sequence[Contestant]) -> dict[str, int]:
     return columns
 
 
-def over_already(job: GenerationJob) -> str:
-    """Return why nothing can be changed at a job that has ended."""
-    return f"Job '{job.name}' is {job.get_state_display().lower()} already."
-
-
-@transaction.atomic
-def raise_cap(job: GenerationJob, *, caps: Caps, actor: User | None = None) -> GenerationJob:
-    """Raise the caps that are given; the others stay. What stopped waits on until `resume`.
+def raise_caps(job: GenerationJob, caps: Caps) -> None:
+    """Raise the caps that are given; the others stay.
 
     Raises:
-        Conflict: Nothing is given, a cap would not be higher than it is, or the job is over.
+        InvalidDocument: A cap can't be.
+        Conflict: A cap would not be higher than it is.
     """
     columns = caps.columns()
-    if not columns:
-        raise Conflict("Say which cap to raise, and to what.")
-    job = GenerationJob.objects.select_for_update().get(pk=job.pk)
-    if job.state not in (State.RUNNING, *GenerationJob.HELD):
-        raise Conflict(over_already(job))
-    before = limit_of(job)
     for name, value in columns.items():
         current = getattr(job, name)
-        if current is None:
-            raise Conflict(f"Job '{job.name}' has no such cap; its cap is {before}.")
-        if value <= current:
-            raise Conflict(f"The new cap must be higher than the one of {before}.")
+        if current is None or value <= current:
+            raise Conflict(f"A new cap must be higher than that of the job: {limit_of(job)}.")
         setattr(job, name, value)
     job.save(update_fields=list(columns))
-    log_change(job, "raise cap", actor, before={"cap": before}, after={"cap": limit_of(job)})
-    return job
 
 
-def costs_of(job: GenerationJob) -> JobCosts:
-    """Count the calls of a job by what is known of their cost; one query."""
-    counts = ModelCall.objects.filter(attempt__augmentation__job=job).aggregate(
-        paid=Count("pk", filter=_PAID),
-        priced=Count("pk", filter=_PAID & Q(cost_nano_usd__isnull=False, spent_tokens__gt=0)),
-        unpriced=Count("pk", filter=_PAID & Q(cost_nano_usd=None)),
-        estimated=Count("pk", filter=_PAID & Q(is_cost_estimated=True)),
-        cached=Count("pk", filter=Q(served_from__isnull=False)),
-    )
-    return JobCosts(**counts)
+def count_unpriced(job: GenerationJob) -> int:
+    """Count the calls of a job that were paid for and whose price is unknown."""
+    calls = ModelCall.objects.filter(attempt__augmentation__job=job, cost_nano_usd=None)
+    return calls.filter(served_from=None, sent_at__isnull=False, settled_at__isnull=False).count()
 
 
 # --- Private -----------------------------------------------------------------------------------

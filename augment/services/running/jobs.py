@@ -15,14 +15,7 @@ from augment.services.clock import DATABASE_TIME, Moment, database_now
 from augment.services.endpoints.treatments import loosen_unanswered
 from augment.services.events import log_change
 from augment.services.inputs import InputKind, check_bounds, input_field
-from augment.services.running.budget import (
-    NO_CAPS,
-    Caps,
-    check_caps,
-    limit_of,
-    over_already,
-    raise_cap,
-)
+from augment.services.running.budget import NO_CAPS, Caps, check_caps, limit_of, raise_caps
 from augment.services.running.choosing import refuse_impossible
 from augment.services.running.progress import count_rows, rows_of_cause
 from augment.services.texts import one_line
@@ -126,14 +119,11 @@ def cancel(job: GenerationJob, actor: User | None = None) -> GenerationJob:
     Raises:
         Conflict: The job is over already.
     """
-    still_open = GenerationJob.objects.filter(pk=job.pk, state__in=OPEN)
-    before = still_open.values_list("state", flat=True).first()
+    before = job.state
     now = timezone.now()
     waiting = Augmentation.objects.filter(job=job, state=State.QUEUED)
     cancelled = change_all(waiting, state=State.CANCELLED, finished_at=now)
-    if not still_open.update(state=JobState.CANCELLED, finished_at=now):
-        job.refresh_from_db()
-        raise Conflict(over_already(job))
+    _move(job, OPEN, JobState.CANCELLED, "cancelled", finished_at=now)
     after = {"state": JobState.CANCELLED.value, "cancelled": cancelled}
     _log(job, "cancel", actor, before={"state": before}, after=after)
     return job
@@ -146,13 +136,7 @@ def pause(job: GenerationJob, *, actor: User | None = None) -> GenerationJob:
     Raises:
         Conflict: The job is not running.
     """
-    running = GenerationJob.objects.filter(pk=job.pk, state=JobState.RUNNING)
-    if not running.update(state=JobState.PAUSED):
-        job.refresh_from_db()
-        reason = over_already(job)
-        if job.state in GenerationJob.HELD:
-            reason = f"{reason[:-1]}: it starts nothing until it is resumed."
-        raise Conflict(reason)
+    _move(job, (JobState.RUNNING,), JobState.PAUSED, "paused")
     counts = count_rows(job)
     after = {"state": JobState.PAUSED, "waiting": counts.queued, "in_flight": counts.running}
     _log(job, "pause", actor, before={"state": JobState.RUNNING.value}, after=after)
@@ -175,20 +159,14 @@ def resume(
     Raises:
         Conflict: The job is not held, or a cap would not be higher than it is.
     """
-    held = GenerationJob.objects.filter(pk=job.pk, state__in=GenerationJob.HELD)
     waiting = Augmentation.objects.filter(job=job.pk, state=State.QUEUED)
     queued = change_all(waiting, sent_at=None)
-    if higher != NO_CAPS:
-        raise_cap(job, caps=higher, actor=actor)
-    before = held.select_for_update().values_list("state", flat=True).first()
-    if not held.update(state=JobState.RUNNING):
-        job.refresh_from_db()
-        raise Conflict(
-            f"Job '{job.name}' is {job.get_state_display().lower()}; only one that is paused "
-            "or stopped at its cap can be resumed."
-        )
-    after = {"state": JobState.RUNNING.value, "queued": queued}
-    _log(job, "resume", actor, before={"state": before}, after=after)
+    job.refresh_from_db(from_queryset=GenerationJob.objects.select_for_update())
+    before = {"state": job.state, "cap": limit_of(job)}
+    raise_caps(job, higher)
+    _move(job, GenerationJob.HELD, JobState.RUNNING, "resumed")
+    after = {"state": JobState.RUNNING.value, "cap": limit_of(job), "queued": queued}
+    _log(job, "resume", actor, before=before, after=after)
     return job
 
 
@@ -303,6 +281,21 @@ def _let_wait(
     open_again(job)
     _log(job, "retry", actor, after={"queued": queued, **logged})
     return queued
+
+
+def _move(
+    job: GenerationJob, origins: Sequence[JobState], state: JobState, verb: str, **columns: object
+) -> None:
+    """Change the state of a job that is in one of these.
+
+    Raises:
+        Conflict: It is not.
+    """
+    rows = GenerationJob.objects.filter(pk=job.pk, state__in=origins)
+    if not rows.update(state=state, **columns):
+        job.refresh_from_db()
+        is_now = job.get_state_display().lower()
+        raise Conflict(f"Job '{job.name}' is {is_now}, so it can't be {verb}.")
 
 
 def _log(

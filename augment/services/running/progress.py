@@ -9,9 +9,8 @@ import re
 from collections import Counter, defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
-from django.db.models import Count, F, Max, Q, QuerySet
+from django.db.models import Count, Max, QuerySet
 from django.db.models.functions import Substr
 
 from augment.errors import UnknownName
@@ -101,8 +100,7 @@ class FailureGroup:
 
     Attributes:
         key: What names it in an address.
-        reason: The reason that most of them have.
-        variants: How many different reasons there are.
+        reason: The beginning of the reason that most of them have.
         augmentations: Some of them, with scenario and contestant.
     """
 
@@ -110,7 +108,6 @@ class FailureGroup:
     state: State
     reason: str
     number: int
-    variants: int
     augmentations: list[Augmentation]
 
     @property
@@ -121,11 +118,10 @@ class FailureGroup:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ToolCallLine:
-    """The tool calls of one contestant, or of one augmentation where there is one.
+    """The tool calls of one augmentation.
 
     Attributes:
-        scenario, augmentation: Slug and code of the one augmentation, empty for a contestant.
-        augmentations: How many called at all.
+        augmentation: Its code.
         attempted: Calls in any form, those after the last that is answered included.
         understood: Calls that could be read.
         mended: Understood calls that were not in the form that was asked for.
@@ -134,12 +130,11 @@ class ToolCallLine:
     contestant: str
     name: str
     is_simulated: bool
+    scenario: str
+    augmentation: str
     attempted: int
     understood: int
     mended: int
-    augmentations: int = 1
-    scenario: str = ""
-    augmentation: str = ""
 
 
 def count_rows(job: GenerationJob) -> JobCounts:
@@ -155,15 +150,6 @@ def count_each(jobs: Sequence[GenerationJob]) -> list[JobCounts]:
         JobCounts(job=job, by_state={state: counts.get((job.pk, state), 0) for state in State})
         for job in jobs
     ]
-
-
-def contestant_lines(job: GenerationJob) -> list[dict[str, Any]]:
-    """Return by contestant its slug, name, total, and the number of rows for each outcome."""
-    counts = {state.value: Count("pk", filter=Q(state=state)) for state in OUTCOMES}
-    groups = job.augmentations.order_by("contestant__slug").values(
-        slug=F("contestant__slug"), name=F("contestant__name")
-    )
-    return [dict(group) for group in groups.annotate(total=Count("pk"), **counts)]
 
 
 def cells_of(job: GenerationJob) -> QuerySet[Augmentation]:
@@ -188,24 +174,16 @@ def failure_groups(job: GenerationJob) -> list[FailureGroup]:
     order = sorted(causes, key=lambda key: (key[0] != State.FAILED, -len(causes[key]), key[1]))
     named = [pk for key in order[:SHOWN] for pk, _ in causes[key][:EXAMPLES]]
     cells = {cell.pk: cell for cell in cells_of(job).filter(pk__in=named)} if named else {}
-    groups = []
-    for state, cause in order:
-        rows = causes[state, cause]
-        reasons = Counter(reason for _, reason in rows)
-        usual = reasons.most_common(1)[0][0]
-        some = [cells[pk] for pk, _ in rows[:EXAMPLES] if pk in cells]
-        whole = next((row.reason for row in some if row.reason.startswith(usual)), usual)
-        groups.append(
-            FailureGroup(
-                key=_key_of(state, cause),
-                state=state,
-                reason=whole,
-                number=len(rows),
-                variants=len(reasons),
-                augmentations=some,
-            )
+    return [
+        FailureGroup(
+            key=_key_of(state, cause),
+            state=state,
+            reason=Counter(reason for _, reason in causes[state, cause]).most_common(1)[0][0],
+            number=len(causes[state, cause]),
+            augmentations=[cells[pk] for pk, _ in causes[state, cause][:EXAMPLES] if pk in cells],
         )
-    return groups
+        for state, cause in order
+    ]
 
 
 def rows_of_cause(job: GenerationJob, key: str) -> tuple[State, str, list[int]]:
@@ -222,7 +200,7 @@ def rows_of_cause(job: GenerationJob, key: str) -> tuple[State, str, list[int]]:
     return keys[key]
 
 
-def tool_calls_by_augmentation(job: GenerationJob) -> list[ToolCallLine]:
+def tool_calls(job: GenerationJob) -> list[ToolCallLine]:
     """Return a line for each augmentation whose latest attempt called a tool, in order."""
     attempts = Attempt.objects.filter(augmentation__job=job).values("augmentation")
     latest = dict(attempts.annotate(last=Max("number")).values_list("augmentation", "last"))
@@ -249,25 +227,6 @@ def tool_calls_by_augmentation(job: GenerationJob) -> list[ToolCallLine]:
             augmentation=str(row.code),
         )
         for row in rows.order_by("contestant__slug", "scenario__slug", "pk")
-    ]
-
-
-def tool_calls_by_contestant(job: GenerationJob) -> list[ToolCallLine]:
-    """Return a line for each contestant that called a tool, by slug."""
-    groups: defaultdict[tuple[str, str, bool], list[ToolCallLine]] = defaultdict(list)
-    for line in tool_calls_by_augmentation(job):
-        groups[line.contestant, line.name, line.is_simulated].append(line)
-    return [
-        ToolCallLine(
-            contestant=slug,
-            name=name,
-            is_simulated=is_simulated,
-            attempted=sum(line.attempted for line in lines),
-            understood=sum(line.understood for line in lines),
-            mended=sum(line.mended for line in lines),
-            augmentations=len(lines),
-        )
-        for (slug, name, is_simulated), lines in sorted(groups.items())
     ]
 
 

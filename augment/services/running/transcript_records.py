@@ -21,7 +21,7 @@ from django.db.models import Prefetch, QuerySet
 
 from augment.llm.messages import IMAGE_SCHEME, shorten
 from augment.models import Attempt, Augmentation, Contestant, ModelCall, TranscriptNote
-from augment.services.endpoints.treatments import left_out_of_each
+from augment.services.endpoints.treatments import left_out
 from augment.services.running.calls import IMAGES
 from augment.variants.respondents import ModelRole
 
@@ -208,14 +208,13 @@ def record_of(augmentation: Augmentation, tries: list[Try]) -> dict[str, Any]:
 
 def contestant_documents(contestants: Sequence[Contestant]) -> list[dict[str, Any]]:
     """Return contestants in full, ready for JSON: who each is, and how it asks."""
-    left_out = left_out_of_each(contestants)
     endpoint = ("label", "base_url", "is_simulated")
     return [
         _columns(row, _CONTESTANT)
         | {
             "variant": row.variant or None,
             "model": row.model or None,
-            "left_out": left_out[row.pk],
+            "left_out": left_out(row),
             "endpoint": None if row.endpoint is None else _columns(row.endpoint, endpoint),
         }
         for row in contestants
