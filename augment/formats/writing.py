@@ -195,7 +195,7 @@ def report_motion(cell: Cell, report: LossReport, *, can_trigger: bool = False) 
     motion = cell.motion
     if motion.ego.source in _ASSUMED:
         report.lose(f"the ego was not recorded; {_ASSUMED[motion.ego.source]}")
-    elif cell.drive is None and cell.recording is not None:
+    elif cell.recording is not None:
         unseen = ~cell.recording.ego_is_seen
         if unseen.any():
             report.lose(
@@ -205,12 +205,11 @@ def report_motion(cell: Cell, report: LossReport, *, can_trigger: bool = False) 
     names = [other.agent.id for other in motion.others if other.source is MotionSource.HELD_SPEED]
     report.lose_of(names, "not recorded; let hold the speed of t0 along the lane, or straight on")
     walkers = [other for other in motion.others if other.agent.walk_to_m is not None]
-    if cell.drive is None:
-        waiting = [walker.agent.id for walker in walkers if walker.stands]
-        text = f"has a walk but stands: the ego never comes within {SETS_OUT_WITHIN_M:g} m"
-        report.lose_of(waiting, text, changes_scene=True)
-        walking = [walker.agent.id for walker in walkers if not walker.stands and not can_trigger]
-        report.lose_of(walking, "sets out at a fixed time, not when the ego comes near")
+    waiting = [walker.agent.id for walker in walkers if walker.stands]
+    text = f"has a walk but stands: the ego never comes within {SETS_OUT_WITHIN_M:g} m"
+    report.lose_of(waiting, text, changes_scene=True)
+    walking = [walker.agent.id for walker in walkers if not walker.stands and not can_trigger]
+    report.lose_of(walking, "sets out at a fixed time, not when the ego comes near")
 
 
 _ASSUMED = {
