@@ -127,7 +127,7 @@ class Log:
         frames = np.flatnonzero(np.isfinite(self.ego.states).all(axis=1)).tolist()
         times_s = self.times_s[frames].tolist()
         for index in frames_every(times_s, every_s):
-            time_s = times_s[index] - times_s[0]
+            time_s = times_s[index] - times_s[0] if len(times_s) > 1 else None
             yield Moment(item=self.item, frame=frames[index], time_s=time_s)
 
     def reading_at(self, frame: int, name: str) -> Reading:
