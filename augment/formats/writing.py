@@ -14,17 +14,9 @@ import numpy as np
 from augment.errors import InvalidDocument
 from augment.formats.interplan.file import InterplanSource
 from augment.geometry.polyline import Polyline
+from augment.scene import entities
 from augment.scene.codec import scene_to_document
-from augment.scene.entities import (
-    AgentType,
-    Area,
-    AreaKind,
-    LaneConnector,
-    Modification,
-    ScenarioType,
-    Scene,
-    apply,
-)
+from augment.scene.entities import LaneConnector, Scene
 from augment.scene.lane_graph import AnyLane
 from augment.scene.motion import SETS_OUT_WITHIN_M, Motion, MotionSource, Movement, motion_of
 from augment.scene.recording import Recording
@@ -47,8 +39,8 @@ class Cell:
 
     name: str
     scene: Scene
-    type: ScenarioType | None
-    modification: Modification
+    type: entities.ScenarioType | None
+    modification: entities.Modification
     keeps_traffic: bool = False
     stem: str = "scenario"
     made_on: date = date(1970, 1, 1)
@@ -62,7 +54,7 @@ class Cell:
         Raises:
             InvalidModification: The change does not fit the scene.
         """
-        return apply(self.scene, self.modification)
+        return entities.apply(self.scene, self.modification)
 
     @cached_property
     def motion(self) -> Motion:
@@ -128,15 +120,15 @@ class LossReport:
         if names:
             self.lose(f"{', '.join(names)}: {text}", changes_scene=changes_scene)
 
-    def lose_types(self, texts: Mapping[AgentType, str]) -> None:
+    def lose_types(self, texts: Mapping[entities.AgentType, str]) -> None:
         """Add one line for all agents of each of these types."""
         for kind, text in texts.items():
             others = [other.agent for other in self._cell.motion.others]
             self.lose_of([agent.id for agent in others if agent.type is kind], text)
 
-    def lose_areas(self, areas: Iterable[Area], text: str) -> None:
+    def lose_areas(self, areas: Iterable[entities.Area], text: str) -> None:
         """Add one line for all areas of a kind, which the text names by {}."""
-        by_kind: dict[AreaKind, list[str]] = defaultdict(list)
+        by_kind: dict[entities.AreaKind, list[str]] = defaultdict(list)
         for area in areas:
             by_kind[area.kind].append(area.id)
         for kind, names in by_kind.items():

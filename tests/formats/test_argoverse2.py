@@ -8,10 +8,10 @@ import pytest
 from augment.errors import InvalidDocument
 from augment.formats.argoverse2 import ArgoverseSensor
 from augment.scene.codec import recording_to_document
-from augment.scene.entities import AgentType, AreaKind, Scene, TrafficLight, TrafficSide, TurnType
+from augment.scene.entities import AgentType, AreaKind, Scene, TrafficLight, TurnType
 from augment.scene.lane_graph import LaneGraph
 from augment.scene.recording import Recording
-from tests.formats.av2_logs import boxes, city_map, poses, segment, write_log
+from tests.formats.av2_logs import boxes, city_map, poses, write_log
 
 
 @pytest.fixture
@@ -86,16 +86,6 @@ def test_areas_are_drivable_or_crosswalks(log: Path) -> None:
         (27.58, -4.0),
         (27.58, 6.0),
     )
-
-
-def test_the_traffic_side_is_read_from_the_lanes(tmp_path: Path, log: Path) -> None:
-    assert read(log)[0].traffic_side is TrafficSide.RIGHT
-    mirrored = city_map()
-    mirrored["lane_segments"]["14"] = segment(
-        14, [(106, 230), (106, 150)], [(102, 230), (102, 150)]
-    )
-    scene, _ = read(write_log(tmp_path / "left", city=mirrored))
-    assert scene.traffic_side is TrafficSide.LEFT
 
 
 def test_the_recording_runs_from_t0_to_the_end_in_the_frame_of_t0(log: Path) -> None:

@@ -95,16 +95,6 @@ def test_kept_traffic_that_interplan_removes_is_said_in_report_and_file() -> Non
     assert "config" not in text.partition("accel_max")[2]
 
 
-def test_places_are_in_the_frame_of_the_scenes_origin() -> None:
-    slug = "overtake-mill-junction"
-    text, _ = write([cell(slug)])
-    details = yaml.safe_load(text)["modification_details_dictionary"][token_of("mill-junction")]
-    ((x_m, y_m, yaw_rad),) = details["special_scenario"]["0"]["stopped_vehicle"]
-    origin = whole_scene("mill-junction").origin.pose
-    assert math.dist((x_m, y_m), (origin.x_m, origin.y_m)) == pytest.approx(24.0, abs=0.01)
-    assert difference(yaw_rad, origin.heading_rad) == pytest.approx(0.0, abs=0.001)
-
-
 def test_several_of_one_scene_are_numbered_and_named_in_comments() -> None:
     same = cell("nudge-plane-tree-street")
     text, _ = write([same, replace(same, name="another")])

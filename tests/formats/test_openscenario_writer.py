@@ -185,11 +185,3 @@ def _sampled(road: ET.Element) -> np.ndarray:
         y_m = float(geometry.attrib["y"]) + u * math.sin(heading) + v * math.cos(heading)
         found.append(np.column_stack([x_m, y_m]))
     return np.vstack(found)
-
-
-def _linear(parts: list[ET.Element], name: str, stations: np.ndarray) -> np.ndarray:
-    """Values a + b ds of laneOffset or width elements at stations."""
-    starts = np.array([float(part.attrib[name]) for part in parts])
-    row = np.searchsorted(starts, stations + 1e-9, side="right") - 1
-    a, b = (np.array([float(part.attrib[key]) for part in parts]) for key in "ab")
-    return np.asarray(a[row] + b[row] * (stations - starts[row]))
