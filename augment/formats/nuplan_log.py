@@ -72,13 +72,8 @@ class NuPlan(Reader):
             lights, notes = _lights(base, token), list(_tag_notes(base, token))
         yield Log(
             times_s=times_s,
-            ego=LoggedTrack(
-                name="ego",
-                type=AgentType.EGO_VEHICLE,
-                length_m=EGO_LENGTH_M,
-                width_m=EGO_WIDTH_M,
-                states=ego,
-            ),
+            ego=ego,
+            ego_size_m=(EGO_LENGTH_M, EGO_WIDTH_M),
             tracks=[*tracks.values()],
             map_at=lambda _: city_around(
                 _map_of(path, location, version),

@@ -172,13 +172,8 @@ def _log(path: Path, item: str | None) -> Log:
     own = str(metadata.get("provenance") or "licence not named")[:300]
     return Log(
         times_s=times_s,
-        ego=LoggedTrack(
-            name=ego.name,
-            type=AgentType.EGO_VEHICLE,
-            length_m=max(ego.length_m, ego.width_m),
-            width_m=min(ego.length_m, ego.width_m),
-            states=ego.states,
-        ),
+        ego=ego.states,
+        ego_size_m=(max(ego.length_m, ego.width_m), min(ego.length_m, ego.width_m)),
         tracks=[track for track in tracks.values() if np.isfinite(track.states).any()],
         map_at=lambda frame: _city(description, frame, city),
         world=f"ScenarioNet frame of {data_set} {city}".strip(),

@@ -80,7 +80,8 @@ class WaymoMotion(Reader):
             kinds = [track.object_type for track in scenario.tracks]
             yield Log(
                 times_s=times_s,
-                ego=ego,
+                ego=ego.states,
+                ego_size_m=(ego.length_m, ego.width_m),
                 tracks=[
                     one
                     for one, kind in zip(tracks, kinds, strict=True)
