@@ -124,6 +124,7 @@ def latex_table(
     heads: Sequence[str] = HEADS,
     notes: Iterable[str] = (),
     caption: str,
+    label: str = "tab:elo",
 ) -> str:
     """The paper's table; it needs booktabs and xcolor with the option `table`.
 
@@ -133,6 +134,7 @@ def latex_table(
         heads: Of the columns, as plain text.
         notes: Lines to put beneath it, as plain text.
         caption: As TeX.
+        label: For references to it.
     """
     right = " r" * (len(heads) - 2)
     across = rf"\multicolumn{{{len(heads)}}}{{p{{0.8\linewidth}}}}"
@@ -149,7 +151,7 @@ def latex_table(
         *(rf"    {across}{{\footnotesize {escape(note)}}}\\" for note in notes),
         r"    \end{tabular}",
         rf"    \caption{{{caption}}}",
-        r"    \label{tab:elo}",
+        rf"    \label{{{label}}}",
         r"\end{table}",
     ]
     return "\n".join(lines) + "\n"

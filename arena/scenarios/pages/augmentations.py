@@ -2,7 +2,6 @@
 
 import re
 import uuid
-from typing import Any
 
 from django.http import Http404, HttpRequest, HttpResponse, HttpResponseBase, JsonResponse
 from django.shortcuts import get_object_or_404, render
@@ -15,7 +14,6 @@ from arena.site.pictures import picture_response, sized_picture_response
 from augment.errors import AugmentError
 from augment.models import Augmentation, BaseScene, Contestant, Scenario, Simulation, UploadMoment
 from augment.services.endpoints.contestants import asking_contestants, preview_contestant
-from augment.services.endpoints.treatments import respondents_of
 from augment.services.judging.displacement import of_augmentation
 from augment.services.judging.findings import check_augmentation
 from augment.services.running.calls import IMAGES
@@ -117,7 +115,6 @@ def prompts_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     context = {
         "contestants": asking_contestants(),
         "contestant": contestant,
-        **_how(contestant, role),
         "scenario": scenario,
         "choices": choices,
         "chosen": next((one for one in choices if one.slug == variant), None),
@@ -154,17 +151,6 @@ def _contestant(request: HttpRequest) -> Contestant | None:
     slug = request.GET.get("contestant")
     rows = Contestant.objects.select_related("endpoint")
     return get_object_or_404(rows, slug=slug) if slug else None
-
-
-def _how(contestant: Contestant | None, role: str) -> dict[str, Any]:
-    """Return what goes with the messages of a contestant: its options, and who is asked."""
-    if contestant is None:
-        return {}
-    try:
-        respondents = {one.value: who for one, who in respondents_of(contestant).items()}
-        return {"asking": asking_of(contestant), "respondent": respondents.get(role)}
-    except AugmentError:  # shown above the messages, of which there are none
-        return {}
 
 
 def _preview(request: HttpRequest, scenario: Scenario) -> Shown:

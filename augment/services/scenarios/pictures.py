@@ -2,10 +2,8 @@
 
 import hashlib
 import json
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict
+from collections.abc import Mapping, Sequence
 from enum import StrEnum
-from functools import cache
 from typing import Any
 
 import numpy as np
@@ -21,7 +19,7 @@ from augment.models import Augmentation, BaseScene, Contestant, GenerationJob, S
 from augment.render.bev import draw
 from augment.render.camera import AROUND_THE_EGO, LOOK, Camera, camera_for
 from augment.render.canvas import shrink, shrink_png
-from augment.render.legend import change_keys, describe, scene_keys
+from augment.render.legend import change_keys, scene_keys
 from augment.scene.codec import (
     modification_from_document,
     modification_to_document,
@@ -284,33 +282,6 @@ def legends_of_changes(views: Mapping[int, Mapping[str, Any]]) -> dict[int, set[
         else change_keys(modification_from_document(document), views[key])
         for key, document in rows.values_list("pk", "modification")
     }
-
-
-Description = list[dict[str, Any]]
-"""The lines of augment.render.legend, ready to be stored."""
-
-
-def descriptions(
-    *, augmentations: Iterable[int], scenarios: Mapping[int, Scenario]
-) -> dict[int, Description]:
-    """The description of each augmentation, by its key; one query.
-
-    One without a modification has the picture of the unchanged scene, and the empty description.
-
-    Args:
-        augmentations: Keys.
-        scenarios: Theirs by key, with their base scenes.
-
-    Raises:
-        InvalidDocument: A stored scene or modification can't be read.
-    """
-    scene = cache(lambda key: scene_of(scenarios[key]))
-    rows = Augmentation.objects.filter(pk__in=set(augmentations)).order_by()
-    by_pk = {}
-    for key, scenario, document in rows.values_list("pk", "scenario", "modification"):
-        change = Modification() if document is None else modification_from_document(document)
-        by_pk[key] = [asdict(line) for line in describe(scene(scenario), change)]
-    return by_pk
 
 
 ATTENTION_CHECK = "attention-check"
