@@ -162,14 +162,15 @@ def _keep_entry(
     actor: User | None,
 ) -> ImportStep:
     token, slug = row.source_item, f"{row.slug}-s{kept['index']}"
-    read = interplan_file.read_entry(token, kept["index"], entry, scene)
-    left_out = f"; left out: {', '.join(read.left_out)}" if read.left_out else ""
-    if Scenario.objects.filter(slug=slug, base_scene=row, type=read.type.value).exists():
-        return ImportStep(StepKind.OLD, f"{read.id}: {slug} was there already{left_out}")
+    name = f"{token}-s{kept['index']}"
+    reference, losses = interplan_file.read_entry(token, kept["index"], entry, scene)
+    left_out = f"; left out: {', '.join(losses)}" if losses else ""
+    if Scenario.objects.filter(slug=slug, base_scene=row, type=entry.type.value).exists():
+        return ImportStep(StepKind.OLD, f"{name}: {slug} was there already{left_out}")
     density, goal = interplan_file.options_of(entry.config)
     details = interplan_file.Details.model_validate(kept["details"])
     traffic = interplan_file.traffic_of(
-        entry, details, scene, seed=token, clear_of=read.modification.added
+        entry, details, scene, seed=token, clear_of=reference.added
     )
     goal_m = interplan_file.goal_place(kept, goal or "", scene)
     options = SceneOptions(density=density, goal=goal, goal_m=goal_m)
