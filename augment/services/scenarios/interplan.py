@@ -75,7 +75,7 @@ def import_interplan(
         for token in by_token
         if token not in wanted
     ]
-    for text in (*file.left_out, *left_out):
+    for text in left_out:
         yield ImportStep(StepKind.LEFT_OUT, f"Left out: {text}.")
     logs: dict[str, Path] = {}
     paths = sorted((data or folder).rglob("*.db"))
