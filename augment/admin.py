@@ -14,8 +14,6 @@ class MadeElsewhere(admin.ModelAdmin):
 
     exclude = ("document", "recording", "reference")
 
-    model: Any
-
     def lookup_allowed(self, lookup: str, value: str, request: HttpRequest) -> bool:
         """Refuse filters that follow a relation backwards.
 
@@ -25,7 +23,7 @@ class MadeElsewhere(admin.ModelAdmin):
         fields = (*self.model._meta.fields, *self.model._meta.many_to_many)
         own = {"pk"} | {name for field in fields for name in (field.name, field.attname)}
         is_own = lookup.split("__")[0] in own
-        return is_own and super().lookup_allowed(lookup, value, request)  # type: ignore[misc]
+        return is_own and super().lookup_allowed(lookup, value, request)
 
     def has_add_permission(self, request: HttpRequest) -> bool:
         """Never by hand."""
