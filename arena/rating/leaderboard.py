@@ -3,13 +3,11 @@
 In: `Comparisons` of named contestants, as arrays. Out: a `Leaderboard`: for each of them a `Line`
 with rating, interval and rank, and what must be said with the numbers.
 
-    votes = as_arrays(names, [Comparison(first="a", second="b", score=1.0, expert="e", ...), ...])
+    votes = Comparisons(names=("a", "b"), first=first, second=second, score=score, ...)  # arrays
     board = rate(votes)  # the default: Bradley-Terry, two-way, intervals in closed form
     board = rate(votes, unit=Unit.VOTE, rounds=PAPER_ROUNDS)  # the paper's mode
     board.lines[i].rating, .lower, .upper, .rank  # None where the votes do not determine them
     board.status, board.explanation, board.warnings  # always shown with the numbers
-
-Votes that were grouped elsewhere go into `Comparisons` directly, with their `count`.
 """
 
 import math

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from arena.rating.chains import Status
-from arena.rating.comparisons import Comparison, Comparisons, as_arrays
+from arena.rating.comparisons import Comparisons
 from arena.rating.leaderboard import Leaderboard, Method, rate
 from arena.rating.rules import TooManyContestants, Unit
-from tests.rating.votes import by_votes, named, versus
+from tests.rating.votes import as_arrays, by_votes, named, versus
 
 
 def unrated(board: Leaderboard) -> bool:
@@ -115,30 +115,12 @@ def test_a_single_vote_has_no_interval_of_zero_width(method: Method, score: str)
     assert all(line.rank is None for line in board.lines)
 
 
-@pytest.mark.parametrize(
-    ("vote", "sentence"),
-    [
-        (Comparison(first="a", second="a", score=1.0), "vote 2: 'a' is compared with itself"),
-        (Comparison(first="a", second="x", score=1.0), "vote 2: 'x' is none of a, b"),
-        (Comparison(first="a", second="b", score=0.7), "vote 2: a score is 1, 0.5 or 0, not 0.7"),
-    ],
-)
-def test_votes_that_make_no_sense_are_refused_with_their_number(
-    vote: Comparison, sentence: str
-) -> None:
-    good = Comparison(first="a", second="b", score=0.5)
-    with pytest.raises(ValueError, match=sentence):
-        as_arrays(("a", "b"), [good, vote])
-
-
 def test_rules_that_make_no_sense_are_refused() -> None:
     votes = named(versus("a", "b", 6, 0, 5))
     with pytest.raises(ValueError, match="at least 1 round, not 0"):
         by_votes(votes, rounds=0)
     with pytest.raises(ValueError, match="single votes only, not by scenario"):
         by_votes(votes, method=Method.ELO, unit=Unit.SCENARIO)
-    with pytest.raises(ValueError, match="named twice"):
-        as_arrays(("a", "a"), [])
 
 
 def test_more_than_two_thousand_contestants_are_refused() -> None:

@@ -7,10 +7,10 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from arena.rating.comparisons import LOSS, TIE, WIN, Comparison, Comparisons, as_arrays, tally
+from arena.rating.comparisons import LOSS, TIE, WIN, Comparisons, tally
 from arena.rating.leaderboard import Leaderboard, Method
 from tests.properties import examples
-from tests.rating.votes import by_votes
+from tests.rating.votes import Comparison, as_arrays, by_votes
 
 NAMES = ("a", "b", "c", "d")
 votes_of_four = st.lists(

@@ -7,11 +7,11 @@ import pytest
 
 from arena.rating.bootstrap import percentile_interval
 from arena.rating.chains import Status
-from arena.rating.comparisons import Comparison, Comparisons, as_arrays
+from arena.rating.comparisons import Comparisons
 from arena.rating.leaderboard import Intervals, Leaderboard, Line, Method, rate
 from arena.rating.ranking import ranks, shown_ranks
 from arena.rating.rules import Unit
-from tests.rating.votes import by_votes, named, versus
+from tests.rating.votes import Comparison, as_arrays, by_votes, named, versus
 
 NINE = tuple("abcdefghi")
 POINTS = 400.0 / np.log(10.0)

@@ -5,7 +5,7 @@ import scipy.stats
 from hypothesis import given
 from hypothesis import strategies as st
 
-from arena.rating.comparisons import LOSS, TIE, WIN, Comparison, Comparisons, share, wilson
+from arena.rating.comparisons import LOSS, TIE, WIN, Comparisons, share, wilson
 from arena.rating.reliability import (
     DifferenceMetric,
     agreement,
@@ -14,7 +14,7 @@ from arena.rating.reliability import (
     raters,
     repeat_consistency,
 )
-from tests.rating.votes import named, simulated
+from tests.rating.votes import Comparison, named, simulated
 
 NOBODY = np.full((9, 9), np.nan)
 
