@@ -7,6 +7,7 @@ from functools import cache
 from typing import Any
 
 from augment.models import Augmentation, GenerationJob, Simulation
+from augment.scene.codec import modification_to_document
 from augment.scene.entities import Modification
 from augment.services.judging import simulations
 from augment.services.judging.simulations import Options
@@ -50,13 +51,7 @@ def finished(job: GenerationJob) -> GenerationJob:
     job.augmentations.update(
         state=Augmentation.State.DONE,
         image="bev/x.png",
-        modification={
-            "format": "scenario-arena/modification",
-            "version": 1,
-            "add": [],
-            "move": [],
-            "remove": [],
-        },
+        modification=modification_to_document(Modification()),
     )
     GenerationJob.objects.filter(pk=job.pk).update(state=GenerationJob.State.FINISHED)
     job.refresh_from_db()

@@ -1,7 +1,9 @@
 """Small hand-made scenes whose right answers can be seen by eye."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -14,6 +16,7 @@ from augment.scene.entities import (
     Lane,
     LaneConnector,
     Origin,
+    Point,
     Scene,
     TrafficAgent,
     TrafficLight,
@@ -32,6 +35,9 @@ EGO = TrafficAgent(
     speed_mps=8.0,
     lane_id="Lane1",
 )
+
+
+_LINES = ("centerline", "left_boundary", "right_boundary")
 
 
 def vehicle(name: str, x_m: float, y_m: float, heading_rad: float = 0.0) -> TrafficAgent:
@@ -163,3 +169,41 @@ def pose_in_parent(frame: Pose, seen: Pose) -> Pose:
     """A pose seen from another, in the frame that one is given in."""
     x_m, y_m = frame.to_parent(np.array([[seen.x_m, seen.y_m]]))[0].tolist()
     return Pose(x_m=x_m, y_m=y_m, heading_rad=wrap(seen.heading_rad + frame.heading_rad))
+
+
+def moved_scene(scene: Scene, frame: Pose, flip: float = 1.0) -> Scene:
+    """The whole scene, ego included, mirrored at the x axis (flip -1) and carried to a frame."""
+
+    def way(given: Any) -> Any:
+        lines = {name: getattr(given, name) for name in _LINES}
+        return replace(
+            given,
+            **{
+                name: line and Polyline(frame.to_parent(line.points_m * (1.0, flip)))
+                for name, line in lines.items()
+            },
+        )
+
+    return replace(
+        scene,
+        ego=moved_agent(scene.ego, frame, flip),
+        agents=tuple(moved_agent(agent, frame, flip) for agent in scene.agents),
+        lanes=tuple(map(way, scene.lanes)),
+        connectors=tuple(map(way, scene.connectors)),
+        areas=tuple(
+            replace(area, boundary_m=_moved_points(area.boundary_m, frame, flip))
+            for area in scene.areas
+        ),
+    )
+
+
+def moved_agent(agent: TrafficAgent, frame: Pose, flip: float = 1.0) -> TrafficAgent:
+    ((x_m, y_m),) = _moved_points([(agent.x_m, agent.y_m)], frame, flip)
+    walk_to_m = agent.walk_to_m and _moved_points([agent.walk_to_m], frame, flip)[0]
+    heading_rad = wrap(flip * agent.heading_rad + frame.heading_rad)
+    return replace(agent, x_m=x_m, y_m=y_m, heading_rad=heading_rad, walk_to_m=walk_to_m)
+
+
+def _moved_points(points: Sequence[Point], frame: Pose, flip: float) -> tuple[Point, ...]:
+    moved = frame.to_parent(np.array(points) * (1.0, flip))
+    return tuple((float(x_m), float(y_m)) for x_m, y_m in moved)

@@ -102,10 +102,7 @@ def _shots() -> list[Shot]:
         here = voted if name in (*VOTES_HERE, *OPEN_HERE) else rated
         shots.append(Shot(name=name, who=who, path=address(name, here)))
     results = address("results", rated)
-    shots += [
-        Shot(name=f"results-{tab.name}", who="admin", path=f"{results}{tab.name}/")
-        for tab in TABS.values()
-    ]
+    shots += [Shot(name=f"results-{tab}", who="admin", path=f"{results}{tab}/") for tab in TABS]
     if drive is not None:
         shots.append(Shot(name="drive", who="admin", path=f"/drives/{drive.code}/"))
     if vote is not None:

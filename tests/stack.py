@@ -16,7 +16,7 @@ from urllib.request import urlopen
 
 from tests.processes import ROOT, Machine, environment_of, wait_until
 
-SMALL_DEMO = ("demo", "--no-serve", "--per-type", "2", "--driven", "1")
+SMALL_DEMO = ("demo", "--no-serve", "--per-type", "2")
 
 
 class Home(Machine):

@@ -1,13 +1,20 @@
-"""What all writers share: the formats that there are, Parquet files, and rounded numbers."""
+"""What all writers share: formats, tables of typed columns, and downloads.
+
+The same rows always give the same bytes. What is unknown or does not exist is empty.
+"""
 
 import io
+import json
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from enum import Enum
 from functools import partial
-from typing import Generic, Protocol, TypeVar
+from typing import Any, Generic, NamedTuple, Protocol, TypeVar
+from uuid import UUID
 
 from django.http import Http404, HttpResponse
 
+from arena.exports.cells import csv_text
 from augment.errors import UnknownName
 
 Table = TypeVar("Table")
@@ -33,6 +40,19 @@ class Format(Generic[Table]):
     write: Callable[[Table], bytes]
 
 
+class Export(NamedTuple):
+    """Something that is offered as files.
+
+    Attributes:
+        make: Makes what the formats write of a row, for example a job.
+        help: A line about it.
+    """
+
+    formats: Mapping[str, Format[Any]]
+    make: Callable[..., Any]
+    help: str = ""
+
+
 _KINDS = {
     "csv": ("csv", "text/csv; charset=utf-8", True),
     "json": ("json", "application/json", True),
@@ -48,7 +68,7 @@ _KINDS = {
 
 
 def formats(**writers: Callable[[Table], bytes]) -> dict[str, Format[Table]]:
-    """How a table can be written: a writer for each name, in the order in which they are shown."""
+    """Return the formats of a table by name, in the order in which they are shown."""
     made = {}
     for name, write in writers.items():
         suffix, content_type, is_text = _KINDS[name]
@@ -57,7 +77,7 @@ def formats(**writers: Callable[[Table], bytes]) -> dict[str, Format[Table]]:
 
 
 def format_named(known: Mapping[str, Named], name: str) -> Named:
-    """How to write that format.
+    """Return the format of that name.
 
     Raises:
         UnknownName: It is none of the known ones.
@@ -68,56 +88,155 @@ def format_named(known: Mapping[str, Named], name: str) -> Named:
 
 
 class _Drawing(Protocol[Drawn]):
-    """A chart as a file of that format: svg, pdf or png."""
+    """Draws a chart as a file of that format: svg, pdf or png."""
 
     def __call__(self, table: Drawn, /, *, file_format: str) -> bytes: ...
 
 
-def drawings(chart: _Drawing[Table]) -> dict[str, Callable[[Table], bytes]]:
-    """The writers of a chart."""
-    return {name: partial(chart, file_format=name) for name in ("svg", "pdf", "png")}
-
-
-def parquet_bytes(columns: Mapping[str, str], rows: Iterable[Sequence[object]]) -> bytes:
-    """A Parquet file; the same rows always give the same bytes.
-
-    Args:
-        columns: What each holds, by its name.
-        rows: Their cells, in the order of the columns; None is unknown.
-    """
-    import pyarrow
-    from pyarrow import parquet
-
-    kinds = [pyarrow.type_for_alias(kind) for kind in columns.values()]
-    cells = list(zip(*rows, strict=True)) or [() for _ in columns]
-    arrays = [
-        pyarrow.array(list(column), type=kind) for column, kind in zip(cells, kinds, strict=True)
-    ]
-    file = io.BytesIO()
-    parquet.write_table(pyarrow.table(arrays, names=list(columns)), file, compression="zstd")
-    return file.getvalue()
-
-
-def round_value(value: float | None) -> float | None:
-    """Four decimals, which every machine agrees on."""
-    return None if value is None else round(value, 4)
+def drawings(chart: _Drawing[Table]) -> dict[str, Format[Table]]:
+    """Return the formats of a chart."""
+    return formats(**{name: partial(chart, file_format=name) for name in ("svg", "pdf", "png")})
 
 
 def download(
-    known: Mapping[str, Format[Table]], name: str, stem: str, make: Callable[[], Table]
+    known: Mapping[str, Format[Table]], name: str, stem: str, table: Table
 ) -> HttpResponse:
-    """Return a table as a file to be saved.
+    """Return a table as a file to be saved; 404 for a format that it does not have.
 
     Args:
         known: The formats that it has.
-        name: Which of them; 404 for another.
+        name: Which of them.
         stem: The file's name without its suffix.
-        make: Makes the table.
+        table: What they write.
     """
     if name not in known:
         raise Http404
     return HttpResponse(
-        known[name].write(make()),
+        known[name].write(table),
         content_type=known[name].content_type,
         headers={"Content-Disposition": f'attachment; filename="{stem}.{known[name].suffix}"'},
+    )
+
+
+# --- Tables with one line a row ----------------------------------------------------------------
+
+Value = str | Callable[[Any], object]
+"""A dotted path of attributes, or a function of a line."""
+Columns = Mapping[str, tuple[Value, str]]
+"""By name: the value, and what the column holds."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Sheet:
+    """Rows of named values.
+
+    Attributes:
+        name: JSON files say "scenario-arena/<name>".
+        key: What the list of rows is called in JSON.
+        columns: What each column holds, by its name.
+        number: The format of floats in CSV.
+        facts: What else a JSON file says.
+    """
+
+    name: str
+    key: str = "rows"
+    columns: Mapping[str, str]
+    rows: Sequence[Sequence[object]]
+    number: str = ""
+    facts: Mapping[str, object] = field(default_factory=dict)
+
+
+def sheet_of(
+    lines: Iterable[object], columns: Columns, *, name: str, digits: int | None = 4, **more: Any
+) -> Sheet:
+    """Return a row of plain values for each line.
+
+    Args:
+        lines: What the columns are read of.
+        columns: How.
+        name: Of the sheet.
+        digits: Decimals to which floats are rounded; None for all.
+        more: Further attributes of the sheet.
+    """
+    kinds = {column: kind for column, (_, kind) in columns.items()}
+    values = [value for value, _ in columns.values()]
+    rows = [tuple(read_value(line, value, digits) for value in values) for line in lines]
+    return Sheet(name=name, columns=kinds, rows=rows, **more)
+
+
+def read_value(line: Any, value: Value, digits: int | None = 4) -> object:
+    """Return a plain value of a line; None where its path meets a None."""
+    if callable(value):
+        read = value(line)
+    else:
+        read = line
+        for name in value.split("."):
+            read = None if read is None else getattr(read, name)
+    match read:
+        case Enum():
+            return read.value
+        case float() if digits is not None:
+            return round(read, digits) + 0.0
+        case tuple():
+            return join_numbers(read)
+        case UUID():
+            return str(read)
+        case _:
+            return read
+
+
+def csv_of(columns: Mapping[str, Value], lines: Iterable[object]) -> bytes:
+    """Return a CSV file with one line a row; floats have two decimals."""
+    rows = ([read_value(line, value, None) for value in columns.values()] for line in lines)
+    return csv_text(list(columns), rows).encode()
+
+
+def join_numbers(numbers: Iterable[float], number: str = ".6g") -> str:
+    """Return several numbers as one cell."""
+    return " ".join(format(value, number) for value in numbers)
+
+
+def json_bytes(document: object, *, sort_keys: bool = False) -> bytes:
+    """Return a document as an indented JSON file."""
+    text = json.dumps(document, indent=2, ensure_ascii=False, sort_keys=sort_keys)
+    return (text + "\n").encode()
+
+
+def sheet_csv(sheet: Sheet) -> bytes:
+    """Return one line a row; no text is a formula."""
+    return csv_text(tuple(sheet.columns), sheet.rows, number=sheet.number).encode()
+
+
+def sheet_json(sheet: Sheet) -> bytes:
+    """Return the rows as objects."""
+    rows = [dict(zip(sheet.columns, row, strict=True)) for row in sheet.rows]
+    head = {"format": f"scenario-arena/{sheet.name}", "version": 1}
+    return json_bytes({**head, **sheet.facts, sheet.key: rows})
+
+
+def sheet_parquet(sheet: Sheet) -> bytes:
+    """Return the rows as typed columns."""
+    import pyarrow
+    from pyarrow import parquet
+
+    schema = pyarrow.schema(
+        [(name, pyarrow.type_for_alias(kind)) for name, kind in sheet.columns.items()]
+    )
+    rows = [dict(zip(sheet.columns, row, strict=True)) for row in sheet.rows]
+    file = io.BytesIO()
+    parquet.write_table(pyarrow.Table.from_pylist(rows, schema), file, compression="zstd")
+    return file.getvalue()
+
+
+TABLE_FORMATS: dict[str, Format[Sheet]] = formats(
+    csv=sheet_csv, json=sheet_json, parquet=sheet_parquet
+)
+
+
+def table_formats(make: Callable[[Table], Sheet]) -> dict[str, Format[Table]]:
+    """Return the formats of what can be made a sheet."""
+    return formats(
+        csv=lambda table: sheet_csv(make(table)),
+        json=lambda table: sheet_json(make(table)),
+        parquet=lambda table: sheet_parquet(make(table)),
     )

@@ -26,7 +26,7 @@ from arena.api.views import (
     page_of,
 )
 from arena.exports.formats import download
-from arena.jobs.exports.registry import JOB_TABLES
+from arena.jobs.exports.tables import JOB_TABLES
 from augment.models import GenerationJob
 from augment.services.running.estimates import estimate
 from augment.services.running.jobs import JobRequest, JobScope, launch
@@ -105,11 +105,9 @@ class JobBody(RequestBody):
     request = JobRequest
 
 
-class EstimateLineDocument(serializers.Serializer[Any]):
-    """The expected use of one contestant."""
+class UseDocument(serializers.Serializer[Any]):
+    """An expected use; money is null where a price is unknown."""
 
-    slug = serializers.CharField()
-    name = serializers.CharField()
     rows = serializers.IntegerField()
     calls = serializers.ListField(
         child=serializers.IntegerField(), help_text="At least, as expected, at most."
@@ -117,19 +115,25 @@ class EstimateLineDocument(serializers.Serializer[Any]):
     tokens_in = serializers.IntegerField(allow_null=True)
     tokens_out = serializers.IntegerField(allow_null=True)
     usd = serializers.DecimalField(None, 9, allow_null=True)
-    seen = serializers.IntegerField(help_text="Earlier augmentations that it rests on.")
+    usd_most = serializers.DecimalField(None, 9, allow_null=True)
+    answered = serializers.IntegerField(help_text="Rows whose answers are in the store already.")
 
 
-class EstimateDocument(serializers.Serializer[Any]):
+class EstimateLineDocument(UseDocument):
+    """The expected use of one contestant."""
+
+    slug = serializers.CharField()
+    name = serializers.CharField()
+    seen = serializers.IntegerField(
+        help_text="Earlier augmentations that it rests on; 0 for a guess."
+    )
+
+
+class EstimateDocument(UseDocument):
     """The expected use of a job."""
 
-    rows = serializers.IntegerField()
     scenarios = serializers.IntegerField()
     contestants = serializers.IntegerField()
-    calls = serializers.ListField(child=serializers.IntegerField())
-    tokens_in = serializers.IntegerField()
-    tokens_out = serializers.IntegerField()
-    usd = serializers.DecimalField(None, 9)
     lines = EstimateLineDocument(many=True)
 
 
@@ -222,4 +226,6 @@ class JobExportView(FileView):
         if name not in JOB_TABLES:
             raise Http404
         table, stem = JOB_TABLES[name], f"{slugify(job.name) or 'job'}-{name}"
-        return download(table.formats, form, stem, lambda: table.make(job))
+        if form not in table.formats:
+            raise Http404
+        return download(table.formats, form, stem, table.make(job))

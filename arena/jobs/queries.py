@@ -1,18 +1,16 @@
 """A part of a job's grid: so many scenarios, contestants and samples as one page can hold."""
 
-import hashlib
 from collections import defaultdict
-from collections.abc import Collection, Hashable
+from collections.abc import Collection
 from dataclasses import dataclass
 from uuid import UUID
 
 from django.contrib.auth.models import User
 from django.core.paginator import Page, Paginator
-from django.db.models import Count, Q, QuerySet, TextField
-from django.db.models.functions import Cast
+from django.db.models import Count, Q, QuerySet
 
 from arena.errors import NotYours
-from arena.models import FaultLabel, LabellingRound, LabelTask, Study
+from arena.models import LabellingRound, LabelTask, Study
 from arena.voting.queries.remembering import Remembered, plan_of
 from augment.models import (
     Augmentation,
@@ -23,7 +21,6 @@ from augment.models import (
     Simulation,
 )
 from augment.services.endpoints.known_models import CONTESTANT, Spending, sum_spending
-from augment.services.judging.analyses import JobAnalysis, analyse_job
 from augment.services.judging.simulations import Options
 
 State = Augmentation.State
@@ -139,46 +136,12 @@ def _rows(
 # --- Drives ------------------------------------------------------------------------------------
 
 
-DRIVES = View(name="drives", cells=300, columns=10, samples=1, rows=50)
-"""How many drives are shown at once: one sample of each contestant."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class DriveCells:
-    """A part of a job's grid with its drives by augmentation, and those of its scenes."""
-
-    grid: GridPart
-    by_augmentation: dict[int, Simulation]
-    before: dict[int, Simulation]
-    reference: dict[int, Simulation]
-
-
 def before_of(row: Simulation) -> Simulation | None:
     """The same scene before the change, driven the same way; None until that is done."""
     options = Options(planner=row.planner, offsets=row.offsets, is_reactive=row.is_reactive)
     rows = options.of(Simulation.objects.filter(scenario_id=row.scenario_id))
     drives = rows.filter(subject=Simulation.Subject.UNMODIFIED, state=Simulation.State.DONE)
     return drives.exclude(pk=row.pk).first()
-
-
-def drive_cells(job: GenerationJob, options: Options, part: Part) -> DriveCells:
-    """The drives of a part of a job's grid; seven queries, no traces."""
-    shown = grid_part(job, part)
-    scenarios = [row.scenario.pk for row in shown.rows]
-    augmentations = [cell.pk for row in shown.rows for cells in row.cells for cell in cells]
-    rows = options.of(Simulation.objects.defer("trace"))
-    of_scenes = list(rows.filter(augmentation=None, scenario__in=scenarios))
-    subject = Simulation.Subject
-    return DriveCells(
-        grid=shown,
-        by_augmentation={
-            row.augmentation_id: row
-            for row in rows.filter(augmentation__in=augmentations)
-            if row.augmentation_id is not None
-        },
-        before={row.scenario_id: row for row in of_scenes if row.subject == subject.UNMODIFIED},
-        reference={row.scenario_id: row for row in of_scenes if row.subject == subject.REFERENCE},
-    )
 
 
 def shown_augmentations(study: Study) -> frozenset[int]:
@@ -209,39 +172,7 @@ def model_classes(contestants: Collection[Contestant]) -> dict[int, str]:
     return {pk: name for pk, name in classes.items() if name is not None}
 
 
-def analysis_of(job: GenerationJob) -> JobAnalysis:
-    """Everything about a job; three queries, and one more where it is not kept."""
-    return _ANALYSED.get(analysed_from(job), lambda: analyse_job(job))
-
-
-def analysed_from(job: GenerationJob) -> Hashable:
-    """Another value whenever a row of the job, a scenario or a contestant of it changes.
-
-    Stored documents are compared as text, which costs a tenth of parsing them.
-    """
-    rows = job.augmentations.order_by("pk").values_list(
-        "pk", "state", "scenario", "contestant", "sample", Cast("modification", TextField())
-    )
-    mine = job.augmentations.order_by()
-    scenarios = Scenario.objects.filter(pk__in=mine.values("scenario")).order_by("pk")
-    contestants = Contestant.objects.filter(pk__in=mine.values("contestant")).order_by("pk")
-    read = (
-        rows,
-        scenarios.values_list(
-            *("pk", "slug", "paraphrase_of"),
-            *(Cast(name, TextField()) for name in ("intent", "reference")),
-        ),
-        contestants.values_list("pk", "slug", "name", "kind"),
-    )
-    found = hashlib.sha256()
-    for lines in read:
-        found.update(repr(list(lines)).encode())
-    return (job.pk, found.digest())
-
-
-# --- Private -----------------------------------------------------------------------------------
-
-_ANALYSED: Remembered[JobAnalysis] = Remembered(10)
+# --- Labellings --------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -291,30 +222,6 @@ def next_task(*, labelling: LabellingRound, expert: User) -> LabelTask | None:
         .order_by("position")
         .first()
     )
-
-
-def labels_of(job: GenerationJob) -> QuerySet[FaultLabel]:
-    """Every label on the augmentations of a job, each with its augmentation's contestant."""
-    found = FaultLabel.objects.filter(augmentation__job=job).select_related("augmentation")
-    return found.only(*_LABEL, "augmentation__contestant").order_by("augmentation", "pk")
-
-
-def contestants_of(job: GenerationJob) -> list[tuple[Contestant, int]]:
-    """The contestants of a job by name, each with its answers that are none; two queries."""
-    missed = Q(state__in=(Augmentation.State.UNREADABLE, Augmentation.State.REFUSED))
-    counted = dict(
-        job.augmentations.order_by()
-        .values_list("contestant")
-        .annotate(missed=Count("pk", filter=missed))
-    )
-    found = Contestant.objects.filter(pk__in=counted).order_by("name", "slug")
-    return [(who, counted[who.pk]) for who in found.only("name", "slug", "kind")]
-
-
-_LABEL = (
-    *("augmentation", "position", "heading", "logic"),
-    *("guessed_position", "guessed_heading", "guessed_logic"),
-)
 
 
 def _counted(rows: QuerySet[LabellingRound]) -> list[LabellingProgress]:

@@ -6,13 +6,13 @@ from uuid import UUID
 
 from django.contrib.auth.models import User
 from django.db import IntegrityError, transaction
-from django.db.models import Q, QuerySet
+from django.db.models import Q
 from django.utils import timezone
 
 from arena.errors import AlreadyLabelled, LabellingClosed, NothingToPlan, NotYours
 from arena.models import FaultLabel, LabellingRound, LabelTask, ScenarioFile
 from arena.people.queries import experts as expert_accounts
-from arena.results.services.written_files import waiting_row
+from arena.results.services.written_files import ask_for
 from augment.errors import Conflict, UnknownName
 from augment.models import Augmentation, GenerationJob, Scenario
 from augment.services.events import log_event
@@ -167,11 +167,10 @@ def _save(expert: User, task_code: UUID, faults: frozenset[FaultClass], note: st
     )
 
 
-@transaction.atomic
 def ask_for_file(
     *, job: GenerationJob, file_format: str, actor: User | None = None
 ) -> ScenarioFile:
-    """A row for a worker to write; one that waits already is asked for once more.
+    """Return a row for a worker to write; one that waits already is asked for once more.
 
     Raises:
         UnknownName: No such format.
@@ -179,17 +178,7 @@ def ask_for_file(
     if file_format not in FORMATS:
         raise UnknownName("format", file_format, list(FORMATS))
     row = ScenarioFile(job=job, format=file_format, asked_by=actor)
-    if (waiting := waiting_row(row)) is not None:
-        return waiting
-    row.save()
-    log_event(
-        actor=actor,
-        verb="ask for scenarios",
-        object_kind="job",
-        object_code=job.code,
-        after={"format": file_format, "file": str(row.code)},
-    )
-    return row
+    return ask_for(row, job, format=file_format)
 
 
 def files_of(job: GenerationJob) -> dict[str, ScenarioFile]:
@@ -198,6 +187,7 @@ def files_of(job: GenerationJob) -> dict[str, ScenarioFile]:
 
 
 _BATCH = 500
+_SHOWN = Q(shown_left__isnull=False) | Q(shown_right__isnull=False) | Q(label_tasks__isnull=False)
 
 
 @transaction.atomic
@@ -206,11 +196,6 @@ def retry_cause(job: GenerationJob, *, key: str, actor: User | None = None) -> G
 
     What experts compare or label stays as it is: an unreadable answer is shown as the unchanged
     scene, and a second one would put another picture in the place of the one that was judged.
-
-    Args:
-        job: Whose rows they are.
-        key: Of the cause.
-        actor: Who wants it.
 
     Raises:
         UnknownName: No row has that cause (any more).
@@ -222,7 +207,8 @@ def retry_cause(job: GenerationJob, *, key: str, actor: User | None = None) -> G
     places = Scenario.objects.filter(pk__in=job.scenarios.values("pk"))
     list(places.select_for_update(no_key=True).order_by("pk").values_list("pk"))
     shown = sum(
-        _shown(pks[start : start + _BATCH]).count() for start in range(0, len(pks), _BATCH)
+        Augmentation.objects.filter(_SHOWN, pk__in=pks[start : start + _BATCH]).distinct().count()
+        for start in range(0, len(pks), _BATCH)
     )
     if shown:
         raise Conflict(
@@ -230,14 +216,3 @@ def retry_cause(job: GenerationJob, *, key: str, actor: User | None = None) -> G
             "is judged stays as it is. Launch a new job instead."
         )
     return jobs.retry_cause(job, key=key, actor=actor)
-
-
-# --- Private -----------------------------------------------------------------------------------
-
-
-def _shown(pks: list[int]) -> QuerySet[Augmentation]:
-    is_shown = (
-        Q(shown_left__isnull=False) | Q(shown_right__isnull=False) | Q(label_tasks__isnull=False)
-    )
-    rows = Augmentation.objects.filter(pk__in=pks)
-    return rows.filter(is_shown).distinct()

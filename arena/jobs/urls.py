@@ -13,28 +13,14 @@ urlpatterns: list[URLPattern] = [
     path("jobs/<uuid:code>/pause/", jobs.pause_job, name="job-pause"),
     path("jobs/<uuid:code>/cancel/", jobs.cancel_job, name="job-cancel"),
     path("jobs/<uuid:code>/resume/", jobs.resume_job, name="job-resume"),
-    path(
-        "jobs/<uuid:code>/displacement.<slug:form>",
-        measures.export_table,
-        {"name": "displacement"},
-        name="displacement-export",
-    ),
     path("jobs/<uuid:code>/analyses/", measures.analyses_page, name="analyses"),
-    path(
-        "jobs/<uuid:code>/analyses-<slug:part>.<slug:form>",
-        measures.export_analysis,
-        name="analyses-export",
-    ),
     path(
         "jobs/<uuid:code>/transcripts.jsonl",
         measures.export_transcripts,
         name="transcripts-export",
     ),
     path(
-        "jobs/<uuid:code>/tool-calls.<slug:form>",
-        measures.export_table,
-        {"name": "tool-calls"},
-        name="tool-calls-export",
+        "jobs/<uuid:code>/files/<slug:name>.<slug:form>", measures.export_table, name="job-export"
     ),
     path(
         "jobs/<uuid:code>/scenarios-<slug:form>/",
@@ -44,21 +30,9 @@ urlpatterns: list[URLPattern] = [
     path("scenarios-<uuid:code>.zip", measures.download_scenarios, name="scenarios-export"),
     path("jobs/<uuid:code>/simulate/", measures.simulate_job, name="job-simulate"),
     path("jobs/<uuid:code>/drives/", measures.drives_page, name="drives"),
-    path(
-        "jobs/<uuid:code>/driving.<slug:form>",
-        measures.export_table,
-        {"name": "driving"},
-        name="driving-export",
-    ),
     path("drives/<uuid:code>/", measures.drive_page, name="drive"),
     path("drives/<uuid:code>.<slug:form>", measures.drive_trace, name="drive-file"),
     path("jobs/<uuid:code>/faults/", labelling.faults_page, name="faults"),
-    path(
-        "jobs/<uuid:code>/faults.<slug:form>",
-        measures.export_table,
-        {"name": "faults"},
-        name="faults-export",
-    ),
     path("label/<uuid:code>/", labelling.label_page, name="label"),
     path("label/<uuid:code>/close/", labelling.close, name="labelling-close"),
 ]

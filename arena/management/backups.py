@@ -25,13 +25,16 @@ from functools import partial
 from pathlib import Path, PurePosixPath
 from typing import IO
 
+from django.apps import apps
 from django.conf import settings
 from django.contrib.auth.hashers import make_password
 from django.contrib.auth.models import Group, User
 from django.core.files.base import ContentFile
 from django.core.files.storage import default_storage
 from django.core.management import call_command
+from django.core.management.color import no_style
 from django.db import DatabaseError, IntegrityError, connection, models, transaction
+from pydantic import TypeAdapter
 
 from arena.errors import ArenaError
 from arena.exports.files import write_whole
@@ -70,9 +73,9 @@ class BackupUnreadable(ArenaError):
 class Manifest:
     """What is in the file."""
 
-    made_at: str
-    database: str
     migrations: list[str]
+    made_at: str = ""
+    database: str = ""
     rows: dict[str, int] = field(default_factory=dict)
     members: dict[str, str] = field(default_factory=dict)
 
@@ -80,6 +83,9 @@ class Manifest:
     def media(self) -> list[str]:
         """The names of the files that are put into the media storage."""
         return [name.removeprefix(MEDIA) for name in self.members if name.startswith(MEDIA)]
+
+
+_MANIFEST = TypeAdapter(Manifest)
 
 
 # --- Taking one ----------------------------------------------------------------------------------
@@ -99,17 +105,15 @@ def take_backup(path: Path, *, now: datetime, say: Say) -> Manifest:
         raise ArenaError(f"{path} is there already; a backup overwrites nothing.")
     if missing := find_unapplied_migrations():
         raise ArenaError(f"Run `manage.py prepare` first: {', '.join(missing)} are not applied.")
-    handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-    beside = Path(name)
-    try:
-        with os.fdopen(handle, "wb") as file:
+    with tempfile.TemporaryDirectory(dir=path.parent, prefix=f".{path.name}.") as folder:
+        beside = Path(folder, path.name)
+        beside.touch(mode=0o600)
+        with beside.open("wb") as file:
             with zipfile.ZipFile(file, "w") as archive:
                 manifest = _fill(archive, now, say)
             file.flush()
             os.fsync(file.fileno())
         beside.rename(path)
-    finally:
-        beside.unlink(missing_ok=True)
     return manifest
 
 
@@ -148,7 +152,8 @@ def _fill(archive: zipfile.ZipFile, now: datetime, say: Say) -> Manifest:
     with stored_rows.frozen_rows():
         for model in stored_rows.find_tables():
             label = stored_rows.label_of(model)
-            manifest.rows[label] = add(f"{ROWS}{label}.jsonl", stored_rows.read_rows(model))
+            lines = map(stored_rows.as_line, stored_rows.read_values(model._base_manager.all()))
+            manifest.rows[label] = add(f"{ROWS}{label}.jsonl", lines)
     say(f"rows: {sum(manifest.rows.values())} of {len(manifest.rows)} tables")
     pictures = list(find_media()) if default_storage.exists("") else []  # a bucket always is
     for name in pictures:
@@ -232,13 +237,7 @@ def _parse_manifest(source: Members, wanted: str) -> Manifest:
                 f"This has version {document['version']} of its format; this release reads "
                 f"{VERSION}."
             )
-        return Manifest(
-            made_at=str(document.get("made_at", "")),
-            database=str(document.get("database", "")),
-            migrations=[str(name) for name in document["migrations"]],
-            rows={str(label): int(number) for label, number in document["rows"].items()},
-            members={str(name): str(digest) for name, digest in document["members"].items()},
-        )
+        return _MANIFEST.validate_python(document)
     except (*UNREADABLE, KeyError, TypeError, ValueError, AttributeError, OSError) as error:
         text = f"This is no backup and no study: no {MANIFEST} that can be read."
         raise BackupUnreadable(text) from error
@@ -267,7 +266,8 @@ def restore_backup(path: Path, *, say: Say) -> Manifest:
             say(f"left out, no file of ours: {MEDIA}{name}")
 
         def write() -> None:
-            stored_rows.empty_what_migrating_made()
+            for label in stored_rows.MADE_BY_MIGRATING:
+                apps.get_model(label)._base_manager.all().delete()
             _write_rows(source, manifest, tables, check_row)
             end_restored_work()
             if SECRET_KEY in manifest.members:
@@ -374,7 +374,7 @@ def _write_media(source: Members, media: list[str], written: list[str]) -> None:
 def _write_rows(
     source: Members,
     manifest: Manifest,
-    tables: Iterable[type[models.Model]],
+    tables: list[type[models.Model]],
     check: Callable[[models.Model], None],
 ) -> None:
     """Store the rows and hold them against each other now, not when all is kept already."""
@@ -392,4 +392,6 @@ def _write_rows(
     except IntegrityError as error:
         raise BackupUnreadable(f"Its rows don't fit each other: {error}") from error
     check_votes()
-    stored_rows.reset_sequences()
+    with connection.cursor() as cursor:  # the next row of each table gets a key that none has
+        for statement in connection.ops.sequence_reset_sql(no_style(), list(tables)):
+            cursor.execute(statement)

@@ -31,8 +31,7 @@ from augment.services.endpoints.contestants import (
     ensure_builtin,
 )
 from augment.services.endpoints.known_endpoints import EndpointRequest, ensure_endpoint
-from augment.services.judging.driving_scores import scores_of_job
-from augment.services.judging.simulations import NUPLAN, Options, plan_scenario
+from augment.services.judging.simulations import Options, plan_scenario
 from augment.services.running.choosing import ALL, resolve_contestants
 from augment.services.running.jobs import JobRequest, launch
 from augment.services.running.progress import count_rows
@@ -63,8 +62,6 @@ STUCK_S = 600.0
 
 A_LINE_EVERY = 8
 DRIVEN_PER_TYPE = 2
-DRIVES_WITHIN_S = 30.0
-"""So long the demo waits for drives at most, once everything else is done."""
 
 
 class DemoFailed(ArenaError):
@@ -82,8 +79,7 @@ class DemoTable:
 def prepare(say: Callable[[str], None]) -> None:
     """Scenes, scenarios, contestants and people; nothing here needs a running worker."""
     load_catalogue(folder=settings.BASE_DIR / "fixtures")
-    count = len(scenarios_of(None))
-    say(f"Catalogue: {count} scenarios on {BaseScene.objects.count()} scenes")
+    say(f"Catalogue: {len(scenarios_of(None))} scenarios on {BaseScene.objects.count()} scenes")
     ensure_builtin()
     address = _stand_in_address()
     Endpoint.objects.filter(label=STAND_IN).update(base_url=address)
@@ -93,8 +89,7 @@ def prepare(say: Callable[[str], None]) -> None:
             slug=slug, variant=variant, endpoint=STAND_IN, model=model, name=name
         )
         add_contestant(request)
-    names = ", ".join(Contestant.objects.values_list("slug", flat=True))
-    say(f"Contestants: {names}")
+    say(f"Contestants: {', '.join(Contestant.objects.values_list('slug', flat=True))}")
     for username, role in PEOPLE:
         _person(username, role)
     for username in SIMULATED_EXPERTS:
@@ -117,7 +112,7 @@ def generate(
 
     Args:
         scenarios: Slugs.
-        say: Gets a line for every bit of progress.
+        say: Told the progress.
         look: Called again and again; it raises where a worker is gone for good.
 
     Raises:
@@ -126,66 +121,31 @@ def generate(
     request = JobRequest(name=JOB, contestants=resolve_contestants([ALL]), scenarios=scenarios)
     job = GenerationJob.objects.filter(name=JOB).first() or launch(request)
     enqueue_job(job.pk)
-    ended, last_said, moved_at = -1, -1, time.monotonic()
+    ended, moved_at = 0, time.monotonic()
     while (now := count_rows(job)).under_way:
         look()
-        if now.settled != ended:
+        if now.settled >= ended + A_LINE_EVERY:
             ended, moved_at = now.settled, time.monotonic()
-        elif time.monotonic() - moved_at > STUCK_S:
-            raise DemoFailed(
-                f"In the job {JOB!r} nothing ended for {STUCK_S:.0f} s: {ended} of {now.total}."
-            )
-        if ended // A_LINE_EVERY > last_said // A_LINE_EVERY:
             say(f"  {ended} of {now.total} augmentations")
-            last_said = ended
+        elif time.monotonic() - moved_at > STUCK_S:
+            raise DemoFailed(f"The job {JOB!r} does not get on: {now.settled} of {now.total}.")
         time.sleep(0.2)
-    states = Augmentation.State
-    outcomes = (states.DONE, states.UNREADABLE, states.REFUSED, states.FAILED)
-    say(
-        "Augmentations: "
-        + ", ".join(f"{now.by_state[outcome]} {outcome.value}" for outcome in outcomes)
-    )
+    ends = {state.value: number for state, number in now.by_state.items() if number}
+    say(f"Augmentations: {', '.join(f'{number} {state}' for state, number in ends.items())}")
     if now.failed:
         reasons = job.augmentations.filter(state=Augmentation.State.FAILED)
         raise DemoFailed("; ".join(sorted(set(reasons.values_list("reason", flat=True)))))
     return job
 
 
-def start_drives(scenarios: list[str], *, per_type: int) -> None:
+def start_drives() -> None:
     """Have a few scenarios driven by the workers, before the change and with the reference."""
-    kinds: dict[str, list[Scenario]] = {}
-    for row in Scenario.objects.filter(slug__in=scenarios).order_by("slug"):
-        kinds.setdefault(row.type, []).append(row)
-    chosen = [row for rows in kinds.values() for row in rows[:per_type]]
-    waiting = [pk for row in chosen for pk in plan_scenario(scenario=row, options=Options())]
+    rows = Scenario.objects.filter(slug__in=scenarios_of(DRIVEN_PER_TYPE))
+    waiting = [pk for row in rows for pk in plan_scenario(scenario=row, options=Options())]
     enqueue_simulations(waiting)
 
 
-def driving_lines(job: GenerationJob, look: Callable[[], None]) -> list[str]:
-    """The driving scores of what was driven within `DRIVES_WITHIN_S`; the rest goes on.
-
-    Args:
-        job: Whose scenes are driven.
-        look: Called again and again; it raises where a worker is gone for good.
-    """
-    until = time.monotonic() + DRIVES_WITHIN_S
-    while True:
-        scores = scores_of_job(job, options=Options(), score=NUPLAN)
-        if not scores.under_way or time.monotonic() > until:
-            break
-        look()
-        time.sleep(0.2)
-    lines = ["Mean driving score of PDM-Closed (nuPlan's rules, own simulator):"]
-    for line in scores.lines:
-        if line.mean is not None:
-            lines.append(f"  {line.name:20} {100.0 * line.mean:5.1f} % of {line.drives} drives")
-    if scores.under_way:
-        lines.append(f"  {scores.under_way} more drives go on while the demo is served.")
-    lines += [f"  Failed: {reason} ({number})" for reason, number in scores.failures]
-    return lines
-
-
-def vote_and_rate(scenarios: list[str], say: Callable[[str], None], folder: Path) -> DemoTable:
+def vote_and_rate(scenarios: list[str], folder: Path) -> DemoTable:
     """A study with simulated votes, closed and rated, and its table as files."""
     study = Study.objects.filter(name=SIMULATED_STUDY).first()
     if study is None:

@@ -1,40 +1,32 @@
-"""What `manage.py export` can write: the arguments of each kind and what writes it."""
+"""What `manage.py export` can write: the arguments of each kind, and the file it makes."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple
 from uuid import UUID
 
 from django.utils.text import slugify
 
 from arena.errors import StudyStillOpen
-from arena.exports.files import ZIP
-from arena.exports.formats import Format, format_named
-from arena.jobs.exports import displacement_files, driving
-from arena.jobs.exports.displacement import displacement_table
+from arena.exports.formats import Export, format_named
 from arena.jobs.exports.files import scenario_zip, zip_name
-from arena.jobs.exports.registry import PLAIN_TABLES, TRANSCRIPTS, JobTable
-from arena.jobs.exports.tables import ANALYSES, TABLE_FORMATS, analysis_sheet, object_sheet
+from arena.jobs.exports.tables import ANALYSES, JOB_FILES
 from arena.models import Snapshot, Study
-from arena.results.exports.charts import CONTENT_TYPES, chart_bytes
 from arena.results.exports.sheets import SHEET_FORMATS, contact_sheet, find_cells, sample_sheet
-from arena.results.exports.tables import leaderboard_table
-from arena.results.exports.votes import VOTE_FORMATS, unrated_votes, vote_table
-from arena.results.exports.writers import FORMATS, bundle
+from arena.results.exports.votes import VOTE_FORMATS, unrated_votes
+from arena.results.exports.writers import CHARTS, RATING_FILES
 from arena.results.queries.access import snapshot_to_export
 from arena.results.queries.votes import is_imported
 from arena.results.services.ratings import log_early_look
 from arena.studies.queries import study_named
 from augment.errors import Conflict, UnknownName
-from augment.services.judging import scenario_export
-from augment.services.judging.analyses import analyse_job
+from augment.services.judging import scenario_export, simulations
 from augment.services.judging.displacement import By, types_named
 from augment.services.judging.driving_scores import options_driven
-from augment.services.judging.simulations import SCORES, Options
+from augment.services.judging.simulations import SCORES
 from augment.services.running.choosing import find_job
 
-Table = TypeVar("Table")
 Chosen = dict[str, Any]
 """The arguments of the command line by name."""
 
@@ -88,13 +80,11 @@ def add_kinds(kinds: Any) -> None:
         parser.add_argument("--out", required=True, help="a file; - for standard output")
 
 
-def _format(names: Mapping[str, Any] | list[str], default: str | None = "csv") -> dict[str, Any]:
-    help_text = f"one of {', '.join(names)}"
-    return {"--format": {"default": default, "help": help_text}}
-
-
-def _fill(form: Format[Table], table: Table) -> ExportedFile:
-    return ExportedFile(form.write(table), form.suffix, form.is_text)
+def _write(exported: Export, form: str, find: Callable[[], Any], **more: Any) -> ExportedFile:
+    """Write one format of what is found; the format is looked at first."""
+    chosen = format_named(exported.formats, form)
+    content = chosen.write(exported.make(find(), **more))
+    return ExportedFile(content, chosen.suffix, chosen.is_text)
 
 
 # --- Of a study's rating -------------------------------------------------------------------------
@@ -112,27 +102,19 @@ def _snapshot(options: Chosen) -> Snapshot:
     return snapshot
 
 
-def _write_leaderboard(options: Chosen, say: Say) -> ExportedFile:
-    """Write the table in one format, or everything of the rating as one zip."""
-    if options["format"] == ZIP:
-        return ExportedFile(bundle(_snapshot(options)), ZIP, False)
-    chosen = format_named(FORMATS, options["format"])
-    return _fill(chosen, leaderboard_table(_snapshot(options)))
+def _write_rating(options: Chosen, say: Say) -> ExportedFile:
+    """Write a table or chart of the rating, or all of them as one zip."""
+    form = options["format"]
+    name = "all" if form == "zip" else options.get("chart") or options["what"]
+    return _write(RATING_FILES[name], form, lambda: _snapshot(options))
 
 
 def _write_votes(options: Chosen, say: Say) -> ExportedFile:
     """Write the votes that the rating counted; of a cancelled study all that were given."""
-    chosen = format_named(VOTE_FORMATS, options["format"])
     study = study_named(options["study"])
     if study.state == Study.State.CANCELLED:
-        return _fill(chosen, unrated_votes(study))
-    return _fill(chosen, vote_table(_snapshot(options)))
-
-
-def _write_chart(options: Chosen, say: Say) -> ExportedFile:
-    form = options["format"]
-    content = chart_bytes(_snapshot(options), name=options["chart"], file_format=form)
-    return ExportedFile(content, form, form == "svg")
+        return _write(Export(VOTE_FORMATS, unrated_votes), options["format"], lambda: study)
+    return _write_rating(options, say)
 
 
 def _write_contact_sheet(options: Chosen, say: Say) -> ExportedFile:
@@ -147,25 +129,35 @@ def _write_contact_sheet(options: Chosen, say: Say) -> ExportedFile:
 # --- Of a job ------------------------------------------------------------------------------------
 
 
-def _plain(table: JobTable, default: str = "csv") -> ExportKind:
-    def write(options: Chosen, say: Say) -> ExportedFile:
-        chosen = format_named(table.formats, options["format"])
-        return _fill(chosen, table.make(find_job(options["job"])))
+def _write_table(name: str, asked: Chosen, **more: Any) -> ExportedFile:
+    return _write(JOB_FILES[name], asked["format"], lambda: find_job(asked["job"]), **more)
 
-    return ExportKind("job", table.help, write, _format(table.formats, default))
+
+def _write_plain(options: Chosen, say: Say) -> ExportedFile:
+    """Write a table that takes no options."""
+    return _write_table(options["what"], options)
 
 
 def _write_displacement(options: Chosen, say: Say) -> ExportedFile:
     """Write how far from the references: in groups, or one row an object."""
-    types = None if options["types"] is None else types_named(options["types"])
-    if options["by"] == BY_OBJECT:
-        of_objects = format_named(TABLE_FORMATS, options["format"])
-        return _fill(of_objects, object_sheet(find_job(options["job"]), types=types))
-    chosen = format_named(displacement_files.FORMATS, options["format"])
-    if options["by"] not in set(By):
-        raise UnknownName("grouping", options["by"], [*By, BY_OBJECT])
-    table = displacement_table(find_job(options["job"]), by=By(options["by"]), types=types)
-    return _fill(chosen, table)
+    by, types = options["by"], options["types"]
+    name = "displacement-objects" if by == BY_OBJECT else f"displacement-by-{by}"
+    return _write_table(name, options, types=None if types is None else types_named(types))
+
+
+def _write_driving(options: Chosen, say: Say) -> ExportedFile:
+    """Write mean scores of the drives that were made just so."""
+    job = find_job(options["job"])
+    how = simulations.Options(
+        planner=options["planner"], offsets=options["offsets"], is_reactive=options["reactive"]
+    )
+    if how not in options_driven(job):
+        raise Conflict(f"Job {job.name!r} was not driven so; manage.py simulate does it.")
+    return _write_table(f"driving-{options['score']}", options, options=how)
+
+
+def _write_analyses(options: Chosen, say: Say) -> ExportedFile:
+    return _write_table(f"analyses-{options['part']}", options)
 
 
 def _write_samples(options: Chosen, say: Say) -> ExportedFile:
@@ -178,35 +170,8 @@ def _write_samples(options: Chosen, say: Say) -> ExportedFile:
     return ExportedFile(sample_sheet(cells, file_format=form, **shown), form, False)
 
 
-def _write_driving(options: Chosen, say: Say) -> ExportedFile:
-    """Write mean scores of the drives that were made just so."""
-    chosen = format_named(driving.FORMATS, options["format"])
-    job = find_job(options["job"])
-    if options["score"] not in SCORES:
-        raise UnknownName("score", options["score"], list(SCORES))
-    how = Options(
-        planner=options["planner"], offsets=options["offsets"], is_reactive=options["reactive"]
-    )
-    if how not in options_driven(job):
-        raise Conflict(f"Job {job.name!r} was not driven so; manage.py simulate does it.")
-    table = driving.driving_table(
-        job, options=how, score=options["score"], with_paper=options["with_paper"]
-    )
-    return _fill(chosen, table)
-
-
-def _write_analyses(options: Chosen, say: Say) -> ExportedFile:
-    chosen = format_named(TABLE_FORMATS, options["format"])
-    if options["part"] not in ANALYSES:
-        raise UnknownName("part", options["part"], list(ANALYSES))
-    found = analyse_job(find_job(options["job"]))
-    return _fill(chosen, analysis_sheet(found, options["part"]))
-
-
 def _write_modifications(options: Chosen, say: Say) -> ExportedFile:
     """Write all modifications of a job as interPlan's YAML."""
-    if options["format"] != "interplan":
-        raise UnknownName("format", options["format"], ["interplan"])
     exported = scenario_export.export_job(
         find_job(options["job"]), file_format="interplan", contestant=options["contestant"]
     )
@@ -221,18 +186,13 @@ def _write_modifications(options: Chosen, say: Say) -> ExportedFile:
 def _write_scenarios(options: Chosen, say: Say) -> ExportedFile:
     """Write all scenarios of a job as a zip of files, and tell what is lost on the way."""
     exported = scenario_export.export_job(
-        find_job(options["job"]),
-        file_format=options["format"],
-        contestant=options["contestant"],
-        motion=options["motion"],
+        find_job(options["job"]), file_format=options["format"], contestant=options["contestant"]
     )
     written = exported.written
-    for loss in exported.missing:
-        say(f"Left out: {loss}.")
-    for loss in written.refused:
-        say(f"Refused: {loss}.")
-    for loss in written.losses:
-        say(f"Lost: {loss}.")
+    told = {"Left out": exported.missing, "Refused": written.refused, "Lost": written.losses}
+    for word, losses in told.items():
+        for loss in losses:
+            say(f"{word}: {loss}.")
     for warning in exported.warnings:
         say(f"Warning: {warning}")
     say(
@@ -240,38 +200,45 @@ def _write_scenarios(options: Chosen, say: Say) -> ExportedFile:
         f"{len(written.refused)} refused."
     )
     slug = slugify(exported.origin.name) or exported.origin.code
-    return ExportedFile(scenario_zip(exported), ZIP, False, name=zip_name(exported, slug))
+    return ExportedFile(scenario_zip(exported), "zip", False, name=zip_name(exported, slug))
 
 
 # --- All of them ---------------------------------------------------------------------------------
 
 
-_OF_RATING: dict[str, dict[str, Any]] = {
-    "--rating": {"type": UUID, "help": "the code of an older rating"},
-    "--early": {"action": "store_true", "help": "export from an open study; this is logged"},
-}
-_CONTESTANT = {"help": "the slug of one; all unless given"}
-_DRIVEN = {"help": "as it was simulated with"}
+Options = dict[str, dict[str, Any]]
+
+
+def _option(flag: str, text: str, **how: Any) -> Options:
+    return {flag: {"help": text} | how}
+
+
+def _format(names: Iterable[str], **how: Any) -> Options:
+    return _option("--format", f"one of {', '.join(names)}", **{"default": "csv"} | how)
+
+
+_OF_RATING = _option("--rating", "the code of an older rating", type=UUID) | _option(
+    "--early", "export from an open study; this is logged", action="store_true"
+)
+_CONTESTANT = _option("--contestant", "the slug of one; all unless given")
+_DRIVEN = "as it was simulated with"
 
 KINDS: dict[str, ExportKind] = {
     "leaderboard": ExportKind(
         "study",
-        "the newest rating of a study",
-        _write_leaderboard,
-        _format([*FORMATS, ZIP]) | _OF_RATING,
+        RATING_FILES["leaderboard"].help,
+        _write_rating,
+        _format([*RATING_FILES["leaderboard"].formats, "zip"]) | _OF_RATING,
     ),
     "votes": ExportKind(
-        "study",
-        "the votes of the newest rating, with pseudonyms",
-        _write_votes,
-        _format(VOTE_FORMATS) | _OF_RATING,
+        "study", RATING_FILES["votes"].help, _write_votes, _format(VOTE_FORMATS) | _OF_RATING
     ),
     "chart": ExportKind(
         "study",
         "a chart of the newest rating beside the table's",
-        _write_chart,
-        {"--chart": {"required": True, "help": "pairs, types, width, displacement, elo-usd, ..."}}
-        | _format(CONTENT_TYPES, "svg")
+        _write_rating,
+        _option("--chart", "which", choices=CHARTS, required=True)
+        | _format(RATING_FILES["pairs"].formats, default="svg")
         | _OF_RATING,
     ),
     "contact-sheet": ExportKind(
@@ -284,74 +251,57 @@ KINDS: dict[str, ExportKind] = {
         "job",
         "how far from the references",
         _write_displacement,
-        {
-            "--by": {
-                "default": "type",
-                "help": f"one of {', '.join(By)}; or {BY_OBJECT}, for one row an object "
-                f"({', '.join(TABLE_FORMATS)})",
-            },
-            "--types": {
-                "nargs": "+",
-                "help": "scenario types, or all; by variant only those with definite places "
-                "unless given",
-            },
-        }
-        | _format(displacement_files.FORMATS),
+        _option("--by", "grouped by, or a row an object", choices=[*By, BY_OBJECT], default="type")
+        | _option("--types", "scenario types, or all; by variant a few unless given", nargs="+")
+        | _format(JOB_FILES["displacement-by-type"].formats),
     ),
     "samples": ExportKind(
         "job",
         "a sheet of pictures with captions",
         _write_samples,
-        {
-            "--scenarios": {"nargs": "+", "required": True, "help": "slugs, top to bottom"},
-            "--contestants": {"nargs": "+", "required": True, "help": "left to right"},
-            "--sample": {"type": int, "default": 1, "help": "which one of each cell"},
-        }
-        | _format([*SHEET_FORMATS, "or what the file's ending says"], None),
+        _option("--scenarios", "slugs, top to bottom", nargs="+", required=True)
+        | _option("--contestants", "left to right", nargs="+", required=True)
+        | _option("--sample", "which one of each cell", type=int, default=1)
+        | _format([*SHEET_FORMATS, "or what the file's ending says"], default=None),
     ),
     "driving": ExportKind(
         "job",
         "mean driving scores of what was simulated",
         _write_driving,
-        {
-            "--score": {"default": "nuplan", "help": f"one of {', '.join(SCORES)}"},
-            "--planner": {"default": "pdm-closed"} | _DRIVEN,
-            "--offsets": {"default": "paper"} | _DRIVEN,
-            "--reactive": {"action": "store_true"} | _DRIVEN,
-            "--with-paper": {"action": "store_true", "help": "add the paper's rows below a rule"},
-        }
-        | _format(driving.FORMATS),
+        _option("--score", "whose rules", choices=list(SCORES), default="nuplan")
+        | _option("--planner", _DRIVEN, default="pdm-closed")
+        | _option("--offsets", _DRIVEN, default="paper")
+        | _option("--reactive", _DRIVEN, action="store_true")
+        | _format(JOB_FILES["driving-nuplan"].formats),
     ),
-    **{name: _plain(table) for name, table in PLAIN_TABLES.items()},
-    "transcripts": _plain(TRANSCRIPTS, "jsonl"),
+    **{
+        name: ExportKind(
+            "job",
+            table.help,
+            _write_plain,
+            _format(table.formats, default=next(iter(table.formats))),
+        )
+        for name, table in JOB_FILES.items()
+        if table.help
+    },
     "analyses": ExportKind(
         "job",
         "pairs of contestants, wordings, refusals",
         _write_analyses,
-        {"--part": {"required": True, "help": f"one of {', '.join(ANALYSES)}"}}
-        | _format(TABLE_FORMATS),
+        _option("--part", "which", choices=list(ANALYSES), required=True)
+        | _format(JOB_FILES["analyses-pairs"].formats),
     ),
     "modifications": ExportKind(
         "job",
         "what a job's contestants made",
         _write_modifications,
-        _format(["interplan"], "interplan") | {"--contestant": _CONTESTANT},
+        _format(["interplan"], choices=["interplan"], default="interplan") | _CONTESTANT,
     ),
     "scenarios": ExportKind(
         "job",
         "what a job made, in a standard format",
         _write_scenarios,
-        {
-            "--format": {
-                "required": True,
-                "help": f"one of {', '.join(scenario_export.FORMATS)}; OUT is a folder",
-            },
-            "--motion": {
-                "default": scenario_export.RECORDED,
-                "help": f"{scenario_export.RECORDED}, or the planner whose finished drives say "
-                "what everybody does",
-            },
-            "--contestant": _CONTESTANT,
-        },
+        _format([*scenario_export.FORMATS, "OUT is a folder"], required=True, default=None)
+        | _CONTESTANT,
     ),
 }

@@ -92,9 +92,6 @@ class StudyFile(WrittenFile):
         )
         indexes = (models.Index(F("study"), F("kind"), name="study_file_of_study"),)
 
-    def __str__(self) -> str:
-        return f"{self.study}: {self.kind}"
-
 
 class ScenarioFile(WrittenFile):
     """All that a job made, in one format, as one zip; the newest of a job and format counts."""
@@ -112,6 +109,3 @@ class ScenarioFile(WrittenFile):
             ready_is_stored("ready_scenario_file_is_stored"),
         )
         indexes = (models.Index(F("job"), F("format"), name="scenario_file_of_job"),)
-
-    def __str__(self) -> str:
-        return f"{self.job} as {self.format}"

@@ -107,9 +107,6 @@ class Snapshot(Work):
             ),
         )
 
-    def __str__(self) -> str:
-        return str(self.code)
-
 
 class Standing(models.Model):
     """One line of a snapshot. Null ratings mean that the votes do not determine them.
@@ -149,9 +146,6 @@ class Standing(models.Model):
             ),
         )
 
-    def __str__(self) -> str:
-        return f"{self.rank} {self.slug}"
-
 
 _COLUMNS = {column.name for column in Standing._meta.local_fields}
 STORED = tuple(
@@ -180,9 +174,6 @@ class EarlyLook(AppendOnly):
             models.UniqueConstraint(name="one_early_look_each", fields=("study", "user")),
         )
 
-    def __str__(self) -> str:
-        return f"{self.user_id} on {self.study_id}"
-
 
 class VoteFile(models.Model):
     """Votes from elsewhere. Their study is closed and has neither matchups nor pictures.
@@ -202,9 +193,6 @@ class VoteFile(models.Model):
 
     class Meta:
         ordering = ("-made_at", "-pk")
-
-    def __str__(self) -> str:
-        return self.name
 
 
 class ImportedVote(AppendOnly):
@@ -243,6 +231,3 @@ class ImportedVote(AppendOnly):
                 condition=Q(outcome__in=["model_a", "model_b", "tie", "tie (bothbad)"]),
             ),
         )
-
-    def __str__(self) -> str:
-        return f"line {self.line}"

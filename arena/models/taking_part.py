@@ -218,9 +218,6 @@ class PracticePair(models.Model):
             ),
         )
 
-    def __str__(self) -> str:
-        return f"{self.position}"
-
     @property
     def left(self) -> Augmentation:
         """What stands left, which is A."""

@@ -122,9 +122,6 @@ class Vote(AppendOnly):
         )
         indexes = (models.Index(fields=("expert", "at"), name="votes_of_expert_by_time"),)
 
-    def __str__(self) -> str:
-        return str(self.key)
-
 
 class Report(AppendOnly):
     """What an expert reports about a matchup, whatever the vote. Append-only."""
@@ -176,9 +173,6 @@ class Report(AppendOnly):
                 | Q(mark_x__gte=0, mark_x__lte=1, mark_y__gte=0, mark_y__lte=1),
             ),
         )
-
-    def __str__(self) -> str:
-        return str(self.key)
 
 
 class LabellingRound(Coded):
@@ -270,6 +264,3 @@ class FaultLabel(AppendOnly):
                 ),
             ),
         )
-
-    def __str__(self) -> str:
-        return f"{self.augmentation_id} by {self.expert_id}"

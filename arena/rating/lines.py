@@ -116,6 +116,7 @@ def latex_table(
     heads: Sequence[str] = HEADS,
     notes: Iterable[str] = (),
     caption: str,
+    label: str = "tab:elo",
 ) -> str:
     """The paper's table; it needs booktabs and xcolor with the option `table`.
 
@@ -125,6 +126,7 @@ def latex_table(
         heads: Of the columns, as plain text.
         notes: Lines to put beneath it, as plain text.
         caption: As TeX.
+        label: For references to it.
     """
     right = " r" * (len(heads) - 2)
     titles = [rf"\textbf{{{escape(head)}}}{_UPWARDS.get(head, '')}" for head in heads]
@@ -142,7 +144,7 @@ def latex_table(
         *(rf"    {across}{{\footnotesize {escape(note)}}}\\" for note in notes),
         r"    \end{tabular}",
         rf"    \caption{{{caption}}}",
-        r"    \label{tab:elo}",
+        rf"    \label{{{label}}}",
         r"\end{table}",
     ]
     return "\n".join(lines) + "\n"

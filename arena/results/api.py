@@ -16,38 +16,30 @@ from rest_framework.request import Request
 
 from arena import tasks
 from arena.api.access import STAFF
-from arena.api.fields import FlagField, StrictSerializer, TextField, WholeNumberField
+from arena.api.fields import RequestBody
 from arena.api.views import (
     ApiView,
     FileView,
     Given,
     RowDocument,
-    as_file,
     file_operation,
     keep_and_send,
     operation,
 )
 from arena.errors import NoSnapshot
-from arena.exports.files import CONTENT_TYPE as ZIP_TYPE
 from arena.exports.formats import download
 from arena.models import Snapshot, Study
 from arena.models.ratings import STORED
-from arena.pairing.order import MAIN, REPEAT
-from arena.rating.leaderboard import Intervals, Line, Method
-from arena.rating.rules import Unit
-from arena.results.exports.charts import CONTENT_TYPES, chart_bytes
-from arena.results.exports.tables import LeaderboardTable, leaderboard_table
-from arena.results.exports.votes import VOTE_FORMATS, vote_table
-from arena.results.exports.writers import FORMATS as LEADERBOARD
-from arena.results.exports.writers import bundle
+from arena.rating.leaderboard import Line
+from arena.results.exports.tables import leaderboard_table
+from arena.results.exports.writers import RATING_FILES
 from arena.results.queries.access import must_read_results
-from arena.results.queries.votes import Filters
-from arena.results.services.ratings import DEFAULT_ROUNDS, MOST_ROUNDS, is_big, plan_snapshot
+from arena.results.services.rating_request import RatingRequest
+from arena.results.services.ratings import is_big, plan_snapshot
 from arena.results.services.ratings import rate_now as rate
 from arena.studies.api import get_study
-from arena.studies.services.plan import HIGHEST_SEED
 from augment.errors import UnknownName
-from augment.services.scenarios.scenes import type_choices
+from augment.services.inputs import read_request
 
 _FIELDS: dict[Any, Callable[[], serializers.Field[Any, Any, Any, Any]]] = {
     str: serializers.CharField,
@@ -83,12 +75,8 @@ class TableDocument(serializers.Serializer[Any]):
 
     method = serializers.CharField(source="method_text")
     left_out = serializers.DictField(child=serializers.IntegerField())
-    warnings = serializers.SerializerMethodField()
+    warnings = serializers.ListField(child=serializers.CharField())
     rows = StandingDocument(many=True)
-
-    def get_warnings(self, table: LeaderboardTable) -> list[str]:
-        """Return them as sentences."""
-        return list(table.warnings)
 
 
 class SnapshotDocument(RowDocument[Snapshot]):
@@ -117,33 +105,10 @@ class SnapshotDocument(RowDocument[Snapshot]):
         return TableDocument(leaderboard_table(row)).data if ready else None
 
 
-class SnapshotBody(StrictSerializer):
+class SnapshotBody(RequestBody):
     """How to rate; what is missing is the default."""
 
-    method = serializers.ChoiceField(
-        choices=[one.value for one in Method], required=False, default=Method.BRADLEY_TERRY.value
-    )
-    resample = serializers.ChoiceField(
-        source="unit", choices=[one.value for one in Unit], required=False
-    )
-    intervals = serializers.ChoiceField(choices=[one.value for one in Intervals], required=False)
-    rounds = WholeNumberField(
-        required=False, default=DEFAULT_ROUNDS, min_value=1, max_value=MOST_ROUNDS
-    )
-    seed = WholeNumberField(required=False, default=0, min_value=0, max_value=HIGHEST_SEED)
-    types = serializers.ListField(
-        child=TextField(max_length=40), required=False, default=list, max_length=200
-    )
-    experts = serializers.ListField(
-        child=TextField(max_length=200),
-        required=False,
-        default=list,
-        max_length=5_000,
-        help_text="Codes as a rating names them; none for all.",
-    )
-    with_repeats = FlagField(required=False, default=False)
-    leave_out_settled = FlagField(required=False, default=False)
-    leave_out_own = FlagField(required=False, default=False)
+    request = RatingRequest
 
 
 class SnapshotsView(ApiView):
@@ -159,10 +124,11 @@ class SnapshotsView(ApiView):
         """
         study = get_study(code)
         must_read_results(user=self.user, study=study)
-        wanted = _wanted(given) | {"early": study.state == Study.State.OPEN, "actor": self.user}
+        choices = read_request(RatingRequest, given).choices()
+        choices |= {"early": study.state == Study.State.OPEN, "actor": self.user}
         if not is_big(study):
-            return rate(study=study, **wanted)
-        plan = partial(plan_snapshot, study=study, **wanted)
+            return rate(study=study, **choices)
+        plan = partial(plan_snapshot, study=study, **choices)
         planned, warnings = keep_and_send(plan, tasks.send_snapshot)
         planned.reason = " ".join([planned.reason, *warnings]).strip()
         return planned
@@ -194,9 +160,6 @@ def get_snapshot(view: ApiView, code: uuid.UUID) -> Snapshot:
     return snapshot
 
 
-CHARTS = ("pairs", "types")
-
-
 class SnapshotExportView(FileView):
     """A rating as a file."""
 
@@ -204,15 +167,12 @@ class SnapshotExportView(FileView):
 
     @file_operation(
         types=[
-            *(one.content_type for one in LEADERBOARD.values()),
-            *(one.content_type for one in VOTE_FORMATS.values()),
-            *CONTENT_TYPES.values(),
-            ZIP_TYPE,
+            form.content_type for one in RATING_FILES.values() for form in one.formats.values()
         ],
         name="exportSnapshot",
         words={
-            "name": ["leaderboard", "votes", "all", *CHARTS],
-            "form": [*LEADERBOARD, *VOTE_FORMATS, *CONTENT_TYPES, "zip"],
+            "name": RATING_FILES,
+            "form": [form for one in RATING_FILES.values() for form in one.formats],
         },
     )
     def get(self, request: Request, code: uuid.UUID, name: str, form: str) -> HttpResponseBase:
@@ -223,40 +183,11 @@ class SnapshotExportView(FileView):
         snapshot = get_snapshot(self, code)
         if snapshot.state != Snapshot.State.READY:
             raise NoSnapshot("This rating is not ready.")
-        study = slugify(snapshot.study.name) or "study"
-        if name == "all":
-            if form != "zip":
-                raise Http404
-            return as_file(bundle(snapshot), ZIP_TYPE, f"{study}-rating.zip")
-        stem = f"{study}-{name}"
-        if name == "leaderboard":
-            return download(LEADERBOARD, form, stem, lambda: leaderboard_table(snapshot))
-        if name == "votes":
-            return download(VOTE_FORMATS, form, stem, lambda: vote_table(snapshot))
+        if name not in RATING_FILES or form not in RATING_FILES[name].formats:
+            raise Http404
         try:
-            content = chart_bytes(snapshot, name=name, file_format=form)
+            made = RATING_FILES[name].make(snapshot)
         except UnknownName as error:
             raise Http404 from error
-        return as_file(content, CONTENT_TYPES[form], f"{stem}.{form}")
-
-
-# --- Private -----------------------------------------------------------------------------------
-
-
-def _wanted(given: dict[str, Any]) -> dict[str, Any]:
-    """Return the choices of the rating services."""
-    kinds = (MAIN, REPEAT) if given.pop("with_repeats") else (MAIN,)
-    known = [name for name, _ in type_choices()]
-    for name in given["types"]:
-        if name not in known:
-            raise serializers.ValidationError(
-                {"types": [f"There is no type {name!r}; there are {', '.join(known)}."]}
-            )
-    filters = Filters(
-        types=tuple(given.pop("types")),
-        experts=tuple(given.pop("experts")),
-        kinds=kinds,
-        leave_out_settled=given.pop("leave_out_settled"),
-        leave_out_own=given.pop("leave_out_own"),
-    )
-    return given | {"filters": filters}
+        stem = f"{slugify(snapshot.study.name) or 'study'}-{'rating' if name == 'all' else name}"
+        return download(RATING_FILES[name].formats, form, stem, made)

@@ -8,7 +8,6 @@ from arena.jobs.urls import urlpatterns as JOBS
 from arena.people import pages as people
 from arena.results.pages import evidence as results_votes
 from arena.results.pages import ratings as results
-from arena.results.pages import ratings as results_files
 from arena.scenarios.urls import urlpatterns as SCENARIOS
 from arena.site import pages
 from arena.studies.pages import experts, planning, setup, studies
@@ -60,7 +59,6 @@ urlpatterns: list[URLPattern] = [
     path("studies/<uuid:code>/experts/invite/", experts.invite_experts, name="invite"),
     path("invitations/<uuid:code>/revoke/", experts.revoke_invitation, name="revoke"),
     path("studies/<uuid:code>/experts/authors/", experts.mark, name="author"),
-    path("authorships/<uuid:code>/take-back/", experts.take_back, name="author-back"),
     path("studies/<uuid:code>/close/", studies.close, name="study-close"),
     path("studies/<uuid:code>/hand-over/", studies.hand_over_pairs, name="study-hand-over"),
     path("studies/<uuid:code>/vote/", voting.vote_page, name="vote"),
@@ -89,16 +87,10 @@ urlpatterns: list[URLPattern] = [
     path("studies/<uuid:code>/results/<slug:tab>/", results.results_page, name="results-tab"),
     path("studies/<uuid:code>/files/<slug:kind>/write/", studies.ask_for_file, name="study-write"),
     path("studies/<uuid:code>/files/<slug:kind>/", studies.download, name="study-file"),
-    path("studies/<uuid:code>/results.<slug:form>", results_files.export, name="results-export"),
     path(
-        "studies/<uuid:code>/results-votes.<slug:form>",
-        results.export_votes,
-        name="results-votes-export",
-    ),
-    path(
-        "studies/<uuid:code>/results-charts/<slug:name>.<slug:form>",
-        results.export_chart,
-        name="results-chart",
+        "studies/<uuid:code>/rating/<slug:name>.<slug:form>",
+        results.rating_file,
+        name="results-export",
     ),
     path("studies/<uuid:code>/rate/", results.rate_study, name="study-rate"),
     path("studies/<uuid:code>/rate/<uuid:rating>/", results.compute_again, name="rating-again"),

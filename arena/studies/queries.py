@@ -11,7 +11,6 @@ from django.contrib.auth.models import User
 from django.db.models import BooleanField, Count, ExpressionWrapper, F, Max, Q, QuerySet
 from django.utils import timezone
 
-from arena.errors import NotYours
 from arena.models import (
     Authorship,
     EnrolledVoter,
@@ -30,18 +29,6 @@ from augment.errors import UnknownName
 from augment.models import Contestant, GenerationJob, Scenario
 
 # --- Studies -----------------------------------------------------------------------------------
-
-
-def voting_study(*, expert: User, code: UUID | str) -> Study:
-    """Return the study that this expert votes in, whatever its state.
-
-    Raises:
-        NotYours: There is none with that code, or the expert does not take part in it.
-    """
-    study = expert.studies.filter(code=code).first()
-    if study is None:
-        raise NotYours("You do not take part in this study.")
-    return study
 
 
 def study_named(name_or_code: str) -> Study:
@@ -101,19 +88,18 @@ def progress_of(studies: Iterable[Study], expert: User | None = None) -> list[St
     return [
         StudyProgress(
             study=study,
-            total=totals.get(study.pk, 0) + _planned_later(study, expert),
+            # The adaptive part still plans some.
+            total=totals.get(study.pk, 0)
+            + sum(
+                votes
+                for username, votes in study.votes_to_plan.items()
+                if expert is None or username == expert.username
+            ),
             voted=voted.get(study.pk, 0),
             skipped=skipped.get(study.pk, 0),
         )
         for study in studies
     ]
-
-
-def _planned_later(study: Study, expert: User | None) -> int:
-    """Return how many showings the adaptive part still plans."""
-    if expert is None:
-        return sum(study.votes_to_plan.values())
-    return int(study.votes_to_plan.get(expert.username, 0))
 
 
 def reports_of(study: Study) -> QuerySet[Report]:
@@ -255,11 +241,10 @@ def find_silent(enrolment: Enrolment, *, now: datetime) -> Voters:
 
 def state_of(enrolment: Enrolment) -> dict[str, int]:
     """Count places, and what became of them."""
-    voters = enrolled_voters(enrolment.study)
-    taken = voters.filter(dropped_at=None).count()
-    return {
-        "taken": taken,
-        "free": max(enrolment.places - taken, 0),
-        "done": voters.filter(is_done=True).count(),
-        "dropped": voters.exclude(dropped_at=None).count(),
-    }
+    is_in = Q(dropped_at=None)
+    state: dict[str, int] = enrolled_voters(enrolment.study).aggregate(
+        taken=Count("pk", filter=is_in),
+        done=Count("pk", filter=Q(is_done=True)),
+        dropped=Count("pk", filter=~is_in),
+    )
+    return state | {"free": max(enrolment.places - state["taken"], 0)}

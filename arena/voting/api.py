@@ -5,6 +5,7 @@ from typing import Any
 from django.core.files.storage import default_storage
 from django.http import Http404, HttpResponse
 from django.http.response import HttpResponseBase
+from django.shortcuts import get_object_or_404
 from rest_framework import serializers
 from rest_framework.permissions import IsAuthenticated
 from rest_framework.request import Request
@@ -23,7 +24,6 @@ from arena.api.views import ApiView, FileView, Given, file_operation, operation
 from arena.errors import StudyNotOpen
 from arena.models import AIDS, OUTCOME_LETTERS, Report, Study, Vote
 from arena.people.services import keep_voting
-from arena.studies.queries import voting_study
 from arena.studies.services.experts import SIDES, Complaint, report
 from arena.studies.services.planning import next_pairs
 from arena.voting.queries.keys import SWITCHES, voting_switches
@@ -140,7 +140,7 @@ class MatchupsView(ApiView):
 
         An empty list when all is done.
         """
-        study = voting_study(expert=self.user, code=given["study"])
+        study = get_object_or_404(self.user.studies, code=given["study"])
         if study.state != Study.State.OPEN:
             raise StudyNotOpen(f"The study {study.name!r} takes no votes: it is {study.state}.")
         matchups = next_pairs(study=study, expert=self.user, n=given["n"])

@@ -12,15 +12,7 @@ from augment.baselines.placing_ground import SIGNS, PlacingGround, build_agent
 from augment.errors import CannotPlace
 from augment.geometry.frames import Pose
 from augment.scene.entities import LENGTH_WIDTH_M, AgentType, TrafficAgent
-from augment.scene.intent import (
-    ConesRequest,
-    LaneChoice,
-    LateralTarget,
-    Post,
-    Shape,
-    Side,
-    WalkRequest,
-)
+from augment.scene.intent import ConesRequest, LaneChoice, Post, Shape, WalkRequest
 from augment.scene.lane_graph import LanePosition
 
 WALK_S = 15.0
@@ -48,7 +40,6 @@ def place_walkers(
     Raises:
         CannotPlace: The lanes end before.
     """
-    start = request.start or ground.kerb  # the rule placer refuses an open one
     added = []
     for index in range(request.count or 1):
         behind_m, along_m = 0.0, index * APART_M
@@ -56,17 +47,17 @@ def place_walkers(
             behind_m, along_m = along_m, 0.0
             if 0 < index <= len(request.behind):
                 behind_m = request.behind[index - 1].drawn(rng)
-        added.append(_walker(request, start, ground, distance_m + along_m, behind_m))
+        added.append(_walker(request, ground, distance_m + along_m, behind_m))
     return tuple(added)
 
 
 def _walker(
-    request: WalkRequest, start: Side, ground: PlacingGround, distance_m: float, behind_m: float
+    request: WalkRequest, ground: PlacingGround, distance_m: float, behind_m: float
 ) -> TrafficAgent:
+    start = request.start or ground.kerb  # the rule placer refuses an open one
     place = ground.along(distance_m)
-    if request.on_road:
-        from_m = ground.lane(place).width_m / 4.0
-    else:
+    from_m = ground.lane(place).width_m / 4.0
+    if not request.on_road:
         from_m = ground.road_edge_m(place.pose, start) + _BEYOND_EDGE_M
     arrives = ground.along(distance_m + (request.drift_m or 0.0)).pose
     to_m = ground.road_edge_m(arrives, start.other) + _BEYOND_EDGE_M
@@ -137,7 +128,7 @@ def _places(
         first_m = (count - 1) * spacing_m / 2.0
         return [(distance_m, first_m - index * spacing_m) for index in range(count)]
     if request.shape is Shape.LINE:
-        sides = (1.0, -1.0) if request.both_sides else (_line_side(request, ground),)
+        sides = (1.0, -1.0) if request.both_sides else (ground.side_sign(request.spot.lateral),)
         return [
             (distance_m + index * along_m, side * edge_m)
             for side in sides
@@ -169,19 +160,6 @@ def _ring(centre_m: float, count: int, spacing_m: float, widest_m: float) -> lis
     along = [first_m + index * spacing_m for index in range(rows)]
     closing = [(first_m - math.sqrt(spacing_m**2 - side_m**2), 0.0)] if count % 2 else []
     return [*closing, *((s, -side_m) for s in along), *((s, side_m) for s in reversed(along))]
-
-
-def _line_side(request: ConesRequest, ground: PlacingGround) -> float:
-    """1 for the left boundary of the ego's direction, -1 for the right one, 0 for the centre."""
-    lateral = request.spot.lateral
-    kerb = SIGNS[ground.kerb]
-    return {
-        LateralTarget.LANE_CENTRE: 0.0,
-        LateralTarget.LEFT_BOUNDARY: 1.0,
-        LateralTarget.RIGHT_BOUNDARY: -1.0,
-        LateralTarget.KERB: kerb,
-        LateralTarget.CENTRE_LINE: -kerb,
-    }[LateralTarget.LANE_CENTRE if lateral is None else lateral.target]
 
 
 def _worker(request: ConesRequest, ground: PlacingGround, places: list[Place]) -> Place:

@@ -22,7 +22,6 @@ from augment.scene.intent import (
     CrashRequest,
     Facing,
     LaneChoice,
-    Lateral,
     LateralTarget,
     Nearness,
     Side,
@@ -110,7 +109,9 @@ def _offset_m(
     lateral = request.spot.lateral
     if lateral is None or lateral.target is LateralTarget.LANE_CENTRE:
         return 0.0
-    side = _side(lateral, ground)
+    side = Side.LEFT if ground.side_sign(lateral) > 0.0 else Side.RIGHT
+    if lateral.on_shoulder and side is not ground.kerb:
+        raise CannotPlace(f"People drive on the {ground.kerb}: no shoulder on the {side}.")
     at_kerb = lateral.target is LateralTarget.KERB and lateral.nearness is Nearness.AT_EDGE
     if (lateral.on_shoulder or at_kerb) and ground.neighbour(place, side) is not None:
         raise CannotPlace(f"On the {side} is another lane, not the edge of the road.")
@@ -132,21 +133,6 @@ def _offset_m(
     return size_m if to_left else -size_m
 
 
-def _side(lateral: Lateral, ground: PlacingGround) -> Side:
-    """The side of the ego's direction that a target is on, on this map."""
-    side = {
-        LateralTarget.LEFT_BOUNDARY: Side.LEFT,
-        LateralTarget.RIGHT_BOUNDARY: Side.RIGHT,
-        LateralTarget.KERB: ground.kerb,
-        LateralTarget.CENTRE_LINE: ground.kerb.other,
-    }[lateral.target]
-    if lateral.on_shoulder and side is not ground.kerb:
-        raise CannotPlace(
-            f"People drive on the {ground.kerb} here, so there is no shoulder on the {side}."
-        )
-    return side
-
-
 def count_arrangements(request: CrashRequest) -> int:
     """Return how many arrangements `place_crash` has for a request, the preferred one first."""
     return len(_SHIFTS_M if request.others else _LOOSER)
@@ -159,14 +145,7 @@ def place_crash(
     rng: np.random.Generator,
     arrangement: int,
 ) -> tuple[TrafficAgent, ...]:
-    """Return the crashed vehicles, the first at the spot.
-
-    Args:
-        request: What was asked for.
-        ground: Where.
-        distance_m: Of the first one, along the ego's lane.
-        rng: Draws a gap from a range.
-        arrangement: Which of those that `count_arrangements` counts.
+    """Return the crashed vehicles, the first at the spot, in one of `count_arrangements` ways.
 
     Raises:
         CannotPlace: The lanes end before the last of them, there is no such lane, or
@@ -184,23 +163,22 @@ def place_crash(
 def _in_a_row(
     request: CrashRequest, ground: PlacingGround, distance_m: float, looseness: float
 ) -> list[Pose]:
-    """Each as near behind the one before as it can stand."""
-
-    def pose_at(along_m: float, index: int) -> Pose:
-        place = ground.beside(along_m, request.spot.lane)
-        pose = ground.graph.place(place.lane_id, place.s_m, looseness * _SIDES_M[index]).pose
-        first_rad = 0.0 if index else _FACING_RAD[request.facing or Facing.WITH_LANE]
-        return pose.turned(looseness * _TURNS_RAD[index] + first_rad)
-
-    poses = [pose_at(distance_m, 0)]
+    """Put each as near behind the one before as it can stand."""
+    poses: list[Pose] = []
     along_m = distance_m
-    for index in range(1, request.count or 2):
+    for index in range(request.count or 2):
+        first_rad = 0.0 if index else _FACING_RAD[request.facing or Facing.WITH_LANE]
+        left_m, turn_rad = looseness * _SIDES_M[index], looseness * _TURNS_RAD[index] + first_rad
 
-        def following(gap_m: float, from_m: float = along_m, index: int = index) -> Pose:
-            return pose_at(from_m + gap_m, index)
+        def pose_at(
+            gap_m: float, from_m: float = along_m, left_m: float = left_m, rad: float = turn_rad
+        ) -> Pose:
+            place = ground.beside(from_m + gap_m, request.spot.lane)
+            return ground.graph.place(place.lane_id, place.s_m, left_m).pose.turned(rad)
 
-        along_m += _touching_m(request.body, poses[-1], following)
-        poses.append(pose_at(along_m, index))
+        gap_m = _touching_m(request.body, poses[-1], pose_at) if poses else 0.0
+        poses.append(pose_at(gap_m))
+        along_m += gap_m
     return poses
 
 
@@ -218,25 +196,27 @@ def _chained(
     unsaid = (request.count or 0) - 1 - len(request.others)
     for other in [*request.others, *[CrashedCar()] * unsaid]:
         gap_m = None if other.gap is None else other.gap.drawn(rng)
-        choices = sorted(
-            _choices(request.body, other, poses, spot.heading_rad, gap_m),
-            key=lambda choice: choice[0],
-        )
-        if not choices:
+        choices = _choices(request.body, other, poses, spot.heading_rad, gap_m)
+        ordered = [pose for _, pose in sorted(choices, key=lambda choice: choice[0])]
+        if not ordered:
             apart = "So near" if gap_m is None else f"{gap_m:g} m apart"
             raise CannotPlace(f"{apart} the cars would stand in each other.")
-        free = (pose for _, pose in choices if _is_free(pose, request.body, ground))
-        poses.append(next(free, choices[0][1]))
+        free = (pose for pose in ordered if _is_free(pose, request.body, ground))
+        poses.append(next(free, ordered[0]))
     return poses
 
 
-def _is_free(pose: Pose, body: Body, ground: PlacingGround) -> bool:
+def _box(body: Body, pose: Pose) -> Box:
     length_m, width_m = _size_m(body)
-    box = Box(pose=pose, length_m=length_m, width_m=width_m)
+    return Box(pose=pose, length_m=length_m, width_m=width_m)
+
+
+def _is_free(pose: Pose, body: Body, ground: PlacingGround) -> bool:
+    box = _box(body, pose)
     return all(
         overlap(box, agent.box).depth_m == 0.0
         for agent in ground.scene.everyone
-        if math.hypot(agent.x_m - pose.x_m, agent.y_m - pose.y_m) < 2.0 * length_m
+        if math.hypot(agent.x_m - pose.x_m, agent.y_m - pose.y_m) < 2.0 * box.length_m
     )
 
 
@@ -257,13 +237,11 @@ def _choices(
         toward_rad = lane_rad + _BEARINGS_RAD[other.bearing or Bearing.AHEAD] + aside_rad
 
         def pose_at(
-            size_m: float, toward_rad: float = toward_rad, heading_rad: float = heading_rad
+            away_m: float, toward_rad: float = toward_rad, heading_rad: float = heading_rad
         ) -> Pose:
-            return Pose(
-                x_m=before.x_m + size_m * math.cos(toward_rad),
-                y_m=before.y_m + size_m * math.sin(toward_rad),
-                heading_rad=heading_rad,
-            )
+            x_m = before.x_m + away_m * math.cos(toward_rad)
+            y_m = before.y_m + away_m * math.sin(toward_rad)
+            return Pose(x_m=x_m, y_m=y_m, heading_rad=heading_rad)
 
         pose = pose_at(_touching_m(body, before, pose_at) if gap_m is None else gap_m)
         shared = max(_shared(body, pose, one) for one in poses)
@@ -284,7 +262,5 @@ def _touching_m(body: Body, before: Pose, pose_at: Callable[[float], Pose]) -> f
 
 
 def _shared(body: Body, one: Pose, other: Pose) -> float:
-    """The share of a box that two of that kind have in common."""
-    length_m, width_m = _size_m(body)
-    boxes = (Box(pose=pose, length_m=length_m, width_m=width_m) for pose in (one, other))
-    return overlap(*boxes).share_of_first
+    """Return the share of a box that two of that kind have in common."""
+    return overlap(_box(body, one), _box(body, other)).share_of_first

@@ -9,16 +9,16 @@ from functools import partial
 
 import shapely
 
+from augment.checks import Ground
+from augment.checks.lanes_across import LanesAcross
 from augment.errors import CannotPlace
 from augment.geometry.frames import Pose, difference
-from augment.scene.ego_route import EgoRoute
 from augment.scene.entities import (
     LENGTH_WIDTH_M,
     AgentType,
     AreaKind,
     Lane,
     Point,
-    Scene,
     TrafficAgent,
     TurnType,
 )
@@ -67,12 +67,12 @@ class PlacingGround:
         CannotPlace: The ego stands on no lane, so nothing lies along it.
     """
 
-    def __init__(self, scene: Scene, turn: TurnType = TurnType.STRAIGHT) -> None:
-        self.scene = scene
-        route = EgoRoute.of(scene, turn=turn)
-        if route is None:
+    def __init__(self, ground: Ground, turn: TurnType = TurnType.STRAIGHT) -> None:
+        self.scene = scene = ground.scene
+        lanes = LanesAcross.of(ground, turn)
+        if lanes is None:
             raise CannotPlace("The ego stands on no lane of the map.")
-        self.route, self.graph = route, route.graph
+        self.route, self.graph, self.side_sign = lanes.route, ground.graph, lanes.side_sign
         self.kerb = Side(scene.traffic_side.value)
         self._drivable, self._walkways = (
             shapely.union_all(

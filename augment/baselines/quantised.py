@@ -30,17 +30,7 @@ _LEFT_FROM_M = 0.005
 """What lies on the ego's own axis is on its right; half a centimetre is no side."""
 _STEP_M = 0.5
 _DRAWS = 50
-_UNKNOWN = {WalkRequest: "pedestrians", ConesRequest: "cones"}
 _NO_VEHICLES = (Body.BICYCLE, Body.BARRIER, Body.CONSTRUCTION_SIGN)
-
-
-class Quadrant(IntEnum):
-    """Where the centre lies, seen from the ego's."""
-
-    FRONT_LEFT = 0
-    BACK_LEFT = 1
-    BACK_RIGHT = 2
-    FRONT_RIGHT = 3
 
 
 class Direction(IntEnum):
@@ -57,11 +47,13 @@ class Code:
     """One vehicle, without a class, a size, a lateral offset or an angle.
 
     Attributes:
+        is_ahead, is_left: The quadrant of the centre, seen from the ego's.
         distance_bin: Of the straight line to the ego's centre, counted from 0.
         speed_bin: In steps of 2.5 m/s, counted from 0; None where it stands.
     """
 
-    quadrant: Quadrant
+    is_ahead: bool
+    is_left: bool
     distance_bin: int
     direction: Direction
     speed_bin: int | None
@@ -73,40 +65,30 @@ class Code:
 
     def words(self, bin_m: float) -> str:
         """Return the code for people, with the edges of its bin."""
-        where, facing = (
-            part.name.replace("_", " ").lower() for part in (self.quadrant, self.direction)
-        )
-        low_m = self.distance_bin * bin_m
-        does = "stands"
-        if self.speed_bin is not None:
-            low_mps = self.speed_bin * SPEED_BIN_MPS
-            does = f"drives at {low_mps:g} to {low_mps + SPEED_BIN_MPS:g} m/s"
-        return f"{where}, {low_m:g} to {low_m + bin_m:g} m away, direction {facing}, {does}"
+        end, side = "front" if self.is_ahead else "back", "left" if self.is_left else "right"
+        low_m, facing = self.distance_bin * bin_m, self.direction.name.replace("_", " ").lower()
+        does = "stands" if self.speed_bin is None else f"drives at about {self.speed_mps:g} m/s"
+        return f"{end} {side}, {low_m:g} to {low_m + bin_m:g} m away, direction {facing}, {does}"
 
 
 def code_of(agent: TrafficAgent, *, bin_m: float) -> Code:
     """Return what is left of a vehicle, distances told in bins of that width."""
-    centre = np.array([[agent.x_m, agent.y_m]])
+    ahead, left, bins = _cells_of(np.array([[agent.x_m, agent.y_m]]), bin_m)
     return Code(
-        quadrant=Quadrant(int(_quadrants_of(centre)[0])),
-        distance_bin=int(_bins_of(centre, bin_m=bin_m)[0]),
+        is_ahead=bool(ahead[0]),
+        is_left=bool(left[0]),
+        distance_bin=int(bins[0]),
         direction=_direction_of(agent.heading_rad),
         speed_bin=int(agent.speed_mps / SPEED_BIN_MPS) if agent.speed_mps > 0.0 else None,
     )
 
 
-def _quadrants_of(points_m: NDArray[np.float64]) -> NDArray[np.int64]:
-    """The quadrants (P,) of points (P, 2)."""
-    ahead, left = points_m[:, 0] > 0.0, points_m[:, 1] > _LEFT_FROM_M
-    front = np.where(left, int(Quadrant.FRONT_LEFT), int(Quadrant.FRONT_RIGHT))
-    back = np.where(left, int(Quadrant.BACK_LEFT), int(Quadrant.BACK_RIGHT))
-    return np.where(ahead, front, back).astype(np.int64)
-
-
-def _bins_of(points_m: NDArray[np.float64], *, bin_m: float) -> NDArray[np.int64]:
-    """The bins (P,) of the distances of points (P, 2); what is further than 72 m counts as 72."""
+def _cells_of(
+    points_m: NDArray[np.float64], bin_m: float
+) -> tuple[NDArray[np.bool_], NDArray[np.bool_], NDArray[np.float64]]:
+    """Return which points (P, 2) are ahead, which to the left, and their bins up to 72 m, (P,)."""
     away_m = np.minimum(np.hypot(points_m[:, 0], points_m[:, 1]), FURTHEST_M)
-    return np.asarray(away_m // bin_m, dtype=np.int64)
+    return points_m[:, 0] > 0.0, points_m[:, 1] > _LEFT_FROM_M, away_m // bin_m
 
 
 def _direction_of(heading_rad: float) -> Direction:
@@ -133,7 +115,10 @@ def place(
         CannotPlace: Something that is no vehicle is asked for, the rule placer
             refuses the intent, or no place is left.
     """
-    _refuse_others(intent)
+    for request in () if intent is None else intent.requests:
+        is_other = isinstance(request, VehicleRequest) and request.body in _NO_VEHICLES
+        if is_other or isinstance(request, WalkRequest | ConesRequest):
+            raise CannotPlace("The code knows vehicles alone, and something else is asked for.")
     right = rule_placer.place(scene, intent, seed=seed).modification
     moved = {agent.id for agent in right.moved}
     standing = [agent for agent in scene.everyone if agent.id not in {*right.removed, *moved}]
@@ -143,9 +128,8 @@ def place(
     notes = []
     for agent in right.changed:
         code = code_of(agent, bin_m=bin_m)
-        allowed, relaxed = places.allowed_by(code, bin_m=bin_m)
-        drawn = places.draw(code, allowed, [*standing, *added], rng)
-        notes.append(f"{agent.id}: {code.words(bin_m)}{relaxed}.")
+        drawn = places.draw(code, bin_m, [*standing, *added], rng)
+        notes.append(f"{agent.id}: {code.words(bin_m)}.")
         if drawn is None:
             notes.append(f"{agent.id} is left out: no place was free.")
         else:
@@ -158,18 +142,6 @@ def place(
         moved=tuple(agent for agent in added if agent.id in moved),
     )
     return rule_placer.Placement(modification=changes, notes=" ".join(notes))
-
-
-def _refuse_others(intent: Intent | None) -> None:
-    requests = () if intent is None else intent.requests
-    kinds = {type(request) for request in requests}
-    bodies = {request.body for request in requests if isinstance(request, VehicleRequest)}
-    asked = [name for kind, name in _UNKNOWN.items() if kind in kinds]
-    asked += [f"{body}s" for body in _NO_VEHICLES if body in bodies]
-    if asked:
-        raise CannotPlace(
-            f"The code knows vehicles alone, and {' and '.join(asked)} are asked for."
-        )
 
 
 class _Places:
@@ -193,38 +165,11 @@ class _Places:
             raise CannotPlace(f"No lane lies within {FURTHEST_M:g} m of the ego.")
         self._points, self._headings, self._lane_ids = np.vstack(points), headings, ids
 
-    def allowed_by(self, code: Code, *, bin_m: float) -> tuple[NDArray[np.intp], str]:
-        """Indices of the places that a code leaves open, and in words what had to be given up.
-
-        Given up, until some place is left: the side, the direction, both, all but the bin, and in
-        the end the bin, of which the nearest with a lane counts.
-        """
-        bins = _bins_of(self._points, bin_m=bin_m)
-        in_bin = bins == code.distance_bin
-        in_quadrant = _quadrants_of(self._points) == code.quadrant
-        is_front = code.quadrant in (Quadrant.FRONT_LEFT, Quadrant.FRONT_RIGHT)
-        ahead = (self._points[:, 0] > 0.0) == is_front
-        facing = np.array([_direction_of(rad) is code.direction for rad in self._headings])
-        for choice, given_up in (
-            (in_bin & in_quadrant & facing, ""),
-            (in_bin & ahead & facing, ", its side given up"),
-            (in_bin & in_quadrant, ", its direction given up"),
-            (in_bin & ahead, ", its side and direction given up"),
-            (in_bin, ", all but the distance given up"),
-        ):
-            if choice.any():
-                return np.flatnonzero(choice), given_up
-        gaps = np.abs(bins - code.distance_bin)
-        return np.flatnonzero(gaps == gaps.min()), ", only the nearest bin with a lane kept"
-
     def draw(
-        self,
-        code: Code,
-        allowed: NDArray[np.intp],
-        others: Sequence[TrafficAgent],
-        rng: np.random.Generator,
+        self, code: Code, bin_m: float, others: Sequence[TrafficAgent], rng: np.random.Generator
     ) -> TrafficAgent | None:
-        """A vehicle at one of the places, None where every draw met somebody else."""
+        """Return a vehicle at a place of its code, None where every draw met somebody else."""
+        allowed = self._allowed_by(code, bin_m)
         for _ in range(_DRAWS):
             index = int(rng.choice(allowed))
             x_m, y_m = self._points[index].round(3).tolist()
@@ -235,3 +180,20 @@ class _Places:
             if not any(overlap(vehicle.box, other.box).depth_m > 0.0 for other in others):
                 return vehicle
         return None
+
+    def _allowed_by(self, code: Code, bin_m: float) -> NDArray[np.intp]:
+        """Return the indices of the places that a code leaves open.
+
+        Until some place is left, its side is given up, its direction, both, all but the bin, and
+        in the end the bin, of which the nearest with a lane counts.
+        """
+        ahead, left, bins = _cells_of(self._points, bin_m)
+        gaps = np.abs(bins - code.distance_bin)
+        same_end = (gaps == 0) & (ahead == code.is_ahead)
+        in_quadrant = same_end & (left == code.is_left)
+        facing = np.array([_direction_of(rad) is code.direction for rad in self._headings])
+        choices = (in_quadrant & facing, same_end & facing, in_quadrant, same_end)
+        return next(
+            (np.flatnonzero(choice) for choice in choices if choice.any()),
+            np.flatnonzero(gaps == gaps.min()),
+        )

@@ -129,8 +129,8 @@ class _Fitting:
     """
 
     def __init__(self, scene: Scene, route: TurnType, rng: np.random.Generator) -> None:
-        self._place, self._route, self._rng = PlacingGround(scene, route), route, rng
         self._scene, self._ground = scene, Ground.of(scene)
+        self._place, self._route, self._rng = PlacingGround(self._ground, route), route, rng
         self.added: _Agents = ()
 
     def fit(self, request: Request) -> tuple[_Agents, str]:

@@ -18,8 +18,6 @@ GROSS_CRASH_SHARE = 0.20
 CROWD_SHARE = 0.5
 """People stand close, and a pedestrian's box is wider than a pedestrian."""
 SLIGHT_SHARE = 0.05
-SAME_SPOT_SHARE = 0.1
-"""Of the longer box: centres nearer than half a metre for cars, five centimetres for cones."""
 FAR_OFF = 1.7
 """By this factor outside its range a size or speed is no longer unusual but wrong."""
 OVER_LIMIT = 1.5
@@ -91,17 +89,6 @@ def _overlap_severity(one: TrafficAgent, other: TrafficAgent, share: float) -> S
     if share <= fine:
         return Severity.FACT
     return Severity.DOUBTFUL if share <= doubtful else Severity.WRONG
-
-
-def duplicate(situation: ChangedScene) -> Iterator[Finding]:
-    """Wrong for a changed agent whose centre is on that of another agent of its type."""
-    for agent, other in situation.new_pairs():
-        apart_m = math.hypot(agent.x_m - other.x_m, agent.y_m - other.y_m)
-        nearest_m = SAME_SPOT_SHARE * max(agent.length_m, other.length_m)
-        if other.type is agent.type and apart_m < nearest_m:
-            words = "{agents[0]} and {agents[1]} are on the same spot, {apart_m:.2f} m apart."
-            pair = [agent, other]
-            yield find(FindingKind.DUPLICATE, Severity.WRONG, pair, words, apart_m=apart_m)
 
 
 def size(situation: ChangedScene) -> Iterator[Finding]:

@@ -18,7 +18,6 @@ class FaultClass(StrEnum):
 class FindingKind(StrEnum):
     """What was measured; those that begin with `asked` are held against the instruction."""
 
-    LANE_DISTANCE = "lane_distance"
     LANE = "lane"
     LANE_NAMED = "lane_named"
     HEADING = "heading"
@@ -26,7 +25,6 @@ class FindingKind(StrEnum):
     WALK_BLOCKED = "walk_blocked"
     OFF_ROAD = "off_road"
     OVERLAP = "overlap"
-    DUPLICATE = "duplicate"
     SIZE = "size"
     SPEED = "speed"
     ASKED_DISTANCE = "asked_distance"
@@ -47,7 +45,6 @@ class FindingKind(StrEnum):
 
 
 _FAULTS = {
-    FindingKind.LANE_DISTANCE: FaultClass.POSITION,
     FindingKind.LANE: FaultClass.POSITION,
     FindingKind.OFF_ROAD: FaultClass.POSITION,
     FindingKind.ASKED_DISTANCE: FaultClass.POSITION,

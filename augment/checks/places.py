@@ -35,47 +35,25 @@ _STEERED = frozenset({AgentType.VEHICLE, AgentType.BUS, AgentType.BICYCLE})
 _EDGE = frozenset({AgentType.TRAFFIC_CONE, AgentType.BARRIER})
 
 
-def lane_distance(situation: ChangedScene) -> Iterator[Finding]:
-    """A fact for every changed agent on a map that has a lane for the ego."""
+def lane(situation: ChangedScene) -> Iterator[Finding]:
+    """A fact for every changed agent: how far along the ego's lanes it is, and on which lane."""
     route = situation.ground.route
     if route is None:
         return
     for agent in situation.changed:
-        place = route.locate_agent(agent)
-        yield find(
-            FindingKind.LANE_DISTANCE,
-            Severity.FACT,
-            [agent],
-            "{agents[0]} is {ahead_m:.1f} m ahead of the ego along its lanes and {left_m:.1f} m "
-            "left of them.",
-            ahead_m=place.ahead_m,
-            left_m=place.left_m,
-        )
-
-
-def lane(situation: ChangedScene) -> Iterator[Finding]:
-    """A fact for every changed agent: the lane under it, or how far it is off the nearest."""
-    for agent in situation.changed:
-        under = situation.under[agent.id]
-        place = under or situation.nearest[agent.id]
-        if place is None:
-            continue
-        words = "{agents[0]} is {off_m:.1f} m off every lane; the nearest lane is {lanes[0]}."
+        place, under = route.locate_agent(agent), situation.under[agent.id]
+        words = "off every lane"
         if under is not None:
-            words = (
-                "{agents[0]} is on {lanes[0]}, {along_m:.1f} m along it and {left_m:.2f} m left "
-                "of its centre line; the lane is {lane_width_m:.1f} m wide."
-            )
+            words = f"on {{lanes[0]}}, {under.d_m:.2f} m left of its centre line"
         yield find(
             FindingKind.LANE,
             Severity.FACT,
             [agent],
-            words,
-            lanes=(place.lane_id,),
-            along_m=place.s_m,
-            left_m=place.d_m,
-            lane_width_m=place.width_m,
-            off_m=place.off_m,
+            "{agents[0]} is {ahead_m:.1f} m ahead of the ego along its lanes and {left_m:.1f} m "
+            f"left of them, {words}.",
+            lanes=() if under is None else (under.lane_id,),
+            ahead_m=place.ahead_m,
+            left_m=place.left_m,
         )
 
 

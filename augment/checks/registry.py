@@ -21,26 +21,17 @@ from augment.checks.asked_things import (
     asked_type,
     asked_walk,
 )
-from augment.checks.bodies import duplicate, overlap, size, speed, walk_blocked
+from augment.checks.bodies import overlap, size, speed, walk_blocked
 from augment.checks.finding import Finding, FindingKind, Severity
 from augment.checks.ground import ChangedScene, Ground
 from augment.checks.lanes_across import LanesAcross, find_picked, resolve_spots
 from augment.checks.parties import USUAL, Asked, AskedCheck, Party, Tolerances, match_to_requests
-from augment.checks.places import (
-    Check,
-    heading,
-    lane,
-    lane_distance,
-    lane_named,
-    off_road,
-    walk_heading,
-)
+from augment.checks.places import Check, heading, lane, lane_named, off_road, walk_heading
 from augment.scene.entities import Modification, Scene
 from augment.scene.intent import Intent, VehicleRequest
 
 CHECKS: tuple[Check, ...] = (
-    *(lane_distance, lane, lane_named, heading, walk_heading, walk_blocked),
-    *(off_road, overlap, duplicate, size, speed),
+    *(lane, lane_named, heading, walk_heading, walk_blocked, off_road, overlap, size, speed),
 )
 ASKED_CHECKS: tuple[AskedCheck, ...] = (
     *(asked_count, asked_type, asked_distance, asked_across, asked_heading, asked_crash),

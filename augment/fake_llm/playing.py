@@ -59,9 +59,6 @@ class Character:
         bend: What becomes of a right modification, given the task and what was heard.
         spoil: What becomes of a modifier's finished answer.
         judge: What a reviewer finds.
-        ratings: What a reviewer rates, by whether there are problems.
-        verdicts: What an engineer decides, by the same.
-        first_calls: Calls that come before the right ones.
         never_stops: Whether it calls as long as it may, and longer.
     """
 
@@ -69,9 +66,6 @@ class Character:
     bend: Callable[[Task, Modification, Heard], Modification] = lambda task, right, _: right
     spoil: Callable[[Task, str, Heard], str] = lambda task, text, _: text
     judge: Callable[[Task], list[Problem]] = lambda task: problems_of(task)
-    ratings: tuple[Sequence[object], Sequence[object]] = ((5, 5, 5), (2, 3, 2))
-    verdicts: tuple[str, str] = ("accept", "feedback")
-    first_calls: Calls = ()
     never_stops: bool = False
 
     def answer(self, request: ChatRequest, intents: Intents = knows_nothing) -> Answer:
@@ -90,10 +84,10 @@ class Character:
         if heard.role is ModelRole.MODIFIER:
             return self._modify(task, heard)
         if heard.role is ModelRole.REVIEWER:
-            return self._rate(self.judge(task)), ()
+            return _rate(self.judge(task)), ()
         if any(message.role == "assistant" for message in request.messages):
             problems = self.judge(task)
-            block = {"verdict": self.verdicts[bool(problems)], "feedback": problems}
+            block = {"verdict": "feedback" if problems else "accept", "feedback": problems}
             return _fenced("I have weighed the answers.", block), ()
         names = list(list_of(task.prompt, "Added agents"))[:6]
         questions = [f"In which lane does {name} stand?" for name in names]
@@ -103,35 +97,34 @@ class Character:
 
     def _modify(self, task: Task, heard: Heard) -> Answer:
         if self.never_stops and (heard.may_call or heard.called):
-            return _call(heard, _named([{"lane": "Lane1", "start": "lane", "distance_m": 1.0}]))
-        if self.first_calls and heard.may_call and not heard.called:
-            return _call(heard, self.first_calls)
+            return _call(heard, [{"lane": "Lane1", "start": "lane", "distance_m": 1.0}])
         try:
             right = _placed(task, self.hear(task, heard))
         except CannotPlace as refused:
-            return _write_refusal(task, UNKNOWN if task.intent is None else refused.reason), ()
+            reason = UNKNOWN if task.intent is None else refused.reason
+            return _write_answer(task, Modification(), f"I did not understand it: {reason}"), ()
         numbered = (
             replace(agent, id=f"Agent{task.first_new + number}")
             for number, agent in enumerate(right.added)
         )
         placed = self.bend(task, replace(right, added=tuple(numbered)), heard)
         wanted = _calls_for(task.scene, placed)
-        spared = len(self.first_calls)
-        if heard.may_call and wanted and len(heard.results) <= spared:
-            return _call(heard, wanted[: _MOST_CALLS - spared])
-        placed = _with_results(task.scene, placed, heard.results[spared:])
+        if heard.may_call and wanted and not heard.results:
+            return _call(heard, wanted)
+        placed = _with_results(task.scene, placed, heard.results)
         return self.spoil(task, _write_answer(task, placed), heard), ()
 
-    def _rate(self, problems: list[Problem]) -> str:
-        ratings = dict(zip(_RATINGS, self.ratings[bool(problems)], strict=True))
-        found = "; ".join(problem["problem"] for problem in problems)
-        return _fenced(
-            "Summary: A road with the ego on it, and what the user wished for.\n\n"
-            "Questions:\n1. Is everything where it was wished for?\n\n"
-            f"Answers:\n1. {found or 'Nothing is to be corrected.'}\n\nRatings: See below.\n\n"
-            "Review:",
-            {"ratings": ratings, "feedback": problems},
-        )
+
+def _rate(problems: list[Problem]) -> str:
+    found = "; ".join(problem["problem"] for problem in problems)
+    ratings = dict(zip(_RATINGS, (2, 3, 2) if problems else (5, 5, 5), strict=True))
+    return _fenced(
+        "Summary: A road with the ego on it, and what the user wished for.\n\n"
+        "Questions:\n1. Is everything where it was wished for?\n\n"
+        f"Answers:\n1. {found or 'Nothing is to be corrected.'}\n\nRatings: See below.\n\n"
+        "Review:",
+        {"ratings": ratings, "feedback": problems},
+    )
 
 
 def problems_of(task: Task) -> list[Problem]:
@@ -161,11 +154,10 @@ def problems_of(task: Task) -> list[Problem]:
 # --- Answers -----------------------------------------------------------------------------------
 
 
-def _write_answer(task: Task, modification: Modification) -> str:
+def _write_answer(task: Task, modification: Modification, remark: str = "") -> str:
     """Write the paper's five sections around a modification."""
     steps = [
-        f"Step {number}: {agent.id} is at ({agent.x_m:.2f}, {agent.y_m:.2f}), "
-        f"{math.hypot(agent.x_m, agent.y_m):.2f} m from the ego; the heading is "
+        f"Step {number}: {agent.id} is at ({agent.x_m:.2f}, {agent.y_m:.2f}); the heading is "
         f"{agent.heading_rad:.3f} rad."
         for number, agent in enumerate(modification.changed, start=1)
     ]
@@ -173,64 +165,31 @@ def _write_answer(task: Task, modification: Modification) -> str:
     named += [("move", agent.id) for agent in modification.moved]
     named += [("remove", name) for name in modification.removed]
     changes = [{"Action": action, "Modified_Agent": name} for action, name in named]
-    return _sections(
-        insights=_road(task.scene),
-        summary=f"The user wants: {' '.join(task.instruction.split())}",
-        changes=json.dumps(changes),
-        calculations="\n".join(steps) or "Nothing is to be computed.",
-        modification=modification,
-    )
-
-
-def _write_refusal(task: Task, reason: str) -> str:
-    """Write an honest answer to what was not understood: readable, and nothing changes."""
-    return _sections(
-        insights=f"{_road(task.scene)} I did not understand the instruction: {reason}",
-        summary="The instruction is not clear to me, so I leave the scene as it is.",
-        changes="none",
-        calculations="none",
-        modification=Modification(),
-    )
-
-
-def _sections(
-    *, insights: str, summary: str, changes: str, calculations: str, modification: Modification
-) -> str:
+    scene = task.scene
     block = {
         "add": [_fields(agent) for agent in modification.added],
         "move": [_fields(agent) for agent in modification.moved],
         "remove": list(modification.removed),
     }
+    insights = (
+        f"The scene has {len(scene.lanes)} lanes and {len(scene.connectors)} connectors; besides "
+        f"the ego there are {len(scene.agents)} agents. {remark}"
+    )
     return (
-        f"Insights: {insights}\n\nSummary: {summary}\n\nModification Dict: {changes}\n\n"
-        f"Modification Calculations:\n{calculations}\n\n"
+        f"Insights: {insights.strip()}\n\n"
+        f"Summary: The user wants: {' '.join(task.instruction.split())}\n\n"
+        f"Modification Dict: {json.dumps(changes) if changes else 'none'}\n\n"
+        f"Modification Calculations:\n{chr(10).join(steps) or 'none'}\n\n"
         f"Modified Vectors:\n```json\n{json.dumps(block, indent=1)}\n```\n"
     )
 
 
-def _road(scene: Scene) -> str:
-    ways = len(scene.connectors)
-    ego_lane = LaneGraph(scene).under(0.0, 0.0, 0.0) or "no lane"
-    crossing = f" and {ways} lane connectors" if ways else ", no intersection"
-    return (
-        f"The scene has {len(scene.lanes)} lanes{crossing}; the ego is on {ego_lane} and drives "
-        f"eastwards. Traffic keeps {scene.traffic_side.value}. "
-        f"Besides the ego there are {len(scene.agents)} agents."
-    )
-
-
 def _fields(agent: TrafficAgent) -> dict[str, object]:
-    fields: dict[str, object] = {
-        "id": agent.id,
-        "type": agent.type.value,
-        "x_m": round(agent.x_m, 3),
-        "y_m": round(agent.y_m, 3),
-        "heading_rad": round(agent.heading_rad, 4),
-        "width_m": round(agent.width_m, 3),
-        "length_m": round(agent.length_m, 3),
-        "speed_mps": round(agent.speed_mps, 3),
-        "lane": agent.lane_id,
-    }
+    numbers = ("x_m", "y_m", "heading_rad", "width_m", "length_m", "speed_mps")
+    fields: dict[str, object] = {"id": agent.id, "type": agent.type.value}
+    for name in numbers:
+        fields[name] = round(getattr(agent, name), 4 if name == "heading_rad" else 3)
+    fields["lane"] = agent.lane_id
     if agent.type is AgentType.PEDESTRIAN and agent.walk_to_m is not None:
         fields["walk_to"] = [round(value, 3) for value in agent.walk_to_m]
     return fields
@@ -288,21 +247,16 @@ def _distance_m(one: TrafficAgent, other: TrafficAgent) -> float:
 # --- Calls of the function ---------------------------------------------------------------------
 
 
-def _call(heard: Heard, calls: Calls) -> Answer:
+def _call(heard: Heard, wanted: Sequence[dict[str, object]]) -> Answer:
+    calls = [(TOOL, json.dumps(arguments)) for arguments in wanted]
     if heard.is_native:
-        return "", calls
-    lines = "\n".join(
-        f'{{"call": {json.dumps(name)}, "arguments": {arguments}}}' for name, arguments in calls
-    )
-    return f"I look up the places that I need.\n\n{lines}", ()
+        return "", tuple(calls)
+    lines = [f'{{"call": "{name}", "arguments": {arguments}}}' for name, arguments in calls]
+    return "\n".join(["I look up the places that I need.\n", *lines]), ()
 
 
-def _named(wanted: Sequence[dict[str, object]]) -> Calls:
-    return tuple((TOOL, json.dumps(arguments)) for arguments in wanted)
-
-
-def _calls_for(scene: Scene, modification: Modification) -> Calls:
-    """Return one call for each of the first added agents, in their order."""
+def _calls_for(scene: Scene, modification: Modification) -> list[dict[str, object]]:
+    """Return the arguments of a call for each of the first added agents, in their order."""
     graph, ego = LaneGraph(scene), scene.ego
     wanted: list[dict[str, object]] = []
     for agent in modification.added[:_MOST_CALLS]:
@@ -324,7 +278,7 @@ def _calls_for(scene: Scene, modification: Modification) -> Calls:
                 "object": agent.type.value,
             }
         )
-    return _named(wanted)
+    return wanted
 
 
 def _with_results(
@@ -393,12 +347,4 @@ GOOD = Character()
 CARELESS = Character(hear=_mishear, bend=_bend, spoil=_mumble, judge=_overlook)
 LEARNING = Character(bend=_learn)
 STUBBORN = Character(bend=lambda task, right, _: careless.too_far(task.scene, right))
-NONNUMERIC = Character(ratings=(("four",) * 3, ("four",) * 3), verdicts=("perhaps", "perhaps"))
 LOOPING = Character(never_stops=True)
-MISNAMING = Character(first_calls=(("nearest_lane", '{"x_m": 20.0, "y_m": 0.0}'),))
-MISCALLING = Character(
-    first_calls=(
-        (TOOL, '{"lane": "Lane1", "start": "lane"'),
-        (TOOL, '{"lane": "Lane1", "start": "lane", "distance_m": "ten metres"}'),
-    )
-)

@@ -1,7 +1,7 @@
 """The stand-in's HTTP server and its models, whose names choose the behaviour.
 
-`fake-good` and `fake-careless` play every role; `fake-qa-...` are wrong at first, for ever, or
-review without ratings; three use their function wrongly; each of the others breaks in one way
+`fake-good` and `fake-careless` play every role; `fake-qa-...` are wrong at first or
+for ever; `fake-tool-loop` calls without end; each of the others breaks in one way
 that real servers do. It also answers the tiny questions of a probe.
 """
 
@@ -270,11 +270,6 @@ def _too_many(retry_after: str) -> Behaviour:
     return _always(error(429, message, kind="requests", code=code, headers=headers))
 
 
-def _spoilt_block(fields: str) -> Behaviour:
-    agent = f'{{"id": "Agent2", "type": "VEHICLE", {fields}}}'
-    return _complete(f'Modified Vectors:\n```json\n{{"add": [{agent}]}}\n```\n')
-
-
 _500 = _always(error(500, "The server had an error.", kind="server_error"))
 _QUOTA, _TOO_LONG = "insufficient_quota", "context_length_exceeded"
 _LIST_ERROR = {"error": {"code": 400, "message": "Invalid value.", "status": "INVALID_ARGUMENT"}}
@@ -284,10 +279,7 @@ MODELS: dict[str, Behaviour] = {
     "fake-careless": _as(playing.CARELESS),
     "fake-qa-low": _as(playing.LEARNING),
     "fake-qa-never": _as(playing.STUBBORN),
-    "fake-qa-nonnumeric": _as(playing.NONNUMERIC),
     "fake-tool-loop": _as(playing.LOOPING),
-    "fake-unknown-tool": _as(playing.MISNAMING),
-    "fake-bad-tool-args": _as(playing.MISCALLING),
     "fake-garbage": _garbage,
     "fake-no-vision": _no_vision,
     "fake-cuts-context": _cuts_context,
@@ -311,7 +303,6 @@ MODELS: dict[str, Behaviour] = {
     "fake-broken-json": _good_but(_halved),
     "fake-dropped": _good_but(_dropped),
     "fake-no-choices": _complete("", {"choices": []}),
-    "fake-null-choices": _complete("", {"choices": None}),
     "fake-no-usage": _good_but(_without_usage),
     "fake-refuse": _complete(None, refusal="I can't help with that."),
     "fake-filtered": _complete(None, finish_reason="content_filter"),
@@ -319,6 +310,4 @@ MODELS: dict[str, Behaviour] = {
         "The car should stand some way ahead of the ego, a little to the side of its lane."
     ),
     "fake-cut-off": _cut_off,
-    "fake-nan": _spoilt_block('"x_m": NaN'),
-    "fake-too-few": _spoilt_block('"x_m": 20.0'),
 }

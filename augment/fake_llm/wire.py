@@ -156,14 +156,13 @@ def chat_request(body: bytes) -> ChatRequest:
         raise BadRequest(f"{path}: {first['msg']}", path) from None
     _check_turns(request)
     has_calls = any(message.tool_calls for message in request.messages)
-    faults = {
-        "messages": request.messages[-1].role not in ("user", "tool"),
-        "tools": request.tools is not None and request.response_format is not None,
-        "tool_choice": request.tools is None and (request.tool_choice is not None or has_calls),
-    }
-    for param, is_wrong in faults.items():
-        if is_wrong:
-            raise BadRequest(f"{param} can't be so in this request", param)
+    _refuse(
+        {
+            "messages": request.messages[-1].role not in ("user", "tool"),
+            "tools": request.tools is not None and request.response_format is not None,
+            "tool_choice": request.tools is None and (bool(request.tool_choice) or has_calls),
+        }
+    )
     return request
 
 
@@ -173,7 +172,6 @@ def completion(
     *,
     finish_reason: str = "stop",
     refusal: str | None = None,
-    with_usage: bool = True,
     calls: Calls = (),
 ) -> dict[str, Any]:
     """Return a chat completion; the same request and text give the same document."""
@@ -185,16 +183,14 @@ def completion(
             _signed(f"{digest}:{number}", *call) for number, call in enumerate(calls)
         ]
     choice = {"index": 0, "message": message, "finish_reason": finish_reason, "logprobs": None}
-    document: dict[str, Any] = {
+    return {
         "id": f"chatcmpl-{digest[:24]}",
         "object": "chat.completion",
         "created": 0,
         "model": request.model,
         "choices": [choice],
+        "usage": usage(prompt_tokens_of(request), 1 + _tokens(text or refusal or "")),
     }
-    if with_usage:
-        document["usage"] = usage(prompt_tokens_of(request), 1 + _tokens(text or refusal or ""))
-    return document
 
 
 def usage(prompt_tokens: int, completion_tokens: int) -> dict[str, int]:
@@ -233,13 +229,20 @@ def error(
 # Private
 
 
+def _refuse(faults: Mapping[str, bool], at: str = "") -> None:
+    for name, is_wrong in faults.items():
+        if is_wrong:
+            raise BadRequest(f"{at}{name} can't be so in this request", f"{at}{name}")
+
+
 def _check_turns(request: ChatRequest) -> None:
     """Check each turn, and that every call is answered once, right behind it, as it was made."""
     open_calls: list[str] = []
     for index, message in enumerate(request.messages):
         is_tool, calls = message.role == "tool", message.tool_calls or []
+        has_text = bool(message.text.strip())
         faults = {
-            "content": (not message.text.strip() and not calls)
+            "content": not (has_text or calls)
             or (message.role != "user" and isinstance(message.content, list)),
             "role": bool(open_calls) and not is_tool,
             "tool_calls": bool(calls and message.role != "assistant")
@@ -247,14 +250,11 @@ def _check_turns(request: ChatRequest) -> None:
             "tool_call_id": is_tool != (message.tool_call_id is not None)
             or (is_tool and message.tool_call_id not in open_calls),
         }
-        for name, is_wrong in faults.items():
-            if is_wrong:
-                raise BadRequest(f"{name} of message {index} is wrong", f"messages.{index}.{name}")
+        _refuse(faults, f"messages.{index}.")
         if is_tool:
             open_calls.remove(str(message.tool_call_id))
         open_calls += [call["id"] for call in calls]
-    if open_calls:
-        raise BadRequest(f"the call {open_calls[0]!r} is not answered", "messages")
+    _refuse({"messages": bool(open_calls)})
 
 
 def _signed(seed: str, name: str, arguments: str) -> dict[str, object]:

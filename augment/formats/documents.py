@@ -62,7 +62,11 @@ def read_json(file: Path, *, what: str) -> object:
         InvalidDocument: No such file, too large, no JSON, a name twice in one object, or a text
             that no database takes.
     """
-    block = _read_bytes(file, what, MAX_BYTES)
+    return parse_json(_read_bytes(file, what, MAX_BYTES), what=what, place=file.name)
+
+
+def parse_json(block: bytes, *, what: str, place: str) -> object:
+    """Return what JSON in UTF-8 holds; a fault names the place. Raises as `read_json`."""
     try:
         # Brackets and commas within texts count too.
         if block.count(b"{") + block.count(b"[") > MOST_PARTS:
@@ -73,9 +77,9 @@ def read_json(file: Path, *, what: str) -> object:
         _check_texts(value)
         return value
     except RecursionError:
-        raise InvalidDocument(what, [(file.name, "is nested too deeply")]) from None
+        raise InvalidDocument(what, [(place, "is nested too deeply")]) from None
     except ValueError as fault:  # not JSON, not UTF-8, or a number of thousands of digits
-        raise InvalidDocument(what, [(file.name, f"is not JSON: {fault}")]) from None
+        raise InvalidDocument(what, [(place, f"is not JSON: {fault}")]) from None
 
 
 def _build_object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:

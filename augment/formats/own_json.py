@@ -25,8 +25,6 @@ from augment.scene.codec import (
 from augment.scene.motion import MotionSource, Movement
 from augment.scene.recording import Recording, Track
 
-_SEEN = (MotionSource.RECORDED, MotionSource.SIMULATED)
-
 
 class OwnJson(Reader):
     """The reader of a scene document."""
@@ -68,21 +66,23 @@ def _write_one(cell: Cell, report: LossReport) -> dict[str, bytes]:
         "scene": scene_to_document(cell.after),
         "modification": modification_to_document(cell.modification),
     }
-    if cell.recording is not None or cell.drive is not None:
+    if cell.recording is not None:
         documents["recording"] = recording_to_document(_recording(cell))
     return {f"{cell.stem}.{name}.json": _text(one) for name, one in documents.items()}
 
 
 def _recording(cell: Cell) -> Recording:
-    """What was seen, in a log or in a drive; nothing that had to be assumed."""
+    """What was seen in a log; nothing that had to be assumed."""
     motion = cell.motion
     ego = motion.ego.states.copy()
-    if motion.ego.source not in _SEEN:
+    if motion.ego.source is not MotionSource.RECORDED:
         ego[1:] = np.nan  # written as null: nobody recorded it
     return Recording(
         times_s=motion.times_s,
         ego=ego,
-        tracks=tuple(_track(other) for other in motion.others if other.source in _SEEN),
+        tracks=tuple(
+            _track(other) for other in motion.others if other.source is MotionSource.RECORDED
+        ),
     )
 
 

@@ -42,7 +42,6 @@ class Cell:
         stem: The name of its files, without an ending.
         made_on: When the change was made, for formats that ask for a date.
         recording: What was recorded after t0, None where nothing was.
-        drive: A simulated drive, which then says what everybody does instead of the recording.
         source: Where the scenario comes from in nuPlan and interPlan, None where it does not.
     """
 
@@ -54,7 +53,6 @@ class Cell:
     stem: str = "scenario"
     made_on: date = date(1970, 1, 1)
     recording: Recording | None = None
-    drive: Motion | None = None
     source: InterplanSource | None = None
 
     @cached_property
@@ -69,8 +67,6 @@ class Cell:
     @cached_property
     def motion(self) -> Motion:
         """What everybody does after t0."""
-        if self.drive is not None:
-            return self.drive
         moved = [agent.id for agent in self.modification.moved]
         return motion_of(
             self.after,
@@ -201,7 +197,7 @@ def report_motion(cell: Cell, report: LossReport, *, can_trigger: bool = False) 
         report.lose("the ego was not recorded; it is let hold its speed along its lane")
     elif motion.ego.source is MotionSource.STANDING:
         report.lose("the ego was not recorded; it stands, as it does at t0")
-    elif cell.drive is None and cell.recording is not None:
+    elif cell.recording is not None:
         unseen = ~cell.recording.ego_is_seen
         if unseen.any():
             report.lose(
@@ -211,8 +207,6 @@ def report_motion(cell: Cell, report: LossReport, *, can_trigger: bool = False) 
     names = [other.agent.id for other in motion.others if other.source is MotionSource.HELD_SPEED]
     report.lose_of(names, "not recorded; let hold the speed of t0 along the lane, or straight on")
     walkers = [other for other in motion.others if other.agent.walk_to_m is not None]
-    if cell.drive is not None:
-        return
     names = [walker.agent.id for walker in walkers if walker.stands]
     report.lose_of(
         names,

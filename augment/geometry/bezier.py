@@ -112,19 +112,6 @@ class CubicBezier:
         return np.concatenate([[0.0], np.cumsum(steps)])
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class FitError:
-    """How far a curve is from the line that it stands for, at its worst place.
-
-    Attributes:
-        position_m: Between the places at the same part of the way.
-        heading_rad: Against the line's chord of `CHORD_REACH_M` either way, where it is that long.
-    """
-
-    position_m: float
-    heading_rad: float
-
-
 def fit(
     line: Polyline, *, start_rad: float | None = None, end_rad: float | None = None
 ) -> CubicBezier:
@@ -154,8 +141,11 @@ def fit(
 
 def fit_error(
     curve: CubicBezier, line: Polyline, start_m: float = 0.0, end_m: float | None = None
-) -> FitError:
-    """Return how far the curve is from the line between two stations, at 600 places at most.
+) -> tuple[float, float]:
+    """Return how far the curve is from the line between two stations, in place and in heading.
+
+    The worst of 600 places at most counts, and its turn against the line's chord of
+    `CHORD_REACH_M` either way, where the line is that long.
 
     The same part of the way is compared with the same part: a curve that has the right shape but
     runs ahead of its line is wrong by that much.
@@ -169,10 +159,7 @@ def fit_error(
     inner = (stations >= CHORD_REACH_M) & (stations <= line.length_m - CHORD_REACH_M)
     turns = curve.headings(t[inner]) - chord_headings(line, stations[inner])
     turns = np.abs(np.remainder(turns + math.pi, 2.0 * math.pi) - math.pi)
-    return FitError(
-        position_m=float(np.hypot(gaps[:, 0], gaps[:, 1]).max()),
-        heading_rad=float(turns.max(initial=0.0)),
-    )
+    return float(np.hypot(gaps[:, 0], gaps[:, 1]).max()), float(turns.max(initial=0.0))
 
 
 def chord_headings(line: Polyline, stations_m: FloatArray) -> FloatArray:

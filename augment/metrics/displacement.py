@@ -91,7 +91,8 @@ def displacement(generated: Modification | None, reference: Modification) -> Dis
             [agent for agent in listed if CLASS_OF[agent.type] is object_class]
             for listed in (reference.changed, placed)
         )
-        matches += _matched(wanted, agents, object_class)
+        if wanted and agents:
+            matches += _matched(wanted, agents, object_class)
     taken = {match.reference for match in matches}
     used = {match.generated for match in matches}
     return Displacement(
@@ -106,8 +107,6 @@ def _matched(
 ) -> list[Match]:
     from scipy.optimize import linear_sum_assignment
 
-    if not wanted or not found:
-        return []
     apart_m = np.hypot(
         np.subtract.outer([one.x_m for one in wanted], [one.x_m for one in found]),
         np.subtract.outer([one.y_m for one in wanted], [one.y_m for one in found]),
@@ -173,13 +172,7 @@ def summarise(displacements: Sequence[Displacement]) -> Summary:
 
 
 def box_of(values_m: Sequence[float]) -> BoxSummary:
-    """The box of at least one value.
-
-    Raises:
-        ValueError: There is no value.
-    """
-    if not values_m:
-        raise ValueError("a box needs at least one value")
+    """Return the box of at least one value."""
     values = np.sort(np.asarray(values_m, dtype=float))
     q1, median, q3 = (float(one) for one in np.percentile(values, (25.0, 50.0, 75.0)))
     reach = WHISKER * (q3 - q1)
@@ -203,44 +196,37 @@ _SHOWN_S = 1.0
 """A picture shows the motion of so much time as an arrow."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Likeness:
-    """Up to which difference two objects look the same, the limits included."""
-
-    distance_m: float = 0.15
-    heading_rad: float = math.radians(2.0)
+_ALIKE_M, _ALIKE_RAD = 0.15, math.radians(2.0)
+"""Up to which differences two objects look the same, the limits included."""
 
 
-def are_alike(one: Modification, other: Modification, within: Likeness | None = None) -> bool:
-    """Whether every object of either change has a counterpart in the other within a tolerance.
+def are_alike(one: Modification, other: Modification) -> bool:
+    """Return whether every object of either change has a counterpart that looks the same.
 
     Place, size, end of a walk and motion in a second are held against the distance. What is
     moved and what is removed must be the same.
     """
-    limits = within or Likeness()
     moved = [{agent.id: agent for agent in change.moved} for change in (one, other)]
     return (
         set(one.removed) == set(other.removed)
         and moved[0].keys() == moved[1].keys()
-        and all(_look_alike(agent, moved[1][name], limits) for name, agent in moved[0].items())
-        and _all_matched(list(one.added), list(other.added), limits)
+        and all(_look_alike(agent, moved[1][name]) for name, agent in moved[0].items())
+        and _all_matched(one.added, other.added)
     )
 
 
-def _all_matched(one: list[TrafficAgent], other: list[TrafficAgent], limits: Likeness) -> bool:
-    """Whether a one-to-one matching within the tolerance exists."""
+def _all_matched(one: Sequence[TrafficAgent], other: Sequence[TrafficAgent]) -> bool:
+    """Return whether a one-to-one matching of objects that look alike exists."""
     from scipy.optimize import linear_sum_assignment
 
     if len(one) != len(other):
         return False
-    apart = np.array([[not _look_alike(a, b, limits) for b in other] for a in one]).reshape(
-        len(one), len(other)
-    )
-    rows, columns = linear_sum_assignment(apart)
-    return not apart[rows, columns].any()
+    apart = np.array([[not _look_alike(a, b) for b in other] for a in one])
+    rows, columns = linear_sum_assignment(apart.reshape(len(one), len(other)))
+    return not apart.reshape(len(one), len(other))[rows, columns].any()
 
 
-def _look_alike(one: TrafficAgent, other: TrafficAgent, limits: Likeness) -> bool:
+def _look_alike(one: TrafficAgent, other: TrafficAgent) -> bool:
     if one.type is not other.type or (one.walk_to_m is None) != (other.walk_to_m is None):
         return False
     gaps_m = [
@@ -251,5 +237,5 @@ def _look_alike(one: TrafficAgent, other: TrafficAgent, limits: Likeness) -> boo
     ]
     if one.walk_to_m is not None and other.walk_to_m is not None:
         gaps_m.append(math.dist(one.walk_to_m, other.walk_to_m))
-    turn = 0.0 if one.type in _UPRIGHT else abs(difference(one.heading_rad, other.heading_rad))
-    return max(gaps_m) <= limits.distance_m + 1e-9 and turn <= limits.heading_rad + 1e-9
+    turn_rad = 0.0 if one.type in _UPRIGHT else difference(one.heading_rad, other.heading_rad)
+    return max(gaps_m) <= _ALIKE_M + 1e-9 and abs(turn_rad) <= _ALIKE_RAD + 1e-9

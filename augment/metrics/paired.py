@@ -5,6 +5,7 @@ samples of one cell. Values in metres.
 """
 
 import math
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
@@ -60,12 +61,37 @@ def compare_all(
     comparisons = []
     for (first, second), stream in zip(pairs, streams, strict=True):
         shared = sorted(values[first].keys() & values[second].keys())
-        if shared:
-            differences = np.array([values[first][one] - values[second][one] for one in shared])
-            rng = np.random.default_rng(stream)
-            comparisons.append(_compared(first, second, differences, rng, rounds))
+        if not shared:
+            continue
+        differences = np.array([values[first][one] - values[second][one] for one in shared])
+        low_m, high_m = _interval(differences, np.random.default_rng(stream), rounds)
+        comparisons.append(
+            PairedComparison(
+                first=first,
+                second=second,
+                scenarios=len(shared),
+                median_m=float(np.median(differences)),
+                low_m=low_m,
+                high_m=high_m,
+                p=find_p_by_signed_ranks(differences),
+            )
+        )
     adjusted = adjust_holm([one.p for one in comparisons])
     return tuple(replace(one, p_holm=p) for one, p in zip(comparisons, adjusted, strict=True))
+
+
+def _interval(
+    differences: NDArray[np.float64], rng: np.random.Generator, rounds: int
+) -> tuple[float, float]:
+    """Return the percentile interval of the median over resampled differences."""
+    n, tail = len(differences), 100.0 * (1.0 - LEVEL) / 2.0
+    medians = [
+        np.median(differences[rng.integers(0, n, size=(size, n))], axis=1)
+        for begin in range(0, rounds, _ROUNDS_AT_ONCE)
+        for size in [min(_ROUNDS_AT_ONCE, rounds - begin)]
+    ]
+    low, high = np.percentile(np.concatenate(medians), (tail, 100.0 - tail))
+    return float(low), float(high)
 
 
 def adjust_holm(p_values: Sequence[float | None]) -> list[float | None]:
@@ -87,34 +113,6 @@ def find_p_by_signed_ranks(differences: NDArray[np.float64]) -> float | None:
     if len(unequal) < FEWEST_PAIRS:
         return None
     return float(wilcoxon(unequal).pvalue)
-
-
-# Private
-
-
-def _compared(
-    first: str,
-    second: str,
-    differences: NDArray[np.float64],
-    rng: np.random.Generator,
-    rounds: int,
-) -> PairedComparison:
-    n, tail = len(differences), 100.0 * (1.0 - LEVEL) / 2.0
-    medians = [
-        np.median(differences[rng.integers(0, n, size=(size, n))], axis=1)
-        for begin in range(0, rounds, _ROUNDS_AT_ONCE)
-        for size in [min(_ROUNDS_AT_ONCE, rounds - begin)]
-    ]
-    low, high = np.percentile(np.concatenate(medians), (tail, 100.0 - tail))
-    return PairedComparison(
-        first=first,
-        second=second,
-        scenarios=n,
-        median_m=float(np.median(differences)),
-        low_m=float(low),
-        high_m=float(high),
-        p=find_p_by_signed_ranks(differences),
-    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -211,15 +209,11 @@ class RefusalScore:
 
 
 def score_refusals(answers: Iterable[tuple[bool, bool]]) -> RefusalScore:
-    """Count answers.
-
-    Args:
-        answers: Of each whether it was refused, and whether the wish can't be met.
-    """
-    given = list(answers)
+    """Count answers: of each whether it was refused, and whether the wish can't be met."""
+    counts = Counter(answers)
     return RefusalScore(
-        right=given.count((True, True)),
-        wrong=given.count((True, False)),
-        overlooked=given.count((False, True)),
-        rest=given.count((False, False)),
+        right=counts[True, True],
+        wrong=counts[True, False],
+        overlooked=counts[False, True],
+        rest=counts[False, False],
     )

@@ -13,7 +13,7 @@ import json
 import re
 import unicodedata
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from enum import StrEnum
 from functools import cache
 from importlib.resources import files
@@ -150,7 +150,8 @@ def pose_tool() -> Tool:
     return Tool(**json.loads(read_text("pose_on_lane.json"))["function"])
 
 
-def reviewer_messages(
+def review_messages(
+    role: str,
     scene: Scene,
     instruction: str,
     modification: Modification,
@@ -158,31 +159,36 @@ def reviewer_messages(
     radius_m: float,
     earlier: Sequence[str] = (),
 ) -> Messages:
-    """Ask the text reviewer: scene, wish and changed vectors, no reasoning.
+    """Ask the reviewer for ratings, or the engineer for questions to the viewer.
+
+    Both see scene, wish and changed vectors, no reasoning.
 
     Args:
+        role: Which of the two.
         scene: The scene before the change.
         instruction: The user's wish.
         modification: What is reviewed.
         radius_m: How far around the ego the scene is written down.
         earlier: The feedback that the editor was given in earlier rounds.
     """
-    problems = read_text("common_problems.md")
-    told = fill_text("reviewer.md", **_rules(radius_m), problems=problems)
-    return _opening(told, _review_task(scene, instruction, modification, radius_m, earlier))
-
-
-def engineer_messages(
-    scene: Scene,
-    instruction: str,
-    modification: Modification,
-    *,
-    radius_m: float,
-    earlier: Sequence[str] = (),
-) -> Messages:
-    """Ask the engineer for questions to the viewer; arguments as above."""
-    told = fill_text("engineer.md", **_rules(radius_m), drawn=read_text("drawn.md"))
-    return _opening(told, _review_task(scene, instruction, modification, radius_m, earlier))
+    system = fill_text(
+        f"{role}.md",
+        input_format=_input_format(radius_m),
+        distances=read_text("distances_walked.md"),
+        rules=read_text("rules.md"),
+        tolerances=_tolerances(),
+        problems=read_text("common_problems.md"),
+        drawn=read_text("drawn.md"),
+    )
+    quoted = quote("\n".join(earlier))
+    task = fill_text(
+        "review_task.md",
+        scene=scene_text(scene, radius_m=radius_m),
+        quoted=quote(instruction),
+        changes=changes_text(scene, modification),
+        earlier=fill_text("earlier_feedback.md", quoted=quoted) if earlier else "",
+    )
+    return _opening(system, task)
 
 
 def viewer_messages(questions: Sequence[str], pictures: Sequence[bytes]) -> Messages:
@@ -204,21 +210,19 @@ def verdict_messages(
     return (*messages, said_by_user(told))
 
 
-def review_re_ask_messages(messages: Messages, answer: str, problems: Sequence[str]) -> Messages:
+def review_re_ask_messages(
+    messages: Messages, answer: str, problems: Sequence[str], *, text: str = "review_re_ask.md"
+) -> Messages:
     """Return the conversation so far, a reviewer's unreadable answer, and its faults."""
-    asked = fill_text("review_re_ask.md", problems=_listed(problems))
+    asked = fill_text(text, problems=_listed(problems))
     return (*messages, model_message(answer), said_by_user(asked))
-
-
-def viewer_re_ask_messages(messages: Messages, answer: str, problems: Sequence[str]) -> Messages:
-    """Return the viewer's conversation with an answer that answers none of the questions."""
-    return (*messages, model_message(answer), said_by_user(read_text("viewer_re_ask.md")))
 
 
 def reader_messages(instruction: str) -> Messages:
     """Ask the intent reader: the rules with the JSON schema, and the sentence."""
     task = fill_text("reader_task.md", quoted=quote(instruction))
-    return _opening(fill_text("reader.md", schema=_intent_schema()), task)
+    schema = json.dumps(parts_schema(), separators=(",", ":"))
+    return _opening(fill_text("reader.md", schema=schema), task)
 
 
 # Private
@@ -263,46 +267,12 @@ def _input_format(radius_m: float, lanes: LaneFormat = LaneFormat.POLYLINE) -> s
     )
 
 
-def _rules(radius_m: float) -> dict[str, str]:
-    """Return what the editor was told and what is a deviation from it, for every reviewer."""
-    tolerances = fill_text(
-        "tolerances.md",
-        distance_m=f"{USUAL.distance_m:g}",
-        distance_percent=f"{100.0 * USUAL.distance_share:g}",
-        across_m=f"{USUAL.across_m:g}",
-        middle_m=f"{USUAL.middle_m:g}",
-        heading_deg=f"{USUAL.heading_deg:g}",
-        spacing_m=f"{USUAL.spacing_m:g}",
-        spacing_percent=f"{100.0 * USUAL.spacing_share:g}",
-    )
-    return {
-        "input_format": _input_format(radius_m),
-        "distances": read_text("distances_walked.md"),
-        "rules": read_text("rules.md"),
-        "tolerances": tolerances,
-    }
-
-
-def _review_task(
-    scene: Scene,
-    instruction: str,
-    modification: Modification,
-    radius_m: float,
-    earlier: Sequence[str],
-) -> str:
-    told = quote("\n".join(earlier))
-    return fill_text(
-        "review_task.md",
-        scene=scene_text(scene, radius_m=radius_m),
-        quoted=quote(instruction),
-        changes=changes_text(scene, modification),
-        earlier=fill_text("earlier_feedback.md", quoted=told) if earlier else "",
-    )
-
-
-@cache
-def _intent_schema() -> str:
-    return json.dumps(parts_schema(), separators=(",", ":"))
+def _tolerances() -> str:
+    """Tell what is a deviation from the wish."""
+    numbers = {name: f"{value:g}" for name, value in asdict(USUAL).items()}
+    shares = {"distance": USUAL.distance_share, "spacing": USUAL.spacing_share}
+    percent = {f"{name}_percent": f"{100.0 * share:g}" for name, share in shares.items()}
+    return fill_text("tolerances.md", **numbers, **percent)
 
 
 def _listed(entries: Sequence[str]) -> str:

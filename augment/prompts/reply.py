@@ -109,19 +109,16 @@ _Feedback = Annotated[list[Correction], Field(max_length=MOST_FEEDBACK)]
 _Remarks = Annotated[list[_Words], Field(max_length=MOST_FEEDBACK)]
 
 
-class _RatedBlock(Strict):
-    ratings: Ratings
-    feedback: _Feedback
-    remarks: _Remarks = []
-
-
-class RatedReview(_RatedBlock):
+class RatedReview(Strict):
     """What the text reviewer found.
 
     Remarks are too small to be corrected: for the record, nobody is told. So are the reviewer's
     own words, empty where he left them out.
     """
 
+    ratings: Ratings
+    feedback: _Feedback
+    remarks: _Remarks = []
     summary: str = ""
     questions: str = ""
     answers: str = ""
@@ -189,17 +186,13 @@ def read_ratings(answer: str, *, accepted_from: float) -> RatedReview:
             that the modifier could be told.
     """
     document, _ = last_object(answer, frozenset({"ratings", "feedback"}))
-    block = validate(_RatedBlock, document)
-    if block.ratings.mean < accepted_from and not block.feedback:
+    review = validate(RatedReview, document)
+    if review.ratings.mean < accepted_from and not review.feedback:
         rule = f"feedback: must not be empty where the mean rating is below {accepted_from:g}"
         raise ReplyUnreadable([rule])
     parts = _sections(answer, "Summary|Questions|Answers|Ratings|Review")
-    return RatedReview(
-        **dict(block),
-        summary=parts.get("Summary", ""),
-        questions=parts.get("Questions", ""),
-        answers=parts.get("Answers", ""),
-    )
+    heads = ("summary", "questions", "answers")
+    return review.model_copy(update={head: parts.get(head.title(), "") for head in heads})
 
 
 def read_questions(answer: str) -> tuple[str, ...]:

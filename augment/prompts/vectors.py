@@ -26,7 +26,7 @@ from augment.geometry.bezier import CubicBezier, travel_pose
 from augment.geometry.frames import Pose
 from augment.geometry.polyline import Projection
 from augment.prompts.extent import boundary_near, extent_of, shown_spans
-from augment.scene.bezier_lanes import BezierLane, bezier_lane, piece_ids, straight_curve
+from augment.scene.bezier_lanes import LanePiece, bezier_lane, piece_ids, straight_curve
 from augment.scene.entities import (
     Lane,
     Modification,
@@ -108,7 +108,7 @@ class LaneCurve:
     """
 
     id: str
-    lane: BezierLane
+    lane: tuple[LanePiece, ...]
     whole: AnyLane
     begins_m: float
     before: tuple[str, ...] = ()
@@ -122,7 +122,7 @@ class LaneCurve:
     @property
     def length_m(self) -> float:
         """How long the shown part is."""
-        return self.lane.length_m
+        return self.lane[-1].end_m
 
     def pose_at(self, s_m: float, d_m: float = 0.0) -> Pose:
         """Return the place on the recorded centreline at s of the shown part, d to the left."""
@@ -136,7 +136,7 @@ class LaneCurve:
     @property
     def pieces(self) -> tuple[str, ...]:
         """How its pieces are called, in order of travel."""
-        return piece_ids(self.id, len(self.lane.pieces))
+        return piece_ids(self.id, len(self.lane))
 
 
 def lane_curves(scene: Scene, names: ShortNames, radius_m: float) -> dict[str, LaneCurve]:
@@ -166,14 +166,14 @@ def lane_curves(scene: Scene, names: ShortNames, radius_m: float) -> dict[str, L
     }
 
 
-def control_points(lane: BezierLane) -> list[list[list[float]]]:
+def control_points(lane: Iterable[LanePiece]) -> list[list[list[float]]]:
     """Return the control points [x, y] of each piece, to the centimetre, ready for JSON.
 
     Four, or of a straight piece its two ends.
     """
     return [
         np.add(np.round(piece.curve.control_m[:: 3 if piece.is_straight else 1], 2), 0.0).tolist()
-        for piece in lane.pieces
+        for piece in lane
     ]
 
 

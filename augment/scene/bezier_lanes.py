@@ -12,22 +12,14 @@ every part of the program, and no distance is lost or gained at a joint.
 """
 
 import math
-from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache
+from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from augment.geometry.bezier import (
-    CHORD_REACH_M,
-    CubicBezier,
-    FitError,
-    chord_headings,
-    fit,
-    fit_error,
-)
-from augment.geometry.frames import Pose
-from augment.geometry.polyline import Polyline, Projection
+from augment.geometry.bezier import CHORD_REACH_M, CubicBezier, chord_headings, fit, fit_error
+from augment.geometry.polyline import Polyline
 
 SHORTEST_PIECE_M = 1.0
 """Nothing is cut shorter: below it the points of a recorded line are its shape."""
@@ -55,13 +47,8 @@ class Tolerance:
 
     def used_by(self, *pieces: "LanePiece") -> float:
         """Return the largest share that the errors of pieces use up; above 1 it is too large."""
-        return max(
-            max(
-                piece.error.position_m / self.position_m,
-                piece.error.heading_rad / self.heading_rad,
-            )
-            for piece in pieces
-        )
+        limits = (self.position_m, self.heading_rad)
+        return float((np.array([piece.error for piece in pieces]) / limits).max())
 
 
 STRAIGHT = Tolerance().loosened(0.75)
@@ -73,13 +60,14 @@ class LanePiece:
     """One cubic, and from where to where on the lane it leads.
 
     Attributes:
+        error: The worst of the lane's places and headings, in metres and radians.
         is_straight: Whether its two ends say all of it.
     """
 
     curve: CubicBezier
     start_m: float
     end_m: float
-    error: FitError
+    error: tuple[float, float] = (0.0, 0.0)
     is_straight: bool = False
 
     @property
@@ -88,54 +76,8 @@ class LanePiece:
         return self.end_m - self.start_m
 
 
-@dataclass(frozen=True, kw_only=True)
-class BezierLane:
-    """A centreline as pieces that follow each other, read by the verbs of `Polyline`."""
-
-    pieces: tuple[LanePiece, ...]
-
-    @property
-    def length_m(self) -> float:
-        """The arc length of the source centreline."""
-        return self.pieces[-1].end_m
-
-    @cached_property
-    def error(self) -> FitError:
-        """The worst error of all pieces."""
-        return FitError(
-            position_m=max(piece.error.position_m for piece in self.pieces),
-            heading_rad=max(piece.error.heading_rad for piece in self.pieces),
-        )
-
-    def pose_at(self, s_m: float, d_m: float = 0.0) -> Pose:
-        """Return position and direction of travel at s, d to the left; the ends go straight on."""
-        piece = self.pieces[self.piece_at(s_m)]
-        own_m = (s_m - piece.start_m) * piece.curve.length_m / piece.length_m
-        return piece.curve.pose_at(own_m, d_m)
-
-    def position(self, s_m: float, d_m: float = 0.0) -> tuple[float, float]:
-        """Return the point s along the lane and d to its left."""
-        pose = self.pose_at(s_m, d_m)
-        return pose.x_m, pose.y_m
-
-    def heading_at(self, s_m: float) -> float:
-        """Return the direction of travel at s, in (-pi, pi]."""
-        return self.pose_at(s_m).heading_rad
-
-    def project(self, x_m: float, y_m: float) -> Projection:
-        """Return the nearest place on the lane; of equally near ones the first."""
-        projections = [(piece, piece.curve.project(x_m, y_m)) for piece in self.pieces]
-        piece, place = min(projections, key=lambda item: item[1].distance_m)
-        s_m = piece.start_m + place.s_m * piece.length_m / piece.curve.length_m
-        return replace(place, s_m=s_m)
-
-    def piece_at(self, s_m: float) -> int:
-        """Return the number of the piece at s; a joint belongs to the piece that begins there."""
-        return max(0, sum(piece.start_m <= s_m for piece in self.pieces) - 1)
-
-
 @lru_cache(maxsize=4096)
-def bezier_lane(line: Polyline, tolerance: Tolerance | None = None) -> BezierLane:
+def bezier_lane(line: Polyline, tolerance: Tolerance | None = None) -> tuple[LanePiece, ...]:
     """Return pieces within the tolerance; a piece that is not is cut where that helps most.
 
     Pieces share their heading at a joint as long as that keeps to the tolerance; where a lane
@@ -146,7 +88,7 @@ def bezier_lane(line: Polyline, tolerance: Tolerance | None = None) -> BezierLan
     lanes in every augmentation of a scene: what was fitted lately is remembered.
     """
     allowed = tolerance or Tolerance()
-    return BezierLane(pieces=tuple(_cut(line, (0.0, line.length_m), allowed)))
+    return tuple(_cut(line, (0.0, line.length_m), allowed))
 
 
 def straight_curve(start_m: ArrayLike, end_m: ArrayLike) -> CubicBezier:
@@ -180,7 +122,7 @@ def _cut(line: Polyline, span: _Span, allowed: Tolerance) -> list[LanePiece]:
     if allowed.used_by(whole) <= 1.0 or whole.length_m < 2.0 * SHORTEST_PIECE_M:
         return [whole]
     halves = _best_halves(line, span, allowed)
-    strays = whole.error.position_m > allowed.position_m
+    strays = whole.error[0] > allowed.position_m
     if not strays and allowed.used_by(*halves) >= allowed.used_by(whole):
         return [whole]
     return [piece for half in halves for piece in _cut(line, (half.start_m, half.end_m), allowed)]
@@ -193,7 +135,7 @@ def _best_halves(line: Polyline, span: _Span, allowed: Tolerance) -> tuple[LaneP
     """
 
     def badness(halves: tuple[LanePiece, LanePiece]) -> tuple[bool, float]:
-        strays = any(half.error.position_m > allowed.position_m for half in halves)
+        strays = any(half.error[0] > allowed.position_m for half in halves)
         return strays, allowed.used_by(*halves)
 
     start_m, end_m = span

@@ -32,7 +32,6 @@ class MotionSource(StrEnum):
     """How one knows what an agent does after t0."""
 
     RECORDED = "recorded"
-    SIMULATED = "simulated"
     WALK = "walk"
     HELD_SPEED = "held speed"
     STANDING = "standing"

@@ -9,8 +9,7 @@ import numpy as np
 from augment.errors import CannotDrive
 from augment.scene.entities import Modification
 from augment.scene.recording import Recording
-from augment.simulation.planners import IdmPlanner
-from augment.simulation.planning import Plan, Planner, Situation
+from augment.simulation.planning import IdmPlanner, Plan, Planner, Situation
 from augment.simulation.road import Road
 from augment.simulation.states import STEP_S, EgoBody, FloatArray, Objects, start_state
 from augment.simulation.tracker import drive_steps

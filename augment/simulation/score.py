@@ -13,6 +13,7 @@ import numpy as np
 import shapely
 
 from augment.scene.entities import AgentType, Modification, ScenarioType
+from augment.simulation import shapes
 from augment.simulation.comfort import comfort_signals, is_comfortable
 from augment.simulation.drive import Drive, Expert
 from augment.simulation.road import Road
@@ -29,13 +30,7 @@ from augment.simulation.states import (
     Kind,
     Objects,
     are_at_fault,
-    bearings,
     classify_contacts,
-    corners,
-    meet,
-    moved_ahead,
-    radii,
-    wrap_angles,
 )
 
 NO_WAY = -1
@@ -178,7 +173,9 @@ def collisions(drive: Drive) -> tuple[Collision, ...]:
     known: set[str] = set()
     astray = off_one_way(drive)
     for moment, objects in enumerate(drive.objects):
-        touching = meet(np.broadcast_to(drive.boxes[moment], objects.boxes.shape), objects.boxes)
+        touching = shapes.meet(
+            np.broadcast_to(drive.boxes[moment], objects.boxes.shape), objects.boxes
+        )
         fresh = np.array([name not in known for name in objects.ids], dtype=bool)
         hit = objects.chosen(touching & fresh)
         known.update(hit.ids)
@@ -201,14 +198,14 @@ def collisions(drive: Drive) -> tuple[Collision, ...]:
 
 def off_one_way(drive: Drive) -> BoolArray:
     """Return whether the ego is off the road, or not on one way and what follows it, (T,)."""
-    boxes = corners(drive.boxes)
+    boxes = shapes.corners(drive.boxes)
     off = ~drive.road.drivable.contains(boxes).all(axis=-1)
     return np.asarray(off | ~drive.road.on_one_way(boxes), dtype=np.bool_)
 
 
 def outside_m(drive: Drive) -> FloatArray:
     """Return how far the ego's furthest corner is outside the drivable area, (T,)."""
-    return np.asarray(drive.road.drivable.distance_m(corners(drive.boxes)).max(axis=1))
+    return np.asarray(drive.road.drivable.distance_m(shapes.corners(drive.boxes)).max(axis=1))
 
 
 def progress_ratio(drive: Drive, expert: Expert) -> float:
@@ -227,10 +224,10 @@ def criticality(drive: Drive, met: tuple[Collision, ...]) -> dict[str, float | N
     """
     ttc_s = float(_ttc_series(drive, met, only_relevant=False).min())
     closest = [
-        float(shapely.distance(bodies, shapely.Polygon(corners(box))).min())
+        float(shapely.distance(bodies, shapely.Polygon(shapes.corners(box))).min())
         for box, objects in zip(drive.boxes, drive.objects, strict=True)
         if len(objects)
-        for bodies in [shapely.polygons(corners(objects.boxes))]
+        for bodies in [shapely.polygons(shapes.corners(objects.boxes))]
     ]
     return {
         "least_ttc_s": None if math.isinf(ttc_s) else ttc_s,
@@ -277,7 +274,7 @@ def _pick_way(
 
     def misfit(number: int) -> tuple[bool, bool, float]:
         path, name = road.way_path(number), road.names[number]
-        turn = wrap_angles(path.poses(np.array(path.station_of(place_m)))[2] - heading_rad)
+        turn = shapes.wrap_angles(path.poses(np.array(path.station_of(place_m)))[2] - heading_rad)
         return name not in after, name not in road.beside, abs(float(turn))
 
     return min((int(number) for number in candidates), key=misfit)
@@ -344,7 +341,7 @@ def _ttc_series(drive: Drive, met: tuple[Collision, ...], *, only_relevant: bool
             continue
         kept = np.array([first.get(name, moment + 1) > moment for name in objects.ids])
         if only_relevant:
-            angle = bearings(state[None], objects.boxes[:, :2])
+            angle = shapes.bearings(state[None], objects.boxes[:, :2])
             kept &= (angle < AHEAD_RAD) | (loose[moment] & (angle <= BEHIND_RAD))
         times[moment] = _first_meeting(drive.boxes[moment], state, objects.chosen(kept))
     return times
@@ -354,12 +351,12 @@ def _first_meeting(box: FloatArray, state: FloatArray, objects: Objects) -> floa
     """The first of 0.1, 0.2 ... 2.9 s at which the ego's box meets one of the objects."""
     times = np.arange(1, round(TTC_HORIZON_S / STEP_S)) * STEP_S
     fastest = abs(state[SPEED]) + np.abs(objects.speeds_mps)
-    reach = radii(objects.boxes) + radii(box) + times[-1] * fastest
+    reach = shapes.radii(objects.boxes) + shapes.radii(box) + times[-1] * fastest
     near = ((objects.boxes[:, :2] - box[:2]) ** 2).sum(axis=1) <= reach**2
     theirs = objects.chosen(near).later(times)
     mine = np.broadcast_to(box, theirs.shape).copy()
-    mine[..., :3] = moved_ahead(mine, (times * state[SPEED])[:, None])
-    hit = meet(mine, theirs).any(axis=1)
+    mine[..., :3] = shapes.moved_ahead(mine, (times * state[SPEED])[:, None])
+    hit = shapes.meet(mine, theirs).any(axis=1)
     return float(times[hit.argmax()]) if hit.any() else float("inf")
 
 

@@ -4,7 +4,6 @@ Metres to the centimetre, radians to the milliradian. Poses are those of box cen
 """
 
 import json
-from enum import StrEnum
 from typing import Any
 
 import numpy as np
@@ -22,17 +21,6 @@ PLAN_EVERY = 5
 """So many steps lie between two plans that are kept."""
 LINE_EVERY = 8
 _AROUND_M = 90.0
-
-
-class EventKind(StrEnum):
-    """What happened; `touched` is a collision that is not the ego's fault."""
-
-    COLLISION = "collision"
-    TOUCHED = "touched"
-    OFF_ROAD = "off_road"
-    HARD_BRAKING = "hard_braking"
-    EMERGENCY_BRAKE = "emergency_brake"
-    MAP_END = "map_end"
 
 
 def trace_of(setting: DriveSetting, drive: Drive, score: Score) -> dict[str, Any]:
@@ -56,24 +44,26 @@ def trace_of(setting: DriveSetting, drive: Drive, score: Score) -> dict[str, Any
 
 
 def events_of(drive: Drive, score: Score) -> list[dict[str, Any]]:
-    """Return all events in the order of time: when each began, what it was, and with whom."""
+    """Return all events in the order of time: when each began, what it was, and with whom.
+
+    Somebody is `touched` in a collision that is not the ego's fault.
+    """
     events = [
-        (collision.moment, kind, collision.object_id)
-        for collision in score.collisions
-        for kind in [EventKind.COLLISION if collision.at_fault else EventKind.TOUCHED]
+        (met.moment, "collision" if met.at_fault else "touched", met.object_id)
+        for met in score.collisions
     ]
     states = {
-        EventKind.OFF_ROAD: outside_m(drive) >= OFF_ROAD_M,
-        EventKind.EMERGENCY_BRAKE: np.array([plan.braking for plan in drive.plans], dtype=bool),
-        EventKind.HARD_BRAKING: drive.states[:, ACCELERATION] <= HARD_BRAKING_MPS2,
+        "off_road": outside_m(drive) >= OFF_ROAD_M,
+        "emergency_brake": np.array([plan.braking for plan in drive.plans], dtype=bool),
+        "hard_braking": drive.states[:, ACCELERATION] <= HARD_BRAKING_MPS2,
     }
     for kind, holds in states.items():
         begins = holds & ~np.concatenate([[False], holds[:-1]])
         events += [(int(moment), kind, "") for moment in np.flatnonzero(begins)]
     if drive.at_map_end:
-        events.append((len(drive.states) - 1, EventKind.MAP_END, ""))
+        events.append((len(drive.states) - 1, "map_end", ""))
     ordered = sorted(events, key=lambda event: event[:2])
-    return [{"step": step, "kind": kind.value, "object": name} for step, kind, name in ordered]
+    return [{"step": step, "kind": kind, "object": name} for step, kind, name in ordered]
 
 
 def blind_trace(trace: dict[str, Any]) -> dict[str, Any]:
@@ -96,10 +86,9 @@ def blind_trace(trace: dict[str, Any]) -> dict[str, Any]:
 
 
 def _poses(boxes: FloatArray, speeds: FloatArray) -> list[list[float]]:
-    return [
-        [round(float(x), 2), round(float(y), 2), round(float(h), 3), round(float(v), 2)]
-        for (x, y, h), v in zip(boxes[:, :3], speeds, strict=True)
-    ]
+    columns = [boxes[:, :2].round(2), boxes[:, 2].round(3), speeds.round(2)]
+    poses: list[list[float]] = np.column_stack(columns).tolist()
+    return poses
 
 
 def _objects(setting: DriveSetting, drive: Drive) -> list[dict[str, Any]]:
@@ -108,28 +97,28 @@ def _objects(setting: DriveSetting, drive: Drive) -> list[dict[str, Any]]:
     types = {agent.id: agent.type.value for agent in setting.after.agents}
     if setting.recording is not None:
         types |= {track.agent_id: track.type.value for track in setting.recording.tracks}
-    by_name: dict[str, dict[str, Any]] = {}
+    shown: dict[str, dict[str, Any]] = {}
     for moment, objects in enumerate(drive.objects):
         poses = _poses(objects.boxes, objects.speeds_mps)
         for row, name in enumerate(objects.ids):
-            length_m, width_m = objects.boxes[row, 3:].tolist()
-            new = {
-                "id": name,
-                "type": types.get(name, Kind(objects.kinds[row]).name),
-                "length_m": round(length_m, 3),
-                "width_m": round(width_m, 3),
-                "changed": name in changed,
-                "first": moment,
-                "poses": [],
-            }
-            entry = by_name.setdefault(name, new)
-            gap = moment - entry["first"] - len(entry["poses"])
-            entry["poses"] += [None] * gap + [poses[row]]
-    for entry in by_name.values():
+            if name not in shown:
+                length_m, width_m = objects.boxes[row, 3:].round(3).tolist()
+                shown[name] = {
+                    "id": name,
+                    "type": types.get(name, Kind(objects.kinds[row]).name),
+                    "length_m": length_m,
+                    "width_m": width_m,
+                    "changed": name in changed,
+                    "first": moment,
+                    "poses": [],
+                }
+            own = shown[name]["poses"]
+            own += [None] * (moment - shown[name]["first"] - len(own)) + [poses[row]]
+    for entry in shown.values():
         poses = entry["poses"]
         if len(poses) == len(drive.objects) and all(pose == poses[0] for pose in poses):
             entry["poses"] = poses[:1]
-    return list(by_name.values())
+    return list(shown.values())
 
 
 def _plans(drive: Drive) -> list[dict[str, Any]]:
@@ -151,28 +140,27 @@ def _road(drive: Drive) -> dict[str, Any]:
     high = drive.boxes[:, :2].max(axis=0) + _AROUND_M
     window = shapely.box(*low, *high)
     road = drive.road
-    near = [n for n, strip in enumerate(road.strips) if strip.intersects(window)]
     ground = shapely.intersection(road.drivable.ground, window).simplify(0.05)
     parts = [part for part in shapely.get_parts(ground) if part.geom_type == "Polygon"]
-    walks: dict[AreaKind, list[list[float]]] = {AreaKind.WALKWAY: [], AreaKind.CROSSWALK: []}
-    for area in road.scene.areas:
-        if area.kind in walks:
-            walks[area.kind].append(_flat(area.boundary_m))
+    areas = road.scene.areas
     return {
         "drivable": [
             [_flat(shapely.get_coordinates(ring)) for ring in (part.exterior, *part.interiors)]
             for part in parts
         ],
-        "walkways": walks[AreaKind.WALKWAY],
-        "crosswalks": walks[AreaKind.CROSSWALK],
+        "walkways": [_flat(area.boundary_m) for area in areas if area.kind is AreaKind.WALKWAY],
+        "crosswalks": [
+            _flat(area.boundary_m) for area in areas if area.kind is AreaKind.CROSSWALK
+        ],
         "lanes": [
             {
-                "line": _flat(road.ways[n].centerline.points_m),
-                "edge": _flat(shapely.get_coordinates(road.strips[n].exterior)),
-                "on_route": road.names[n] in road.route,
-                "is_red": road.names[n] in road.red,
+                "line": _flat(way.centerline.points_m),
+                "edge": _flat(shapely.get_coordinates(strip.exterior)),
+                "on_route": way.id in road.route,
+                "is_red": way.id in road.red,
             }
-            for n in near
+            for way, strip in zip(road.ways, road.strips, strict=True)
+            if strip.intersects(window)
         ],
         "end": _flat(road.centreline.poses(np.array([road.end_m]))[:, :2]),
     }

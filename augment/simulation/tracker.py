@@ -12,6 +12,7 @@ from functools import lru_cache
 
 import numpy as np
 
+from augment.simulation import shapes
 from augment.simulation.states import (
     ACCELERATION,
     HEADING,
@@ -23,7 +24,6 @@ from augment.simulation.states import (
     FloatArray,
     X,
     Y,
-    wrap_angles,
 )
 
 MAX_STEERING_RAD = math.pi / 3.0
@@ -46,7 +46,7 @@ _SPEED_GAIN = _B_S * SPEED_WEIGHT / (_B_S * SPEED_WEIGHT * _B_S + SPEED_COST)
 def track(references: FloatArray, start: FloatArray, body: EgoBody) -> FloatArray:
     """Return the states (B, T, 6) of following references (B, T, 3) from one start (6,)."""
     states = drive_steps(references, start, body, references.shape[1] - 1)
-    states[..., HEADING] = wrap_angles(states[..., HEADING])
+    states[..., HEADING] = shapes.wrap_angles(states[..., HEADING])
     return states
 
 
@@ -118,7 +118,7 @@ def curvatures(poses: FloatArray, speed: FloatArray) -> FloatArray:
     penalty = CURVATURE_RATE_PENALTY * rates.T @ rates
     penalty[0, 0] += FIRST_CURVATURE_PENALTY
     normal = penalty + np.eye(len(way)) * (way.T**2)[:, :, None]
-    right = way * wrap_angles(np.diff(poses[..., HEADING], axis=0))
+    right = way * shapes.wrap_angles(np.diff(poses[..., HEADING], axis=0))
     return np.asarray(np.linalg.solve(normal, right.T[:, :, None])[:, :, 0].T, dtype=np.float64)
 
 
@@ -151,7 +151,7 @@ class _Plan:
         pose, bends = self._poses[step], self._bends[step]
         cos, sin = np.cos(pose[HEADING]), np.sin(pose[HEADING])
         lateral = cos * (state[Y] - pose[Y]) - sin * (state[X] - pose[X])
-        heading = wrap_angles(state[HEADING] - pose[HEADING])
+        heading = shapes.wrap_angles(state[HEADING] - pose[HEADING])
         # The errors, and how they answer to a steering rate of 1 rad/s.
         by_lateral, by_heading = np.zeros(lateral.shape), np.zeros(lateral.shape)
         for ahead in range(HORIZON):
@@ -161,6 +161,6 @@ class _Plan:
             heading = heading + way * (state[STEERING] / wheelbase_m - bends[ahead])
             by_heading += way * (ahead * STEP_S / wheelbase_m)
         gain = LATERAL_WEIGHT * by_lateral * lateral
-        gain += HEADING_WEIGHT * by_heading * wrap_angles(heading)
+        gain += HEADING_WEIGHT * by_heading * shapes.wrap_angles(heading)
         cost = LATERAL_WEIGHT * by_lateral**2 + HEADING_WEIGHT * by_heading**2
         return np.asarray(-gain / (cost + STEERING_RATE_COST), dtype=np.float64)

@@ -12,6 +12,7 @@ import numpy as np
 
 from augment.scene.entities import AgentType, Modification, Scene, TrafficAgent, apply
 from augment.scene.recording import Recording, Track, agent_of
+from augment.simulation import shapes
 from augment.simulation.path import Path
 from augment.simulation.planning import Idm
 from augment.simulation.road import Road
@@ -23,11 +24,8 @@ from augment.simulation.states import (
     IntArray,
     Kind,
     Objects,
-    corners,
     join_objects,
-    meet,
     objects_of,
-    radii,
 )
 
 TRAFFIC_IDM = Idm(1.0, 2.0, 4.0)
@@ -232,7 +230,7 @@ class LaneDrivers:
         driver, other, hit = self._first_inside(*self._near(everybody), everybody, noses)
         pose = self._tables[driver, hit]
         tangent = np.stack([np.cos(pose[:, 2]), np.sin(pose[:, 2])], axis=1)
-        offset = corners(everybody.boxes[other]) - pose[:, None, :2]
+        offset = shapes.corners(everybody.boxes[other]) - pose[:, None, :2]
         gaps = hit + (offset * tangent[:, None, :]).sum(axis=-1).min(axis=1) - front[driver]
         along = everybody.speeds_mps[other] * np.cos(everybody.boxes[other, 2] - pose[:, 2])
         for row in np.argsort(-gaps, kind="stable"):  # the nearest is written last
@@ -248,8 +246,8 @@ class LaneDrivers:
         offset = boxes[None, :, :2] - mine.boxes[:, None, :2]
         heading = mine.boxes[:, None, 2]
         ahead = offset[..., 0] * np.cos(heading) + offset[..., 1] * np.sin(heading)
-        near = (offset**2).sum(axis=-1) < (look[:, None] + radii(boxes)) ** 2
-        near &= ahead > -radii(boxes)
+        near = (offset**2).sum(axis=-1) < (look[:, None] + shapes.radii(boxes)) ** 2
+        near &= ahead > -shapes.radii(boxes)
         near &= np.array(mine.ids, dtype=object)[:, None] != np.array(everybody.ids, dtype=object)
         driver, other = np.nonzero(near)
         return rows[driver], other
@@ -315,7 +313,7 @@ def _set_moving(
         taken, clear = np.vstack([start_clear_of[None], objects_of(standing).boxes]), []
         for agent in driving:
             box = objects_of([agent]).boxes
-            if not meet(taken, np.broadcast_to(box, taken.shape)).any():
+            if not shapes.meet(taken, box).any():
                 clear.append(agent)
                 taken = np.vstack([taken, box])
         driving = clear

@@ -266,7 +266,7 @@ class PoseTool:
         except ValueError:
             raise ToolError(TOOL, "lane must be an id, or the control points of a piece") from None
         for curve in self.curves.values():
-            for name, piece in zip(curve.pieces, curve.lane.pieces, strict=True):
+            for name, piece in zip(curve.pieces, curve.lane, strict=True):
                 if name == lane or (
                     control is not None
                     and np.abs(piece.curve.control_m - control.control_m).max() <= COPIED_WITHIN_M

@@ -124,7 +124,7 @@ def review_text(submission: Submission) -> Verdict:
         ModelFault: The wire broke for good.
     """
     accepted_from = submission.limits.accepted_from
-    messages = _review_messages(fill.reviewer_messages, submission)
+    messages = _review_messages(ModelRole.REVIEWER, submission)
     reader = partial(read_ratings, accepted_from=accepted_from)
     with _unusable("the reviewer"):
         review, _, _ = submission.respondents.read(ModelRole.REVIEWER, messages, reader)
@@ -158,7 +158,7 @@ def review_picture(submission: Submission) -> Verdict:
         ModelFault: The wire broke for good.
     """
     read = submission.respondents.read
-    messages = _review_messages(fill.engineer_messages, submission)
+    messages = _review_messages(ModelRole.ENGINEER, submission)
     with _unusable("a reviewer"):
         questions, asked, reply = read(ModelRole.ENGINEER, messages, read_questions)
         shown = pictures(
@@ -168,7 +168,7 @@ def review_picture(submission: Submission) -> Verdict:
             ModelRole.VIEWER,
             fill.viewer_messages(questions, shown),
             partial(read_sight, count=len(questions)),
-            again=fill.viewer_re_ask_messages,
+            again=partial(fill.review_re_ask_messages, text="viewer_re_ask.md"),
         )
         talk = (*asked, fill.model_message(reply.text))
         messages = fill.verdict_messages(talk, questions, seen)
@@ -256,10 +256,9 @@ GEOMETRIC_REVIEW = Review(name="geometric", judge=review_geometry)
 # Private
 
 
-def _review_messages(
-    messages: Callable[..., fill.Messages], submission: Submission
-) -> fill.Messages:
-    return messages(
+def _review_messages(role: ModelRole, submission: Submission) -> fill.Messages:
+    return fill.review_messages(
+        role,
         submission.scene,
         submission.instruction,
         submission.modification,

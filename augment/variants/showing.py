@@ -95,10 +95,10 @@ def shown_prompt(
     if role is ModelRole.VIEWER:
         images = pictures(scene, modification, width_px=recipe.limits.picture_px)
         return Shown(messages=fill.viewer_messages(questions, images))
-    is_reviewer = role is ModelRole.REVIEWER
-    messages = fill.reviewer_messages if is_reviewer else fill.engineer_messages
     radius_m = recipe.limits.radius_m
-    return Shown(messages=messages(scene, instruction, modification, radius_m=radius_m))
+    return Shown(
+        messages=fill.review_messages(role, scene, instruction, modification, radius_m=radius_m)
+    )
 
 
 def calls_of(recipe: Recipe) -> dict[ModelRole, CallRange]:

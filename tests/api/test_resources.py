@@ -213,12 +213,7 @@ def test_files_have_the_bytes_of_the_pages() -> None:
     asking, page = program_of(admin), signed_in(admin)
     for name, form in (("leaderboard", "latex"), ("votes", "csv"), ("pairs", "svg")):
         program_file = asking.get(f"{API}snapshots/{snapshot.code}/exports/{name}.{form}")
-        part = {
-            "leaderboard": "results.",
-            "votes": "results-votes.",
-            "pairs": "results-charts/pairs.",
-        }
-        shown = page.get(f"/studies/{here.study.code}/{part[name]}{form}")
+        shown = page.get(f"/studies/{here.study.code}/rating/{name}.{form}")
         assert program_file.content == shown.content
         assert program_file.headers["Content-Type"] == shown.headers["Content-Type"]
     missing = asking.get(f"{API}snapshots/{snapshot.code}/exports/leaderboard.docx")

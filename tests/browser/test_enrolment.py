@@ -32,11 +32,13 @@ def test_somebody_enrols_votes_and_gets_a_code(booth: Booth) -> None:
     plan_with_hung_pictures(booth.study)
     enrolment = set_enrolment(
         study=booth.study,
-        consent="I take part of my own free will.\n\nMy answers are kept.",
-        asks_for="Your Prolific ID",
-        places=2,
-        votes_each=2,
-        drop_out_after_h=24,
+        rules={
+            "consent": "I take part of my own free will.\n\nMy answers are kept.",
+            "asks_for": "Your Prolific ID",
+            "places": 2,
+            "votes_each": 2,
+            "drop_out_after_h": 24,
+        },
     )
     context = booth.browser.new_context(
         base_url=booth.address, viewport=PHONE, color_scheme="dark", bypass_csp=True

@@ -5,6 +5,7 @@ scene is sent, its scenarios are written on a page and by a list, and the job go
 that a job can go.
 """
 
+import csv
 import json
 import re
 import threading
@@ -59,18 +60,18 @@ def model(stand_in: StandIn) -> Iterator[FakeServer]:
 
 @pytest.fixture
 def files(tmp_path: Path) -> Path:
-    """A scene; a list of all scenarios but the first, with the documents that it names."""
+    """A scene; a list of all scenarios but the first, with their documents."""
     folder = tmp_path / "files"
     folder.mkdir()
     write_street(folder)
-    lines = ["scene,type,instruction,slug,reference,intent"]
-    for number in range(1, SCENARIOS):
-        ahead_m = 15 + 5 * number
-        for name, document in (("to", reference(ahead_m)), ("asks", asked(ahead_m))):
-            (folder / f"{name}-{ahead_m}.json").write_text(json.dumps(document))
-        parts = (f"parked-{ahead_m}", f"to-{ahead_m}.json", f"asks-{ahead_m}.json")
-        lines.append(",".join(("street", TYPE, wish(ahead_m), *parts)))
-    (folder / "many.csv").write_text("\n".join(lines) + "\n")
+    with (folder / "many.csv").open("w", newline="") as file:
+        table = csv.writer(file)
+        table.writerow(["scene", "type", "instruction", "slug", "reference", "intent"])
+        for number in range(1, SCENARIOS):
+            ahead_m = 15 + 5 * number
+            documents = [json.dumps(one) for one in (reference(ahead_m), asked(ahead_m))]
+            said = ["street", TYPE, wish(ahead_m), f"parked-{ahead_m}"]
+            table.writerow([*said, *documents])
     return folder
 
 
@@ -155,7 +156,6 @@ def _write_scenarios(page: Page, files: Path) -> None:
     expect(page.get_by_text("The reference is kept")).to_be_visible()
     page.goto("/scenarios/bulk/")
     page.set_input_files("[name=file]", files / "many.csv")
-    page.set_input_files("[name=documents]", sorted(files.glob("*-*.json")))
     page.get_by_role("button", name="Add them").click()
     expect(page.get_by_text(f"{SCENARIOS - 1} scenarios are added.")).to_be_visible()
 

@@ -23,28 +23,23 @@ from tests.scenes import curve, junction, pedestrian, scene, vehicle
 def test_the_distance_along_the_lanes(
     world: Scene, x_m: float, y_m: float, ahead_m: float, left_m: float
 ) -> None:
-    (distance,) = of_kind(found_in(world, vehicle("Agent2", x_m, y_m)), FindingKind.LANE_DISTANCE)
-    assert distance.measured == pytest.approx({"ahead_m": ahead_m, "left_m": left_m}, abs=0.02)
-    assert f"{ahead_m:.1f} m ahead of the ego along its lanes" in distance.sentence()
-
-
-def test_an_ego_off_every_lane_measures_no_distance() -> None:
-    lost = replace(scene().ego, y_m=80.0, lane_id=None)
-    assert not of_kind(
-        found_in(scene(ego=lost), vehicle("Agent2", 30, 0)), FindingKind.LANE_DISTANCE
-    )
+    (lane,) = of_kind(found_in(world, vehicle("Agent2", x_m, y_m)), FindingKind.LANE)
+    assert lane.measured["ahead_m"] == pytest.approx(ahead_m, abs=0.02)
+    assert lane.measured["left_m"] == pytest.approx(left_m, abs=0.02)
 
 
 @pytest.mark.parametrize(
     ("y_m", "words"),
-    [
-        (4.0, "on Lane2, 80.0 m along it and -0.50 m left of its centre line; the lane is 3.5 m "),
-        (-9.05, "7.3 m off every lane; the nearest lane is Lane1."),
-    ],
+    [(4.0, "4.0 m left of them, on Lane2, -0.50 m left of its"), (-9.0, "off every lane.")],
 )
 def test_the_lane_under_an_agent(y_m: float, words: str) -> None:
     (lane,) = of_kind(found_in(scene(), vehicle("Agent2", 20.0, y_m, math.pi)), FindingKind.LANE)
-    assert lane.sentence().startswith(f"Agent2 is {words}")
+    assert words in lane.sentence()
+
+
+def test_an_ego_off_every_lane_measures_no_distance() -> None:
+    lost = replace(scene().ego, y_m=80.0, lane_id=None)
+    assert not of_kind(found_in(scene(ego=lost), vehicle("Agent2", 30, 0)), FindingKind.LANE)
 
 
 @pytest.mark.parametrize(

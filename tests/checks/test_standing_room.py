@@ -64,30 +64,6 @@ def test_any_overlap_with_the_ego_is_wrong() -> None:
     )
 
 
-@pytest.mark.parametrize(
-    ("ahead_m", "left_m", "is_same_spot"),
-    [
-        (0.0, 0.0, True),
-        (0.49, 0.0, True),
-        (0.5, 0.0, False),
-        (-0.49, 0.0, True),
-        (-0.5, 0.0, False),
-        (0.3, 0.39, True),
-        (0.3, 0.41, False),
-        (0.0, -0.51, False),
-    ],
-)
-def test_a_tenth_of_a_car_apart_is_another_spot(
-    ahead_m: float, left_m: float, is_same_spot: bool
-) -> None:
-    car = replace(vehicle("Agent2", 32.0, 0.0), length_m=5.0)
-    other = replace(car, id="Agent3", x_m=32.0 + ahead_m, y_m=left_m, length_m=4.0)
-    found = of_kind(found_in(scene(), car, other), FindingKind.DUPLICATE)
-    assert [one.agents for one in found] == ([("Agent2", "Agent3")] if is_same_spot else [])
-    unlike = replace(car, type=AgentType.BUS), other
-    assert not of_kind(found_in(scene(), *unlike), FindingKind.DUPLICATE)
-
-
 def test_the_small_box_counts() -> None:
     inside = cone("Agent3", 41.0, 0.2)
     (overlap,) = of_kind(found_in(scene(), BUS, inside), FindingKind.OVERLAP)
@@ -100,15 +76,6 @@ def test_what_was_recorded_is_in_the_way_too() -> None:
     assert (FindingKind.OVERLAP, Severity.WRONG) in severities(
         found_in(busy, vehicle("Agent3", 31, 0))
     )
-
-
-def test_two_agents_on_the_same_spot() -> None:
-    found = found_in(scene(), vehicle("Agent2", 30, 0), vehicle("Agent3", 30.1, 0))
-    (twice,) = of_kind(found, FindingKind.DUPLICATE)
-    assert twice.severity is Severity.WRONG
-    assert twice.sentence() == "Agent2 and Agent3 are on the same spot, 0.10 m apart."
-    row = [cone(f"Agent{number}", 30.0 + number, 0.0) for number in range(2, 6)]
-    assert not of_kind(found_in(scene(), *row), FindingKind.DUPLICATE)
 
 
 @pytest.mark.parametrize(

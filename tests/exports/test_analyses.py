@@ -6,16 +6,12 @@ from pathlib import Path
 
 import pytest
 from django.core.management import CommandError, call_command
-from django.db import connection
-from django.test.utils import CaptureQueriesContext
 from django.urls import reverse
 
-from arena.jobs.queries import analysis_of
 from augment.models import Augmentation, Contestant, GenerationJob, Scenario
 from augment.scene.codec import intent_to_document, modification_to_document
 from augment.scene.entities import Modification
 from augment.scene.intent import Intent
-from augment.services.judging.analyses import analyse_job
 from augment.services.scenarios.pictures import store
 from augment.services.scenarios.scenes import reference_of
 from tests.jobs import rows
@@ -109,17 +105,8 @@ def test_pairs_wordings_and_refusals_come_as_files(tmp_path: Path) -> None:
         str(out),
     )
     assert json.loads(out.read_text())["rows"][0]["scenarios"] == 7
-    with pytest.raises(CommandError, match="pairs, wordings, refusals"):
+    with pytest.raises(CommandError, match="elephants"):
         exported(job, "elephants", tmp_path)
-
-
-def test_a_second_look_reads_what_it_follows_from_and_computes_nothing() -> None:
-    job = a_job()
-    kept = analysis_of(job)
-    assert kept == analyse_job(job)
-    with CaptureQueriesContext(connection) as asked:
-        assert analysis_of(job) is kept
-    assert len(asked) == 3
 
 
 def test_the_page_shows_all_three_and_an_empty_job_says_so() -> None:
@@ -132,4 +119,6 @@ def test_the_page_shows_all_three_and_an_empty_job_says_so() -> None:
     shown = staff.get(reverse("analyses", args=[empty.code])).content.decode()
     assert "No two contestants" in shown
     assert "Nobody has refused" in shown
-    assert staff.get(reverse("analyses-export", args=[empty.code, "x", "csv"])).status_code == 404
+    assert (
+        staff.get(reverse("job-export", args=[empty.code, "analyses-x", "csv"])).status_code == 404
+    )

@@ -20,6 +20,6 @@ def exported(*arguments: str) -> str:
 def test_the_table_of_a_job_is_written_the_same_twice() -> None:
     driven(finished(rows.launch()))
     first = exported("--format", "json")
-    assert '"lowered": 0.75' in first
+    assert '"lowered_percent": 75.0' in first
     assert exported("--format", "json") == first
     assert exported().splitlines()[1].startswith("Unmodified scene,,,,no,100.00,100.00,0.00,1,0")

@@ -8,9 +8,10 @@ from typing import Any
 import pytest
 from django.contrib.auth.models import User
 
+from arena.exports.files import zip_bytes
 from arena.models import Snapshot, Study
 from arena.people.links import mark_author
-from arena.results.exports.writers import bundle
+from arena.results.exports.writers import bundle_files
 from arena.results.queries.votes import Filters
 from arena.results.services.ratings import rate_now as rate
 from arena.results.services.ratings import votes_of
@@ -42,7 +43,7 @@ def table_of(snapshot: Snapshot) -> dict[str, tuple[Any, ...]]:
 
 
 def zipped(snapshot: Snapshot) -> dict[str, bytes]:
-    with zipfile.ZipFile(io.BytesIO(bundle(snapshot))) as archive:
+    with zipfile.ZipFile(io.BytesIO(zip_bytes(bundle_files(snapshot)))) as archive:
         return {name: archive.read(name) for name in archive.namelist()}
 
 

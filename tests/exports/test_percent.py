@@ -1,12 +1,9 @@
-"""A share is rounded the same wherever it stands: in the table, the heat map and the panels."""
+"""A share is rounded the same wherever it stands: in the table and the panels."""
 
 import pytest
 
 from arena.rating.comparisons import Estimate
 from arena.rating.lines import whole_percent
-from arena.rating.snapshot_document import PairRecord
-from arena.results.exports.charts import heat_map
-from arena.results.exports.tables import Row
 from arena.templatetags.results import estimate_percent, percent
 
 
@@ -18,30 +15,6 @@ def test_a_half_goes_to_the_even_number(share: float, shown: int) -> None:
     assert whole_percent(share) == shown
 
 
-def test_table_heat_map_and_panels_agree() -> None:
-    rows = [_row("ann", wins=23), _row("bob", wins=17)]
-    judged = PairRecord(a="ann", b="bob", wins=23, ties=0, losses=17, both_miss=0, planned=None)
-    lines = heat_map([judged], rows)
-    shown = [cell.percent for line in lines for cell in line.cells if cell is not None]
-    assert shown == [row.score_percent for row in rows] == [58, 42]
+def test_pages_print_it_so() -> None:
     assert percent(0.575) == "58 %"
     assert "58 %" in estimate_percent(Estimate(value=0.575, lower=0.425, upper=0.995))
-
-
-def _row(slug: str, *, wins: int) -> Row:
-    return Row(
-        name=slug,
-        variant="",
-        slug=slug,
-        kind="rule",
-        simulated=False,
-        rank=None,
-        rating=None,
-        lower=None,
-        upper=None,
-        votes=40,
-        wins=wins,
-        ties=0,
-        losses=40 - wins,
-        note="",
-    )

@@ -7,9 +7,18 @@ from dataclasses import replace
 import pytest
 
 from arena.models import Snapshot
-from arena.rating.snapshot_document import DisplacementSummary, ScenarioCost
-from arena.results.exports.charts import chart_bytes, charts, interval_chart
-from arena.results.exports.tables import leaderboard_table
+from arena.rating.snapshot_document import DisplacementSummary, PairRecord, ScenarioCost
+from arena.results.exports.charts import (
+    Point,
+    Scatter,
+    charts,
+    heat_chart,
+    interval_chart,
+    scatter_chart,
+)
+from arena.results.exports.drawing import SIMULATED
+from arena.results.exports.tables import Row, leaderboard_table
+from arena.results.exports.writers import CHARTS
 from arena.results.services.ratings import rate_now as rate
 from tests.full_study import Size, full_study
 
@@ -49,16 +58,36 @@ def snapshot() -> Snapshot:
 
 def test_every_chart_comes_in_every_format_the_same_twice(snapshot: Snapshot) -> None:
     """Those that the zip of everything has are drawn twice for its test (test_bundle.py)."""
-    names = ["leaderboard", "pairs", "types", "width", "displacement"]
-    names += ["elo-usd", "displacement-usd", "elo-tokens", "displacement-tokens"]
-    assert list(charts(snapshot)) == names
-    again = Snapshot.objects.get(pk=snapshot.pk)
-    for name in names:
+    drawn, again = charts(snapshot), charts(Snapshot.objects.get(pk=snapshot.pk))
+    assert tuple(drawn) == ("leaderboard", *CHARTS)
+    for name, chart in drawn.items():
         for form in BEGINS if name == "displacement" else ("svg",):
-            content = chart_bytes(snapshot, name=name, file_format=form)
+            content = chart(file_format=form)
             assert content.startswith(BEGINS[form]), (name, form)
             if name == "displacement":
-                assert (content == chart_bytes(again, name=name, file_format=form)) is True
+                assert (content == again[name](file_format=form)) is True
+
+
+def a_row(slug: str, *, simulated: bool = False) -> Row:
+    return Row(name=slug, slug=slug, kind="rule", simulated=simulated, rating=1000.0)
+
+
+def test_the_heat_map_mirrors_scores_and_says_nothing_without_votes() -> None:
+    pair = PairRecord(a="a", b="b", wins=30, ties=10, losses=0, both_miss=0, planned=50)
+    rows = [a_row("a"), a_row("b"), a_row("c")]
+    drawing = heat_chart(rows, [pair], file_format="svg").decode()
+    assert [drawing.count(f">{cell}<") for cell in ("88", "12", "40")] == [1, 1, 2]
+
+
+@pytest.mark.parametrize("simulated", [True, False])
+def test_the_key_of_a_file_has_the_colour_of_its_points(simulated: bool) -> None:
+    row = a_row("x", simulated=simulated)
+    points = [
+        Point(number=n, row=row, x=x, model_class="utility")
+        for n, x in enumerate((1.0, 2.0), start=1)
+    ]
+    drawing = scatter_chart(Scatter(across="Votes", points=points), file_format="svg").decode()
+    assert (SIMULATED in drawing, "#2c7a4b" in drawing) == (simulated, not simulated)
 
 
 def test_charts_that_are_drawn_at_once_are_those_that_are_drawn_alone(snapshot: Snapshot) -> None:

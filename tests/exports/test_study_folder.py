@@ -21,10 +21,9 @@ from django.core.management import CommandError, call_command
 from django.utils import timezone
 from pytest_django import Settings
 
-from arena.models import Person, Study, Vote
-from arena.results.exports.closure import TRAVELLING, close_over
+from arena.models import Person, Study
 from arena.results.services.ratings import rate_now as rate
-from arena.results.services.stored_rows import as_line, columns_of, find_filled_tables, label_of
+from arena.results.services.stored_rows import as_line, columns_of, find_filled_tables
 from arena.studies.services.opening import close_study
 from augment.models import Augmentation, Contestant, Endpoint, GenerationJob, Scenario, Simulation
 from tests.study_rows import a_study, hang, matchups_of, scenario, vote, write_changes
@@ -162,43 +161,6 @@ def test_only_drives_that_are_over_travel(study: Study, tmp_path: Path) -> None:
     assert len(rows.splitlines()) == 1
 
 
-SPOILT: dict[str, tuple[str, bytes | None]] = {
-    "pairs.csv has another content": ("pairs.csv", b"other"),
-    "arena.vote.jsonl is missing": ("rows/arena.vote.jsonl", None),
-    "more.txt is not named": ("more.txt", b""),
-    "no manifest.json": ("manifest.json", b"{}"),
-    "format is not": ("manifest.json", b'{"format": "scenario-arena-backup"}'),
-}
-
-
-def test_a_folder_that_is_not_whole_is_refused(study: Study, tmp_path: Path) -> None:
-    whole = tmp_path / "out"
-    export(study, whole)
-    empty()
-    for says, (name, content) in SPOILT.items():
-        spoilt = tmp_path / "spoilt"
-        shutil.copytree(whole, spoilt)
-        (spoilt / name).unlink(missing_ok=True)
-        if content is not None:
-            (spoilt / name).write_bytes(content)
-        with pytest.raises(CommandError, match=says):
-            call_command("import", "study", str(spoilt))
-        shutil.rmtree(spoilt)
-    assert not Study.objects.exists()
-
-
-def test_it_is_taken_in_by_an_empty_installation_alone(study: Study, tmp_path: Path) -> None:
-    export(study, tmp_path / "out")
-    with pytest.raises(CommandError, match="An empty installation is needed"):
-        call_command("import", "study", str(tmp_path / "out"))
-    assert Vote.objects.count() == 5
-
-
-def test_the_tables_that_travel_are_those_that_are_taken_in(study: Study) -> None:
-    written = {label_of(rows.model) for rows in close_over(study).tables()}
-    assert written == TRAVELLING
-
-
 def craft(folder: Path, label: str, change: Callable[[dict[str, Any]], dict[str, Any]]) -> None:
     """Change the rows of a table as somebody would who also recomputes the hash."""
     path = folder / f"rows/{label}.jsonl"
@@ -249,7 +211,7 @@ HOSTILE: list[tuple[str, dict[str, Any], str]] = [
     ("augment.simulation", {"offsets": "wide"}, "offsets: one of paper, original"),
     ("augment.simulation", {"trace": "AAAA"}, "trace: "),
     ("augment.generationjob", {"state": "running"}, "state: 'running' is not over"),
-    ("augment.generationjob", {"samples": 9999}, "Samples go from 1 to"),
+    ("augment.generationjob", {"samples": 9999}, "samples: goes from 1 to"),
     ("augment.augmentation", {"state": "queued"}, "state: 'queued' is not over"),
     ("augment.augmentation", {"image": "../../secret.png"}, "image: '../../secret.png' must be"),
     ("augment.augmentation", {"image": f"/{'0' * 64}.png"}, "must be bev/"),

@@ -1,7 +1,6 @@
 """Every transcript of a job in one call: the same records as one by one."""
 
 import json
-import zipfile
 from pathlib import Path
 
 import pytest
@@ -41,11 +40,3 @@ def test_a_line_for_each_augmentation_is_its_transcript(
     assert lines == [alone(row) for row in Augmentation.objects.filter(job=job).order_by("pk")]
     (attempt,) = lines[0]["attempts"]
     assert len(attempt["steps"]) == 2
-
-
-def test_the_zip_holds_the_same_lines(job: GenerationJob, tmp_path: Path) -> None:
-    lines, packed = tmp_path / "all.jsonl", tmp_path / "all.zip"
-    call_command("export", "transcripts", job.name, "--out", str(lines))
-    call_command("export", "transcripts", job.name, "--format", "zip", "--out", str(packed))
-    with zipfile.ZipFile(packed) as archive:
-        assert archive.read("transcripts.jsonl") == lines.read_bytes()

@@ -2,9 +2,11 @@ import csv
 import io
 import json
 from dataclasses import replace
+from typing import Any
 
 import pytest
 
+from arena.models import Snapshot, Study
 from arena.rating.lines import escape
 from arena.results.exports.tables import (
     EARLY_LOOK,
@@ -13,7 +15,7 @@ from arena.results.exports.tables import (
     Row,
     for_experts,
 )
-from arena.results.exports.writers import FORMATS, csv_bytes, json_bytes, latex
+from arena.results.exports.writers import FORMATS
 
 PAPER = (
     ("interPlan", "", 1, 1042, 9, 11, 1960),
@@ -42,22 +44,23 @@ def row(model: str, variant: str = "", **changes: object) -> Row:
     return replace(made, **changes)  # type: ignore[arg-type]
 
 
-def table(*rows: Row, **changes: object) -> LeaderboardTable:
-    made = LeaderboardTable(
-        study="Round 1",
-        rows=rows,
-        method="bt",
-        rounds=1000,
-        unit="vote",
-        seed=7,
-        degenerate_rounds=0,
-        votes=5760,
-        left_out={"superseded": 3},
-        votes_sha256="ab" * 32,
-        simulated=False,
-        early=False,
-    )
-    return replace(made, **changes)  # type: ignore[arg-type]
+def table(
+    *rows: Row, study: str = "Round 1", left_out: dict[str, int] | None = None, **rating: object
+) -> LeaderboardTable:
+    values: dict[str, Any] = {
+        "method": "bt",
+        "rounds": 1000,
+        "resampling_unit": "vote",
+        "seed": 7,
+        "votes_counted": 5760,
+        "votes_sha256": "ab" * 32,
+    }
+    snapshot = Snapshot(study=Study(name=study), **values | rating)
+    return LeaderboardTable(snapshot=snapshot, rows=rows, left_out=left_out or {"superseded": 3})
+
+
+def latex(given: LeaderboardTable) -> str:
+    return FORMATS["latex"].write(given).decode()
 
 
 def papers_rows() -> list[Row]:
@@ -113,7 +116,7 @@ def test_a_line_break_in_a_name_cannot_leave_its_comment() -> None:
 
 def test_a_table_says_that_it_is_simulated_and_an_early_look() -> None:
     plain = latex(table(row("x")))
-    marked = latex(table(row("x"), simulated=True, early=True))
+    marked = latex(table(row("x"), includes_simulated=True, is_early=True))
     for warning in (SIMULATED_TABLE, EARLY_LOOK):
         assert f"% {warning}" in marked
         assert warning not in plain
@@ -125,7 +128,7 @@ def test_experts_do_not_read_that_votes_of_authors_are_left_out() -> None:
 
 
 def parsed(given: LeaderboardTable) -> list[dict[str, str]]:
-    return list(csv.DictReader(io.StringIO(csv_bytes(given).decode())))
+    return list(csv.DictReader(io.StringIO(FORMATS["csv"].write(given).decode())))
 
 
 def test_csv_has_a_line_per_contestant() -> None:
@@ -162,7 +165,7 @@ def test_a_negative_rating_is_a_number_not_a_formula() -> None:
 
 
 def test_json_has_everything_that_makes_the_table_again() -> None:
-    document = json.loads(json_bytes(table(*papers_rows(), simulated=True)))
+    document = json.loads(FORMATS["json"].write(table(*papers_rows(), includes_simulated=True)))
     assert document["simulated"] is True
     assert document["method"] == {
         "name": "bt",

@@ -74,9 +74,8 @@ def test_no_file_says_nan_whatever_of_the_ego_and_the_others_was_recorded(
 @pytest.mark.parametrize("form", sorted(WRITERS))
 def test_what_is_not_finite_is_refused_and_the_rest_is_written(form: str) -> None:
     nowhere = cell(stem="nowhere", added=(vehicle("Agent2", np.nan, 0.0),), name="nowhere")
-    drive = cell().motion
-    drive.ego.states[5, 0] = np.nan
-    lost = cell(drive=drive, name="lost")
+    lost = cell(name="lost")
+    lost.motion.ego.states[5, 0] = np.nan
     written = writer_named(form)([nowhere, lost, cell()])
     assert [one.cell for one in written.refused] == ["nowhere", "lost"]
     assert "agents[0].x_m" in written.refused[0].text

@@ -7,10 +7,8 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from augment.geometry.bezier import CubicBezier, FloatArray, fit, fit_error
-from augment.geometry.frames import Pose
 from augment.geometry.polyline import Polyline
 from tests.scenes import curve as curved_scene
-from tests.scenes import pose_in_parent
 
 KAPPA = 4.0 / 3.0 * (math.sqrt(2.0) - 1.0)
 QUARTER = CubicBezier([(10, 0), (10, 10 * KAPPA), (10 * KAPPA, 10), (0, 10)])
@@ -65,40 +63,11 @@ def test_arc_length_is_that_of_a_dense_line(curve: CubicBezier) -> None:
     assert curve.length_m == pytest.approx(dense_length(curve), abs=1e-3)
 
 
-@given(curve=curves())
-def test_going_further_never_goes_back(curve: CubicBezier) -> None:
-    stations = np.linspace(0.0, curve.length_m, 200)
-    assert (np.diff(curve.parameters_at(stations)) >= 0.0).all()
-
-
 @given(curve=lane_like(), share=st.floats(0.0, 1.0))
 def test_the_place_at_an_arc_length_has_that_arc_length(curve: CubicBezier, share: float) -> None:
     s_m = share * curve.length_m
     t = float(curve.parameters_at([s_m])[0])
     assert dense_length(curve, t) == pytest.approx(s_m, abs=1e-3)
-
-
-@given(
-    curve=lane_like(),
-    share=st.floats(0.0, 1.0),
-    pose=st.builds(
-        Pose,
-        x_m=st.floats(-500.0, 500.0),
-        y_m=st.floats(-500.0, 500.0),
-        heading_rad=st.floats(-3.1, 3.1),
-    ),
-)
-def test_a_moved_and_turned_curve_has_moved_and_turned_poses(
-    curve: CubicBezier, share: float, pose: Pose
-) -> None:
-    moved = CubicBezier(pose.to_parent(curve.control_m))
-    assert moved.length_m == pytest.approx(curve.length_m, abs=1e-8)
-    there = moved.pose_at(share * moved.length_m, 1.5)
-    wanted = pose_in_parent(pose, curve.pose_at(share * curve.length_m, 1.5))
-    assert (there.x_m, there.y_m) == pytest.approx((wanted.x_m, wanted.y_m), abs=1e-6)
-    assert math.remainder(there.heading_rad - wanted.heading_rad, math.tau) == pytest.approx(
-        0.0, abs=1e-6
-    )
 
 
 @given(curve=lane_like(), share=st.floats(0.02, 0.98), d_m=st.floats(-1.5, 1.5))
@@ -134,7 +103,7 @@ def test_a_doubled_control_point_still_has_a_heading() -> None:
 def test_a_fit_finds_a_curve_again() -> None:
     line = Polyline(QUARTER.points(QUARTER.parameters_at(np.linspace(0, QUARTER.length_m, 200))))
     found = fit(line)
-    assert fit_error(found, line).position_m < 0.01
+    assert fit_error(found, line)[0] < 0.01
     assert found.length_m == pytest.approx(QUARTER.length_m, abs=0.005)
 
 
@@ -148,11 +117,11 @@ def test_a_fit_keeps_the_ends_and_takes_the_headings_it_is_given() -> None:
 
 def test_the_error_of_a_fit_is_its_worst_place() -> None:
     line = Polyline([(0, 0), (30, 0)])
-    assert fit_error(STRAIGHT, line).position_m == pytest.approx(0.0, abs=1e-9)
+    assert fit_error(STRAIGHT, line)[0] == pytest.approx(0.0, abs=1e-9)
     aside = CubicBezier(STRAIGHT.control_m + np.array([0.0, 0.4]))
-    assert fit_error(aside, line).position_m == pytest.approx(0.4)
+    assert fit_error(aside, line)[0] == pytest.approx(0.4)
     turned = CubicBezier(STRAIGHT.control_m @ np.array([[0.0, 1.0], [-1.0, 0.0]]))
-    assert fit_error(turned, line).heading_rad == pytest.approx(math.pi / 2)
+    assert fit_error(turned, line)[1] == pytest.approx(math.pi / 2)
 
 
 @pytest.mark.parametrize(
@@ -183,23 +152,3 @@ def test_a_fit_never_leaves_or_arrives_against_the_heading_it_is_given(
     arm = (ends - inner)[1] if is_end else (inner - ends)[0]
     along_m = arm @ [math.cos(wanted_rad), math.sin(wanted_rad)]
     assert along_m >= 0.01 - 1e-9
-
-
-@given(
-    st.lists(st.floats(-0.6, 0.6), min_size=3, max_size=8),
-    st.floats(-math.pi, math.pi),
-    st.floats(-math.pi, math.pi),
-)
-def test_the_fit_to_a_mirrored_line_is_the_mirrored_fit(
-    turns: list[float], start_rad: float, end_rad: float
-) -> None:
-    headings = np.cumsum(turns)
-    points = np.cumsum(4.0 * np.column_stack([np.cos(headings), np.sin(headings)]), axis=0)
-    points = np.vstack([[0.0, 0.0], points])
-    given = fit(Polyline(points), start_rad=start_rad, end_rad=end_rad)
-    mirror = [1.0, -1.0]
-    other = fit(Polyline(points * mirror), start_rad=-start_rad, end_rad=-end_rad)
-    assert np.allclose(given.control_m * mirror, other.control_m, atol=1e-5)
-    for curve, wanted in ((given, (start_rad, end_rad)), (other, (-start_rad, -end_rad))):
-        made = curve.headings(np.array([0.0, 1.0]))
-        assert np.allclose(np.cos(made - wanted), 1.0, atol=1e-6)

@@ -20,8 +20,8 @@ from django.core.files.storage import default_storage
 from django.utils import timezone
 from pytest_django import Settings
 
+from arena.jobs.exports.displacement import FORMATS as DISPLACEMENT
 from arena.jobs.exports.displacement import displacement_table
-from arena.jobs.exports.displacement_files import FORMATS as DISPLACEMENT
 from arena.management.demo import JOB, RATED, SIMULATED_EXPERTS, SIMULATED_STUDY, vote_and_rate
 from arena.models import Person, Study
 from arena.models.people import fresh_token
@@ -107,7 +107,7 @@ def demo_folder(steady_rows: None, tmp_path: Path, settings: Settings) -> Path:
     for person in Person.objects.all():
         person.code = uuid.uuid5(uuid.NAMESPACE_URL, person.user.username)
         person.save()
-    vote_and_rate([f"place-{number:02d}" for number in range(PLACES)], print, tmp_path / "tables")
+    vote_and_rate([f"place-{number:02d}" for number in range(PLACES)], tmp_path / "tables")
     return tmp_path / "tables"
 
 

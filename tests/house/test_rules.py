@@ -20,7 +20,7 @@ HEAVY = {
     "pandas": ("augment.formats", "arena.exports"),
     "pyarrow": ("augment.formats", "arena.exports", "arena.rating.votes_file"),
     "scenariogeneration": ("augment.formats",),
-    "matplotlib": ("arena.exports", "arena.results.exports"),
+    "matplotlib": ("arena.jobs.exports", "arena.results.exports"),
     "scipy.interpolate": ("augment.fake_llm",),
     "scipy.optimize": ("augment.metrics", "arena.pairing"),
     "scipy.signal": ("augment.simulation",),

@@ -56,7 +56,6 @@ def fault(ask: Ask, model: str) -> ModelFault:
         ("nobody", 404, False, None, "fake-good"),
         ("fake-html", 200, False, None, "instead of JSON"),
         ("fake-no-choices", 200, True, None, "without a choice"),
-        ("fake-null-choices", 200, True, None, "without a choice"),
         ("fake-broken-json", None, True, None, "not valid JSON"),
         ("fake-dropped", None, True, None, "the connection failed"),
     ],

@@ -14,21 +14,25 @@ from tests.scenes import cone
 
 pytestmark = pytest.mark.django_db
 
-CSV = """scene,type,instruction,slug,keep_traffic,reference
+CHANGE = modification_to_document(Modification(added=(cone("Agent2", 9.0, 0.0),)))
+IN_CSV = json.dumps(CHANGE).replace('"', '""')
+CSV = f"""scene,type,instruction,slug,keep_traffic,reference
 street-scene,cut_in,"Let a car cut in, closely.",one,yes,
-street-scene,jaywalking_pedestrian,Let somebody cross.,,,change.json
+street-scene,jaywalking_pedestrian,Let somebody cross.,,,"{IN_CSV}"
 """
 YAML = """
 - {scene: street-scene, type: cut_in, instruction: Let a car cut in.}
 - {scene: street-scene, type: cut_in, instruction: And another., keep_traffic: true}
-"""
+- scene: street-scene
+  type: jaywalking_pedestrian
+  instruction: Let somebody cross.
+  reference:
+""" + json.dumps(CHANGE, indent=2).replace("\n", "\n    ").replace("{", "    {", 1)
 
 
 @pytest.fixture(autouse=True)
-def street(tmp_path: Path) -> None:
+def street() -> None:
     add_scenario("street")
-    change = Modification(added=(cone("Agent2", 9.0, 0.0),))
-    (tmp_path / "change.json").write_text(json.dumps(modification_to_document(change)))
 
 
 def add(folder: Path, name: str, text: str) -> None:
@@ -58,6 +62,7 @@ def test_a_yaml_file_is_added_too(tmp_path: Path) -> None:
         ("street-scene-cut-in-1", False),
         ("street-scene-cut-in-2", True),
     ]
+    assert Scenario.objects.get(slug="street-scene-jaywalker-1").reference == CHANGE
 
 
 def test_one_bad_row_keeps_all_out_and_every_error_is_named(tmp_path: Path) -> None:
@@ -65,7 +70,7 @@ def test_one_bad_row_keeps_all_out_and_every_error_is_named(tmp_path: Path) -> N
         CSV
         + """nowhere,cut_in,Something.,,,
 street-scene,cut_in,Something.,,maybe,
-street-scene,cut_in,,,,none.json
+street-scene,cut_in,,,,
 """
     )
     with pytest.raises(CommandError) as refused:

@@ -12,7 +12,6 @@ from arena.management.commands.demo import Command
         ("--per-type", "-1", "1 or more is needed, not -1"),
         ("--per-type", "0", "1 or more is needed, not 0"),
         ("--per-type", "few", "'few' is no whole number"),
-        ("--driven", "-1", "0 or more is needed, not -1"),
     ],
 )
 def test_a_number_that_makes_no_sense_is_refused(option: str, given: str, says: str) -> None:

@@ -1,18 +1,14 @@
 """`manage.py doctor` names what is wrong with an installation, and what to do."""
 
 from collections.abc import Iterator
-from datetime import timedelta
 from pathlib import Path
 
 import pytest
-from django.contrib.auth.models import User
 from django.core.cache import cache
 from django.core.management import CommandError, call_command
-from django.utils import timezone
 from pytest_django import Settings
 
 from arena.management.doctor import Level, examine
-from arena.models import ApiToken
 from arena.people.services import create_person
 from arena.serving import readiness
 from augment.models import Endpoint, GenerationJob, Worker
@@ -36,11 +32,6 @@ def _sound(tmp_path: Path, settings: Settings) -> Iterator[None]:
     Worker.objects.create(name="w 1", **now)
     with broker_at(MEMORY):
         yield
-
-
-@pytest.fixture
-def admin() -> User:
-    return User.objects.get(username="root")
 
 
 def wrong() -> dict[str, Level]:
@@ -107,31 +98,3 @@ def test_settings_that_will_surprise(
         setattr(settings, name, value)
     (found,) = (found for found in examine() if found.part == "settings")
     assert (found.level, says in found.text) == (Level.DOUBTFUL, True)
-
-
-@pytest.mark.parametrize(
-    ("expires", "used", "is_told"),
-    [
-        (3, 1, True),
-        (-3, 5, True),
-        (8, 1, False),
-        (3, None, False),
-        (3, 31, False),
-        (-31, 31, False),
-    ],
-)
-def test_a_token_in_use_that_expires(
-    admin: User, expires: int, used: int | None, is_told: bool
-) -> None:
-    now = timezone.now()
-    token = ApiToken.objects.create(
-        owner=admin,
-        name="nightly",
-        role="analyst",
-        token_sha256="0" * 64,
-        expires_at=now + timedelta(days=expires),
-        last_used_at=None if used is None else now - timedelta(days=used),
-    )
-    assert wrong() == ({"token nightly": Level.DOUBTFUL} if is_told else {})
-    ApiToken.objects.filter(pk=token.pk).update(revoked_at=now)
-    assert wrong() == {}

@@ -97,7 +97,7 @@ def a_rated_study() -> Shown:
     Contestant.objects.filter(slug="interplan").update(kind=Contestant.Kind.REFERENCE)
     snapshot = rate(study=study, rounds=1000, seed=4)
     client = signed_in(people()["analyst"])
-    tabs = ("table", "pairs", "types", "raters", "coverage")
+    tabs = ("table", "pairs", "types", "raters")
     return Shown(
         votes=_votes(study),
         results=Snapshot.objects.get(pk=snapshot.pk).results,

@@ -31,12 +31,6 @@ def test_a_lane_reaches_half_its_width_to_either_side(
     assert graph.under(20.0, sign * off_m) == (lane.id if is_on else None)
 
 
-def test_straight_on_comes_first_where_lanes_part() -> None:
-    graph = LaneGraph(junction())
-    assert graph.successors("Lane1") == ("Connector1", "Connector2")
-    assert graph.route("Lane1", 100.0) == ["Lane1", "Connector1", "Lane2"]
-
-
 @pytest.mark.parametrize("turn", [TurnType.LEFT, TurnType.RIGHT, TurnType.U_TURN])
 @pytest.mark.parametrize("straight_first", [True, False])
 def test_the_order_of_the_file_does_not_tell_where_the_road_goes_on(
@@ -69,6 +63,7 @@ def test_a_distance_runs_on_over_connectors() -> None:
     assert place is not None
     assert (place.lane_id, place.s_m) == ("Lane2", 4.0)
     assert (place.pose.x_m, place.pose.y_m) == (40.0, 0.5)
+    assert LaneGraph(junction()).along("Lane2", 0.0, 65.0) is None, "past the map"
 
 
 def test_a_turn_can_be_asked_for_and_a_distance_can_run_back() -> None:
@@ -80,10 +75,6 @@ def test_a_turn_can_be_asked_for_and_a_distance_can_run_back() -> None:
     assert back is not None
     assert back.lane_id == "Lane1"
     assert back.pose.x_m == pytest.approx(0.0)
-
-
-def test_past_the_map_there_is_nothing() -> None:
-    assert LaneGraph(junction()).along("Lane2", 0.0, 65.0) is None
 
 
 def test_an_unknown_lane_names_the_known_ones() -> None:
@@ -247,8 +238,3 @@ def test_the_lane_that_the_ego_names_counts_before_the_one_under_it() -> None:
 
 def test_an_ego_off_every_lane_has_no_route() -> None:
     assert EgoRoute.of(scene(ego=replace(EGO, y_m=40.0, lane_id=None))) is None
-
-
-def test_where_lanes_part_the_route_goes_straight_on() -> None:
-    assert route_of(junction()).lane_ids == ("Lane1", "Connector1", "Lane2")
-    assert route_of(junction()).heading_at(60.0) == pytest.approx(0.0)

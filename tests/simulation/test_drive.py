@@ -28,15 +28,14 @@ from augment.scene.entities import (
 from augment.scene.lane_graph import LaneGraph
 from augment.simulation.drive import ExpertKind, expert_of, run
 from augment.simulation.pdm_closed import ORIGINAL_OFFSETS_M, PdmClosed
-from augment.simulation.planners import IdmPlanner
-from augment.simulation.planning import Plan, Situation
+from augment.simulation.planning import IdmPlanner, Plan, Situation
 from augment.simulation.road import Road, find_route
 from augment.simulation.score import collisions, progress_ratio, score_drive
 from augment.simulation.states import EgoBody, X, Y
 from augment.simulation.traffic import DriveSetting
 from tests.properties import examples
 from tests.recorded import recorded
-from tests.scenes import junction, pedestrian, vehicle
+from tests.scenes import junction, moved_scene, pedestrian, vehicle
 from tests.simulation.short_recordings import (
     LENGTHS_S,
     ConstantSpeed,
@@ -45,26 +44,6 @@ from tests.simulation.short_recordings import (
     recorded_street,
 )
 from tests.simulation.worlds import street
-
-
-def moved(agent: TrafficAgent, frame: Pose, flip: float) -> TrafficAgent:
-    """An agent mirrored at the x axis (flip -1) and then moved into the frame."""
-    x, y = frame.to_parent(np.array([[agent.x_m, flip * agent.y_m]]))[0]
-    heading = flip * agent.heading_rad + frame.heading_rad
-    return replace(agent, x_m=float(x), y_m=float(y), heading_rad=heading)
-
-
-def moved_scene(scene: Scene, frame: Pose, flip: float) -> Scene:
-    def line(given: Polyline) -> Polyline:
-        return Polyline(frame.to_parent(given.points_m * np.array([1.0, flip])))
-
-    lanes = tuple(replace(lane, centerline=line(lane.centerline)) for lane in scene.lanes)
-    return replace(
-        scene,
-        lanes=lanes,
-        ego=moved(scene.ego, frame, flip),
-        agents=tuple(moved(agent, frame, flip) for agent in scene.agents),
-    )
 
 
 def bend() -> Scene:
@@ -221,15 +200,6 @@ def test_who_stands_stays_and_who_moves_goes_on_along_its_lane(reactive: bool) -
     assert ahead[0] > 40.0 + 8.0 * 15.0 - 1.0, "it goes on at its speed or the limit"
     steps = [row.boxes[row.ids.index("Agent2"), 0] for row in drive.objects]
     assert ((np.diff(steps) > 0.0) & (np.diff(steps) < 1.1)).all(), "without a jump"
-
-
-def test_a_parked_cars_noise_is_no_motion() -> None:
-    scene, recording = recorded_street()
-    recording.tracks[1].states[:, 3] = 0.05
-    drive = run(DriveSetting(scene=scene, recording=cut(recording, 3.0)), ConstantSpeed(4.0))
-    last = drive.objects[-1]
-    assert last.boxes[last.ids.index("Agent3"), 0] == 60.0
-    assert last.speeds_mps[last.ids.index("Agent3")] == 0.0
 
 
 def test_a_recording_of_one_moment_measures_by_an_idm_drive() -> None:

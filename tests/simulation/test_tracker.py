@@ -8,8 +8,9 @@ import shapely
 from hypothesis import given
 from hypothesis import strategies as st
 
-from augment.simulation.path import Path, Region, dense
-from augment.simulation.states import EgoBody, FloatArray, corners, meet
+from augment.simulation.path import Path, dense
+from augment.simulation.shapes import corners, meet
+from augment.simulation.states import EgoBody, FloatArray
 from augment.simulation.tracker import track
 from tests.properties import examples
 
@@ -39,28 +40,6 @@ def bent(speed_mps: float, curvature: float, gain_mps2: float = 0.0) -> FloatArr
         )
         speed_mps += gain_mps2 * DT
     return np.array(poses)
-
-
-def test_the_speed_follows_the_closed_form_through_the_pedals_lag() -> None:
-    states = follow(straight(8.0), (0.0, 0.0, 0.0, 5.0))
-    speed, pull = 5.0, 0.0
-    for state in states:
-        assert state[3] == pytest.approx(speed, abs=1e-9)
-        assert state[4] == pytest.approx(pull, abs=1e-9)
-        command = 10.0 * (8.0 - speed) / 11.0
-        pull += DT / (DT + 0.2) * (command - pull)
-        speed += pull * DT
-
-
-def test_the_first_steering_rate_is_the_closed_form_of_the_lateral_error() -> None:
-    # With a speed that stays, the error after ten steps is e0 + b_e * rate, the heading error
-    # b_h * rate, where b_h = (v dt dt / L) * 45 and b_e = (v dt)^2 dt / L * sum of j (9 - j).
-    speed, offset = 8.0, 0.5
-    states = follow(straight(speed), (0.0, offset, 0.0, speed))
-    by_heading = speed * DT * DT / BODY.wheelbase_m * 45.0
-    by_offset = (speed * DT) ** 2 * DT / BODY.wheelbase_m * sum(j * (9 - j) for j in range(10))
-    rate = -by_offset * offset / (by_offset**2 + 10.0 * by_heading**2 + 1.0)
-    assert states[1, 5] == pytest.approx(DT / (DT + 0.05) * rate * DT, rel=1e-9)
 
 
 def test_at_walking_pace_the_stopping_controller_takes_half_the_missing_speed() -> None:
@@ -156,17 +135,6 @@ def test_boxes_meet_where_their_polygons_do(pairs: list[tuple[tuple[float, ...],
     clear = np.abs(shapely.distance(a, b) - 1e-9) > 1e-9  # nobody argues about rounding
     clear |= shapely.area(shapely.intersection(a, b)) > 1e-9
     assert (meet(first, second) == shapely.intersects(a, b))[clear].all()
-
-
-@examples(25)
-@given(st.integers(0, 2**32 - 1))
-def test_a_region_answers_as_its_polygon_does(seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    rings = [rng.uniform(-20.0, 20.0, (3, 2)) for _ in range(4)]
-    ground = shapely.union_all([shapely.Polygon(ring) for ring in rings])
-    points = rng.uniform(-25.0, 25.0, (40, 10, 2))
-    found = Region(ground).contains(points)
-    assert (found == shapely.contains_xy(ground, points[..., 0], points[..., 1])).all()
 
 
 @examples(25)

@@ -26,7 +26,7 @@ def link(study: Study, **changes: object) -> Enrolment:
         "votes_each": 6,
         "drop_out_after_h": 24,
     }
-    return set_enrolment(study=study, **{**given, **changes})  # type: ignore[arg-type]
+    return set_enrolment(study=study, rules={**given, **changes})
 
 
 def join(enrolment: Enrolment, name: str) -> EnrolledVoter:

@@ -95,7 +95,7 @@ def test_repeats_are_drawn_anew_for_who_takes_over() -> None:
     ("giver", "to", "error", "sentence"),
     [
         ("eva", [], Conflict, "Name at least one"),
-        ("eva", ["eva"], Conflict, "eva can't take over their own pairs"),
+        ("eva", ["eva"], Conflict, "other than eva"),
         ("eva", ["nobody"], UnknownName, "Unknown expert 'nobody'"),
         ("eva", ["sim"], Conflict, "Simulated: sim"),
         ("hans", ["finn"], UnknownName, "expert of this study 'hans'. Known: eva, finn"),

@@ -9,7 +9,7 @@ from django.core.management import call_command
 from django.db import IntegrityError, transaction
 
 from arena.errors import LabellingClosed, NotYours
-from arena.jobs.exports.faults import csv_bytes, fault_table, latex
+from arena.jobs.exports.faults import FORMATS, fault_table
 from arena.jobs.queries import labelling_of, next_task
 from arena.jobs.services import close_labelling, open_labelling, save_label
 from arena.models import FaultLabel, LabellingRound, LabelTask
@@ -108,8 +108,8 @@ def test_of_several_experts_more_than_half_must_see_a_fault(job: GenerationJob, 
     save(by_finn[0], P)
     save(by_eva[1], L)
     ann, sim = fault_table(job).lines
-    assert ann.shown_counts == (2, 1, 0, 1)
-    assert sim.shown_counts == (2, "--", "--", "--"), "nothing of it was labelled"
+    assert ann.shown_counts == ("2", "1", "0", "1")
+    assert sim.shown_counts == ("2", "--", "--", "--"), "nothing of it was labelled"
     assert (ann.labelled, ann.labels, sim.labelled, sim.without_modification) == (2, 3, 0, 2)
 
 
@@ -134,12 +134,12 @@ def test_a_closed_labelling_takes_no_more_and_asks_for_nothing(
 def test_the_files_have_the_papers_columns(job: GenerationJob, eva: User) -> None:
     save(tasks_of(opened(job, "eva"), eva)[0], P)
     table = fault_table(job)
-    lines = list(csv.DictReader(io.StringIO(csv_bytes(table).decode())))
+    lines = list(csv.DictReader(io.StringIO(FORMATS["csv"].write(table).decode())))
     assert [(line["contestant"], line["all"]) for line in lines] == [
         ("ann", "1"),
         ("sim (simulated)", "2"),
     ]
-    text = latex(table).decode()
+    text = FORMATS["latex"].write(table).decode()
     assert r"    ann & 1 & 1 & 0 & 0 & 0 & 1\\" in text
     # Two unreadable answers and nothing to label: two misses, of two.
     assert r"    sim (simulated) & 2 & -- & -- & -- & 2 & 2\\" in text

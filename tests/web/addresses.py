@@ -4,8 +4,7 @@ import uuid
 
 from django.urls import reverse
 
-from arena.models import Authorship
-from arena.people.links import invite, mark_author
+from arena.people.links import invite
 from arena.studies.services.drafts import keep_draft
 from augment.models import Endpoint, EndpointModel, SceneUpload, Simulation, UploadMoment
 from tests.web.cast import World
@@ -29,18 +28,14 @@ def address(name: str, here: World) -> str:
         "job-pause": {"code": here.job.code},
         "job-simulate": {"code": here.job.code},
         "drives": {"code": here.job.code},
-        "driving-export": {"code": here.job.code, "form": "csv"},
         "job-cancel": {"code": here.job.code},
         "job-resume": {"code": here.job.code},
-        "displacement-export": {"code": here.job.code, "form": "csv"},
-        "tool-calls-export": {"code": here.job.code, "form": "csv"},
+        "job-export": {"code": here.job.code, "name": "tool-calls", "form": "csv"},
         "transcripts-export": {"code": here.job.code},
         "scenarios-export": {"code": STRANGER},
         "scenarios-write": {"code": here.job.code, "form": "json"},
         "analyses": {"code": here.job.code},
-        "analyses-export": {"code": here.job.code, "part": "pairs", "form": "csv"},
         "faults": {"code": here.job.code},
-        "faults-export": {"code": here.job.code, "form": "csv"},
         "label": {"code": here.job.code},
         "labelling-close": {"code": here.job.code},
         "augmentation": {"code": here.augmentation.code},
@@ -58,17 +53,14 @@ def address(name: str, here: World) -> str:
         "set-intent": {"code": here.augmentation.scenario.code},
         "intent-edit": {"code": here.augmentation.scenario.code},
         "scenario-retired": {"code": here.augmentation.scenario.code},
-        "scene-retired": {"code": here.augmentation.scenario.base_scene.code},
         "scenario-edit": {"code": here.augmentation.scenario.code},
         "scenario-delete": {"code": here.augmentation.scenario.code},
         "scene-delete": {"code": here.augmentation.scenario.base_scene.code},
         "intent-read": {"code": here.augmentation.scenario.code},
         "picture": {"kind": "augmentation", "code": shown.left.code},
-        "results-export": {"code": here.study.code, "form": "csv"},
+        "results-export": {"code": here.study.code, "name": "votes", "form": "csv"},
         "study-file": {"code": here.study.code, "kind": "interplan"},
         "study-write": {"code": here.study.code, "kind": "interplan"},
-        "results-chart": {"code": here.study.code, "name": "pairs", "form": "svg"},
-        "results-votes-export": {"code": here.study.code, "form": "csv"},
         "results-vote": {"code": here.study.code, "vote": STRANGER},
         "shown-picture": {"code": here.study.code, "matchup": shown.code, "side": "left"},
         "results-tab": {"code": here.study.code, "tab": "pairs"},
@@ -101,9 +93,6 @@ def address(name: str, here: World) -> str:
     if name == "revoke":
         made = invite(study=here.study, expert=here.expert)
         arguments["revoke"] = {"code": made.invitation.code}
-    if name == "author-back":
-        mark_author(study=here.study, expert=here.expert, contestant="ann")
-        arguments["author-back"] = {"code": Authorship.objects.get().code}
     own = (
         *("study", "preregistration", "experts", "invite", "author", "study-close"),
         *("study-cancel", "study-again"),

@@ -41,9 +41,7 @@ def pages_of_a_rated_study() -> list[ShownPage]:
     study.save()
     rate(study=study, rounds=100, filters=Filters())
     code = [study.code]
-    named = {
-        f"tab {tab.name}": reverse("results-tab", args=[*code, tab.name]) for tab in TABS.values()
-    }
+    named = {f"tab {tab}": reverse("results-tab", args=[*code, tab]) for tab in TABS}
     named |= {
         name: reverse(name, args=code) for name in ("study", "preregistration", "results-votes")
     }

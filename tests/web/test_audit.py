@@ -68,7 +68,7 @@ def test_acts_are_filtered_and_exported() -> None:
 # --- Early looks -------------------------------------------------------------------------------
 
 GIVES_RESULTS = re.compile(
-    r"\b(leaderboard_table|bundle|chart_bytes|vote_table|vote_list_csv|snapshot_to_export"
+    r"\b(leaderboard_table|bundle_files|RATING_FILES|vote_table|vote_list_csv|snapshot_to_export"
     r"|write_study|ask_for_study_file|unrated_votes|plan_snapshot|answer_hypotheses|known_of)\("
     r"|services\.ratings import .*\brate_now\b"
 )
@@ -103,7 +103,7 @@ def test_every_door_to_results_is_on_the_list() -> None:
     assert found == set(DOORS)
 
 
-TABS = ("table", "pairs", "types", "raters", "coverage", "displacement", "cost", "log")
+TABS = ("table", "pairs", "types", "raters", "displacement", "cost", "log")
 GATED = ("results", *TABS)
 """What answers with the question whether to look early."""
 
@@ -116,13 +116,14 @@ def _pages(study: Study, rating: Snapshot) -> dict[str, str]:
         **{tab: reverse("results-tab", args=[code, tab]) for tab in TABS},
         "votes": reverse("results-votes", args=[code]),
         **{
-            form: reverse("results-export", args=[code, form])
-            for form in ("csv", "json", "latex", "parquet", "zip")
+            f"{name}.{form}": reverse("results-export", args=[code, name, form])
+            for name, form in (
+                *(("leaderboard", form) for form in ("csv", "json", "latex", "parquet")),
+                *(("all", "zip"), ("votes", "csv"), ("pairs", "svg")),
+            )
         },
-        "votes.csv": reverse("results-votes-export", args=[code, "csv"]),
         "api rating": reverse("api-snapshot", args=[rating.code]),
         "api file": reverse("api-snapshot-file", args=[rating.code, "leaderboard", "csv"]),
-        "pairs.svg": reverse("results-chart", args=[code, "pairs", "svg"]),
     }
 
 
@@ -156,7 +157,7 @@ def test_no_page_shows_results_of_an_open_study_before_an_early_look() -> None:
         dict.fromkeys(pages, 200)
     )
     admin = signed_in(accounts["admin"])
-    assert admin.get(pages["csv"]).status_code == 403
+    assert admin.get(pages["leaderboard.csv"]).status_code == 403
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ from arena.templatetags.marks import usd
 from augment.models import GenerationJob
 from augment.services.running import runner
 from augment.services.running.budget import Caps
-from tests.jobs.models import Model, add_llama, llama_job
+from tests.jobs.models import Model, llama_job
 from tests.jobs.rows import add_scenario, only_row
 from tests.web.cast import people, signed_in
 
@@ -25,17 +25,6 @@ def ran(job: GenerationJob, model: Model | None = None) -> GenerationJob:
     runner.work_on(augmentation_pk=only_row(job).pk, connect=model or Model())
     job.refresh_from_db()
     return job
-
-
-def test_a_job_is_launched_with_its_caps() -> None:
-    add_llama(price="1")
-    add_scenario("street")
-    sent = {"name": "R", "contestants": ["llama"], "scenarios": ["street"], "is_fresh": "on"}
-    caps = {"cap_usd": "2.50", "cap_calls": "40", "cap_tokens": ""}
-    signed_in(people()["admin"]).post(reverse("job-new"), sent | caps)
-    job = GenerationJob.objects.get()
-    assert (job.cap_usd, job.cap_calls, job.cap_tokens) == (Decimal("2.5"), 40, None)
-    assert job.is_fresh
 
 
 def test_the_page_shows_what_is_spent_beside_the_cap() -> None:

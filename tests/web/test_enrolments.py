@@ -19,11 +19,13 @@ pytestmark = pytest.mark.django_db
 def enrolment() -> Enrolment:
     return set_enrolment(
         study=a_study(votes_per_expert=3),
-        consent="I agree <fully>.\nReally.",
-        asks_for="Your Prolific ID",
-        places=2,
-        votes_each=6,
-        drop_out_after_h=24,
+        rules={
+            "consent": "I agree <fully>.\nReally.",
+            "asks_for": "Your Prolific ID",
+            "places": 2,
+            "votes_each": 6,
+            "drop_out_after_h": 24,
+        },
     )
 
 

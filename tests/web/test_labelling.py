@@ -92,5 +92,7 @@ def test_an_admin_opens_a_labelling_and_an_analyst_reads_it(job: GenerationJob, 
     shown = signed_in(accounts["analyst"]).get(url).content.decode()
     assert "Cohen’s kappa" in shown
     assert "1 of 2" in shown
-    table = signed_in(accounts["analyst"]).get(reverse("faults-export", args=[job.code, "csv"]))
+    table = signed_in(accounts["analyst"]).get(
+        reverse("job-export", args=[job.code, "faults", "csv"])
+    )
     assert table.content.startswith(b"contestant,slug")

@@ -44,7 +44,7 @@ def test_files_are_the_same_in_every_language() -> None:
     rate(study=close_study(study=study), rounds=20)
     reader = signed_in(people()["analyst"])
     for form in ("csv", "json", "latex"):
-        address = reverse("results-export", args=[study.code, form])
+        address = reverse("results-export", args=[study.code, "leaderboard", form])
         english, german = (
             reader.get(address, HTTP_ACCEPT_LANGUAGE=wish).getvalue() for wish in ("en", "de")
         )

@@ -67,7 +67,7 @@ def test_opening_a_study_asks_with_its_numbers_and_keeps_what_was_filled_in() ->
     shown = text_of(asked)
     assert "Open the study “<b>Round</b> 1”?" in html.unescape(asked.content.decode())
     assert "Experts: 2. Votes: 24. Contestants: 3. Scenarios: 6." in shown
-    assert "hidden repeats 6, attention checks 0." in shown
+    assert "For each expert about 15 pairs" in shown
     assert (Study.objects.count(), Event.objects.count()) == (0, events)
     back = admin.post(page, {**hidden_of(asked), "change": "1"})
     assert 'value="&lt;b&gt;Round&lt;/b&gt; 1"' in back.content.decode()

@@ -1,9 +1,5 @@
 """The results page: the table, its files, and what is said with them."""
 
-import csv
-import io
-import json
-
 import pytest
 from django.contrib.auth.models import User
 from django.urls import reverse
@@ -43,23 +39,6 @@ def test_the_table_says_rank_rating_interval_and_votes_with_the_method_beneath()
     assert order == sorted(order)
     for said in ("Bradley-Terry on the Elo scale", "50 rounds", "seed 0", "SHA-256", "one plus"):
         assert said in page
-
-
-def test_files_carry_the_numbers_of_the_page() -> None:
-    study, analyst = judged(), signed_in(people()["analyst"])
-    rate(study=study, rounds=50)
-
-    def file(form: str) -> str:
-        answer = analyst.get(reverse("results-export", args=[study.code, form]))
-        assert answer.headers["Content-Disposition"].startswith("attachment; filename=")
-        return answer.content.decode()
-
-    lines = list(csv.DictReader(io.StringIO(file("csv"))))
-    assert [line["model"] for line in lines] == ["Ann", "Bob", "Cid"]
-    assert json.loads(file("json"))["votes"]["counted"] == 18
-    assert "Ann" in file("latex")
-    assert file("csv") == file("csv")
-    assert analyst.get(reverse("results-export", args=[study.code, "docx"])).status_code == 404
 
 
 def test_what_is_simulated_is_said_on_every_page_of_the_study() -> None:

@@ -7,7 +7,7 @@ from django.urls import reverse
 from pytest_django import DjangoAssertNumQueries
 
 from arena.models import EarlyLook, Matchup, Study
-from arena.results.pages.tabs import TABS
+from arena.results.pages.tabs import FOR_EXPERTS, TABS
 from arena.results.services.ratings import rate_now as rate
 from arena.studies.services.opening import close_study
 from augment.scene.entities import ScenarioType
@@ -41,10 +41,10 @@ def analyst() -> Client:
 def test_every_tab_reads_the_snapshot_with_few_queries(
     study: Study, analyst: Client, django_assert_max_num_queries: DjangoAssertNumQueries
 ) -> None:
-    for tab in TABS.values():
-        page(analyst, study, tab.name)  # templates are compiled once
+    for tab in TABS:
+        page(analyst, study, tab)  # templates are compiled once
         with django_assert_max_num_queries(12):
-            page(analyst, study, tab.name)
+            page(analyst, study, tab)
 
 
 def test_raters_are_pseudonyms_with_repeats_and_checks(analyst: Client) -> None:
@@ -74,12 +74,15 @@ def test_experts_read_the_table_but_nothing_about_each_other(study: Study) -> No
     shown = page(expert, study)
     assert "Raters" not in shown
     assert "Export" not in shown
-    assert "?rating=" not in page(expert, study, "pairs")
-    for tab in TABS.values():
-        status = expert.get(reverse("results-tab", args=[study.code, tab.name])).status_code
-        assert status == (403 if tab.staff else 200), tab.name
-    for name, form in (("results-export", "zip"), ("results-votes-export", "csv")):
-        assert expert.get(reverse(name, args=[study.code, form])).status_code == 403
+    assert "results/votes" not in page(expert, study, "pairs")
+    for tab in TABS:
+        status = expert.get(reverse("results-tab", args=[study.code, tab])).status_code
+        assert status == (200 if tab in FOR_EXPERTS else 403), tab
+    for name, form in (("all", "zip"), ("votes", "csv"), ("leaderboard", "json")):
+        address = reverse("results-export", args=[study.code, name, form])
+        assert expert.get(address).status_code == 403
+    chart = reverse("results-export", args=[study.code, "leaderboard", "svg"])
+    assert expert.get(chart).status_code == 200
 
 
 def test_a_new_rating_is_asked_for_with_method_and_filters(study: Study, analyst: Client) -> None:

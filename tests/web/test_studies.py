@@ -31,7 +31,9 @@ def test_what_cannot_be_planned_is_said_on_the_form_and_nothing_is_kept() -> Non
     cast = study_rows.cast_of()
     study_rows.contestant("new")
     sent = {"name": "Round 1", **cast, "contestants": ["ann", "new"], "votes_per_expert": 9}
-    answer = signed_in(people()["admin"]).post(reverse("study-new"), {**sent, "seed": 4})
+    answer = signed_in(people()["admin"]).post(
+        reverse("study-new"), {**sent, "seed": 4, "sure": "1"}
+    )
     assert answer.status_code == 422
     assert "no picture yet of new" in answer.content.decode()
     assert 'value="Round 1"' in answer.content.decode()
@@ -99,7 +101,7 @@ def test_an_admin_hands_over_what_an_expert_has_not_judged() -> None:
         "Handed over: finn 4, gus 5." in said.content.decode()
     )
     assert not study.matchups.filter(expert__username="eva").exists()
-    again = admin.post(url, {"giver": "eva", "takers": ["finn"]}, follow=True)
+    again = admin.post(url, {"giver": "eva", "takers": ["finn"], "sure": "1"}, follow=True)
     assert "eva has nothing left to hand over." in again.content.decode()
     nobody = admin.post(url, {"giver": "finn"}, follow=True)
     assert "Choose who takes over." in nobody.content.decode()

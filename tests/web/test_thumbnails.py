@@ -14,7 +14,7 @@ from augment.render.bev import draw
 from augment.render.camera import camera_for
 from augment.render.canvas import shrink_png
 from augment.scene.entities import Modification
-from augment.services.scenarios.pictures import WIDTHS_PX, store, thumbnail_of
+from augment.services.scenarios.pictures import store, thumbnail_of
 from tests import scenes
 from tests.buckets import Bucket, bucket
 from tests.jobs.rows import add_scenario
@@ -40,16 +40,6 @@ def there(settings: Settings, monkeypatch: pytest.MonkeyPatch) -> Iterator[Bucke
 def read(name: str) -> bytes:
     with default_storage.open(name) as file:
         return bytes(file.read())
-
-
-@pytest.mark.parametrize("widest_px", WIDTHS_PX)
-def test_a_thumbnail_is_small_and_the_same_whenever_it_is_made(
-    picture: bytes, widest_px: int
-) -> None:
-    small = shrink_png(picture, widest_px)
-    assert small == shrink_png(picture, widest_px)
-    assert Image.open(io.BytesIO(small)).width == widest_px
-    assert len(small) < len(picture) / 2
 
 
 def test_a_thumbnail_is_made_once(picture: bytes) -> None:

@@ -1,55 +1,49 @@
-"""The displacement errors of a job as a table: what its files, chart and page show."""
+"""The displacement errors of a job: a table in groups or one row an object, and box plots."""
+
+from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import TYPE_CHECKING, Any
 
+from arena.exports.formats import (
+    NUMBER,
+    TEXT,
+    WHOLE,
+    YES_NO,
+    Columns,
+    Sheet,
+    drawings,
+    join_numbers,
+    sheet_of,
+    table_formats,
+)
+from arena.results.exports.drawing import MARK, house_style, name_lines, write_figure
+from arena.results.exports.tables import shown_name
 from augment.models import GenerationJob
 from augment.services.judging.displacement import (
     PLACED_EXACTLY,
     By,
     Group,
-    Measured,
     groups,
+    objects_of,
     of_job,
 )
-from augment.services.scenarios.scenes import ScenarioType, in_type_order
+from augment.services.scenarios.scenes import ScenarioType, in_type_order, type_choices
 
-SOURCE = "read from the paper's figure"
-
-
-class PublishedBox(NamedTuple):
-    """One box of the paper's figure "Displacement error by variant", in metres."""
-
-    model: str
-    variant: str
-    q1_m: float
-    median_m: float
-    q3_m: float
-    high_m: float
-
-
-BY_VARIANT = (
-    PublishedBox("GPT-4o", "OTM", 1.2, 1.5, 2.1, 2.9),
-    PublishedBox("Gemini-1.5-Flash", "OTM", 1.0, 1.4, 3.9, 5.2),
-    PublishedBox("Llama3.1-70B", "OTM", 0.9, 2.7, 7.3, 9.7),
-    PublishedBox("GPT-4o", "FC", 0.3, 0.5, 1.2, 1.9),
-    PublishedBox("Gemini-1.5-Flash", "FC", 0.2, 0.4, 0.8, 1.8),
-    PublishedBox("Llama3.1-70B", "FC", 0.3, 0.7, 1.4, 1.8),
-    PublishedBox("GPT-4o", "tQA", 1.1, 1.4, 2.4, 3.9),
-    PublishedBox("Gemini-1.5-Flash", "tQA", 0.6, 1.0, 2.4, 4.8),
-    PublishedBox("Llama3.1-70B", "tQA", 0.9, 1.4, 3.2, 4.2),
-    PublishedBox("Gemini-1.5-Flash", "vQA", 0.9, 1.3, 2.9, 4.8),
-)
-"""Read from the paper's box plot by eye, to a tenth of a metre; nothing was measured here. Lower
-whiskers can't be told apart there, means and numbers of objects are not given."""
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 PAPERS_CHOICE = (
     "As in the paper, construction zone and accident site are left out: their objects can lie in "
     "many places that all follow the instruction."
 )
 SIMULATED_NOTE = "Simulated contestants are marked; they say nothing about a real one."
+
+FAR = 4.0
+"""Values this many times beyond the longest whisker make the axis logarithmic."""
+LINEAR_UP_TO_M = 1.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -58,18 +52,14 @@ class DisplacementTable:
 
     Attributes:
         types: The scenario types that count, by their names.
-        measured: Every row of the job, for whoever wants the single values.
         left_out: Augmentations without a displacement, by reason.
-        published: The paper's boxes to stand beside, empty where they answer another question.
     """
 
     job: str
     by: By
     types: tuple[str, ...]
     groups: tuple[Group, ...]
-    measured: tuple[Measured, ...]
     left_out: dict[str, int]
-    published: tuple[PublishedBox, ...]
 
     @property
     def simulated(self) -> bool:
@@ -81,30 +71,20 @@ class DisplacementTable:
         """Which scenario types count, in words."""
         if self.types == tuple(ScenarioType):
             return "All five scenario types"
-        own = {one.row.scenario.type: one.row.scenario.type_label for one in self.measured}
-        known = own | {one.value: str(one.label) for one in ScenarioType}
-        labels = tuple(known[name] for name in self.types)
-        return f"Scenario types: {', '.join(labels)}"
-
-    @property
-    def notes(self) -> tuple[str, ...]:
-        """Sentences that belong beneath every form of it."""
-        return (f"{self.types_text}.", *self.remarks)
+        labels = dict(type_choices())
+        return f"Scenario types: {', '.join(labels.get(name, name) for name in self.types)}"
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        """The same but for the scenario types."""
-        unmeasured = (
-            f"Augmentations not measured: {number} ({reason})."
-            for reason, number in self.left_out.items()
-        )
+        """Sentences that belong beneath every form of it, beside the scenario types."""
+        is_papers = self.by is By.VARIANT and set(self.types) == set(PLACED_EXACTLY)
         return (
             "Distances between centres, in metres, of objects matched within their class so that "
             "their sum is smallest; each matched object counts once.",
             "Missing and surplus objects are counted and have no distance; an unreadable or "
             "refused answer misses all.",
-            *([PAPERS_CHOICE] if self.published else []),
-            *unmeasured,
+            *([PAPERS_CHOICE] if is_papers else []),
+            *(f"Not measured: {number} ({why})." for why, number in self.left_out.items()),
             *([SIMULATED_NOTE] if self.simulated else []),
         )
 
@@ -121,17 +101,161 @@ def displacement_table(
             places are definite, else all.
     """
     measured = of_job(job)
-    every = tuple(in_type_order([*ScenarioType, *(one.row.scenario.type for one in measured)]))
+    every = in_type_order([*ScenarioType, *(one.row.scenario.type for one in measured)])
     if types is None:
-        types = PLACED_EXACTLY if by is By.VARIANT else every
-    chosen = tuple(one for one in every if one in set(types))
+        types = PLACED_EXACTLY if by is By.VARIANT else list(every)
+    chosen = tuple(name for name in every if name in set(types))
     left_out = Counter(one.why_not.value for one in measured if one.why_not is not None)
     return DisplacementTable(
         job=job.name,
         by=by,
         types=chosen,
         groups=tuple(groups(measured, by=by, types=chosen)),
-        measured=tuple(one for one in measured if one.row.scenario.type in chosen),
         left_out=dict(sorted(left_out.items())),
-        published=BY_VARIANT if by is By.VARIANT and set(chosen) == set(PLACED_EXACTLY) else (),
     )
+
+
+GROUPS: Columns = {
+    "group": ("heading", TEXT),
+    "contestant": (lambda group: shown_name(group.contestant, group.is_simulated), TEXT),
+    **{name: (name, TEXT) for name in ("slug", "model", "variant")},
+    "simulated": ("is_simulated", YES_NO),
+    **{name: (f"summary.{name}", WHOLE) for name in ("augmentations", "n", "missing", "surplus")},
+    **{
+        name: (f"summary.box.{name}", NUMBER)
+        for name in ("median_m", "q1_m", "q3_m", "mean_m", "low_m", "high_m")
+    },
+    "outliers_m": (
+        lambda group: join_numbers(getattr(group.summary.box, "outliers_m", ()), ".3f"),
+        TEXT,
+    ),
+}
+
+
+def group_sheet(table: DisplacementTable) -> Sheet:
+    """Return one row a group."""
+    types = " ".join(table.types)
+    facts = {
+        "job": table.job,
+        "by": table.by.value,
+        "simulated": table.simulated,
+        "notes": [f"{table.types_text}.", *table.remarks],
+        "not_measured": table.left_out,
+    }
+    columns: Columns = {**GROUPS, "types": (lambda group: types, TEXT)}
+    return sheet_of(
+        table.groups, columns, name="displacement", key="groups", number=".3f", facts=facts
+    )
+
+
+# --- One row an object -------------------------------------------------------------------------
+
+
+WHOSE: Columns = {
+    "scenario": ("row.scenario.slug", TEXT),
+    "type": ("row.scenario.type", TEXT),
+    "contestant": ("row.contestant.slug", TEXT),
+    **{name: (f"row.contestant.{name}", TEXT) for name in ("name", "model", "variant")},
+    "simulated": ("row.contestant.is_simulated", YES_NO),
+}
+OBJECTS: Columns = {
+    **WHOSE,
+    "augmentation": ("row.code", TEXT),
+    "state": ("row.state", TEXT),
+    "object": ("standing", TEXT),
+    "class": ("object_class", TEXT),
+    "reference": ("reference.id", TEXT),
+    "reference_x_m": ("reference.x_m", NUMBER),
+    "reference_y_m": ("reference.y_m", NUMBER),
+    "generated": ("generated.id", TEXT),
+    "x_m": ("generated.x_m", NUMBER),
+    "y_m": ("generated.y_m", NUMBER),
+    "distance_m": ("distance_m", NUMBER),
+    "sample": ("row.sample", WHOLE),
+}
+"""`object` is matched, missing or surplus; places are in the ego frame."""
+
+
+def object_sheet(job: GenerationJob, *, types: Collection[str] | None = None) -> Sheet:
+    """Return the displacement of a job with one row an object.
+
+    Args:
+        job: Whose augmentations are measured.
+        types: The scenario types that count; None for all.
+    """
+    found = objects_of(job)
+    lines = (line for line in found if types is None or line.row.scenario.type in types)
+    return sheet_of(lines, OBJECTS, name="displacement-objects", key="objects", number=".4f")
+
+
+# --- Box plots ---------------------------------------------------------------------------------
+
+
+def box_plot(table: DisplacementTable, *, file_format: str) -> bytes:
+    """Draw a box a group: quartiles, median, Tukey's whiskers, outliers, mean as a diamond."""
+    from matplotlib.figure import Figure
+
+    boxes = {place: _stats(group) for place, group in enumerate(table.groups) if group.summary.box}
+    with house_style():
+        figure = Figure(figsize=(7.2, 1.4 + 0.3 * len(table.groups)), layout="constrained")
+        axes = figure.add_subplot()
+        axes.bxp(
+            list(boxes.values()),
+            positions=list(boxes),
+            widths=0.56,
+            orientation="horizontal",
+            manage_ticks=False,
+            patch_artist=True,
+            showmeans=True,
+            boxprops={"facecolor": f"{MARK}33", "edgecolor": MARK},
+            medianprops={"color": MARK, "linewidth": 2.2},
+            meanprops={"marker": "D", "markersize": 3.5, "markerfacecolor": "white"},
+            flierprops={"marker": "o", "markersize": 3.2, "markeredgecolor": MARK},
+        )
+        simulated = [group.is_simulated for group in table.groups]
+        name_lines(axes, [_name(table, group) for group in table.groups], simulated)
+        _scale(axes, list(boxes.values()))
+        marks = ", with simulated contestants" if table.simulated else ""
+        legend = "Boxes: quartiles around the median; whiskers: up to 1.5 boxes; diamonds: means"
+        text = f"Displacement error (m){marks}\n{table.types_text}\n{legend}"
+        figure.supxlabel(text, fontsize=8)
+        return write_figure(figure, file_format)
+
+
+def _stats(group: Group) -> dict[str, Any]:
+    """Return a box as matplotlib takes it."""
+    box = group.summary.box
+    assert box is not None
+    return {
+        "med": box.median_m,
+        "q1": box.q1_m,
+        "q3": box.q3_m,
+        "whislo": box.low_m,
+        "whishi": box.high_m,
+        "mean": box.mean_m,
+        "fliers": list(box.outliers_m),
+    }
+
+
+def _name(table: DisplacementTable, group: Group) -> str:
+    """Return what a box is called: its group, and how many objects it stands for."""
+    name = shown_name(group.contestant, group.is_simulated)
+    heading = "" if table.by is By.CONTESTANT else f"{group.heading}: "
+    summary = group.summary
+    counts = {"n": summary.n, "missing": summary.missing, "surplus": summary.surplus}
+    said = ", ".join(
+        f"{word} {number}" for word, number in counts.items() if number or word == "n"
+    )
+    return f"{heading}{name} ({said})"
+
+
+def _scale(axes: Axes, boxes: Sequence[dict[str, Any]]) -> None:
+    """Scale the axis logarithmically beyond 1 m where outliers would squeeze all boxes."""
+    longest = max([LINEAR_UP_TO_M, *(box["whishi"] for box in boxes)])
+    if any(outlier > FAR * longest for box in boxes for outlier in box["fliers"]):
+        axes.set_xscale("symlog", linthresh=LINEAR_UP_TO_M, subs=[2.0, 5.0])
+        axes.xaxis.set_major_formatter("{x:g}")
+    axes.set_xlim(left=0.0)
+
+
+FORMATS = table_formats(group_sheet) | drawings(box_plot)

@@ -5,32 +5,30 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from django.db.models import Count, Q
 
-from arena.exports.cells import csv_text
-from arena.exports.formats import Format, formats
-from arena.jobs.queries import contestants_of, labels_of
+from arena.exports.formats import (
+    TEXT,
+    WHOLE,
+    YES_NO,
+    Columns,
+    Sheet,
+    formats,
+    sheet_of,
+    table_formats,
+)
 from arena.models import FaultLabel
-from arena.rating.lines import escape
+from arena.rating.lines import UNKNOWN, escape, latex_table
 from arena.rating.reliability import DifferenceMetric, cohens_kappa, krippendorff_alpha
 from arena.results.exports.tables import shown_name
-from augment.models import GenerationJob
+from augment.models import Augmentation, Contestant, GenerationJob
 from augment.services.judging.findings import FaultClass
 
-COLUMNS = (
-    "contestant",
-    "slug",
-    "simulated",
-    "all",
-    "position",
-    "heading",
-    "logic",
-    "augmentations_labelled",
-    "labels",
-    "without_modification",
+_MISSES = (Augmentation.State.UNREADABLE, Augmentation.State.REFUSED)
+_LABEL = (
+    *("augmentation", "position", "heading", "logic", "augmentation__contestant"),
+    *("guessed_position", "guessed_heading", "guessed_logic"),
 )
-
-
-NOT_LABELLED = "--"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -38,7 +36,8 @@ class FaultLine:
     """One contestant's faults.
 
     Attributes:
-        counts: Augmentations by class of fault; an augmentation with two counts in both.
+        position, heading, logic: Augmentations with that fault, one with two counts in both; None
+            where nothing was labelled.
         labelled: Augmentations with a label.
         labels: Labels on them, over all experts.
         without_modification: Unreadable and refused answers: nobody labels them, each is a miss.
@@ -47,15 +46,18 @@ class FaultLine:
     name: str
     slug: str
     is_simulated: bool
-    counts: dict[FaultClass, int]
+    position: int | None
+    heading: int | None
+    logic: int | None
     labelled: int
     labels: int
     without_modification: int
 
     @property
-    def all(self) -> int:
+    def all(self) -> int | None:
         """The sum over the classes, as the paper has it, and one for each answer that is none."""
-        return sum(self.counts.values()) + self.without_modification
+        seen = sum(count or 0 for count in (self.position, self.heading, self.logic))
+        return seen + self.without_modification if self.counted else None
 
     @property
     def counted(self) -> int:
@@ -63,13 +65,10 @@ class FaultLine:
         return self.labelled + self.without_modification
 
     @property
-    def shown_counts(self) -> tuple[int | str, ...]:
-        """All, position, heading and logic; a dash where nothing was labelled.
-
-        Answers without a modification count in the sum of all, labelled or not.
-        """
-        by_class = self.counts.values() if self.labelled else [NOT_LABELLED] * len(FaultClass)
-        return self.all if self.counted else NOT_LABELLED, *by_class
+    def shown_counts(self) -> tuple[str, ...]:
+        """All, position, heading and logic; two hyphens where nothing was labelled."""
+        counts = (self.all, self.position, self.heading, self.logic)
+        return tuple(UNKNOWN if count is None else str(count) for count in counts)
 
     @property
     def shown_name(self) -> str:
@@ -115,96 +114,88 @@ class FaultTable:
 
 
 def fault_table(job: GenerationJob) -> FaultTable:
-    """Return the table of a job; three queries, which read a row a label and a row a contestant.
+    """Return the table of a job; two queries, which read a row a label and a row a contestant.
 
     Of several experts on one augmentation a fault counts where more than half of them see it.
     """
-    labels = list(labels_of(job))
+    rows = FaultLabel.objects.filter(augmentation__job=job).select_related("augmentation")
+    labels = list(rows.only(*_LABEL).order_by("augmentation", "pk"))
     by_augmentation: defaultdict[int, list[FaultLabel]] = defaultdict(list)
     for label in labels:
         by_augmentation[label.augmentation_id].append(label)
     by_contestant: defaultdict[int, list[list[FaultLabel]]] = defaultdict(list)
     for own in by_augmentation.values():
         by_contestant[own[0].augmentation.contestant_id].append(own)
-    return FaultTable(
-        job=job.name,
-        lines=tuple(
-            FaultLine(
-                name=who.name,
-                slug=who.slug,
-                is_simulated=who.is_simulated,
-                counts={
-                    fault: sum(_is_seen(fault, own) for own in by_contestant[who.pk])
-                    for fault in FaultClass
-                },
-                labelled=len(by_contestant[who.pk]),
-                labels=sum(map(len, by_contestant[who.pk])),
-                without_modification=missed,
-            )
-            for who, missed in contestants_of(job)
-        ),
-        agreement=tuple(
-            _agreement(fault, labels, by_augmentation.values()) for fault in FaultClass
-        ),
-    )
-
-
-def csv_bytes(table: FaultTable) -> bytes:
-    """Return one line a contestant; counts are empty where nothing was labelled."""
-    rows = (
-        (
-            line.shown_name,
-            line.slug,
-            line.is_simulated,
-            *("" if count == NOT_LABELLED else count for count in line.shown_counts),
-            line.labelled,
-            line.labels,
-            line.without_modification,
+    mine = Q(augmentations__job=job)
+    missed = Count("augmentations", filter=mine & Q(augmentations__state__in=_MISSES))
+    contestants = Contestant.objects.filter(mine).annotate(missed=missed)
+    lines = []
+    for who in contestants.only("name", "slug", "kind").order_by("name", "slug"):
+        labelled = by_contestant[who.pk]
+        counts = {
+            fault.value: sum(_is_seen(fault, own) for own in labelled) if labelled else None
+            for fault in FaultClass
+        }
+        line = FaultLine(
+            name=who.name,
+            slug=who.slug,
+            is_simulated=who.is_simulated,
+            labelled=len(labelled),
+            labels=sum(map(len, labelled)),
+            without_modification=who.missed,
+            **counts,
         )
-        for line in table.lines
-    )
-    return csv_text(COLUMNS, rows).encode()
+        lines.append(line)
+    agreement = tuple(_agreement(fault, labels, by_augmentation.values()) for fault in FaultClass)
+    return FaultTable(job=job.name, lines=tuple(lines), agreement=agreement)
 
 
-def latex(table: FaultTable) -> bytes:
-    """Return the paper's table "Error Count per Category"; needs booktabs and xcolor (`table`).
+COLUMNS: Columns = {
+    "contestant": ("shown_name", TEXT),
+    "slug": ("slug", TEXT),
+    "simulated": ("is_simulated", YES_NO),
+    **{name: (name, WHOLE) for name in ("all", "position", "heading", "logic")},
+    "augmentations_labelled": ("labelled", WHOLE),
+    "labels": ("labels", WHOLE),
+    "without_modification": ("without_modification", WHOLE),
+}
+
+
+def fault_sheet(table: FaultTable) -> Sheet:
+    """Return one row a contestant; counts are empty where nothing was labelled."""
+    return sheet_of(table.lines, COLUMNS, name="faults", facts={"job": table.job})
+
+
+def fault_latex(table: FaultTable) -> bytes:
+    """Return the paper's table "Error Count per Category".
 
     Beside the paper's columns stand unreadable and refused answers, and how many were judged.
     """
-    kappas = (f"{one.fault} {_printed(one.kappa)} (n={one.n})" for one in table.agreement)
-    alphas = (
-        f"{one.fault} {_printed(one.alpha)} (pictures={one.pictures})" for one in table.agreement
-    )
-    lines = [
-        r"% \usepackage{booktabs} and \usepackage[table]{xcolor}",
-        f"% {' '.join(table.job.split())}: {table.labels} labels",
-        f"% Cohen's kappa of the checks' first guess and the experts: {', '.join(kappas)}",
-        f"% Krippendorff's alpha of the experts among themselves: {', '.join(alphas)}",
-        r"\providecolor{llm_blue}{RGB}{105, 156, 219}",
-        r"\begin{table}",
-        r"    \centering",
-        r"    \begin{tabular}{l>{\columncolor{llm_blue!20}}rrrrrr}",
-        r"    \toprule",
-        r"    \textbf{Model} & \textbf{All}~$\downarrow$ & \textbf{Position}~$\downarrow$"
-        r" & \textbf{Heading}~$\downarrow$ & \textbf{Logic}~$\downarrow$"
-        r" & \textbf{No answer}~$\downarrow$ & \textbf{n} \\",
-        r"    \midrule",
-        *(
-            f"    {escape(line.shown_name)} & {' & '.join(map(str, line.shown_counts))} "
-            rf"& {line.without_modification} & {line.counted}\\"
-            for line in table.lines
-            if line.counted
-        ),
-        r"    \bottomrule",
-        r"    \end{tabular}",
-        r"    \caption{Error Count per Category.}",
-        r"    \label{tab:manual_eval}",
-        r"\end{table}",
+    comments = [f"{table.job}: {table.labels} labels"]
+    comments += [
+        f"{line.fault}: Cohen's kappa of the checks' first guess and the experts "
+        f"{_printed(line.kappa)} (n={line.n}), Krippendorff's alpha of the experts among "
+        f"themselves {_printed(line.alpha)} (pictures={line.pictures})"
+        for line in table.agreement
     ]
-    return ("\n".join(lines) + "\n").encode()
+    rows = (
+        (
+            escape(line.shown_name),
+            *line.shown_counts,
+            *(str(line.without_modification), str(line.counted)),
+        )
+        for line in table.lines
+        if line.counted
+    )
+    heads = ("Model", "All", "Position", "Heading", "Logic", "No answer", "n")
+    caption = "Error Count per Category."
+    text = latex_table(
+        rows, heads=heads, comments=comments, caption=caption, label="tab:manual_eval"
+    )
+    return text.encode()
 
 
-FORMATS: dict[str, Format[FaultTable]] = formats(csv=csv_bytes, latex=latex)
+FORMATS = table_formats(fault_sheet) | formats(latex=fault_latex)
 
 
 def _is_seen(fault: FaultClass, labels: Sequence[FaultLabel]) -> bool:

@@ -6,20 +6,17 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import asdict
 from importlib import metadata
-from typing import Any
 
 from django.core.files.base import ContentFile
-from django.core.files.storage import default_storage
 from django.utils.text import slugify
 
 from arena.exports.files import zip_bytes
-from arena.exports.formats import Format, formats
+from arena.exports.formats import Format, formats, json_bytes
 from arena.models import ScenarioFile
 from arena.results.services.vote_files import digest_of
 from arena.results.services.written_files import FileWork, MadeFile
 from augment.models import Augmentation, GenerationJob
 from augment.services.judging.scenario_export import Exported, export_job
-from augment.services.running.calls import IMAGES
 from augment.services.running.transcript_records import record_of, tries_by_augmentation
 
 MANIFEST = "manifest.json"
@@ -62,10 +59,10 @@ def _manifest(exported: Exported, files: dict[str, bytes]) -> bytes:
         | {name: metadata.version(name) for name in WRITTEN_WITH},
         "files": {
             name: {"sha256": digest_of(content), "bytes": len(content)}
-            for name, content in sorted(files.items())
+            for name, content in files.items()
         },
     }
-    return (json.dumps(document, indent=2, ensure_ascii=False, sort_keys=True) + "\n").encode()
+    return json_bytes(document, sort_keys=True)
 
 
 class ScenarioFiles(FileWork[ScenarioFile]):
@@ -97,44 +94,21 @@ def made_of(exported: Exported, slug: str) -> MadeFile:
 AT_ONCE = 50
 """So many transcripts are read and held in memory together."""
 
-LINES = "transcripts.jsonl"
 
-
-def transcript_records(job: GenerationJob) -> Iterator[dict[str, Any]]:
-    """A record for each augmentation as they were made, images by their SHA-256 alone."""
+def transcript_lines(job: GenerationJob) -> Iterator[bytes]:
+    """Yield a line for each augmentation as they were made, images by their SHA-256 alone."""
     rows = Augmentation.objects.filter(job=job).order_by("pk")
     keys = list(rows.values_list("pk", flat=True))
     for start in range(0, len(keys), AT_ONCE):
         part = keys[start : start + AT_ONCE]
-        chosen = rows.filter(pk__in=part)
         tries = tries_by_augmentation(part)
+        chosen = rows.filter(pk__in=part)
         for row in chosen.select_related("job", "scenario", "contestant__endpoint"):
             record = record_of(row, tries.get(row.pk, []))
-            yield record | {"images": sorted(record["images"])}
-
-
-def transcript_lines(job: GenerationJob) -> Iterator[bytes]:
-    """Each record as one line."""
-    for record in transcript_records(job):
-        yield (json.dumps(record, ensure_ascii=False) + "\n").encode()
-
-
-def zip_of(job: GenerationJob) -> bytes:
-    """The lines, and every image that one of them names and that is still there."""
-    lines: list[bytes] = []
-    images: set[str] = set()
-    for record in transcript_records(job):
-        images.update(record["images"])
-        lines.append((json.dumps(record, ensure_ascii=False) + "\n").encode())
-    files = {LINES: b"".join(lines)}
-    for digest in sorted(images):
-        name = f"{IMAGES}/{digest}.png"
-        if default_storage.exists(name):
-            with default_storage.open(name) as file:
-                files[f"images/{digest}.png"] = file.read()
-    return zip_bytes(files)
+            record["images"] = sorted(record["images"])
+            yield (json.dumps(record, ensure_ascii=False) + "\n").encode()
 
 
 TRANSCRIPT_FORMATS: dict[str, Format[GenerationJob]] = formats(
-    jsonl=lambda job: b"".join(transcript_lines(job)), zip=zip_of
+    jsonl=lambda job: b"".join(transcript_lines(job))
 )

@@ -114,31 +114,12 @@ def retry_job(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
 @allow_only(ADMIN)
 @require_POST
 def retry_cause(request: HttpRequest, code: uuid.UUID, key: str) -> HttpResponse:
-    """Queue again what ended for one cause; ask first before an answer gets a second chance."""
+    """Queue again what ended for one cause; of an unreadable answer the last attempt counts."""
     job = get_object_or_404(GenerationJob, code=code)
     with refusals_told(request), transaction.atomic():
-        state, _cause, pks = progress.rows_of_cause(job, key)
-        if state == State.UNREADABLE and not is_sure(request):
-            return ask(
-                request,
-                Confirmation(
-                    title=f"Ask again for {len(pks)} unreadable answers?",
-                    facts=(
-                        "An unreadable answer is the contestant’s own and counts as a miss.",
-                        "Asked again it has a second chance that the others did not have; that "
-                        "is logged.",
-                        "The attempts so far stay in the transcripts; what counts is the last "
-                        "one.",
-                    ),
-                    button="Ask again",
-                    back=reverse("job", args=[job.code]),
-                    is_final=False,
-                    crumbs=crumbs_of(job),
-                ),
-            )
         retry_one_cause(job, key=key, actor=user_of(request))
         send_later(request, enqueue_job, job.pk)
-        messages.success(request, f"Queued again: {len(pks)} with this cause.")
+        messages.success(request, "What ended for this cause is queued again.")
     return redirect("job", code=code)
 
 
@@ -184,14 +165,12 @@ def cancel_job(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
 
 
 def _cancelling(job: GenerationJob) -> Confirmation:
-    counts = progress.count_rows(job).by_state
-    waiting, running = counts[State.QUEUED], counts[State.RUNNING]
+    counts = progress.count_rows(job)
     return Confirmation(
         title=f"Cancel “{job.name}”?",
         facts=(
-            f"Augmentations that wait and are never made: {waiting}.",
-            f"Running now, which end and keep their results: {running}.",
-            f"Settled, which stay as they are: {sum(counts.values()) - waiting - running}.",
+            f"Augmentations that wait and are never made: {counts.by_state[State.QUEUED]}.",
+            f"Settled, which stay as they are: {counts.settled}. What runs ends and is kept.",
             "A cancelled job can’t go on; what is missing takes a new one.",
         ),
         button="Cancel the job",

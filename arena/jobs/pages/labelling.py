@@ -7,7 +7,6 @@ from django import forms
 from django.contrib import messages
 from django.contrib.auth.models import User
 from django.core.exceptions import PermissionDenied
-from django.db import transaction
 from django.http import Http404, HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, redirect, render
 from django.urls import reverse
@@ -22,7 +21,7 @@ from arena.jobs.services import close_labelling, open_labelling, save_label
 from arena.models import FaultLabel, LabellingRound
 from arena.people.queries import by_pseudonym, experts, role_of
 from arena.site.access import ADMIN, EXPERT, STAFF, allow_only, user_of
-from arena.site.acts import Confirmation, ask, is_sure, refusals_in, refusals_told, wants_to_change
+from arena.site.acts import Confirmation, ask, is_sure, refusals_in, refusals_told
 from arena.site.forms import offer
 from arena.voting.queries.showings import original_beside
 from augment.models import GenerationJob
@@ -109,12 +108,9 @@ def faults_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     form = LabellingForm(request.POST or None, experts=by_pseudonym(experts()))
     if request.method == "POST" and role_of(request.user) != ADMIN:
         raise PermissionDenied
-    if form.is_bound and form.is_valid() and not wants_to_change(request):
-        given = {name: form.cleaned_data[name] for name in ("name", "experts", "seed")}
+    if form.is_bound and form.is_valid():
         with refusals_in(form):
-            if not is_sure(request):
-                return ask(request, _opening(job, given))
-            labelling = open_labelling(job=job, **given, actor=user_of(request))
+            labelling = open_labelling(job=job, **form.cleaned_data, actor=user_of(request))
             messages.success(request, f"“{labelling.name}” is open; its experts can label now.")
             return redirect("faults", code=job.code)
     context = {
@@ -140,36 +136,14 @@ def close(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     return redirect("faults", code=labelling.job.code)
 
 
-def _opening(job: GenerationJob, given: dict[str, Any]) -> Confirmation:
-    """Return what is asked before: counted by opening it and taking that back at once."""
-    with transaction.atomic():
-        labelling = open_labelling(job=job, **given)
-        tasks = labelling.tasks.count()
-        pictures = labelling.tasks.values("augmentation").distinct().count()
-        experts_asked = labelling.experts.count()
-        transaction.set_rollback(True)
-    return Confirmation(
-        title=f"Open the labelling “{given['name']}”?",
-        facts=(
-            f"Pictures: {pictures}. Experts: {experts_asked}. Labels planned: {tasks}.",
-            "Experts see it at once; who labels, and in which order, can’t be changed afterwards.",
-        ),
-        button="Open the labelling",
-        back=reverse("faults", args=[job.code]),
-        is_final=False,
-        crumbs=_crumbs(job),
-    )
-
-
 def _closing(labelling: LabellingRound) -> Confirmation:
-    (line,) = (
-        line for line in queries.labellings_of(labelling.job) if line.labelling.pk == labelling.pk
-    )
+    labels = FaultLabel.objects.filter(task__labelling=labelling).count()
+    missing = labelling.tasks.count() - labels
     return Confirmation(
         title=f"Close the labelling “{labelling.name}”?",
         facts=(
-            f"Labels saved, which stay: {line.labelled}.",
-            f"Planned labels that will be missing: {line.left}.",
+            f"Labels saved, which stay: {labels}.",
+            f"Planned labels that will be missing: {missing}.",
             "It takes no more labels. This can’t be taken back.",
         ),
         button="Close the labelling",

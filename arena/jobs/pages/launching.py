@@ -1,12 +1,12 @@
 """The page of a new job: choose, see what it would use, try one scenario first, launch."""
 
-import uuid
 from dataclasses import replace
 from decimal import Decimal
 from typing import Any
 
 from django import forms
 from django.contrib import messages
+from django.core.exceptions import ValidationError
 from django.db import transaction
 from django.http import HttpRequest, HttpResponse
 from django.shortcuts import redirect, render
@@ -138,23 +138,20 @@ def _page(
 def _like(request: HttpRequest) -> dict[str, Any]:
     """Return the values of another job where the address names one."""
     try:
-        code = uuid.UUID(request.GET.get("like", ""))
-    except ValueError:
+        job = GenerationJob.objects.filter(code=request.GET.get("like", "")).first()
+    except ValidationError:
         return {}
-    job = GenerationJob.objects.filter(code=code).first()
     if job is None:
         return {}
-    caps: dict[str, Any] = {"cap_calls": job.cap_calls, "cap_tokens": job.cap_tokens}
-    if job.cap_usd is not None:
-        caps["cap_usd"] = f"{job.cap_usd.normalize():f}"
-    like = {
+    names = ("samples", "is_fresh", "cap_calls", "cap_tokens")
+    like: dict[str, Any] = {name: getattr(job, name) for name in names}
+    like |= {
         "name": f"{job.name} (2)"[:LONGEST_NAME],
         "contestants": list(job.contestants.values_list("slug", flat=True)),
         "scenarios": list(job.scenarios.values_list("slug", flat=True)),
-        "samples": job.samples,
-        "is_fresh": job.is_fresh,
-        **caps,
     }
+    if job.cap_usd is not None:
+        like["cap_usd"] = f"{job.cap_usd.normalize():f}"
     is_all = request.GET.get("all") == "1"
     return like | (job.full_plan or {}) if is_all else like
 

@@ -21,36 +21,25 @@ from django.views.decorators.http import require_POST, require_safe
 
 from arena import tasks
 from arena.exports.files import CONTENT_TYPE
-from arena.exports.formats import download
-from arena.jobs.exports import displacement_files
-from arena.jobs.exports import driving as driving_exports
-from arena.jobs.exports.displacement import DisplacementTable, displacement_table
-from arena.jobs.exports.driving import SCORE_LABELS, DrivingTable, driving_table
+from arena.exports.formats import TABLE_FORMATS, download
+from arena.jobs.exports import displacement, driving
 from arena.jobs.exports.files import TRANSCRIPT_FORMATS, transcript_lines
-from arena.jobs.exports.registry import JOB_TABLES
-from arena.jobs.exports.tables import TABLE_FORMATS
-from arena.jobs.queries import (
-    DRIVES,
-    Part,
-    analysis_of,
-    before_of,
-    drive_cells,
-    shown_augmentations,
-)
+from arena.jobs.exports.tables import JOB_FILES
+from arena.jobs.queries import before_of
 from arena.jobs.services import ask_for_file
-from arena.models import ScenarioFile, Snapshot
-from arena.results.exports.tables import LeaderboardTable
+from arena.models import ScenarioFile
 from arena.site.access import ADMIN, STAFF, allow_only, user_of
 from arena.site.acts import refusals_told, send_later
-from arena.site.listing import choice_asked, page_asked
+from arena.site.listing import choice_asked, read_page
 from augment.errors import UnknownName
 from augment.models import GenerationJob, Simulation
 from augment.services.judging import simulations
+from augment.services.judging.analyses import analyse_job
 from augment.services.judging.displacement import By, types_named
 from augment.services.judging.driving_scores import (
+    drives_of_job,
     least_clearance_m,
     options_driven,
-    scores_of_augmentations,
 )
 from augment.services.judging.scenario_export import FORMATS
 from augment.services.judging.simulations import FILES, NUPLAN, SCORES, Options, drive_file
@@ -60,6 +49,7 @@ PDM_CLOSED = Options().planner
 OFFSETS = {"paper": "Up to 4 m (paper)", "original": "Up to 1 m (original)"}
 """What the names of the lateral offsets mean."""
 
+DRIVES_AT_ONCE = 50
 PLANNERS = {PDM_CLOSED: "PDM-Closed", "idm": "IDM"}
 
 
@@ -89,35 +79,19 @@ def simulate_job(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
 @allow_only(*STAFF)
 @require_safe
 def drives_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
-    """Show the drives of a job in a grid, page by page."""
+    """List the drives of a job that were made one way, page by page."""
     job = get_object_or_404(GenerationJob, code=code)
-    score = score_asked(request)
     known = options_driven(job)
     way = _way_asked(request, known)
-    part = Part(
-        view=DRIVES,
-        row=page_asked(request, "row"),
-        column=page_asked(request, "column"),
-        sample=page_asked(request, "sample"),
+    drives = Simulation.objects.filter(drives_of_job(job)).defer("trace")
+    rows = (known[way] if known else Options()).of(drives)
+    related = rows.select_related("scenario", "augmentation__contestant")
+    ordered = related.order_by(
+        "scenario__type", "scenario__slug", "augmentation__contestant__name"
     )
-    cells = drive_cells(job, known[way] if known else Options(), part)
-    lines = [
-        {
-            "scenario": row.scenario,
-            "scenes": [
-                _cell(found.get(row.scenario.pk), score)
-                for found in (cells.before, cells.reference)
-            ],
-            "cells": [
-                _cell(cells.by_augmentation.get(sample[0].pk) if sample else None, score)
-                for sample in row.cells
-            ],
-        }
-        for row in cells.grid.rows
-    ]
-    context = {"job": job, "lines": lines, "grid": cells.grid, "score": score}
-    driven = {"labels": SCORE_LABELS, "driven": way}
-    return render(request, "drives/list.html", context | driven)
+    page = read_page(request, ordered, size=DRIVES_AT_ONCE)
+    lines = [(row, least_clearance_m(row)) for row in page.object_list]
+    return render(request, "drives/list.html", {"job": job, "page": page, "lines": lines})
 
 
 @allow_only(*STAFF)
@@ -132,7 +106,7 @@ def drive_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         "before": before,
         "files": FILES if row.state == Simulation.State.DONE else (),
         "metrics": [metric | {"before": old.get(metric["name"])} for metric in metrics],
-        "labels": SCORE_LABELS,
+        "labels": driving.SCORE_LABELS,
     }
     return render(request, "drives/drive.html", context)
 
@@ -154,9 +128,10 @@ def drive_trace(request: HttpRequest, code: uuid.UUID, form: str) -> HttpRespons
 
 def driving_section(request: HttpRequest, job: GenerationJob) -> dict[str, object]:
     """Return the context of the driving part of a job's page."""
-    table = driving_asked(request, job)
     known = options_driven(job)
     chosen = _way_asked(request, known)
+    score = choice_asked(request, "score", list(SCORES)) or NUPLAN
+    table = driving.driving_table(job, score=score, **_how_driven(request, job))
     ways = [
         {
             "planner": PLANNERS.get(one.planner, one.planner),
@@ -166,50 +141,20 @@ def driving_section(request: HttpRequest, job: GenerationJob) -> dict[str, objec
         }
         for number, one in enumerate(known)
     ]
-    choices = {"planner": PLANNERS.items(), "offsets": OFFSETS.items()}
-    asked = {"ways": ways, "driven": chosen, "choices": choices, "asked": table.scores.options}
-    return {"table": table, "forms": driving_exports.FORMATS, **asked, **_shown(table)}
-
-
-def driving(snapshot: Snapshot, table: LeaderboardTable) -> dict[str, Any]:
-    """Return the context of a study's tab: the drives of the augmentations that it shows."""
-    if not Simulation.objects.exists():
-        return {"drivings": []}
-    ids = shown_augmentations(snapshot.study)
-    found = [
-        DrivingTable(
-            title=snapshot.study.name,
-            scores=scores_of_augmentations(ids, options=Options(), score=score),
-        )
-        for score in SCORES
-    ]
-    return {"drivings": [{"table": one, **_shown(one)} for one in found if one.lines]}
-
-
-def driving_asked(request: HttpRequest, job: GenerationJob) -> DrivingTable:
-    """Return the table that the address asks for; of the last way of driving unless it says so."""
-    known = options_driven(job)
-    options = known[_way_asked(request, known)] if known else None
-    return driving_table(
-        job, options=options, score=score_asked(request), with_paper="paper" in request.GET
-    )
-
-
-def _shown(table: DrivingTable) -> dict[str, Any]:
     return {
-        "lines": [
-            {"line": line, "types": [line.by_type[kind] for kind, _ in table.types]}
-            for line in table.lines
-        ],
-        "labels": SCORE_LABELS,
-        "score": table.scores.score,
+        **driving.shown_driving(table),
+        "forms": driving.FORMATS,
+        "ways": ways,
+        "driven": chosen,
+        "choices": {"planner": PLANNERS.items(), "offsets": OFFSETS.items()},
+        "asked": table.scores.options,
     }
 
 
-def score_asked(request: HttpRequest) -> str:
-    """Return the score that the address names, nuPlan's unless it names one."""
-    wanted = request.GET.get("score", NUPLAN)
-    return wanted if wanted in SCORES else NUPLAN
+def _how_driven(request: HttpRequest, job: GenerationJob) -> dict[str, Any]:
+    """Return the way of driving that the address asks for, the last one unless it says so."""
+    known = options_driven(job)
+    return {"options": known[_way_asked(request, known)]} if known else {}
 
 
 def _way_asked(request: HttpRequest, known: list[Options]) -> int:
@@ -222,25 +167,12 @@ def _driven(code: uuid.UUID) -> Simulation:
     return get_object_or_404(rows, code=code)
 
 
-def _cell(row: Simulation | None, score: str) -> dict[str, Any] | None:
-    if row is None:
-        return None
-    return {
-        "row": row,
-        "value": getattr(row, SCORES[score]),
-        "clearance_m": least_clearance_m(row),
-    }
-
-
 def _metrics(row: Simulation | None) -> list[dict[str, Any]]:
     """Return the parts of nuPlan's score."""
     return [] if row is None or row.document is None else row.document["metrics"][NUPLAN]
 
 
 # --- Displacement, analyses and files -----------------------------------------------------------
-
-BY_OBJECT = "object"
-"""How the table with one row an object is asked for, beside the groupings."""
 
 GROUPINGS = {By.CONTESTANT: "Contestant", By.TYPE: "Scenario type", By.VARIANT: "Variant"}
 
@@ -250,29 +182,15 @@ GROUPINGS = {By.CONTESTANT: "Contestant", By.TYPE: "Scenario type", By.VARIANT: 
 def export_table(request: HttpRequest, code: uuid.UUID, name: str, form: str) -> HttpResponseBase:
     """Answer with a table as a file, with the options that its part of the page has."""
     job = get_object_or_404(GenerationJob, code=code)
-    stem = slugify(job.name) or "job"
-    if name == "displacement" and request.GET.get("by") == BY_OBJECT:
-        name = "displacement-objects"
-    if name == "displacement":
-        table = displacement_asked(request, job)
-        stem += f"-displacement-by-{table.by}" + "-all-types" * _asks_for_all_types(request)
-        return download(displacement_files.FORMATS, form, stem, lambda: table)
-    if name == "driving":
-        stem += f"-driving-{score_asked(request)}"
-        return download(driving_exports.FORMATS, form, stem, lambda: driving_asked(request, job))
-    if name not in JOB_TABLES:
+    if name not in JOB_FILES:
         raise Http404
-    known = JOB_TABLES[name]
-    return download(known.formats, form, f"{stem}-{name}", lambda: known.make(job))
-
-
-@allow_only(*STAFF)
-@require_safe
-def export_analysis(
-    request: HttpRequest, code: uuid.UUID, part: str, form: str
-) -> HttpResponseBase:
-    """Answer with one part of the analyses as a file."""
-    return export_table(request, code=code, name=f"analyses-{part}", form=form)
+    options: dict[str, Any] = {}
+    if name.startswith("driving-"):
+        options = _how_driven(request, job)
+    elif name.startswith("displacement-") and request.GET.get("types") == "all":
+        options = {"types": types_named(["all"])}
+    stem = f"{slugify(job.name) or 'job'}-{name}" + "-all-types" * ("types" in options)
+    return download(JOB_FILES[name].formats, form, stem, JOB_FILES[name].make(job, **options))
 
 
 @allow_only(*STAFF)
@@ -293,7 +211,7 @@ def export_transcripts(request: HttpRequest, code: uuid.UUID) -> StreamingHttpRe
 def analyses_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Show all three parts, on a page of their own: the bootstrap may take seconds."""
     job = get_object_or_404(GenerationJob, code=code)
-    context = {"job": job, "analysis": analysis_of(job), "forms": list(TABLE_FORMATS)}
+    context = {"job": job, "analysis": analyse_job(job), "forms": list(TABLE_FORMATS)}
     return render(request, "jobs/analyses.html", context)
 
 
@@ -323,30 +241,19 @@ def download_scenarios(request: HttpRequest, code: uuid.UUID) -> FileResponse:
     return FileResponse(content, as_attachment=True, filename=row.name, content_type=CONTENT_TYPE)
 
 
-def displacement_asked(request: HttpRequest, job: GenerationJob) -> DisplacementTable:
-    """Return the displacement table that an address asks for: by contestant, unless it says so."""
-    by = request.GET.get("by", By.CONTESTANT)
-    return displacement_table(
-        job,
-        by=By(by) if by in set(By) else By.CONTESTANT,
-        types=types_named(["all"]) if _asks_for_all_types(request) else None,
-    )
-
-
 def displacement_section(request: HttpRequest, job: GenerationJob) -> dict[str, object]:
-    """Return the context of the displacement part of a job's page."""
-    table, is_all = displacement_asked(request, job), _asks_for_all_types(request)
+    """Return the context of the displacement part of a job's page: by contestant unless asked."""
+    by = By(choice_asked(request, "by", list(By)) or By.CONTESTANT)
+    is_all = request.GET.get("types") == "all"
+    types = types_named(["all"]) if is_all else None
     return {
-        "table": table,
-        "by": table.by,
+        "table": displacement.displacement_table(job, by=by, types=types),
+        "by": by,
         "labels": GROUPINGS,
-        "forms": displacement_files.FORMATS,
+        "forms": displacement.FORMATS,
         "object_forms": TABLE_FORMATS,
-        "query": f"by={table.by}" + "&types=all" * is_all,
-        "has_choice": table.by is By.VARIANT,
+        "name": f"displacement-by-{by}",
+        "query": "?types=all" * is_all,
+        "has_choice": by is By.VARIANT,
         "is_all": is_all,
     }
-
-
-def _asks_for_all_types(request: HttpRequest) -> bool:
-    return request.GET.get("types") == "all"

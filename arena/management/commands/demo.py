@@ -2,7 +2,6 @@
 
 import time
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 from django.conf import settings
@@ -36,12 +35,6 @@ class Command(TerminalCommand):
             "metavar": "N",
             "help": "only N scenarios of each type; default: all",
         },
-        "--driven": {
-            "type": at_least(0),
-            "metavar": "N",
-            "default": demo.DRIVEN_PER_TYPE,
-            "help": "drive N scenarios of each type; default: %(default)s",
-        },
     }
 
     def handle(self, *args: Any, **options: Any) -> None:
@@ -49,13 +42,11 @@ class Command(TerminalCommand):
         web = Web(host=options["host"], port=options["port"])
         try:
             with hold_alone():
-                self._run(
-                    web, options["per_type"], options["driven"], serve=not options["no_serve"]
-                )
+                self._run(web, options["per_type"], serve=not options["no_serve"])
         except KeyboardInterrupt:
             raise CommandError(STOPPED, returncode=INTERRUPTED) from None
 
-    def _run(self, web: Web, per_type: int | None, driven: int, *, serve: bool) -> None:
+    def _run(self, web: Web, per_type: int | None, *, serve: bool) -> None:
         started = time.monotonic()
         server = [web_server(web)] if serve else []
         call_command("prepare", verbosity=0)
@@ -66,40 +57,27 @@ class Command(TerminalCommand):
             try:
                 supervisor.start()
                 look = partial(_look_at, supervisor)
-                job = demo.generate(scenarios, self.stdout.write, look)
-                demo.start_drives(scenarios, per_type=driven)
+                demo.generate(scenarios, self.stdout.write, look)
                 folder = settings.VAR_DIR / "demo"
-                board = demo.vote_and_rate(scenarios, self.stdout.write, folder)
-                drives = demo.driving_lines(job, look)
-                self._show(board, drives, web, time.monotonic() - started, serve=serve)
+                board = demo.vote_and_rate(scenarios, folder)
+                demo.start_drives()
+                self._show(board, web, time.monotonic() - started, serve=serve)
                 if serve and not supervisor.is_stopping:
                     supervisor.watch()
             finally:
                 supervisor.stop()
 
-    def _show(
-        self, board: demo.DemoTable, drives: list[str], web: Web, took_s: float, *, serve: bool
-    ) -> None:
+    def _show(self, board: demo.DemoTable, web: Web, took_s: float, *, serve: bool) -> None:
+        where = "Scenario Arena is at" if serve else "“make serve” serves it at"
         lines = [
-            "",
-            board.text,
-            "",
-            *drives,
-            "",
-            f"Tables:   {', '.join(str(_short(path)) for path in board.files)}",
-            f"Pictures: {_pictures()}/bev/",
-            f"The demo took {took_s:.0f} s.",
+            f"\n{board.text}\n",
+            f"Tables:   {', '.join(map(str, board.files))}",
+            f"The demo took {took_s:.0f} s.\n",
+            f"{where} {web.address}",
+            *demo.login_lines(),
+            f"  Vote as 'expert' in the study {demo.OPEN_STUDY!r}.",
+            f"  See the drives as 'admin': Jobs, {demo.JOB!r}, See the drives.",
         ]
-        if serve:
-            lines += ["", f"Scenario Arena is at {web.address}  (Ctrl-C stops it)"]
-        else:
-            lines += ["", f"“make serve” serves it at {web.address}"]
-        lines += demo.login_lines()
-        if serve:
-            lines += [
-                f"  Vote as 'expert' in the study {demo.OPEN_STUDY!r}.",
-                f"  See the drives as 'admin': Jobs, {demo.JOB!r}, See the drives.",
-            ]
         self.stdout.write("\n".join(lines))
         self.stdout.flush()
 
@@ -118,16 +96,3 @@ def _look_at(supervisor: Supervisor) -> None:
     supervisor.insist_on_steadiness()
     if supervisor.is_stopping:
         raise KeyboardInterrupt
-
-
-def _pictures() -> str:
-    media = settings.STORAGES["default"].get("OPTIONS", {})
-    if "bucket_name" not in media:
-        return str(_short(settings.MEDIA_ROOT))
-    return f"s3://{media['bucket_name']}/{media['location']}".rstrip("/")
-
-
-def _short(path: Path) -> Path:
-    """The path as seen from here, where that is shorter."""
-    here = Path.cwd()
-    return path.relative_to(here) if path.is_relative_to(here) else path

@@ -1,6 +1,6 @@
 """Which rows a study is made of, and how people stand in them."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -24,7 +24,7 @@ from arena.models import (
     Vote,
     VoteFile,
 )
-from arena.results.services.stored_rows import columns_of, read_values
+from arena.results.services.stored_rows import columns_of, label_of, read_values
 from augment.models import (
     Attempt,
     Augmentation,
@@ -43,23 +43,6 @@ from augment.models import (
 LONG_AGO = "2000-01-01T00:00:00+00:00"
 """When an account was made is nobody's business."""
 
-TRAVELLING = frozenset(
-    {
-        *("auth.user", "arena.person", "augment.basescene", "augment.scenario"),
-        *("augment.endpoint", "augment.endpointmodel", "augment.contestant"),
-        *("augment.generationjob", "augment.generationjob_contestants"),
-        *("augment.generationjob_scenarios", "augment.augmentation", "augment.attempt"),
-        *("augment.intentreading", "augment.modelcall", "augment.transcriptnote"),
-        *("augment.simulation", "arena.study", "arena.study_contestants"),
-        *("arena.study_scenarios", "arena.study_experts", "arena.matchup", "arena.vote"),
-        *("arena.report", "arena.authorship", "arena.earlylook", "arena.votefile"),
-        *("arena.importedvote", "arena.snapshot", "arena.standing"),
-        *("arena.labellinground", "arena.labellinground_experts", "arena.labeltask"),
-        "arena.faultlabel",
-    }
-)
-"""The tables of a study; a folder that brings others is none of ours."""
-
 Rows = QuerySet[Any]
 
 
@@ -68,7 +51,6 @@ class Closure:
     """A study and all that its rows lead to.
 
     Attributes:
-        study: Which.
         jobs: Whose augmentations are shown, whole, and those that they took answers from.
         accounts: The names that accounts get instead of their own, by key.
         names: The same by their own names.
@@ -81,61 +63,42 @@ class Closure:
 
     def tables(self) -> Iterator[Rows]:
         """The rows of each table, those first that others name."""
-        # Through their keys: a join with the jobs would give one of two jobs twice.
-        taking_part = Contestant.objects.filter(self._of("contestants"))
-        contestants = Contestant.objects.filter(pk__in=taking_part.values("pk"))
-        named = Scenario.objects.filter(self._of("scenarios"))
-        # A paraphrase comes with what it says in other words.
+        for model, choose in _CHOSEN.items():
+            yield model._default_manager.filter(choose(self))
+
+    @property
+    def contestants(self) -> Rows:
+        """Who takes part in the study or in its jobs."""
+        return self._of("contestants", Contestant)
+
+    @property
+    def named_scenarios(self) -> Rows:
+        """What is shown and worked on."""
+        return self._of("scenarios", Scenario)
+
+    @property
+    def scenarios(self) -> Rows:
+        """The same with what its paraphrases say in other words."""
+        named = self.named_scenarios
         originals = named.exclude(paraphrase_of=None).values("paraphrase_of")
-        scenarios = Scenario.objects.filter(Q(pk__in=named.values("pk")) | Q(pk__in=originals))
-        attempts = Attempt.objects.filter(augmentation__job__in=self.jobs)
-        readings = IntentReading.objects.filter(
-            pk__in=ModelCall.objects.filter(copies__attempt__in=attempts).values("reading")
-        )
-        endpoints = self._endpoints(contestants, readings)
-        experts = User.objects.filter(pk__in=self.accounts)
-        labellings = LabellingRound.objects.filter(job__in=self.jobs)
-        matchups = self.study.matchups.all()
-        snapshots = self.study.snapshots.filter(state=Snapshot.State.READY)
-        files = VoteFile.objects.filter(study=self.study)
-        yield experts
-        yield Person.objects.filter(user__in=self.accounts)
-        yield BaseScene.objects.filter(pk__in=scenarios.values("base_scene"))
-        yield scenarios
-        yield endpoints
-        yield EndpointModel.objects.filter(endpoint__in=endpoints)
-        yield contestants
-        yield GenerationJob.objects.filter(pk__in=self.jobs)
-        yield GenerationJob.contestants.through._default_manager.filter(
-            generationjob__in=self.jobs
-        )
-        yield GenerationJob.scenarios.through._default_manager.filter(generationjob__in=self.jobs)
-        yield Augmentation.objects.filter(job__in=self.jobs)
-        yield attempts
-        yield readings
-        yield ModelCall.objects.filter(Q(attempt__in=attempts) | Q(reading__in=readings))
-        yield TranscriptNote.objects.filter(attempt__in=attempts)
-        yield Simulation.objects.filter(
-            Q(augmentation__job__in=self.jobs)
-            | Q(augmentation=None, scenario__in=scenarios.values("pk"))
-        ).exclude(state__in=Simulation.UNDER_WAY)
-        yield Study.objects.filter(pk=self.study.pk)
-        yield Study.contestants.through._default_manager.filter(study=self.study)
-        yield Study.scenarios.through._default_manager.filter(study=self.study)
-        yield Study.experts.through._default_manager.filter(study=self.study)
-        yield matchups
-        yield Vote.objects.filter(matchup__in=matchups)
-        yield Report.objects.filter(matchup__in=matchups)
-        yield Authorship.objects.filter(study=self.study)
-        yield EarlyLook.objects.filter(study=self.study)
-        yield files
-        yield ImportedVote.objects.filter(file__in=files)
-        yield snapshots
-        yield Standing.objects.filter(snapshot__in=snapshots)
-        yield labellings
-        yield LabellingRound.experts.through._default_manager.filter(labellinground__in=labellings)
-        yield LabelTask.objects.filter(labelling__in=labellings)
-        yield FaultLabel.objects.filter(task__labelling__in=labellings)
+        return Scenario.objects.filter(Q(pk__in=named.values("pk")) | Q(pk__in=originals))
+
+    @property
+    def readings(self) -> Rows:
+        """Readings of intents whose answers were taken over."""
+        copied = Q(copies__attempt__augmentation__job__in=self.jobs)
+        calls = ModelCall.objects.filter(copied)
+        return IntentReading.objects.filter(pk__in=calls.values("reading"))
+
+    @property
+    def endpoints(self) -> list[int]:
+        """Keys of the endpoints that contestants or readings ask."""
+        named = set(self.contestants.exclude(endpoint=None).values_list("endpoint", flat=True))
+        named |= set(self.readings.values_list("endpoint", flat=True))
+        roles = self.contestants.values_list("roles", flat=True)
+        labels = {role.get("endpoint") for own in roles for role in (own or {}).values()}
+        named |= set(Endpoint.objects.filter(label__in=labels).values_list("pk", flat=True))
+        return sorted(named)
 
     def renamed_rules(self) -> dict[str, Any]:
         """The rules with the names that accounts get."""
@@ -155,17 +118,63 @@ class Closure:
         numbered = {name: f"former-{place:04}" for place, name in enumerate(former, start=1)}
         return self.names | numbered
 
-    def _of(self, name: str) -> Q:
-        """What the study names, its jobs work on, or its pairs show."""
-        return Q(pk__in=getattr(self.study, name).values("pk")) | Q(jobs__in=self.jobs)
+    def _of(self, name: str, model: type[models.Model]) -> Rows:
+        """What the study names or its jobs work on.
 
-    def _endpoints(self, contestants: Rows, readings: Rows) -> Rows:
-        named = set(contestants.exclude(endpoint=None).values_list("endpoint", flat=True))
-        named |= set(readings.values_list("endpoint", flat=True))
-        for roles in contestants.values_list("roles", flat=True):
-            labels = [one.get("endpoint") for one in (roles or {}).values()]
-            named |= set(Endpoint.objects.filter(label__in=labels).values_list("pk", flat=True))
-        return Endpoint.objects.filter(pk__in=named)
+        Through their keys: a join with the jobs would give one of two jobs twice.
+        """
+        own = getattr(self.study, name).values("pk")
+        found = model._default_manager.filter(Q(pk__in=own) | Q(jobs__in=self.jobs))
+        return model._default_manager.filter(pk__in=found.values("pk"))
+
+
+_CHOSEN: dict[type[models.Model], Callable[[Closure], Q]] = {
+    User: lambda it: Q(pk__in=it.accounts),
+    Person: lambda it: Q(user__in=it.accounts),
+    BaseScene: lambda it: Q(pk__in=it.scenarios.values("base_scene")),
+    Scenario: lambda it: Q(pk__in=it.scenarios.values("pk")),
+    Endpoint: lambda it: Q(pk__in=it.endpoints),
+    EndpointModel: lambda it: Q(endpoint__in=it.endpoints),
+    Contestant: lambda it: Q(pk__in=it.contestants.values("pk")),
+    GenerationJob: lambda it: Q(pk__in=it.jobs),
+    GenerationJob.contestants.through: lambda it: Q(generationjob__in=it.jobs),
+    GenerationJob.scenarios.through: lambda it: Q(generationjob__in=it.jobs),
+    Augmentation: lambda it: Q(job__in=it.jobs),
+    Attempt: lambda it: Q(augmentation__job__in=it.jobs),
+    IntentReading: lambda it: Q(pk__in=it.readings.values("pk")),
+    ModelCall: lambda it: (
+        Q(attempt__augmentation__job__in=it.jobs) | Q(reading__in=it.readings.values("pk"))
+    ),
+    TranscriptNote: lambda it: Q(attempt__augmentation__job__in=it.jobs),
+    Simulation: lambda it: (
+        (
+            Q(augmentation__job__in=it.jobs)
+            | Q(augmentation=None, scenario__in=it.scenarios.values("pk"))
+        )
+        & ~Q(state__in=Simulation.UNDER_WAY)
+    ),
+    Study: lambda it: Q(pk=it.study.pk),
+    Study.contestants.through: lambda it: Q(study=it.study),
+    Study.scenarios.through: lambda it: Q(study=it.study),
+    Study.experts.through: lambda it: Q(study=it.study),
+    Matchup: lambda it: Q(study=it.study),
+    Vote: lambda it: Q(matchup__study=it.study),
+    Report: lambda it: Q(matchup__study=it.study),
+    Authorship: lambda it: Q(study=it.study),
+    EarlyLook: lambda it: Q(study=it.study),
+    VoteFile: lambda it: Q(study=it.study),
+    ImportedVote: lambda it: Q(file__study=it.study),
+    Snapshot: lambda it: Q(study=it.study, state=Snapshot.State.READY),
+    Standing: lambda it: Q(snapshot__study=it.study, snapshot__state=Snapshot.State.READY),
+    LabellingRound: lambda it: Q(job__in=it.jobs),
+    LabellingRound.experts.through: lambda it: Q(labellinground__job__in=it.jobs),
+    LabelTask: lambda it: Q(labelling__job__in=it.jobs),
+    FaultLabel: lambda it: Q(task__labelling__job__in=it.jobs),
+}
+"""Which rows of each table belong to a study."""
+
+TRAVELLING = frozenset(map(label_of, _CHOSEN))
+"""The tables of a study; a folder that brings others is none of ours."""
 
 
 def close_over(study: Study) -> Closure:
@@ -180,33 +189,27 @@ def close_over(study: Study) -> Closure:
         sources = ModelCall.objects.filter(copies__attempt__augmentation__job__in=new)
         found = sources.exclude(attempt=None).values_list("attempt__augmentation__job", flat=True)
         new = set(found) - closure.jobs
-    people = _people(closure)
     # In the order of their names, so that whatever is ordered by name stays as it is.
     # Sorted here: databases order letters each in its own way.
-    named = User.objects.filter(pk__in=people).values_list("pk", "username")
-    in_order = sorted(named, key=lambda one: one[1])
-    for place, (pk, username) in enumerate(in_order, start=1):
+    named = User.objects.filter(pk__in=_people(closure)).values_list("username", "pk")
+    for place, (username, pk) in enumerate(sorted(named), start=1):
         closure.accounts[pk] = closure.names[username] = f"expert-{place:04}"
     return closure
 
 
 def _people(closure: Closure) -> set[int]:
     """Who votes, labels, has written or has looked; whoever only administered stays at home."""
-    study, labellings = closure.study, LabellingRound.objects.filter(job__in=closure.jobs)
-    people: list[QuerySet[Any, Any]] = [
-        study.experts.values_list("pk", flat=True),
-        labellings.exclude(experts=None).values_list("experts", flat=True),
-    ]
-    columns: list[tuple[QuerySet[Any], str]] = [
-        (Matchup.objects.filter(study=study), "expert"),
-        (Vote.objects.filter(matchup__study=study), "expert"),
-        (Report.objects.filter(matchup__study=study), "expert"),
-        (Authorship.objects.filter(study=study), "expert"),
-        (EarlyLook.objects.filter(study=study), "user"),
-        (LabelTask.objects.filter(labelling__in=labellings), "expert"),
-    ]
-    people += [rows.values_list(column, flat=True) for rows, column in columns]
-    return {pk for keys in people for pk in keys}
+    columns: dict[type[models.Model], str] = {
+        Study.experts.through: "user",
+        LabellingRound.experts.through: "user",
+        **dict.fromkeys((Matchup, Vote, Report, Authorship, LabelTask), "expert"),
+        EarlyLook: "user",
+    }
+    people: set[int] = set()
+    for model, column in columns.items():
+        rows = model._default_manager.filter(_CHOSEN[model](closure))
+        people.update(rows.values_list(column, flat=True))
+    return people
 
 
 def travelling_rows(closure: Closure, rows: Rows) -> Iterator[list[Any]]:

@@ -1,15 +1,12 @@
-"""Shared parts of all charts: colours, axes, intervals, and files with reproducible bytes."""
+"""Shared parts of all charts: the house style, intervals, and files with reproducible bytes."""
 
 from __future__ import annotations
 
 import io
-import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from threading import Lock
 from typing import TYPE_CHECKING, Any
-
-from arena.results.exports.tables import Row
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -17,7 +14,6 @@ if TYPE_CHECKING:
 
 INK, SOFT, GRID, MARK, SIMULATED = "#1d2733", "#5b6773", "#d5dbe3", "#2f6db5", "#7a4fae"
 DPI = 200
-MOST_TICKS = 7
 
 Interval = tuple[float | None, float | None, float | None]
 """Lower bound, rating, upper bound."""
@@ -29,6 +25,20 @@ NO_METADATA: dict[str, dict[str, Any]] = {
 }
 """No date, random id or version may get into a file, so that its bytes never differ."""
 
+_STYLE: dict[Any, Any] = {
+    "svg.hashsalt": "scenario-arena",
+    "svg.fonttype": "none",
+    "pdf.fonttype": 42,  # publishers refuse Type 3, matplotlib's default
+    "text.parse_math": False,  # a dollar sign in a name is a dollar sign
+    "font.size": 8.0,
+    **{f"{name}.color": INK for name in ("text", "xtick", "ytick")},
+    "axes.labelcolor": INK,
+    "axes.axisbelow": True,
+    "grid.color": GRID,
+    "grid.linewidth": 0.6,
+    **{f"axes.spines.{side}": False for side in ("top", "right", "left")},
+    "ytick.major.size": 0.0,
+}
 _LOCK = Lock()
 
 
@@ -40,24 +50,8 @@ def house_style() -> Iterator[None]:
     """
     import matplotlib
 
-    settings: dict[Any, Any] = {
-        "svg.hashsalt": "scenario-arena",
-        "svg.fonttype": "none",
-        "pdf.fonttype": 42,  # publishers refuse Type 3, matplotlib's default
-        "text.parse_math": False,  # a dollar sign in a name is a dollar sign
-    }
-    with _LOCK, matplotlib.rc_context(settings):
+    with _LOCK, matplotlib.rc_context(_STYLE):
         yield
-
-
-def names_width_in(rows: Sequence[Row], size_pt: float) -> float:
-    """Return how many inches the longest name takes; call it within `house_style`."""
-    from matplotlib.textpath import TextPath
-
-    widths = (
-        TextPath((0.0, 0.0), row.model, size=size_pt).get_extents().width / 72.0 for row in rows
-    )
-    return max(map(float, widths), default=0.0)
 
 
 def write_figure(figure: Figure, file_format: str) -> bytes:
@@ -67,62 +61,53 @@ def write_figure(figure: Figure, file_format: str) -> bytes:
     return picture.getvalue()
 
 
-def name_rows(axes: Axes, rows: Sequence[Row], **text: Any) -> None:
-    """Write the contestants' names beside the lines of a chart, simulated ones in their colour."""
-    axes.set_yticks(range(len(rows)), [row.model for row in rows], **text)
-    for label, row in zip(axes.get_yticklabels(), rows, strict=True):
-        label.set_color(SIMULATED if row.simulated else INK)
+def name_lines(axes: Axes, names: Sequence[str], simulated: Sequence[bool]) -> None:
+    """Name the lines of a chart from top to bottom, simulated ones in their colour."""
+    axes.set_yticks(range(len(names)), names)
+    for label, is_simulated in zip(axes.get_yticklabels(), simulated, strict=False):
+        label.set_color(SIMULATED if is_simulated else INK)
+    axes.set_ylim(len(names) - 0.5, -0.5)
+    axes.grid(axis="x")
 
 
-def draw_interval(axes: Axes, place: int, interval: Interval, *, simulated: bool) -> None:
+def draw_interval(
+    axes: Axes,
+    place: float,
+    interval: Interval,
+    *,
+    simulated: bool,
+    colour: str = MARK,
+    upright: bool = False,
+    label: str = "",
+) -> None:
     """Draw a mark at the rating and a bar over the interval, with an arrow where it is open.
 
-    Nothing without a rating and bounds; a bound alone begins with a stroke.
+    Args:
+        axes: Where to draw.
+        place: The line of the chart; across with `upright`.
+        interval: Nothing is drawn if all of it is unknown; a bound alone begins with a stroke.
+        simulated: Whether it is a diamond in a colour of its own.
+        colour: Of the others.
+        upright: Whether the bar stands.
+        label: Of the mark, in a key.
     """
-    lower, middle, upper = interval
-    colour, shape = (SIMULATED, "D") if simulated else (MARK, "o")
     known = [value for value in interval if value is not None]
     if not known:
         return
-    if len(known) > 1:
-        axes.plot([known[0], known[-1]], [place, place], color=colour, linewidth=1.6)
+    lower, middle, upper = interval
+    colour, shape = (SIMULATED, "D") if simulated else (colour, "o")
+
+    def at(value: float) -> tuple[float, float]:
+        return (place, value) if upright else (value, place)
+
+    ends = zip(at(known[0]), at(known[-1]), strict=True)
+    axes.plot(*ends, color=colour, linewidth=1.6)
     if middle is None:
-        axes.plot(known, [place], marker="|", markersize=9, markeredgewidth=1.6, color=colour)
-    else:
-        axes.plot([middle], [place], marker=shape, markersize=5, color=colour)
+        shape, middle = "_" if upright else "|", known[0]
+    look: dict[str, Any] = {"marker": shape, "markersize": 5, "linestyle": "", "color": colour}
+    axes.plot(*zip(at(middle), strict=True), label=label or None, **look)
     if (lower is None) != (upper is None):
         start, edge = (known[0], 0.0) if lower is None else (known[-1], 1.0)
+        to_edge = axes.get_xaxis_transform() if upright else axes.get_yaxis_transform()
         arrow = {"arrowstyle": "->", "color": colour, "linewidth": 1.6, "shrinkA": 0, "shrinkB": 0}
-        axes.annotate(
-            "", (edge, place), (start, place), axes.get_yaxis_transform(), "data", arrowprops=arrow
-        )
-
-
-def rating_axis(axes: Axes, rows: int) -> None:
-    """Put ratings across and lines from top to bottom."""
-    axes.set_ylim(rows - 0.5, -0.5)
-    axes.grid(axis="x", color=GRID, linewidth=0.6)
-    axes.set_axisbelow(True)
-    axes.spines[["top", "right", "left"]].set_visible(False)
-    axes.tick_params(axis="y", length=0)
-
-
-def interval_ticks(intervals: Iterable[Interval], ratings: Sequence[float] = ()) -> list[float]:
-    """Return the ticks of an axis that covers intervals and ratings; none without an interval."""
-    ends = [
-        value
-        for lower, middle, upper in intervals
-        if lower is not None or upper is not None
-        for value in (lower, middle, upper)
-        if value is not None
-    ]
-    return round_ticks(min([*ends, *ratings]), max([*ends, *ratings])) if ends else []
-
-
-def round_ticks(low: float, high: float) -> list[float]:
-    """Return round numbers that enclose low..high, at most MOST_TICKS steps apart."""
-    span = max(high - low, 1e-9 if high > low else 1.0)
-    power = 10.0 ** math.floor(math.log10(span / MOST_TICKS))
-    step = next(power * f for f in (1, 2, 5, 10) if span / (power * f) <= MOST_TICKS)
-    first, last = math.floor(low / step), math.ceil(high / step)
-    return [step * n for n in range(first, max(last, first + 1) + 1)]
+        axes.annotate("", at(edge), at(start), to_edge, "data", arrowprops=arrow)

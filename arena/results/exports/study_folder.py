@@ -3,7 +3,6 @@
 import hashlib
 import json
 import re
-import shutil
 import tempfile
 from collections.abc import Callable, Iterable, Iterator
 from importlib.metadata import version
@@ -15,8 +14,9 @@ from django.template.loader import render_to_string
 
 from arena.errors import ArenaError
 from arena.exports.cells import csv_text
-from arena.jobs.exports.tables import object_sheet, sheet_csv
-from arena.models import Matchup, Snapshot, Study, Vote
+from arena.exports.formats import Value, csv_of, read_value, sheet_csv
+from arena.jobs.exports.displacement import object_sheet
+from arena.models import Snapshot, Study
 from arena.results.exports.closure import Closure, close_over, travelling_rows
 from arena.results.exports.writers import MANIFEST as RATING_MANIFEST
 from arena.results.exports.writers import bundle_files
@@ -29,7 +29,7 @@ from arena.results.services.stored_rows import (
 )
 from arena.site.services import UNFINISHED
 from arena.studies.services.opening import FILE_NAME, preregistration_sha256
-from augment.models import Augmentation, Contestant, GenerationJob, Scenario
+from augment.models import Augmentation, GenerationJob
 from augment.services.running.transcript_records import record_of, tries_by_augmentation
 
 File = tuple[str, bytes]
@@ -47,71 +47,68 @@ PICTURE_COLUMNS = frozenset({"image", "original_image", "left_image", "right_ima
 ASKED = "asked"
 """Where the pictures lie that reviewers were sent; a request names them by their hash."""
 
-PAIRS = (
-    "matchup",
-    "judge",
-    "position",
-    "kind",
-    "repeat_of",
-    "scenario",
-    "contestant_a",
-    "augmentation_a",
-    "contestant_b",
-    "augmentation_b",
-    "outcome",
-    "both_miss",
-    "skip_reason",
-    "aids",
-    "ms_visible",
-    "comment",
-    "at",
-    "vote",
-    "supersedes",
-    "simulated",
-)
+_SHOWN: dict[str, Value] = {
+    "matchup": "code",
+    "judge": "expert.person.pseudonym",
+    "position": "position",
+    "kind": "kind",
+    "repeat_of": "repeat_of.code",
+    "scenario": "scenario.slug",
+    "contestant_a": "left.contestant.slug",
+    "augmentation_a": "left.code",
+    "contestant_b": "right.contestant.slug",
+    "augmentation_b": "right.code",
+}
+_JUDGED: dict[str, Value] = {
+    "outcome": "outcome",
+    "both_miss": "both_miss",
+    "skip_reason": "reason",
+    "aids": "aids",
+    "ms_visible": "ms_visible",
+    "comment": "comment",
+    "at": lambda vote: vote.at.isoformat(),
+    "vote": "key",
+    "supersedes": "supersedes.key",
+    "simulated": "is_simulated",
+}
 """One line a vote, superseded ones and skips included, and one for each pair without a vote."""
 
-AUGMENTATIONS = (
-    "augmentation",
-    "job",
-    "scenario",
-    "type",
-    "contestant",
-    "sample",
-    "state",
-    "reason",
-    "picture",
-    "modification_sha256",
-    "finished_at",
-)
 
-_CONTESTANT = (
-    "slug",
-    "name",
-    "kind",
-    "variant",
-    "model",
-    "roles",
-    "error_rates",
-    "options",
-    "frozen_options",
-    "sends",
-)
-_SCENARIO = (
-    "slug",
-    "type",
-    "type_label",
-    "keep_traffic",
-    "traffic_density",
-    "goal",
-    "spawned",
-    "interplan",
-    "language",
-    "instruction",
-    "reference",
-    "intent",
-    "intent_origin",
-)
+def _digest_of_change(row: Augmentation) -> str | None:
+    if row.modification is None:
+        return None
+    return hashlib.sha256(_json(row.modification)).hexdigest()
+
+
+AUGMENTATIONS: dict[str, Value] = {
+    "augmentation": "code",
+    "job": "job.name",
+    "scenario": "scenario.slug",
+    "type": "scenario.type",
+    "contestant": "contestant.slug",
+    "sample": "sample",
+    "state": "state",
+    "reason": "reason",
+    "picture": "image",
+    "modification_sha256": _digest_of_change,
+    "finished_at": lambda row: row.finished_at and row.finished_at.isoformat(),
+}
+
+_CONTESTANT: dict[str, str] = {
+    **{name: name for name in ("slug", "name", "kind", "variant", "model", "roles")},
+    **{name: name for name in ("error_rates", "options", "frozen_options", "sends")},
+    "endpoint": "endpoint.base_url",
+}
+_SCENARIO: dict[str, str] = {
+    **{name: name for name in ("slug", "type", "type_label", "keep_traffic", "traffic_density")},
+    **{name: name for name in ("goal", "spawned", "interplan", "language", "instruction")},
+    **{name: name for name in ("reference", "intent", "intent_origin")},
+    "scene": "base_scene.slug",
+    "source": "base_scene.source",
+    "provenance": "base_scene.provenance",
+    "set": "catalogue_set",
+    "paraphrase_of": "paraphrase_of.slug",
+}
 
 _AT_ONCE = 100
 """So many transcripts are held in memory; each may have some hundred thousand characters."""
@@ -138,14 +135,12 @@ def write_study(study: Study, out: Path, *, say: Callable[[str], None]) -> None:
     if study.state == Study.State.CANCELLED:
         raise ArenaError(f"The study {study.name!r} was cancelled; export its votes instead.")
     out.parent.mkdir(parents=True, exist_ok=True)
-    beside = Path(tempfile.mkdtemp(dir=out.parent, prefix=f".{out.name}."))
-    try:
+    with tempfile.TemporaryDirectory(dir=out.parent, prefix=f".{out.name}.") as folder:
+        beside = Path(folder, out.name)
+        beside.mkdir()
         with frozen_rows():
             _fill(study, beside, say)
-        beside.chmod(0o755)
         beside.rename(out)
-    finally:
-        shutil.rmtree(beside, ignore_errors=True)
 
 
 class _Folder:
@@ -246,28 +241,26 @@ def _manifest(closure: Closure, counts: dict[str, int], digests: dict[str, str])
 
 
 def _files_for_people(closure: Closure) -> Iterator[File]:
-    """Every file but the rows, the pictures and the README, in a fixed order."""
+    """Yield every file but the rows, the pictures and the README, in a fixed order."""
     study, jobs = closure.study, closure.jobs
+    rows = Augmentation.objects.filter(job__in=jobs).order_by("pk")
     augmentations = list(
-        Augmentation.objects.filter(job__in=jobs)
-        .select_related("job", "scenario__base_scene", "contestant__endpoint")
-        .order_by("pk")
+        rows.select_related("job", "scenario__base_scene", "contestant__endpoint")
     )
-    yield "pairs.csv", csv_text(PAIRS, _pairs(study)).encode()
-    yield "augmentations.csv", csv_text(AUGMENTATIONS, map(_cells_of, augmentations)).encode()
-    contestants = Contestant.objects.filter(jobs__in=jobs) | study.contestants.all()
-    rows = contestants.distinct().select_related("endpoint")
-    documents = [_contestant(row) for row in sorted(rows, key=lambda row: row.slug)]
-    yield "contestants.json", _json(documents)
+    yield "pairs.csv", _pairs(study)
+    yield "augmentations.csv", csv_of(AUGMENTATIONS, augmentations)
+    contestants = sorted(
+        closure.contestants.select_related("endpoint"), key=lambda row: str(row.slug)
+    )
+    yield "contestants.json", _json([_document(row, _CONTESTANT) for row in contestants])
     if frozen := study.preregistration.encode():
         yield FILE_NAME, frozen
-    places = Scenario.objects.filter(jobs__in=jobs) | study.scenarios.all()
-    related = places.distinct().select_related("base_scene", "paraphrase_of")
-    scenarios = sorted(related, key=lambda row: row.slug)
+    named = closure.named_scenarios.select_related("base_scene", "paraphrase_of")
+    scenarios = sorted(named, key=lambda row: str(row.slug))
     for scenario in scenarios:
-        yield f"scenarios/{scenario.slug}.json", _json(_scenario(scenario))
+        yield f"scenarios/{scenario.slug}.json", _json(_document(scenario, _SCENARIO))
     scenes = {scenario.base_scene for scenario in scenarios}
-    for scene in sorted(scenes, key=lambda row: row.slug):
+    for scene in sorted(scenes, key=lambda row: str(row.slug)):
         yield f"scenes/{scene.slug}.json", _json(scene.document)
     for job in GenerationJob.objects.filter(pk__in=jobs).order_by("pk"):
         yield f"objects/{job.code}.csv", sheet_csv(object_sheet(job))
@@ -296,70 +289,22 @@ def _made(augmentations: list[Augmentation]) -> Iterator[File]:
             yield f"transcripts/{augmentation.code}.json", _json(document)
 
 
-def _pairs(study: Study) -> Iterator[list[str]]:
-    matchups = (
-        Matchup.objects.filter(study=study)
-        .select_related(
-            *("expert__person", "scenario", "repeat_of"),
-            *("left__contestant", "right__contestant"),
-        )
-        .prefetch_related("votes__supersedes")
-    )
+def _pairs(study: Study) -> bytes:
+    related = ("expert__person", "scenario", "repeat_of", "left__contestant", "right__contestant")
+    matchups = study.matchups.select_related(*related).prefetch_related("votes__supersedes")
+    rows = []
     # Sorted here: databases order letters each in its own way.
     for matchup in sorted(matchups, key=lambda row: (row.expert.person.pseudonym, row.position)):
-        shown = [
-            matchup.code,
-            matchup.expert.person.pseudonym,
-            matchup.position,
-            matchup.kind,
-            matchup.repeat_of and matchup.repeat_of.code,
-            matchup.scenario.slug,
-            *(matchup.left.contestant.slug, matchup.left.code),
-            *(matchup.right.contestant.slug, matchup.right.code),
-        ]
+        shown = [read_value(matchup, value) for value in _SHOWN.values()]
         votes = sorted(matchup.votes.all(), key=lambda vote: vote.pk)
-        for cells in [_cells_of_vote(vote) for vote in votes] or [[None] * 10]:
-            yield [_text(cell) for cell in (*shown, *cells)]
+        judged = [[read_value(vote, value) for value in _JUDGED.values()] for vote in votes]
+        rows += [[*shown, *cells] for cells in judged or [[None] * len(_JUDGED)]]
+    return csv_text([*_SHOWN, *_JUDGED], rows).encode()
 
 
-def _cells_of_vote(vote: Vote) -> list[object]:
-    return [
-        *(vote.outcome, vote.both_miss, vote.reason, vote.aids, vote.ms_visible, vote.comment),
-        *(vote.at.isoformat(), vote.key, vote.supersedes and vote.supersedes.key),
-        vote.is_simulated,
-    ]
-
-
-def _cells_of(row: Augmentation) -> list[str]:
-    document = None if row.modification is None else _json(row.modification)
-    cells = (
-        *(row.code, row.job.name, row.scenario.slug, row.scenario.type, row.contestant.slug),
-        *(row.sample, row.state, row.reason, row.image),
-        document and hashlib.sha256(document).hexdigest(),
-        row.finished_at and row.finished_at.isoformat(),
-    )
-    return [_text(cell) for cell in cells]
-
-
-def _contestant(row: Contestant) -> dict[str, Any]:
-    document = {name: getattr(row, name) for name in _CONTESTANT}
-    return document | {"endpoint": row.endpoint.base_url if row.endpoint else None}
-
-
-def _scenario(row: Scenario) -> dict[str, Any]:
-    return {name: getattr(row, name) for name in _SCENARIO} | {
-        "scene": row.base_scene.slug,
-        "source": row.base_scene.source,
-        "provenance": row.base_scene.provenance,
-        "set": row.catalogue_set,
-        "paraphrase_of": row.paraphrase_of.slug if row.paraphrase_of else None,
-    }
-
-
-def _text(value: object) -> str:
-    if isinstance(value, bool):
-        return "yes" if value else "no"
-    return "" if value is None else str(value)
+def _document(row: Any, columns: dict[str, str]) -> dict[str, Any]:
+    """Return values of a row by name, as they are."""
+    return {name: read_value(row, path, None) for name, path in columns.items()}
 
 
 def _json(document: object) -> bytes:

@@ -64,73 +64,69 @@ class LeaderboardTable:
 
     Attributes:
         reasons: Why ratings or intervals are missing, none if none is.
-        early: The study was still open.
-        notes: What else the method has to say about these votes.
         left_out: Votes that do not count, by reason.
-        covariates: What the ratings are adjusted for.
         preregistration: The SHA-256 of the file that was frozen at the opening, empty without.
         hypotheses: What was expected, and what the rating says of it.
     """
 
-    study: str
+    snapshot: Snapshot
     rows: tuple[Row, ...]
-    method: str
-    rounds: int
-    unit: str
-    intervals: str = "resamples"
-    seed: int
-    degenerate_rounds: int
-    votes: int
     left_out: dict[str, int]
-    votes_sha256: str
-    experts: int = 0
-    scenarios: int = 0
     reasons: tuple[str, ...] = ()
-    simulated: bool
-    early: bool
-    notes: tuple[str, ...] = ()
-    covariates: tuple[str, ...] = ()
     preregistration: str = ""
     hypotheses: tuple[Answered, ...] = ()
 
     @property
-    def status(self) -> str:
-        """The reasons in one line, empty if nothing is missing."""
-        return " ".join(self.reasons)
+    def study(self) -> str:
+        """The study's name."""
+        return self.snapshot.study.name
+
+    @property
+    def is_simulated(self) -> bool:
+        """Whether votes or contestants are simulated."""
+        return self.snapshot.includes_simulated
+
+    @property
+    def early(self) -> bool:
+        """Whether the study was still open."""
+        return self.snapshot.is_early
+
+    @property
+    def covariates(self) -> list[str]:
+        """What the ratings are adjusted for."""
+        adjustment = self.snapshot.results.adjustment
+        return [effect.name for effect in adjustment.effects] if adjustment else []
 
     @property
     def method_text(self) -> str:
         """How the numbers came about, in one line."""
+        rating = self.snapshot
         adjusted = f", adjusted for {', '.join(self.covariates)}" if self.covariates else ""
-        unit = UNIT_TEXTS[self.unit]
+        unit = UNIT_TEXTS[rating.resampling_unit]
         intervals = (
             f"in closed form, clustered by {unit}"
             if self.is_closed_form
-            else f"by {self.rounds} resamples of {unit}"
+            else f"by {rating.rounds} resamples of {unit}"
         )
-        method = METHOD_TEXTS[self.method]
-        return f"{method}{adjusted}, 95 % intervals {intervals}, seed {self.seed}"
-
-    @property
-    def notes_on_method(self) -> dict[str, Any]:
-        """How intervals were found and what is adjusted for, for documents.
-
-        Older ratings had no word for resamples.
-        """
-        notes: dict[str, Any] = {"intervals": self.intervals} if self.is_closed_form else {}
-        return notes | ({"covariates": list(self.covariates)} if self.covariates else {})
+        method = METHOD_TEXTS[rating.method]
+        return f"{method}{adjusted}, 95 % intervals {intervals}, seed {rating.seed}"
 
     @property
     def is_closed_form(self) -> bool:
         """Whether intervals come from a formula and not from resampled rounds."""
-        return self.intervals == Intervals.CLOSED_FORM.value
+        return self.snapshot.intervals == Intervals.CLOSED_FORM.value
 
     @property
-    def warnings(self) -> tuple[str, ...]:
+    def warnings(self) -> list[str]:
         """Sentences that no reader may miss, for files."""
-        marks = ((SIMULATED_TABLE, self.simulated), (EARLY_LOOK, self.early))
-        said = [mark for mark, so in marks if so]
-        return (*said, *((self.status,) if self.status else ()), *self.notes)
+        marks = {SIMULATED_TABLE: self.is_simulated, EARLY_LOOK: self.early}
+        said = [mark for mark, holds in marks.items() if holds]
+        return [*said, *filter(None, [" ".join(self.reasons)]), *self.notes]
+
+    @property
+    def notes(self) -> list[str]:
+        """What else the method has to say about these votes."""
+        return list(filter(None, self.snapshot.results.board.warnings))
 
     @property
     def frozen_text(self) -> str:
@@ -149,10 +145,10 @@ class LeaderboardTable:
 
 
 def leaderboard_table(snapshot: Snapshot) -> LeaderboardTable:
-    """The table of a snapshot, best first; one query."""
+    """Return the table of a snapshot, best first; one query."""
     lines = snapshot.standings.select_related("contestant")
     standings = list(lines.order_by(F("rating").desc(nulls_last=True), "slug"))
-    board, adjustment = snapshot.results.board, snapshot.results.adjustment
+    board = snapshot.results.board
     reasons = (snapshot.reason,) if board.reasons is None else board.reasons
     last = len(standings)
     standings.sort(key=lambda standing: board.parts.get(standing.slug, last))
@@ -167,24 +163,10 @@ def leaderboard_table(snapshot: Snapshot) -> LeaderboardTable:
         rows = [replace(row, rank=None, rank_best=None, rank_worst=None) for row in rows]
         reasons = (*reasons, NOT_RANKED)
     return LeaderboardTable(
-        study=snapshot.study.name,
+        snapshot=snapshot,
         rows=tuple(rows),
-        method=snapshot.method,
-        rounds=snapshot.rounds,
-        unit=snapshot.resampling_unit,
-        intervals=snapshot.intervals,
-        seed=snapshot.seed,
-        degenerate_rounds=snapshot.degenerate_rounds,
-        votes=snapshot.votes_counted,
         left_out=dict(sorted(snapshot.votes_left_out.items())),
-        votes_sha256=snapshot.votes_sha256,
-        experts=board.experts,
-        scenarios=board.scenarios,
         reasons=tuple(filter(None, reasons)),
-        simulated=snapshot.includes_simulated,
-        early=snapshot.is_early,
-        notes=tuple(filter(None, board.warnings)),
-        covariates=tuple(effect.name for effect in adjustment.effects) if adjustment else (),
         preregistration=preregistration_sha256(snapshot.study),
         hypotheses=answer_hypotheses(snapshot),
     )
@@ -224,8 +206,8 @@ class Column:
     `Standing`.
 
     Attributes:
-        field: Of a contestant's row; of the whole table with `of_table`.
         name: In CSV and Parquet; `kind` is what Parquet holds.
+        field: Of a contestant's row, or of the whole table.
         key: In JSON.
         printed: Its head in LaTeX and in the terminal.
         page: Its head on the page.
@@ -233,19 +215,18 @@ class Column:
         identifies: Says whose line it is, which stands first in JSON and where it is printed.
     """
 
-    field: str
     name: str = ""
     kind: str = TEXT
+    field: str
     key: str = ""
     printed: str = ""
     page: str = ""
     text_field: str = ""
     identifies: bool = False
-    of_table: bool = False
 
     def value_of(self, table: LeaderboardTable, row: Row) -> object:
         """What stands in files."""
-        return getattr(table if self.of_table else row, self.field)
+        return getattr(row if hasattr(row, self.field) else table, self.field)
 
     def text(self, row: Row) -> str:
         """What is printed."""
@@ -253,20 +234,16 @@ class Column:
 
 
 def _column(name: str, kind: str = TEXT, **more: Any) -> Column:
-    """A column that is called in JSON, and in the row unless said otherwise, as in files."""
+    """Return a column that unless said otherwise is called the same everywhere."""
     return Column(**{"field": name, "name": name, "kind": kind, "key": name} | more)
-
-
-def _column_of_table(name: str, kind: str = TEXT, field: str = "") -> Column:
-    return Column(field=field or name, name=name, kind=kind, of_table=True)
 
 
 COLUMNS = (
     _column("rank", WHOLE, printed="Rank", page="Rank", text_field="rank_text"),
     _column("model", printed="Model", page="Contestant", identifies=True),
-    _column(
-        "elo",
-        NUMBER,
+    Column(
+        name="elo",
+        kind=NUMBER,
         field="rating",
         key="rating",
         printed="Elo",
@@ -285,13 +262,13 @@ COLUMNS = (
     _column("kind", identifies=True),
     _column("simulated", YES_NO, identifies=True),
     _column("note"),
-    _column_of_table("study"),
-    _column_of_table("method", field="method_text"),
-    _column_of_table("study_simulated", YES_NO, "simulated"),
-    _column_of_table("early", YES_NO),
+    _column("study", key=""),
+    _column("method", key="", field="method_text"),
+    _column("study_simulated", YES_NO, key="", field="is_simulated"),
+    _column("early", YES_NO, key=""),
     _column("rank_best", WHOLE),
     _column("rank_worst", WHOLE),
-    _column_of_table("preregistration"),
+    _column("preregistration", key=""),
     Column(field="ranks_text", printed="95% ranks"),
     _column("options"),
 )

@@ -1,10 +1,9 @@
 """Votes as files: those of a rating in the column form of Chatbot Arena, and a list of any."""
 
 from collections.abc import Iterator
-from typing import NamedTuple
 
 from arena.exports.cells import csv_parts
-from arena.exports.formats import TEXT, WHOLE, YES_NO, Format, formats, parquet_bytes
+from arena.exports.formats import TEXT, WHOLE, YES_NO, Sheet, formats, sheet_csv, sheet_parquet
 from arena.models import Snapshot, Study
 from arena.results.queries.evidence import ListedVote, each_vote
 from arena.results.queries.search import VoteSearch
@@ -18,7 +17,6 @@ from arena.results.services.vote_files import (
     Row,
     vote_columns,
     vote_rows,
-    votes_csv,
 )
 
 _KINDS = {"ms_visible": WHOLE, "simulated": YES_NO, "position": WHOLE}
@@ -27,68 +25,50 @@ LIST_COLUMNS = (*COLUMNS, "mark", "reason", "vote")
 """Those of the rating's own file, then why a vote does not count ("counted" where it does), why it
 was skipped, and the code in its address."""
 
-
-class VoteTable(NamedTuple):
-    """Votes in the order in which they came, and the version of the columns to write."""
-
-    version: int
-    rows: list[Row]
+VOTE_FORMATS = formats(csv=sheet_csv, parquet=sheet_parquet)
 
 
-def vote_table(snapshot: Snapshot) -> VoteTable:
-    """The votes that the rating is made of.
+def vote_table(snapshot: Snapshot) -> Sheet:
+    """Return the votes that the rating is made of.
 
     Raises:
         Conflict: They are not what they were.
     """
     rows = vote_rows(votes_of(snapshot).counted, snapshot.results.judges)
-    return VoteTable(version=votes_version_of(snapshot), rows=list(rows))
+    return _sheet(rows, votes_version_of(snapshot))
 
 
-def unrated_votes(study: Study) -> VoteTable:
-    """The votes of a study that nobody rates, repeats and checks by their kind; no skips."""
+def unrated_votes(study: Study) -> Sheet:
+    """Return the votes of a study that nobody rates, repeats and checks too; no skips."""
     current = current_votes(study, Filters(), last_vote_of(study))
     decided = [vote for vote in current if vote.outcome in RATED]
     names = {vote.judge: vote.judge_name for vote in decided}
-    return VoteTable(version=VERSION, rows=list(vote_rows(decided, names)))
+    return _sheet(vote_rows(decided, names), VERSION)
 
 
-def parquet_of(table: VoteTable) -> bytes:
-    """The columns of the CSV file, typed; nothing is guarded, as no spreadsheet reads it."""
-    names = vote_columns(table.version)
-    rows = (row[: len(names)] for row in table.rows)
-    return parquet_bytes({name: _KINDS.get(name, TEXT) for name in names}, rows)
-
-
-VOTE_FORMATS: dict[str, Format[VoteTable]] = formats(
-    csv=lambda table: votes_csv(table.rows, table.version), parquet=parquet_of
-)
+def _sheet(rows: Iterator[Row], version: int) -> Sheet:
+    names = vote_columns(version)
+    return Sheet(
+        name="votes",
+        columns={name: _KINDS.get(name, TEXT) for name in names},
+        rows=[row[: len(names)] for row in rows],
+    )
 
 
 def vote_list_csv(snapshot: Snapshot, search: VoteSearch) -> Iterator[bytes]:
-    """All votes that are looked for, some lines at a time; names are pseudonyms."""
+    """Yield all votes that are looked for, some lines at a time; names are pseudonyms."""
     return csv_parts(LIST_COLUMNS, map(_list_row, each_vote(snapshot, search)))
 
 
 def _list_row(vote: ListedVote) -> tuple[object, ...]:
     return (
-        vote.left.slug,
-        vote.right.slug,
+        *(vote.left.slug, vote.right.slug),
         BOTH_BAD if vote.both_miss else WINNERS.get(vote.outcome),
-        vote.judge,
-        vote.scenario,
-        vote.type,
-        vote.kind,
+        *(vote.judge, vote.scenario, vote.type, vote.kind),
         vote.outcome if vote.outcome in ("left", "right") else None,
-        vote.ms_visible,
-        vote.is_simulated,
+        *(vote.ms_visible, vote.is_simulated),
         vote.at and vote.at.isoformat(timespec="milliseconds"),
-        vote.position,
-        vote.aids,
-        vote.comment,
-        vote.left.augmentation,
-        vote.right.augmentation,
-        vote.mark,
-        vote.reason,
-        vote.code,
+        *(vote.position, vote.aids, vote.comment),
+        *(vote.left.augmentation, vote.right.augmentation),
+        *(vote.mark, vote.reason, vote.code),
     )

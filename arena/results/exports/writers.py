@@ -3,18 +3,28 @@
 The same snapshot always gives the same bytes.
 """
 
-import json
-from collections.abc import Iterable, Sequence
+from functools import partial
+from operator import attrgetter
 from typing import Any
 
 from arena.exports.cells import csv_text
 from arena.exports.files import zip_bytes
-from arena.exports.formats import Format, drawings, formats, parquet_bytes, round_value
+from arena.exports.formats import (
+    Export,
+    Format,
+    Sheet,
+    Value,
+    csv_of,
+    drawings,
+    formats,
+    json_bytes,
+    sheet_csv,
+    sheet_parquet,
+)
 from arena.models import Snapshot
 from arena.rating.lines import caption_text, escape, latex_table
 from arena.rating.snapshot_document import Results, results_document
-from arena.results.exports.charts import CONTENT_TYPES as CHART_FORMATS
-from arena.results.exports.charts import charts, interval_chart
+from arena.results.exports.charts import Chart, charts, interval_chart
 from arena.results.exports.tables import (
     IN_FILES,
     IN_JSON,
@@ -27,6 +37,7 @@ from arena.results.exports.votes import VOTE_FORMATS, vote_table
 from arena.results.services.vote_files import digest_of
 from arena.studies.services.opening import FILE_NAME
 from arena.studies.services.plan import Answered
+from augment.errors import UnknownName
 
 MANIFEST = "manifest.json"
 
@@ -34,45 +45,41 @@ MANIFEST = "manifest.json"
 # --- The table ---------------------------------------------------------------------------------
 
 
-def csv_bytes(table: LeaderboardTable) -> bytes:
-    """One line a contestant; what is unknown is empty, numbers have two decimals."""
-    return csv_text([column.name for column in IN_FILES], _values(table)).encode()
+def leaderboard_sheet(table: LeaderboardTable) -> Sheet:
+    """Return one row a contestant; in CSV numbers have two decimals."""
+    return Sheet(
+        name="leaderboard",
+        columns={column.name: column.kind for column in IN_FILES},
+        rows=[[column.value_of(table, row) for column in IN_FILES] for row in table.rows],
+        number=".2f",
+    )
 
 
-def parquet_of(table: LeaderboardTable) -> bytes:
-    """The columns of the CSV file, typed; numbers as they are."""
-    return parquet_bytes({column.name: column.kind for column in IN_FILES}, _values(table))
-
-
-def json_bytes(table: LeaderboardTable) -> bytes:
-    """An object whose `standings` is a list of {model, rank, rating, lower, upper, votes, ...}."""
-    notes = {name: note for name, note in table.notes_on_method.items() if name == "intervals"}
-    document: dict[str, Any] = {
-        "format": "scenario-arena/leaderboard",
-        "version": 1,
-        "study": table.study,
-        "simulated": table.simulated,
-        "early": table.early,
-        "method": {
-            "name": table.method,
-            "text": table.method_text,
-            "resampling_unit": table.unit,
-            **notes,
-            "rounds": table.rounds,
-            "degenerate_rounds": table.degenerate_rounds,
-            "seed": table.seed,
-        },
-        "votes": {
-            "counted": table.votes,
-            "left_out": table.left_out,
-            "sha256": table.votes_sha256,
-        },
-        "preregistration": table.preregistration or None,
-        "hypotheses": [_hypothesis(answer) for answer in table.hypotheses],
-        "status": table.status,
-        "standings": [_standing(table, row) for row in table.rows],
-    }
-    return (json.dumps(document, indent=2, ensure_ascii=False) + "\n").encode()
+def leaderboard_json(table: LeaderboardTable) -> bytes:
+    """Return an object whose `standings` is a list of {model, rank, rating, lower, upper, ...}."""
+    rating = table.snapshot
+    method = _method(table)
+    method.pop("covariates", None)
+    seed = method.pop("seed")
+    return json_bytes(
+        {
+            "format": "scenario-arena/leaderboard",
+            "version": 1,
+            "study": table.study,
+            "simulated": table.is_simulated,
+            "early": table.early,
+            "method": method | {"degenerate_rounds": rating.degenerate_rounds, "seed": seed},
+            "votes": {
+                "counted": rating.votes_counted,
+                "left_out": table.left_out,
+                "sha256": rating.votes_sha256,
+            },
+            "preregistration": table.preregistration or None,
+            "hypotheses": [_hypothesis(answer) for answer in table.hypotheses],
+            "status": " ".join(table.reasons),
+            "standings": [_standing(table, row) for row in table.rows],
+        }
+    )
 
 
 def plain_text(table: LeaderboardTable) -> str:
@@ -90,8 +97,9 @@ def plain_text(table: LeaderboardTable) -> str:
         for line in grid
     ]
     left_out = ", ".join(f"{number} {reason}" for reason, number in table.left_out.items())
+    votes = table.snapshot.votes_counted
     lines += ["", *(f"{line}." for line in table.missing)]
-    lines.append(f"{table.votes} votes counted; left out: {left_out or 'none'}.")
+    lines.append(f"{votes} votes counted; left out: {left_out or 'none'}.")
     lines.append(f"{table.method_text}.")
     if table.frozen_text:
         lines.append(f"{table.frozen_text[0].upper()}{table.frozen_text[1:]}.")
@@ -99,90 +107,118 @@ def plain_text(table: LeaderboardTable) -> str:
     return "\n".join([*lines, *table.warnings])
 
 
-def latex(table: LeaderboardTable) -> str:
-    """The paper's table with comments: needs booktabs and xcolor with the option `table`."""
-    marks = [word for word, so in (("simulated", table.simulated), ("early", table.early)) if so]
+def leaderboard_latex(table: LeaderboardTable) -> bytes:
+    """Return the paper's table with comments."""
+    rating, board = table.snapshot, table.snapshot.results.board
+    marks = {"simulated": table.is_simulated, "early": table.early}
+    words = [word for word, holds in marks.items() if holds]
     caption = caption_text(
-        table.method_text, votes=table.votes, experts=table.experts, scenarios=table.scenarios
+        table.method_text,
+        votes=rating.votes_counted,
+        experts=board.experts,
+        scenarios=board.scenarios,
     )
-    return latex_table(
+    text = latex_table(
         (
             [_latex_name(row), *(column.text(row) for column in PRINTED if not column.identifies)]
             for row in table.rows
         ),
         heads=[column.printed for column in PRINTED],
         comments=(
-            f"{table.study}: {table.votes} votes; {table.method_text}",
-            f"votes sha256 {table.votes_sha256}",
+            f"{table.study}: {rating.votes_counted} votes; {table.method_text}",
+            f"votes sha256 {rating.votes_sha256}",
             *((table.frozen_text,) if table.frozen_text else ()),
             *table.warnings,
         ),
         notes=table.missing,
-        caption=f"{caption} ({', '.join(marks)})" if marks else caption,
+        caption=f"{caption} ({', '.join(words)})" if words else caption,
     )
+    return text.encode()
 
 
-FORMATS: dict[str, Format[LeaderboardTable]] = formats(
-    csv=csv_bytes,
-    json=json_bytes,
-    parquet=parquet_of,
-    latex=lambda table: latex(table).encode(),
+FORMATS: dict[str, Format[LeaderboardTable]] = {
+    **formats(
+        csv=lambda table: sheet_csv(leaderboard_sheet(table)),
+        json=leaderboard_json,
+        parquet=lambda table: sheet_parquet(leaderboard_sheet(table)),
+        latex=leaderboard_latex,
+    ),
     **drawings(interval_chart),
-)
+}
+
+
+def _draw(chart: Chart, *, file_format: str) -> bytes:
+    return chart(file_format=file_format)
+
+
+CHART_FORMATS: dict[str, Format[Chart]] = drawings(_draw)
 
 
 # --- Everything in one zip ---------------------------------------------------------------------
 
 
-def bundle(snapshot: Snapshot) -> bytes:
-    """Everything about a rating in one zip with its manifest.
+def bundle_files(snapshot: Snapshot) -> dict[str, bytes]:
+    """Return everything about a rating by name, with a manifest.
 
     Raises:
         Conflict: The votes are not what they were when they were rated.
     """
-    return zip_bytes(bundle_files(snapshot))
-
-
-def bundle_files(snapshot: Snapshot) -> dict[str, bytes]:
-    """What is in the zip, by name; raises as `bundle`."""
     table, results = leaderboard_table(snapshot), snapshot.results
     votes = vote_table(snapshot)
     files = {
-        f"leaderboard.{chosen.suffix}": chosen.write(table)
-        for chosen in FORMATS.values()
-        if chosen.suffix not in CHART_FORMATS
+        f"leaderboard.{form.suffix}": form.write(table)
+        for name, form in FORMATS.items()
+        if name not in CHART_FORMATS
     }
-    files |= {f"votes.{chosen.suffix}": chosen.write(votes) for chosen in VOTE_FORMATS.values()}
+    files |= {f"votes.{form.suffix}": form.write(votes) for form in VOTE_FORMATS.values()}
     files |= {
-        f"{name}.{form}": chart(file_format=form)
+        f"{name}.{form.suffix}": form.write(chart)
         for name, chart in charts(snapshot).items()
-        for form in CHART_FORMATS
+        for form in CHART_FORMATS.values()
     }
     files["pairs.csv"] = _pairs_csv(results)
     files["types.csv"] = _types_csv(results)
-    files["raters.csv"] = _raters_csv(results)
-    frozen = snapshot.study.preregistration.encode()
-    if frozen:
+    files["raters.csv"] = csv_of(RATERS, results.trust.raters)
+    if frozen := snapshot.study.preregistration.encode():
         files[FILE_NAME] = frozen
     if table.hypotheses:
-        files["hypotheses.csv"] = _hypotheses_csv(table.hypotheses)
-    files["statistics.json"] = _json(_statistics(results))
-    files[MANIFEST] = _json(_manifest(snapshot, table, files))
+        files["hypotheses.csv"] = csv_of(HYPOTHESES, table.hypotheses)
+    files["statistics.json"] = json_bytes(_statistics(results), sort_keys=True)
+    files[MANIFEST] = json_bytes(_manifest(snapshot, table, files), sort_keys=True)
     return files
 
 
+def chart_named(snapshot: Snapshot, *, name: str) -> Chart:
+    """Return a chart of a rating.
+
+    Raises:
+        UnknownName: The rating has no such chart.
+    """
+    known = charts(snapshot)
+    if name not in known:
+        raise UnknownName("chart of this rating", name, list(known))
+    return known[name]
+
+
+CHARTS = ("pairs", "types", "displacement", "elo-usd", "elo-tokens")
+RATING_FILES = {
+    "leaderboard": Export(FORMATS, leaderboard_table, "the newest rating of a study"),
+    "votes": Export(VOTE_FORMATS, vote_table, "the votes of the newest rating, with pseudonyms"),
+    "all": Export(formats(zip=zip_bytes), bundle_files),
+    **{name: Export(CHART_FORMATS, partial(chart_named, name=name)) for name in CHARTS},
+}
+"""What a rating is offered as. PostgreSQL keeps the keys of stored documents in an order of its
+own, so documents are sorted."""
+
+
 # --- Private -----------------------------------------------------------------------------------
-
-
-def _values(table: LeaderboardTable) -> list[list[object]]:
-    return [[column.value_of(table, row) for column in IN_FILES] for row in table.rows]
 
 
 def _standing(table: LeaderboardTable, row: Row) -> dict[str, Any]:
     values = {column.key: column.value_of(table, row) for column in IN_JSON}
     part = {"part": row.part} if table.has_parts else {}
     return {
-        key: round_value(value) if isinstance(value, float) else value
+        key: round(value, 4) if isinstance(value, float) else value
         for key, value in values.items()
     } | part
 
@@ -216,6 +252,21 @@ def _hypothesis_line(answer: Answered) -> str:
     return f"{text}: {answer.verdict} ({', '.join(numbers) or 'unrated'})."
 
 
+def _method(table: LeaderboardTable) -> dict[str, Any]:
+    """Return how the rating was made; older ones had no word for resamples."""
+    rating = table.snapshot
+    method: dict[str, Any] = {
+        "name": rating.method,
+        "text": table.method_text,
+        "resampling_unit": rating.resampling_unit,
+    }
+    if table.is_closed_form:
+        method["intervals"] = rating.intervals
+    if table.covariates:
+        method["covariates"] = table.covariates
+    return method | {"rounds": rating.rounds, "seed": rating.seed}
+
+
 def _manifest(
     snapshot: Snapshot, table: LeaderboardTable, files: dict[str, bytes]
 ) -> dict[str, Any]:
@@ -227,37 +278,29 @@ def _manifest(
         )
     if "authors" in filters:
         filters["authors"] = len(filters["authors"])
+    frozen = {"file": FILE_NAME, "sha256": table.preregistration}
     return {
         "format": "scenario-arena/rating",
         "version": 1,
         "study": table.study,
         "rating": str(snapshot.code),
         "rated_at": snapshot.made_at.isoformat(),
-        "simulated": table.simulated,
+        "simulated": table.is_simulated,
         "early": table.early,
-        "preregistration": {"file": FILE_NAME, "sha256": table.preregistration}
-        if table.preregistration
-        else None,
-        "warnings": list(table.warnings),
-        "method": {
-            "name": table.method,
-            "text": table.method_text,
-            "resampling_unit": table.unit,
-            **table.notes_on_method,
-            "rounds": table.rounds,
-            "seed": table.seed,
-        },
+        "preregistration": frozen if table.preregistration else None,
+        "warnings": table.warnings,
+        "method": _method(table),
         "filters": filters,
         "votes": {
-            "counted": table.votes,
+            "counted": snapshot.votes_counted,
             "left_out": table.left_out,
-            "sha256": table.votes_sha256,
+            "sha256": snapshot.votes_sha256,
             "file": "votes.csv",
         },
-        "versions": dict(sorted(snapshot.versions.items())),
+        "versions": snapshot.versions,
         "files": {
             name: {"sha256": digest_of(content), "bytes": len(content)}
-            for name, content in sorted(files.items())
+            for name, content in files.items()
         },
     }
 
@@ -273,92 +316,54 @@ def _statistics(results: Results) -> dict[str, Any]:
     return document | {"trust": trust, "judges": sorted(results.judges.values())}
 
 
-def _json(document: object) -> bytes:
-    # Sorted, because PostgreSQL keeps the keys of stored documents in an order of its own.
-    text = json.dumps(document, indent=2, ensure_ascii=False, sort_keys=True)
-    return (text + "\n").encode()
-
-
-def _csv(head: Sequence[str], rows: Iterable[Sequence[object]]) -> bytes:
-    return csv_text(head, rows).encode()
-
-
 def _pairs_csv(results: Results) -> bytes:
-    head = ("a", "b", "wins", "ties", "losses", "both_miss", "planned")
-    more: tuple[str, ...] = ()
-    if results.board.p_values is not None:
-        more = ("difference", "lower", "upper", "p")
+    """Return each pair, with its adjusted p value where the table has them."""
+    names = ("a", "b", "wins", "ties", "losses", "both_miss", "planned")
+    more = {"difference": "difference", "lower": "lower", "upper": "upper", "p_adjusted": "p"}
+    if results.board.p_values is None:
+        more = {}
     judged = {(value.a, value.b): value for value in results.board.p_values or ()}
     rows = (
         [
-            *(getattr(pair, name) for name in head),
-            *(getattr(judged.get((pair.a, pair.b)), name, None) for name in more),
+            *attrgetter(*names)(pair),
+            *(getattr(judged.get((pair.a, pair.b)), name, None) for name in more.values()),
         ]
         for pair in results.pairs
     )
-    return _csv([*head, *("p_adjusted" if name == "p" else name for name in more)], rows)
+    return csv_text([*names, *more], rows).encode()
 
 
 def _types_csv(results: Results) -> bytes:
     head = ("type", "contestant", "rank", "elo", "lower", "upper", "votes", "too_few", "note")
-    keys = ("slug", "rank", "rating", "lower", "upper", "votes", "few", "note")
-    lines = [(part.type, line) for part in results.types for line in part.lines]
-    return _csv(head, ([name, *(getattr(line, key) for key in keys)] for name, line in lines))
+    read = attrgetter("slug", "rank", "rating", "lower", "upper", "votes", "few", "note")
+    rows = ((part.type, *read(line)) for part in results.types for line in part.lines)
+    return csv_text(head, rows).encode()
 
 
-def _raters_csv(results: Results) -> bytes:
-    head = (
-        "judge",
-        "votes",
-        "median_ms",
-        "under_1_s",
-        "ties",
-        "left",
-        "agreement",
-        "shared",
-        "favourites",
-        "decided",
-        "repeats",
-        "repeats_same",
-        "checks",
-        "checks_passed",
-        "moves",
-        "checks_skipped",
-        "aids",
-    )
-    rows = (
-        [
-            line.name,
-            line.votes,
-            line.median_ms,
-            line.fast,
-            line.ties,
-            line.left.value,
-            line.agreement.value,
-            line.shared,
-            line.favourites.value,
-            line.decided,
-            *line.repeats,
-            *line.checks,
-            line.moves,
-            line.checks_skipped,
-            " ".join(f"{name}={number}" for name, number in line.aids),
-        ]
-        for line in results.trust.raters
-    )
-    return _csv(head, rows)
-
-
-def _hypotheses_csv(answers: Sequence[Answered]) -> bytes:
-    head = ("hypothesis", "better", "other", "verdict", "difference", "p_adjusted")
-    rows = (
-        [
-            answer.hypothesis.text,
-            *(answer.hypothesis.above or ("", "")),
-            answer.verdict or "",
-            answer.difference,
-            answer.p,
-        ]
-        for answer in answers
-    )
-    return _csv(head, rows)
+RATERS: dict[str, Value] = {
+    "judge": "name",
+    "votes": "votes",
+    "median_ms": "median_ms",
+    "under_1_s": "fast",
+    "ties": "ties",
+    "left": "left.value",
+    "agreement": "agreement.value",
+    "shared": "shared",
+    "favourites": "favourites.value",
+    "decided": "decided",
+    "repeats": lambda line: line.repeats[0],
+    "repeats_same": lambda line: line.repeats[1],
+    "checks": lambda line: line.checks[0],
+    "checks_passed": lambda line: line.checks[1],
+    "moves": "moves",
+    "checks_skipped": "checks_skipped",
+    "aids": lambda line: " ".join(f"{name}={number}" for name, number in line.aids),
+}
+HYPOTHESES: dict[str, Value] = {
+    "hypothesis": "hypothesis.text",
+    "better": lambda answer: (answer.hypothesis.above or ("", ""))[0],
+    "other": lambda answer: (answer.hypothesis.above or ("", ""))[1],
+    "verdict": "verdict",
+    "difference": "difference",
+    "p_adjusted": "p",
+}

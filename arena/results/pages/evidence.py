@@ -11,8 +11,7 @@ from django.shortcuts import get_object_or_404, render
 from django.utils.text import slugify
 from django.views.decorators.http import require_safe
 
-from arena.models import ImportedVote, Matchup, Snapshot, Study
-from arena.models.votes import AID_LABELS
+from arena.models import Matchup, Snapshot, Study
 from arena.people.queries import natural_order
 from arena.results.exports.tables import shown_name
 from arena.results.exports.votes import vote_list_csv
@@ -39,14 +38,9 @@ class VoteSearchForm(forms.Form):
         label="Scenario type", required=False, choices=lambda: [_ALL, *type_choices()]
     )
     scenario = forms.CharField(label="Scenario", required=False, max_length=200)
-    sample = forms.IntegerField(label="Sample", required=False, min_value=1)
     expert = forms.ChoiceField(label="Expert", required=False)
     mark = forms.ChoiceField(label="Counts", required=False, choices=[*MARKS.items()])
     part = forms.ChoiceField(label="Only", required=False, choices=[_ALL, *PARTS.items()])
-    aid = forms.ChoiceField(
-        label="Looked with", required=False, choices=[_ALL, *AID_LABELS.items()]
-    )
-    comment = forms.CharField(label="Words in the comment", required=False, max_length=200)
     order = forms.ChoiceField(
         label="Begin with", required=False, choices=[("", "First votes"), *ORDERS.items()]
     )
@@ -55,47 +49,14 @@ class VoteSearchForm(forms.Form):
         """Offer what the rating has."""
         data = {name: query.get(name, "") for name in self.base_fields}
         super().__init__(data | {"mark": data["mark"] or COUNTED})
-        self._study = snapshot.study
         lines = snapshot.standings.order_by("name")
         shown = [(line.slug, shown_name(line.name, line.is_simulated)) for line in lines]
         fields: dict[str, Any] = self.fields
         fields["contestant"].choices = fields["opponent"].choices = [_ALL, *shown]
         fields["expert"].choices = [_ALL, *_experts(snapshot)]
-        if not self._study.shows_all_samples:
-            del fields["sample"]
-        if is_imported(self._study):
-            for name in ("type", "part", "aid", "comment", "order"):
+        if is_imported(snapshot.study):
+            for name in ("type", "part", "order"):
                 del fields[name]
-
-    def clean_scenario(self) -> str:
-        """A scenario that occurs, be it in attention checks alone."""
-        slug: str = self.cleaned_data["scenario"].strip()
-        study = self._study
-        occurs = not slug or (
-            ImportedVote.objects.filter(file__study=study, item=slug).exists()
-            if is_imported(study)
-            else study.matchups.filter(scenario__slug=slug).exists()
-            or study.scenarios.filter(slug=slug).exists()
-        )
-        if not occurs:
-            raise forms.ValidationError(
-                "There is no scenario “%(name)s” in this study.", params={"name": slug}
-            )
-        return slug
-
-    def clean_sample(self) -> str:
-        """As an address has it."""
-        return str(self.cleaned_data["sample"] or "")
-
-    def clean(self) -> dict[str, Any]:
-        """Refuse what says nothing."""
-        cleaned: dict[str, Any] = super().clean() or {}
-        contestant, outcome = cleaned.get("contestant"), cleaned.get("outcome")
-        if contestant and contestant == cleaned.get("opponent"):
-            self.add_error("opponent", "Choose somebody else: nobody meets themselves.")
-        if outcome in ("won", "lost") and not contestant:
-            self.add_error("outcome", "Choose the contestant who won or lost.")
-        return cleaned
 
     def search(self) -> VoteSearch:
         """What is looked for; everything that counts where the form is not valid."""

@@ -1,10 +1,7 @@
 """The results of a study: its tabs, its files, a new rating, and opening them early."""
 
 import uuid
-from typing import cast
 
-from django.contrib import messages
-from django.contrib.auth.models import User
 from django.core.exceptions import PermissionDenied
 from django.http import Http404, HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, redirect, render
@@ -12,18 +9,15 @@ from django.utils.text import slugify
 from django.views.decorators.http import require_POST, require_safe
 
 from arena import tasks
-from arena.errors import ArenaError, NoSnapshot
-from arena.exports.files import CONTENT_TYPE, ZIP
-from arena.exports.formats import format_named
+from arena.errors import NoSnapshot
+from arena.exports.formats import download
 from arena.models import Snapshot, Study
 from arena.people.queries import role_of
-from arena.results.exports.charts import CONTENT_TYPES, chart_bytes
 from arena.results.exports.tables import EARLY_LOOK, for_experts, leaderboard_table
-from arena.results.exports.votes import VOTE_FORMATS, unrated_votes, vote_table
-from arena.results.exports.writers import FORMATS, bundle
+from arena.results.exports.votes import VOTE_FORMATS, unrated_votes
+from arena.results.exports.writers import CHART_FORMATS, RATING_FILES
 from arena.results.pages.rating_form import RatingForm, rate_or_send
-from arena.results.pages.tabs import TABS, show_adjustment
-from arena.results.queries.access import STAFF as STAFF_ROLES
+from arena.results.pages.tabs import FOR_EXPERTS, TABS, show_adjustment
 from arena.results.queries.access import (
     ResultsAccess,
     results_access,
@@ -33,10 +27,13 @@ from arena.results.queries.access import (
 )
 from arena.results.queries.evidence import count_settled
 from arena.results.queries.votes import is_imported
+from arena.results.services.rating_request import RatingRequest
 from arena.results.services.ratings import open_early
-from arena.site.access import ADMIN, ANALYST, EXPERT, STAFF, allow_only
+from arena.site.access import ADMIN, ANALYST, EXPERT, STAFF, allow_only, user_of
+from arena.site.acts import refusals_told, tell_errors
 from arena.studies.pages.studies import export_place
-from augment.errors import AugmentError, Conflict, UnknownName
+from augment.errors import UnknownName
+from augment.services.inputs import read_request
 
 SHOWN = 12
 """So many ratings can be chosen on the page; the log lists all."""
@@ -47,18 +44,17 @@ SHOWN = 12
 def results_page(request: HttpRequest, code: uuid.UUID, tab: str = "table") -> HttpResponse:
     """One tab of a rating; of an open study only for staff who opened its results."""
     study = get_object_or_404(Study.objects.select_related("vote_file"), code=code)
-    user = cast(User, request.user)
-    role = role_of(user)
-    access = results_access(user=user, study=study, role=role)
+    user = user_of(request)
+    access = results_access(user=user, study=study)
     if access is ResultsAccess.NONE:
         raise PermissionDenied
     if access is ResultsAccess.EARLY:
         context = {"study": study, "is_expert": votes_in(user, study)}
         return render(request, "results/gate.html", context)
-    is_staff = role in STAFF_ROLES
+    is_staff = role_of(user) in STAFF
     if tab not in TABS:
         raise Http404
-    if TABS[tab].staff and not is_staff:
+    if tab not in FOR_EXPERTS and not is_staff:
         raise PermissionDenied
     ratings = list(snapshots_of(study).defer("results")[:SHOWN])
     snapshot = _chosen(request, study, ratings)
@@ -68,8 +64,9 @@ def results_page(request: HttpRequest, code: uuid.UUID, tab: str = "table") -> H
         "snapshot": snapshot,
         "ratings": ratings,
         "under_way": [rating for rating in ratings if rating.state != Snapshot.State.READY],
-        "tab": TABS[tab],
-        "tabs": [known for known in TABS.values() if is_staff or not known.staff],
+        "tab": tab,
+        "tab_template": f"results/{tab}.html",
+        "tabs": TABS if is_staff else FOR_EXPERTS,
         "is_staff": is_staff,
         "query": f"?rating={snapshot.code}" if snapshot and request.GET.get("rating") else "",
     }
@@ -78,19 +75,24 @@ def results_page(request: HttpRequest, code: uuid.UUID, tab: str = "table") -> H
         # Votes from a file have no page of a study, where the files are otherwise.
         context["export"] = export_place(study, user) if is_imported(study) else None
     if snapshot is not None:
-        table = leaderboard_table(snapshot)
-        if not is_staff:
-            table = for_experts(table)
-        settled = count_settled(snapshot)
-        context |= {
-            "table": table,
-            "early_look": EARLY_LOOK,
-            "settled": settled,
-            "cast": snapshot.votes_counted - settled,
-            "adjusted": show_adjustment(snapshot),
-            **TABS[tab].fill(snapshot, table),
-        }
+        context |= _of_rating(snapshot, tab, is_staff=is_staff)
     return render(request, "results/page.html", context)
+
+
+def _of_rating(snapshot: Snapshot, tab: str, *, is_staff: bool) -> dict[str, object]:
+    """Return what the page shows of a rating."""
+    table = leaderboard_table(snapshot)
+    if not is_staff:
+        table = for_experts(table)
+    settled = count_settled(snapshot)
+    return {
+        "table": table,
+        "early_look": EARLY_LOOK,
+        "settled": settled,
+        "cast": snapshot.votes_counted - settled,
+        "adjusted": show_adjustment(snapshot),
+        **TABS[tab](snapshot, table),
+    }
 
 
 @allow_only(*STAFF)
@@ -100,16 +102,12 @@ def rate_study(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     study = get_readable_study(request, code)
     form = RatingForm(request.POST)
     if not form.is_valid():
-        for faults in form.errors.values():
-            messages.error(request, " ".join(str(fault) for fault in faults))
+        tell_errors(request, form)
         return redirect("results", code=code)
-    choices = form.choices()
-    choices["early"] = study.state == Study.State.OPEN
-    choices["actor"] = cast(User, request.user)
-    try:
+    with refusals_told(request):
+        choices = read_request(RatingRequest, form.cleaned_data).choices()
+        choices |= {"early": study.state == Study.State.OPEN, "actor": user_of(request)}
         rate_or_send(request, study, **choices)
-    except (ArenaError, AugmentError) as error:
-        messages.error(request, str(error))
     return redirect("results", code=code)
 
 
@@ -120,10 +118,8 @@ def compute_again(request: HttpRequest, code: uuid.UUID, rating: uuid.UUID) -> H
     study = get_readable_study(request, code)
     snapshot = get_object_or_404(Snapshot, study=study, code=rating)
     snapshot.wait_again(progress=0)
-    try:
+    with refusals_told(request):
         tasks.send_snapshot(snapshot.pk)
-    except AugmentError as error:
-        messages.error(request, str(error))
     return redirect("results", code=code)
 
 
@@ -132,67 +128,36 @@ def compute_again(request: HttpRequest, code: uuid.UUID, rating: uuid.UUID) -> H
 def open_results_early(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """The explicit, logged act; who votes in the study votes no longer."""
     study = get_object_or_404(Study, code=code)
-    try:
-        open_early(study=study, actor=cast(User, request.user))
-    except AugmentError as error:
-        messages.error(request, str(error))
+    with refusals_told(request):
+        open_early(study=study, actor=user_of(request))
     return redirect("results", code=code)
-
-
-# --- Files -------------------------------------------------------------------------------------
-
-
-@allow_only(*STAFF)
-@require_safe
-def export(request: HttpRequest, code: uuid.UUID, form: str) -> HttpResponse:
-    """The rating that the address names, else the newest, as a file or as all of them in a zip."""
-    study = get_readable_study(request, code)
-    snapshot = get_snapshot(request, study)
-    if form == ZIP:
-        try:
-            return _file(study, bundle(snapshot), CONTENT_TYPE, "rating.zip")
-        except Conflict as error:
-            messages.error(request, str(error))
-            return redirect("results", code=code)
-    try:
-        chosen = format_named(FORMATS, form)
-    except UnknownName as error:
-        raise Http404 from error
-    content = chosen.write(leaderboard_table(snapshot))
-    return _file(study, content, chosen.content_type, f"leaderboard.{chosen.suffix}")
 
 
 @allow_only(ADMIN, ANALYST, EXPERT)
 @require_safe
-def export_chart(request: HttpRequest, code: uuid.UUID, name: str, form: str) -> HttpResponse:
-    """A chart of a rating for whoever may read it: a picture of its page, or a file."""
-    study = get_readable_study(request, code)
-    snapshot = get_snapshot(request, study)
-    try:
-        content = chart_bytes(snapshot, name=name, file_format=form)
-    except UnknownName as error:
-        raise Http404 from error
-    return _file(study, content, CONTENT_TYPES[form], f"{name}.{form}")
+def rating_file(request: HttpRequest, code: uuid.UUID, name: str, form: str) -> HttpResponse:
+    """A file of the rating that the address names, else of the newest.
 
-
-@allow_only(*STAFF)
-@require_safe
-def export_votes(request: HttpRequest, code: uuid.UUID, form: str) -> HttpResponse:
-    """The votes of a rating, with pseudonyms; of a cancelled study, which has none, all votes."""
+    Experts who may read the results get its charts, which are pictures of their page; of a
+    cancelled study, which has no rating, staff get the votes.
+    """
     study = get_object_or_404(Study.objects.select_related("vote_file"), code=code)
-    is_cancelled = study.state == Study.State.CANCELLED
-    if not is_cancelled:
-        study = get_readable_study(request, code)
-    try:
-        chosen = format_named(VOTE_FORMATS, form)
-        rows = unrated_votes(study) if is_cancelled else vote_table(get_snapshot(request, study))
-    except UnknownName as error:
-        raise Http404 from error
-    except Conflict as error:
-        messages.error(request, str(error))
-        return redirect("results", code=code)
-    content = chosen.write(rows)
-    return _file(study, content, chosen.content_type, f"votes.{chosen.suffix}")
+    is_staff = role_of(request.user) in STAFF
+    if form not in CHART_FORMATS and not is_staff:
+        raise PermissionDenied
+    stem = f"{slugify(study.name) or 'study'}-{'rating' if name == 'all' else name}"
+    if study.state == Study.State.CANCELLED and name == "votes":
+        return download(VOTE_FORMATS, form, stem, unrated_votes(study))
+    snapshot = get_snapshot(request, get_readable_study(request, code))
+    if name not in RATING_FILES or form not in RATING_FILES[name].formats:
+        raise Http404
+    with refusals_told(request):
+        try:
+            made = RATING_FILES[name].make(snapshot)
+        except UnknownName as error:
+            raise Http404 from error
+        return download(RATING_FILES[name].formats, form, stem, made)
+    return redirect("results", code=code)
 
 
 # --- What other pages of a rating share --------------------------------------------------------
@@ -205,7 +170,7 @@ def get_readable_study(request: HttpRequest, code: uuid.UUID) -> Study:
         PermissionDenied: They may not, or not without opening them early first.
     """
     study = get_object_or_404(Study.objects.select_related("vote_file"), code=code)
-    if results_access(user=cast(User, request.user), study=study) is not ResultsAccess.FULL:
+    if results_access(user=user_of(request), study=study) is not ResultsAccess.FULL:
         raise PermissionDenied
     return study
 
@@ -238,10 +203,3 @@ def _chosen(request: HttpRequest, study: Study, ratings: list[Snapshot]) -> Snap
         return None
     rows = Snapshot.objects.select_related("study", "made_by__person")
     return get_object_or_404(rows, study=study, code=code, state=Snapshot.State.READY)
-
-
-def _file(study: Study, content: bytes, content_type: str, name: str) -> HttpResponse:
-    disposition = f'attachment; filename="{slugify(study.name) or "study"}-{name}"'
-    return HttpResponse(
-        content, content_type=content_type, headers={"Content-Disposition": disposition}
-    )

@@ -1,24 +1,26 @@
-"""The tabs of the results page, each made of a snapshot and its table."""
+"""The tabs of the results page: each makes what its template needs of a snapshot and its table."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
-from arena.jobs.pages.measures import driving
+from arena.jobs.exports.driving import DrivingTable, shown_driving
+from arena.jobs.queries import shown_augmentations
 from arena.models import Snapshot
-from arena.models.votes import AIDS
 from arena.people.queries import natural_order
-from arena.rating.snapshot_document import PairRecord, PanelRater, TypeStanding
-from arena.results.exports.charts import FEW, heat_map
-from arena.results.exports.plots import plots
+from arena.rating.snapshot_document import PairRecord, PanelRater
+from arena.results.exports.charts import scatters_of
 from arena.results.exports.tables import ON_PAGE, LeaderboardTable, Row
 from arena.results.queries.access import log_of, names_in_log, snapshots_of
 from arena.results.queries.votes import AUTOMATIC, Filters
-from augment.models import EndpointModel
+from augment.models import EndpointModel, Simulation
+from augment.services.judging.driving_scores import scores_of_augmentations
+from augment.services.judging.simulations import SCORES, Options
 
 Context = dict[str, Any]
-"""What a tab's template needs."""
 
+FEW = 30
+"""Fewer votes are too few to read much from."""
 LOG_LINES = 200
 
 COVARIATE_LABELS = {
@@ -27,42 +29,8 @@ COVARIATE_LABELS = {
     "vehicles": "the number of vehicles",
 }
 
-_MONEY, _TOKENS = "USD per scenario.", "tokens per scenario, in and out."
-_ELO, _METRES = "Elo with its 95 % interval", "median displacement in metres, less is better"
-_CHARTS = {
-    "elo-usd": ("Elo against money", f"Up: {_ELO}. Across: {_MONEY}"),
-    "elo-tokens": ("Elo against tokens", f"Up: {_ELO}. Across: {_TOKENS}"),
-    "displacement-usd": ("Displacement against money", f"Up: {_METRES}. Across: {_MONEY}"),
-    "displacement-tokens": ("Displacement against tokens", f"Up: {_METRES}. Across: {_TOKENS}"),
-}
-"""Title and legend of each; all have a logarithmic axis across."""
 
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Tab:
-    """A tab of the page.
-
-    Attributes:
-        staff: Whether only analysts and admins see it.
-        fill: Makes what its template needs.
-    """
-
-    name: str
-    staff: bool
-    fill: Callable[[Snapshot, LeaderboardTable], Context]
-
-    @property
-    def label(self) -> str:
-        """What it is called on the page."""
-        return self.name.capitalize()
-
-    @property
-    def template(self) -> str:
-        """Where it is written."""
-        return f"results/{self.name}.html"
-
-
-def standings(snapshot: Snapshot, table: LeaderboardTable) -> Context:
+def fill_table(snapshot: Snapshot, table: LeaderboardTable) -> Context:
     """The table with its intervals, and the lines that say how far it can be trusted."""
     trust = snapshot.results.trust
     moves = [line.moves for line in trust.raters if line.moves is not None]
@@ -76,27 +44,23 @@ def standings(snapshot: Snapshot, table: LeaderboardTable) -> Context:
     }
 
 
-def pairs(snapshot: Snapshot, table: LeaderboardTable) -> Context:
-    """The heat map and every pair as a line."""
+def fill_pairs(snapshot: Snapshot, table: LeaderboardTable) -> Context:
+    """Every pair as a line, from the view of the one that stands higher."""
     board = snapshot.results.board
     place = {row.slug: n for n, row in enumerate(table.rows)}
     apart = None if board.above is None else {frozenset(pair) for pair in board.above}
     p_values = {frozenset((value.a, value.b)): value.p for value in board.p_values or ()}
 
     def line_of(pair: PairRecord) -> Context:
-        """A pair from the view of the one that stands higher."""
-        first, second, wins, losses = pair.a, pair.b, pair.wins, pair.losses
-        if place[second] < place[first]:
-            first, second, wins, losses = second, first, losses, wins
-        both = frozenset((first, second))
-        return {
-            "a": table.rows[place[first]],
-            "b": table.rows[place[second]],
-            "wins": wins,
-            "ties": pair.ties,
-            "losses": losses,
-            "both_miss": pair.both_miss,
-            "votes": pair.votes,
+        higher, lower = sorted((pair.a, pair.b), key=place.__getitem__)
+        counts = {"wins": pair.wins, "losses": pair.losses}
+        if higher != pair.a:
+            counts = {"wins": pair.losses, "losses": pair.wins}
+        both = frozenset((higher, lower))
+        return counts | {
+            "a": table.rows[place[higher]],
+            "b": table.rows[place[lower]],
+            "kept": pair,
             "p": p_values.get(both),
             "apart": None if apart is None else both in apart,
         }
@@ -104,21 +68,29 @@ def pairs(snapshot: Snapshot, table: LeaderboardTable) -> Context:
     lines = [line_of(pair) for pair in snapshot.results.pairs]
     lines.sort(key=lambda line: (place[line["a"].slug], place[line["b"].slug]))
     return {
-        "heat": heat_map(snapshot.results.pairs, table.rows),
         "lines": lines,
-        "few": FEW,
-        "any_few": any(0 < line["votes"] < FEW for line in lines),
+        "has_plan": any(pair.planned is not None for pair in snapshot.results.pairs),
         "has_p_values": bool(p_values),
         "told_apart": None if apart is None else len(apart),
     }
 
 
-def types(snapshot: Snapshot, table: LeaderboardTable) -> Context:
+def fill_types(snapshot: Snapshot, table: LeaderboardTable) -> Context:
     """One chart of all scenario types, and a table each."""
-    whole = _by_slug(table)
+    whole, names = _by_slug(table), ("rank", "rating", "lower", "upper", "votes")
     parts: list[Context] = []
     for part in snapshot.results.types:
-        rows = [_row_of_type(line, whole[line.slug]) for line in part.lines if line.votes]
+        rows = [
+            replace(
+                whole[line.slug],
+                rank_best=None,
+                rank_worst=None,
+                note=line.note or "",
+                **{name: getattr(line, name) for name in names},
+            )
+            for line in part.lines
+            if line.votes
+        ]
         if not snapshot.results.board.order:  # of an earlier version
             rows.sort(key=lambda row: (row.rating is None, -(row.rating or 0.0), row.slug))
         reasons = (part.status,) if part.reasons is None else part.reasons
@@ -130,38 +102,35 @@ def types(snapshot: Snapshot, table: LeaderboardTable) -> Context:
     }
 
 
-def raters(snapshot: Snapshot, table: LeaderboardTable) -> Context:
+def fill_raters(snapshot: Snapshot, table: LeaderboardTable) -> Context:
     """Agreement, repeats, sides, and the panel of experts."""
     trust = snapshot.results.trust
     lines = [line for line in trust.raters if line.judge != AUTOMATIC]
-    used = {name for line in lines for name, _ in line.aids}
-    aids = [name for name in AIDS if name in used]
     authors = {judge for judge, _ in Filters.of_document(snapshot.filters).authors}
     return {
         "trust": trust,
         "all_tied": trust.tie_share == 1.0,
         "panel": [
-            {"rater": line, "is_author": line.judge in authors, **_counts(line, aids)}
+            {"rater": line, "is_author": line.judge in authors, **_counts(line)}
             for line in sorted(lines, key=lambda line: natural_order(line.name))
         ],
-        "aids": aids,
         "automatic": sum(line.votes for line in trust.raters if line.judge == AUTOMATIC),
         "automatic_judge": AUTOMATIC,
     }
 
 
-def coverage(snapshot: Snapshot, table: LeaderboardTable) -> Context:
-    """Votes against the plan, and widths against votes."""
-    plot = plots(snapshot, table).get("width")
-    points = plot.points if plot else ()
+def _counts(rater: PanelRater) -> Context:
+    """How many votes the shares of an expert stand for; of the favourites only where all do."""
+    ties, left = round(rater.ties * rater.votes), rater.left.value
+    decided = rater.votes - ties
     return {
-        "points": [(point, table.rows[point.number - 1]) for point in points],
-        "heat": heat_map(snapshot.results.pairs, table.rows),
-        "planned": sum(pair.planned or 0 for pair in snapshot.results.pairs),
+        "ties": ties,
+        "left": None if left is None else round(left * decided),
+        "all_foreseen": rater.decided == decided,
     }
 
 
-def displacement(snapshot: Snapshot, table: LeaderboardTable) -> Context:
+def fill_displacement(snapshot: Snapshot, table: LeaderboardTable) -> Context:
     """Elo against the distance from the references."""
     metres = {line.slug: line for line in snapshot.results.displacement}
     lines = [
@@ -169,15 +138,31 @@ def displacement(snapshot: Snapshot, table: LeaderboardTable) -> Context:
         for n, row in enumerate(table.rows, start=1)
         if row.slug in metres
     ]
-    return {"lines": lines, "has_chart": "displacement" in plots(snapshot, table)}
+    return {"lines": lines, "has_chart": "displacement" in scatters_of(snapshot, table)}
 
 
-def cost(snapshot: Snapshot, table: LeaderboardTable) -> Context:
-    """Elo and displacement against money and tokens, by class of model."""
+def fill_driving(snapshot: Snapshot, table: LeaderboardTable) -> Context:
+    """The drives of the augmentations that the study shows."""
+    if not Simulation.objects.exists():
+        return {"drivings": []}
+    ids = shown_augmentations(snapshot.study)
+    found = [
+        DrivingTable(
+            title=snapshot.study.name,
+            scores=scores_of_augmentations(ids, options=Options(), score=score),
+        )
+        for score in SCORES
+    ]
+    return {"drivings": [shown_driving(one) for one in found if one.lines]}
+
+
+def fill_cost(snapshot: Snapshot, table: LeaderboardTable) -> Context:
+    """Elo against money and tokens, by class of model."""
     spent = {line.slug: line for line in snapshot.results.cost}
     metres = {line.slug: line.median_m for line in snapshot.results.displacement}
     labels = {value: str(label) for value, label in EndpointModel.ModelClass.choices}
-    drawn = plots(snapshot, table)
+    titles = {"elo-usd": "Elo against money", "elo-tokens": "Elo against tokens"}
+    drawn = scatters_of(snapshot, table)
     return {
         "lines": [
             {
@@ -190,15 +175,11 @@ def cost(snapshot: Snapshot, table: LeaderboardTable) -> Context:
             for n, row in enumerate(table.rows, start=1)
             if row.slug in spent
         ],
-        "charts": [
-            {"name": name, "title": title, "legend": legend}
-            for name, (title, legend) in _CHARTS.items()
-            if name in drawn
-        ],
+        "charts": [(name, title) for name, title in titles.items() if name in drawn],
     }
 
 
-def log(snapshot: Snapshot, table: LeaderboardTable) -> Context:
+def fill_log(snapshot: Snapshot, table: LeaderboardTable) -> Context:
     """What was done to the study, and every rating of it."""
     study = snapshot.study
     return {
@@ -209,30 +190,27 @@ def log(snapshot: Snapshot, table: LeaderboardTable) -> Context:
     }
 
 
-TABS = {
-    tab.name: tab
-    for tab in (
-        Tab(name="table", staff=False, fill=standings),
-        Tab(name="pairs", staff=False, fill=pairs),
-        Tab(name="types", staff=False, fill=types),
-        Tab(name="raters", staff=True, fill=raters),
-        Tab(name="coverage", staff=True, fill=coverage),
-        Tab(name="displacement", staff=True, fill=displacement),
-        Tab(name="driving", staff=True, fill=driving),
-        Tab(name="cost", staff=True, fill=cost),
-        Tab(name="log", staff=True, fill=log),
-    )
+TABS: dict[str, Callable[[Snapshot, LeaderboardTable], Context]] = {
+    "table": fill_table,
+    "pairs": fill_pairs,
+    "types": fill_types,
+    "raters": fill_raters,
+    "displacement": fill_displacement,
+    "driving": fill_driving,
+    "cost": fill_cost,
+    "log": fill_log,
 }
+FOR_EXPERTS = ("table", "pairs", "types")
+"""The tabs that not only analysts and admins see."""
 
 
 def show_adjustment(snapshot: Snapshot) -> list[Context] | None:
     """What the covariates are worth; None where nothing was to be adjusted for."""
-    kept = snapshot.results.adjustment
+    kept, labels = snapshot.results.adjustment, COVARIATE_LABELS
     if kept is None:
         return None
     return [
-        {"label": COVARIATE_LABELS.get(effect.name, effect.name), "kept": effect}
-        for effect in kept.effects
+        {"label": labels.get(effect.name, effect.name), "kept": effect} for effect in kept.effects
     ]
 
 
@@ -241,31 +219,3 @@ def show_adjustment(snapshot: Snapshot) -> list[Context] | None:
 
 def _by_slug(table: LeaderboardTable) -> Mapping[str, Row]:
     return {row.slug: row for row in table.rows}
-
-
-def _row_of_type(line: TypeStanding, row: Row) -> Row:
-    """A contestant's row among the votes of one type."""
-    return replace(
-        row,
-        rank=line.rank,
-        rank_best=None,
-        rank_worst=None,
-        rating=line.rating,
-        lower=line.lower,
-        upper=line.upper,
-        votes=line.votes,
-        note=line.note or "",
-    )
-
-
-def _counts(rater: PanelRater, aids: list[str]) -> Context:
-    """How many votes the shares of an expert stand for; of the favourites only where all do."""
-    ties = round(rater.ties * rater.votes)
-    decided = rater.votes - ties
-    left, used = rater.left.value, dict(rater.aids)
-    return {
-        "aids": [(name, used.get(name, 0)) for name in aids],
-        "ties": ties,
-        "left": None if left is None else round(left * decided),
-        "all_foreseen": rater.decided == decided,
-    }

@@ -75,27 +75,21 @@ class VoteSearch:
     Attributes:
         contestant, opponent: Slugs of who was shown.
         scenario: A slug, and `type` the type of scenarios.
-        sample: Its number, in a study that shows every sample on its own.
         expert: The code of a judge.
         outcome: Of OUTCOMES; won, tied and lost are seen from the contestant.
         part: Of PARTS: what a number of the results stands for.
         mark: Of MARKS.
-        comment: Words in the expert's comment.
-        aid: What the expert looked with.
         order: Of ORDERS: what comes first; empty is the order in which the votes were given.
     """
 
     contestant: str = ""
     opponent: str = ""
     scenario: str = ""
-    sample: str = ""
     type: str = ""
     expert: str = ""
     outcome: str = ""
     part: str = ""
     mark: str = COUNTED
-    comment: str = ""
-    aid: str = ""
     order: str = ""
 
     def as_query(self) -> dict[str, str]:
@@ -116,13 +110,7 @@ def find_votes(snapshot: Snapshot, search: VoteSearch) -> QuerySet[Vote]:
         return rows.none()
     if search.expert:
         rows = rows.filter(expert__in=users_of([search.expert]).values())
-    words = {
-        "matchup__scenario__slug": search.scenario,
-        "matchup__right__sample": search.sample,  # both sides show the same one
-        "matchup__scenario__type": search.type,
-        "comment__icontains": search.comment,
-        "aids__contains": search.aid,  # no aid's name is part of another's
-    }
+    words = {"matchup__scenario__slug": search.scenario, "matchup__scenario__type": search.type}
     rows = rows.filter(**{path: word for path, word in words.items() if word})
     if search.outcome == "both_miss":
         rows = rows.filter(both_miss=True)
@@ -139,7 +127,7 @@ def find_lines(snapshot: Snapshot, search: VoteSearch) -> QuerySet[ImportedVote]
     filters = Filters.of_document(snapshot.filters)
     lines = marked_lines(snapshot.study, filters, snapshot.last_vote)
     rows: QuerySet[ImportedVote] = _by_mark(lines, search.mark)
-    if search.type or search.part or search.comment:
+    if search.type or search.part:
         return rows.none()
     words = {"judge": search.expert, "item": search.scenario}
     rows = rows.filter(**{name: word for name, word in words.items() if word})
@@ -148,7 +136,7 @@ def find_lines(snapshot: Snapshot, search: VoteSearch) -> QuerySet[ImportedVote]
 
 def is_found(tie: Judged, search: VoteSearch) -> bool:
     """Whether a tie on a pair that nobody can tell apart is looked for."""
-    if search.comment or search.part or search.aid or search.sample:
+    if search.part:
         return False
     marks = {EVERY: True, LEFT_OUT: tie.mark not in (COUNTED, AUTOMATIC_TIE)}
     return (

@@ -14,7 +14,6 @@ from uuid import UUID
 
 from django.apps import apps
 from django.core.exceptions import ObjectDoesNotExist, ValidationError
-from django.core.management.color import no_style
 from django.db import connection, models, transaction
 from django.db.migrations.loader import MigrationLoader
 from django.db.models import QuerySet
@@ -78,12 +77,6 @@ def frozen_rows() -> Iterator[None]:
         yield
 
 
-def read_rows(model: type[models.Model]) -> Iterator[bytes]:
-    """Each row as a line: its column values in the order of `columns_of`."""
-    for row in read_values(model._base_manager.all()):
-        yield as_line(row)
-
-
 def read_values(found: QuerySet[Any]) -> Iterator[list[Any]]:
     """Each row as plain values, in the order of `columns_of` and of their keys."""
     columns = columns_of(found.model)
@@ -105,7 +98,7 @@ def columns_of(model: type[models.Model]) -> list[models.Field[Any, Any]]:
 def write_rows(
     model: type[models.Model], lines: Iterable[bytes], *, check: Callable[[models.Model], None]
 ) -> int:
-    """Store what `read_rows` gave, keys and times included; returns how many.
+    """Store lines of `as_line`, keys and times included; returns how many.
 
     Args:
         model: Of which table.
@@ -117,15 +110,21 @@ def write_rows(
     """
     columns = columns_of(model)
     largest = max(1, connection.ops.bulk_batch_size(columns, [None] * AT_ONCE))
-    number = 0
     waiting = enumerate(lines, start=1)
+    number = 0
     while batch := list(islice(waiting, min(AT_ONCE, largest))):
-        rows = [_checked_row(model, columns, line, check, place) for place, line in batch]
+        rows = []
+        for number, line in batch:
+            try:
+                values = json.loads(line, parse_constant=_refuse_constant)
+                rows.append(_row(model, columns, values))
+                check(rows[-1])
+            except (*REFUSALS, ObjectDoesNotExist, RecursionError) as error:
+                raise ValueError(f"line {number}: {_sentence(error)}") from error
         # Raw: times that are set when a row is made stay those of the backup.
         model._base_manager.all()._insert(  # type: ignore[attr-defined]
             rows, fields=columns, using=connection.alias, raw=True
         )
-        number += len(rows)
     return number
 
 
@@ -141,32 +140,7 @@ def find_filled_tables() -> list[str]:
     ]
 
 
-def empty_what_migrating_made() -> None:
-    """Make room for the backup's own."""
-    for label in MADE_BY_MIGRATING:
-        apps.get_model(label)._base_manager.all().delete()
-
-
-def reset_sequences() -> None:
-    """Let the next row of each table get a key that none has."""
-    with connection.cursor() as cursor:
-        for statement in connection.ops.sequence_reset_sql(no_style(), find_tables()):
-            cursor.execute(statement)
-
-
-def _checked_row(
-    model: type[models.Model],
-    columns: list[models.Field[Any, Any]],
-    line: bytes,
-    check: Callable[[models.Model], None],
-    place: int,
-) -> models.Model:
-    try:
-        row = _row(model, columns, json.loads(line, parse_constant=_refuse_constant))
-        check(row)
-    except (*REFUSALS, ObjectDoesNotExist, RecursionError) as error:
-        raise ValueError(f"line {place}: {_sentence(error)}") from error
-    return row
+# --- Private -----------------------------------------------------------------------------------
 
 
 def _sentence(error: Exception) -> str:
@@ -184,32 +158,32 @@ def _row(
 ) -> models.Model:
     if not isinstance(values, list) or len(values) != len(columns):
         raise ValueError(f"{label_of(model)}: {len(columns)} values are needed in each line")
-    given = list(zip(columns, values, strict=True))
-    row = model(**{field.attname: _typed(field, value) for field, value in given})
-    for field, value in given:
-        _check_column(row, field, value)
+    row = model()
+    for field, value in zip(columns, values, strict=True):
+        try:
+            setattr(row, field.attname, _parsed(field, value))
+            _check_column(row, field, value)
+        except REFUSALS as error:
+            raise ValueError(f"{field.name}: {_sentence(error)}") from error
     return row
 
 
 def _check_column(row: models.Model, field: models.Field[Any, Any], given: Any) -> None:
-    """Refuse a value that `read_rows` would not have written, or that the column's rules refuse.
+    """Refuse a value that would not be written so, or that the column's rules refuse.
 
     Raises:
-        ValueError: With the column.
+        ValueError: Or another of REFUSALS.
     """
     value = getattr(row, field.attname)
     written = _plain(field, value)
-    try:
-        if written != given or type(written) is not type(given):
-            raise ValueError(f"{given!r} is no value of this column")
-        if isinstance(value, str) and make_storable(value) != value:
-            raise ValueError("holds signs that no database takes")
-        if isinstance(field, models.JSONField):
-            field.to_python(value)
-        elif not field.is_relation and not (value is None and field.null):
-            field.clean(value, row)
-    except REFUSALS as error:
-        raise ValueError(f"{field.name}: {_sentence(error)}") from error
+    if written != given or type(written) is not type(given):
+        raise ValueError(f"{given!r} is no value of this column")
+    if isinstance(value, str) and make_storable(value) != value:
+        raise ValueError("holds signs that no database takes")
+    if isinstance(field, models.JSONField):
+        field.to_python(value)
+    elif not field.is_relation and not (value is None and field.null):
+        field.clean(value, row)
 
 
 def _plain(field: models.Field[Any, Any], value: Any) -> Any:
@@ -224,13 +198,6 @@ def _plain(field: models.Field[Any, Any], value: Any) -> Any:
             return base64.b64encode(bytes(value)).decode()
         case _:
             return value
-
-
-def _typed(field: models.Field[Any, Any], value: Any) -> Any:
-    try:
-        return _parsed(field, value)
-    except REFUSALS as error:
-        raise ValueError(f"{field.name}: {_sentence(error)}") from error
 
 
 def _parsed(field: models.Field[Any, Any], value: Any) -> Any:

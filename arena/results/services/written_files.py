@@ -19,6 +19,7 @@ from arena.models import ScenarioFile, Snapshot, Study, StudyFile
 from arena.models.files import WrittenFile
 from arena.results.queries.votes import is_imported
 from augment.errors import Conflict, UnknownName
+from augment.models import GenerationJob
 from augment.services.events import log_event
 from augment.services.work import Lease, Settlement, WorkKind
 
@@ -61,9 +62,27 @@ class FileWork(WorkKind[Row]):
             keep_file(row, held, made)
 
 
-def waiting_row(row: Row) -> Row | None:
-    """One like this that a worker has, or will have; None where there is none."""
-    return row.alike().filter(state__in=row.UNDER_WAY).first()
+@transaction.atomic
+def ask_for(row: Row, owner: Study | GenerationJob, **after: str) -> Row:
+    """Keep a row for a worker to write; one that waits already is asked for once more.
+
+    Args:
+        row: Not stored yet.
+        owner: Whose file it is.
+        after: What the log says of it.
+    """
+    waiting = row.alike().filter(state__in=row.UNDER_WAY).first()
+    if waiting is not None:
+        return waiting
+    row.save()
+    log_event(
+        actor=row.asked_by,
+        verb="ask for a file",
+        object_kind="study" if isinstance(owner, Study) else "job",
+        object_code=owner.code,
+        after=after,
+    )
+    return row
 
 
 def keep_file(row: Row, held: Lease[Row], made: MadeFile) -> None:
@@ -130,7 +149,6 @@ def why_not(study: Study, kind: str) -> str:
     return ""
 
 
-@transaction.atomic
 def ask_for_study_file(*, study: Study, kind: str, actor: User | None = None) -> StudyFile:
     """Return a row for a worker to write; one that waits already is asked for once more.
 
@@ -140,18 +158,7 @@ def ask_for_study_file(*, study: Study, kind: str, actor: User | None = None) ->
     """
     if reason := why_not(study, kind):
         raise Conflict(reason)
-    row = StudyFile(study=study, kind=kind, asked_by=actor)
-    if (waiting := waiting_row(row)) is not None:
-        return waiting
-    row.save()
-    log_event(
-        actor=actor,
-        verb="ask for a file",
-        object_kind="study",
-        object_code=study.code,
-        after={"file": kind},
-    )
-    return row
+    return ask_for(StudyFile(study=study, kind=kind, asked_by=actor), study, file=kind)
 
 
 def study_files_of(study: Study) -> dict[str, StudyFile]:

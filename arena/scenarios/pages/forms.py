@@ -107,19 +107,18 @@ def edit_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
 
 @form_for(*STAFF)
 def bulk_page(request: HttpRequest) -> HttpResponse:
-    """Add many scenarios from a CSV or YAML file and the JSON files that it names, all or none."""
-    report, problem = None, ""
+    """Add many scenarios from a CSV or YAML file, all or none."""
+    report, problem, most = None, "", bulk.MOST_ROWS_AT_ONCE
     if request.method == "POST":
-        table, others = request.FILES.get("file"), request.FILES.getlist("documents")
+        table = request.FILES.get("file")
         try:
             if table is None or services.was_too_large(request.META):
                 raise Conflict("Choose a CSV or YAML file; it may be too large.")
-            if len(others) > bulk.MOST_FILES:
-                raise Conflict(f"At most {bulk.MOST_FILES} JSON files are taken.")
-            report = bulk.add_from_files(table, others, keeps=True, actor=user_of(request))
+            name, actor = table.name or "", user_of(request)
+            report = bulk.add_rows(name, table.read(), most=most, actor=actor)
         except AugmentError as error:
             problem = str(error)
-    context = {"report": report, "problem": problem, "most": bulk.MOST_ROWS_AT_ONCE}
+    context = {"report": report, "problem": problem, "most": most}
     return render(request, "scenarios/bulk.html", context)
 
 

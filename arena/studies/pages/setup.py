@@ -28,7 +28,7 @@ from arena.studies.forms import StudyForm
 from arena.studies.queries import missing_of
 from arena.studies.services import drafts
 from arena.studies.services.experts import has_practice
-from arena.studies.services.opening import open_study
+from arena.studies.services.outlook import StudyEstimate
 from arena.studies.services.plan import StudyPlan
 from augment.models import Contestant, GenerationJob
 
@@ -63,20 +63,10 @@ def draft_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
 
 
 @allow_only(ADMIN)
-@require_http_methods(["GET", "HEAD", "POST"])
+@require_POST
 def discard(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
-    """Remove a draft; asks first."""
+    """Remove a draft."""
     draft = get_object_or_404(StudyDraft, code=code)
-    if not is_sure(request):
-        name, back = draft.name or "Study without a name", reverse("study-draft", args=[code])
-        question = Confirmation(
-            title=f"Discard the draft “{name}”?",
-            facts=("What was entered is gone then. No expert has seen anything of it.",),
-            button="Discard the draft",
-            back=back,
-            crumbs=(("Studies", reverse("studies")), (name, back)),
-        )
-        return ask(request, question)
     drafts.discard_draft(draft=draft, actor=user_of(request))
     messages.success(request, "The draft is discarded.")
     return redirect("studies")
@@ -117,18 +107,13 @@ def _set_up(request: HttpRequest, draft: StudyDraft | None) -> HttpResponse:
             study_plan = form.study_plan()
             if not is_sure(request):
                 return ask(request, _opening(study_plan, draft))
-            study = _open(request, draft, study_plan)
+            study = drafts.open_draft(
+                study_plan, draft=draft, revision=_revision(request), actor=user_of(request)
+            )
             messages.success(request, f"“{study.name}” is open; its experts can vote now.")
             return redirect("study", code=study.code)
     revision = request.POST.get("revision", "") or (draft.revision if draft else "")
     return _show(request, draft, form, revision, 422 if form.errors else 200)
-
-
-def _open(request: HttpRequest, draft: StudyDraft | None, study_plan: StudyPlan) -> Study:
-    actor = user_of(request)
-    if draft is None:
-        return open_study(study_plan, actor=actor)
-    return drafts.open_draft(study_plan, draft=draft, revision=_revision(request), actor=actor)
 
 
 def _keep(request: HttpRequest, draft: StudyDraft | None) -> HttpResponse:
@@ -186,27 +171,21 @@ def _initial(draft: StudyDraft | None) -> dict[str, Any]:
     return SUGGESTED | {"checks": usual_checks(), "practice": has_practice()}
 
 
-def _opening(study_plan: StudyPlan, draft: StudyDraft | None) -> Confirmation:
-    """Ask whether to open the study, with what it would be in numbers.
-
-    Raises:
-        AugmentError: It can't be opened.
-    """
-    facts = [
-        "Experts: {experts}. Votes: {votes}. Contestants: {contestants}. Scenarios: {scenarios}.",
-        "On top of the votes: hidden repeats {repeats}, attention checks {checks}.",
-        "Pairs that nobody can tell apart, settled as ties: {settled}.",
-        "Votes that are planned later, by those before: {later}.",
-        "Minutes for each expert: about {minutes}, at {seconds:g} s a pair.",
-        "Experts can vote at once. The rules can’t be changed afterwards.",
-    ]
-    preview = drafts.preview_study(study_plan)
+def _opening(plan: StudyPlan, draft: StudyDraft | None) -> Confirmation:
+    pairs = plan.votes_per_expert * (1 + (plan.repeats + plan.checks) / 100)
+    seconds = StudyEstimate().seconds
     page = ("New study", reverse("study-new"))
     if draft is not None:
         page = ("Draft", reverse("study-draft", args=[draft.code]))
     return Confirmation(
-        title=f"Open the study “{study_plan.name}”?",
-        facts=tuple(fact.format(**preview) for fact in facts),
+        title=f"Open the study “{plan.name}”?",
+        facts=(
+            f"Experts: {len(plan.experts)}. Votes: {len(plan.experts) * plan.votes_per_expert}. "
+            f"Contestants: {len(plan.contestants)}. Scenarios: {len(plan.scenarios)}.",
+            f"For each expert about {pairs:.0f} pairs, repeats and checks among them, which take "
+            f"{pairs * seconds / 60:.0f} minutes at {seconds:g} s a pair.",
+            "Experts can vote at once. The rules can’t be changed afterwards.",
+        ),
         button="Open the study",
         back=page[1],
         is_final=False,

@@ -136,11 +136,17 @@ def hand_over_pairs(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         tell_errors(request, form)
         return redirect("study", code=code)
     giver, takers = form.cleaned_data["giver"], form.cleaned_data["takers"]
-    with refusals_told(request), transaction.atomic():
+    if not is_sure(request):
+        question = _question(
+            study,
+            f"Hand over what {giver} has not judged?",
+            f"It is shared out among: {', '.join(takers)}.",
+            f"{giver} no longer sees it; votes that were given stay. This can’t be taken back.",
+            button="Hand over",
+        )
+        return ask(request, question)
+    with refusals_told(request):
         taken = hand_over(study=study, username=giver, to=takers, actor=user_of(request))
-        if not is_sure(request):  # it was only tried
-            transaction.set_rollback(True)
-            return ask(request, _handing_over(study, giver, taken))
         shares = ", ".join(f"{name} {votes}" for name, votes in taken.items())
         messages.success(request, f"Handed over: {shares}.")
     return redirect("study", code=code)
@@ -177,16 +183,6 @@ def cancel(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         cancel_study(study=study, why=request.POST.get(WHY, ""), actor=user_of(request))
         messages.success(request, "Cancelled. Its votes stay.")
     return redirect("study", code=code)
-
-
-def _handing_over(study: Study, giver: str, taken: dict[str, int]) -> Confirmation:
-    return _question(
-        study,
-        f"Hand over what {giver} has not judged?",
-        *(f"Pairs that {name} takes: {number}." for name, number in taken.items()),
-        f"{giver} no longer sees them; votes that were given stay. This can’t be taken back.",
-        button="Hand over",
-    )
 
 
 def _closing(study: Study) -> Confirmation:

@@ -1,6 +1,5 @@
-"""Studies that are set up over several sittings, and what opening one would make."""
+"""Studies that are set up over several sittings."""
 
-from collections import Counter
 from collections.abc import Mapping
 from dataclasses import asdict
 from itertools import count
@@ -9,9 +8,8 @@ from typing import Any
 from django.contrib.auth.models import User
 from django.db import transaction
 
-from arena.models import Matchup, Study, StudyDraft
+from arena.models import Study, StudyDraft
 from arena.studies.services.opening import open_study
-from arena.studies.services.outlook import StudyEstimate
 from arena.studies.services.plan import LONGEST_NAME, PLAN_INPUTS, StudyPlan, plan_of
 from augment.errors import Conflict
 from augment.services.events import log_change
@@ -80,13 +78,13 @@ def discard_draft(*, draft: StudyDraft, actor: User | None = None) -> None:
 
 @transaction.atomic
 def open_draft(
-    study_plan: StudyPlan, *, draft: StudyDraft, revision: int, actor: User | None = None
+    study_plan: StudyPlan, *, draft: StudyDraft | None, revision: int, actor: User | None = None
 ) -> Study:
     """Open the study that a draft has come to; the draft goes.
 
     Args:
         study_plan: What the draft has come to.
-        draft: Which.
+        draft: Which; None where nothing was saved.
         revision: Of the draft that the plan was made of.
         actor: Who, for the log.
 
@@ -94,10 +92,11 @@ def open_draft(
         Conflict: Somebody else saved or discarded the draft meanwhile.
         AugmentError: See `open_study`.
     """
-    row = _hold(draft, revision)
+    row = None if draft is None else _hold(draft, revision)
     study = open_study(study_plan, actor=actor)
-    log_change(row, "open draft", actor, after={"study": str(study.code)})
-    row.delete()
+    if row is not None:
+        log_change(row, "open draft", actor, after={"study": str(study.code)})
+        row.delete()
     return study
 
 
@@ -140,33 +139,3 @@ def _hold(draft: StudyDraft, revision: int) -> StudyDraft:
     if (row := rows.first()) is None:
         raise Conflict("Somebody else saved, opened or discarded this draft meanwhile.")
     return row
-
-
-def preview_study(study_plan: StudyPlan) -> dict[str, float]:
-    """Return what opening this study would make, in numbers; nothing is kept.
-
-    `later` of the votes are planned by those before, and repeats and checks come on top of them;
-    `settled` counts pairs that are settled as ties.
-
-    Raises:
-        AugmentError: It can't be opened.
-    """
-    with transaction.atomic():
-        study = open_study(study_plan)
-        kinds = Counter(study.matchups.values_list("kind", flat=True))
-        later, experts = sum(study.votes_to_plan.values()), study.experts.count()
-        seconds = StudyEstimate().seconds
-        preview = {
-            "experts": experts,
-            "contestants": study.contestants.count(),
-            "scenarios": study.scenarios.count(),
-            "votes": kinds[Matchup.Kind.MAIN] + later,
-            "later": later,
-            "repeats": kinds[Matchup.Kind.REPEAT],
-            "checks": kinds[Matchup.Kind.CHECK],
-            "settled": len(study.rules["identical"]),
-            "seconds": seconds,
-            "minutes": round((kinds.total() + later) / experts * seconds / 60),
-        }
-        transaction.set_rollback(True)
-    return preview

@@ -82,7 +82,7 @@ def open_study(study_plan: StudyPlan, *, actor: User | None = None) -> Study:
     check_seed(study_plan.seed)
     contestants, scenarios = _contestants(study_plan), _scenarios(study_plan)
     accounts = {user.username: user for user in expert_accounts()}
-    experts = _named("expert", study_plan.experts, accounts)
+    experts = find_named("expert", study_plan.experts, accounts)
     has_simulated = _check_simulated(study_plan, contestants, experts)
     shown = choose_pictures(
         contestants,
@@ -120,19 +120,20 @@ def check_seed(seed: int) -> None:
 
 def _contestants(study_plan: StudyPlan) -> list[Contestant]:
     rateable = Contestant.objects.exclude(kind=Contestant.Kind.CHECK).select_related("endpoint")
-    return _named("contestant", study_plan.contestants, {row.slug: row for row in rateable})
+    return find_named("contestant", study_plan.contestants, {row.slug: row for row in rateable})
 
 
 def _scenarios(study_plan: StudyPlan) -> list[Scenario]:
     known = {row.slug: row for row in Scenario.objects.only("slug")}
-    chosen = _named("scenario", study_plan.scenarios, known)
+    chosen = find_named("scenario", study_plan.scenarios, known)
     # Locked, so that no picture is drawn anew between its choice and the opening.
     rows = Scenario.objects.filter(pk__in=[row.pk for row in chosen])
     list(rows.select_for_update(no_key=True).order_by("pk").values_list("pk"))
     return chosen
 
 
-def _named(kind: str, names: Iterable[str], known: dict[str, Any]) -> list[Any]:
+def find_named(kind: str, names: Iterable[str], known: dict[str, Any]) -> list[Any]:
+    """Return what has these names, sorted by them; raise UnknownName for one that is not known."""
     for name in names:
         if name not in known:
             raise UnknownName(kind, name, sorted(known))

@@ -1,30 +1,27 @@
 """Changes of who takes part: pairs handed over, enrolment by link, drop-outs, forgetting."""
 
 import uuid
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from datetime import datetime
+from typing import Any
 
-import numpy as np
 from axes.models import AccessAttempt, AccessFailureLog, AccessLog
 from django.contrib.auth.models import User
 from django.db import transaction
-from django.db.models import Count
 from django.utils import timezone
 from django.utils.translation import gettext
 
 from arena.errors import EnrolmentOver, NothingToPlan, StudyNotOpen
 from arena.models import EnrolledVoter, Enrolment, Invitation, Matchup, Person, Study
-from arena.pairing.later import choose_for_newcomer as choose_units
-from arena.pairing.later import deal, units_of
-from arena.pairing.order import IntArray
-from arena.pairing.rules import Grid, place_of
+from arena.pairing.later import choose_for_newcomer, deal, judges, units_of
 from arena.people.queries import experts as expert_accounts
 from arena.people.queries import forgotten_name
 from arena.people.services import SIGNED_IN, check_may_change, create_person, end_sessions
 from arena.studies.queries import expert_named, find_silent, find_unfinished
 from arena.studies.services.drafts import rename_in_drafts
+from arena.studies.services.opening import find_named
 from arena.studies.services.planning import Planning, planned_so_far, votes_left
-from augment.errors import Conflict, UnknownName
+from augment.errors import Conflict
 from augment.services.events import log_change
 from augment.services.texts import one_line
 
@@ -69,7 +66,8 @@ def hand_over(
     positions = {row.position for row in rows}
     open_pairs = [one for one in known[username] if one.position in positions]
     units = units_of(planning.grid, open_pairs)
-    later = _share_out(votes_left(study, giver), names)
+    each, rest = divmod(votes_left(study, giver), len(names))
+    later = {name: each + (index < rest) for index, name in enumerate(names)}
     if not units and not any(later.values()):
         raise NothingToPlan(f"{username} has nothing left to hand over.")
     dealt = deal(planning.grid, known, names, units, planning.rng)
@@ -82,7 +80,11 @@ def hand_over(
         study.votes_to_plan = waiting | {n: waiting.get(n, 0) + later[n] for n in names}
         study.save(update_fields=["votes_to_plan"])
     taken = {name: len(dealt[name]) + later[name] for name in names}
-    withdrawn = [[row.position, row.kind, row.scenario.slug, *_slugs(row)] for row in rows]
+    withdrawn = [
+        [row.position, row.kind, row.scenario.slug]
+        + [side.contestant.slug for side in (row.left, row.right)]
+        for row in rows
+    ]
     log_change(
         study,
         "hand over",
@@ -93,20 +95,10 @@ def hand_over(
     return taken
 
 
-def _slugs(row: Matchup) -> tuple[str, str]:
-    return row.left.contestant.slug, row.right.contestant.slug
-
-
 def _find_takers(study: Study, username: str, to: Sequence[str]) -> list[User]:
-    known = {user.username: user for user in expert_accounts()}
-    if not to:
-        raise Conflict("Name at least one expert who takes over.")
-    if username in to:
-        raise Conflict(f"{username} can't take over their own pairs.")
-    for name in to:
-        if name not in known:
-            raise UnknownName("expert", name, sorted(known))
-    takers = [known[name] for name in sorted(set(to))]
+    if not to or username in to:
+        raise Conflict(f"Name at least one expert, other than {username}, who takes over.")
+    takers = find_named("expert", to, {user.username: user for user in expert_accounts()})
     simulated = [user.username for user in takers if user.person.is_simulated]
     if simulated and not study.allow_simulated:
         raise Conflict(f"Simulated: {', '.join(simulated)}. This study does not allow them.")
@@ -132,26 +124,12 @@ def undecided_rows(study: Study, giver: User) -> list[Matchup]:
     return [row for row in rows if row.pk in still]
 
 
-def _share_out(votes: int, names: Sequence[str]) -> dict[str, int]:
-    """Share out votes that are still to be planned equally."""
-    each, rest = divmod(votes, len(names))
-    return {name: each + (index < rest) for index, name in enumerate(names)}
-
-
 # --- Enrolment by a link for everybody ---------------------------------------------------------
 
 
 @transaction.atomic
 def set_enrolment(
-    *,
-    study: Study,
-    consent: str,
-    asks_for: str,
-    places: int,
-    votes_each: int,
-    drop_out_after_h: int | None,
-    is_open: bool = True,
-    actor: User | None = None,
+    *, study: Study, rules: Mapping[str, Any], actor: User | None = None
 ) -> Enrolment:
     """Make the link of an open study, or change what it says; the link itself stays the same.
 
@@ -159,12 +137,8 @@ def set_enrolment(
 
     Args:
         study: An open one.
-        consent: What people agree to; their agreement is kept with a digest of this text.
-        asks_for: What the id is called that they enter, "Your Prolific ID" for example.
-        places: How many may take part at once; who drops out makes room.
-        votes_each: The quota of everybody who enrols from now on.
-        drop_out_after_h: Who is silent for so long and not done loses the place; None: nobody.
-        is_open: Whether anybody may still enrol.
+        rules: Columns of Enrolment: consent, asks_for, places, votes_each, drop_out_after_h and
+            is_open. Agreements are kept with a digest of the consent.
         actor: Who does so, for the log.
 
     Raises:
@@ -174,17 +148,11 @@ def set_enrolment(
     study = Study.objects.select_for_update().get(pk=study.pk)
     if study.state != Study.State.OPEN:
         raise Conflict(f"The study '{study.name}' is not open: nobody can enrol.")
-    consent = consent.replace("\r\n", "\n").strip()
+    consent = rules["consent"].replace("\r\n", "\n").strip()
     if not 0 < len(consent) <= LONGEST_CONSENT:
         raise Conflict(f"What people agree to has 1 to {LONGEST_CONSENT} characters.")
-    values = {
-        "consent": consent,
-        "asks_for": one_line("asks_for", asks_for, what="enrolment", longest=LONGEST_ID),
-        "places": places,
-        "votes_each": votes_each,
-        "drop_out_after_h": drop_out_after_h,
-        "is_open": is_open,
-    }
+    asks_for = one_line("asks_for", rules["asks_for"], what="enrolment", longest=LONGEST_ID)
+    values = {**rules, "consent": consent, "asks_for": asks_for}
     before = Enrolment.objects.filter(study=study).values(*values).first()
     enrolment, _ = Enrolment.objects.update_or_create(study=study, defaults=values)
     log_change(study, "set enrolment", actor, before=before, after=values)
@@ -236,8 +204,8 @@ def _take_on(study: Study, enrolment: Enrolment, external_id: str) -> EnrolledVo
         pseudonym=f"Voter {number} of {study.code.hex[:6]}",
     )
     planning = Planning.begin(study)
-    counts = _count_judges(study, planning.grid)
-    units = choose_units(planning.grid, counts, enrolment.votes_each, planning.rng)
+    counts = judges(planning.grid, planned_so_far(study))
+    units = choose_for_newcomer(planning.grid, counts, enrolment.votes_each, planning.rng)
     if not units:
         raise NothingToPlan(gettext("The study has no pair that could be shown."))
     planned, _ = planning.follow(person.username, [], units)
@@ -256,21 +224,6 @@ def _take_on(study: Study, enrolment: Enrolment, external_id: str) -> EnrolledVo
     }
     log_change(study, "enrol", person, after=after)
     return voter
-
-
-def _count_judges(study: Study, grid: Grid) -> IntArray:
-    """Return (P, S) how many experts have each unit."""
-    rows = {frozenset(pair): row for row, pair in enumerate(grid.pairs)}
-    columns = {place: column for column, place in enumerate(grid.scenarios)}
-    counts = np.zeros(grid.showable.shape, dtype=np.int64)
-    mains = study.matchups.filter(kind=Matchup.Kind.MAIN).order_by()
-    names = ("scenario__slug", "left__contestant__slug", "right__contestant__slug")
-    for slug, left, right, sample, n in mains.values_list(*names, "right__sample").annotate(
-        n=Count("pk")
-    ):
-        place = place_of(slug, sample) if study.shows_all_samples else slug
-        counts[rows[frozenset((left, right))], columns[place]] += n
-    return counts
 
 
 @transaction.atomic

@@ -1,7 +1,6 @@
 """Writers of SQLite one after the other, in the order in which they came, and not for ever."""
 
 import fcntl
-import os
 import threading
 import time
 from collections.abc import Iterator
@@ -88,7 +87,8 @@ def _turn(limit: float | None) -> Iterator[None]:
         raise DatabaseBusy
     try:
         path = Path(str(connection.settings_dict["NAME"]) + SUFFIX)
-        with open(path, "ab", opener=_private) as turn:  # closed, it is free again
+        path.touch(mode=0o600)
+        with path.open("ab") as turn:  # closed, it is free again
             if limit is None:
                 fcntl.flock(turn, fcntl.LOCK_EX)
             while limit is not None and not _locked(turn):
@@ -126,7 +126,3 @@ def _patience_until(limit: float | None) -> Iterator[None]:
 
 def _ms(seconds: float) -> int:
     return max(0, round(seconds * 1000))
-
-
-def _private(path: str, flags: int) -> int:
-    return os.open(path, flags, 0o600)

@@ -140,7 +140,7 @@ def _init(xosc: Any, everyone: Sequence[Movement]) -> Any:
 def _events(xosc: Any, cell: Cell, movement: Movement) -> Iterator[Any]:
     """What somebody does: come, follow a trajectory, go. Nothing for who stands throughout."""
     agent, times_s = movement.agent, cell.motion.times_s
-    walk = None if agent.walk_to_m is None or cell.drive is not None else _walk(agent)
+    walk = None if agent.walk_to_m is None else _walk(agent)
     if walk is not None:
         yield _event(
             xosc,

@@ -6,17 +6,10 @@ from typing import Any
 from django.core.management.base import CommandError
 
 from augment.errors import InvalidDocument
+from augment.formats.documents import read_json
 from augment.models.scenes import GOALS
 from augment.scene.entities import ScenarioType, TrafficDensity
-from augment.services.scenarios.bulk import (
-    NEEDED,
-    OPTIONAL,
-    PARTS,
-    WHAT,
-    add_rows,
-    read_part,
-    read_rows,
-)
+from augment.services.scenarios.bulk import DOCUMENTS, NEEDED, OPTIONAL, WHAT, add_rows
 from augment.services.scenarios.scenes import add_scenario
 from augment.services.terminal import TerminalCommand
 
@@ -65,9 +58,11 @@ class Command(TerminalCommand):
         names = ("scene", "type", "instruction", "slug", "keep_traffic")
         given = {name: options[name] for name in names}
         given |= {name: options[name] or "" for name in ("density", "goal")}
-        for name, what in PARTS.items():
-            file = options[name]
-            given[name] = None if file is None else read_part(file, what)
+        for name, what in DOCUMENTS.items():
+            if (file := options[name]) is not None:
+                given[name] = read_json(file, what=what)
+                if given[name] is None:
+                    raise InvalidDocument(what, [(file.name, "holds null")])
         scenario = add_scenario(**given)
         with_reference = "with" if scenario.reference is not None else "without"
         with_intent = "" if scenario.intent is None else ", with its intent"
@@ -79,10 +74,15 @@ class Command(TerminalCommand):
         given = [f"--{name.replace('_', '-')}" for name in (*NEEDED, *OPTIONAL) if options[name]]
         if given:
             raise CommandError(f"--file says all of it; it goes without {', '.join(given)}.")
-        report = add_rows(read_rows(options["file"]), folder=options["file"].parent)
+        file: Path = options["file"]
+        try:
+            content = file.read_bytes()
+        except OSError as fault:
+            raise CommandError(f"{file} can't be read: {fault.strerror}.") from None
+        report = add_rows(file.name, content)
         problems = [
             (f"row {row.number}.{path}" if path else f"row {row.number}", text)
-            for row in report.faults
+            for row in report.rows
             for path, text in row.problems
         ]
         if problems:

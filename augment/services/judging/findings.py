@@ -17,9 +17,6 @@ from augment.checks import Finding as Finding
 from augment.checks import FindingKind as FindingKind
 from augment.checks import Ground, Severity
 from augment.checks.finding import FaultClass as FaultClass
-from augment.checks.measures import LaneEdges as LaneEdges
-from augment.checks.measures import MeasureLine as MeasureLine
-from augment.checks.measures import find_measures, lane_edges_at
 from augment.checks.registry import check_against_intent
 from augment.errors import InvalidDocument, InvalidModification
 from augment.metrics.fault_guess import first_guess
@@ -168,26 +165,6 @@ def draw_marked(*, augmentation_pk: int) -> str:
     )
     store_as(name, png)
     return name
-
-
-def measures_of(scenario: Scenario) -> tuple[MeasureLine, ...]:
-    """Return the lines that help to measure a scenario's pictures, in their frame.
-
-    No augmentation of the scenario is looked at.
-
-    Raises:
-        InvalidDocument: The stored scene or intent can't be read.
-    """
-    return find_measures(_ground_of(scenario), intent_of(scenario))
-
-
-def lane_edges_of(scenario: Scenario, x_m: float, y_m: float) -> LaneEdges | None:
-    """Return how far a point is from the edges of its lane, None off every lane.
-
-    Raises:
-        InvalidDocument: The stored scene can't be read.
-    """
-    return lane_edges_at(_ground_of(scenario), x_m, y_m)
 
 
 # --- Private -----------------------------------------------------------------------------------

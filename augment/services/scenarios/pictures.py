@@ -2,10 +2,8 @@
 
 import hashlib
 import json
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict
+from collections.abc import Mapping, Sequence
 from enum import StrEnum
-from functools import cache
 from typing import Any
 
 import numpy as np
@@ -13,7 +11,6 @@ from django.contrib.auth.models import User
 from django.core.files.base import ContentFile
 from django.core.files.storage import default_storage
 from django.db import transaction
-from django.db.models import QuerySet
 from django.utils import timezone
 from numpy.typing import NDArray
 
@@ -22,7 +19,7 @@ from augment.models import Augmentation, BaseScene, Contestant, GenerationJob, S
 from augment.render.bev import draw
 from augment.render.camera import AROUND_THE_EGO, LOOK, Camera, camera_for
 from augment.render.canvas import shrink, shrink_png
-from augment.render.legend import change_keys, describe, scene_keys
+from augment.render.legend import change_keys, scene_keys
 from augment.scene.codec import (
     modification_from_document,
     modification_to_document,
@@ -141,8 +138,18 @@ def redraw(scenario: Scenario) -> int:
     """
     redrawn = 0
     # Another worker may store a change that widens the window while this one draws.
-    while outdated := _find_outdated(scenario):
-        redrawn += _redraw_rows(scenario, outdated)
+    while outdated := _list_outdated(scenario):
+        scene, camera = scene_of(scenario), camera_of(scenario)
+        drawn = [(row, picture_of(scene, _shown(row), camera)) for row in outdated]
+        with transaction.atomic():
+            Scenario.objects.select_for_update(no_key=True).get(pk=scenario.pk)
+            original_picture(scenario)
+            redrawn += sum(
+                Augmentation.objects.filter(pk=row.pk, image=row.image).update(
+                    image=name, earlier_images=[*row.earlier_images, row.image]
+                )
+                for row, name in drawn
+            )
     original_picture(scenario)
     return redrawn
 
@@ -150,25 +157,11 @@ def redraw(scenario: Scenario) -> int:
 # --- Private -----------------------------------------------------------------------------------
 
 
-def _find_outdated(scenario: Scenario) -> list[Augmentation]:
+def _list_outdated(scenario: Scenario) -> list[Augmentation]:
     key = camera_of(scenario).key
     rows = scenario.augmentations.exclude(image="")
     rows = rows.only("image", "earlier_images", "state", "modification")
     return [row for row in rows if window_of(row.image) != key]
-
-
-def _redraw_rows(scenario: Scenario, outdated: list[Augmentation]) -> int:
-    scene, camera = scene_of(scenario), camera_of(scenario)
-    drawn = [(row, picture_of(scene, _shown(row), camera)) for row in outdated]
-    with transaction.atomic():
-        Scenario.objects.select_for_update(no_key=True).get(pk=scenario.pk)
-        original_picture(scenario)
-        return sum(
-            Augmentation.objects.filter(pk=row.pk, image=row.image).update(
-                image=name, earlier_images=[*row.earlier_images, row.image]
-            )
-            for row, name in drawn
-        )
 
 
 def _shown(row: Augmentation) -> Modification:
@@ -253,17 +246,7 @@ _LOOK = 1
 
 
 def thumbnail_of(name: str, widest_px: int) -> str:
-    """The name of a stored picture made smaller; "" where there is no such picture.
-
-    Args:
-        name: Of the picture.
-        widest_px: One of `WIDTHS_PX`.
-
-    Raises:
-        ValueError: There are no thumbnails of that width.
-    """
-    if widest_px not in WIDTHS_PX:
-        raise ValueError(f"thumbnails are {WIDTHS_PX} pixels wide, not {widest_px}")
+    """Return the name of a stored picture made smaller, "" where there is no such picture."""
     small = f"{THUMBNAILS}/{_LOOK}-{widest_px}/{name}"
     if not name or default_storage.exists(small):
         return small if name else ""
@@ -301,33 +284,6 @@ def legends_of_changes(views: Mapping[int, Mapping[str, Any]]) -> dict[int, set[
     }
 
 
-Description = list[dict[str, Any]]
-"""The lines of augment.render.legend, ready to be stored."""
-
-
-def descriptions(
-    *, augmentations: Iterable[int], scenarios: Mapping[int, Scenario]
-) -> dict[int, Description]:
-    """The description of each augmentation, by its key; one query.
-
-    One without a modification has the picture of the unchanged scene, and the empty description.
-
-    Args:
-        augmentations: Keys.
-        scenarios: Theirs by key, with their base scenes.
-
-    Raises:
-        InvalidDocument: A stored scene or modification can't be read.
-    """
-    scene = cache(lambda key: scene_of(scenarios[key]))
-    rows = Augmentation.objects.filter(pk__in=set(augmentations)).order_by()
-    by_pk = {}
-    for key, scenario, document in rows.values_list("pk", "scenario", "modification"):
-        change = Modification() if document is None else modification_from_document(document)
-        by_pk[key] = [asdict(line) for line in describe(scene(scenario), change)]
-    return by_pk
-
-
 ATTENTION_CHECK = "attention-check"
 JOB = "Attention checks"
 
@@ -358,45 +314,30 @@ def draw_checks(*, scenarios: Sequence[str], actor: User | None = None) -> list[
         if change is None:
             continue
         document = modification_to_document(change)
-        if not _pictures(row).filter(modification=document).exists():
-            drawn.append((row, document, picture_of(scene_of(row), change, camera_of(row))))
-    kept = _keep(drawn, actor) if drawn else []
-    for row, _, _ in drawn:
-        redraw(row)
+        checks = row.augmentations.filter(contestant__kind=Contestant.Kind.CHECK, state=State.DONE)
+        if not checks.filter(modification=document).exists():
+            image = picture_of(scene_of(row), change, camera_of(row))
+            drawn.append(Augmentation(scenario=row, modification=document, image=image))
+    kept = _keep_checks(drawn, actor) if drawn else []
+    for made in kept:
+        redraw(made.scenario)
     return kept
 
 
-def _pictures(scenario: Scenario) -> QuerySet[Augmentation]:
-    kind = Contestant.Kind.CHECK
-    return scenario.augmentations.filter(contestant__kind=kind, state=State.DONE)
-
-
 @transaction.atomic
-def _keep(
-    drawn: list[tuple[Scenario, dict[str, object], str]], actor: User | None
-) -> list[Augmentation]:
+def _keep_checks(drawn: list[Augmentation], actor: User | None) -> list[Augmentation]:
     contestant, _ = Contestant.objects.get_or_create(
         slug=ATTENTION_CHECK, defaults={"name": "Attention check", "kind": Contestant.Kind.CHECK}
     )
-    now = timezone.now()
+    now, finished = timezone.now(), GenerationJob.State.FINISHED
     job = GenerationJob.objects.create(
-        name=JOB, state=GenerationJob.State.FINISHED, launched_by=actor, finished_at=now
+        name=JOB, state=finished, launched_by=actor, finished_at=now
     )
     job.contestants.set([contestant])
-    job.scenarios.set([scenario for scenario, _, _ in drawn])
-    rows = Augmentation.objects.bulk_create(
-        Augmentation(
-            job=job,
-            scenario=scenario,
-            contestant=contestant,
-            state=State.DONE,
-            modification=document,
-            image=image,
-            finished_at=now,
-        )
-        for scenario, document, image in drawn
-    )
-    log_change(
-        job, "draw checks", actor, after={"scenarios": [scenario.slug for scenario, _, _ in drawn]}
-    )
+    job.scenarios.set([row.scenario for row in drawn])
+    for row in drawn:
+        row.job, row.contestant, row.state, row.finished_at = job, contestant, State.DONE, now
+    rows = Augmentation.objects.bulk_create(drawn)
+    after = {"scenarios": [row.scenario.slug for row in drawn]}
+    log_change(job, "draw checks", actor, after=after)
     return rows

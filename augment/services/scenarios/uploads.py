@@ -169,8 +169,8 @@ def _log(row: SceneUpload, verb: str, actor: User | None, **after: Any) -> None:
 
 def ask_for_moment(
     upload: SceneUpload, *, item: str, frame: int, actor: User | None = None
-) -> tuple[UploadMoment, bool]:
-    """Return the row of a moment that the upload offers, and whether it has still to be drawn.
+) -> UploadMoment:
+    """Return the row of a moment that the upload offers; one that failed waits again.
 
     Raises:
         Conflict: The upload offers no such moment.
@@ -178,10 +178,11 @@ def ask_for_moment(
     offered = {(stop["item"], stop["frame"]) for track in upload.tracks for stop in track["stops"]}
     if (item, frame) not in offered:
         raise Conflict(f"“{upload.name}” offers no such moment.")
-    row, is_new = UploadMoment.objects.get_or_create(
+    row, _ = UploadMoment.objects.get_or_create(
         upload=upload, item=item, frame=frame, defaults={"asked_by": actor}
     )
-    return row, row.wait_again(state=MomentState.QUEUED) or is_new
+    row.wait_again(state=MomentState.QUEUED)
+    return row
 
 
 @transaction.atomic

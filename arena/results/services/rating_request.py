@@ -1,0 +1,94 @@
+"""How a new rating is asked for: what form, body and services share."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from arena.pairing.order import MAIN, REPEAT
+from arena.rating.leaderboard import Intervals, Method
+from arena.rating.rules import Unit
+from arena.results.queries.votes import Filters
+from arena.results.services.ratings import DEFAULT_ROUNDS, MOST_ROUNDS, Choices
+from arena.studies.services.plan import HIGHEST_SEED
+from augment.services.inputs import InputKind, input_field
+from augment.services.judging.displacement import types_named
+
+METHODS = {
+    Method.BRADLEY_TERRY.value: "Bradley-Terry",
+    Method.DAVIDSON.value: "Davidson (ties)",
+    Method.ELO.value: "Online Elo",
+}
+UNITS = {
+    Unit.TWO_WAY.value: "experts and scenarios",
+    Unit.SCENARIO.value: "scenarios",
+    Unit.EXPERT.value: "experts",
+    Unit.VOTE.value: "votes, as in the paper",
+}
+INTERVALS = {
+    Intervals.CLOSED_FORM.value: "in closed form",
+    Intervals.RESAMPLES.value: "by resamples",
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class RatingRequest:
+    """A new rating of a study's votes as they are now."""
+
+    method: str = input_field(
+        InputKind.CHOICE, "Method", choices=METHODS, default=Method.BRADLEY_TERRY.value
+    )
+    resample: str | None = input_field(
+        InputKind.CHOICE,
+        "What hangs together",
+        "As the votes allow unless given.",
+        choices=UNITS,
+        default=None,
+    )
+    intervals: str | None = input_field(
+        InputKind.CHOICE,
+        "Intervals",
+        "Right for the method unless given.",
+        choices=INTERVALS,
+        default=None,
+    )
+    rounds: int = input_field(
+        InputKind.WHOLE, "Rounds", least=1, most=MOST_ROUNDS, default=DEFAULT_ROUNDS
+    )
+    seed: int = input_field(InputKind.WHOLE, "Seed", least=0, most=HIGHEST_SEED, default=0)
+    adjust: Sequence[str] = input_field(
+        InputKind.NAMES, "Rate as if contestants were alike in", default=()
+    )
+    types: Sequence[str] = input_field(InputKind.NAMES, "Scenario types", default=())
+    experts: Sequence[str] = input_field(
+        InputKind.NAMES, "Experts", "Codes as a rating names them; none for all.", default=()
+    )
+    with_repeats: bool = input_field(InputKind.SWITCH, "Count hidden repeats too", default=False)
+    leave_out_settled: bool = input_field(
+        InputKind.SWITCH,
+        "Leave out pairs that nobody can tell apart, instead of counting them as ties",
+        default=False,
+    )
+    leave_out_own: bool = input_field(
+        InputKind.SWITCH, "Leave out votes of authors on their own contestants", default=False
+    )
+
+    def choices(self) -> Choices:
+        """Return it as the rating services take it.
+
+        Raises:
+            UnknownName: There is no such scenario type.
+        """
+        return Choices(
+            method=self.method,
+            unit=self.resample,
+            intervals=self.intervals,
+            covariates=self.adjust,
+            rounds=self.rounds,
+            seed=self.seed,
+            filters=Filters(
+                types=types_named(self.types),
+                experts=tuple(self.experts),
+                kinds=(MAIN, REPEAT) if self.with_repeats else (MAIN,),
+                leave_out_settled=self.leave_out_settled,
+                leave_out_own=self.leave_out_own,
+            ),
+        )
