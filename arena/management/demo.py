@@ -201,13 +201,6 @@ def _person(username: str, role: str, *, is_simulated: bool = False) -> None:
 
 
 def _stand_in_address() -> str:
-    """The address that it had before, unless somebody else listens there now."""
-    kept = Endpoint.objects.filter(label=STAND_IN).first()
-    with socket.socket() as probe:
-        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        port = int(kept.base_url.rsplit(":", 1)[1].split("/")[0]) if kept else 0
-        try:
-            probe.bind(("127.0.0.1", port))
-        except OSError:
-            probe.bind(("127.0.0.1", 0))
+    """An address that nobody listens at."""
+    with socket.create_server(("127.0.0.1", 0)) as probe:
         return f"http://127.0.0.1:{probe.getsockname()[1]}/v1"
