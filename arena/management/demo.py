@@ -6,7 +6,6 @@ Every step can be repeated: what is there already is used again, so a second run
 import socket
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -66,14 +65,6 @@ DRIVEN_PER_TYPE = 2
 
 class DemoFailed(ArenaError):
     """A step of the demo did not end as it should; the text says which and how."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class DemoTable:
-    """The table for a terminal, and where its files are."""
-
-    text: str
-    files: tuple[Path, ...]
 
 
 def prepare(say: Callable[[str], None]) -> None:
@@ -145,8 +136,8 @@ def start_drives() -> None:
     enqueue_simulations(waiting)
 
 
-def vote_and_rate(scenarios: list[str], folder: Path) -> DemoTable:
-    """A study with simulated votes, closed and rated, and its table as files."""
+def vote_and_rate(scenarios: list[str], folder: Path) -> tuple[str, list[Path]]:
+    """Return the table of a study with simulated votes, and the files that it is written to."""
     study = Study.objects.filter(name=SIMULATED_STUDY).first()
     if study is None:
         asked = _study_asked(SIMULATED_STUDY, scenarios)
@@ -166,7 +157,7 @@ def vote_and_rate(scenarios: list[str], folder: Path) -> DemoTable:
     for chosen in FORMATS.values():
         files.append(folder / f"leaderboard.{chosen.suffix}")
         write_whole(files[-1], chosen.write(table))
-    return DemoTable(text=plain_text(table), files=tuple(files))
+    return plain_text(table), files
 
 
 def login_lines() -> list[str]:
