@@ -172,11 +172,6 @@ def ask_for_file(
     return ask_for(row, job, format=file_format)
 
 
-def files_of(job: GenerationJob) -> dict[str, ScenarioFile]:
-    """The newest row of each format."""
-    return {row.format: row for row in ScenarioFile.objects.filter(job=job).order_by("pk")}
-
-
 _BATCH = 500
 _SHOWN = Q(shown_left__isnull=False) | Q(shown_right__isnull=False) | Q(label_tasks__isnull=False)
 
