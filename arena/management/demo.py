@@ -112,7 +112,7 @@ def generate(
     request = JobRequest(name=JOB, contestants=resolve_contestants([ALL]), scenarios=scenarios)
     job = GenerationJob.objects.filter(name=JOB).first() or launch(request)
     enqueue_job(job.pk)
-    ended, moved_at = 0, time.monotonic()
+    ended, moved_at = -A_LINE_EVERY, time.monotonic()
     while (now := count_rows(job)).under_way:
         look()
         if now.settled >= ended + A_LINE_EVERY:
