@@ -56,3 +56,22 @@ def test_what_is_simulated_is_said_on_every_page_of_the_study() -> None:
         assert "simulated</span>" in signed_in(reader).get(reverse(name)).content.decode()
     overview = signed_in(reader).get(reverse("study", args=[study.code])).content.decode()
     assert "Simulated votes and contestants count in this study." in overview
+
+
+def test_an_expert_reads_results_only_once_no_open_study_has_the_same_contestants() -> None:
+    study = judged()
+    eva = User.objects.get(username="eva")
+    url = reverse("results", args=[study.code])
+    assert signed_in(eva).get(url).status_code == 200
+    second = open_study(
+        name="Round 2",
+        votes_per_expert=3,
+        seed=1,
+        experts=["eva"],
+        contestants=["ann", "bob"],
+        scenarios=["place-0", "place-1", "place-2"],
+    )
+    assert signed_in(eva).get(url).status_code == 403
+    assert url not in signed_in(eva).get("/").content.decode()
+    close_study(study=second)
+    assert signed_in(eva).get(url).status_code == 200
