@@ -9,7 +9,6 @@ from urllib.parse import urlencode
 from django.contrib.auth.models import User
 from django.db import transaction
 from django.db.models import Model, QuerySet
-from django.http import HttpResponse
 from django.http.response import HttpResponseBase
 from django.views.decorators.cache import never_cache
 from django.views.decorators.http import conditional_page
@@ -149,15 +148,6 @@ def keep_and_send(keep: Callable[[], Row], send: Callable[[int], object]) -> tup
         row = keep()
         transaction.on_commit(partial(_send, warnings, send, row.pk))
     return row, warnings
-
-
-def as_file(content: bytes, content_type: str, name: str) -> HttpResponse:
-    """Return a file to be saved under that name."""
-    return HttpResponse(
-        content,
-        content_type=content_type,
-        headers={"Content-Disposition": f'attachment; filename="{name}"'},
-    )
 
 
 # --- Private -----------------------------------------------------------------------------------

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import wraps
 from typing import Any
 
 from boto3.exceptions import Boto3Error
@@ -27,6 +28,15 @@ CLIENT = Config(
 """Standard retries wait longer each time: a bucket that is gone for a moment costs no picture."""
 
 
+def _named(deed: str, method: Callable[..., Any]) -> Callable[..., Any]:
+    @wraps(method)
+    def call(self: S3Media, name: str) -> Any:
+        with self._faults_named(deed, name):
+            return method(self, name)
+
+    return call
+
+
 class S3Media(S3Storage):  # type: ignore[misc] # it has no types
     """Files of a bucket. An object is there whole or not at all, and the last writer wins.
 
@@ -44,30 +54,10 @@ class S3Media(S3Storage):  # type: ignore[misc] # it has no types
             **options,
         )
 
-    def exists(self, name: str) -> bool:
-        """Whether there is such a file; the bucket itself always counts as being there."""
-        with self._faults_named("look for", name):
-            return not name or bool(super().exists(name))
-
-    def size(self, name: str) -> int:
-        """How many bytes it has.
-
-        Raises:
-            FileNotFoundError: There is none.
-        """
-        with self._faults_named("look for", name):
-            return int(super().size(name))
-
-    def delete(self, name: str) -> None:
-        """Remove it, if it is there."""
-        with self._faults_named("delete", name):
-            super().delete(name)
-
-    def listdir(self, name: str) -> tuple[list[str], list[str]]:
-        """The names of what lies directly beneath a place: folders and files."""
-        with self._faults_named("list", name):
-            folders, files = super().listdir(name)
-        return folders, files
+    exists = _named("look for", S3Storage.exists)
+    size = _named("look for", S3Storage.size)
+    delete = _named("delete", S3Storage.delete)
+    listdir = _named("list", S3Storage.listdir)
 
     def _open(self, name: str, mode: str = "rb") -> File[bytes]:
         if mode != "rb":

@@ -1,13 +1,11 @@
 """Contestants and how they ask."""
 
 import uuid
-from collections.abc import Sequence
 from functools import partial
 from typing import Any
 
 from django.http import Http404
 from django.shortcuts import get_object_or_404
-from drf_spectacular.utils import extend_schema_field
 from rest_framework import serializers
 from rest_framework.response import Response
 
@@ -28,7 +26,6 @@ from augment.models import Contestant, Endpoint, EndpointModel, Probe
 from augment.services.endpoints.contestants import VARIANTS, ContestantRequest, add_contestant
 from augment.services.endpoints.known_endpoints import EndpointRequest, add_endpoint, add_model
 from augment.services.endpoints.probing import plan_probe
-from augment.services.running.transcript_records import contestant_documents
 from augment.tasks import enqueue_probe
 
 KINDS = [kind.value for kind in Contestant.Kind if kind is not Contestant.Kind.CHECK]
@@ -42,34 +39,17 @@ class ContestantQuery(PageQuery):
     slug = serializers.CharField(max_length=80, required=False)
 
 
-class ContestantEndpointDocument(serializers.Serializer[Any]):
-    """Where a contestant's model is."""
+class ContestantDocument(RowDocument[Contestant]):
+    """A contestant; `frozen_options` are all of its options, from its first run on."""
 
-    label = serializers.CharField()  # type: ignore[assignment]
-    base_url = serializers.CharField()
-    is_simulated = serializers.BooleanField()
+    endpoint = serializers.CharField(source="endpoint.label", default=None, allow_null=True)
 
-
-class WholeContestantDocument(serializers.Serializer[Any]):
-    """A contestant, as in transcripts."""
-
-    code = serializers.UUIDField()
-    slug = serializers.CharField()
-    name = serializers.CharField()
-    kind = serializers.CharField()
-    variant = serializers.CharField(allow_null=True)
-    model = serializers.CharField(allow_null=True)
-    roles = serializers.DictField(help_text="The models of other roles.")
-    options = serializers.DictField(help_text="Those that were chosen.")
-    frozen_options = serializers.DictField(
-        allow_null=True, help_text="All options, from its first run on."
-    )
-    left_out = serializers.DictField(
-        help_text="By role, options that its model does not support and that are not sent."
-    )
-    sends = serializers.DictField(allow_null=True)
-    endpoint = ContestantEndpointDocument(allow_null=True)
-    retired_at = serializers.DateTimeField(allow_null=True)
+    class Meta:
+        model = Contestant
+        fields = (
+            *("code", "slug", "name", "kind", "variant", "endpoint", "model", "roles"),
+            *("options", "frozen_options", "retired_at"),
+        )
 
 
 class ContestantBody(RequestBody):
@@ -84,31 +64,22 @@ class ContestantsView(ApiView):
 
     readers, writers = STAFF, ADMINS
 
-    @operation(page_of(WholeContestantDocument), query=ContestantQuery, name="listContestants")
+    @operation(page_of(ContestantDocument), query=ContestantQuery, name="listContestants")
     def get(self, given: Given) -> Response:
         """Contestants by slug.
 
         Retired ones have a date in `retired_at`.
         """
         rows = Contestant.objects.exclude(kind=Contestant.Kind.CHECK).select_related("endpoint")
-        return self.answer_page(
-            rows, given, WholeContestantDocument, order="slug", lines=_documents
-        )
+        return self.answer_page(rows, given, ContestantDocument, order="slug")
 
-    @operation(WholeContestantDocument, takes=ContestantBody, status=201, name="createContestant")
-    def post(self, given: Given) -> dict[str, Any]:
+    @operation(ContestantDocument, takes=ContestantBody, status=201, name="createContestant")
+    def post(self, given: Given) -> Contestant:
         """Add a contestant that asks a language model.
 
         The same one twice is one.
         """
-        return _documents([add_contestant(ContestantRequest(**given), self.user)])[0]
-
-
-def _documents(rows: Sequence[Contestant]) -> list[dict[str, Any]]:
-    return [
-        document | {"code": row.code, "retired_at": row.retired_at}
-        for row, document in zip(rows, contestant_documents(rows), strict=True)
-    ]
+        return add_contestant(ContestantRequest(**given), self.user)
 
 
 class EndpointDocument(RowDocument[Endpoint]):
@@ -149,25 +120,8 @@ class NewModelBody(StrictSerializer):
     model = TextField(max_length=120, help_text="Its id there.")
 
 
-class ProbeLineDocument(serializers.Serializer[Any]):
-    """The result of one question so far."""
-
-    ability = serializers.CharField()
-    progress = serializers.CharField(
-        help_text="asked, asking, waiting, or left where it was not asked."
-    )
-    has_it = serializers.BooleanField(
-        allow_null=True, help_text="Null where the answer does not tell."
-    )
-    note = serializers.CharField()
-    model_returned = serializers.CharField()
-    tokens = serializers.IntegerField(allow_null=True)
-    latency_s = serializers.FloatField(allow_null=True)
-    cost_usd = serializers.DecimalField(None, 9, allow_null=True)
-
-
 class ProbeDocument(RowDocument[Probe], WarnedDocument):
-    """A probe with a line for each ability."""
+    """A probe with a line for each ability, those to come included."""
 
     lines = serializers.SerializerMethodField()
 
@@ -175,10 +129,9 @@ class ProbeDocument(RowDocument[Probe], WarnedDocument):
         model = Probe
         fields = ("code", "state", "reason", "lines", "created_at", "finished_at", "warnings")
 
-    @extend_schema_field(ProbeLineDocument(many=True))
-    def get_lines(self, probe: Probe) -> Any:
-        """Return the lines, those to come included."""
-        return ProbeLineDocument(probe_lines(probe.model, probe), many=True).data
+    def get_lines(self, probe: Probe) -> list[dict[str, Any]]:
+        """Return whether the model has each ability, and what it said."""
+        return probe_lines(probe.model, probe)
 
 
 class EndpointsView(ApiView):

@@ -1,7 +1,5 @@
 """Contestants and models as pages show them: how one asks, and what a probe saw of the other."""
 
-from dataclasses import dataclass, replace
-from decimal import Decimal
 from typing import Any
 
 from augment.models import Contestant, EndpointModel, Probe
@@ -9,58 +7,31 @@ from augment.services.endpoints.probing import ABILITIES
 from augment.services.endpoints.treatments import OPTIONS, left_out, options_of
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ProbeLine:
-    """What one question showed so far.
+def probe_lines(model: EndpointModel, probe: Probe | None) -> list[dict[str, Any]]:
+    """Return a line for each ability; of the model's report where nobody asked on a page.
 
-    Attributes:
-        progress: "asked" once it is known, "asking", "waiting", or "left" where it was not asked.
-        has_it: None where the answer does not tell.
+    `progress` is "asked" once it is known, "asking", "waiting", or "left" where it was not asked.
     """
-
-    ability: str
-    progress: str
-    has_it: bool | None = None
-    note: str = ""
-    model_returned: str = ""
-    tokens: int | None = None
-    latency_s: float | None = None
-    cost_usd: Decimal | None = None
-
-
-def probe_lines(model: EndpointModel, probe: Probe | None) -> list[ProbeLine]:
-    """Return the lines of a probe; of the model's report where nobody asked on a page."""
-    if probe is not None:
-        findings = list(probe.findings)
-    else:
-        findings = list((model.probe_report or {}).get("findings", ()))
+    report = (model.probe_report or {}).get("findings", ()) if probe is None else probe.findings
+    findings = {finding["ability"]: finding for finding in report}
     if probe is None and not findings:
         return []
-    by_ability = {finding["ability"]: finding for finding in findings}
     to_come = "waiting" if probe is not None and probe.state in Probe.UNDER_WAY else "left"
     lines = [
-        _probe_line(by_ability[ability])
-        if ability in by_ability
-        else ProbeLine(ability=ability, progress=to_come)
+        dict.fromkeys(("has_it", "latency_s", "cost_usd", "tokens"))
+        | {"ability": ability, "progress": to_come, "note": "", "model_returned": ""}
         for ability in ABILITIES
     ]
-    if probe is not None and probe.state == Probe.State.RUNNING:
-        place = next((n for n, line in enumerate(lines) if line.progress == to_come), None)
-        if place is not None:
-            lines[place] = replace(lines[place], progress="asking")
+    for line in lines:
+        finding = findings.get(str(line["ability"]))
+        if finding is not None:
+            tokens = (finding["prompt_tokens"], finding["completion_tokens"])
+            line |= {name: finding[name] for name in line.keys() & finding.keys()}
+            line |= {"progress": "asked", "tokens": None if None in tokens else sum(tokens)}
+    coming = next((line for line in lines if line["progress"] == "waiting"), None)
+    if coming is not None and probe is not None and probe.state == Probe.State.RUNNING:
+        coming["progress"] = "asking"
     return lines
-
-
-def _probe_line(finding: dict[str, Any]) -> ProbeLine:
-    tokens = (finding["prompt_tokens"], finding["completion_tokens"])
-    cost = finding["cost_usd"]
-    same = ("ability", "has_it", "note", "model_returned", "latency_s")
-    return ProbeLine(
-        progress="asked",
-        tokens=None if None in tokens else sum(tokens),
-        cost_usd=None if cost is None else Decimal(cost),
-        **{name: finding[name] for name in same},
-    )
 
 
 LABELS = {

@@ -59,7 +59,6 @@ def _beside(path: Path, pieces: Iterable[bytes]) -> Iterator[Path]:
         Path(name).unlink(missing_ok=True)
 
 
-ZIP = "zip"
 CONTENT_TYPE = "application/zip"
 
 _EPOCH = (1980, 1, 1, 0, 0, 0)

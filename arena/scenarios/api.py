@@ -29,7 +29,6 @@ from arena.scenarios.services import was_too_large
 from augment.models import Scenario, SceneUpload, UploadMoment
 from augment.models.scenes import DENSITIES, GOALS
 from augment.services.scenarios import uploads
-from augment.services.scenarios import uploads as upload_moments
 from augment.services.scenarios.scenes import (
     INSTRUCTION_LENGTH,
     LONGEST_TYPE,
@@ -165,26 +164,14 @@ class KeepBody(StrictSerializer):
     slug = TextField(max_length=80)
 
 
-class StopDocument(serializers.Serializer[Any]):
-    """A moment that can be chosen."""
-
-    item = serializers.CharField(allow_blank=True)
-    frame = serializers.IntegerField()
-    time_s = serializers.FloatField(allow_null=True)
-    place_m = serializers.ListField(child=serializers.FloatField(), allow_null=True)
-
-
-class RecordingPartDocument(serializers.Serializer[Any]):
-    """One part of a recording."""
-
-    name = serializers.CharField(allow_blank=True)
-    stops = StopDocument(many=True)
-
-
 class UploadDocument(RowDocument[SceneUpload], WarnedDocument):
     """A recording, and once it is read the moments that it offers."""
 
-    tracks = RecordingPartDocument(many=True, read_only=True)
+    tracks = serializers.ListField(
+        child=serializers.DictField(),
+        read_only=True,
+        help_text="Its parts: `name` and `stops`, each with item, frame, time_s and place_m.",
+    )
 
     class Meta:
         model = SceneUpload
@@ -211,7 +198,7 @@ class MomentDocument(RowDocument[UploadMoment], WarnedDocument):
 
     def get_notes(self, row: UploadMoment) -> list[str]:
         """Return them as sentences."""
-        return upload_moments.sentences_of(row)
+        return uploads.sentences_of(row)
 
 
 class UploadsView(ApiView):
@@ -264,18 +251,8 @@ class MomentsView(ApiView):
         The same one twice is one; poll it until it is drawn.
         """
         upload = get_object_or_404(SceneUpload, code=code)
-        is_new = False
-
-        def ask() -> UploadMoment:
-            nonlocal is_new
-            row, is_new = upload_moments.ask_for_moment(upload, **given, actor=self.user)
-            return row
-
-        def send(pk: int) -> None:
-            if is_new:
-                enqueue_moment(pk)
-
-        return keep_and_send(ask, send)
+        ask = partial(uploads.ask_for_moment, upload, **given, actor=self.user)
+        return keep_and_send(ask, enqueue_moment)
 
 
 class MomentView(ApiView):
@@ -305,7 +282,7 @@ class KeepMomentView(ApiView):
         """
 
         def ask() -> UploadMoment:
-            upload_moments.ask_to_keep(_find_moment(code), slug=given["slug"], actor=self.user)
+            uploads.ask_to_keep(_find_moment(code), slug=given["slug"], actor=self.user)
             return _find_moment(code)
 
         return keep_and_send(ask, enqueue_moment)

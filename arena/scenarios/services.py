@@ -1,7 +1,6 @@
 """Changes of scenarios and scenes that nothing depends on yet, references, and redrawing."""
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 
 from django.contrib.auth.models import User
 from django.db import transaction
@@ -9,7 +8,7 @@ from django.db import transaction
 from arena.models import LabelTask, Study
 from augment.errors import AugmentError, Conflict
 from augment.models import BaseScene, Scenario
-from augment.services.events import log_event
+from augment.services.events import log_change
 from augment.services.scenarios import editing
 from augment.services.scenarios.pictures import redraw
 from augment.services.scenarios.scenes import change_surroundings, set_wording
@@ -27,41 +26,20 @@ def was_too_large(meta: Mapping[str, object]) -> bool:
 # --- Redrawing ---------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Redrawn:
-    """What was done about one scenario.
+def redraw_pictures() -> Iterator[tuple[str, int | AugmentError]]:
+    """Draw every scenario's pictures in today's window; yield how many, or why that can't be.
 
-    Attributes:
-        pictures: How many have been drawn anew.
-        fault: Why they could not be drawn, empty where they could.
-    """
-
-    scenario: str
-    pictures: int = 0
-    fault: str = ""
-
-    @property
-    def says(self) -> str:
-        """One line about it."""
-        if self.fault:
-            return f"{self.scenario}: kept as they are. {self.fault}"
-        return f"{self.scenario}: {self.pictures} drawn anew"
-
-
-def redraw_pictures() -> Iterator[Redrawn]:
-    """Draw every scenario's pictures in today's window, one scenario after the other.
-
-    Open studies go on showing those that they were opened with. What can't be drawn is reported
-    and does not stop the others.
+    Open studies go on showing those that they were opened with.
     """
     drawn = Scenario.objects.filter(augmentations__image__gt="").distinct().order_by("slug")
     for pk, slug in list(drawn.values_list("pk", "slug")):
-        scenario = Scenario.objects.select_related("base_scene").get(pk=pk)
         try:
-            if pictures := redraw(scenario):
-                yield Redrawn(scenario=slug, pictures=pictures)
+            number = redraw(Scenario.objects.select_related("base_scene").get(pk=pk))
         except AugmentError as error:
-            yield Redrawn(scenario=slug, fault=str(error))
+            yield slug, error
+        else:
+            if number:
+                yield slug, number
 
 
 # --- References --------------------------------------------------------------------------------
@@ -142,14 +120,7 @@ def change_scenario(
     set_wording(row, instruction, type)
     change_surroundings(row, keep_traffic=keep_traffic, density=density, goal=goal)
     row.save()
-    log_event(
-        actor=actor,
-        verb="change",
-        object_kind="scenario",
-        object_code=row.code,
-        before=before,
-        after=_state(row),
-    )
+    log_change(row, "change", actor, before=before, after=_state(row))
     return row
 
 
@@ -162,41 +133,25 @@ def delete(row: Scenario | BaseScene, *, actor: User | None = None) -> None:
     """
     type(row).objects.select_for_update(of=("self",)).only("pk").get(pk=row.pk)
     _refuse_needed(row, "deleted")
-    log_event(
-        actor=actor,
-        verb="delete",
-        object_kind="scenario" if isinstance(row, Scenario) else "scene",
-        object_code=row.code,
-        before={"slug": row.slug},
-    )
+    log_change(row, "delete", actor, before={"slug": row.slug})
     row.delete()
 
 
 def _refuse_needed(row: Scenario | BaseScene, what: str) -> None:
     if isinstance(row, BaseScene):
-        slugs = row.scenarios.order_by("slug").values_list("slug", flat=True)
-        needed_by = [f"the scenario “{slug}”" for slug in slugs]
+        needed_by = [f"the scenario “{one.slug}”" for one in row.scenarios.order_by("slug")]
     else:
-        drives = row.simulations.count()
         needed_by = [
             *(f"the job “{job.name}”" for job in row.jobs.order_by("pk")),
             *(f"the study “{study.name}”" for study in row.studies.order_by("pk")),
             *(f"its other wording “{other.slug}”" for other in row.paraphrases.order_by("slug")),
-            *([f"{drives} drives"] if drives else []),
+            *(["drives"] if row.simulations.exists() else []),
         ]
-    if not needed_by:
-        return
-    more = len(needed_by) - MOST_NAMED
-    *first, last = [*needed_by[:MOST_NAMED], *([f"{more} more"] if more > 0 else [])]
-    named = f"{', '.join(first)} and {last}" if first else last
-    raise Conflict(f"“{row.slug}” can’t be {what}; it is needed by {named}.")
+    if needed_by:
+        named = ", ".join(needed_by[:MOST_NAMED])
+        raise Conflict(f"“{row.slug}” can’t be {what}; it is needed by {named}.")
 
 
 def _state(row: Scenario) -> dict[str, object]:
-    return {
-        "instruction": row.instruction,
-        "type": row.type,
-        "keep_traffic": row.keep_traffic,
-        "density": row.traffic_density,
-        "goal": row.goal,
-    }
+    names = ("instruction", "type", "keep_traffic", "traffic_density", "goal")
+    return {name: getattr(row, name) for name in names}

@@ -38,7 +38,7 @@ BATCH = 200
 """So many calls are emptied in one transaction, so that nobody waits for long."""
 
 
-def removable(before: datetime) -> QuerySet[ModelCall]:
+def find_removable(before: datetime) -> QuerySet[ModelCall]:
     """Return calls from before then with their words that no job or study under way needs."""
     unfinished = Matchup.objects.exclude(study__state=Study.State.CLOSED).order_by()
     shown = Augmentation.objects.filter(
@@ -64,7 +64,7 @@ def remove_old(
     Raises:
         Conflict: A job was resumed or a study opened meanwhile, so that some calls may not go.
     """
-    keys = list(removable(before).order_by("pk").values_list("pk", flat=True))
+    keys = list(find_removable(before).order_by("pk").values_list("pk", flat=True))
     images = images_named_by(keys)
     counts = {"older_than": before.isoformat(), "calls": len(keys)}
     log_event(actor=actor, verb="prune", object_kind="calls", object_code="all", after=counts)
@@ -78,7 +78,7 @@ def remove_old(
 def _empty(keys: list[int], *, before: datetime, now: datetime) -> None:
     """Remove messages and answers of a batch, locked so that no job is resumed meanwhile."""
     rows = list(ModelCall.objects.select_for_update().filter(pk__in=keys).order_by("pk"))
-    if removable(before).filter(pk__in=keys).count() != len(keys):
+    if find_removable(before).filter(pk__in=keys).count() != len(keys):
         raise Conflict(
             "A job went on or a study was opened meanwhile; the rest is kept. Run it again."
         )

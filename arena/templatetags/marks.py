@@ -34,7 +34,6 @@ _TONES = {
     "open": "busy",
     "closed": "good",
 }
-_MATCHUPS = {"main": "Votes", "repeat": "Hidden repeats", "check": "Attention checks"}
 _ICONS = {"finished": "done", "stopped_at_cap": "stop"}
 
 
@@ -61,22 +60,19 @@ def job_mark(counts: JobCounts) -> Mark:
         if counts.failed == counts.total:
             return Mark(tone="bad", icon="icons/failed.svg", label="Failed")
         return Mark(tone="warn", icon="icons/failed.svg", label="Finished in part")
-    if job.state == states.FINISHED and not counts.done and counts.total:
+    if (
+        job.state == states.FINISHED
+        and not counts.by_state[Augmentation.State.DONE]
+        and counts.total
+    ):
         label = "Finished without a modification"
         return Mark(tone="warn", icon="icons/unreadable.svg", label=label)
     running = counts.by_state[Augmentation.State.RUNNING]
     words: dict[str, str] = {states.PAUSED: "Pausing", states.CANCELLED: "Cancelled"}
     if running and job.state in words:
-        runs = "runs" if running == 1 else "run"
-        label = f"{words[job.state]}, {running} still {runs}"
+        label = f"{words[job.state]}, {running} running"
         return Mark(tone="busy", icon=f"icons/{job.state}.svg", label=label)
     return mark(job)
-
-
-@register.filter
-def matchups_label(kind: str) -> str:
-    """What matchups of a kind are called."""
-    return str(_MATCHUPS[kind])
 
 
 @register.filter

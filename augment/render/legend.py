@@ -1,18 +1,10 @@
-"""What a picture shows, in words: its legend, the names of its entries, the list of its changes.
+"""The legend of a picture: drawn for reviewers, and the names of its entries for the web."""
 
-The list tells what the picture tells, and of what lies outside of it as well. Whatever is drawn in
-the changed colour is "changed", be it added or moved; whatever stood there before and no longer
-does is "gone". Ids, sizes and the order of a modification leave no trace, and numbers are rounded.
-"""
-
-import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from augment.geometry.frames import wrap
 from augment.geometry.polyline import FloatArray
 from augment.render import palette
 from augment.render.camera import Camera
@@ -31,10 +23,6 @@ from augment.scene.entities import (
     TrafficAgent,
     TrafficLight,
 )
-
-CHANGED, GONE = "changed", "gone"
-STEP_DEG = 5
-"""Headings are told in these steps: finer ones can't be seen, and would be a handwriting."""
 
 _TEXT_PX = 14
 _ROW_PX, _SAMPLE_PX, _GAP_PX, _MARGIN_PX = 36.0, 56.0, 18.0, 10.0
@@ -68,37 +56,9 @@ _AGENT_KEYS = {
 }
 _AREA_KEYS = {AreaKind.CROSSWALK: "crosswalk", AreaKind.WALKWAY: "walkway"}
 _DARK = (TrafficLight.NONE, TrafficLight.UNKNOWN)
-# Drawn upright whatever their heading; drawn alike from either end.
-_UPRIGHT = {AgentType.TRAFFIC_CONE, AgentType.CONSTRUCTION_SIGN}
-_SYMMETRIC = {AgentType.BARRIER, AgentType.GENERIC_OBJECT}
 
 _Sample = Callable[[Canvas, Spot], None]
 """Draws a sample about a point in pixels."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class DescribedAgent:
-    """One agent of the list.
-
-    Frame: ego frame, metres ahead of the ego's centre and to its left.
-
-    Attributes:
-        change: `CHANGED` or `GONE`.
-        kind: The value of an `AgentType`.
-        heading_deg: To the left of the ego's, in (-180, 180]; None where its mark shows none.
-        along_deg: How a thing without a front lies, in (-90, 90]; None for all others.
-        speed_mps: 0 for a road user that stands; None for things that do, and for who walks.
-        walk_to_m: Where a walk ends, ahead and left; None without a walk.
-    """
-
-    change: str
-    kind: str
-    ahead_m: float
-    left_m: float
-    heading_deg: int | None = None
-    along_deg: int | None = None
-    speed_mps: float | None = None
-    walk_to_m: Point | None = None
 
 
 def draw_legend(scene: Scene, modification: Modification, width_px: int) -> Canvas:
@@ -162,19 +122,6 @@ def change_keys(change: Modification, view: Mapping[str, Any]) -> set[str]:
         inside = _is_inside([(agent.x_m, agent.y_m)], view)
         keys |= {"changed"} | _agent_keys(agent) if inside else {"outside"}
     return keys
-
-
-def describe(scene: Scene, modification: Modification) -> list[DescribedAgent]:
-    """List what was changed, then what is gone, each the nearest first, then by kind.
-
-    Args:
-        scene: The scene before the change; ids that it does not have are passed over.
-        modification: The change; the list of an empty one is empty.
-    """
-    left = {agent.id for agent in modification.moved} | set(modification.removed)
-    lines = [_line(CHANGED, agent) for agent in modification.changed]
-    lines += [_line(GONE, agent) for agent in scene.agents if agent.id in left]
-    return sorted(lines, key=_place)
 
 
 # --- The legend's entries ----------------------------------------------------------------------
@@ -285,7 +232,7 @@ def _between(canvas: Canvas, at_m: Spot) -> None:
     canvas.dashed(_line_px(canvas, at_m, 16.0), palette.LANE_LINE, 3.0, 8.0, 6.0)
 
 
-# --- Keys and lines ----------------------------------------------------------------------------
+# --- Keys ----------------------------------------------------------------------------
 
 
 def _agent_keys(agent: TrafficAgent) -> set[str]:
@@ -306,44 +253,3 @@ def _is_inside(points_m: FloatArray | Iterable[Point], view: Mapping[str, Any]) 
     x, y = ego_x + points[:, 0] * scale, ego_y - points[:, 1] * scale
     inside = (x >= 0.0) & (x <= view["width"]) & (y >= 0.0) & (y <= view["height"])
     return bool(inside.any())
-
-
-def _line(change: str, agent: TrafficAgent) -> DescribedAgent:
-    walks, moves = is_walking(agent), not stands(agent)
-    is_thing = agent.type in _UPRIGHT | _SYMMETRIC
-    heading = along = speed = None
-    if moves or not is_thing:
-        heading = _turn(agent.heading_rad)
-        speed = None if walks else _metres(agent.speed_mps) if moves else 0.0
-    elif agent.type in _SYMMETRIC:
-        along = _turn(math.remainder(agent.heading_rad, math.pi))
-        along = 90 if along == -90 else along
-    end = agent.walk_to_m if walks else None
-    return DescribedAgent(
-        change=change,
-        kind=agent.type.value,
-        ahead_m=_metres(agent.x_m),
-        left_m=_metres(agent.y_m),
-        heading_deg=heading,
-        along_deg=along,
-        speed_mps=speed,
-        walk_to_m=None if end is None else (_metres(end[0]), _metres(end[1])),
-    )
-
-
-def _place(line: DescribedAgent) -> tuple[object, ...]:
-    """Sort by everything that a line says, so that two which differ never stand as they came."""
-    distance_m = round(math.hypot(line.ahead_m, line.left_m), 3)
-    rest = (line.heading_deg, line.along_deg, line.speed_mps)
-    known = tuple((value is not None, value or 0) for value in rest)
-    walk = line.walk_to_m or ()
-    return (line.change, distance_m, line.kind, line.ahead_m, line.left_m, *known, walk)
-
-
-def _metres(value: float) -> float:
-    return round(value, 1) + 0.0  # no minus before a zero
-
-
-def _turn(angle_rad: float) -> int:
-    degrees = STEP_DEG * round(math.degrees(wrap(angle_rad)) / STEP_DEG)
-    return 180 if degrees == -180 else degrees

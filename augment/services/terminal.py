@@ -6,7 +6,6 @@ its way out, whoever wrote the command.
 """
 
 from collections.abc import Callable, Mapping
-from pathlib import Path
 from typing import Any
 
 from django.core.management.base import BaseCommand, CommandError, CommandParser, OutputWrapper
@@ -79,13 +78,6 @@ class TerminalCommand(BaseCommand):
             return super().execute(*args, **options)
         except foreseen as error:
             raise CommandError(f"{self.failure} {error}".lstrip()) from error
-
-    def write_file(self, path: Path, content: bytes) -> None:
-        """Write a file that somebody named; a CommandError says why it can't be written."""
-        try:
-            path.write_bytes(content)
-        except OSError as error:
-            raise CommandError(f"{path} can't be written: {error.strerror}.") from error
 
 
 def _wrapped(given: OutputWrapper) -> TerminalOutput:

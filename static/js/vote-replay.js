@@ -11,7 +11,7 @@ const parts = at("replay-parts");
 const { url, style, none } = parts.dataset;
 const [sides] = document.getElementsByClassName("sides");
 const figures = [...sides.querySelectorAll(".side")];
-const matchup = () => at("vote").elements.matchup.value;
+const matchup = () => at("vote").dataset.matchup;
 let shown = null;
 
 const styled = new Promise((done) => {

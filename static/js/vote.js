@@ -61,6 +61,7 @@ function paint(pair) {
   paintedAt = Infinity;
   lens.show(pair, preferences.keep_zoom);
   page.drawPair(pair.shown);
+  form.dataset.matchup = pair.shown.matchup;
   form.elements.report_side.value = "both";
   page.drawReview(review);
   field.value = (review ? review.comment : pair.draft) ?? "";

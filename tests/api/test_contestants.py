@@ -1,7 +1,6 @@
 import pytest
 from django.urls import reverse
 
-from augment.models import EndpointModel
 from augment.services.endpoints import contestants
 from augment.services.endpoints.contestants import ContestantRequest
 from augment.services.endpoints.known_endpoints import EndpointRequest, ensure_endpoint
@@ -17,11 +16,10 @@ def test_a_contestant_is_told_in_full_to_staff_alone() -> None:
             slug="one", variant="otm", endpoint="here", model="m", options={"temperature": 0.7}
         )
     )
-    EndpointModel.objects.update(temperature=False)
     accounts = people()
     address = reverse("api-contestants")
     assert signed_in(accounts["expert"]).get(address).status_code == 403
     (found,) = signed_in(accounts["analyst"]).get(address).json()["results"]
     assert (found["slug"], found["retired_at"]) == ("one", None)
     assert (found["options"], found["frozen_options"]) == ({"temperature": 0.7}, None)
-    assert found["left_out"] == {"modifier": ["temperature"]}
+    assert (found["endpoint"], found["model"], found["roles"]) == ("here", "m", {})

@@ -99,7 +99,7 @@ def test_the_end_is_the_page_of_thanks_and_the_last_vote_can_still_be_changed(
     page = booth.enter()
     page.keyboard.press("3")
     expect(page.get_by_role("heading", name="You are done.")).to_be_visible()
-    page.get_by_role("link", name="Change pair 9: B").click()
+    page.get_by_role("link", name="Pair 9").click()
     ready(page)
     expect(page.locator("#question")).to_contain_text("Pair 9: B.")
     page.keyboard.press("1")

@@ -38,8 +38,7 @@ def read(row: SceneUpload) -> SceneUpload:
 
 
 def looked_at(row: SceneUpload, frame: int) -> UploadMoment:
-    moment, is_new = upload_moments.ask_for_moment(row, item="", frame=frame)
-    assert is_new
+    moment = upload_moments.ask_for_moment(row, item="", frame=frame)
     upload_moments.MOMENTS.perform(moment.pk)
     moment.refresh_from_db()
     return moment
@@ -66,7 +65,7 @@ def test_a_zip_of_a_log_becomes_a_scene_at_the_moment_that_was_chosen(log: bytes
     assert (moment.state, moment.scene) == ("kept", kept)
     assert kept.recording is not None
     assert len(kept.recording["times_s"]) == 3
-    assert "frame 2 of 5" in kept.provenance
+    assert "step 2 of 5" in kept.provenance
     event = Event.objects.get(verb="import")
     assert event.after is not None
     assert (event.actor, event.after["frame"]) == (ada, 2)
@@ -77,7 +76,7 @@ def test_a_second_message_finds_nothing_to_do(log: bytes) -> None:
     moment = looked_at(row, 0)
     assert not upload_moments.MOMENTS.perform(moment.pk)
     assert not uploads.UPLOADS.perform(row.pk)
-    assert upload_moments.ask_for_moment(row, item="", frame=0) == (moment, False)
+    assert upload_moments.ask_for_moment(row, item="", frame=0) == moment
 
 
 @pytest.mark.parametrize(

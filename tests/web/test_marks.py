@@ -35,8 +35,8 @@ def test_all_but_one_is_not_yet_a_hundred_percent() -> None:
         ("finished", {"failed": 3}, "bad", "Failed"),
         ("running", {"failed": 3}, "busy", "Running"),
         ("cancelled", {"cancelled": 3}, "quiet", "Cancelled"),
-        ("cancelled", {"cancelled": 2, "running": 1}, "busy", "Cancelled, 1 still runs"),
-        ("cancelled", {"cancelled": 1, "running": 2}, "busy", "Cancelled, 2 still run"),
+        ("cancelled", {"cancelled": 2, "running": 1}, "busy", "Cancelled, 1 running"),
+        ("cancelled", {"cancelled": 1, "running": 2}, "busy", "Cancelled, 2 running"),
         ("stopped_at_cap", {"failed": 3}, "warn", "Stopped at cap"),
     ],
 )

@@ -26,8 +26,5 @@ class Command(TerminalCommand):
         settings.STATIC_ROOT.mkdir(parents=True, exist_ok=True)
         call_command("collectstatic", interactive=False, verbosity=0)
         compile_catalogue()
-        for found in redraw_pictures():
-            if found.fault:
-                self.stderr.write(found.says)
-            elif found.pictures:
-                self.stdout.write(f"Pictures of an earlier version: {found.says}")
+        for slug, drawn in redraw_pictures():
+            self.stdout.write(f"Pictures of {slug} that were drawn anew: {drawn}")

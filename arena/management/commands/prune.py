@@ -6,7 +6,7 @@ from typing import Any
 from django.utils import timezone
 
 from arena.management.arguments import at_least
-from arena.site.services import removable, remove_old
+from arena.site.services import find_removable, remove_old
 from augment.services.terminal import TerminalCommand
 
 LOST = """Afterwards these answers can't be used again: the same request is asked, and paid, anew.
@@ -29,7 +29,7 @@ class Command(TerminalCommand):
         """Count, and remove where that is wanted."""
         now = timezone.now()
         before = now - timedelta(days=options["older_than"])
-        number = removable(before).count()
+        number = find_removable(before).count()
         if not number:
             self.stdout.write("Nothing is that old, or it belongs to what goes on.")
             return

@@ -64,17 +64,6 @@ def must_read_results(*, user: User, study: Study) -> None:
         raise NotYours("You may not read the results of this study.")
 
 
-def unread_studies(user: User) -> QuerySet[Study]:
-    """Open studies whose results the user has not opened: nothing may tell how they stand.
-
-    Who is no staff can't open any.
-    """
-    is_open = Study.objects.filter(state=Study.State.OPEN)
-    if role_of(user) not in STAFF:
-        return is_open
-    return is_open.exclude(early_looks__user=user)
-
-
 def votes_in(user: User, study: Study) -> bool:
     """Whether somebody is an expert of the study."""
     return study.experts.filter(pk=user.pk).exists()

@@ -2,7 +2,6 @@
 
 import re
 import uuid
-from typing import Any
 
 from django.http import Http404, HttpRequest, HttpResponse, HttpResponseBase, JsonResponse
 from django.shortcuts import get_object_or_404, render
@@ -13,9 +12,7 @@ from arena.site.access import STAFF, page_for
 from arena.site.acts import looks_again, send_later
 from arena.site.pictures import picture_response, sized_picture_response
 from augment.errors import AugmentError
-from augment.models import Augmentation, BaseScene, Contestant, Scenario, Simulation, UploadMoment
-from augment.services.endpoints.contestants import asking_contestants, preview_contestant
-from augment.services.endpoints.treatments import respondents_of
+from augment.models import Augmentation, BaseScene, Scenario, Simulation, UploadMoment
 from augment.services.judging.displacement import of_augmentation
 from augment.services.judging.findings import check_augmentation
 from augment.services.running.calls import IMAGES
@@ -106,7 +103,7 @@ def picture(request: HttpRequest, kind: str, code: uuid.UUID) -> HttpResponseBas
 @page_for(*STAFF)
 def prompts_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Show the exact messages of a variant's role, with about how many tokens they are."""
-    scenario, contestant = _scenario(code), _contestant(request)
+    scenario = _scenario(code)
     problem, shown = "", None
     try:
         shown = _preview(request, scenario)
@@ -115,9 +112,6 @@ def prompts_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     role, variant = request.GET.get("role", "modifier"), request.GET.get("variant", "otm")
     choices = list_recipes()
     context = {
-        "contestants": asking_contestants(),
-        "contestant": contestant,
-        **_how(contestant, role),
         "scenario": scenario,
         "choices": choices,
         "chosen": next((one for one in choices if one.slug == variant), None),
@@ -149,31 +143,10 @@ def _scenario(code: uuid.UUID) -> Scenario:
     return get_object_or_404(rows, code=code)
 
 
-def _contestant(request: HttpRequest) -> Contestant | None:
-    """Return the contestant that the address names, if any; 404 for an unknown one."""
-    slug = request.GET.get("contestant")
-    rows = Contestant.objects.select_related("endpoint")
-    return get_object_or_404(rows, slug=slug) if slug else None
-
-
-def _how(contestant: Contestant | None, role: str) -> dict[str, Any]:
-    """Return what goes with the messages of a contestant: its options, and who is asked."""
-    if contestant is None:
-        return {}
-    try:
-        respondents = {one.value: who for one, who in respondents_of(contestant).items()}
-        return {"asking": asking_of(contestant), "respondent": respondents.get(role)}
-    except AugmentError:  # shown above the messages, of which there are none
-        return {}
-
-
 def _preview(request: HttpRequest, scenario: Scenario) -> Shown:
-    contestant, role = _contestant(request), request.GET.get("role", "modifier")
-    if contestant is not None:
-        return preview_contestant(scenario, contestant, role=role)
     return preview_prompt(
         scenario,
         variant=request.GET.get("variant", "otm"),
-        role=role,
+        role=request.GET.get("role", "modifier"),
         native_tools="native" in request.GET,
     )

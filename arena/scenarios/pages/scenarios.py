@@ -150,16 +150,10 @@ def read_instruction(request: HttpRequest, code: uuid.UUID) -> None:
 # --- Retiring and deleting ---------------------------------------------------------------------
 
 
-def _find(kind: str, code: uuid.UUID) -> Scenario | BaseScene:
-    if kind == "scenario":
-        return get_object_or_404(Scenario, code=code)
-    return get_object_or_404(BaseScene.objects.defer("recording", "document"), code=code)
-
-
 @form_for(ADMIN)
 def delete(request: HttpRequest, code: uuid.UUID, kind: str) -> HttpResponse:
     """Delete a scenario or scene that nothing depends on, once that is confirmed."""
-    row = _find(kind, code)
+    row: Any = get_object_or_404(Scenario if kind == "scenario" else BaseScene, code=code)
     if not is_sure(request):
         facts = ("Only what no job, study or scenario needs is deleted. There is no way back.",)
         question = Confirmation(
@@ -176,10 +170,8 @@ def delete(request: HttpRequest, code: uuid.UUID, kind: str) -> HttpResponse:
     return redirect(kind, code=code)
 
 
-@act_for(ADMIN, back="scenarios")
-def set_retired(request: HttpRequest, code: uuid.UUID, kind: str) -> HttpResponse:
-    """Retire a scenario or scene, or take that back."""
+@act_for(ADMIN, back="scenario")
+def set_retired(request: HttpRequest, code: uuid.UUID) -> None:
+    """Retire a scenario, or take that back."""
     change = take_back if request.POST.get("retired") == "no" else retire
-    row: Any = _find(kind, code)
-    change(row, actor=user_of(request))
-    return redirect(kind, code=code)
+    change(get_object_or_404(Scenario, code=code), actor=user_of(request))

@@ -109,11 +109,10 @@ def show_moment(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         chosen = row.tracks[track]["stops"][stop]
     except (ValueError, LookupError):
         raise Conflict("This recording has no such moment.") from None
-    moment, is_new = uploads.ask_for_moment(
+    moment = uploads.ask_for_moment(
         row, item=chosen["item"], frame=chosen["frame"], actor=user_of(request)
     )
-    if is_new:
-        send_later(request, enqueue_moment, moment.pk)
+    send_later(request, enqueue_moment, moment.pk)
     return _moment_page(moment)
 
 

@@ -27,7 +27,7 @@ from augment.render.bev import draw
 from augment.render.camera import camera_for
 from augment.scene.entities import Modification
 from augment.scene.recording import notes_from_document, notes_to_document
-from augment.services.events import log_event
+from augment.services.events import log_change
 from augment.services.scenarios.pictures import store_as
 from augment.services.scenarios.scene_imports import keep_reading, sentence_of
 from augment.services.scenarios.scenes import check_slug
@@ -87,7 +87,8 @@ def keep_upload(
     try:
         with transaction.atomic():
             row.save(force_insert=True)
-            _log(row, "upload", actor, size_bytes=row.size_bytes, digest=row.digest)
+            after = {"name": row.name, "size_bytes": row.size_bytes, "digest": row.digest}
+            log_change(row, "upload", actor, after=after)
     except BaseException:
         default_storage.delete(row.stored)
         raise
@@ -98,7 +99,7 @@ def keep_upload(
 def remove_upload(row: SceneUpload, actor: User | None = None) -> None:
     """Forget a file and what was drawn of it; scenes that were kept stay."""
     names = [row.stored, *row.moments.values_list("picture", flat=True)]
-    _log(row, "remove upload", actor)
+    log_change(row, "remove upload", actor, after={"name": row.name})
     row.delete()
     for name in filter(None, names):
         transaction.on_commit(partial(default_storage.delete, name))
@@ -154,23 +155,13 @@ def _document(track: RecordingPart) -> dict[str, Any]:
     return seen | {"stops": stops}
 
 
-def _log(row: SceneUpload, verb: str, actor: User | None, **after: Any) -> None:
-    log_event(
-        actor=actor,
-        verb=verb,
-        object_kind="upload",
-        object_code=row.code,
-        after={"name": row.name, **after},
-    )
-
-
 # Moments
 
 
 def ask_for_moment(
     upload: SceneUpload, *, item: str, frame: int, actor: User | None = None
-) -> tuple[UploadMoment, bool]:
-    """Return the row of a moment that the upload offers, and whether it has still to be drawn.
+) -> UploadMoment:
+    """Return the row of a moment that the upload offers; one that failed waits again.
 
     Raises:
         Conflict: The upload offers no such moment.
@@ -178,10 +169,11 @@ def ask_for_moment(
     offered = {(stop["item"], stop["frame"]) for track in upload.tracks for stop in track["stops"]}
     if (item, frame) not in offered:
         raise Conflict(f"“{upload.name}” offers no such moment.")
-    row, is_new = UploadMoment.objects.get_or_create(
+    row, _ = UploadMoment.objects.get_or_create(
         upload=upload, item=item, frame=frame, defaults={"asked_by": actor}
     )
-    return row, row.wait_again(state=MomentState.QUEUED) or is_new
+    row.wait_again(state=MomentState.QUEUED)
+    return row
 
 
 @transaction.atomic
