@@ -57,6 +57,11 @@ def test_an_unusable_review_lets_the_modifiers_result_stand() -> None:
     assert "unusable" in play.notes("review")[0]
 
 
+def test_a_later_review_that_fails_leaves_the_newest_round() -> None:
+    play = Play("tqa", [car(10.0), LOW, car(20.0), "Fine.", "Fine."])
+    assert play.x_m == 20.0
+
+
 def test_a_regeneration_that_can_not_be_read_leaves_the_round_before() -> None:
     play = Play("tqa", [car(10.0), LOW, "There.", "There."])
     assert (play.roles, play.x_m, play.outcome.is_accepted) == ("mrmm", 10.0, False)
