@@ -59,7 +59,6 @@ urlpatterns: list[URLPattern] = [
     path("studies/<uuid:code>/experts/invite/", experts.invite_experts, name="invite"),
     path("invitations/<uuid:code>/revoke/", experts.revoke_invitation, name="revoke"),
     path("studies/<uuid:code>/experts/authors/", experts.mark, name="author"),
-    path("authorships/<uuid:code>/take-back/", experts.take_back, name="author-back"),
     path("studies/<uuid:code>/close/", studies.close, name="study-close"),
     path("studies/<uuid:code>/hand-over/", studies.hand_over_pairs, name="study-hand-over"),
     path("studies/<uuid:code>/vote/", voting.vote_page, name="vote"),

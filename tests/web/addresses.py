@@ -4,8 +4,7 @@ import uuid
 
 from django.urls import reverse
 
-from arena.models import Authorship
-from arena.people.links import invite, mark_author
+from arena.people.links import invite
 from arena.studies.services.drafts import keep_draft
 from augment.models import Endpoint, EndpointModel, SceneUpload, Simulation, UploadMoment
 from tests.web.cast import World
@@ -94,9 +93,6 @@ def address(name: str, here: World) -> str:
     if name == "revoke":
         made = invite(study=here.study, expert=here.expert)
         arguments["revoke"] = {"code": made.invitation.code}
-    if name == "author-back":
-        mark_author(study=here.study, expert=here.expert, contestant="ann")
-        arguments["author-back"] = {"code": Authorship.objects.get().code}
     own = (
         *("study", "preregistration", "experts", "invite", "author", "study-close"),
         *("study-cancel", "study-again"),

@@ -105,7 +105,6 @@ ACTIONS: dict[str, tuple[int, int, int]] = {
     "api-token-revoke": (404, 404, 404),  # somebody else's
     "revoke": (302, 403, 403),
     "author": (302, 403, 403),
-    "author-back": (302, 403, 403),
     "set-intent": (302, 302, 403),
     "scenario-retired": (302, 403, 403),
     "scenario-delete": (200, 403, 403),

@@ -18,7 +18,7 @@ from django.views.decorators.http import require_http_methods, require_POST, req
 
 from arena.errors import EnrolmentOver, LinkOver
 from arena.exports.cells import csv_text
-from arena.models import Authorship, Enrolment, Invitation, Study
+from arena.models import Enrolment, Invitation, Study
 from arena.people import links
 from arena.people.pages import find_account, link_page, with_own_language
 from arena.site.access import ADMIN, BACKEND, GONE, allow_only, user_of
@@ -121,37 +121,26 @@ def experts_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
 @allow_only(ADMIN)
 @require_POST
 def mark(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
-    """Mark an expert as author of a contestant, be the study open or closed."""
+    """Mark an expert as author of a contestant, or take it back, be the study open or closed."""
     study = get_object_or_404(Study, code=code)
     form = AuthorForm(request.POST, study=study)
     if not form.is_valid():
         tell_errors(request, form)
-    else:
-        expert, contestant = form.cleaned_data["expert"], form.cleaned_data["contestant"]
-        links.mark_author(
-            study=study, expert=expert, contestant=contestant.slug, actor=user_of(request)
-        )
-        messages.success(
-            request, f"{expert.person.pseudonym} is marked as author of {contestant.name}."
-        )
-    return redirect("experts", code=code)
-
-
-@allow_only(ADMIN)
-@require_POST
-def take_back(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
-    """Remove one mark of authorship; it stays in the log."""
-    rows = Authorship.objects.select_related("study", "expert__person", "contestant")
-    row = get_object_or_404(rows, code=code)
+        return redirect("experts", code=code)
+    expert, contestant = form.cleaned_data["expert"], form.cleaned_data["contestant"].slug
+    is_author = "back" not in request.POST
     links.mark_author(
-        study=row.study,
-        expert=row.expert,
-        contestant=row.contestant.slug,
-        is_author=False,
+        study=study,
+        expert=expert,
+        contestant=contestant,
+        is_author=is_author,
         actor=user_of(request),
     )
-    messages.success(request, "The mark was taken back.")
-    return redirect("experts", code=row.study.code)
+    state = "is" if is_author else "is not"
+    messages.success(
+        request, f"{expert.person.pseudonym} {state} marked as author of {contestant}."
+    )
+    return redirect("experts", code=code)
 
 
 @allow_only(ADMIN)

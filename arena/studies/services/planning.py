@@ -5,7 +5,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from operator import eq
-from typing import Any, Self
+from typing import Self
 
 import numpy as np
 from django.contrib.auth.models import User
@@ -36,10 +36,10 @@ from arena.studies.services.pictures import (
 from arena.voting.queries.ballots import upcoming
 from arena.voting.queries.showings import LEGEND
 from arena.voting.services.casting import mark_served
-from arena.voting.services.shown_pictures import ScenarioFrame, find_frames, frames_shown, sides_of
+from arena.voting.services.shown_pictures import find_frames, frames_shown, sides_of
 from augment.models import Augmentation, Scenario
 from augment.services.events import log_change
-from augment.services.scenarios.pictures import legend_of_scene, legends_of_changes
+from augment.services.scenarios.pictures import legends_of_changes
 
 MOST_AHEAD = 12
 """The most matchups that a browser may ask for; with as many waiting no new batch is needed."""
@@ -149,7 +149,9 @@ def store(
     known = frames_shown(study, {scenario_of(one.scenario) for one in planned}) if batch else {}
     scenarios = _scenarios(planned, cells, reads_scenes=not known)
     frames = find_frames(planned, cells, scenarios, known)
-    views = _pair_views(planned, cells, scenarios, frames)
+    changes = legends_of_changes(
+        {cell.pk: frames[one.scenario].view for one in planned for cell in sides_of(one, cells)}
+    )
     rows = [
         Matchup(
             study=study,
@@ -160,14 +162,21 @@ def store(
             right=right,
             left_image=left.image,
             right_image=right.image,
-            original_image=frames[one.scenario].original_image,
-            view=view,
+            original_image=frame.original_image,
+            # The same legend whichever side adds what.
+            view=frame.view
+            | {
+                LEGEND: {
+                    "scene": frame.legend,
+                    "pair": sorted(changes[left.pk] | changes[right.pk]),
+                }
+            },
             kind=one.kind,
             batch=batch,
             draw_probability=one.draw_probability,
         )
-        for one, view in zip(planned, views, strict=True)
-        for left, right in [sides_of(one, cells)]
+        for one in planned
+        for frame, (left, right) in [(frames[one.scenario], sides_of(one, cells))]
     ]
     firsts = [row for row in rows if row.kind != Matchup.Kind.REPEAT]
     Matchup.objects.bulk_create(firsts, batch_size=500)
@@ -191,34 +200,6 @@ def _scenarios(
     if reads_scenes:
         rows = rows.select_related("base_scene").defer("base_scene__recording")
     return {row.slug: row for row in rows}
-
-
-def _pair_views(
-    planned: Sequence[PlannedMatchup],
-    cells: Cells,
-    scenarios: dict[str, Scenario],
-    frames: dict[str, ScenarioFrame],
-) -> list[dict[str, Any]]:
-    """Return the view of each showing, with its legend: the same whichever side adds what."""
-    scenes: dict[str, list[str]] = {}
-    for place, frame in frames.items():
-        slug = scenario_of(place)
-        kept = frame.view.get(LEGEND)
-        if kept is not None:
-            scenes[slug] = kept["scene"]
-        elif slug not in scenes:
-            scenes[slug] = legend_of_scene(scenarios[slug], frame.view)
-    sides = [(one.scenario, sides_of(one, cells)) for one in planned]
-    adds = legends_of_changes(
-        {cell.pk: frames[place].view for place, pair in sides for cell in pair}
-    )
-    views = []
-    for place, (left, right) in sides:
-        pair = sorted(adds[left.pk] | adds[right.pk])
-        views.append(
-            frames[place].view | {LEGEND: {"scene": scenes[scenario_of(place)], "pair": pair}}
-        )
-    return views
 
 
 # --- Later plannings ---------------------------------------------------------------------------

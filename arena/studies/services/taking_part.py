@@ -5,20 +5,15 @@ from collections.abc import Mapping, Sequence
 from datetime import datetime
 from typing import Any
 
-import numpy as np
 from axes.models import AccessAttempt, AccessFailureLog, AccessLog
 from django.contrib.auth.models import User
 from django.db import transaction
-from django.db.models import Count
 from django.utils import timezone
 from django.utils.translation import gettext
 
 from arena.errors import EnrolmentOver, NothingToPlan, StudyNotOpen
 from arena.models import EnrolledVoter, Enrolment, Invitation, Matchup, Person, Study
-from arena.pairing.later import choose_for_newcomer as choose_units
-from arena.pairing.later import deal, units_of
-from arena.pairing.order import IntArray
-from arena.pairing.rules import Grid, place_of
+from arena.pairing.later import choose_for_newcomer, deal, judges, units_of
 from arena.people.queries import experts as expert_accounts
 from arena.people.queries import forgotten_name
 from arena.people.services import SIGNED_IN, check_may_change, create_person, end_sessions
@@ -209,8 +204,8 @@ def _take_on(study: Study, enrolment: Enrolment, external_id: str) -> EnrolledVo
         pseudonym=f"Voter {number} of {study.code.hex[:6]}",
     )
     planning = Planning.begin(study)
-    counts = _count_judges(study, planning.grid)
-    units = choose_units(planning.grid, counts, enrolment.votes_each, planning.rng)
+    counts = judges(planning.grid, planned_so_far(study))
+    units = choose_for_newcomer(planning.grid, counts, enrolment.votes_each, planning.rng)
     if not units:
         raise NothingToPlan(gettext("The study has no pair that could be shown."))
     planned, _ = planning.follow(person.username, [], units)
@@ -229,21 +224,6 @@ def _take_on(study: Study, enrolment: Enrolment, external_id: str) -> EnrolledVo
     }
     log_change(study, "enrol", person, after=after)
     return voter
-
-
-def _count_judges(study: Study, grid: Grid) -> IntArray:
-    """Return (P, S) how many experts have each unit."""
-    rows = {frozenset(pair): row for row, pair in enumerate(grid.pairs)}
-    columns = {place: column for column, place in enumerate(grid.scenarios)}
-    counts = np.zeros(grid.showable.shape, dtype=np.int64)
-    mains = study.matchups.filter(kind=Matchup.Kind.MAIN).order_by()
-    names = ("scenario__slug", "left__contestant__slug", "right__contestant__slug")
-    for slug, left, right, sample, n in mains.values_list(*names, "right__sample").annotate(
-        n=Count("pk")
-    ):
-        place = place_of(slug, sample) if study.shows_all_samples else slug
-        counts[rows[frozenset((left, right))], columns[place]] += n
-    return counts
 
 
 @transaction.atomic

@@ -15,11 +15,11 @@ from arena.models import Matchup, Study
 from arena.pairing.plan import PlannedMatchup
 from arena.pairing.rules import place_of, scenario_of
 from arena.studies.services.pictures import Cells, find_showable
-from arena.voting.queries.showings import VIEW_OF_OLD
+from arena.voting.queries.showings import LEGEND, VIEW_OF_OLD
 from augment.errors import Conflict
 from augment.models import Augmentation, Contestant, GenerationJob, Scenario, Simulation
 from augment.services.judging.simulations import Options
-from augment.services.scenarios.pictures import camera_of, view_of, window_of
+from augment.services.scenarios.pictures import camera_of, legend_of_scene, view_of, window_of
 
 MOST_NAMED = 8
 """So many missing pictures are named, the others counted."""
@@ -27,29 +27,33 @@ MOST_NAMED = 8
 
 @dataclass(frozen=True, slots=True)
 class ScenarioFrame:
-    """What all showings of a scenario share: where metres lie, the scene before any change."""
+    """What all showings of a scenario share.
+
+    Attributes:
+        view: Where metres lie.
+        original_image: The scene before any change.
+        legend: The legend's entries of the scene.
+    """
 
     view: dict[str, Any]
     original_image: str
+    legend: list[str]
 
 
-FramesShown = dict[tuple[str, str], ScenarioFrame]
-"""By scenario and window, what a study's showings have already."""
+Frames = dict[tuple[str, str], ScenarioFrame]
+"""By scenario and window."""
 
 
 def find_frames(
-    planned: Sequence[PlannedMatchup],
-    cells: Cells,
-    places: dict[str, Scenario],
-    shown_before: FramesShown,
+    planned: Sequence[PlannedMatchup], cells: Cells, scenarios: dict[str, Scenario], known: Frames
 ) -> dict[str, ScenarioFrame]:
     """Return frames by place; both sides of every pair are drawn in one window.
 
     Args:
         planned: What is to be shown.
         cells: The pictures.
-        places: The scenarios by slug.
-        shown_before: Of the study; what is known so is not worked out from the scene again.
+        scenarios: By slug.
+        known: What the study shows already, which is not worked out from the scene again.
 
     Raises:
         NothingToPlan: Some are of an earlier version, or of before the reference was changed; or
@@ -59,57 +63,61 @@ def find_frames(
     for one in planned:
         for cell in sides_of(one, cells):
             shown.setdefault(one.scenario, {})[window_of(cell.image)] = cell
-    mixed = [scenario_of(name) for name, windows in sorted(shown.items()) if len(windows) > 1]
-    if mixed:
-        raise _other_windows(mixed)
-    return {
-        name: shown_before.get((scenario_of(name), next(iter(windows))))
-        or _frame(places[scenario_of(name)], *windows.popitem())
-        for name, windows in shown.items()
-    }
+    if mixed := [scenario_of(place) for place, windows in shown.items() if len(windows) > 1]:
+        raise _other_windows(sorted(mixed))
+    frames, by_place = dict(known), {}
+    for place, windows in shown.items():
+        ((window, cell),) = windows.items()
+        slug = scenario_of(place)
+        if (slug, window) not in frames:
+            frames[slug, window] = _frame(scenarios[slug], window, cell)
+        by_place[place] = frames[slug, window]
+    return by_place
 
 
-def frames_shown(study: Study, scenarios: Iterable[str]) -> FramesShown:
-    """Return those of the first showing of each scenario; without the scene before, it is none.
+def frames_shown(study: Study, scenarios: Iterable[str]) -> Frames:
+    """Return those of the first showing of each scenario.
 
     To read a scene takes longer than all else that planning for one more expert does.
     """
-    first = (
-        study.matchups.filter(scenario__slug__in=set(scenarios), view__isnull=False)
-        .order_by()
-        .values("scenario")
-        .annotate(first=Min("pk"))
-    )
-    rows = Matchup.objects.filter(pk__in=[row["first"] for row in first])
-    names = ("scenario__slug", "left_image", "view", "original_image")
+    shown = study.matchups.filter(scenario__slug__in=set(scenarios), view__has_key=LEGEND)
+    first = shown.order_by().values("scenario").annotate(first=Min("pk")).values("first")
+    rows = Matchup.objects.filter(pk__in=first).exclude(original_image="")
     return {
-        (slug, window_of(image)): ScenarioFrame(view, original)
-        for slug, image, view, original in rows.values_list(*names)
-        if original and view
+        (slug, window_of(image)): ScenarioFrame(view, original, view[LEGEND]["scene"])
+        for slug, image, view, original in rows.values_list(
+            *("scenario__slug", "left_image", "view", "original_image")
+        )
+        if view
     }
 
 
-def _frame(place: Scenario, window: str, cell: Augmentation) -> ScenarioFrame:
+def _frame(scenario: Scenario, window: str, cell: Augmentation) -> ScenarioFrame:
     """Return what a picture needs, whatever version drew it: today's window, or one before.
 
     Raises:
         NothingToPlan: Nobody knows any more where metres lie in such a picture.
     """
-    if window in place.windows:
-        noted = place.windows[window]
-        return ScenarioFrame(noted["view"], noted["image"])
-    original = place.original_image if window_of(place.original_image) == window else ""
-    camera = camera_of(place)
+    view, original = _view(scenario, window, cell)
+    return ScenarioFrame(view, original, legend_of_scene(scenario, view))
+
+
+def _view(scenario: Scenario, window: str, cell: Augmentation) -> tuple[dict[str, Any], str]:
+    if window in scenario.windows:
+        noted = scenario.windows[window]
+        return noted["view"], noted["image"]
+    original = scenario.original_image if window_of(scenario.original_image) == window else ""
+    camera = camera_of(scenario)
     if window == camera.key:
-        return ScenarioFrame(view_of(camera), original)
+        return view_of(camera), original
     shows = Q(left_image=cell.image) | Q(right_image=cell.image)
-    earlier = Matchup.objects.filter(shows, scenario=place, view__isnull=False)
+    earlier = Matchup.objects.filter(shows, scenario=scenario, view__isnull=False)
     before = earlier.order_by("pk").first()
     if before is not None and before.view is not None:
-        return ScenarioFrame(before.view, before.original_image)
+        return before.view, before.original_image
     if window:
-        raise _other_windows([place.slug])
-    return ScenarioFrame(VIEW_OF_OLD, original)
+        raise _other_windows([scenario.slug])
+    return VIEW_OF_OLD, original
 
 
 def _other_windows(scenarios: list[str]) -> NothingToPlan:
