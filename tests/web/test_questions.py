@@ -59,11 +59,12 @@ def test_closing_a_study_asks_and_says_what_will_be_missing() -> None:
 
 
 def test_opening_a_study_asks_with_its_numbers_and_keeps_what_was_filled_in() -> None:
-    targets = "ann 20\r\nbob = 15\r\n\r\ncid: 13"
     sent = {"name": "<b>Round</b> 1", **study_rows.cast_of(), "votes_per_expert": 12, "seed": 4}
     admin, page = admin_of(), reverse("study-new")
     events = Event.objects.count()
-    asked = admin.post(page, {**sent, "repeats": "25", "targets": targets})
+    asked = admin.post(
+        page, {**sent, "repeats": "25", "hypotheses": "ann above bob\r\n\r\nIt is so."}
+    )
     shown = text_of(asked)
     assert "Open the study “<b>Round</b> 1”?" in html.unescape(asked.content.decode())
     assert "Experts: 2. Votes: 24. Contestants: 3. Scenarios: 6." in shown
@@ -74,7 +75,7 @@ def test_opening_a_study_asks_with_its_numbers_and_keeps_what_was_filled_in() ->
     assert not Study.objects.exists()
     admin.post(page, {**hidden_of(asked), "sure": "1"})
     study = Study.objects.get()
-    assert study.rules["appearances"] == [["ann", 20], ["bob", 15], ["cid", 13]]
+    assert [one["text"] for one in study.rules["hypotheses"]] == ["ann above bob", "It is so."]
     assert study.matchups.count() == 24 + 6
 
 
