@@ -1,4 +1,4 @@
-"""Django's admin of augment, for rare edits; everything else has pages of its own."""
+"""Django's admin of augment: rows to look at, and to delete while nothing hangs on them."""
 
 from typing import Any
 
@@ -8,10 +8,17 @@ from django.http import HttpRequest
 from augment.models import BaseScene, Contestant, Endpoint, Scenario
 
 
-class MadeElsewhere:
-    """Rows that services make, because they check what they are given and log it."""
+@admin.register(BaseScene, Contestant, Endpoint, Scenario)
+class MadeElsewhere(admin.ModelAdmin):
+    """Rows that services make and change, because they check what they are given and log it."""
+
+    exclude = ("document", "recording", "reference")
 
     def has_add_permission(self, request: HttpRequest) -> bool:
+        """Never by hand."""
+        return False
+
+    def has_change_permission(self, request: HttpRequest, obj: Any = None) -> bool:
         """Never by hand."""
         return False
 
@@ -26,55 +33,4 @@ class MadeElsewhere:
             one.related_model._default_manager.filter(**{one.field.name: obj}).exists()
             for one in obj._meta.related_objects
         )
-        return not is_used and super().has_delete_permission(request, obj)  # type: ignore[misc]
-
-
-@admin.register(BaseScene)
-class BaseSceneAdmin(MadeElsewhere, admin.ModelAdmin):
-    """Scenes; their documents come from files and are not typed in."""
-
-    list_display = ("slug", "source", "created_at")
-    list_filter = ("source",)
-    search_fields = ("slug", "provenance")
-    exclude = ("document", "recording")
-    readonly_fields = ("code", "slug", "source", "created_at")
-
-
-@admin.register(Scenario)
-class ScenarioAdmin(MadeElsewhere, admin.ModelAdmin):
-    """Scenarios; what contestants were asked stays as it was asked."""
-
-    list_display = ("slug", "type", "base_scene", "catalogue_set", "keep_traffic")
-    list_filter = ("type", "catalogue_set", "language", "keep_traffic")
-    list_select_related = ("base_scene",)
-    search_fields = ("slug", "instruction")
-    exclude = ("reference",)
-    readonly_fields = (
-        *("code", "slug", "type", "base_scene", "instruction", "keep_traffic"),
-        *("original_image", "created_at"),
-    )
-
-
-@admin.register(Endpoint)
-class EndpointAdmin(MadeElsewhere, admin.ModelAdmin):
-    """Endpoints; they are changed on their own pages, and deleted here while nobody asks them."""
-
-    list_display = ("label", "base_url", "key_variable", "is_simulated", "max_concurrency")
-    readonly_fields = (
-        *("code", "label", "base_url", "key_variable", "is_simulated"),
-        *("max_concurrency", "requests_per_minute"),
-    )
-
-
-@admin.register(Contestant)
-class ContestantAdmin(MadeElsewhere, admin.ModelAdmin):
-    """Contestants; only what people read can be changed, the rest is what was rated."""
-
-    list_display = ("slug", "name", "kind", "variant", "model", "endpoint")
-    list_filter = ("kind", "variant")
-    list_select_related = ("endpoint",)
-    search_fields = ("slug", "name", "model")
-    readonly_fields = (
-        *("code", "slug", "kind", "variant", "endpoint", "model", "roles", "error_rates"),
-        *("options", "frozen_options", "sends", "created_at", "retired_at"),
-    )
+        return not is_used and super().has_delete_permission(request, obj)

@@ -59,7 +59,7 @@ DRAWN: Mapping[str, Callable[[int], object]] = {
 @shared_task(name="augment.work", bind=True, acks_late=True, ignore_result=True)
 def work(self: Any, kind: str, pk: int) -> None:
     """Work on one row, unless another worker has it or it has an outcome."""
-    if workers.is_stop_requested():
+    if workers.stopping.is_set():
         raise Reject("this worker stops", requeue=True)
     worker = f"{self.request.hostname or 'here'} {os.getpid()}"
     KINDS[kind].perform(pk, worker=worker[:120])
@@ -196,7 +196,7 @@ def recover(*, now: Moment = DATABASE_TIME, at_start: bool = False) -> None:
 @worker_ready.connect
 def start_recovering(**_: object) -> None:
     """Show that this worker lives and recover again and again, in threads of its main process."""
-    workers.withdraw_stop()
+    workers.stopping.clear()
     presence = workers.Presence(workers.worker_name(os.getpid()))
     Thread(target=_be_present, args=(presence,), name="presence", daemon=True).start()
     Thread(target=_recover_until_stopped, args=(presence,), name="recover", daemon=True).start()
@@ -205,7 +205,7 @@ def start_recovering(**_: object) -> None:
 @worker_shutting_down.connect
 def stop_recovering(**_: object) -> None:
     """Begin nothing new; what is under way may end."""
-    workers.request_stop()
+    workers.stopping.set()
 
 
 # --- Private -----------------------------------------------------------------------------------
@@ -213,11 +213,12 @@ def stop_recovering(**_: object) -> None:
 
 def _recover_until_stopped(presence: workers.Presence) -> None:
     """Do one round at the start, then one every RECOVER_EVERY_S."""
-    rounds = workers.RecoveryRounds(lambda at_start: recover(at_start=at_start), presence)
-    while not workers.is_stop_requested():
-        rounds.go_on()
+    at_start = True
+    while not workers.stopping.is_set():
+        if workers.do_round(partial(recover, at_start=at_start), presence):
+            at_start = False
         connection.close()
-        workers.wait(settings.RECOVER_EVERY_S)
+        workers.stopping.wait(settings.RECOVER_EVERY_S)
 
 
 def _be_present(presence: workers.Presence) -> None:

@@ -60,7 +60,11 @@ def job_mark(counts: JobCounts) -> Mark:
         if counts.failed == counts.total:
             return Mark(tone="bad", icon="icons/failed.svg", label="Failed")
         return Mark(tone="warn", icon="icons/failed.svg", label="Finished in part")
-    if job.state == states.FINISHED and not counts.done and counts.total:
+    if (
+        job.state == states.FINISHED
+        and not counts.by_state[Augmentation.State.DONE]
+        and counts.total
+    ):
         label = "Finished without a modification"
         return Mark(tone="warn", icon="icons/unreadable.svg", label=label)
     running = counts.by_state[Augmentation.State.RUNNING]

@@ -13,15 +13,7 @@ from augment.checks import Ground
 from augment.checks.lanes_across import LanesAcross
 from augment.errors import CannotPlace
 from augment.geometry.frames import Pose, difference
-from augment.scene.entities import (
-    LENGTH_WIDTH_M,
-    AgentType,
-    AreaKind,
-    Lane,
-    Point,
-    TrafficAgent,
-    TurnType,
-)
+from augment.scene import entities
 from augment.scene.intent import LaneChoice, Side
 from augment.scene.lane_graph import AnyLane, LanePosition
 
@@ -36,17 +28,17 @@ SIGNS = {Side.LEFT: 1.0, Side.RIGHT: -1.0}
 
 
 def build_agent(
-    kind: AgentType,
+    kind: entities.AgentType,
     pose: Pose,
     lane_id: str | None,
     size_m: tuple[float, float] | None = None,
     *,
     speed_mps: float = 0.0,
-    walk_to_m: Point | None = None,
-) -> TrafficAgent:
+    walk_to_m: entities.Point | None = None,
+) -> entities.TrafficAgent:
     """Return an agent of the kind's size, or of another length and width, its id still empty."""
-    length_m, width_m = size_m or LENGTH_WIDTH_M[kind]
-    return TrafficAgent(
+    length_m, width_m = size_m or entities.LENGTH_WIDTH_M[kind]
+    return entities.TrafficAgent(
         id="",
         type=kind,
         x_m=pose.x_m,
@@ -67,7 +59,9 @@ class PlacingGround:
         CannotPlace: The ego stands on no lane, so nothing lies along it.
     """
 
-    def __init__(self, ground: Ground, turn: TurnType = TurnType.STRAIGHT) -> None:
+    def __init__(
+        self, ground: Ground, turn: entities.TurnType = entities.TurnType.STRAIGHT
+    ) -> None:
         self.scene = scene = ground.scene
         lanes = LanesAcross.of(ground, turn)
         if lanes is None:
@@ -82,7 +76,7 @@ class PlacingGround:
                     if area.kind is kind
                 ]
             )
-            for kind in (AreaKind.DRIVABLE, AreaKind.WALKWAY)
+            for kind in (entities.AreaKind.DRIVABLE, entities.AreaKind.WALKWAY)
         )
 
     def along(self, distance_m: float) -> LanePosition:
@@ -125,7 +119,7 @@ class PlacingGround:
     def neighbour(self, place: LanePosition, side: Side) -> str | None:
         """Return the lane of the same direction on that side of the place's lane."""
         lane = self.lane(place)
-        if not isinstance(lane, Lane):
+        if not isinstance(lane, entities.Lane):
             return None
         return lane.left_neighbor if side is Side.LEFT else lane.right_neighbor
 
@@ -145,7 +139,7 @@ class PlacingGround:
         """
         near = [lane for lane in self.graph.lanes.values() if self._runs_along(lane, pose)]
 
-        def is_on_lane(point: Point) -> bool:
+        def is_on_lane(point: entities.Point) -> bool:
             return any(
                 lane.centerline.project(*point).distance_m <= lane.width_m / 2.0 for lane in near
             )
@@ -178,7 +172,7 @@ class PlacingGround:
         )
 
     def _scan(
-        self, pose: Pose, side: Side, start_m: float, is_road: Callable[[Point], bool]
+        self, pose: Pose, side: Side, start_m: float, is_road: Callable[[entities.Point], bool]
     ) -> float:
         """The last road straight across from `start_m` on, before a walkway or a gap."""
         end_m = across_m = start_m
@@ -192,6 +186,6 @@ class PlacingGround:
         return end_m
 
 
-def _covers(area: shapely.Geometry, point: Point) -> bool:
+def _covers(area: shapely.Geometry, point: entities.Point) -> bool:
     """Return whether a point lies in an area; its lower and left edges belong to it."""
     return bool(shapely.contains_xy(area, point[0] + 1e-9, point[1] + 1e-9))

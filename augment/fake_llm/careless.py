@@ -10,7 +10,7 @@ import hashlib
 import math
 import random
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from augment.geometry.frames import wrap
 from augment.scene.ego_route import EgoRoute
@@ -33,18 +33,6 @@ _LEVEL_M = 8.0
 
 Agents = tuple[TrafficAgent, ...]
 _Mistake = Callable[[Agents, EgoRoute, random.Random], Agents]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Bent:
-    """A placement gone wrong.
-
-    Attributes:
-        mistake: Its name, "none" where it stayed about right.
-    """
-
-    modification: Modification
-    mistake: str = "none"
 
 
 def dice(prompt: str) -> random.Random:
@@ -72,15 +60,10 @@ def misread(intent: Intent, rng: random.Random) -> Intent:
     if intent.route in others:
         misreadings.append(replace(intent, route=others[intent.route]))
     if any(_is_relative(one.spot) for one in (*intent.requests, *intent.moves)):
-        misreadings.append(
-            replace(
-                intent,
-                requests=tuple(replace(one, spot=_from_ego(one.spot)) for one in intent.requests),
-                moves=tuple(replace(one, spot=_from_ego(one.spot)) for one in intent.moves),
-            )
-        )
-    picks = [one.spot.landmark for one in intent.requests]
-    if any(pick is not None and pick.ordinal > 1 for pick in picks):
+        requests = (replace(one, spot=_from_ego(one.spot)) for one in intent.requests)
+        moves = (replace(one, spot=_from_ego(one.spot)) for one in intent.moves)
+        misreadings.append(replace(intent, requests=tuple(requests), moves=tuple(moves)))
+    if any(one.spot.landmark and one.spot.landmark.ordinal > 1 for one in intent.requests):
         requests = (replace(one, spot=_first(one.spot)) for one in intent.requests)
         misreadings.append(replace(intent, requests=tuple(requests)))
     if not misreadings or (intent.unmet and rng.random() > _ATTEMPT_SHARE):
@@ -91,11 +74,7 @@ def misread(intent: Intent, rng: random.Random) -> Intent:
 def too_far(scene: Scene, right: Modification) -> Modification:
     """Return the right modification, 8 m too far along the lanes."""
     route = EgoRoute.of(scene)
-    if route is None:
-        moved = tuple(put(agent, agent.x_m + 8.0, agent.y_m) for agent in right.added)
-    else:
-        moved = _shifted(right.added, route, 8.0)
-    return replace(right, added=moved)
+    return right if route is None else replace(right, added=_shifted(right.added, route, 8.0))
 
 
 def lay_straight(scene: Scene, right: Modification) -> Modification:
@@ -112,8 +91,8 @@ def lay_straight(scene: Scene, right: Modification) -> Modification:
 
 def bend(
     scene: Scene, right: Modification, rng: random.Random, spared: frozenset[str] = frozenset()
-) -> Bent:
-    """Return the right modification with a small inaccuracy and, mostly, one mistake.
+) -> tuple[Modification, str]:
+    """Return the modification with a small inaccuracy and, mostly, a mistake, and its name.
 
     Of the mistakes only those are drawn that make a difference here: a straight line is no
     mistake on a straight road.
@@ -126,7 +105,7 @@ def bend(
     """
     route = EgoRoute.of(scene)
     if route is None or not right.changed:
-        return Bent(modification=right)
+        return right, "none"
     shaky = _shifted(right.changed, route, rng.uniform(-1.5, 1.5))
     outcomes = {
         name: mistake(shaky, route, rng)
@@ -135,9 +114,9 @@ def bend(
     }
     possible = sorted(name for name, agents in outcomes.items() if _differs(agents, shaky))
     if not possible or rng.random() < _RIGHT_SHARE:
-        return Bent(modification=_with(right, shaky))
+        return _with(right, shaky), "none"
     name = rng.choice(possible)
-    return Bent(modification=_with(right, outcomes[name]), mistake=name)
+    return _with(right, outcomes[name]), name
 
 
 def straight_line(agents: Agents, route: EgoRoute, rng: random.Random | None = None) -> Agents:

@@ -8,25 +8,14 @@ Frame: ego frame.
 import json
 import math
 import re
+import struct
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 
 from augment.baselines.rule_placer import place
 from augment.errors import CannotPlace
-from augment.fake_llm import careless
-from augment.fake_llm.sight import (
-    Heard,
-    Intents,
-    NothingSeen,
-    Task,
-    agent_of,
-    instruction_in,
-    knows_nothing,
-    list_of,
-    read_conversation,
-    task_of,
-)
+from augment.fake_llm import careless, sight
 from augment.fake_llm.wire import Calls, ChatRequest
 from augment.geometry.frames import difference, wrap
 from augment.prompts.calls import TOOL
@@ -46,6 +35,7 @@ _VEHICLES = frozenset({AgentType.VEHICLE, AgentType.BUS})
 _RATINGS = ("compliance", "realism", "logical_consistency")
 
 Problem = dict[str, str]
+_Bend = Callable[[sight.Task, Modification, sight.Heard], Modification]
 Answer = tuple[str, Calls]
 """A text, native calls of functions, or both."""
 
@@ -62,24 +52,24 @@ class Character:
         never_stops: Whether it calls as long as it may, and longer.
     """
 
-    hear: Callable[[Task, Heard], Intent | None] = lambda task, _: task.intent
-    bend: Callable[[Task, Modification, Heard], Modification] = lambda task, right, _: right
-    spoil: Callable[[Task, str, Heard], str] = lambda task, text, _: text
-    judge: Callable[[Task], list[Problem]] = lambda task: problems_of(task)
+    hear: Callable[[sight.Task, sight.Heard], Intent | None] = lambda task, _: task.intent
+    bend: _Bend = lambda task, right, _: right
+    spoil: Callable[[sight.Task, str, sight.Heard], str] = lambda task, text, _: text
+    judge: Callable[[sight.Task], list[Problem]] = lambda task: problems_of(task)
     never_stops: bool = False
 
-    def answer(self, request: ChatRequest, intents: Intents = knows_nothing) -> Answer:
+    def answer(self, request: ChatRequest, intents: sight.Intents = sight.knows_nothing) -> Answer:
         """Answer from the request and the list of intents alone."""
-        heard = read_conversation(request)
+        heard = sight.read_conversation(request)
         if heard.role is ModelRole.VIEWER:
             return _describe_picture(request), ()
         try:
             if heard.role is ModelRole.READER:
-                intent = intents(instruction_in(request.messages))
+                intent = intents(sight.instruction_in(request.messages))
                 known = intent and _fenced("From my list:", intent_to_parts(intent))
                 return known or UNKNOWN, ()
-            task = task_of(request.messages, intents)
-        except NothingSeen:
+            task = sight.task_of(request.messages, intents)
+        except sight.NothingSeen:
             return SEES_NOTHING, ()
         if heard.role is ModelRole.MODIFIER:
             return self._modify(task, heard)
@@ -89,13 +79,13 @@ class Character:
             problems = self.judge(task)
             block = {"verdict": "feedback" if problems else "accept", "feedback": problems}
             return _fenced("I have weighed the answers.", block), ()
-        names = list(list_of(task.prompt, "Added agents"))[:6]
+        names = list(sight.list_of(task.prompt, "Added agents"))[:6]
         questions = [f"In which lane does {name} stand?" for name in names]
         questions += ["Do any two blue objects overlap?", "Is a blue object off the road?"]
         questions += ["Is the ego alone in its lane?"]
         return _fenced("I ask the viewer.", {"questions": questions[:8]}), ()
 
-    def _modify(self, task: Task, heard: Heard) -> Answer:
+    def _modify(self, task: sight.Task, heard: sight.Heard) -> Answer:
         if self.never_stops and (heard.may_call or heard.called):
             return _call(heard, [{"lane": "Lane1", "start": "lane", "distance_m": 1.0}])
         try:
@@ -127,7 +117,7 @@ def _rate(problems: list[Problem]) -> str:
     )
 
 
-def problems_of(task: Task) -> list[Problem]:
+def problems_of(task: sight.Task) -> list[Problem]:
     """Return what is wrong with the work in the task, by the stand-in's own placement.
 
     Nothing where it does not know what the wish asks for.
@@ -136,8 +126,8 @@ def problems_of(task: Task) -> list[Problem]:
         right = list(place(task.scene, task.intent).modification.added)
     except CannotPlace:
         return []
-    vectors = list_of(task.prompt, "Added agents").items()
-    added = [agent_of(name, vector[:8]) for name, vector in vectors]
+    vectors = sight.list_of(task.prompt, "Added agents").items()
+    added = [sight.agent_of(name, vector[:8]) for name, vector in vectors]
     if len(added) != len(right):
         said = f"{len(added)} agents were added, {len(right)} were asked for."
         return [_problem(said, "Count.")]
@@ -154,7 +144,7 @@ def problems_of(task: Task) -> list[Problem]:
 # --- Answers -----------------------------------------------------------------------------------
 
 
-def _write_answer(task: Task, modification: Modification, remark: str = "") -> str:
+def _write_answer(task: sight.Task, modification: Modification, remark: str = "") -> str:
     """Write the paper's five sections around a modification."""
     steps = [
         f"Step {number}: {agent.id} is at ({agent.x_m:.2f}, {agent.y_m:.2f}); the heading is "
@@ -201,10 +191,10 @@ def _fenced(words: str, block: object) -> str:
 
 def _describe_picture(request: ChatRequest) -> str:
     """Tell a viewer's questions what picture there is, and nothing that it can't see."""
-    sizes = [image.size_px for message in request.messages for image in message.images]
-    if not sizes:
+    pictures = [png for message in request.messages for png in message.images]
+    if not pictures:
         return "There is no picture."
-    width, height = sizes[-1]
+    width, height = struct.unpack_from(">II", pictures[-1], 16)  # behind the PNG's signature
     count = len(re.findall(r"^[0-9]+\. ", request.messages[-1].text, re.MULTILINE)) or 1
     lines = [f"1. The picture has {width} x {height} pixels; more I cannot see."]
     return "\n".join(lines + [f"{number}. cannot see" for number in range(2, count + 1)])
@@ -213,7 +203,7 @@ def _describe_picture(request: ChatRequest) -> str:
 # --- Placing and comparing ---------------------------------------------------------------------
 
 
-def _placed(task: Task, taken_for: Intent | None) -> Modification:
+def _placed(task: sight.Task, taken_for: Intent | None) -> Modification:
     """Place the wish as it was heard; what can't be placed is heard rightly."""
     if taken_for != task.intent:
         with suppress(CannotPlace):
@@ -247,7 +237,7 @@ def _distance_m(one: TrafficAgent, other: TrafficAgent) -> float:
 # --- Calls of the function ---------------------------------------------------------------------
 
 
-def _call(heard: Heard, wanted: Sequence[dict[str, object]]) -> Answer:
+def _call(heard: sight.Heard, wanted: Sequence[dict[str, object]]) -> Answer:
     calls = [(TOOL, json.dumps(arguments)) for arguments in wanted]
     if heard.is_native:
         return "", tuple(calls)
@@ -305,12 +295,12 @@ def _with_results(
 # --- The characters ----------------------------------------------------------------------------
 
 
-def _all_told(task: Task, heard: Heard) -> str:
+def _all_told(task: sight.Task, heard: sight.Heard) -> str:
     """Return the prompt and all feedback: a new round is a new throw of the dice."""
     return "\n".join([task.prompt, *heard.feedback])
 
 
-def _mishear(task: Task, heard: Heard) -> Intent | None:
+def _mishear(task: sight.Task, heard: sight.Heard) -> Intent | None:
     if task.intent is None:
         return None
     return careless.misread(
@@ -318,33 +308,32 @@ def _mishear(task: Task, heard: Heard) -> Intent | None:
     )
 
 
-def _bend(task: Task, right: Modification, heard: Heard) -> Modification:
+def _bend(task: sight.Task, right: Modification, heard: sight.Heard) -> Modification:
     rng = careless.dice(_all_told(task, heard))
     if careless.is_unreadable(rng):
         return right
-    if heard.called or heard.may_call:
-        return careless.bend(task.scene, right, rng, careless.SPARED_BY_TOOL).modification
-    laid = careless.lay_straight(task.scene, right)
-    return careless.bend(task.scene, laid, rng).modification
+    has_tool = heard.called or heard.may_call
+    shown = right if has_tool else careless.lay_straight(task.scene, right)
+    spared = careless.SPARED_BY_TOOL if has_tool else frozenset()
+    return careless.bend(task.scene, shown, rng, spared)[0]
 
 
-def _mumble(task: Task, text: str, heard: Heard) -> str:
+def _mumble(task: sight.Task, text: str, heard: sight.Heard) -> str:
     rng = careless.dice(_all_told(task, heard))
     return text.partition("```")[0] if careless.is_unreadable(rng) else text
 
 
-def _overlook(task: Task) -> list[Problem]:
+def _overlook(task: sight.Task) -> list[Problem]:
     """Find all problems or, as often, none."""
     return problems_of(task) if careless.dice(task.prompt).random() < 0.5 else []
 
 
-def _learn(task: Task, right: Modification, heard: Heard) -> Modification:
-    """Place too far at first, right after feedback."""
-    return right if heard.feedback else careless.too_far(task.scene, right)
-
-
 GOOD = Character()
 CARELESS = Character(hear=_mishear, bend=_bend, spoil=_mumble, judge=_overlook)
-LEARNING = Character(bend=_learn)
+LEARNING = Character(
+    bend=lambda task, right, heard: (
+        right if heard.feedback else careless.too_far(task.scene, right)
+    )
+)
 STUBBORN = Character(bend=lambda task, right, _: careless.too_far(task.scene, right))
 LOOPING = Character(never_stops=True)

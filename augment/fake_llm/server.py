@@ -14,20 +14,8 @@ from dataclasses import replace
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any
 
-from augment.fake_llm import careless, playing
+from augment.fake_llm import careless, playing, wire
 from augment.fake_llm.sight import Intents, knows_nothing
-from augment.fake_llm.wire import (
-    BadRequest,
-    Calls,
-    ChatRequest,
-    Response,
-    as_json,
-    chat_request,
-    completion,
-    error,
-    prompt_tokens_of,
-    usage,
-)
 
 WINDOW_TOKENS = 2048
 """The context window of `fake-cuts-context`."""
@@ -78,7 +66,7 @@ class FakeServer(ThreadingHTTPServer):
         self.shutdown()
         self.server_close()
 
-    def is_first(self, request: ChatRequest) -> bool:
+    def is_first(self, request: wire.ChatRequest) -> bool:
         """Return whether this very request comes for the first time."""
         key = request.model_dump_json()
         with self._lock:
@@ -116,34 +104,38 @@ class _Handler(BaseHTTPRequestHandler):
         """List the models."""
         models = [{"id": name, "object": "model", "owned_by": "fake"} for name in MODELS]
         is_list = self.path.rstrip("/") == "/v1/models"
-        self._send(as_json({"object": "list", "data": models}) if is_list else self._no_path())
+        self._send(
+            wire.as_json({"object": "list", "data": models}) if is_list else self._no_path()
+        )
 
     def do_POST(self) -> None:
         """Answer a conversation."""
         length = self.headers.get("Content-Length", "")
         if not length.isdecimal() or int(length) > _LONGEST_BODY:
             self.close_connection = True
-            self._send(error(411, "Content-Length is missing or too large"))
+            self._send(wire.error(411, "Content-Length is missing or too large"))
             return
         body = self.rfile.read(int(length))
         if self.path != "/v1/chat/completions":
             self._send(self._no_path())
             return
         try:
-            request = chat_request(body)
-        except BadRequest as refused:
-            self._send(error(400, str(refused), param=refused.param))
+            request = wire.chat_request(body)
+        except wire.BadRequest as refused:
+            self._send(wire.error(400, str(refused), param=refused.param))
             return
         self._send(MODELS.get(request.model, _unknown)(request, self.server))
 
     def log_message(self, format: str, *args: object) -> None:
         """Stay quiet: a request may hold what nobody wants in a log."""
 
-    def _no_path(self) -> Response:
+    def _no_path(self) -> wire.Response:
         shown = json.dumps(self.path[:80])
-        return error(404, f"There is no {shown}; POST to /v1/chat/completions", code="not_found")
+        return wire.error(
+            404, f"There is no {shown}; POST to /v1/chat/completions", code="not_found"
+        )
 
-    def _send(self, response: Response) -> None:
+    def _send(self, response: wire.Response) -> None:
         self.server.stopping.wait(max(self.server.latency_s, response.wait_s))
         try:
             self.send_response(response.status)
@@ -161,23 +153,23 @@ class _Handler(BaseHTTPRequestHandler):
 
 # --- The models --------------------------------------------------------------------------------
 
-Behaviour = Callable[[ChatRequest, FakeServer], Response]
+Behaviour = Callable[[wire.ChatRequest, FakeServer], wire.Response]
 
 
-def _unknown(request: ChatRequest, server: FakeServer) -> Response:
+def _unknown(request: wire.ChatRequest, server: FakeServer) -> wire.Response:
     message = f"The model {request.model!r} does not exist. Known: {', '.join(sorted(MODELS))}."
-    return error(404, message, param="model", code="model_not_found")
+    return wire.error(404, message, param="model", code="model_not_found")
 
 
 def _as(character: playing.Character) -> Behaviour:
-    def played(request: ChatRequest, server: FakeServer) -> Response:
+    def played(request: wire.ChatRequest, server: FakeServer) -> wire.Response:
         text, calls = _probed(request) or character.answer(request, server.intents)
-        return as_json(completion(request, text or None, calls=calls))
+        return wire.as_json(wire.completion(request, text or None, calls=calls))
 
     return played
 
 
-def _probed(request: ChatRequest) -> tuple[str, Calls] | None:
+def _probed(request: wire.ChatRequest) -> tuple[str, wire.Calls] | None:
     """Answer a question of a probe; None where the request is none."""
     message = request.messages[-1]
     text = message.text
@@ -203,54 +195,54 @@ def _probed(request: ChatRequest) -> tuple[str, Calls] | None:
 _good = _as(playing.GOOD)
 
 
-def _no_vision(request: ChatRequest, server: FakeServer) -> Response:
+def _no_vision(request: wire.ChatRequest, server: FakeServer) -> wire.Response:
     if any(message.images for message in request.messages):
-        return error(400, "This model does not support image input.", param="messages")
+        return wire.error(400, "This model does not support image input.", param="messages")
     return _good(request, server)
 
 
-def _cuts_context(request: ChatRequest, server: FakeServer) -> Response:
+def _cuts_context(request: wire.ChatRequest, server: FakeServer) -> wire.Response:
     """Answer as servers do that keep to their window without a word: the front is gone."""
-    if prompt_tokens_of(request) <= WINDOW_TOKENS:
+    if wire.prompt_tokens_of(request) <= WINDOW_TOKENS:
         return _good(request, server)
     last = request.messages[-1]
     kept = last.model_copy(update={"content": last.text[-_KEPT_CHARACTERS:]})
     cut = _good(request.model_copy(update={"messages": [kept]}), server)
-    return as_json(json.loads(cut.body) | {"usage": usage(WINDOW_TOKENS, 9)})
+    return wire.as_json(json.loads(cut.body) | {"usage": wire.usage(WINDOW_TOKENS, 9)})
 
 
-def _good_but(change: Callable[[Response, FakeServer], Response]) -> Behaviour:
+def _good_but(change: Callable[[wire.Response, FakeServer], wire.Response]) -> Behaviour:
     """Answer well and then spoil the response."""
     return lambda request, server: change(_good(request, server), server)
 
 
-def _halved(whole: Response, server: FakeServer) -> Response:
+def _halved(whole: wire.Response, server: FakeServer) -> wire.Response:
     return replace(whole, body=whole.body[: len(whole.body) // 2])
 
 
-def _dropped(whole: Response, server: FakeServer) -> Response:
+def _dropped(whole: wire.Response, server: FakeServer) -> wire.Response:
     return replace(whole, cut_at=len(whole.body) // 2)
 
 
-def _without_usage(whole: Response, server: FakeServer) -> Response:
+def _without_usage(whole: wire.Response, server: FakeServer) -> wire.Response:
     document = json.loads(whole.body)
     del document["usage"]
-    return as_json(document)
+    return wire.as_json(document)
 
 
-def _cut_off(request: ChatRequest, server: FakeServer) -> Response:
+def _cut_off(request: wire.ChatRequest, server: FakeServer) -> wire.Response:
     text, _ = playing.GOOD.answer(request, server.intents)
     middle = text.find("```json") + len("```json") + 40
-    return as_json(completion(request, text[:middle], finish_reason="length"))
+    return wire.as_json(wire.completion(request, text[:middle], finish_reason="length"))
 
 
-def _garbage(request: ChatRequest, server: FakeServer) -> Response:
+def _garbage(request: wire.ChatRequest, server: FakeServer) -> wire.Response:
     rng = careless.dice(request.model_dump_json())
     alphabet = '{}[]",:0123456789.-eE\n\\`#*abcXYZ \u00e9\u2028\x00add"move"remove"call"'
-    return as_json(completion(request, "".join(rng.choices(alphabet, k=2000))))
+    return wire.as_json(wire.completion(request, "".join(rng.choices(alphabet, k=2000))))
 
 
-def _always(response: Response) -> Behaviour:
+def _always(response: wire.Response) -> Behaviour:
     """Give the same response to every request."""
     return lambda request, server: response
 
@@ -259,18 +251,18 @@ def _complete(
     text: str | None, changes: dict[str, object] | None = None, **more: str
 ) -> Behaviour:
     """Complete every request with that text."""
-    return lambda request, server: as_json(
-        completion(request, text, **more) | (changes or {})  # type: ignore[arg-type]
+    return lambda request, server: wire.as_json(
+        wire.completion(request, text, **more) | (changes or {})  # type: ignore[arg-type]
     )
 
 
 def _too_many(retry_after: str) -> Behaviour:
     headers = {"Retry-After": retry_after}
     message, code = "Rate limit reached.", "rate_limit_exceeded"
-    return _always(error(429, message, kind="requests", code=code, headers=headers))
+    return _always(wire.error(429, message, kind="requests", code=code, headers=headers))
 
 
-_500 = _always(error(500, "The server had an error.", kind="server_error"))
+_500 = _always(wire.error(500, "The server had an error.", kind="server_error"))
 _QUOTA, _TOO_LONG = "insufficient_quota", "context_length_exceeded"
 _LIST_ERROR = {"error": {"code": 400, "message": "Invalid value.", "status": "INVALID_ARGUMENT"}}
 
@@ -290,14 +282,14 @@ MODELS: dict[str, Behaviour] = {
     "fake-429": _too_many("1"),
     "fake-429-long": _too_many("600"),
     "fake-quota": _always(
-        error(429, "You exceeded your current quota.", kind=_QUOTA, code=_QUOTA)
+        wire.error(429, "You exceeded your current quota.", kind=_QUOTA, code=_QUOTA)
     ),
     "fake-context": _always(
-        error(400, "This model's maximum context length is 4096 tokens.", code=_TOO_LONG)
+        wire.error(400, "This model's maximum context length is 4096 tokens.", code=_TOO_LONG)
     ),
-    "fake-list-error": _always(as_json([_LIST_ERROR], status=400)),
+    "fake-list-error": _always(wire.as_json([_LIST_ERROR], status=400)),
     "fake-html": _always(
-        Response(body=b"<html><body>Sign in</body></html>", content_type="text/html")
+        wire.Response(body=b"<html><body>Sign in</body></html>", content_type="text/html")
     ),
     "fake-slow": _good_but(lambda whole, server: replace(whole, wait_s=server.slow_s)),
     "fake-broken-json": _good_but(_halved),

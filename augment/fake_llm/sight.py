@@ -21,18 +21,7 @@ from augment.geometry.frames import difference
 from augment.geometry.polyline import Polyline
 from augment.prompts.fill import QUOTE, read_text
 from augment.prompts.vectors import curve_from
-from augment.scene.entities import (
-    AgentType,
-    Area,
-    AreaKind,
-    Lane,
-    LaneConnector,
-    Origin,
-    Scene,
-    TrafficAgent,
-    TrafficSide,
-    TurnType,
-)
+from augment.scene import entities
 from augment.scene.intent import Intent
 from augment.variants.respondents import ModelRole
 
@@ -64,7 +53,7 @@ class Task:
     """
 
     prompt: str
-    scene: Scene
+    scene: entities.Scene
     instruction: str
     first_new: int
     intent: Intent | None = None
@@ -174,12 +163,12 @@ def list_of(text: str, title: str) -> dict[str, list[Any]]:
     return dict(vectors)
 
 
-def agent_of(name: str, vector: Sequence[Any]) -> TrafficAgent:
+def agent_of(name: str, vector: Sequence[Any]) -> entities.TrafficAgent:
     """Return the agent that a vector of the prompt describes."""
     kind, x, y, heading, width, length, speed, lane = vector
-    return TrafficAgent(
+    return entities.TrafficAgent(
         id=name,
-        type=AgentType(kind),
+        type=entities.AgentType(kind),
         x_m=float(x),
         y_m=float(y),
         heading_rad=float(heading),
@@ -210,33 +199,39 @@ def _task(text: str) -> Task:
     if side is None or first_new is None:
         raise NothingSeen("the side of the road or the first new agent is not named")
     lanes = tuple(
-        Lane(id=name, centerline=_line(vector[-1]), width_m=float(vector[3]))
+        entities.Lane(id=name, centerline=_line(vector[-1]), width_m=float(vector[3]))
         for name, vector in list_of(text, "Lanes").items()
     )
     connectors = tuple(
-        LaneConnector(
+        entities.LaneConnector(
             id=name,
             from_lane=before,
             to_lane=after,
             centerline=_line(points),
             width_m=float(width),
-            turn_type=TurnType(turn),
+            turn_type=entities.TurnType(turn),
         )
         for name, (before, after, _, turn, width, _, points) in list_of(
             text, "Lane connectors"
         ).items()
     )
     areas = tuple(
-        Area(id=name, kind=AreaKind(kind), boundary_m=tuple((float(x), float(y)) for x, y in ring))
+        entities.Area(
+            id=name,
+            kind=entities.AreaKind(kind),
+            boundary_m=tuple((float(x), float(y)) for x, y in ring),
+        )
         for name, (kind, ring) in list_of(text, "Areas").items()
     )
-    scene = Scene(
+    scene = entities.Scene(
         name="seen",
-        ego=next(agent for agent in agents if agent.type is AgentType.EGO_VEHICLE),
-        traffic_side=TrafficSide(side.group(1)),
-        origin=Origin(frame="prompt", x_m=0.0, y_m=0.0, heading_rad=0.0),
+        ego=next(agent for agent in agents if agent.type is entities.AgentType.EGO_VEHICLE),
+        traffic_side=entities.TrafficSide(side.group(1)),
+        origin=entities.Origin(frame="prompt", x_m=0.0, y_m=0.0, heading_rad=0.0),
         provenance="read from a prompt",
-        agents=tuple(agent for agent in agents if agent.type is not AgentType.EGO_VEHICLE),
+        agents=tuple(
+            agent for agent in agents if agent.type is not entities.AgentType.EGO_VEHICLE
+        ),
         lanes=tuple(_joined(lane, lanes) for lane in lanes),
         connectors=connectors,
         areas=areas,
@@ -272,7 +267,7 @@ def _smooth(points: NDArray[np.float64]) -> Polyline:
     return Polyline(CubicSpline(stations, coarse.points_m)(at))
 
 
-def _joined(lane: Lane, lanes: tuple[Lane, ...]) -> Lane:
+def _joined(lane: entities.Lane, lanes: tuple[entities.Lane, ...]) -> entities.Lane:
     """Return the lane with its neighbours and successors, which no list of the prompt names."""
     line = lane.centerline
     middle, end = line.pose_at(line.length_m / 2.0), line.points_m[-1]

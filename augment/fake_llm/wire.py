@@ -4,15 +4,13 @@ Stricter than most servers on purpose: a client that passes here sends nothing o
 """
 
 import base64
-import binascii
 import hashlib
 import json
-import struct
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from augment.llm.costs import least_tokens
 
@@ -20,7 +18,6 @@ Calls = tuple[tuple[str, str], ...]
 """Calls of functions: name and arguments as written."""
 
 _PNG_URL = "data:image/png;base64,"
-_PNG_START, _PNG_END = b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR", b"IEND\xaeB`\x82"
 _CHARACTERS_PER_TOKEN = 4
 
 
@@ -41,69 +38,31 @@ class _Strict(BaseModel):
     model_config = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False, frozen=True)
 
 
-class TextPart(_Strict):
-    """A piece of text in a message."""
-
-    type: Literal["text"]
-    text: str
-
-
-class ImageUrl(_Strict):
-    """A PNG as a data URL."""
-
-    url: str
-
-    @field_validator("url")
-    @classmethod
-    def _is_png(cls, url: str) -> str:
-        try:
-            png = base64.b64decode(url.removeprefix(_PNG_URL), validate=True)
-        except binascii.Error:
-            raise ValueError("only data:image/png;base64 is understood") from None
-        if not (png.startswith(_PNG_START) and png.endswith(_PNG_END)):
-            raise ValueError("the image is no whole PNG")
-        return url
-
-    @property
-    def size_px(self) -> tuple[int, int]:
-        """Width and height."""
-        width, height = struct.unpack_from(
-            ">II", base64.b64decode(self.url.removeprefix(_PNG_URL)), len(_PNG_START)
-        )
-        return width, height
-
-
-class ImagePart(_Strict):
-    """A picture in a message."""
-
-    type: Literal["image_url"]
-    image_url: ImageUrl
-
-
-Part = Annotated[TextPart | ImagePart, Field(discriminator="type")]
-
-
 class SpokenMessage(_Strict):
     """One turn of the conversation."""
 
     role: Literal["system", "developer", "user", "assistant", "tool"]
-    content: str | Annotated[list[Part], Field(min_length=1)] | None
+    content: str | Annotated[list[dict[str, Any]], Field(min_length=1)] | None
     tool_calls: Annotated[list[dict[str, Any]], Field(min_length=1)] | None = None
     tool_call_id: str | None = None
 
     @property
-    def text(self) -> str:
-        """All text of the turn."""
-        if isinstance(self.content, str):
+    def parts(self) -> list[dict[str, Any]]:
+        """Texts and pictures of the turn."""
+        if isinstance(self.content, list):
             return self.content
-        parts = self.content or []
-        return "\n".join(part.text for part in parts if isinstance(part, TextPart))
+        return [{"type": "text", "text": self.content or ""}]
 
     @property
-    def images(self) -> list[ImageUrl]:
-        """All pictures of the turn."""
-        parts = self.content if isinstance(self.content, list) else []
-        return [part.image_url for part in parts if isinstance(part, ImagePart)]
+    def text(self) -> str:
+        """All text of the turn."""
+        return "\n".join(part["text"] for part in self.parts if part["type"] == "text")
+
+    @property
+    def images(self) -> list[bytes]:
+        """All pictures of the turn, PNG."""
+        urls = [part["image_url"]["url"] for part in self.parts if part["type"] == "image_url"]
+        return [base64.b64decode(url.removeprefix(_PNG_URL)) for url in urls]
 
 
 class ChatRequest(_Strict):
@@ -240,9 +199,9 @@ def _check_turns(request: ChatRequest) -> None:
     open_calls: list[str] = []
     for index, message in enumerate(request.messages):
         is_tool, calls = message.role == "tool", message.tool_calls or []
-        has_text = bool(message.text.strip())
         faults = {
-            "content": not (has_text or calls)
+            "content": not all(map(_is_part, message.parts))
+            or not (message.text.strip() or calls)
             or (message.role != "user" and isinstance(message.content, list)),
             "role": bool(open_calls) and not is_tool,
             "tool_calls": bool(calls and message.role != "assistant")
@@ -255,6 +214,15 @@ def _check_turns(request: ChatRequest) -> None:
             open_calls.remove(str(message.tool_call_id))
         open_calls += [call["id"] for call in calls]
     _refuse({"messages": bool(open_calls)})
+
+
+def _is_part(part: dict[str, Any]) -> bool:
+    match part:
+        case {"type": "text", "text": str(), **rest}:
+            return not rest
+        case {"type": "image_url", "image_url": {"url": str() as url, **more}, **rest}:
+            return url.startswith(_PNG_URL) and not more and not rest
+    return False
 
 
 def _signed(seed: str, name: str, arguments: str) -> dict[str, object]:

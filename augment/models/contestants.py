@@ -3,7 +3,6 @@
 import re
 import uuid
 
-from django.conf import settings
 from django.core.exceptions import ValidationError
 from django.core.validators import MinValueValidator
 from django.db import models
@@ -12,7 +11,7 @@ from django.db.models import Q
 from augment.errors import InvalidDocument
 from augment.llm.addresses import check_base_url
 from augment.models.scenes import SLUG_HELP
-from augment.models.work import Work
+from augment.models.work import Work, account_column
 
 NOT_A_VARIABLE = "the name of an environment variable is needed, not the key"
 
@@ -288,9 +287,7 @@ class Probe(Work):
     model = models.ForeignKey(EndpointModel, on_delete=models.CASCADE, related_name="probes")
     state = models.CharField(max_length=20, choices=State.choices, default=State.QUEUED)
     findings = models.JSONField(default=list, help_text="one a question, as far as they are asked")
-    asked_by = models.ForeignKey(
-        settings.AUTH_USER_MODEL, null=True, blank=True, on_delete=models.PROTECT, related_name="+"
-    )
+    asked_by = account_column()
 
     class Meta:
         ordering = ("-created_at", "-pk")

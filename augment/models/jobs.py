@@ -3,14 +3,13 @@
 import uuid
 from decimal import Decimal
 
-from django.conf import settings
 from django.db import models
 from django.db.models import F, Q
 
 from augment.llm.costs import usd_of
 from augment.models.contestants import Contestant, Endpoint
 from augment.models.scenes import Scenario
-from augment.models.work import Work
+from augment.models.work import Work, account_column
 
 
 class GenerationJob(models.Model):
@@ -36,13 +35,7 @@ class GenerationJob(models.Model):
     state = models.CharField(max_length=20, choices=State.choices, default=State.RUNNING)
     contestants = models.ManyToManyField(Contestant, related_name="jobs")
     scenarios = models.ManyToManyField(Scenario, related_name="jobs")
-    launched_by = models.ForeignKey(
-        settings.AUTH_USER_MODEL,
-        null=True,
-        blank=True,
-        on_delete=models.PROTECT,
-        related_name="generation_jobs",
-    )
+    launched_by = account_column(related_name="generation_jobs")
     samples = models.PositiveSmallIntegerField(
         default=1, help_text="so often every contestant is asked about every scenario"
     )
@@ -142,13 +135,8 @@ class Augmentation(Work):
         related_name="corrections",
         help_text="what a person corrected by it",
     )
-    made_by = models.ForeignKey(
-        settings.AUTH_USER_MODEL,
-        null=True,
-        blank=True,
-        on_delete=models.PROTECT,
-        related_name="+",
-        help_text="whose hand made the modification; null where no person did",
+    made_by = account_column(
+        help_text="whose hand made the modification; null where no person did"
     )
     image = models.CharField(max_length=120, blank=True, help_text="name in the media storage")
     earlier_images = models.JSONField(
@@ -242,9 +230,7 @@ class IntentReading(Work):
     cap_nano_usd = models.PositiveBigIntegerField(null=True, blank=True)
     cap_calls = models.PositiveIntegerField(null=True, blank=True)
     cap_tokens = models.PositiveBigIntegerField(null=True, blank=True)
-    asked_by = models.ForeignKey(
-        settings.AUTH_USER_MODEL, null=True, blank=True, on_delete=models.PROTECT, related_name="+"
-    )
+    asked_by = account_column()
 
     class Meta:
         ordering = ("-pk",)

@@ -2,11 +2,10 @@
 
 import uuid
 
-from django.conf import settings
 from django.db import models
 from django.db.models import Q
 
-from augment.models.work import Work
+from augment.models.work import Work, account_column
 from augment.scene.entities import CatalogueSet, ScenarioType, TrafficDensity, TurnType
 from augment.scene.intent import IntentOrigin
 
@@ -186,13 +185,7 @@ class SceneUpload(Work):
         default=list, blank=True, help_text="parts with moments, as services.scenarios.uploads"
     )
     is_cut = models.BooleanField(default=False, help_text="it holds more than is offered")
-    uploaded_by = models.ForeignKey(
-        settings.AUTH_USER_MODEL,
-        null=True,
-        blank=True,
-        on_delete=models.SET_NULL,
-        related_name="+",
-    )
+    uploaded_by = account_column(on_delete=models.SET_NULL)
 
     class Meta:
         ordering = ("-pk",)
@@ -231,13 +224,7 @@ class UploadMoment(Work):
     scene = models.ForeignKey(
         BaseScene, null=True, blank=True, on_delete=models.SET_NULL, related_name="+"
     )
-    asked_by = models.ForeignKey(
-        settings.AUTH_USER_MODEL,
-        null=True,
-        blank=True,
-        on_delete=models.SET_NULL,
-        related_name="+",
-    )
+    asked_by = account_column(on_delete=models.SET_NULL)
 
     class Meta:
         ordering = ("pk",)

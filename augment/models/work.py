@@ -2,7 +2,7 @@
 
 import uuid
 from collections.abc import Iterable, Mapping
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from django.apps import AppConfig
 from django.conf import settings
@@ -12,8 +12,25 @@ from django.db.models import Model
 from django.db.models.signals import post_migrate, pre_migrate
 from django.dispatch import receiver
 
+if TYPE_CHECKING:
+    from django.contrib.auth.models import User
+
 FAILED = "failed"
 """The state of work that the machinery could not bring to another outcome; each kind has it."""
+
+
+def account_column(
+    *, related_name: str = "+", on_delete: Any = models.PROTECT, help_text: str = ""
+) -> "models.ForeignKey[User | None, User | None]":
+    """Return a column for the account that did something; null for the machine."""
+    return models.ForeignKey(
+        settings.AUTH_USER_MODEL,
+        null=True,
+        blank=True,
+        on_delete=on_delete,
+        related_name=related_name,
+        help_text=help_text,
+    )
 
 
 class Work(models.Model):
@@ -186,14 +203,7 @@ _MAKING = {"sqlite": _for_sqlite, "postgresql": _for_postgresql}
 class Event(AppendOnly):
     """One line of the append-only log: who did what to which object, when, before and after."""
 
-    actor = models.ForeignKey(
-        settings.AUTH_USER_MODEL,
-        null=True,
-        blank=True,
-        on_delete=models.PROTECT,
-        related_name="events",
-        help_text="null for the machine itself",
-    )
+    actor = account_column(related_name="events", help_text="null for the machine itself")
     verb = models.CharField(max_length=60)
     object_kind = models.CharField(max_length=40)
     object_code = models.CharField(max_length=64)

@@ -15,13 +15,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 from augment.errors import ReplyUnreadable
-from augment.prompts.blocks import (
-    LONGEST_ANSWER,
-    names_changes,
-    strict_json,
-    strict_json_at,
-    without_thoughts,
-)
+from augment.prompts import blocks
 
 TOOL = "pose_on_lane"
 PARAMETERS = ("lane", "start", "distance_m", "lateral_m", "object")
@@ -64,10 +58,10 @@ def calls_in(answer: str, *, is_cut_off: bool = False) -> tuple[WrittenCall, ...
         is_cut_off: Whether it hit its length limit: the block of changes may be missing, so
             only the form that was asked for counts.
     """
-    if len(answer) > LONGEST_ANSWER:
+    if len(answer) > blocks.LONGEST_ANSWER:
         return ()
-    text = without_thoughts(answer)
-    is_final = is_cut_off or names_changes(text)
+    text = blocks.without_thoughts(answer)
+    is_final = is_cut_off or blocks.names_changes(text)
     calls = tuple(_calls(text, exact_alone=is_final))
     if not calls and not is_final and TOOL in text:
         problem = f"{TOOL} is named and not called; a call is one line of the form {_FORM}"
@@ -77,10 +71,12 @@ def calls_in(answer: str, *, is_cut_off: bool = False) -> tuple[WrittenCall, ...
 
 def read_arguments(written: str) -> WrittenCall:
     """Read the arguments of a native call, a JSON text of their own."""
-    if len(written) > LONGEST_ANSWER:
-        return WrittenCall(problem=f"the arguments are longer than {LONGEST_ANSWER} characters")
+    if len(written) > blocks.LONGEST_ANSWER:
+        return WrittenCall(
+            problem=f"the arguments are longer than {blocks.LONGEST_ANSWER} characters"
+        )
     try:
-        return WrittenCall(arguments=strict_json(written))
+        return WrittenCall(arguments=blocks.strict_json(written))
     except ReplyUnreadable as broken:
         return WrittenCall(problem=f"the arguments are not JSON: {broken.problems[0]}")
 
@@ -101,7 +97,7 @@ def _calls(text: str, *, exact_alone: bool) -> Iterator[WrittenCall]:
         if looked_at > MOST_LOOKED_AT:
             return
         try:
-            written, end = strict_json_at(text, start)
+            written, end = blocks.strict_json_at(text, start)
         except ReplyUnreadable as broken:
             fault = broken.problems[0].replace("the JSON block", "the line")
             yield WrittenCall(problem=f"a call is one line of the form {_FORM}; {fault}")

@@ -38,16 +38,7 @@ _Rating = Annotated[int, Field(ge=1, le=5)]
 
 class _Agent(Strict):
     id: _Id
-    type: Literal[
-        "VEHICLE",
-        "BUS",
-        "BICYCLE",
-        "PEDESTRIAN",
-        "TRAFFIC_CONE",
-        "BARRIER",
-        "CONSTRUCTION_SIGN",
-        "GENERIC_OBJECT",
-    ]
+    type: Annotated[AgentType, Field(strict=False)]
     x_m: float
     y_m: float
     heading_rad: float = Field(ge=-2.0 * math.pi, le=2.0 * math.pi)
@@ -160,6 +151,8 @@ def read_reply(answer: str, scene: Scene, *, radius_m: float = DEFAULT_RADIUS_M)
             problems.append(f"{agent.id}: its lane is none of the scene's; null means none")
         if agent.walk_to is not None and agent.type != AgentType.PEDESTRIAN:
             problems.append(f"{agent.id}: only a PEDESTRIAN has walk_to")
+        if agent.type is AgentType.EGO_VEHICLE:
+            problems.append(f"{agent.id}: nobody else is an EGO_VEHICLE")
     if problems:
         raise ReplyUnreadable(problems[:_MOST_PROBLEMS])
     modification = _modification(block, scene, names)
@@ -284,14 +277,8 @@ def _modification(block: _Block, scene: Scene, names: ShortNames) -> Modificatio
 
 def _agent(agent: _Agent, names: ShortNames) -> TrafficAgent:
     return TrafficAgent(
-        id=agent.id,
-        type=AgentType(agent.type),
-        x_m=agent.x_m,
-        y_m=agent.y_m,
+        **agent.model_dump(exclude={"heading_rad", "lane", "walk_to"}),
         heading_rad=wrap(agent.heading_rad),
-        width_m=agent.width_m,
-        length_m=agent.length_m,
-        speed_mps=agent.speed_mps,
         lane_id=None if agent.lane is None else names.lane_ids[agent.lane],
         walk_to_m=None if agent.walk_to is None else (agent.walk_to[0], agent.walk_to[1]),
     )

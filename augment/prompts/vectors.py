@@ -26,15 +26,8 @@ from augment.geometry.bezier import CubicBezier, travel_pose
 from augment.geometry.frames import Pose
 from augment.geometry.polyline import Projection
 from augment.prompts.extent import boundary_near, extent_of, shown_spans
+from augment.scene import entities
 from augment.scene.bezier_lanes import LanePiece, bezier_lane, piece_ids, straight_curve
-from augment.scene.entities import (
-    Lane,
-    Modification,
-    Scene,
-    TrafficAgent,
-    TrafficDensity,
-    TurnType,
-)
 from augment.scene.lane_graph import AnyLane, LaneGraph
 
 SPACING_M = 5.0
@@ -83,7 +76,7 @@ class ShortNames:
         return f"Agent{1 + max(_number_of(short) for short in self.agents.values())}"
 
 
-def short_names(scene: Scene) -> ShortNames:
+def short_names(scene: entities.Scene) -> ShortNames:
     """Return the short forms for everything in the scene; ids that are short already stay."""
     return ShortNames(
         agents=_shorten((agent.id for agent in scene.everyone), "Agent"),
@@ -139,7 +132,7 @@ class LaneCurve:
         return piece_ids(self.id, len(self.lane))
 
 
-def lane_curves(scene: Scene, names: ShortNames, radius_m: float) -> dict[str, LaneCurve]:
+def lane_curves(scene: entities.Scene, names: ShortNames, radius_m: float) -> dict[str, LaneCurve]:
     """Return all lanes and connectors that a prompt shows, by short id, in the scene's order."""
     graph = LaneGraph(scene)
     spans = shown_spans(scene, radius_m)
@@ -187,22 +180,25 @@ def curve_from(points: Sequence[Sequence[float]]) -> CubicBezier:
 
 
 def scene_text(
-    scene: Scene, *, radius_m: float = DEFAULT_RADIUS_M, lanes: LaneFormat = LaneFormat.POLYLINE
+    scene: entities.Scene,
+    *,
+    radius_m: float = DEFAULT_RADIUS_M,
+    lanes: LaneFormat = LaneFormat.POLYLINE,
 ) -> str:
     """Write the four lists under their headings, and what the lists can't say."""
     names, density, goal = short_names(scene), scene.options.density, scene.options.goal
     parts = [_list_text(*entry) for entry in scene_vectors(scene, radius_m, lanes).items()]
     parts.append(f"Traffic drives on the {scene.traffic_side.value}-hand side of the road.")
-    if density is not TrafficDensity.NONE:
+    if density is not entities.TrafficDensity.NONE:
         parts.append(f"The traffic around the ego has a {density} density.")
     if goal is not None:
-        way = "goes straight on" if goal is TurnType.STRAIGHT else f"turns {goal}"
+        way = "goes straight on" if goal is entities.TurnType.STRAIGHT else f"turns {goal}"
         parts.append(f"The ego's goal: its way {way} where the lanes first part.")
     parts.append(f"The first new agent is {names.next_agent}.")
     return "\n\n".join(parts)
 
 
-def changes_text(scene: Scene, modification: Modification) -> str:
+def changes_text(scene: entities.Scene, modification: entities.Modification) -> str:
     """Write what was added, moved and removed, as three lists under their headings."""
     names = short_names(scene)
     added = {agent.id: _agent_vector(agent, names) for agent in modification.added}
@@ -218,7 +214,7 @@ def changes_text(scene: Scene, modification: Modification) -> str:
 
 
 def scene_vectors(
-    scene: Scene, radius_m: float, lanes: LaneFormat = LaneFormat.POLYLINE
+    scene: entities.Scene, radius_m: float, lanes: LaneFormat = LaneFormat.POLYLINE
 ) -> dict[str, dict[str, Vector]]:
     """Return the four lists by heading: each entity's attributes by its short id.
 
@@ -235,7 +231,7 @@ def scene_vectors(
         line = lane.centerline.between(*spans[lane.id])
         short = names.lanes[lane.id]
         facts: Vector
-        if isinstance(lane, Lane):
+        if isinstance(lane, entities.Lane):
             heading_rad = line.heading_at(line.project(0.0, 0.0).s_m)
             facts = [_number_of(short), compass(heading_rad), _relative(heading_rad)]
         else:
@@ -246,7 +242,7 @@ def scene_vectors(
             coordinates: object = control_points(bezier_lane(line))
         else:
             coordinates = _points(line.resampled(SPACING_M).points_m)
-        kind = "Lanes" if isinstance(lane, Lane) else "Lane connectors"
+        kind = "Lanes" if isinstance(lane, entities.Lane) else "Lane connectors"
         road[kind][short] = [*facts, _metres(lane.width_m), limit_mps, coordinates]
     extent = extent_of(scene, radius_m)
     areas: dict[str, Vector] = {}
@@ -259,7 +255,7 @@ def scene_vectors(
     return {"Agents": agents, **road, "Areas": areas}
 
 
-def shown_agents(scene: Scene, radius_m: float) -> tuple[TrafficAgent, ...]:
+def shown_agents(scene: entities.Scene, radius_m: float) -> tuple[entities.TrafficAgent, ...]:
     """Return the ego, and the agents with their centres in the region that is shown."""
     places = np.array([(agent.x_m, agent.y_m) for agent in scene.agents]).reshape(-1, 2)
     inside = extent_of(scene, radius_m).holds(places)
@@ -294,7 +290,7 @@ def _relative(heading_rad: float) -> str:
     return "opposite" if turn >= 3.0 * math.pi / 4.0 else "crossing"
 
 
-def _agent_vector(agent: TrafficAgent, names: ShortNames) -> Vector:
+def _agent_vector(agent: entities.TrafficAgent, names: ShortNames) -> Vector:
     """Return an agent's attributes, at the end that of its walk if it walks."""
     walk = [] if agent.walk_to_m is None else [[_metres(value) for value in agent.walk_to_m]]
     return [

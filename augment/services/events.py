@@ -6,7 +6,15 @@ from django.contrib.auth.models import User
 from django.db import transaction
 from django.utils import timezone
 
-from augment.models import BaseScene, Contestant, EndpointModel, Event, GenerationJob, Scenario
+from augment.models import (
+    BaseScene,
+    Contestant,
+    EndpointModel,
+    Event,
+    GenerationJob,
+    Scenario,
+    SceneUpload,
+)
 
 
 @transaction.atomic
@@ -39,7 +47,7 @@ def log_event(
     )
 
 
-_KINDS = {BaseScene: "scene", EndpointModel: "model", GenerationJob: "job"}
+_KINDS = {BaseScene: "scene", EndpointModel: "model", GenerationJob: "job", SceneUpload: "upload"}
 """What the log calls rows whose own name is longer."""
 
 Retirable = TypeVar("Retirable", Contestant, Scenario, BaseScene)

@@ -36,7 +36,7 @@ from augment.services.scenarios.scenes import (
     INSTRUCTION_LENGTH,
     check_reference,
     check_slug,
-    check_type,
+    label_for,
     scene_of,
 )
 from augment.services.texts import check_picture_name, check_prose, check_stored_name, one_line
@@ -58,7 +58,7 @@ def _check_scene(row: BaseScene) -> None:
 
 def _check_scenario(row: Scenario) -> None:
     check_slug(row.slug, what="scenario")
-    check_type(row.type)
+    label_for(row.type)
     check_prose("instruction", row.instruction, what="scenario", longest=INSTRUCTION_LENGTH)
     check_picture_name("original_image", row.original_image)
     if row.intent is not None:

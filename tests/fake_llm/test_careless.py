@@ -18,7 +18,7 @@ ROUND_THE_BEND = replace(vehicle("Agent2", 10.0 + 40.0 * math.sin(0.7), 9.4, 0.7
 def drawn(shown: Scene, *right: TrafficAgent) -> dict[str, Modification]:
     """One modification of each mistake that comes up in 300 draws."""
     bent = [bend(shown, Modification(added=right), random.Random(n)) for n in range(300)]
-    return {made.mistake: made.modification for made in bent}
+    return {mistake: modification for modification, mistake in bent}
 
 
 def test_only_mistakes_that_make_a_difference_are_made() -> None:

@@ -26,7 +26,7 @@ from augment.services.running.estimates import estimate
 from augment.services.running.jobs import JobRequest, JobScope
 from augment.services.running.runner import AUGMENTATIONS, Held
 from tests.jobs.models import Model, add_llama, after_a_second_look, llama_job, ran, reply
-from tests.jobs.rows import NOON, STALE, add_kind, add_scenario, launch, leased, only_row
+from tests.jobs.rows import NOON, STALE, add_kind, add_scenario, only_row
 from tests.variants.playing import GOOD
 
 pytestmark = pytest.mark.django_db
@@ -204,25 +204,6 @@ def test_a_money_cap_needs_every_price() -> None:
     assert not GenerationJob.objects.exists()
 
 
-def test_a_money_cap_takes_contestants_that_cost_nothing() -> None:
-    add_llama(price="1")
-    add_scenario("street")
-    launch()
-    job = jobs.launch(
-        JobRequest(
-            name="R",
-            contestants=["llama", "reference"],
-            scenarios=["street"],
-            cap_usd=Decimal("2.50"),
-        )
-    )
-    assert job.cap_usd == Decimal("2.5")
-    event = Event.objects.filter(verb="launch").first()
-    assert event is not None
-    assert event.after is not None
-    assert event.after["cap"] == "2.5 USD"
-
-
 @pytest.mark.parametrize(
     "given",
     [
@@ -285,19 +266,6 @@ def test_a_cap_has_room_up_to_its_last_unit(
     assert after.reserved_calls == reserved.get("calls", 0) + taken
     assert after.reserved_nano_usd == reserved.get("nano_usd", 0) + NANO * taken
     assert (after.state == "stopped_at_cap") is (room == Room.SPENT)
-
-
-@pytest.mark.parametrize(
-    ("after_the_beat", "is_taken_back"),
-    [(STALE - INSTANT, False), (STALE, False), (STALE + INSTANT, True)],
-)
-def test_when_a_claim_without_a_beat_is_taken_back(
-    after_the_beat: timedelta, is_taken_back: bool
-) -> None:
-    row = only_row(launch())
-    leased(row, now=NOON)
-    now = NOON + after_the_beat
-    assert bool(AUGMENTATIONS.take_back_lost(now=now)) is is_taken_back
 
 
 @pytest.mark.parametrize(
@@ -386,14 +354,6 @@ def test_a_fault_is_no_answer() -> None:
     jobs.retry_failed(job)
     model = Model()
     assert ran(job, model).state == DONE
-    assert len(model.requests) == 1
-
-
-def test_a_refusal_is_an_answer_and_stays_one() -> None:
-    model = Model(lambda request: Reply(text="", refusal="I would rather not."))
-    ran(llama_job(), model)
-    row = ran(again(), model)
-    assert (row.state, row.reason) == (Augmentation.State.REFUSED, "I would rather not.")
     assert len(model.requests) == 1
 
 

@@ -6,14 +6,13 @@ from django.db import connection
 from django.test.utils import CaptureQueriesContext
 
 from arena.jobs.services import retry_cause as retry_unless_shown
-from augment.errors import Conflict, UnknownName
+from augment.errors import Conflict
 from augment.models import Augmentation, Contestant, Event, GenerationJob, ModelCall
 from augment.services.running import jobs
-from augment.services.running.budget import Caps
 from augment.services.running.jobs import JobRequest
 from augment.services.running.progress import cause_of, count_rows, failure_groups
 from augment.services.running.runner import AUGMENTATIONS
-from tests.jobs.models import Model, after_a_second_look, llama_job, ran, reply
+from tests.jobs.models import Model, llama_job, ran, reply
 from tests.jobs.rows import NOON, add_kind, add_scenario, done, failed, launch, leased
 from tests.variants.playing import GOOD
 
@@ -42,13 +41,6 @@ def test_a_launch_is_logged_with_who_and_what() -> None:
     assert (event.actor, event.verb, event.object_code) == (admin, "launch", str(job.code))
     assert event.after is not None
     assert (event.after["name"], event.after["contestants"]) == ("R", ["reference"])
-
-
-def test_an_unknown_contestant_stops_the_launch_and_names_the_known() -> None:
-    add_kind("reference")
-    with pytest.raises(UnknownName, match=r"Unknown contestant 'gpt'\. Known: reference"):
-        jobs.launch(JobRequest(name="R", contestants=["gpt"], scenarios=["nowhere"]))
-    assert not GenerationJob.objects.exists()
 
 
 def test_the_reference_can_not_run_where_there_is_none() -> None:
@@ -132,17 +124,6 @@ def test_a_paused_job_starts_nothing_and_what_is_in_flight_keeps_its_result() ->
     assert AUGMENTATIONS.find_unsent(older_than=timedelta(0)) == [second.pk, third.pk]
     first.refresh_from_db()
     assert first.state == State.DONE
-
-
-def test_all_calls_of_what_is_in_flight_are_made_though_the_job_is_paused_between_them() -> None:
-    def pause_once() -> None:
-        if GenerationJob.objects.get().state == Job.RUNNING:
-            jobs.pause(GenerationJob.objects.get())
-
-    model = Model(after_a_second_look, looking_on=pause_once)
-    row = ran(llama_job(caps=Caps(cap_calls=9)), model)
-    assert (row.state, len(model.requests)) == (State.DONE, 2)
-    assert GenerationJob.objects.get().state == Job.FINISHED, "nothing is left to resume"
 
 
 @pytest.mark.parametrize(

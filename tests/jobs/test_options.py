@@ -21,7 +21,7 @@ from augment.services.running.jobs import JobRequest
 from augment.services.running.transcript_records import transcript_of
 from augment.variants.options import NAMES, options_from_document
 from tests.jobs.rows import add_scenario
-from tests.jobs.scripted import SCRIPTS, Bodies, Scripted, add, run
+from tests.jobs.scripted import Bodies, Scripted, add, run
 from tests.llm.json_server import serving
 
 pytestmark = pytest.mark.django_db
@@ -140,29 +140,6 @@ def test_samples_are_asked_anew_with_seeds_of_their_own() -> None:
     assert [one.attempt.augmentation for one in sources if one and one.attempt] == rows
     sent = [transcript_of(row)["attempts"][0]["steps"][0]["request"] for row in rows]
     assert [(call["temperature"], call["seed"]) for call in sent] == [(1.0, 7), (1.0, 8), (1.0, 9)]
-
-
-def test_another_option_never_reuses_an_answer_and_the_same_does() -> None:
-    with serving(Scripted()) as server:
-        for slug, rounds in (("two", 2), ("also-two", 2), ("three", 3)):
-            ensure_endpoint(EndpointRequest(label="here", base_url=server.url))
-            server.script = SCRIPTS["tqa"]
-            contestants.add_contestant(
-                ContestantRequest(
-                    slug=slug,
-                    variant="tqa",
-                    endpoint="here",
-                    model="m",
-                    name=slug,
-                    options={"rounds": rounds},
-                )
-            )
-        run("two")
-        assert len(server.bodies) == 4
-        run("also-two")
-        assert len(server.bodies) == 4
-        run("three")
-        assert len(server.bodies) == 10
 
 
 def test_the_command_takes_every_option_and_keeps_contestants_apart(

@@ -1,4 +1,3 @@
-import hashlib
 import os
 import subprocess
 import threading
@@ -12,15 +11,11 @@ from django.core.files.storage import default_storage
 from pytest_django import Settings
 
 from augment.models import Augmentation, ModelCall
-from augment.scene.entities import Modification
 from augment.services.running import jobs
-from augment.services.scenarios.pictures import camera_of, original_picture, picture_of, store
-from augment.services.scenarios.scenes import scene_of
+from augment.services.scenarios.pictures import original_picture, store
 from tests.jobs.models import Wire, llama_job, ran
-from tests.jobs.rows import add_scenario
 from tests.variants.playing import GOOD
 
-NAME = f"bev/{hashlib.sha256(b'png').hexdigest()}.png"
 WORKERS = 4
 
 
@@ -46,17 +41,6 @@ def test_workers_with_the_same_picture_never_meet_half_of_it(
         with ThreadPoolExecutor(WORKERS) as pool:
             assert all(pool.map(store_and_read, range(WORKERS)))
     assert len(default_storage.listdir("bev")[1]) == 20, "nothing else is left behind"
-
-
-@pytest.mark.django_db
-def test_the_original_picture_is_drawn_once_and_remembered() -> None:
-    scenario = add_scenario("street")
-    name = original_picture(scenario)
-    assert read(name).startswith(b"\x89PNG")
-    scenario.refresh_from_db()
-    assert scenario.original_image == name
-    assert name == picture_of(scene_of(scenario), Modification(), camera_of(scenario))
-    assert original_picture(scenario) == name
 
 
 pytestmark = pytest.mark.django_db

@@ -6,8 +6,6 @@ from typing import Any
 
 import pytest
 
-from augment.fake_llm.server import running
-from augment.llm.client import Patience
 from augment.llm.costs import least_tokens
 from augment.llm.messages import LengthName
 from augment.llm.questions import MARKER, Ability
@@ -86,7 +84,7 @@ def candidate(can: frozenset[str] = EVERYTHING, status: int = 200) -> Iterator[C
 
 def asked() -> ProbeReport:
     known = model_at(endpoint=Endpoint.objects.get(), model="m")
-    return probe(known, patience=Patience(attempts=1))
+    return probe(known)
 
 
 def row() -> EndpointModel:
@@ -132,19 +130,3 @@ def test_a_limit_that_is_passed_over_is_sent_by_its_other_name() -> None:
     assert report.has(Ability.ANSWER_LIMIT) is True
     assert report.refused == row().refused_parameters == ["max_completion_tokens"]
     assert report.calls == 8
-
-
-@pytest.mark.parametrize(
-    ("model", "lacks"),
-    [
-        ("fake-good", None),
-        ("fake-no-vision", Ability.VISION),
-        ("fake-cuts-context", Ability.WHOLE_PROMPT),
-    ],
-)
-def test_the_stand_in_can_be_probed(model: str, lacks: Ability | None) -> None:
-    with running() as server:
-        Endpoint.objects.create(label="local", base_url=server.url, is_simulated=True)
-        report = probe(model_at(endpoint=Endpoint.objects.get(), model=model))
-    found = {made.ability: made.has_it for made in report.findings}
-    assert found == {ability: ability != lacks for ability in Ability}

@@ -5,27 +5,18 @@ from typing import Any
 
 import pytest
 from celery.exceptions import Reject
-from django.conf import settings
 from django.core.files.storage import default_storage
 from django.utils import timezone
 
 from augment import tasks
-from augment.errors import Conflict, LeaseLost, WorkerStopping
+from augment.errors import Conflict, LeaseLost
 from augment.llm.messages import Reply
 from augment.models import Augmentation, Contestant, GenerationJob, ModelCall
-from augment.scene.codec import (
-    intent_to_document,
-    modification_from_document,
-    modification_to_document,
-)
+from augment.scene.codec import modification_from_document, modification_to_document
 from augment.scene.entities import Modification
-from augment.scene.intent import Intent
-from augment.services.endpoints import contestants
-from augment.services.endpoints.client import Queue, place_at
 from augment.services.running import jobs, runner, workers
 from augment.services.running.jobs import JobRequest
 from augment.services.running.runner import AUGMENTATIONS
-from tests.intents import parked
 from tests.jobs.models import Model, Wire, llama_job, ran, reply
 from tests.jobs.rows import INSTRUCTION, TWO_CONES, add_kind, add_scenario, launch, only_row
 from tests.variants.playing import GOOD
@@ -115,17 +106,6 @@ def test_a_worker_whose_claim_was_taken_asks_no_model_and_writes_nothing() -> No
     assert not ModelCall.objects.exists()
 
 
-def test_what_nobody_foresaw_fails_the_row_and_is_logged(caplog: pytest.LogCaptureFixture) -> None:
-    row = only_row(llama_job())
-    row = ran(row, Model(ZeroDivisionError("division by zero")))
-    assert "Traceback" in caplog.text
-    assert row.state == State.FAILED
-    assert row.reason == "unexpected: ZeroDivisionError: division by zero"
-    assert row.attempts.get().outcome == "failed"
-    row.job.refresh_from_db()
-    assert row.job.state == GenerationJob.State.FINISHED
-
-
 def one_job(kind: str, **columns: Any) -> Augmentation:
     add_kind("someone", kind)
     add_scenario("street", **columns)
@@ -141,33 +121,6 @@ def test_a_reference_that_does_not_fit_is_a_failure_with_a_sentence() -> None:
     assert row.reason.startswith("The modification does not fit the scene: Agent9")
 
 
-def test_the_rule_placer_places_the_same_each_time() -> None:
-    first = ran(one_job(Contestant.Kind.RULE))
-    assert first.state == State.DONE
-    again = jobs.launch(JobRequest(name="R2", contestants=["someone"], scenarios=["street"]))
-    second = ran(only_row(again))
-    assert second.modification == first.modification
-    assert second.image == first.image
-
-
-PARKED = parked(22.0)
-
-
-def quantised(slug: str, intent: Intent) -> Augmentation:
-    add_scenario(f"street-{slug}", intent=intent_to_document(intent))
-    contestants.ensure_builtin()
-    job = jobs.launch(JobRequest(name="Q", contestants=[slug], scenarios=[f"street-{slug}"]))
-    return ran(only_row(job))
-
-
-@pytest.mark.parametrize("slug", ["quantised-5m", "quantised-20m"])
-def test_the_quantised_baselines_place_vehicles_and_tell_their_codes(slug: str) -> None:
-    row = quantised(slug, PARKED)
-    assert row.state == State.DONE
-    assert "Agent2: front right, 20 to " in row.notes
-    assert "direction same, stands" in row.notes
-
-
 def test_simulated_errors_of_an_earlier_version_run_no_more() -> None:
     add_kind("someone", Contestant.Kind.SIMULATED)
     Contestant.objects.filter(slug="someone").update(error_rates={"position": 0.1})
@@ -178,9 +131,9 @@ def test_simulated_errors_of_an_earlier_version_run_no_more() -> None:
 
 @pytest.fixture(autouse=True)
 def _going_on() -> Iterator[None]:
-    workers.withdraw_stop()
+    workers.stopping.clear()
     yield
-    workers.withdraw_stop()
+    workers.stopping.clear()
 
 
 def only(job: GenerationJob) -> tuple[Augmentation, list[ModelCall]]:
@@ -191,7 +144,7 @@ def only(job: GenerationJob) -> tuple[Augmentation, list[ModelCall]]:
 
 def test_no_row_is_claimed_any_more_and_its_message_goes_back() -> None:
     row = only_row(launch())
-    workers.request_stop()
+    workers.stopping.set()
     with pytest.raises(Reject) as caught:
         tasks.work.run("augmentation", row.pk)
     assert caught.value.requeue
@@ -203,7 +156,7 @@ def test_no_row_is_claimed_any_more_and_its_message_goes_back() -> None:
 def test_where_nothing_was_sent_the_row_goes_back_unpaid() -> None:
     job = llama_job()
     assert runner.work_on(
-        augmentation_pk=only_row(job).pk, connect=Model(waiting=workers.request_stop)
+        augmentation_pk=only_row(job).pk, connect=Model(waiting=workers.stopping.set)
     )
     row, calls = only(job)
     assert (row.state, row.sent_at, row.claim) == (State.QUEUED, None, None)
@@ -216,36 +169,15 @@ def test_where_nothing_was_sent_the_row_goes_back_unpaid() -> None:
 def test_an_answer_before_the_stop_is_not_asked_for_again() -> None:
     """It can't be read, so the model is asked once more: by whoever takes the row next."""
     job = llama_job()
-    unreadable = Model(lambda _: reply("no answer at all"), looking_on=workers.request_stop)
+    unreadable = Model(lambda _: reply("no answer at all"), looking_on=workers.stopping.set)
     assert runner.work_on(augmentation_pk=only_row(job).pk, connect=unreadable)
     row, calls = only(job)
     assert row.state == State.QUEUED
     assert len(calls) == 1
-    workers.withdraw_stop()
+    workers.stopping.clear()
     assert runner.work_on(augmentation_pk=row.pk, connect=Wire(GOOD))
     row, calls = only(job)
     assert row.state == State.DONE
     assert [call.served_from_id is not None for call in calls] == [False, True, False]
     job.refresh_from_db()
     assert job.spent_calls == 2
-
-
-def test_who_waits_for_a_place_gives_up_the_wait() -> None:
-    endpoint = llama_job().contestants.get().endpoint
-    assert endpoint is not None
-    endpoint.max_concurrency = 1
-    endpoint.save()
-    looks: list[float] = []
-
-    def sleep(seconds: float) -> None:
-        looks.append(seconds)
-        workers.request_stop()
-
-    queue = Queue(longest_s=600.0, still_wanted=workers.insist_on_going_on, sleep=sleep)
-    with (
-        place_at(endpoint, Queue(longest_s=settings.LLM_QUEUE_S)),
-        pytest.raises(WorkerStopping),
-        place_at(endpoint, queue),
-    ):
-        pytest.fail("two have one place")
-    assert len(looks) == 1

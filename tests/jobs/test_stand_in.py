@@ -2,7 +2,6 @@
 
 import pytest
 
-from augment.models import Scenario
 from augment.scene.intent import Shape
 from augment.services.scenarios.prompts import StoredIntents
 from tests.intents import cones
@@ -17,9 +16,3 @@ def test_an_intent_is_found_by_the_text_of_its_instruction_however_it_is_spaced(
     add_scenario("street")
     assert look_up(f"  {INSTRUCTION.replace(' ', '  ')}\n") == cones(20.0, 1, Shape.LINE)
     assert look_up("Paint the sky green.") is None
-
-
-def test_a_scenario_without_an_intent_is_not_on_the_list() -> None:
-    add_scenario("street", intent=None, intent_origin="")
-    assert StoredIntents()(INSTRUCTION) is None
-    assert Scenario.objects.count() == 1

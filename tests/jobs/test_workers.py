@@ -1,10 +1,9 @@
 """Signs of life of workers, and what brings lost work back whatever happens."""
 
-import logging
 import shutil
 import tempfile
 from collections.abc import Iterator
-from datetime import UTC, datetime, timedelta
+from datetime import timedelta
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +17,7 @@ from augment import tasks
 from augment.errors import QueueRefused, QueueUnreachable
 from augment.models import Worker
 from augment.services.clock import DATABASE_TIME
-from augment.services.running.workers import Presence, RecoveryRounds, workforce
+from augment.services.running.workers import Presence, do_round, workforce
 from tests.jobs.rows import launch, only_row
 from tests.processes import Process, wait_until
 
@@ -54,20 +53,6 @@ def test_a_worker_that_is_silent_too_long_is_dead_since_its_last_word(
 # --- Bringing lost work back ---------------------------------------------------------------------
 
 
-class Round:
-    """Does what it is told to in each round."""
-
-    def __init__(self, *outcomes: Exception | None) -> None:
-        self._outcomes = list(outcomes)
-        self.first: list[bool] = []
-
-    def __call__(self, at_start: bool) -> None:
-        self.first.append(at_start)
-        outcome = self._outcomes.pop(0)
-        if outcome is not None:
-            raise outcome
-
-
 @pytest.mark.parametrize(
     "fault",
     [
@@ -75,30 +60,20 @@ class Round:
         OperationalError("database is locked"),
         KeyError("nobody foresaw this"),
         MemoryError(),
-        RecursionError("too deep"),
     ],
 )
-def test_no_fault_ends_the_rounds_and_all_of_them_are_told(
+def test_no_fault_ends_the_rounds_and_each_is_told(
     fault: Exception, caplog: pytest.LogCaptureFixture
 ) -> None:
-    round_ = Round(None, fault, fault, None)
-    rounds = RecoveryRounds(round_, Presence("here 1"))
-    with caplog.at_level(logging.INFO, logger="augment"):
-        assert [rounds.go_on() for _ in range(4)] == [True, False, False, True]
-    worked = f"{datetime.now(UTC):%Y-%m-%d}"
-    failures = [line for line in caplog.messages if "Could not bring lost work back" in line]
-    assert len(failures) == 2
-    assert f"since {worked}" in failures[0]
-    assert "(2 rounds)" in failures[1]
-    assert "again, after 2 failed rounds" in caplog.messages[-1]
+    def fail() -> None:
+        raise fault
 
-
-def test_the_first_round_that_works_sends_what_waits() -> None:
-    round_ = Round(KeyError("x"), None, None)
-    rounds = RecoveryRounds(round_, Presence("here 1"))
-    for _ in range(3):
-        rounds.go_on()
-    assert round_.first == [True, True, False]
+    presence = Presence("here 1")
+    assert not do_round(fail, presence)
+    assert "Could not bring lost work back" in caplog.messages[0]
+    assert workforce().fault == (str(fault) or "MemoryError")
+    assert do_round(lambda: None, presence)
+    assert workforce().works
 
 
 # --- A Redis that is there and refuses -----------------------------------------------------------
@@ -150,6 +125,5 @@ def test_a_redis_that_refuses_is_not_called_missing(refusing: str, says: str) ->
     assert not isinstance(caught.value, QueueUnreachable)
     assert "No Redis" not in str(caught.value)
     assert only_row(job).sent_at is None
-    rounds = RecoveryRounds(lambda at_start: tasks.recover(at_start=at_start), Presence("here 1"))
-    assert rounds.go_on() is False
+    assert not do_round(tasks.recover, Presence("here 1"))
     assert says in workforce().fault

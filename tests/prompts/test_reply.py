@@ -120,7 +120,7 @@ def test_mending_leaves_strings_alone() -> None:
         (GOOD.replace('"y_m": 0.9', '"x_m": 0.9'), "'x_m' stands twice"),
         (block(agent(x_m=...)), "add.0.x_m: Field required"),
         (block(agent(colour="red")), "add.0.colour: Extra inputs are not permitted"),
-        (block(agent(type="EGO_VEHICLE")), "add.0.type: Input should be 'VEHICLE'"),
+        (block(agent(type="EGO_VEHICLE")), "nobody else is an EGO_VEHICLE"),
         (block(agent(speed_mps=-1.0)), "add.0.speed_mps: Input should be greater than"),
         (block(agent(lane="Lane9")), "Agent2: its lane is none of the scene's"),
         (block(agent(walk_to=[1.0, 2.0])), "Agent2: only a PEDESTRIAN has walk_to"),

@@ -3,7 +3,6 @@ from io import StringIO
 from pathlib import Path
 
 import pytest
-from django.core.management import call_command
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -55,16 +54,6 @@ def test_a_name_in_an_error_of_a_command_is_escaped(
     printed = capsys.readouterr().err
     assert r"\x1b[2J.csv: No such file" in printed
     assert CLEAR not in printed
-
-
-def test_a_name_out_of_a_file_is_escaped_in_what_a_command_prints(tmp_path: Path) -> None:
-    file = tmp_path / "votes.csv"
-    rows = [f"{CLEAR},b,model_a", f"b,{CLEAR},model_a"] * 5
-    file.write_text("\n".join(["model_a,model_b,winner", *rows]))
-    out = StringIO()
-    call_command("rate_csv", str(file), rounds=10, stdout=out)
-    assert r"\x1b[2J" in out.getvalue()
-    assert "\x1b" not in out.getvalue()
 
 
 class Terminal(StringIO):

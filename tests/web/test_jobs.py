@@ -65,7 +65,7 @@ def test_a_job_is_paused_says_what_still_runs_and_is_resumed() -> None:
     held = rows.leased(job.augmentations.all()[0])
     admin, url = signed_in(people()["admin"]), reverse("job", args=[job.code])
     answer = admin.post(reverse("job-pause", args=[job.code]), follow=True).content.decode()
-    assert "Pausing, 1 still runs" in answer
+    assert "Pausing, 1 running" in answer
     assert 'id="pause"' not in answer
     held.settle(rows.done(), now=rows.NOON)
     shown = admin.get(url).content.decode()

@@ -72,12 +72,11 @@ def opened(**rules: object) -> tuple[int, str]:
     return answer.status_code, " ".join(answer.content.decode().split())
 
 
-def test_a_study_is_opened_with_all_its_rules() -> None:
-    opened(repeats="25", checks="2", adaptive="", allow_both_miss="on")
-    study = Study.objects.get()
-    assert study.allow_both_miss
-    kinds = study.matchups.values_list("kind", flat=True)
-    assert (list(kinds).count("main"), list(kinds).count("repeat")) == (24, 6)
+def test_a_target_that_can_not_be_read_is_refused_beside_its_field() -> None:
+    status, shown = opened(targets="ann lots")
+    assert status == 422
+    assert re.search(r"</textarea>.{0,400}is no target: write CONTESTANT NUMBER", shown)
+    assert not Study.objects.exists()
 
 
 def test_an_admin_hands_over_what_an_expert_has_not_judged() -> None:

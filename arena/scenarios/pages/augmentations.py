@@ -12,8 +12,7 @@ from arena.site.access import STAFF, page_for
 from arena.site.acts import looks_again, send_later
 from arena.site.pictures import picture_response, sized_picture_response
 from augment.errors import AugmentError
-from augment.models import Augmentation, BaseScene, Contestant, Scenario, Simulation, UploadMoment
-from augment.services.endpoints.contestants import asking_contestants, preview_contestant
+from augment.models import Augmentation, BaseScene, Scenario, Simulation, UploadMoment
 from augment.services.judging.displacement import of_augmentation
 from augment.services.judging.findings import check_augmentation
 from augment.services.running.calls import IMAGES
@@ -104,7 +103,7 @@ def picture(request: HttpRequest, kind: str, code: uuid.UUID) -> HttpResponseBas
 @page_for(*STAFF)
 def prompts_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Show the exact messages of a variant's role, with about how many tokens they are."""
-    scenario, contestant = _scenario(code), _contestant(request)
+    scenario = _scenario(code)
     problem, shown = "", None
     try:
         shown = _preview(request, scenario)
@@ -113,8 +112,6 @@ def prompts_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     role, variant = request.GET.get("role", "modifier"), request.GET.get("variant", "otm")
     choices = list_recipes()
     context = {
-        "contestants": asking_contestants(),
-        "contestant": contestant,
         "scenario": scenario,
         "choices": choices,
         "chosen": next((one for one in choices if one.slug == variant), None),
@@ -146,20 +143,10 @@ def _scenario(code: uuid.UUID) -> Scenario:
     return get_object_or_404(rows, code=code)
 
 
-def _contestant(request: HttpRequest) -> Contestant | None:
-    """Return the contestant that the address names, if any; 404 for an unknown one."""
-    slug = request.GET.get("contestant")
-    rows = Contestant.objects.select_related("endpoint")
-    return get_object_or_404(rows, slug=slug) if slug else None
-
-
 def _preview(request: HttpRequest, scenario: Scenario) -> Shown:
-    contestant, role = _contestant(request), request.GET.get("role", "modifier")
-    if contestant is not None:
-        return preview_contestant(scenario, contestant, role=role)
     return preview_prompt(
         scenario,
         variant=request.GET.get("variant", "otm"),
-        role=role,
+        role=request.GET.get("role", "modifier"),
         native_tools="native" in request.GET,
     )

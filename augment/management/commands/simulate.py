@@ -53,6 +53,7 @@ class Command(TerminalCommand):
         scenario = Scenario.objects.filter(slug=options["what"]).first()
         job = None if scenario is not None else find_job(options["what"])
         also = () if options["queue"] else (how.planner,)
+        simulations.load_planner(how, also=also)
         if options["queue"]:
             check_broker()
         with transaction.atomic():

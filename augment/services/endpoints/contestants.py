@@ -9,31 +9,17 @@ from django.db import transaction
 
 from augment.baselines.registry import PLACERS
 from augment.errors import Conflict
-from augment.models import Contestant, Scenario
+from augment.models import Contestant
 from augment.services.endpoints.known_endpoints import SLUG_RULE, find_endpoint
 from augment.services.endpoints.known_models import model_at
-from augment.services.endpoints.treatments import (
-    Respondent,
-    check_roles,
-    options_of,
-    other_prompts,
-    respondents_of,
-)
+from augment.services.endpoints.treatments import Respondent, check_roles
 from augment.services.events import log_change
 from augment.services.inputs import Input, InputKind, input_field
-from augment.services.scenarios.prompts import preview_prompt
 from augment.services.scenarios.scenes import check_slug
 from augment.services.texts import one_line
-from augment.variants.options import (
-    RULES,
-    ContestantOptions,
-    ToolProtocol,
-    check_options,
-    options_from_document,
-)
-from augment.variants.recipes import RECIPES, Recipe, Tools, find_recipe, spell_variant
+from augment.variants.options import RULES, ContestantOptions, check_options, options_from_document
+from augment.variants.recipes import RECIPES, Recipe, find_recipe, spell_variant
 from augment.variants.respondents import ModelRole
-from augment.variants.showing import Shown
 
 Kind = Contestant.Kind
 LONGEST_NAME = 120
@@ -146,39 +132,6 @@ def add_contestant(request: ContestantRequest, actor: User | None = None) -> Con
             "choose another slug."
         )
     return row
-
-
-def asking_contestants() -> list[Contestant]:
-    """Return the contestants that ask a model, by name; retired ones come last."""
-    rows = Contestant.objects.exclude(endpoint=None).select_related("endpoint")
-    return sorted(rows, key=lambda row: (row.retired_at is not None, row.name, row.pk))
-
-
-def preview_contestant(scenario: Scenario, contestant: Contestant, *, role: str) -> Shown:
-    """Return the first messages to a role, as the contestant's options have them.
-
-    Options are those of its first run; of one that has not run yet, those that it would run with
-    now.
-
-    Raises:
-        Conflict: It asks no model, nobody plays that role, an endpoint of it is gone, or it asks
-            with prompts that are not installed any more.
-        UnknownName: Its variant is none of ours any more, or there is no such role.
-    """
-    if not respondents_of(contestant):
-        raise Conflict(f"{contestant.slug} asks no model.")
-    options = options_of(contestant)
-    if (unlike := other_prompts(contestant.slug, options)) is not None:
-        raise Conflict(unlike)
-    has_tools = find_recipe(contestant.variant).tools is not Tools.NONE
-    is_native = options.protocol is ToolProtocol.NATIVE and role == ModelRole.MODIFIER
-    return preview_prompt(
-        scenario,
-        variant=contestant.variant,
-        role=role,
-        native_tools=has_tools and is_native,
-        options=options,
-    )
 
 
 def _reviewers(roles: Roles, own: Respondent, actor: User | None) -> dict[ModelRole, Respondent]:

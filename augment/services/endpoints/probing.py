@@ -15,7 +15,7 @@ from django.db import IntegrityError, transaction
 from django.utils import timezone
 
 from augment.errors import Conflict, ModelFault, ParameterRefused
-from augment.llm.client import ChatClient, ModelProfile, Patience
+from augment.llm.client import ChatClient, ModelProfile
 from augment.llm.costs import cut_of, usd_of
 from augment.llm.messages import LengthName, Reply, Request, shorten
 from augment.llm.questions import Ability, ProbeQuestion, questions_for
@@ -80,7 +80,6 @@ def probe(
     row: EndpointModel,
     *,
     actor: User | None = None,
-    patience: Patience | None = None,
     on_finding: Callable[[ProbeFinding], None] = lambda finding: None,
 ) -> ProbeReport:
     """Ask the questions and store what they show.
@@ -88,7 +87,6 @@ def probe(
     Args:
         row: The model.
         actor: Who wants it.
-        patience: How faults that may pass are waited for.
         on_finding: Told what each question showed as soon as it is known.
 
     Raises:
@@ -97,7 +95,7 @@ def probe(
     """
     report = ProbeReport(probed_at=timezone.now())
     with wire_to(row.endpoint) as wire:
-        prober = _Prober(client=wire, row=row, patience=patience or Patience(attempts=2))
+        prober = _Prober(client=wire, row=row)
         for question in questions_for(row.model):
             report.findings.append(prober.ask(question))
             on_finding(report.findings[-1])
@@ -153,8 +151,8 @@ PROBES = Probes()
 class _Prober:
     """Asks within the endpoint's limits, and goes without what it was refused."""
 
-    def __init__(self, *, client: ChatClient, row: EndpointModel, patience: Patience) -> None:
-        self._client, self._row, self._patience = client, row, patience
+    def __init__(self, *, client: ChatClient, row: EndpointModel) -> None:
+        self._client, self._row = client, row
         self._price = price_of(row.endpoint, row.model)
         self.calls = 0
         self.profile = ModelProfile(
@@ -194,8 +192,7 @@ class _Prober:
         )
 
     def _answer(self, question: ProbeQuestion) -> tuple[Request, Reply]:
-        """Return the request as it was sent, and its answer."""
-        attempt = 1
+        """Return the request as it was sent, and its answer; goes without what is refused."""
         while True:
             request = self.profile.fitted(question.request)
             try:
@@ -206,12 +203,6 @@ class _Prober:
                 if refused.parameter == question.parameter:
                     raise
                 self.profile = self.profile.without(refused.parameter)
-            except ModelFault as fault:
-                wait_s = self._patience.wait_s(fault, attempt=attempt)
-                if wait_s is None:
-                    raise
-                self._patience.sleep(wait_s)
-                attempt += 1
 
     def _cost_usd(self, reply: Reply) -> str | None:
         prompt, completion = reply.prompt_tokens, reply.completion_tokens

@@ -47,20 +47,28 @@ class Respondent:
     def __str__(self) -> str:
         return f"{self.model} at {self.endpoint.label}"
 
-    @property
-    def known(self) -> EndpointModel | None:
-        """What is known of the model there, None where nobody entered anything."""
-        return EndpointModel.objects.filter(endpoint=self.endpoint, model=self.model).first()
+    def _known(self, name: str) -> Any:
+        """Return a fact about the model there, None where nobody entered it."""
+        rows = EndpointModel.objects.filter(endpoint=self.endpoint, model=self.model)
+        return rows.values_list(name, flat=True).first()
 
     @property
     def context_tokens(self) -> int | None:
-        """The model's context window there, None where nobody entered it."""
-        return known.context_tokens if (known := self.known) else None
+        """The model's context window."""
+        tokens: int | None = self._known("context_tokens")
+        return tokens
 
     @property
     def sees(self) -> bool | None:
-        """Whether the model sees pictures, None where nobody probed it or said so."""
-        return known.vision if (known := self.known) else None
+        """Whether the model sees pictures."""
+        can_see: bool | None = self._known("vision")
+        return can_see
+
+    @property
+    def native_tools(self) -> bool | None:
+        """Whether the model calls functions natively."""
+        can_call: bool | None = self._known("native_tools")
+        return can_call
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

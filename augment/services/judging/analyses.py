@@ -10,18 +10,8 @@ from django.db.models import Q
 
 from augment.checks import Severity
 from augment.errors import InvalidDocument, InvalidModification
+from augment.metrics import paired
 from augment.metrics.displacement import Displacement
-from augment.metrics.paired import (
-    PairedComparison,
-    RefusalScore,
-    Robustness,
-    SampleSpread,
-    compare_all,
-    measure_robustness,
-    score_refusals,
-    spread_of,
-    within_sd,
-)
 from augment.models import Augmentation, Contestant, GenerationJob
 from augment.services.endpoints.known_models import AUGMENTATION, Spending, sum_spending
 from augment.services.judging.displacement import Measured, of_job
@@ -45,8 +35,8 @@ class ContestantAnalysis:
     slug: str
     name: str
     is_simulated: bool
-    refusals: RefusalScore | None
-    robustness: Robustness | None
+    refusals: paired.RefusalScore | None
+    robustness: paired.Robustness | None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -58,7 +48,7 @@ class JobAnalysis:
     """
 
     contestants: tuple[ContestantAnalysis, ...]
-    pairs: tuple[PairedComparison, ...]
+    pairs: tuple[paired.PairedComparison, ...]
     seed: int
 
     @property
@@ -106,17 +96,17 @@ class RepeatLine:
     slug: str
     name: str
     is_simulated: bool
-    displacement_m: SampleSpread | None
+    displacement_m: paired.SampleSpread | None
     within_m: float | None
-    missed: SampleSpread | None
-    usd: SampleSpread | None
+    missed: paired.SampleSpread | None
+    usd: paired.SampleSpread | None
 
     @property
-    def missed_percent(self) -> SampleSpread | None:
+    def missed_percent(self) -> paired.SampleSpread | None:
         """The share in percent, for people."""
         if self.missed is None:
             return None
-        return spread_of([100.0 * value for value in self.missed.values])
+        return paired.spread_of([100.0 * value for value in self.missed.values])
 
 
 def analyse_job(job: GenerationJob, *, seed: int = SEED) -> JobAnalysis:
@@ -134,7 +124,7 @@ def analyse_job(job: GenerationJob, *, seed: int = SEED) -> JobAnalysis:
         contestants=tuple(
             _analyse(measured, values[slug]) for slug, measured in sorted(by_contestant.items())
         ),
-        pairs=compare_all(values, seed=seed),
+        pairs=paired.compare_all(values, seed=seed),
         seed=seed,
     )
 
@@ -192,8 +182,8 @@ def _analyse(measured: Sequence[Measured], values: dict[str, float]) -> Contesta
         slug=contestant.slug,
         name=contestant.name,
         is_simulated=contestant.is_simulated,
-        refusals=score_refusals(answered) if answered else None,
-        robustness=measure_robustness(wordings),
+        refusals=paired.score_refusals(answered) if answered else None,
+        robustness=paired.measure_robustness(wordings),
     )
 
 
@@ -221,16 +211,16 @@ def _repeat_line(lines: Sequence[AugmentationLine]) -> RepeatLine:
         name=contestant.name,
         is_simulated=contestant.is_simulated,
         displacement_m=_spread([_distance_m(sample) for sample in samples]),
-        within_m=within_sd(by_scenario.values()),
+        within_m=paired.within_sd(by_scenario.values()),
         missed=_spread([fmean(line.row.state in MISSES for line in one) for one in samples]),
         usd=_spread([_usd(sample) for sample in samples]),
     )
 
 
-def _spread(values: Sequence[float | None]) -> SampleSpread | None:
+def _spread(values: Sequence[float | None]) -> paired.SampleSpread | None:
     """Return None where a sample has no value: the rest would be another comparison."""
     known = [value for value in values if value is not None]
-    return spread_of(known) if len(known) == len(values) else None
+    return paired.spread_of(known) if len(known) == len(values) else None
 
 
 def _distance_m(lines: Sequence[AugmentationLine]) -> float | None:

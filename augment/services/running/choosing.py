@@ -8,10 +8,10 @@ from uuid import UUID
 from django.db.models import Q, QuerySet
 
 from augment.baselines.registry import PLACERS
-from augment.errors import AugmentError, Conflict, KeyMissing, KeyNotAllowed, UnknownName
+from augment.errors import AugmentError, Conflict, UnknownName
 from augment.models import Contestant, GenerationJob, Scenario
 from augment.scene.entities import CatalogueSet
-from augment.services.endpoints.known_endpoints import key_of, may_hold_key
+from augment.services.endpoints.known_endpoints import KEY_RULE, is_key_here, may_hold_key
 from augment.services.endpoints.treatments import options_of, other_prompts, respondents_of
 from augment.variants.options import ToolProtocol
 from augment.variants.respondents import ModelRole
@@ -42,26 +42,15 @@ def find_obstacle(contestant: Contestant) -> str:
     variables = {one.endpoint.key_variable for one in respondents.values()} - {""}
     forbidden = sorted(name for name in variables if not may_hold_key(name))
     if forbidden:
-        return (
-            f"the variable {', '.join(forbidden)} may not hold a key; its name has to end in "
-            "_API_KEY, or ARENA_KEY_VARIABLES has to list it"
-        )
-    modifier = respondents[ModelRole.MODIFIER]
-    if options.protocol is ToolProtocol.NATIVE and contestant.frozen_options is None:
-        known = modifier.known
-        if known is not None and known.native_tools is False:
-            return (
-                f"it is to call its function natively, and {modifier} has no native calls. Add a "
-                "contestant with the protocol prompt, or probe the model anew"
-            )
-    viewer = respondents.get(ModelRole.VIEWER)
+        return f"the variable {', '.join(forbidden)} may not hold a key: {KEY_RULE} is needed"
+    modifier, viewer = respondents[ModelRole.MODIFIER], respondents.get(ModelRole.VIEWER)
+    is_open = contestant.frozen_options is None
+    if is_open and options.protocol is ToolProtocol.NATIVE and modifier.native_tools is False:
+        return f"it is to call its function natively, and {modifier} has no native calls"
     # Two calls of every augmentation would be paid for before a blind viewer fails.
+    if viewer is not None and viewer.sees is None:
+        return f"nobody knows whether its viewer {viewer} sees pictures: probe the model"
     if viewer is not None and not viewer.sees:
-        if viewer.sees is None:
-            return (
-                f"nobody knows whether its viewer {viewer} sees pictures, which visual QA needs: "
-                "probe the model on the page of its endpoint, or say there what you know"
-            )
         return f"its viewer {viewer} sees text alone; visual QA needs vision"
     return other_prompts(contestant.slug, options) or ""
 
@@ -71,15 +60,8 @@ def keys_missing(contestant: Contestant) -> list[str]:
 
     Workers elsewhere may have them: this is a warning, no obstacle.
     """
-    missing = set()
-    for respondent in respondents_of(contestant).values():
-        try:
-            key_of(respondent.endpoint)
-        except KeyMissing as error:
-            missing.add(error.variable)
-        except KeyNotAllowed:
-            continue  # an obstacle, see there
-    return sorted(missing)
+    names = {one.endpoint.key_variable for one in respondents_of(contestant).values()} - {""}
+    return sorted(name for name in names if may_hold_key(name) and not is_key_here(name))
 
 
 def refuse_impossible(who: Sequence[Contestant], where: Sequence[Scenario]) -> None:

@@ -74,24 +74,15 @@ class JobCounts:
         return self.total - self.under_way
 
     @property
-    def done(self) -> int:
-        """Rows that have a modification."""
-        return self.by_state[State.DONE]
-
-    @property
     def failed(self) -> int:
         """Rows that broke and may be tried again."""
         return self.by_state[State.FAILED]
 
     @property
-    def is_held(self) -> bool:
-        """Whether nothing is started until somebody resumes the job."""
-        return self.job.state in GenerationJob.HELD
-
-    @property
     def is_moving(self) -> bool:
         """Whether anything will change by itself: not where all that is left is held."""
-        return (self.running if self.is_held else self.under_way) > 0
+        is_held = self.job.state in GenerationJob.HELD
+        return (self.running if is_held else self.under_way) > 0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -7,7 +7,7 @@ with its state, modification, notes or reason, and picture, and its calls as `Mo
 import logging
 from collections.abc import Callable
 from contextlib import AbstractContextManager, ExitStack
-from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 from django.conf import settings
@@ -19,6 +19,7 @@ from augment.errors import (
     AugmentError,
     BudgetSpent,
     CannotPlace,
+    Conflict,
     DatabaseLocked,
     InvalidModification,
     JobCancelled,
@@ -29,15 +30,10 @@ from augment.llm.client import ChatClient
 from augment.llm.messages import shorten
 from augment.models import Attempt, Augmentation, Contestant, Endpoint, GenerationJob
 from augment.scene.codec import modification_from_document, modification_to_document
-from augment.scene.entities import Modification, Scene
+from augment.scene.entities import Scene
 from augment.services.clock import Moment
 from augment.services.endpoints.client import EndpointClient, Queue, wire_to
-from augment.services.endpoints.treatments import (
-    Respondent,
-    Treatment,
-    respondents_of,
-    treatment_of,
-)
+from augment.services.endpoints.treatments import Treatment, respondents_of, treatment_of
 from augment.services.running import budget, jobs, workers
 from augment.services.running.calls import RowTranscript, insist_wanted, sentence_of
 from augment.services.scenarios.pictures import camera_of, original_picture, picture_of, redraw
@@ -46,6 +42,7 @@ from augment.services.texts import LONGEST_NOTES, make_document_storable, make_s
 from augment.services.work import Lease, Settlement, TryEnd, WorkKind, change_all
 from augment.variants import pipeline
 from augment.variants.options import ToolProtocol, recipe_with
+from augment.variants.pipeline import Outcome, OutcomeStatus
 from augment.variants.recipes import find_recipe
 from augment.variants.respondents import ModelRole, RespondentClient
 
@@ -61,16 +58,6 @@ CLOSED = GenerationJob.objects.filter(
     state__in=(GenerationJob.State.CANCELLED, *GenerationJob.HELD)
 )
 """Jobs in which nothing is started any more, or not for now."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Answer:
-    """What a contestant made of a scenario, before it is drawn."""
-
-    state: Augmentation.State
-    modification: Modification | None = None
-    notes: str = ""
-    reason: str = ""
 
 
 class Augmentations(WorkKind[Augmentation]):
@@ -97,17 +84,26 @@ class Augmentations(WorkKind[Augmentation]):
         try:
             scene = scene_of(row.scenario)
             unchanged = original_picture(row.scenario)
-            answer = _stored_answer(row) or _ask(row, scene, held, self._connect)
-            if answer.state == State.FAILED:
-                return Settlement(state=State.FAILED, reason=answer.reason)
-            if answer.modification is None:
-                return Settlement(
-                    state=answer.state, reason=answer.reason, columns={"image": unchanged}
+            if row.modification is not None:  # of an earlier attempt that could not draw it
+                outcome = Outcome(
+                    status=OutcomeStatus.DONE,
+                    modification=modification_from_document(row.modification),
+                    notes=row.notes,
                 )
-            columns = _columns(answer, answer.modification)
+            else:
+                outcome = _ask(row, scene, held, self._connect)
+            if outcome.modification is None:
+                columns: dict[str, Any] = {"image": unchanged}
+                return Settlement(
+                    state=outcome.status.value, reason=outcome.reason, columns=columns
+                )
+            document = modification_to_document(outcome.modification)
+            columns = {"modification": make_document_storable(document)}
+            if outcome.notes:
+                columns["notes"] = shorten(make_storable(outcome.notes), LONGEST_NOTES)
             held.note(**columns)  # a second try only has to draw
-            image = picture_of(scene, answer.modification, camera_of(row.scenario))
-            return Settlement(state=answer.state, columns=columns | {"image": image})
+            image = picture_of(scene, outcome.modification, camera_of(row.scenario))
+            return Settlement(state=State.DONE, columns=columns | {"image": image})
         except JobCancelled as cancelled:
             return Settlement(state=State.CANCELLED, reason=str(cancelled))
         except (Unwanted, BudgetSpent):
@@ -199,70 +195,53 @@ def open_wire(
 # --- Private -----------------------------------------------------------------------------------
 
 
-def _stored_answer(row: Augmentation) -> Answer | None:
-    """Return the answer of an earlier attempt that was stored but not drawn any more."""
-    if row.modification is None:
-        return None
-    modification = modification_from_document(row.modification)
-    return Answer(state=State.DONE, modification=modification, notes=row.notes)
-
-
-def _columns(answer: Answer, modification: Modification) -> dict[str, Any]:
-    notes = {"notes": shorten(make_storable(answer.notes), LONGEST_NOTES)} if answer.notes else {}
-    document = make_document_storable(modification_to_document(modification))
-    return {"modification": document, **notes}
-
-
-def _ask(row: Augmentation, scene: Scene, held: Held, connect: Connect | None) -> Answer:
+def _ask(row: Augmentation, scene: Scene, held: Held, connect: Connect | None) -> Outcome:
     contestant = row.contestant
-    match contestant.kind:
-        case Kind.REFERENCE:
-            reference = reference_of(row.scenario)
-            if reference is None:
-                reason = "The scenario has no reference modification."
-                return Answer(state=State.FAILED, reason=reason)
-            return Answer(state=State.DONE, modification=reference)
-        case Kind.RULE:
-            return _place(row, RULE_PLACER, scene)
-        case Kind.BASELINE if contestant.slug in PLACERS:
-            return _place(row, contestant.slug, scene)
-        case Kind.LLM | Kind.SIMULATED if contestant.endpoint is not None:
-            return _ask_model(row, contestant.endpoint, scene, held, connect)
-    reason = f"A job can't run contestants of kind {contestant.kind!r}."
-    return Answer(state=State.FAILED, reason=reason)
-
-
-def _place(row: Augmentation, placer: str, scene: Scene) -> Answer:
-    """Return what a contestant without a model makes of the intent, or why it refuses."""
+    if contestant.kind == Kind.REFERENCE:
+        reference = reference_of(row.scenario)
+        if reference is None:
+            raise Conflict("The scenario has no reference modification.")
+        return Outcome(status=OutcomeStatus.DONE, modification=reference)
+    if contestant.endpoint is not None:
+        return _ask_model(row, contestant.endpoint, scene, held, connect)
+    placer = RULE_PLACER if contestant.kind == Kind.RULE else contestant.slug
+    if contestant.kind not in (Kind.RULE, Kind.BASELINE) or placer not in PLACERS:
+        raise Conflict(f"A job can't run contestants of kind {contestant.kind!r}.")
     slug = row.scenario.slug
     # Each sample has a seed of its own; the first keeps that of jobs without samples.
     seed = seed_of(slug if row.sample == 1 else f"{slug}#{row.sample}")
     try:
         placed = PLACERS[placer].place(scene, intent_of(row.scenario), seed=seed)
     except CannotPlace as refusal:
-        return Answer(state=State.REFUSED, reason=refusal.reason)
-    return Answer(state=State.DONE, modification=placed.modification, notes=placed.notes)
+        return Outcome(status=OutcomeStatus.REFUSED, reason=refusal.reason)
+    return Outcome(status=OutcomeStatus.DONE, modification=placed.modification, notes=placed.notes)
 
 
 def _ask_model(
     row: Augmentation, endpoint: Endpoint, scene: Scene, held: Held, connect: Connect | None
-) -> Answer:
+) -> Outcome:
     respondents = respondents_of(row.contestant)
     treatment = treatment_of(row.contestant, respondents)
     options = treatment.options
     held.note(options=options.to_document())
-    endpoints = {one.endpoint.pk: one.endpoint for one in respondents.values()}
+    open_client = connect or partial(open_wire, held=held, treatment=treatment)
     with ExitStack() as opened:
         clients = {
-            pk: opened.enter_context(
-                open_wire(site, held, treatment) if connect is None else connect(site)
-            )
-            for pk, site in endpoints.items()
+            site: opened.enter_context(open_client(site))
+            for site in {one.endpoint for one in respondents.values()}
         }
-        playing = {role: _client_for(one, clients) for role, one in respondents.items()}
-        is_native = options.protocol is ToolProtocol.NATIVE
-        modifier = replace(playing.pop(ModelRole.MODIFIER), native_tools=is_native)
-        outcome = pipeline.run(
+        playing = {
+            role: RespondentClient(
+                client=clients[one.endpoint],
+                model=one.model,
+                context_tokens=one.context_tokens,
+                native_tools=role is ModelRole.MODIFIER
+                and options.protocol is ToolProtocol.NATIVE,
+            )
+            for role, one in respondents.items()
+        }
+        modifier = playing.pop(ModelRole.MODIFIER)
+        return pipeline.run(
             recipe_with(find_recipe(row.contestant.variant), options),
             scene=scene,
             instruction=row.scenario.instruction,
@@ -278,17 +257,3 @@ def _ask_model(
             intent=intent_of(row.scenario),
             sampling=options.sampling(row.sample),
         )
-    return Answer(
-        state=State(outcome.status.value),
-        modification=outcome.modification,
-        notes=outcome.notes,
-        reason=outcome.reason,
-    )
-
-
-def _client_for(respondent: Respondent, clients: dict[int, ChatClient]) -> RespondentClient:
-    return RespondentClient(
-        client=clients[respondent.endpoint.pk],
-        model=respondent.model,
-        context_tokens=respondent.context_tokens,
-    )

@@ -11,7 +11,7 @@ from django.conf import settings
 
 from augment.errors import WorkerStopping
 from augment.models import Worker
-from augment.services.clock import DATABASE_TIME, database_now
+from augment.services.clock import DATABASE_TIME
 from augment.services.texts import make_storable
 
 logger = logging.getLogger(__name__)
@@ -25,8 +25,6 @@ MOST_HEARD = 200
 
 LATE_ROUNDS = 4
 """A worker whose last good round is so many rounds ago does not recover lost work."""
-
-_stop_requested = Event()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -109,43 +107,17 @@ class Presence:
         return bool(Worker.objects.filter(pk=self._pk).update(**changes)) if self._pk else False
 
 
-class RecoveryRounds:
-    """Recovers lost work, round after round; no fault ends it.
-
-    Args:
-        recover: One round; told whether it is the first that works.
-        presence: Where it is kept when a round last worked.
-    """
-
-    def __init__(self, recover: Callable[[bool], None], presence: Presence) -> None:
-        self._recover = recover
-        self._presence = presence
-        self._at_start = True
-        self._failed = 0
-        self._worked_at: datetime | None = None
-
-    def go_on(self) -> bool:
-        """Do one round; returns whether it worked. Faults are logged and kept for the pages."""
-        try:
-            self._recover(self._at_start)
-            self._presence.recovered()
-            now = database_now()
-        except Exception as error:
-            self._failed += 1
-            fault = str(error) or type(error).__name__
-            since = f"{self._worked_at:%Y-%m-%d %H:%M:%S} UTC" if self._worked_at else "the start"
-            text = "Could not bring lost work back since %s (%d rounds), will try again: %s: %s"
-            values = (since, self._failed, type(error).__name__, fault)
-            if self._failed == 1:
-                logger.exception(text, *values)
-            else:  # a fault that stays is told in full once
-                logger.warning(text, *values)
-            survive(lambda: self._presence.failed(fault), "This could not be stored for the pages")
-            return False
-        if self._failed:
-            logger.info("Lost work is brought back again, after %d failed rounds.", self._failed)
-        self._at_start, self._failed, self._worked_at = False, 0, now
-        return True
+def do_round(recover: Callable[[], object], presence: Presence) -> bool:
+    """Recover lost work once; a fault of any kind is logged, kept for the pages and returned."""
+    try:
+        recover()
+        presence.recovered()
+    except Exception as error:
+        logger.exception("Could not bring lost work back, will try again.")
+        fault = str(error) or type(error).__name__
+        survive(lambda: presence.failed(fault), "This could not be stored for the pages")
+        return False
+    return True
 
 
 def workforce() -> Workforce:
@@ -167,30 +139,11 @@ def workforce() -> Workforce:
     return Workforce(living=len(living), not_recovered_since=worked_at[last.pk], fault=last.fault)
 
 
-# --- Whether this process is to stop -----------------------------------------------------------
-
-
-def request_stop() -> None:
-    """Let nothing new begin; safe to call from a signal handler."""
-    _stop_requested.set()
-
-
-def withdraw_stop() -> None:
-    """Go on as at the start of a process."""
-    _stop_requested.clear()
-
-
-def is_stop_requested() -> bool:
-    """Return whether this process is to stop."""
-    return _stop_requested.is_set()
-
-
-def wait(seconds: float) -> None:
-    """Wait until so many seconds have passed or the process is to stop."""
-    _stop_requested.wait(seconds)
+stopping = Event()
+"""Whether this process is to stop: nothing new begins. Safe to set in a signal handler."""
 
 
 def insist_on_going_on() -> None:
     """Raise WorkerStopping if the process was told to stop."""
-    if _stop_requested.is_set():
+    if stopping.is_set():
         raise WorkerStopping("this worker was told to stop")

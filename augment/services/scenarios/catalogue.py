@@ -17,14 +17,7 @@ from django.db import transaction
 from augment.errors import Conflict, InvalidDocument, InvalidModification, UnknownName
 from augment.formats.documents import read_json
 from augment.models import Augmentation, BaseScene, Scenario
-from augment.scene.codec import (
-    CatalogueEntry,
-    entry_from_document,
-    intent_to_document,
-    modification_to_document,
-    scene_from_document,
-    scene_to_document,
-)
+from augment.scene import codec
 from augment.scene.entities import CatalogueSet, Scene, without_traffic
 from augment.scene.intent import IntentOrigin
 from augment.services.events import log_change
@@ -48,7 +41,7 @@ def folder_of(folder: Path, one: CatalogueSet) -> Path:
     return folder if one is CatalogueSet.PAPER else folder / one.value
 
 
-def read_catalogue(folder: Path) -> tuple[dict[str, Scene], list[CatalogueEntry]]:
+def read_catalogue(folder: Path) -> tuple[dict[str, Scene], list[codec.CatalogueEntry]]:
     """Return the scenes by name and the scenarios of a folder, each fitting its scene.
 
     A folder holds `scenes/<name>.json` and `scenarios/<slug>.json`.
@@ -58,8 +51,8 @@ def read_catalogue(folder: Path) -> tuple[dict[str, Scene], list[CatalogueEntry]
             fit together; every problem names its file and the path inside it.
     """
     problems: Problems = []
-    scenes = _read_files(folder / "scenes", scene_from_document, "name", problems)
-    entries = _read_files(folder / "scenarios", entry_from_document, "slug", problems)
+    scenes = _read_files(folder / "scenes", codec.scene_from_document, "name", problems)
+    entries = _read_files(folder / "scenarios", codec.entry_from_document, "slug", problems)
     if not (scenes or entries or problems):
         problems.append((str(folder), "holds no scenes/*.json and no scenarios/*.json"))
     for entry in entries.values():
@@ -181,7 +174,7 @@ def load_catalogue(
 
 
 def _store_scene(scene: Scene, actor: User | None) -> CatalogueStep:
-    document = scene_to_document(scene)
+    document = codec.scene_to_document(scene)
     wanted = {
         "document": document,
         "provenance": scene.provenance,
@@ -209,14 +202,14 @@ def _store_scene(scene: Scene, actor: User | None) -> CatalogueStep:
 
 
 def _store_scenario(
-    entry: CatalogueEntry, which: CatalogueSet, original: Scenario | None, actor: User | None
+    entry: codec.CatalogueEntry, which: CatalogueSet, original: Scenario | None, actor: User | None
 ) -> CatalogueStep:
     row = Scenario.objects.filter(slug=entry.slug).select_related("base_scene").first()
-    intent = None if entry.intent is None else intent_to_document(entry.intent)
+    intent = None if entry.intent is None else codec.intent_to_document(entry.intent)
     said: dict[str, Any] = {
         "type": entry.type.value,
         "instruction": entry.instruction.strip(),
-        "reference": modification_to_document(entry.reference),
+        "reference": codec.modification_to_document(entry.reference),
         "keep_traffic": entry.keep_traffic,
         "intent": intent,
     }

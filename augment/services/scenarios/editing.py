@@ -16,23 +16,13 @@ from augment.errors import Conflict, UnknownName
 from augment.geometry.frames import difference, wrap
 from augment.models import IntentReading, Scenario
 from augment.render.camera import AROUND_THE_EGO
-from augment.scene.codec import (
-    intent_from_document,
-    modification_from_document,
-    modification_to_document,
-)
+from augment.scene import codec
 from augment.scene.entities import LENGTH_WIDTH_M, AgentType, Modification, Scene, TrafficAgent
 from augment.scene.intent import IntentOrigin
 from augment.scene.intent_statements import list_statements
 from augment.scene.lane_graph import LaneGraph
 from augment.services.events import log_change
-from augment.services.scenarios.scenes import (
-    check_reference,
-    intent_of,
-    placeable_intent,
-    scene_key,
-    scene_of,
-)
+from augment.services.scenarios import scenes
 
 PLACED = tuple(one for one in AgentType if one is not AgentType.EGO_VEHICLE)
 _SNAP_WITHIN_M = 15.0
@@ -52,7 +42,7 @@ def editor_document(scenario: Scenario) -> dict[str, Any]:
     names = ("x_min_m", "y_max_m", "px_per_m", "width_px", "height_px")
     return {
         "camera": {name: getattr(camera, name) for name in names},
-        "agents": modification_to_document(Modification(moved=scene.agents))["move"],
+        "agents": codec.modification_to_document(Modification(moved=scene.agents))["move"],
         "sizes": {
             one.value: dict(zip(("length_m", "width_m"), LENGTH_WIDTH_M[one], strict=True))
             for one in PLACED
@@ -67,14 +57,14 @@ def read_edit(scenario: Scenario, document: object) -> Modification:
         InvalidDocument: It breaks its format.
         InvalidModification: It does not fit the scene.
     """
-    scene, graph = _read_scene(scenario.pk, scene_key(scenario))
-    given = modification_from_document(document)
+    scene, graph = _read_scene(scenario.pk, scenes.scene_key(scenario))
+    given = codec.modification_from_document(document)
     placed = replace(
         given,
         added=tuple(_on_its_lane(agent, graph) for agent in given.added),
         moved=tuple(_on_its_lane(agent, graph) for agent in given.moved),
     )
-    check_reference(scene, placed)
+    scenes.check_reference(scene, placed)
     return placed
 
 
@@ -84,12 +74,12 @@ def snap(scenario: Scenario, modification: Modification, agent_id: str) -> Modif
     A pedestrian who walks somewhere faces that way from there, along or across the lane.
     Nothing happens to an agent that is not changed, or further than 15 m from every lane.
     """
-    _, graph = _read_scene(scenario.pk, scene_key(scenario))
+    _, graph = _read_scene(scenario.pk, scenes.scene_key(scenario))
 
-    def snapped(agents: tuple[TrafficAgent, ...]) -> tuple[TrafficAgent, ...]:
-        return tuple(_snapped(one, graph) if one.id == agent_id else one for one in agents)
-
-    added, moved = snapped(modification.added), snapped(modification.moved)
+    added, moved = (
+        tuple(_snapped(one, graph) if one.id == agent_id else one for one in agents)
+        for agents in (modification.added, modification.moved)
+    )
     return replace(modification, added=added, moved=moved)
 
 
@@ -99,13 +89,13 @@ def editable_scene(scenario: Scenario) -> Scene:
     Raises:
         InvalidDocument: The stored scene can't be read.
     """
-    return _read_scene(scenario.pk, scene_key(scenario))[0]
+    return _read_scene(scenario.pk, scenes.scene_key(scenario))[0]
 
 
 @lru_cache(maxsize=8)
 def _read_scene(scenario_pk: int, key: str) -> tuple[Scene, LaneGraph]:
     """The key alone tells when a scene that was read before still holds."""
-    scene = scene_of(Scenario.objects.select_related("base_scene").get(pk=scenario_pk))
+    scene = scenes.scene_of(Scenario.objects.select_related("base_scene").get(pk=scenario_pk))
     return scene, LaneGraph(scene)
 
 
@@ -115,11 +105,11 @@ def _on_its_lane(agent: TrafficAgent, graph: LaneGraph) -> TrafficAgent:
 
 def _snapped(agent: TrafficAgent, graph: LaneGraph) -> TrafficAgent:
     lane_id = graph.under(agent.x_m, agent.y_m, agent.heading_rad)
-    if lane_id is None:
-        nearest = graph.nearest(agent.x_m, agent.y_m)
-        if nearest is None or nearest[1].distance_m > _SNAP_WITHIN_M:
-            return agent
+    nearest = graph.nearest(agent.x_m, agent.y_m)
+    if lane_id is None and nearest is not None and nearest[1].distance_m <= _SNAP_WITHIN_M:
         lane_id = nearest[0]
+    if lane_id is None:
+        return agent
     line = graph.lane(lane_id).centerline
     pose = line.pose_at(line.project(agent.x_m, agent.y_m).s_m)
     heading_rad = pose.heading_rad
@@ -146,13 +136,15 @@ def set_reference(scenario: Scenario, document: object, *, actor: User | None = 
     """
     row = _locked(scenario.slug, "reference")
     modification = read_edit(row, document)
-    intent = intent_of(row)
+    intent = scenes.intent_of(row)
     if modification.is_empty and not (intent and intent.unmet):
         raise Conflict(
             "Nothing is added, moved or removed. An empty reference is for wishes that can't "
             "be met, whose intent says so."
         )
-    return _set(row, "set reference", actor, reference=modification_to_document(modification))
+    return _set(
+        row, "set reference", actor, reference=codec.modification_to_document(modification)
+    )
 
 
 # Intents
@@ -169,7 +161,7 @@ def enter_intent(*, scenario: str, document: object, actor: User | None = None) 
     """
     row = _locked(scenario, "intent")
     entered = IntentOrigin.ENTERED
-    intent = placeable_intent(document)
+    intent = scenes.placeable_intent(document)
     return _set(row, "set intent", actor, intent=intent, intent_origin=entered)
 
 
@@ -186,7 +178,7 @@ def accept_reading(*, scenario: str, actor: User | None = None) -> Scenario:
     reading = waiting_reading(row)
     if reading is None:
         raise Conflict(f"No reading of '{row.slug}' waits to be accepted.")
-    intent = placeable_intent(reading.document)
+    intent = scenes.placeable_intent(reading.document)
     IntentReading.objects.filter(pk=reading.pk).update(state=IntentReading.State.ACCEPTED)
     return _set(row, "set intent", actor, intent=intent, intent_origin=IntentOrigin.READ)
 
@@ -208,7 +200,7 @@ def statements_of(document: object) -> tuple[str, ...]:
     Raises:
         InvalidDocument: The document breaks the format.
     """
-    return () if document is None else list_statements(intent_from_document(document))
+    return () if document is None else list_statements(codec.intent_from_document(document))
 
 
 def refuse_catalogue(row: Scenario, part: str = "reference") -> None:

@@ -18,18 +18,7 @@ from pydantic import BaseModel
 from augment.errors import AugmentError, InvalidDocument
 from augment.formats.apart import UntrustedInput
 from augment.formats.documents import MAX_CHARACTERS, read_yaml_file
-from augment.formats.interplan.file import (
-    WHAT,
-    Details,
-    File,
-    SpecialScenario,
-    file_of,
-    goal_place,
-    options_of,
-    place_of,
-    read_entry,
-    traffic_of,
-)
+from augment.formats.interplan import file as interplan_file
 from augment.formats.interplan.intent import describe_reference
 from augment.formats.nuplan_log import NuPlan
 from augment.models import BaseScene, Scenario
@@ -77,24 +66,27 @@ def import_interplan(
     Raises:
         InvalidDocument: There is not exactly one modification file, or it breaks its format.
     """
-    file = file_of(read_yaml_file(_modification_file_in(folder), what=WHAT))
+    file = interplan_file.file_of(
+        read_yaml_file(_modification_file_in(folder), what=interplan_file.WHAT)
+    )
     by_token = file.modification_details_dictionary
     wanted = {token: one for token, one in by_token.items() if one.special_scenario}
-    for text in file.left_out:
+    left_out = [
+        f"base token {token}, without a special scenario"
+        for token in by_token
+        if token not in wanted
+    ]
+    for text in (*file.left_out, *left_out):
         yield ImportStep(StepKind.LEFT_OUT, f"Left out: {text}.")
-    for token in by_token.keys() - wanted.keys():
-        text = f"Left out: base token {token}, which has no special scenario."
-        yield ImportStep(StepKind.LEFT_OUT, text)
     logs: dict[str, Path] = {}
     paths = sorted((data or folder).rglob("*.db"))
     for number, path in enumerate(paths, start=1):
-        tokens: tuple[str, ...] = ()
         try:
             tokens = UntrustedInput(path=path, format=NuPlan.name).tokens(list(wanted))
             found = f"{len(tokens)} base tokens"
+            logs = dict.fromkeys(tokens, path) | logs
         except InvalidDocument as fault:
             found = str(fault)
-        logs = dict.fromkeys(tokens, path) | logs
         yield ImportStep(StepKind.LOG, f"Log {number} of {len(paths)}, {path.name}: {found}")
     for token, details in wanted.items():
         if token in logs:
@@ -104,32 +96,28 @@ def import_interplan(
 
 
 def _modification_file_in(folder: Path) -> Path:
-    """The one modification file in a folder, whatever it is called."""
-    if folder.is_file():
-        return folder
-    if not folder.is_dir():
-        raise InvalidDocument(WHAT, [(str(folder), "is not a folder")])
-    candidates = [*sorted(folder.rglob("*.yaml")), *sorted(folder.rglob("*.yml"))]
+    """Return the one modification file in a folder, whatever it is called."""
     files = [
         file
-        for file in candidates
+        for file in ([folder] if folder.is_file() else sorted(folder.rglob("*.y*ml")))
         if file.is_file()
         and file.stat().st_size <= MAX_CHARACTERS
         and _KEY.encode() in file.read_bytes()
     ]
     if len(files) != 1:
-        named = ", ".join(str(file.relative_to(folder)) for file in files[:5])
-        text = f"holds {len(files)} YAML files with {_KEY}, there must be one: {named}"
-        raise InvalidDocument(WHAT, [(str(folder), text.rstrip(": "))])
+        problem = f"{len(files)} YAML files with {_KEY} are there; there must be one"
+        raise InvalidDocument(interplan_file.WHAT, [(str(folder), problem)])
     return files[0]
 
 
-def _skip_all(token: str, details: Details, reason: str) -> Iterator[ImportStep]:
+def _skip_all(token: str, details: interplan_file.Details, reason: str) -> Iterator[ImportStep]:
     for index in details.special_scenario or {}:
         yield ImportStep(StepKind.SKIPPED, f"{token}-s{index}: skipped. {reason}")
 
 
-def _keep_token(token: str, file: File, log: Path, actor: User | None) -> Iterator[ImportStep]:
+def _keep_token(
+    token: str, file: interplan_file.File, log: Path, actor: User | None
+) -> Iterator[ImportStep]:
     details = file.modification_details_dictionary[token]
     try:
         recorded = UntrustedInput(path=log, format=NuPlan.name)
@@ -149,7 +137,9 @@ def _keep_token(token: str, file: File, log: Path, actor: User | None) -> Iterat
             yield ImportStep(StepKind.SKIPPED, f"{token}-s{index}: skipped. {fault}")
 
 
-def _verbatim(file: File, token: str, index: str, entry: SpecialScenario) -> dict[str, Any]:
+def _verbatim(
+    file: interplan_file.File, token: str, index: str, entry: interplan_file.SpecialScenario
+) -> dict[str, Any]:
     """Return all that an export has to say again."""
     parts: dict[str, tuple[BaseModel, set[str]]] = {
         "entry": (entry, set()),
@@ -163,23 +153,29 @@ def _verbatim(file: File, token: str, index: str, entry: SpecialScenario) -> dic
     try:
         json.dumps(document, allow_nan=False)
     except ValueError:
-        problem = (place_of(token, index), "holds a number that is not finite")
-        raise InvalidDocument(WHAT, [problem]) from None
+        problem = (interplan_file.place_of(token, index), "holds a number that is not finite")
+        raise InvalidDocument(interplan_file.WHAT, [problem]) from None
     return document
 
 
 def _keep_entry(
-    row: BaseScene, scene: Scene, entry: SpecialScenario, kept: dict[str, Any], actor: User | None
+    row: BaseScene,
+    scene: Scene,
+    entry: interplan_file.SpecialScenario,
+    kept: dict[str, Any],
+    actor: User | None,
 ) -> ImportStep:
     token, slug = row.source_item, f"{row.slug}-s{kept['index']}"
-    read = read_entry(token, kept["index"], entry, scene)
+    read = interplan_file.read_entry(token, kept["index"], entry, scene)
     left_out = f"; left out: {', '.join(read.left_out)}" if read.left_out else ""
     if Scenario.objects.filter(slug=slug, base_scene=row, type=read.type.value).exists():
         return ImportStep(StepKind.OLD, f"{read.id}: {slug} was there already{left_out}")
-    density, goal = options_of(entry.config)
-    details = Details.model_validate(kept["details"])
-    traffic = traffic_of(entry, details, scene, seed=token, clear_of=read.modification.added)
-    goal_m = goal_place(kept, goal or "", scene)
+    density, goal = interplan_file.options_of(entry.config)
+    details = interplan_file.Details.model_validate(kept["details"])
+    traffic = interplan_file.traffic_of(
+        entry, details, scene, seed=token, clear_of=read.modification.added
+    )
+    goal_m = interplan_file.goal_place(kept, goal or "", scene)
     options = SceneOptions(density=density, goal=goal, goal_m=goal_m)
     driven = replace(scene, agents=traffic, options=options)
     instruction, intent = describe_reference(read.type, read.modification, driven)

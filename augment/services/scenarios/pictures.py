@@ -20,11 +20,7 @@ from augment.render.bev import draw
 from augment.render.camera import AROUND_THE_EGO, LOOK, Camera, camera_for
 from augment.render.canvas import shrink, shrink_png
 from augment.render.legend import change_keys, scene_keys
-from augment.scene.codec import (
-    modification_from_document,
-    modification_to_document,
-    scene_from_document,
-)
+from augment.scene import codec
 from augment.scene.entities import Modification, Scene, without_traffic
 from augment.services.events import log_change
 from augment.services.scenarios.scenes import content_hash, reference_of, scene_key, scene_of
@@ -74,7 +70,9 @@ def camera_of(scenario: Scenario) -> Camera:
     """
     answered = scenario.augmentations.exclude(modification=None).order_by("pk")
     documents = answered.values_list("modification", flat=True)
-    changes = tuple(modification_from_document(document) for document in documents if document)
+    changes = tuple(
+        codec.modification_from_document(document) for document in documents if document
+    )
     return camera_for(scene_of(scenario), reference_of(scenario), changes)
 
 
@@ -168,7 +166,7 @@ def _shown(row: Augmentation) -> Modification:
     """What its picture shows: an answer that could not be read changes nothing."""
     if row.state != Augmentation.State.DONE or not row.modification:
         return Modification()
-    return modification_from_document(row.modification)
+    return codec.modification_from_document(row.modification)
 
 
 SCENES = "scenes"
@@ -213,7 +211,7 @@ def draw_scene(scene_pk: int) -> None:
     missing = [view for view in SceneView if not is_drawn(scene_picture(row, view))]
     if not missing:
         return
-    scene = scene_from_document(row.document)
+    scene = codec.scene_from_document(row.document)
     for view in missing:
         shown = scene if view is SceneView.KEPT else without_traffic(scene)
         camera = AROUND_THE_EGO if view is SceneView.BACKDROP else camera_for(scene, None)
@@ -279,7 +277,7 @@ def legends_of_changes(views: Mapping[int, Mapping[str, Any]]) -> dict[int, set[
     return {
         key: set()
         if not document
-        else change_keys(modification_from_document(document), views[key])
+        else change_keys(codec.modification_from_document(document), views[key])
         for key, document in rows.values_list("pk", "modification")
     }
 
@@ -313,7 +311,7 @@ def draw_checks(*, scenarios: Sequence[str], actor: User | None = None) -> list[
         change = None if reference is None else break_reference(reference)
         if change is None:
             continue
-        document = modification_to_document(change)
+        document = codec.modification_to_document(change)
         checks = row.augmentations.filter(contestant__kind=Contestant.Kind.CHECK, state=State.DONE)
         if not checks.filter(modification=document).exists():
             image = picture_of(scene_of(row), change, camera_of(row))

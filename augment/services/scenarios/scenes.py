@@ -15,13 +15,7 @@ from augment.errors import Conflict, InvalidDocument, UnknownName
 from augment.formats.interplan.file import goal_place
 from augment.models import BaseScene, Scenario
 from augment.models.scenes import GOALS
-from augment.scene.codec import (
-    intent_from_document,
-    intent_to_document,
-    modification_from_document,
-    modification_to_document,
-    scene_from_document,
-)
+from augment.scene import codec
 from augment.scene.density import spawn_traffic
 from augment.scene.entities import (
     Modification,
@@ -51,9 +45,8 @@ def type_choices() -> list[tuple[str, str]]:
 
 
 def type_label(name: str) -> str:
-    """What people read for a type; a type that nobody knows is its own label."""
-    known = type_of(name)
-    return dict(type_choices()).get(name, name) if known is None else known.label
+    """Return what people read for a type; a type that nobody knows is its own label."""
+    return dict(type_choices()).get(name, name)
 
 
 def type_of(name: str) -> ScenarioType | None:
@@ -67,32 +60,19 @@ def type_rank(name: str) -> int:
     return known.index(name) if name in known else len(known)
 
 
-def check_type(name: str) -> None:
-    """Refuse what can't be a scenario type.
+def label_for(name: str) -> str:
+    """Return the label that a scenario of this type is stored with: empty for one of the five.
 
     Raises:
         InvalidDocument: It is neither one of the five nor a slug.
     """
     if type_of(name) is not None:
-        return
+        return ""
     if len(name) > LONGEST_TYPE or not re.fullmatch(r"[a-z0-9]+([_-][a-z0-9]+)*", name):
         known = ", ".join(one.value for one in ScenarioType)
-        rule = (
-            f"one of {known}, or a slug of your own: lower-case letters, digits and single _ or "
-            f"-, at most {LONGEST_TYPE}"
-        )
-        raise InvalidDocument("scenario", [("type", f"{name!r} must be {rule}")])
-
-
-def _label_for(name: str) -> str:
-    """Return the label that a scenario of this type is stored with: empty for one of the five.
-
-    Raises:
-        InvalidDocument: The slug of a type of one's own can't be.
-    """
-    check_type(name)
-    if type_of(name) is not None:
-        return ""
+        rule = f"one of {known}, or lower-case letters, digits and single _ or -"
+        problem = f"{name!r} must be {rule}, at most {LONGEST_TYPE}"
+        raise InvalidDocument("scenario", [("type", problem)])
     before = Scenario.objects.filter(type=name).values_list("type_label", flat=True).first()
     return before or re.sub(r"[_-]", " ", name).capitalize()
 
@@ -108,7 +88,7 @@ def placeable_intent(document: object) -> dict[str, Any]:
     Raises:
         InvalidDocument: It breaks the format, or leaves open what the rule placer would refuse.
     """
-    intent = intent_from_document(document)
+    intent = codec.intent_from_document(document)
     problems = [
         (f"requests[{n}]", problem)
         for n, request in enumerate(intent.requests)
@@ -116,7 +96,7 @@ def placeable_intent(document: object) -> dict[str, Any]:
     ]
     if problems:
         raise InvalidDocument("intent", problems)
-    return intent_to_document(intent)
+    return codec.intent_to_document(intent)
 
 
 @transaction.atomic
@@ -175,7 +155,7 @@ def add_scenario(
     if intent is not None:
         # The catalogue leaves some open on purpose: the rule placer refuses them, models do not.
         is_entered = intent_origin is IntentOrigin.ENTERED
-        read = intent_to_document(intent_from_document(intent))
+        read = codec.intent_to_document(codec.intent_from_document(intent))
         scenario.intent = placeable_intent(intent) if is_entered else read
         scenario.intent_origin = intent_origin
     _insert(scenario, actor)
@@ -207,7 +187,7 @@ def set_wording(scenario: Scenario, instruction: str, type: str) -> None:
         InvalidDocument: The type or the instruction breaks its format.
     """
     check_prose("instruction", instruction, what="scenario", longest=INSTRUCTION_LENGTH)
-    scenario.type, scenario.type_label = type, _label_for(type)
+    scenario.type, scenario.type_label = type, label_for(type)
     scenario.instruction_is_generated &= scenario.instruction == instruction.strip()
     scenario.instruction = instruction.strip()
 
@@ -228,7 +208,7 @@ def change_surroundings(
         return
     traffic = None
     if is_same_traffic and scenario.spawned is not None:
-        traffic = modification_from_document(scenario.spawned).added
+        traffic = codec.modification_from_document(scenario.spawned).added
     _set_surroundings(scenario, keep_traffic, density, goal, traffic, scenario.reference)
     scenario.original_image, scenario.windows = "", {}
 
@@ -255,30 +235,30 @@ def _set_surroundings(
         raise Conflict("Spawned traffic replaces the recorded one: choose one of the two.")
     scenario.keep_traffic, scenario.traffic_density = keep_traffic, spawned.value
     scenario.goal = TurnType(goal).value if goal else ""
-    change = None if reference is None else modification_from_document(reference)
+    change = None if reference is None else codec.modification_from_document(reference)
     if traffic is None:
         base = scenario.base_scene
         traffic = spawn_traffic(
-            without_traffic(scene_from_document(base.document)),
+            without_traffic(codec.scene_from_document(base.document)),
             spawned,
             seed=base.slug,
             clear_of=() if change is None else change.added,
         )
     scenario.spawned = None
     if traffic:
-        scenario.spawned = modification_to_document(Modification(added=tuple(traffic)))
+        scenario.spawned = codec.modification_to_document(Modification(added=tuple(traffic)))
     if change is not None:
         check_reference(scene_of(scenario), change)
-        scenario.reference = modification_to_document(change)
+        scenario.reference = codec.modification_to_document(change)
 
 
 def scene_of(scenario: Scenario) -> Scene:
     """The scene that contestants are asked to change, with the scenario's own traffic and goal."""
-    scene = scene_from_document(scenario.base_scene.document)
+    scene = codec.scene_from_document(scenario.base_scene.document)
     if not scenario.keep_traffic:
         scene = without_traffic(scene)
     if scenario.spawned is not None:
-        scene = apply(scene, modification_from_document(scenario.spawned))
+        scene = apply(scene, codec.modification_from_document(scenario.spawned))
     own = scene.options
     density = own.density if scenario.keep_traffic else TrafficDensity(scenario.traffic_density)
     options = replace(own, density=density)
@@ -306,12 +286,12 @@ def reference_of(scenario: Scenario) -> Modification | None:
     """The human modification, None for a scenario without one."""
     if scenario.reference is None:
         return None
-    return modification_from_document(scenario.reference)
+    return codec.modification_from_document(scenario.reference)
 
 
 def intent_of(scenario: Scenario) -> Intent | None:
     """What the instruction asks for, None where nobody has written it down."""
-    return None if scenario.intent is None else intent_from_document(scenario.intent)
+    return None if scenario.intent is None else codec.intent_from_document(scenario.intent)
 
 
 def content_hash(document: dict[str, Any]) -> str:

@@ -27,7 +27,7 @@ from augment.render.bev import draw
 from augment.render.camera import camera_for
 from augment.scene.entities import Modification
 from augment.scene.recording import notes_from_document, notes_to_document
-from augment.services.events import log_event
+from augment.services.events import log_change
 from augment.services.scenarios.pictures import store_as
 from augment.services.scenarios.scene_imports import keep_reading, sentence_of
 from augment.services.scenarios.scenes import check_slug
@@ -87,7 +87,8 @@ def keep_upload(
     try:
         with transaction.atomic():
             row.save(force_insert=True)
-            _log(row, "upload", actor, size_bytes=row.size_bytes, digest=row.digest)
+            after = {"name": row.name, "size_bytes": row.size_bytes, "digest": row.digest}
+            log_change(row, "upload", actor, after=after)
     except BaseException:
         default_storage.delete(row.stored)
         raise
@@ -98,7 +99,7 @@ def keep_upload(
 def remove_upload(row: SceneUpload, actor: User | None = None) -> None:
     """Forget a file and what was drawn of it; scenes that were kept stay."""
     names = [row.stored, *row.moments.values_list("picture", flat=True)]
-    _log(row, "remove upload", actor)
+    log_change(row, "remove upload", actor, after={"name": row.name})
     row.delete()
     for name in filter(None, names):
         transaction.on_commit(partial(default_storage.delete, name))
@@ -152,16 +153,6 @@ def _document(track: RecordingPart) -> dict[str, Any]:
     ]
     seen = {"name": track.name, "is_seen": track.is_seen, "roads_m": track.roads_m}
     return seen | {"stops": stops}
-
-
-def _log(row: SceneUpload, verb: str, actor: User | None, **after: Any) -> None:
-    log_event(
-        actor=actor,
-        verb=verb,
-        object_kind="upload",
-        object_code=row.code,
-        after={"name": row.name, **after},
-    )
 
 
 # Moments
