@@ -199,13 +199,10 @@ class _Fitting:
 
 def _as_request(move: Move, agent: TrafficAgent) -> VehicleRequest:
     """Return a road user's move as the placement of a new one."""
-    return VehicleRequest(
-        spot=move.spot,
+    return replace(
+        move.vehicle_request,
         body=_BODIES.get(agent.type, Body.VEHICLE),
-        facing=move.facing,
-        turn_deg=move.turn_deg,
         speed_mps=agent.speed_mps if move.speed_mps is None else move.speed_mps,
-        count=1,
     )
 
 
