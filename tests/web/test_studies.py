@@ -1,5 +1,7 @@
 """Opening, watching and closing a study by its pages."""
 
+import re
+
 import pytest
 from django.contrib.auth.models import User
 from django.urls import reverse
