@@ -119,9 +119,6 @@ def even_out(chosen: BoolArray, showable: BoolArray, aim: IntArray) -> None:
             chosen[giver, column], chosen[taker, column] = False, True
 
 
-# --- Private -----------------------------------------------------------------------------------
-
-
 def _chain(level: IntArray, can_give: BoolArray) -> list[int] | None:
     """The shortest way by `can_give` (P, P) from a row down to one at least two lower."""
     for source in np.argsort(-level, kind="stable"):
@@ -159,12 +156,6 @@ _TRIES = 8
 """Rounds over all experts without an exchange, after which there is none."""
 
 
-def overlap_of(chosen: BoolArray) -> tuple[int, int]:
-    """How many units of a plan (E, P, S) somebody judges, and how many two experts or more."""
-    judges = chosen.sum(axis=0)
-    return int((judges > 0).sum()), int((judges > 1).sum())
-
-
 def bring_together(
     chosen: BoolArray, showable: BoolArray, share: float, rng: np.random.Generator
 ) -> None:
@@ -189,10 +180,10 @@ def bring_together(
         )
         idle = 0 if moved else idle + 1
         if idle == _TRIES:
-            judged, shared = overlap_of(chosen)
             raise NothingToPlan(
                 f"Of the pairs that are judged, {share:.0%} are to be judged by two experts or "
-                f"more; with these experts, votes and pictures {shared} of {judged} are reached. "
+                f"more; with these experts, votes and pictures {int((judges > 1).sum())} of "
+                f"{int((judges > 0).sum())} are reached. "
                 "Ask for less, or for more votes per expert."
             )
 
