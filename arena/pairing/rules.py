@@ -251,7 +251,9 @@ def check_rules(rules: PlanRules, grid: Grid) -> None:
     check_share("what two experts judge", rules.overlap_share, MOST_OVERLAP)
     check_share(ATTENTION_CHECKS, rules.check_share, MOST_CHECKS)
     check_share("the adaptive part", rules.adaptive_share, MOST_ADAPTIVE)
-    places = [check.scenario for check in rules.checks]
+    contestants = len({entry.contestant for entry in rules.entries})
+    checked = [check.scenario for check in rules.checks]
+    votes, units, same = rules.votes_per_expert, int(grid.showable.sum()), len(grid.identical)
     refusals = {
         f"The seed must be 0 or more, not {rules.seed}.": rules.seed < 0,
         f"Votes per expert must be 1 or more, not {votes}.": votes < 1,
@@ -262,10 +264,23 @@ def check_rules(rules: PlanRules, grid: Grid) -> None:
         f"{rules.uniform_share:.0%}.": not 0.2 <= rules.uniform_share <= 1,
         "For pairs that two experts judge there must be two.": rules.overlap_share > 0
         and len(rules.experts) < 2,
-        "Each check is on a scenario of its own out of those of the study.": not set(places)
-        <= set(grid.scenarios)
-        or len(set(places)) < len(places),
+        "Each check is on a scenario of its own out of those of the study.": len(set(checked))
+        < len(checked)
+        or not set(checked) <= set(grid.scenarios),
+        f"Nobody sees the same pair of a scenario twice: {len(grid.scenarios)} scenarios have "
+        f"{units} different pairs to show (and {same} with identical pictures), but each expert "
+        f"is to judge {votes}.": units < votes,
     }
     for sentence, is_refused in refusals.items():
         if is_refused:
             raise NothingToPlan(sentence)
+
+
+def check_share(part: str, share: float, most: float) -> None:
+    """Refuse a share that is not from 0 to the most that there can be.
+
+    Raises:
+        NothingToPlan: It is none.
+    """
+    if not 0 <= share <= most:
+        raise NothingToPlan(f"The share of {part} goes from 0 to {most:.0%}, not {share:.1%}.")
