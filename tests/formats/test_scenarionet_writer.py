@@ -42,10 +42,6 @@ def test_the_pickle_names_nothing_that_numpy_1_lacks() -> None:
         assert names <= {"numpy.core.multiarray _reconstruct", "numpy ndarray", "numpy dtype"}
 
 
-def test_the_same_cells_give_the_same_bytes() -> None:
-    assert write([cell()]).files == write([cell()]).files
-
-
 def test_a_walk_is_written_as_motion() -> None:
     state = document()["tracks"]["Agent5"]["state"]
     assert state["position"][-1, :2] == pytest.approx((70.0, 8.0 - 12.0 * 2.5 / 15.0), abs=0.1)

@@ -1,8 +1,8 @@
 """Lanelets, signs, lights and intersections of CommonRoad XML as segments and areas.
 
-What an intersection names as the successors of its incoming lanelets lies in it, and what follows
-these in a bend. In a file without intersections, lanelets of forks and merges that cross others
-do. Turn types are those that it names; a light holds for the ways in its direction.
+What an intersection names as the successors of its incoming lanelets lies in it. In a file
+without intersections, lanelets of forks and merges that cross others do. Turn types are those
+that it names; a light holds for the ways in its direction.
 """
 
 import math
@@ -13,11 +13,8 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from augment.formats.road_map import RoadMap, Segment
-from augment.formats.roads import midline
 from augment.formats.values import FURTHEST, FloatArray, fault_at, look_up, read_finite
-from augment.geometry.polyline import Polyline
 from augment.scene.entities import AreaKind, TrafficLight, TurnType
-from augment.scene.lane_graph import turn_type_of
 
 SPEED_SIGNS = frozenset({"274", "R2-1"})
 """The speed limit of Germany (and of Zamunda), and of the United States; values in m/s."""
@@ -129,7 +126,7 @@ def network_of(root: Element, step: int) -> RoadMap:
         for key, one in elements.items()
     }
     lanelets = {key: _segment(key, one, limits) for key, one in elements.items()}
-    inside = _inside(root, lanelets, {key for key in kinds if "intersection" in kinds[key]})
+    inside = _inside(root, {key for key in kinds if "intersection" in kinds[key]})
     segments, areas = [], []
     for key, one in lanelets.items():
         for kind in sorted(kinds[key] & AREA_OF.keys())[:1]:
@@ -152,7 +149,9 @@ def network_of(root: Element, step: int) -> RoadMap:
         segments=tuple(segments),
         areas=tuple(areas),
         left_out=left_out,
-        tells_crossings=bool(inside),  # the dialect of 2018b has no intersections
+        tells_crossings=any(
+            one.crosses for one in segments
+        ),  # the dialect of 2018b has no intersections
     )
 
 
@@ -214,34 +213,10 @@ def _segment(key: int, element: Element, limits: dict[int, float]) -> Segment:
     )
 
 
-def _inside(
-    root: Element, lanelets: dict[int, Segment], marked: set[int]
-) -> dict[int, TurnType | None]:
+def _inside(root: Element, marked: set[int]) -> dict[int, TurnType | None]:
     """What lies in an intersection, with its turn where the file tells it."""
     named: dict[int, TurnType | None] = dict.fromkeys(marked)
     for incoming in root.findall("intersection/incoming"):
         for word, turn in _TURNS.items():
             named |= dict.fromkeys(_references(incoming, f"successors{word}"), turn)
-    inside = {key: turn for key, turn in named.items() if key in lanelets}
-    # Where the file says itself what is an intersection, no bend has to tell.
-    waiting = [] if marked else list(inside)
-    while waiting:
-        for name in lanelets[waiting.pop()].successors:
-            key = int(name)
-            if key not in lanelets or key in inside:
-                continue
-            one = lanelets[key]
-            if set(one.predecessors) <= inside.keys() and one.successors and _bends(one):
-                inside[key] = None
-                waiting.append(key)
-    return inside
-
-
-def _bends(one: Segment) -> bool:
-    assert one.left is not None
-    assert one.right is not None
-    try:
-        line = midline(Polyline(one.left), Polyline(one.right))
-    except ValueError:
-        return False  # it is refused where the road is built
-    return turn_type_of(line) is not TurnType.STRAIGHT
+    return named

@@ -69,12 +69,6 @@ class _Array:
         return self
 
 
-class _Name:
-    """A name that is only ever handed on."""
-
-    __slots__ = ()
-
-
 def _build_scalar(kind: Any, block: Any) -> Any:
     return _Array().fill(block, kind, (), "C").value.item()
 
@@ -96,15 +90,15 @@ def _encode(text: str, coding: str = "latin1") -> bytes:
     return text.encode("latin1")
 
 
-_ALLOWED: dict[str, Any] = {
-    "numpy.ndarray": _Name(),
+_ALLOWED: dict[str, Any] = {  # None: a name that is only ever handed on
+    "numpy.ndarray": None,
     "numpy.dtype": _Kind,
     "collections.defaultdict": _build_dictionary,
     "collections.OrderedDict": _build_dictionary,
-    "builtins.int": _Name(),
+    "builtins.int": None,
     "builtins.set": set,
-    "__builtin__.int": _Name(),
-    "__builtin__.long": _Name(),
+    "__builtin__.int": None,
+    "__builtin__.long": None,
     "__builtin__.set": set,
     "_codecs.encode": _encode,
     "numpy.core.multiarray._reconstruct": _Array,
