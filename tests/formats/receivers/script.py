@@ -57,12 +57,10 @@ def read_commonroad(file: str) -> dict[str, Any]:
     network = scenario.lanelet_network
     return {
         "faults": [],
-        "dt": scenario.dt,
         "lanelets": {
             one.lanelet_id: {
                 "center": one.center_vertices.tolist(),
                 "successor": one.successor,
-                "adj_right": one.adj_right,
                 "type": sorted(kind.value for kind in one.lanelet_type),
             }
             for one in network.lanelets
