@@ -86,11 +86,6 @@ def read_commonroad(file: str) -> dict[str, Any]:
             [*one.initial_state.position.tolist(), one.initial_state.velocity]
             for one in problems.planning_problem_dict.values()
         ],
-        "goals": [
-            [goal.position.center.x, goal.position.center.y, goal.time_step.end]
-            for one in problems.planning_problem_dict.values()
-            for goal in one.goal.state_list
-        ],
     }
 
 
