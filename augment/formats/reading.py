@@ -153,7 +153,9 @@ class Log:
             traffic_side=road.traffic_side,
             origin=Origin.at(origin, frame=self.world),
             provenance=f"{self.title}, step {frame} of {len(self.times_s)}; {self.licence}",
-            agents=tuple(_agent(track) for track in tracks if _is_near(track)),
+            agents=tuple(
+                _agent(track) for track in tracks if np.hypot(*track.states[0, :2]) <= RADIUS_M
+            ),
             lanes=road.lanes,
             connectors=road.connectors,
             areas=road.areas,
@@ -361,10 +363,6 @@ def _local(states: FloatArray, origin: Pose) -> FloatArray:
     local = np.column_stack([xy, headings, np.round(states[:, 3], 3)])
     local[~np.isfinite(local).all(axis=1)] = np.nan
     return local
-
-
-def _is_near(track: Track) -> bool:
-    return bool(np.hypot(*track.states[0, :2]) <= RADIUS_M)
 
 
 def _ego(log: Log, frame: int) -> TrafficAgent:

@@ -8,7 +8,7 @@ import pytest
 from augment.errors import InvalidDocument
 from augment.formats.argoverse2 import ArgoverseSensor
 from augment.scene.codec import recording_to_document
-from augment.scene.entities import AgentType, AreaKind, Scene, TrafficLight, TurnType
+from augment.scene.entities import AgentType, Scene, TrafficLight, TurnType
 from augment.scene.lane_graph import LaneGraph
 from augment.scene.recording import Recording
 from tests.formats.av2_logs import boxes, city_map, poses, write_log
@@ -74,18 +74,6 @@ def test_each_way_over_an_intersection_is_one_connector(log: Path) -> None:
     assert found == {("Lane1", onward, TurnType.STRAIGHT), ("Lane1", leftward, TurnType.LEFT)}
     assert {c.traffic_light for c in scene.connectors} == {TrafficLight.UNKNOWN}
     assert LaneGraph(scene).route("Lane1", 90.0)[-1] == onward
-
-
-def test_areas_are_drivable_or_crosswalks(log: Path) -> None:
-    scene, _ = read(log)
-    by_kind = {area.kind: area.boundary_m for area in scene.areas}
-    assert set(by_kind) == {AreaKind.DRIVABLE, AreaKind.CROSSWALK}
-    assert by_kind[AreaKind.CROSSWALK] == (
-        (24.58, 6.0),
-        (24.58, -4.0),
-        (27.58, -4.0),
-        (27.58, 6.0),
-    )
 
 
 def test_the_recording_runs_from_t0_to_the_end_in_the_frame_of_t0(log: Path) -> None:

@@ -8,7 +8,6 @@ from augment.errors import Conflict
 from augment.formats.interplan.file import token_of
 from augment.formats.interplan.writer import interplan_text as write
 from augment.formats.writing import Cell
-from augment.geometry.frames import difference
 from augment.scene.entities import (
     AgentType,
     Modification,
@@ -102,14 +101,6 @@ def test_several_of_one_scene_are_numbered_and_named_in_comments() -> None:
     assert f"# {token}-s1 plane-tree-street: another" in text
     with pytest.raises(Conflict, match="at most 100"):
         write([same] * 101)
-
-
-def test_a_walk_of_no_length_becomes_a_step_along_the_heading() -> None:
-    given = first("jaywalker-plane-tree-street")
-    still = replace(given, walk_to_m=(given.x_m, given.y_m), speed_mps=0.0)
-    back = read_again(cell("jaywalker-plane-tree-street", still)).added[0]
-    assert abs(difference(back.heading_rad, still.heading_rad)) < 0.001
-    assert back.walk_to_m is None
 
 
 def test_a_name_with_control_characters_leaves_a_file_that_can_be_read() -> None:

@@ -13,7 +13,7 @@ from augment.formats.openscenario.writer import REAR_AXLE_SHARE, write
 from augment.formats.writing import Cell
 from augment.geometry.polyline import Polyline
 from augment.scene.codec import scene_from_document
-from augment.scene.entities import Lane, Scene, TrafficSide
+from augment.scene.entities import Lane, Scene
 from augment.scene.lane_graph import AnyLane
 from tests.formats.cells import OF_EACH_TYPE, cell, crossing, recorded_street
 from tests.formats.receivers import told_by
@@ -94,19 +94,6 @@ def test_a_lane_lies_between_its_own_edges() -> None:
     # On the left the lane lies left of its inner edge, the right one.
     assert offsets[0] == pytest.approx((0.0, -2.0), abs=0.01)
     assert np.array(widths) == pytest.approx(np.array([(0.0, 4.0), (30.0, 4.5)]), abs=0.01)
-
-
-def test_left_hand_traffic_drives_left_of_the_line() -> None:
-    for side, found, rule in (
-        (TrafficSide.LEFT, "left", "LHT"),
-        (TrafficSide.RIGHT, "right", "RHT"),
-    ):
-        _, road_map = files(cell(replace(crossing(), traffic_side=side), added=()))
-        for road in road_map.findall("road"):
-            assert road.attrib["rule"] == rule
-            assert [lane.attrib["type"] for lane in road.findall(f".//{found}/lane")] == [
-                "driving"
-            ]
 
 
 def test_a_fork_is_a_junction() -> None:

@@ -195,7 +195,9 @@ def read_entry(
             add(kind, place(x_m, y_m, key, number), heading_rad)
     for number, cone in enumerate(entry.cones):
         point = place(*cone, "cones", number)
-        add(AgentType.TRAFFIC_CONE, point, cone_heading(ground, *point))
+        # A cone has no direction in the file.
+        way_rad = 0.0 if ground.route is None else ground.route.locate(*point).tangent_rad
+        add(AgentType.TRAFFIC_CONE, point, way_rad)
     for number, (x_m, y_m, to_x_m, to_y_m, iteration) in enumerate(entry.pedestrian):
         start = place(x_m, y_m, "pedestrian", number)
         end = place(to_x_m, to_y_m, "pedestrian", number)
@@ -291,11 +293,6 @@ def goal_place(source: Mapping[str, Any] | None, goal: str, scene: Scene) -> Poi
 def _to_local(scene: Scene, x_m: float, y_m: float) -> Point:
     x_m, y_m = scene.origin.pose.to_local(np.array([[x_m, y_m]]))[0].tolist()
     return x_m, y_m
-
-
-def cone_heading(ground: Ground, x_m: float, y_m: float) -> float:
-    """Return the direction of the ego's way beside a place: a cone has none in the file."""
-    return 0.0 if ground.route is None else ground.route.locate(x_m, y_m).tangent_rad
 
 
 # The suffix of options

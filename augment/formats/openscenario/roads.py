@@ -15,7 +15,7 @@ import numpy as np
 from augment.formats import writing
 from augment.formats.writing import Cell, LossReport
 from augment.geometry.polyline import FloatArray, Polyline
-from augment.scene.entities import Lane, LaneConnector, Scene, TrafficLight, TrafficSide
+from augment.scene.entities import LaneConnector, Scene, TrafficLight, TrafficSide
 from augment.scene.lane_graph import AnyLane, LaneGraph
 
 NARROWEST_M: Final = 0.1
@@ -122,8 +122,6 @@ def _is_connecting(one: LaneConnector, roads: Mapping[str, _Road]) -> bool:
     """Whether both its ends are lanes that it really reaches."""
     before, after = (roads.get(name or "") for name in (one.from_lane, one.to_lane))
     if before is None or after is None:
-        return False
-    if not (isinstance(before.way, Lane) and isinstance(after.way, Lane)):
         return False
     return before.leads_to(roads[one.id]) and roads[one.id].leads_to(after)
 

@@ -16,9 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from augment.errors import InvalidDocument
-
-WHAT = "ScenarioNet file"
+from augment.formats.values import fault_at
 
 _KIND = re.compile(r"[<>=|]?(?:[?]|[biuf](?:1|2|4|8)|[US][0-9]{1,4}|b1|O|O8)")
 _FAULTS = (
@@ -125,8 +123,7 @@ def read_pickle(path: Path) -> Any:
     try:
         return _plain(_Unpickler(io.BytesIO(path.read_bytes()), encoding="latin1").load())
     except (OSError, *_FAULTS) as fault:
-        problem = f"can't be unpickled safely: {str(fault)[:200]}"
-        raise InvalidDocument(WHAT, [(path.name, problem)]) from None
+        raise fault_at(path.name, f"can't be unpickled safely: {str(fault)[:200]}") from None
 
 
 def _plain(value: Any) -> Any:

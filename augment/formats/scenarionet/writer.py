@@ -95,11 +95,8 @@ def describe(cell: Cell, report: LossReport) -> dict[str, Any]:
             "metadrive_processed": False,
             "coordinate": "right-handed",
             "ts": motion.times_s.copy(),
-            "sample_rate": motion.step_s,
             "sdc_id": scene.ego.id,
-            "source_file": scene.name,
             "current_time_index": 0,
-            "tracks_to_predict": {},
             "traffic_side": scene.traffic_side.value,
             "provenance": scene.provenance,
         },
@@ -161,14 +158,7 @@ def _track(movement: Movement) -> dict[str, Any]:
             "width": np.where(present, agent.width_m, 0.0),
             "height": np.where(present, height_m, 0.0),
         },
-        "metadata": {
-            "type": _TYPES[agent.type],
-            "track_length": steps,
-            "object_id": agent.id,
-            "original_id": agent.id,
-            "dataset": DATASET,
-            "motion": movement.source.value,
-        },
+        "metadata": {"type": _TYPES[agent.type], "object_id": agent.id, "dataset": DATASET},
     }
 
 
@@ -179,12 +169,7 @@ def _light(connector: LaneConnector, steps: int) -> dict[str, Any]:
         "state": {"object_state": [_LIGHTS[connector.traffic_light]] * steps},
         "lane": connector.id,
         "stop_point": np.array([*start, 0.0]),
-        "metadata": {
-            "type": "TRAFFIC_LIGHT",
-            "track_length": steps,
-            "object_id": connector.id,
-            "dataset": DATASET,
-        },
+        "metadata": {"type": "TRAFFIC_LIGHT", "object_id": connector.id, "dataset": DATASET},
     }
 
 
