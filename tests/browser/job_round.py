@@ -47,7 +47,7 @@ def _launch_all(page: Page) -> None:
     page.click("#full")
     expect(page.locator("[name=name]")).to_have_value("Round 1")
     expect(page.locator("[name=scenarios]:checked")).to_have_count(SCENARIOS)
-    expect(page.get_by_text("Answered already")).to_be_visible()
+    expect(page.get_by_text("Cost expected")).to_be_visible()
     page.click("[data-launch]")
     expect(page.get_by_role("heading", name="Round 1", exact=True)).to_be_visible()
 
