@@ -204,7 +204,6 @@ def _as_request(move: Move, agent: TrafficAgent) -> VehicleRequest:
         facing=move.facing,
         turn_deg=move.turn_deg,
         speed_mps=agent.speed_mps if move.speed_mps is None else move.speed_mps,
-        count=1,
     )
 
 

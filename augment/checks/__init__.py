@@ -2,6 +2,6 @@
 
 from augment.checks.finding import Finding, FindingKind, Severity
 from augment.checks.ground import Ground
-from augment.checks.registry import findings, findings_on
+from augment.checks.registry import findings_on
 
-__all__ = ["Finding", "FindingKind", "Ground", "Severity", "findings", "findings_on"]
+__all__ = ["Finding", "FindingKind", "Ground", "Severity", "findings_on"]

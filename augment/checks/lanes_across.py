@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import shapely
 
-from augment.checks.ground import Ground
+from augment.checks.ground import Ground, is_stopped
 from augment.geometry.frames import difference
 from augment.scene.ego_route import EgoRoute, RoutePosition
 from augment.scene.entities import (
@@ -40,12 +40,16 @@ _SAME_LANE_M = 1.0
 """A lane whose centre is nearer than this is the same lane."""
 _ALONG_RAD, _AGAINST_RAD = math.radians(45.0), math.radians(135.0)
 _JOINT_M = 1.0
-_STANDS_BELOW_MPS = 0.5
 _BESIDE_M = 15.0
 """Who is further from the route is on another road; prompts show as much beside it."""
 _ON_A_SIDE_M = 1.0
-_STEP_M = 0.1
 _VEHICLES = (AgentType.VEHICLE, AgentType.BUS)
+_SIGHTS = {
+    **dict.fromkeys((Sight.VEHICLE, Sight.PARKED, Sight.MOVING), _VEHICLES),
+    Sight.BUS: (AgentType.BUS,),
+    Sight.BICYCLE: (AgentType.BICYCLE,),
+    Sight.PEDESTRIAN: (AgentType.PEDESTRIAN,),
+}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -200,17 +204,10 @@ def list_absent(intent: Intent, lanes: LanesAcross) -> tuple[str, ...]:
 
 
 def _fits(lanes: LanesAcross, pick: Pick, agent: TrafficAgent, place: RoutePosition) -> bool:
-    is_standing = abs(agent.speed_mps) < _STANDS_BELOW_MPS
-    is_vehicle = agent.type in _VEHICLES
-    kinds = {
-        Sight.VEHICLE: is_vehicle,
-        Sight.PARKED: is_vehicle and is_standing,
-        Sight.MOVING: is_vehicle and not is_standing,
-        Sight.BUS: agent.type is AgentType.BUS,
-        Sight.BICYCLE: agent.type is AgentType.BICYCLE,
-        Sight.PEDESTRIAN: agent.type is AgentType.PEDESTRIAN,
-    }
-    if not kinds[pick.kind] or abs(place.left_m) > _BESIDE_M:
+    stands = is_stopped(agent)
+    if agent.type not in _SIGHTS[pick.kind] or abs(place.left_m) > _BESIDE_M:
+        return False
+    if stands is not {Sight.PARKED: True, Sight.MOVING: False}.get(pick.kind, stands):
         return False
     if pick.side is not None and pick.side.sign * place.left_m <= _ON_A_SIDE_M:
         return False
@@ -228,12 +225,12 @@ def _fits(lanes: LanesAcross, pick: Pick, agent: TrafficAgent, place: RoutePosit
 
 def _crosswalk_m(lanes: LanesAcross) -> float | None:
     """The middle of the first crosswalk that the route leads over."""
-    route = lanes.route
-    ahead_m = np.arange(0.0, route.line.length_m - route.ego_s_m, _STEP_M)
-    points = route.line.points_at(route.ego_s_m + ahead_m)
-    stations_m = []
+    line, ego_s_m, stations_m = lanes.route.line, lanes.route.ego_s_m, list[float]()
+    way = shapely.LineString(line.between(ego_s_m, line.length_m).points_m)
     for area in lanes.route.scene.areas:
         if area.kind is AreaKind.CROSSWALK:
-            inside = shapely.contains_xy(shapely.Polygon(area.boundary_m), points)
-            stations_m += [float(ahead_m[inside].mean())] if inside.any() else []
+            part = shapely.intersection(way, shapely.Polygon(area.boundary_m))
+            points = shapely.points(shapely.get_coordinates(part))
+            ends_m = np.asarray(shapely.line_locate_point(way, points))
+            stations_m += [float(ends_m.min() + ends_m.max()) / 2.0] if len(ends_m) else []
     return min(stations_m, default=None)

@@ -27,7 +27,7 @@ from augment.checks.ground import ChangedScene, Ground
 from augment.checks.lanes_across import LanesAcross, find_picked, resolve_spots
 from augment.checks.parties import USUAL, Asked, AskedCheck, Party, Tolerances, match_to_requests
 from augment.checks.places import Check, heading, lane, lane_named, off_road, walk_heading
-from augment.scene.entities import Modification, Scene
+from augment.scene.entities import Modification
 from augment.scene.intent import Intent, VehicleRequest
 
 CHECKS: tuple[Check, ...] = (
@@ -40,21 +40,8 @@ ASKED_CHECKS: tuple[AskedCheck, ...] = (
 _OF_PLACE = frozenset({FindingKind.HEADING, FindingKind.WALK_HEADING, FindingKind.OFF_ROAD})
 
 
-def findings(scene: Scene, modification: Modification) -> tuple[Finding, ...]:
-    """Measure every added and moved agent, agent by agent.
-
-    Args:
-        scene: The scene before the change.
-        modification: The change; of what it removes nothing is measured.
-
-    Raises:
-        InvalidModification: The modification does not fit the scene.
-    """
-    return findings_on(Ground.of(scene), modification)
-
-
 def findings_on(ground: Ground, modification: Modification) -> tuple[Finding, ...]:
-    """As `findings`, for callers who ask about one scene more than once.
+    """Measure every added and moved agent, agent by agent; of what is removed nothing is measured.
 
     Raises:
         InvalidModification: The modification does not fit the scene.
@@ -102,14 +89,7 @@ def _asked(
     picked = [(move, agent.id) for move in counted.moves for agent in find_picked(lanes, move.who)]
     for move, name in picked:
         if name in moved:
-            request = VehicleRequest(
-                spot=move.spot,
-                facing=move.facing,
-                turn_deg=move.turn_deg,
-                speed_mps=move.speed_mps,
-                count=1,
-            )
-            parties.append(Party(request=request, agents=(moved[name],)))
+            parties.append(Party(request=move.vehicle_request, agents=(moved[name],)))
     gone = [agent.id for pick in intent.removals for agent in find_picked(lanes, pick)]
     return Asked(
         modification=modification,

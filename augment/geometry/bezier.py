@@ -5,14 +5,14 @@ from its first control point. N places, 4 control points.
 """
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from augment.geometry.frames import Pose
-from augment.geometry.polyline import Polyline, Projection
+from augment.geometry.polyline import Polyline
 
 FloatArray = NDArray[np.float64]
 
@@ -49,12 +49,6 @@ class CubicBezier:
         control.flags.writeable = False
         object.__setattr__(self, "control_m", control)
 
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, CubicBezier) and np.array_equal(self.control_m, other.control_m)
-
-    def __hash__(self) -> int:
-        return hash(self.control_m.tobytes())
-
     @property
     def length_m(self) -> float:
         """The arc length from the first control point to the last."""
@@ -85,19 +79,6 @@ class CubicBezier:
     def parameters_at(self, stations_m: ArrayLike) -> FloatArray:
         """Return the parameters (N,) at the arc lengths (N,), which are clipped to the curve."""
         return np.interp(np.asarray(stations_m, dtype=np.float64), self._stations_m, _KNOTS)
-
-    def pose_at(self, s_m: float, d_m: float = 0.0) -> Pose:
-        """Return position and direction at s, d to the left; the ends are extended straight."""
-        t = self.parameters_at([s_m])
-        heading_rad = float(self.headings(t)[0])
-        over_m = s_m - min(max(s_m, 0.0), self.length_m)
-        return _pose_off(self.points(t)[0], heading_rad, over_m, d_m)
-
-    def project(self, x_m: float, y_m: float) -> Projection:
-        """Return the nearest place on the curve; of equally near ones the first."""
-        place = Polyline(self.points(_KNOTS)).project(x_m, y_m)
-        heading_rad = float(self.headings(self.parameters_at([place.s_m]))[0])
-        return replace(place, heading_rad=heading_rad)
 
     @cached_property
     def _powers(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
@@ -182,22 +163,15 @@ def travel_pose(line: Polyline, s_m: float, d_m: float = 0.0) -> Pose:
     before, middle, after = line.points_at(inner_m + np.array([-reach_m, 0.0, reach_m]))
     bend = (before - 2.0 * middle + after) * (on_m - inner_m) / reach_m
     dx, dy = (after - before) / 2.0 + bend
-    point = line.points_at(np.array([s_m]))[0]
-    return _pose_off(point, math.atan2(dy, dx), s_m - on_m, d_m)
+    x_m, y_m = line.points_at(np.array([s_m]))[0].tolist()
+    heading_rad = math.atan2(dy, dx)
+    (place,) = Pose(x_m=x_m, y_m=y_m, heading_rad=heading_rad).to_parent(
+        np.array([[s_m - on_m, d_m]])
+    )
+    return Pose(x_m=float(place[0]), y_m=float(place[1]), heading_rad=heading_rad)
 
 
 # Private
-
-
-def _pose_off(point_m: FloatArray, heading_rad: float, over_m: float, d_m: float) -> Pose:
-    """The pose so far past a point (2,) in the direction of travel, and d to the left."""
-    x_m, y_m = point_m
-    cos, sin = math.cos(heading_rad), math.sin(heading_rad)
-    return Pose(
-        x_m=float(x_m) + over_m * cos - d_m * sin,
-        y_m=float(y_m) + over_m * sin + d_m * cos,
-        heading_rad=heading_rad,
-    )
 
 
 def _arms(heading_rad: float | None) -> FloatArray:

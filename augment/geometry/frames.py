@@ -81,17 +81,15 @@ class Overlap:
 
     Attributes:
         depth_m: The shortest push that would part them.
-        area_m2: The area of what they share.
-        share_of_first, share_of_second: That area as a part of each box, 0 to 1.
+        share_of_first, share_of_second: What they share as a part of each box, 0 to 1.
     """
 
     depth_m: float
-    area_m2: float
     share_of_first: float
     share_of_second: float
 
 
-APART = Overlap(depth_m=0.0, area_m2=0.0, share_of_first=0.0, share_of_second=0.0)
+APART = Overlap(depth_m=0.0, share_of_first=0.0, share_of_second=0.0)
 
 
 def corners(pose: Pose, length_m: float, width_m: float) -> NDArray[np.float64]:
@@ -122,7 +120,6 @@ def overlap(first: Box, second: Box) -> Overlap:
     area_m2 = float(shared.area)
     return Overlap(
         depth_m=depth_m,
-        area_m2=area_m2,
         share_of_first=min(1.0, area_m2 / (first.length_m * first.width_m)),
         share_of_second=min(1.0, area_m2 / (second.length_m * second.width_m)),
     )

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from enum import StrEnum
-from typing import Annotated, Self
+from typing import Annotated
 
 from pydantic import Field
 
@@ -346,26 +346,24 @@ def without_traffic(scene: Scene) -> Scene:
 
 
 class ScenarioType(StrEnum):
-    """A type by interPlan's own name (`type` of a special scenario).
+    """A type by interPlan's own name (`type` of a special scenario)."""
 
-    Attributes:
-        label: The words that the paper uses for it.
-    """
+    CONSTRUCTION_ZONE = "approaching_construction_zone"
+    ACCIDENT_SITE = "avoid_crashed_cars"
+    JAYWALKER = "jaywalking_pedestrian"
+    NUDGE = "nudge_around_parked_vehicle"
+    OVERTAKE = "overtake_parked_vehicle"
 
-    label: str
+    @property
+    def label(self) -> str:
+        """The words that the paper uses for it."""
+        return _LABELS.get(self) or self.name.replace("_", " ").capitalize()
 
-    CONSTRUCTION_ZONE = "approaching_construction_zone", "Construction zone"
-    ACCIDENT_SITE = "avoid_crashed_cars", "Accident site"
-    JAYWALKER = "jaywalking_pedestrian", "Jaywalker"
-    NUDGE = "nudge_around_parked_vehicle", "Nudge around parked vehicle"
-    OVERTAKE = "overtake_parked_vehicle", "Overtake parked vehicle"
 
-    def __new__(cls, value: str, label: str = "") -> Self:
-        """A member with its label; a lookup has the value alone."""
-        member = str.__new__(cls, value)
-        member._value_ = value
-        member.label = label
-        return member
+_LABELS = {
+    ScenarioType.NUDGE: "Nudge around parked vehicle",
+    ScenarioType.OVERTAKE: "Overtake parked vehicle",
+}
 
 
 def in_type_order(names: Iterable[str]) -> list[str]:

@@ -459,6 +459,17 @@ class Move:
         _check_turn(self)
         return self
 
+    @property
+    def vehicle_request(self) -> VehicleRequest:
+        """The same as a request for one vehicle."""
+        return VehicleRequest(
+            spot=self.spot,
+            facing=self.facing,
+            turn_deg=self.turn_deg,
+            speed_mps=self.speed_mps,
+            count=1,
+        )
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Intent:

@@ -42,7 +42,6 @@ class LanePosition:
     s_m: float
     d_m: float
     pose: Pose
-    remaining_m: float
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -211,14 +210,8 @@ class LaneGraph:
 
     def place(self, lane_id: str, s_m: float, d_m: float = 0.0) -> LanePosition:
         """Return the place s along one lane and d to its left."""
-        line = self.lane(lane_id).centerline
-        return LanePosition(
-            lane_id=lane_id,
-            s_m=s_m,
-            d_m=d_m,
-            pose=line.pose_at(s_m, d_m),
-            remaining_m=line.length_m - s_m,
-        )
+        pose = self.lane(lane_id).centerline.pose_at(s_m, d_m)
+        return LanePosition(lane_id=lane_id, s_m=s_m, d_m=d_m, pose=pose)
 
     def along(
         self,

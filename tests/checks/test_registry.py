@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from augment.checks import Finding, FindingKind, Severity, findings
+from augment.checks import Finding, FindingKind, Severity
 from augment.geometry.frames import Pose
 from augment.scene.entities import (
     AgentType,
@@ -22,7 +22,7 @@ from augment.scene.entities import (
     TrafficAgent,
     TrafficSide,
 )
-from tests.checks.worlds import Reference, references, severities
+from tests.checks.worlds import Reference, findings, references, severities
 from tests.recorded import recorded
 from tests.scenes import cone, curve, junction, moved_agent, moved_scene, scene, vehicle
 

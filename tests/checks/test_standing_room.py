@@ -139,65 +139,35 @@ def road() -> Scene:
     )
 
 
+CAR = vehicle("Agent2", 30.0, 0.0)
+
+
 @pytest.mark.parametrize("side", [1.0, -1.0], ids=["left", "right"])
-@pytest.mark.parametrize("kind", [AgentType.VEHICLE, AgentType.BUS])
 @pytest.mark.parametrize(
-    ("outside_percent", "severity"),
+    ("agent", "left_m", "severity"),
     [
-        (0.0, None),
-        (1.9, None),
-        (2.1, FACT),
-        (14.9, FACT),
-        (15.1, DOUBTFUL),
-        (29.0, DOUBTFUL),
-        (49.9, DOUBTFUL),
-        (50.1, WRONG),
-        (100.0, WRONG),
+        # A box 2 m wide counts by the share of it that is past the road's edge.
+        *((CAR, 3.0 + 2.0 * share, None) for share in (0.0, 0.019)),
+        *((CAR, 3.0 + 2.0 * share, FACT) for share in (0.021, 0.149)),
+        *((CAR, 3.0 + 2.0 * share, DOUBTFUL) for share in (0.151, 0.499)),
+        *((CAR, 3.0 + 2.0 * share, WRONG) for share in (0.501, 1.0)),
+        (replace(CAR, type=AgentType.BUS), 3.0 + 2.0 * 0.151, DOUBTFUL),
+        # A cone counts by how far its centre is off the road.
+        *((cone("Agent2", 30.0, 0.0), EDGE_M + off_m, None) for off_m in (-1.0, 0.99)),
+        *((cone("Agent2", 30.0, 0.0), EDGE_M + off_m, DOUBTFUL) for off_m in (1.01, 2.99)),
+        (cone("Agent2", 30.0, 0.0), EDGE_M + 3.01, WRONG),
+        # Who walks counts by how far he is off all that the map shows.
+        (pedestrian("Agent2", 30.0, 0.0), 5.99, None),
+        *((pedestrian("Agent2", 30.0, 0.0), 6.0 + off_m, FACT) for off_m in (0.01, 1.99)),
+        *((pedestrian("Agent2", 30.0, 0.0), 6.0 + off_m, DOUBTFUL) for off_m in (2.01, 9.99)),
+        (pedestrian("Agent2", 30.0, 0.0), 16.01, WRONG),
     ],
 )
-def test_a_vehicle_on_the_kerb_counts_by_the_share_of_its_box(
-    side: float, kind: AgentType, outside_percent: float, severity: Severity | None
+def test_each_kind_has_its_ground_and_its_edge(
+    side: float, agent: TrafficAgent, left_m: float, severity: Severity | None
 ) -> None:
-    """A box 2 m wide along the road: the share outside is what its far edge is past the road's."""
-    share = outside_percent / 100.0
-    car = replace(vehicle("Agent2", 30.0, side * (EDGE_M - 1.0 + 2.0 * share)), type=kind)
-    found = of_kind(found_in(road(), car), FindingKind.OFF_ROAD)
-    assert [one.severity for one in found] == ([] if severity is None else [severity])
-    if found:
-        assert found[0].measured["outside_share"] == pytest.approx(share, abs=1e-6)
-
-
-@pytest.mark.parametrize("side", [1.0, -1.0], ids=["left", "right"])
-@pytest.mark.parametrize(
-    ("off_m", "severity"),
-    [(-1.0, None), (0.99, None), (1.01, DOUBTFUL), (2.99, DOUBTFUL), (3.01, WRONG)],
-)
-def test_a_cone_counts_by_how_far_its_centre_is_off_the_road(
-    side: float, off_m: float, severity: Severity | None
-) -> None:
-    found = of_kind(
-        found_in(road(), cone("Agent2", 30.0, side * (EDGE_M + off_m))), FindingKind.OFF_ROAD
-    )
-    assert [one.severity for one in found] == ([] if severity is None else [severity])
-
-
-@pytest.mark.parametrize("side", [1.0, -1.0], ids=["left", "right"])
-@pytest.mark.parametrize(
-    ("off_m", "severity"),
-    [
-        (-0.01, None),
-        (0.01, FACT),
-        (1.99, FACT),
-        (2.01, DOUBTFUL),
-        (9.99, DOUBTFUL),
-        (10.01, WRONG),
-    ],
-)
-def test_who_walks_counts_by_how_far_he_is_off_all_that_the_map_shows(
-    side: float, off_m: float, severity: Severity | None
-) -> None:
-    walker = pedestrian("Agent2", 30.0, side * (6.0 + off_m))
-    found = of_kind(found_in(road(), walker), FindingKind.OFF_ROAD)
+    moved = replace(agent, y_m=side * left_m)
+    found = of_kind(found_in(road(), moved), FindingKind.OFF_ROAD)
     assert [one.severity for one in found] == ([] if severity is None else [severity])
 
 

@@ -5,7 +5,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import NamedTuple
 
-from augment.checks import Finding, FindingKind, Severity, findings
+from augment.checks import Finding, FindingKind, Ground, Severity, findings_on
 from augment.scene.codec import modification_from_document, scene_from_document
 from augment.scene.entities import Modification, Scene, TrafficAgent, without_traffic
 
@@ -30,6 +30,10 @@ def references() -> list[Reference]:
         reference = modification_from_document(document["reference"])
         found.append(Reference(document["slug"], shown, reference))
     return found
+
+
+def findings(scene: Scene, change: Modification) -> tuple[Finding, ...]:
+    return findings_on(Ground.of(scene), change)
 
 
 def found_in(scene: Scene, *added: TrafficAgent) -> tuple[Finding, ...]:

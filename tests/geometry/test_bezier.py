@@ -6,7 +6,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from augment.geometry.bezier import CubicBezier, FloatArray, fit, fit_error
+from augment.geometry.bezier import CubicBezier, FloatArray, fit, fit_error, travel_pose
 from augment.geometry.polyline import Polyline
 from tests.scenes import curve as curved_scene
 
@@ -51,53 +51,17 @@ def test_a_point_is_what_de_casteljau_finds(curve: CubicBezier, t: float) -> Non
     )
 
 
-@given(curve=curves())
-def test_a_curve_begins_and_ends_in_its_end_points(curve: CubicBezier) -> None:
-    start, end = curve.pose_at(0.0), curve.pose_at(curve.length_m)
-    assert (start.x_m, start.y_m) == pytest.approx(tuple(curve.control_m[0]), abs=1e-6)
-    assert (end.x_m, end.y_m) == pytest.approx(tuple(curve.control_m[3]), abs=1e-6)
-
-
-@given(curve=lane_like())
-def test_arc_length_is_that_of_a_dense_line(curve: CubicBezier) -> None:
-    assert curve.length_m == pytest.approx(dense_length(curve), abs=1e-3)
-
-
 @given(curve=lane_like(), share=st.floats(0.0, 1.0))
 def test_the_place_at_an_arc_length_has_that_arc_length(curve: CubicBezier, share: float) -> None:
+    assert curve.length_m == pytest.approx(dense_length(curve), abs=1e-3)
     s_m = share * curve.length_m
     t = float(curve.parameters_at([s_m])[0])
     assert dense_length(curve, t) == pytest.approx(s_m, abs=1e-3)
 
 
-@given(curve=lane_like(), share=st.floats(0.02, 0.98), d_m=st.floats(-1.5, 1.5))
-def test_projecting_a_position_gives_it_back(curve: CubicBezier, share: float, d_m: float) -> None:
-    pose = curve.pose_at(share * curve.length_m, d_m)
-    place = curve.project(pose.x_m, pose.y_m)
-    # Inside a bend tighter than the offset another place may be nearer.
-    assert place.distance_m <= abs(d_m) + 1e-4
-    if place.distance_m > abs(d_m) - 1e-4:
-        back = curve.pose_at(place.s_m, place.d_m)
-        assert (back.x_m, back.y_m) == pytest.approx((pose.x_m, pose.y_m), abs=1e-3)
-
-
-def test_a_quarter_of_a_circle_is_read_as_one() -> None:
-    pose = QUARTER.pose_at(QUARTER.length_m / 2.0, 1.0)
-    assert QUARTER.length_m == pytest.approx(5.0 * math.pi, abs=0.01)
-    assert pose.heading_rad == pytest.approx(0.75 * math.pi)
-    assert math.hypot(pose.x_m, pose.y_m) == pytest.approx(9.0, abs=0.003)
-
-
-def test_the_ends_are_extended_straight() -> None:
-    before, behind = STRAIGHT.pose_at(-3.0, 1.0), STRAIGHT.pose_at(34.0)
-    assert (before.x_m, before.y_m) == pytest.approx((-3.0, 1.0))
-    assert (behind.x_m, behind.y_m) == pytest.approx((34.0, 0.0))
-
-
 def test_a_doubled_control_point_still_has_a_heading() -> None:
     doubled = CubicBezier([(0, 0), (0, 0), (5, 5), (5, 5)])
-    assert doubled.pose_at(0.0).heading_rad == pytest.approx(math.pi / 4)
-    assert doubled.pose_at(doubled.length_m).heading_rad == pytest.approx(math.pi / 4)
+    assert doubled.headings(np.array([0.0, 1.0])) == pytest.approx([math.pi / 4] * 2)
 
 
 def test_a_fit_finds_a_curve_again() -> None:
@@ -111,8 +75,7 @@ def test_a_fit_keeps_the_ends_and_takes_the_headings_it_is_given() -> None:
     line = curved_scene().lanes[0].centerline.between(50.0, 110.0)
     found = fit(line, start_rad=0.1, end_rad=1.2)
     assert np.array_equal(found.control_m[[0, 3]], line.points_m[[0, -1]])
-    assert found.pose_at(0.0).heading_rad == pytest.approx(0.1)
-    assert found.pose_at(found.length_m).heading_rad == pytest.approx(1.2)
+    assert found.headings(np.array([0.0, 1.0])) == pytest.approx([0.1, 1.2])
 
 
 def test_the_error_of_a_fit_is_its_worst_place() -> None:
@@ -152,3 +115,13 @@ def test_a_fit_never_leaves_or_arrives_against_the_heading_it_is_given(
     arm = (ends - inner)[1] if is_end else (inner - ends)[0]
     along_m = arm @ [math.cos(wanted_rad), math.sin(wanted_rad)]
     assert along_m >= 0.01 - 1e-9
+
+
+@pytest.mark.parametrize("d_m", [0.0, 1.5, -1.5])
+def test_what_drives_along_a_line_turns_evenly_and_leaves_its_ends_straight(d_m: float) -> None:
+    line = curved_scene().lanes[0].centerline
+    for s_m, turned in ((-5.0, 0.0), (0.0, 0.0), (80.0, 0.5)):
+        pose = travel_pose(line, s_m, d_m)
+        wanted = line.pose_at(s_m, d_m)
+        assert pose.heading_rad == pytest.approx(turned, abs=0.01)
+        assert math.dist((pose.x_m, pose.y_m), (wanted.x_m, wanted.y_m)) < 0.03

@@ -5,13 +5,13 @@ import math
 
 import pytest
 
-from augment.checks import findings
 from augment.checks.finding import FaultClass
 from augment.checks.registry import check_against_intent
 from augment.metrics.fault_guess import first_guess
 from augment.scene.entities import Modification, TrafficAgent
 from bench.faults import MAKERS
 from bench.injected_faults import Tally, measure, shifted_share
+from tests.checks.worlds import findings
 from tests.scenes import scene, vehicle
 
 COUNT = 150

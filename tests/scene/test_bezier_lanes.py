@@ -4,7 +4,6 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from augment.geometry.frames import difference
 from augment.geometry.polyline import Polyline
 from augment.scene.bezier_lanes import LanePiece, Tolerance, bezier_lane, piece_ids
 from tests.scenes import curve, scene
@@ -31,9 +30,9 @@ def test_a_lane_that_one_cubic_cannot_follow_is_cut_and_joined_smoothly() -> Non
     assert (lane[0].start_m, lane[-1].end_m) == (0.0, WINDING.length_m)
     for before, after in pairwise(lane):
         assert after.start_m == before.end_m
-        behind, ahead = before.curve.pose_at(before.curve.length_m), after.curve.pose_at(0.0)
-        assert math.hypot(ahead.x_m - behind.x_m, ahead.y_m - behind.y_m) < 1e-5
-        assert abs(difference(ahead.heading_rad, behind.heading_rad)) < 1e-5
+        assert before.curve.control_m[3].tolist() == after.curve.control_m[0].tolist()
+        turn = after.curve.headings(np.zeros(1)) - before.curve.headings(np.ones(1))
+        assert np.cos(turn) == pytest.approx(1.0, abs=1e-9)
 
 
 def test_a_wider_tolerance_takes_fewer_pieces() -> None:
@@ -51,9 +50,9 @@ def test_a_restless_line_keeps_its_error_and_says_so() -> None:
 def test_a_bend_has_its_own_heading_at_its_very_ends() -> None:
     line = curve().lanes[0].centerline
     bend = bezier_lane(line.between(60.0, line.length_m))
-    start, end = bend[0].curve.pose_at(0.0), bend[-1].curve.pose_at(bend[-1].curve.length_m)
-    wanted = [0.0, math.pi / 2]
-    assert [start.heading_rad, end.heading_rad] == pytest.approx(wanted, abs=math.radians(0.5))
+    start, end = bend[0].curve.headings(np.zeros(1)), bend[-1].curve.headings(np.ones(1))
+    assert start == pytest.approx(0.0, abs=math.radians(0.5))
+    assert end == pytest.approx(math.pi / 2, abs=math.radians(0.5))
 
 
 def test_pieces_are_called_by_their_lane_and_a_letter() -> None:

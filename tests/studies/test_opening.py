@@ -7,7 +7,6 @@ from django.utils import timezone
 from arena.errors import NothingToPlan
 from arena.models import Study
 from arena.pairing.plan import plan
-from arena.studies.services.opening import close_study
 from arena.studies.services.planning import rules_of
 from augment.errors import Conflict, UnknownName
 from augment.models import Augmentation, Contestant, Event, Scenario
@@ -28,13 +27,6 @@ def test_an_open_study_has_every_experts_matchups_and_a_line_in_the_log() -> Non
     assert event.after == {"name": "Round 1", "matchups": 18, "seed": 7}
 
 
-def test_tokens_are_fresh_for_every_showing() -> None:
-    study = a_study()
-    tokens = [*study.matchups.values_list("left_token", flat=True)]
-    tokens += study.matchups.values_list("right_token", flat=True)
-    assert len(set(tokens)) == 36
-
-
 def test_the_stored_rules_give_the_stored_plan_again() -> None:
     study = Study.objects.get(pk=a_study().pk)
     planned = plan(rules_of(study))
@@ -53,23 +45,15 @@ def test_the_stored_rules_give_the_stored_plan_again() -> None:
     assert study.rules["scenario_gap_kept"] == 5
 
 
-def test_the_latest_picture_takes_part() -> None:
+@pytest.mark.parametrize("state", [Augmentation.State.DONE, Augmentation.State.UNREADABLE])
+def test_the_latest_picture_takes_part_also_of_an_unreadable_answer(state: str) -> None:
     cast = cast_of(contestants=("ann", "bob"), scenarios=1)
     place, ann = Scenario.objects.get(), Contestant.objects.get(slug="ann")
-    latest = picture(place, ann)
+    latest = picture(place, ann, state=state)
     picture(place, ann, state=Augmentation.State.FAILED, image="")
     study = open_study(name="Round 1", votes_per_expert=1, seed=1, **cast)
     shown = {pk for pair in study.matchups.values_list("left", "right") for pk in pair}
     assert latest.pk in shown
-
-
-def test_an_unreadable_answer_takes_part_as_the_unchanged_scene() -> None:
-    cast = cast_of(contestants=("ann", "bob"), scenarios=1)
-    place, ann = Scenario.objects.get(), Contestant.objects.get(slug="ann")
-    miss = picture(place, ann, state=Augmentation.State.UNREADABLE)
-    study = open_study(name="Round 1", votes_per_expert=1, seed=1, **cast)
-    shown = {pk for pair in study.matchups.values_list("left", "right") for pk in pair}
-    assert miss.pk in shown
 
 
 def test_identical_pictures_are_never_shown() -> None:
@@ -108,12 +92,3 @@ def test_who_may_know_the_contestants_is_not_asked_to_vote() -> None:
     finn.groups.add(Group.objects.get_or_create(name="analyst")[0])
     with pytest.raises(UnknownName, match=r"Unknown expert 'finn'. Known: eva"):
         open_study(name="Round 1", votes_per_expert=3, seed=7, **cast)
-
-
-def test_closing_is_logged_once_and_final() -> None:
-    study = a_study()
-    closed = close_study(study=study)
-    assert closed.state == Study.State.CLOSED
-    assert closed.closed_at is not None
-    assert close_study(study=study).closed_at == closed.closed_at
-    assert Event.objects.filter(verb="close").count() == 1

@@ -7,12 +7,10 @@ from django.core.management import call_command
 from django.urls import reverse
 from django.utils import timezone
 
-from arena.models import Matchup, Study
+from arena.models import Study
 from arena.voting.services.shown_pictures import draw_sample
 from augment.errors import Conflict
 from augment.models import Augmentation, Contestant, GenerationJob, Scenario
-from tests.jobs.scripted import Scripted, add, run
-from tests.llm.json_server import serving
 from tests.opening import open_study
 from tests.study_rows import contestant, expert, scenario
 from tests.web.cast import people, signed_in
@@ -104,35 +102,3 @@ def test_a_study_shows_the_jobs_that_it_names(capsys: pytest.CaptureFixture[str]
     assert study.rules["options"]["ann"] == {"temperature": 0.2}
     page = signed_in(people()["admin"]).get(reverse("study", args=[study.code]))
     assert "Shown are augmentations of" in page.content.decode()
-
-
-def test_two_contestants_that_differ_in_protocol_alone_meet_in_one_study() -> None:
-    expert("eva")
-    with serving(Scripted()) as server:
-        for protocol in ("prompt", "native"):
-            add(server, protocol, "fc", protocol=protocol, temperature=0.3)
-        prompt_row, native_row = sorted(run("prompt", "native"), key=lambda row: row.sample)[:2]
-        bodies = {"tools" in body for body in server.bodies}
-    assert bodies == {True, False}
-    native, prompt = (
-        Contestant.objects.get(slug=slug).frozen_options for slug in ("native", "prompt")
-    )
-    assert native is not None
-    assert prompt is not None
-    assert {name for name in native if native[name] != prompt[name]} == {"protocol"}
-    # Their cars stand apart, so that there is something to judge.
-    assert {prompt_row.state, native_row.state} == {Augmentation.State.DONE}
-    study = open_study(
-        name="Protocols",
-        contestants=["prompt", "native"],
-        scenarios=["street"],
-        experts=["eva"],
-        votes_per_expert=1,
-        seed=1,
-    )
-    matchup = Matchup.objects.get(study=study)
-    assert {matchup.left.contestant.slug, matchup.right.contestant.slug} == {"prompt", "native"}
-    assert {name: one["protocol"] for name, one in study.rules["options"].items()} == {
-        "prompt": "prompt",
-        "native": "native",
-    }

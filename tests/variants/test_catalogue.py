@@ -9,7 +9,6 @@ from collections.abc import Iterator
 
 import pytest
 
-from augment.checks import findings
 from augment.fake_llm.server import FakeServer, running
 from augment.llm.client import Patience
 from augment.llm.openai_wire import OpenAIWire
@@ -18,6 +17,7 @@ from augment.variants.pipeline import Outcome, OutcomeStatus, run
 from augment.variants.recipes import RECIPES, Tools, find_recipe
 from augment.variants.respondents import RespondentClient
 from tests.baselines.test_rule_placer import placed
+from tests.checks.worlds import findings
 from tests.fixtures.shelf import SLUGS, entry, shown_scene
 from tests.intents import intents
 from tests.variants.memory import MemoryTranscript

@@ -47,19 +47,6 @@ def test_a_vote_behind_a_long_writer_is_given_back_and_taken_later() -> None:
     assert Vote.objects.count() == 1
 
 
-@only_sqlite
-def test_a_report_behind_a_long_writer_is_given_back_in_the_same_shape() -> None:
-    matchup = matchups_of(a_study(), "eva")[0]
-    body = {"key": body_for(matchup)["key"], "matchup": str(matchup.code), "reason": "other"}
-    client = signed_in("eva")
-    turns.limit_waiting(connection, SHORT_S)  # as web servers do: see the last test
-    with kept_busy():
-        refused = client.post("/api/v1/reports", body, content_type="application/json")
-    error_of(refused, 503, "busy")
-    assert refused["Retry-After"] == "2"
-    connection.close()
-
-
 @contextmanager
 def full_disk() -> Iterator[None]:
     """Let a vote need more pages than SQLite may add, as on a full disk (SQLITE_FULL)."""

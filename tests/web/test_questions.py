@@ -10,8 +10,7 @@ from django.test import Client
 from django.urls import reverse
 
 from arena.jobs.services import open_labelling
-from arena.models import Study
-from augment.models import Event, GenerationJob
+from augment.models import GenerationJob
 from tests import study_rows
 from tests.web.cast import people, signed_in
 
@@ -56,26 +55,6 @@ def test_closing_a_study_asks_and_says_what_will_be_missing() -> None:
     study.refresh_from_db()
     assert study.state == "closed"
     assert admin.get(page).status_code == 302, "a closed one asks nothing"
-
-
-def test_opening_a_study_asks_with_its_numbers_and_keeps_what_was_filled_in() -> None:
-    targets = "ann 20\r\nbob = 15\r\n\r\ncid: 13"
-    sent = {"name": "<b>Round</b> 1", **study_rows.cast_of(), "votes_per_expert": 12, "seed": 4}
-    admin, page = admin_of(), reverse("study-new")
-    events = Event.objects.count()
-    asked = admin.post(page, {**sent, "repeats": "25", "targets": targets})
-    shown = text_of(asked)
-    assert "Open the study “<b>Round</b> 1”?" in html.unescape(asked.content.decode())
-    assert "Experts: 2. Votes: 24. Contestants: 3. Scenarios: 6." in shown
-    assert "For each expert about 15 pairs" in shown
-    assert (Study.objects.count(), Event.objects.count()) == (0, events)
-    back = admin.post(page, {**hidden_of(asked), "change": "1"})
-    assert 'value="&lt;b&gt;Round&lt;/b&gt; 1"' in back.content.decode()
-    assert not Study.objects.exists()
-    admin.post(page, {**hidden_of(asked), "sure": "1"})
-    study = Study.objects.get()
-    assert study.rules["appearances"] == [["ann", 20], ["bob", 15], ["cid", 13]]
-    assert study.matchups.count() == 24 + 6
 
 
 def test_every_question_is_for_admins_alone_and_no_crawler_acts() -> None:

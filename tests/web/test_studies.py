@@ -74,16 +74,6 @@ def opened(**rules: object) -> tuple[int, str]:
     return answer.status_code, " ".join(answer.content.decode().split())
 
 
-def test_a_study_is_opened_with_all_its_rules() -> None:
-    targets = "ann 20\nbob = 15\n\ncid: 13"
-    opened(repeats="25", checks="2", adaptive="", targets=targets, allow_both_miss="on")
-    study = Study.objects.get()
-    assert study.allow_both_miss
-    kinds = study.matchups.values_list("kind", flat=True)
-    assert (list(kinds).count("main"), list(kinds).count("repeat")) == (24, 6)
-    assert study.rules["appearances"] == [["ann", 20], ["bob", 15], ["cid", 13]]
-
-
 def test_a_target_that_can_not_be_read_is_refused_beside_its_field() -> None:
     status, shown = opened(targets="ann lots")
     assert status == 422
