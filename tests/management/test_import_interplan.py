@@ -12,7 +12,6 @@ from augment.checks.registry import check_against_intent
 from augment.errors import CannotPlace
 from augment.models import Augmentation, BaseScene, GenerationJob, Scenario
 from augment.scene.entities import AgentType
-from augment.services.scenarios.scene_imports import notes_of
 from augment.services.scenarios.scenes import intent_of, reference_of, scene_of
 from tests.formats.interplan_files import ELSEWHERE, HERE, fifty_entries, write_folder
 from tests.jobs import rows
@@ -77,8 +76,6 @@ def test_what_is_not_used_stands_in_the_lines_and_the_token_with_the_scene(folde
     assert row.source_item == HERE
     assert row.recording is not None
     assert any(f"{HERE}-s2" in line and "starts at iteration 12" in line for line in lines)
-    notes = [str(note) for note in notes_of(row)]
-    assert any(note.startswith("The source's route leads over 2 roadblocks") for note in notes)
 
 
 def test_an_unchanged_reference_goes_out_as_it_came_in(tmp_path: Path) -> None:
