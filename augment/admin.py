@@ -14,6 +14,17 @@ class MadeElsewhere(admin.ModelAdmin):
 
     exclude = ("document", "recording", "reference")
 
+    def lookup_allowed(self, lookup: str, value: str, request: HttpRequest) -> bool:
+        """Refuse filters that follow a relation backwards.
+
+        Django lets an address filter a list by one such step: contestants by the ranks of their
+        standings, augmentations by the votes that they won.
+        """
+        fields = (*self.model._meta.fields, *self.model._meta.many_to_many)
+        own = {"pk"} | {name for field in fields for name in (field.name, field.attname)}
+        is_own = lookup.split("__")[0] in own
+        return is_own and super().lookup_allowed(lookup, value, request)
+
     def has_add_permission(self, request: HttpRequest) -> bool:
         """Never by hand."""
         return False

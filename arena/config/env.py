@@ -132,7 +132,7 @@ def read_environment() -> Environment:
     """
     texts = {name: os.environ.get(name, "").strip() for name in Environment.model_fields}
     try:
-        read = Environment(**{name: text for name, text in texts.items() if text})  # type: ignore[arg-type]
+        read = Environment.model_validate({n: text for n, text in texts.items() if text})
     except ValidationError as error:
         lines = [
             f"{fault['loc'][0]}={texts[str(fault['loc'][0])]!r} can't be used: "

@@ -14,30 +14,26 @@ from arena.errors import DatabaseBusy
 
 def answer_unreadable(request: HttpRequest, exception: Exception) -> HttpResponse:
     """Answer 400: the request is invalid, its host name for example."""
-    if _wants_json(request):
-        return fault(400, "bad_request", "The request can’t be read.")
-    return bad_request(request, exception)
+    page = bad_request(request, exception)
+    return _as_json(request, page, "bad_request", "The request can’t be read.")
 
 
 def answer_refused(request: HttpRequest, exception: Exception | None = None) -> HttpResponse:
     """Answer 403: signed in, but not allowed to do this."""
-    if _wants_json(request):
-        return fault(403, "forbidden", "Your account may not do this.")
-    return render(request, "403.html", status=403)
+    page = render(request, "403.html", status=403)
+    return _as_json(request, page, "forbidden", "Your account may not do this.")
 
 
 def answer_forged(request: HttpRequest, reason: str = "") -> HttpResponse:
     """Answer 403: the CSRF token is missing or old."""
-    if _wants_json(request):
-        return fault(403, "forbidden", "The CSRF token is missing or old.")
-    return render(request, "403_csrf.html", status=403)
+    page = render(request, "403_csrf.html", status=403)
+    return _as_json(request, page, "forbidden", "The CSRF token is missing or old.")
 
 
 def answer_missing(request: HttpRequest, exception: Exception | None = None) -> HttpResponse:
     """Answer 404: no such address, or nothing that this account may know of."""
-    if _wants_json(request):
-        return fault(404, "not_found", "There is nothing at this address.")
-    return render(request, "404.html", status=404)
+    page = render(request, "404.html", status=404)
+    return _as_json(request, page, "not_found", "There is nothing at this address.")
 
 
 def answer_locked(
@@ -53,33 +49,30 @@ def answer_locked(
 
 def answer_broken(request: HttpRequest) -> HttpResponse:
     """Answer 500: a bug, which is in the log."""
-    if _wants_json(request):
-        return fault(500, "broken", "Something broke on our side; it was written to the log.")
-    return HttpResponse(render_to_string("500.html"), status=500)
+    page = HttpResponse(render_to_string("500.html"), status=500)
+    message = "Something broke on our side; it was written to the log."
+    return _as_json(request, page, "broken", message)
 
 
-def answer_busy(request: HttpRequest) -> HttpResponse:
-    """Answer 503: the database can't be written at the moment."""
-    return _later(request, "busy", busy_message())
-
-
-def answer_without_media(request: HttpRequest) -> HttpResponse:
-    """Answer 503: the picture storage does not respond; the log says why."""
-    message = "Pictures can’t be reached just now. Try again later."
-    return _later(request, "no_pictures", message, lacks_pictures=True)
-
-
-def _later(request: HttpRequest, code: str, message: str, **context: bool) -> HttpResponse:
-    answer = HttpResponse(render_to_string("503.html", context), status=503)
-    if _wants_json(request):
-        answer = fault(503, code, message)
+def answer_busy(request: HttpRequest, *, lacks_pictures: bool = False) -> HttpResponse:
+    """Answer 503: the database can't be written now, or the picture storage does not respond."""
+    page = HttpResponse(
+        render_to_string("503.html", {"lacks_pictures": lacks_pictures}), status=503
+    )
+    code, message = "busy", busy_message()
+    if lacks_pictures:
+        code, message = "no_pictures", "Pictures can’t be reached just now. Try again later."
+    answer = _as_json(request, page, code, message)
     answer.headers["Retry-After"] = str(DatabaseBusy.retry_after_s)
     return answer
 
 
-def _wants_json(request: HttpRequest) -> bool:
-    """By its address, or because a program accepts JSON (a transcript) but no page."""
-    if request.path_info.startswith("/api/"):
-        return True
+def _as_json(request: HttpRequest, page: HttpResponse, code: str, message: str) -> HttpResponse:
+    """Return the page, or the error as JSON for who asks at the API or accepts no page.
+
+    A program that asks for a transcript accepts JSON alone, for example.
+    """
     wanted = request.get_preferred_type(["text/html", "application/json"])
-    return wanted == "application/json"
+    if request.path_info.startswith("/api/") or wanted == "application/json":
+        return fault(page.status_code, code, message)
+    return page

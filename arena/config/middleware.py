@@ -34,7 +34,7 @@ class BusyMiddleware:
             return faults.answer_busy(request)
         if isinstance(exception, MediaFault):
             logger.error("%s", exception)
-            return faults.answer_without_media(request)
+            return faults.answer_busy(request, lacks_pictures=True)
         return None
 
 
@@ -51,10 +51,8 @@ NOT_KEPT = "private, no-store"
 """Nothing of a page stays behind in a browser after signing out, nor in a proxy."""
 
 NOT_USED = (
-    *("accelerometer", "autoplay", "bluetooth", "browsing-topics", "camera", "display-capture"),
-    *("encrypted-media", "fullscreen", "geolocation", "gyroscope", "hid", "idle-detection"),
-    *("local-fonts", "magnetometer", "microphone", "midi", "payment", "picture-in-picture"),
-    *("publickey-credentials-get", "screen-wake-lock", "serial", "usb", "xr-spatial-tracking"),
+    *("bluetooth", "camera", "display-capture", "geolocation", "microphone", "midi", "payment"),
+    *("publickey-credentials-get", "serial", "usb"),
 )
 """Features of browsers that no page needs, so none may ask for them."""
 

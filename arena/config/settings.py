@@ -48,19 +48,14 @@ SECURE_HSTS_SECONDS = 31_536_000 if HTTPS else 0
 SECURE_PROXY_SSL_HEADER = ("HTTP_X_FORWARDED_PROTO", "https") if HTTPS else None
 PROXIES = ENV.ARENA_PROXIES
 SESSION_COOKIE_AGE = 30 * 24 * 3600
-X_FRAME_OPTIONS = "DENY"
-SECURE_REFERRER_POLICY = "same-origin"
 CONTENT_SECURITY_POLICY = {
     "DIRECTIVES": {
-        "default-src": [NONE],
-        "script-src": [SELF],
-        "style-src": [SELF],
-        "img-src": [SELF, "blob:"],
-        "font-src": [SELF],
-        "connect-src": [SELF],
+        **{f"{kind}-src": [SELF] for kind in ("script", "style", "font", "connect")},
         "form-action": [SELF],
+        "default-src": [NONE],
         "base-uri": [NONE],
         "frame-ancestors": [NONE],
+        "img-src": [SELF, "blob:"],
     }
 }
 
@@ -82,7 +77,7 @@ AXES_LOCKOUT_CALLABLE = "arena.config.faults.answer_locked"
 # --- What it is made of ------------------------------------------------------------------------
 
 INSTALLED_APPS = [
-    "arena.config.admin_site.SiteConfig",
+    "django.contrib.admin",
     "django.contrib.auth",
     "django.contrib.contenttypes",
     "django.contrib.sessions",
@@ -112,7 +107,6 @@ MIDDLEWARE = [
     "arena.config.middleware.BusyMiddleware",
 ]
 ROOT_URLCONF = "arena.config.urls"
-WSGI_APPLICATION = "arena.config.wsgi.application"
 TEMPLATES = [
     {
         "BACKEND": "django.template.backends.django.DjangoTemplates",
@@ -144,8 +138,6 @@ LANGUAGE_CODE = "en"
 LANGUAGES = [("en", "English"), ("de", "Deutsch")]
 LOCALE_PATHS = [VAR_DIR / "locale"]  # where `prepare` compiles the catalogue
 FORMAT_MODULE_PATH = ["arena.config.formats"]
-USE_I18N = True
-USE_TZ = True
 TIME_ZONE = "UTC"
 DEFAULT_AUTO_FIELD = "django.db.models.BigAutoField"
 
@@ -154,9 +146,7 @@ REST_FRAMEWORK = {
         "arena.api.access.BearerToken",
         "rest_framework.authentication.SessionAuthentication",
     ],
-    "DEFAULT_PERMISSION_CLASSES": ["rest_framework.permissions.IsAuthenticated"],
     "DEFAULT_RENDERER_CLASSES": ["rest_framework.renderers.JSONRenderer"],
-    "DEFAULT_PARSER_CLASSES": ["rest_framework.parsers.JSONParser"],
     "DEFAULT_SCHEMA_CLASS": "arena.api.views.ArenaSchema",
     "EXCEPTION_HANDLER": "arena.api.errors.answer_error",
 }
@@ -165,7 +155,6 @@ SPECTACULAR_SETTINGS = {
     "VERSION": "1",
     "OAS_VERSION": "3.1.1",
     "SCHEMA_PATH_PREFIX": "/api/v1/",
-    "SERVE_INCLUDE_SCHEMA": False,
     "POSTPROCESSING_HOOKS": [],  # what a field may be is said where the field is
     "ENUM_GENERATE_CHOICE_DESCRIPTION": False,
 }
@@ -241,7 +230,6 @@ CELERY_TASK_ACKS_LATE = True
 CELERY_TASK_REJECT_ON_WORKER_LOST = True
 CELERY_WORKER_PREFETCH_MULTIPLIER = 1
 CELERY_BROKER_CONNECTION_RETRY_ON_STARTUP = True
-CELERY_TASK_ALWAYS_EAGER = False
 # Asking models is waiting, drawing and driving is computing: each can have workers of its own.
 CELERY_TASK_DEFAULT_QUEUE = "models"
 # The last is what messages of earlier releases may still wait in.
@@ -251,7 +239,6 @@ CELERY_TASK_ROUTES = {
     "arena.draw_checks": {"queue": "drawing"},
 }
 CELERY_BROKER_TRANSPORT_OPTIONS = {"visibility_timeout": 3600, "socket_connect_timeout": 5}
-CELERY_TIMEZONE = "UTC"
 
 HEARTBEAT_S = ENV.ARENA_HEARTBEAT_S
 STALE_AFTER_S = ENV.ARENA_STALE_AFTER_S
@@ -296,10 +283,7 @@ LOGGING = {
     "loggers": {
         "django.request": {"level": "ERROR"},
         "django.server": {"handlers": ["console"], "propagate": False},
-        "axes": {"level": "WARNING"},
-        "fontTools": {"level": "WARNING"},
-        "matplotlib": {"level": "WARNING"},
-        "httpx2": {"level": "WARNING"},
+        **{name: {"level": "WARNING"} for name in ("axes", "fontTools", "httpx2", "matplotlib")},
         # Threads of the web worker take turns at a queue on purpose: an entry is no news.
         "waitress.queue": {"level": "ERROR"},
     },

@@ -47,12 +47,8 @@ class CountsDocument(serializers.Serializer[Any]):
     state = serializers.CharField(source="job.state")
     total = serializers.IntegerField()
     settled = serializers.IntegerField()
-    by_state = serializers.SerializerMethodField()
+    by_state = serializers.DictField(child=serializers.IntegerField())
     is_over = serializers.SerializerMethodField()
-
-    def get_by_state(self, found: JobCounts) -> dict[str, int]:
-        """Return the number of augmentations by state."""
-        return {state.value: number for state, number in found.by_state.items()}
 
     def get_is_over(self, found: JobCounts) -> bool:
         """Return whether nothing will change by itself."""

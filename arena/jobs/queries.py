@@ -3,11 +3,12 @@
 from collections import defaultdict
 from collections.abc import Collection
 from dataclasses import dataclass
+from typing import Any, NamedTuple
 from uuid import UUID
 
 from django.contrib.auth.models import User
-from django.core.paginator import Page, Paginator
-from django.db.models import Count, Q, QuerySet
+from django.core.paginator import Paginator
+from django.db.models import Count, Q
 
 from arena.errors import NotYours
 from arena.models import LabellingRound, LabelTask, Study
@@ -28,14 +29,8 @@ State = Augmentation.State
 _LEAN = (*("code", "state", "sample", "image", "scenario_id", "contestant_id"), "job_id")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class View:
-    """How cells are shown, and how many at once.
-
-    Attributes:
-        cells: At most so many on a page, but for a single row.
-        columns, samples, rows: At most so many of each.
-    """
+class View(NamedTuple):
+    """How cells are shown: at most so many on a page, but for a single row, and of each kind."""
 
     name: str
     cells: int
@@ -44,8 +39,8 @@ class View:
     rows: int
 
 
-MARKS = View(name="marks", cells=300, columns=10, samples=10, rows=50)
-PICTURES = View(name="pictures", cells=24, columns=4, samples=2, rows=12)
+MARKS = View("marks", cells=300, columns=10, samples=10, rows=50)
+PICTURES = View("pictures", cells=24, columns=4, samples=2, rows=12)
 VIEWS = {view.name: view for view in (MARKS, PICTURES)}
 
 
@@ -61,76 +56,42 @@ class Part:
     search: str = ""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class PartRow:
-    """One scenario, and its samples by contestant."""
-
-    scenario: Scenario
-    cells: list[list[Augmentation]]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class GridPart:
-    """What a page shows of a grid."""
-
-    part: Part
-    contestants: Page[Contestant]
-    samples: Page[int]
-    scenarios: Page[Scenario]
-    rows: list[PartRow]
-
-
-def grid_part(job: GenerationJob, part: Part) -> GridPart:
+def grid_part(job: GenerationJob, part: Part) -> dict[str, Any]:
     """Return scenarios down, contestants across; five queries, however large the job is.
 
-    Pages beyond the last one are the last one.
+    Pages beyond the last one are the last one. Each row has a scenario and its samples by
+    contestant.
     """
     view, cells = part.view, job.augmentations.order_by()
     contestants = Contestant.objects.filter(pk__in=cells.values("contestant"))
     lean = contestants.only("slug", "name", "kind", "code").order_by("name", "pk")
     columns = Paginator(lean, view.columns).get_page(part.column)
     samples = Paginator(range(1, job.samples + 1), view.samples).get_page(part.sample)
-    if part.state:
-        cells = cells.filter(state=part.state)
-    scenarios = Scenario.objects.filter(pk__in=cells.values("scenario"))
-    if part.search:
-        scenarios = scenarios.filter(slug__icontains=part.search)
+    shown = cells.filter(state=part.state) if part.state else cells
+    scenarios = Scenario.objects.filter(
+        pk__in=shown.values("scenario"), slug__icontains=part.search
+    )
     wide = max(1, len(columns.object_list)) * len(samples.object_list)
-    lines = min(view.rows, max(1, view.cells // wide))
     ordered = scenarios.only("slug", "type", "code").order_by("type", "slug")
-    shown = Paginator(ordered, lines).get_page(part.row)
-    return GridPart(
-        part=part,
-        contestants=columns,
-        samples=samples,
-        scenarios=shown,
-        rows=_rows(job, list(columns.object_list), list(shown.object_list), samples),
-    )
-
-
-def _rows(
-    job: GenerationJob,
-    contestants: list[Contestant],
-    scenarios: list[Scenario],
-    samples: Page[int],
-) -> list[PartRow]:
-    numbers = list(samples.object_list)
+    lines = Paginator(ordered, min(view.rows, max(1, view.cells // wide))).get_page(part.row)
     by_place: defaultdict[tuple[int, int], list[Augmentation]] = defaultdict(list)
-    cells = Augmentation.objects.filter(
-        job=job,
-        contestant__in=contestants,
-        scenario__in=scenarios,
-        sample__range=(numbers[0], numbers[-1]),
+    wanted = cells.filter(
+        contestant__in=list(columns.object_list),
+        scenario__in=list(lines.object_list),
+        sample__in=samples.object_list,
     )
-    for cell in cells.only(*_LEAN).order_by("sample"):
+    for cell in wanted.only(*_LEAN).order_by("sample"):
         by_place[cell.scenario_id, cell.contestant_id].append(cell)
-    return [
-        PartRow(
-            scenario=scenario,
-            cells=[by_place[scenario.pk, contestant.pk] for contestant in contestants],
-        )
-        for scenario in scenarios
-    ]
+    return {
+        "part": part,
+        "contestants": columns,
+        "samples": samples,
+        "scenarios": lines,
+        "rows": [
+            {"scenario": row, "cells": [by_place[row.pk, who.pk] for who in columns.object_list]}
+            for row in lines.object_list
+        ],
+    }
 
 
 # --- Drives ------------------------------------------------------------------------------------
@@ -189,14 +150,15 @@ class LabellingProgress:
         return 0 if self.labelling.closed_at else self.planned - self.labelled
 
 
-def of_expert(expert: User) -> list[LabellingProgress]:
-    """Return the labellings that an expert was invited to, counted over their own showings."""
-    return _counted(LabellingRound.objects.filter(tasks__expert=expert))
-
-
-def labellings_of(job: GenerationJob) -> list[LabellingProgress]:
-    """The labellings of a job over all their experts."""
-    return _counted(job.labellings.all())
+def find_labellings(**narrow: Any) -> list[LabellingProgress]:
+    """Return labellings; of those that are narrowed to an expert's, their own showings count."""
+    counted = LabellingRound.objects.filter(**narrow).annotate(
+        planned=Count("tasks", distinct=True), labelled=Count("tasks__label", distinct=True)
+    )
+    return [
+        LabellingProgress(labelling=row, planned=row.planned, labelled=row.labelled)
+        for row in counted
+    ]
 
 
 def labelling_of(*, expert: User, code: UUID) -> LabellingProgress:
@@ -205,7 +167,7 @@ def labelling_of(*, expert: User, code: UUID) -> LabellingProgress:
     Raises:
         NotYours: There is none with that code, or the expert takes no part in it.
     """
-    progress = _counted(LabellingRound.objects.filter(code=code, tasks__expert=expert))
+    progress = find_labellings(code=code, tasks__expert=expert)
     if not progress:
         raise NotYours("You do not take part in this labelling.")
     return progress[0]
@@ -222,13 +184,3 @@ def next_task(*, labelling: LabellingRound, expert: User) -> LabelTask | None:
         .order_by("position")
         .first()
     )
-
-
-def _counted(rows: QuerySet[LabellingRound]) -> list[LabellingProgress]:
-    counted = rows.annotate(
-        planned=Count("tasks", distinct=True), labelled=Count("tasks__label", distinct=True)
-    )
-    return [
-        LabellingProgress(labelling=row, planned=row.planned, labelled=row.labelled)
-        for row in counted
-    ]

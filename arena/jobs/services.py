@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from uuid import UUID
 
 from django.contrib.auth.models import User
-from django.db import IntegrityError, transaction
+from django.db import transaction
 from django.db.models import Q
 from django.utils import timezone
 
@@ -96,6 +96,7 @@ def close_labelling(*, labelling: LabellingRound, actor: User | None = None) -> 
     return labelling
 
 
+@transaction.atomic
 def save_label(
     *, expert: User, task_code: UUID, faults: frozenset[FaultClass], note: str = ""
 ) -> FaultLabel:
@@ -106,10 +107,32 @@ def save_label(
         AlreadyLabelled: It has another label.
         LabellingClosed: It has no label, and its labelling takes none any more.
     """
-    try:
-        return _save(expert, task_code, faults, note)
-    except IntegrityError:  # another request was faster: this one is its replay, or too late
-        return _save(expert, task_code, faults, note)
+    # Held, so that a replay finds the label, and nobody closes the labelling meanwhile.
+    tasks = LabelTask.objects.select_for_update(of=("self", "labelling"), no_key=True)
+    rows = tasks.select_related("labelling", "augmentation__scenario__base_scene")
+    task = rows.filter(code=task_code, expert=expert).first()
+    if task is None:
+        raise NotYours("This picture is not yours to label.")
+    seen = {fault.value: fault in faults for fault in FaultClass}
+    known = FaultLabel.objects.filter(task=task).first()
+    if known is not None:
+        if any(getattr(known, name) != value for name, value in seen.items()):
+            raise AlreadyLabelled("You had labelled that picture before; your first label counts.")
+        return known
+    if task.labelling.closed_at is not None:
+        raise LabellingClosed(f"The labelling '{task.labelling.name}' is closed.")
+    guessed = guess_faults(task.augmentation)
+    return FaultLabel.objects.create(
+        augmentation=task.augmentation,
+        expert=expert,
+        task=task,
+        note=make_storable(note.strip())[:NOTE_LENGTH],
+        **seen,
+        **{
+            f"guessed_{fault.value}": None if guessed is None else fault in guessed
+            for fault in FaultClass
+        },
+    )
 
 
 def _experts(usernames: Sequence[str]) -> list[User]:
@@ -135,38 +158,6 @@ def _planned(labelling: LabellingRound, expert: User) -> list[LabelTask]:
     ]
 
 
-@transaction.atomic
-def _save(expert: User, task_code: UUID, faults: frozenset[FaultClass], note: str) -> FaultLabel:
-    task = (
-        LabelTask.objects.select_related("labelling", "augmentation__scenario__base_scene")
-        .filter(code=task_code, expert=expert)
-        .first()
-    )
-    if task is None:
-        raise NotYours("This picture is not yours to label.")
-    note = make_storable(note.strip())[:NOTE_LENGTH]
-    seen = {fault.value: fault in faults for fault in FaultClass}
-    known = FaultLabel.objects.filter(task=task).first()
-    if known is not None:
-        if any(getattr(known, name) != value for name, value in seen.items()):
-            raise AlreadyLabelled("You had labelled that picture before; your first label counts.")
-        return known
-    if task.labelling.closed_at is not None:
-        raise LabellingClosed(f"The labelling '{task.labelling.name}' is closed.")
-    guessed = guess_faults(task.augmentation)
-    return FaultLabel.objects.create(
-        augmentation=task.augmentation,
-        expert=expert,
-        task=task,
-        note=note,
-        **seen,
-        **{
-            f"guessed_{fault.value}": None if guessed is None else fault in guessed
-            for fault in FaultClass
-        },
-    )
-
-
 def ask_for_file(
     *, job: GenerationJob, file_format: str, actor: User | None = None
 ) -> ScenarioFile:
@@ -179,11 +170,6 @@ def ask_for_file(
         raise UnknownName("format", file_format, list(FORMATS))
     row = ScenarioFile(job=job, format=file_format, asked_by=actor)
     return ask_for(row, job, format=file_format)
-
-
-def files_of(job: GenerationJob) -> dict[str, ScenarioFile]:
-    """The newest row of each format."""
-    return {row.format: row for row in ScenarioFile.objects.filter(job=job).order_by("pk")}
 
 
 _BATCH = 500

@@ -6,7 +6,6 @@ Every step can be repeated: what is there already is used again, so a second run
 import socket
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -68,14 +67,6 @@ class DemoFailed(ArenaError):
     """A step of the demo did not end as it should; the text says which and how."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class DemoTable:
-    """The table for a terminal, and where its files are."""
-
-    text: str
-    files: tuple[Path, ...]
-
-
 def prepare(say: Callable[[str], None]) -> None:
     """Scenes, scenarios, contestants and people; nothing here needs a running worker."""
     load_catalogue(folder=settings.BASE_DIR / "fixtures")
@@ -121,7 +112,7 @@ def generate(
     request = JobRequest(name=JOB, contestants=resolve_contestants([ALL]), scenarios=scenarios)
     job = GenerationJob.objects.filter(name=JOB).first() or launch(request)
     enqueue_job(job.pk)
-    ended, moved_at = 0, time.monotonic()
+    ended, moved_at = -A_LINE_EVERY, time.monotonic()
     while (now := count_rows(job)).under_way:
         look()
         if now.settled >= ended + A_LINE_EVERY:
@@ -145,8 +136,8 @@ def start_drives() -> None:
     enqueue_simulations(waiting)
 
 
-def vote_and_rate(scenarios: list[str], folder: Path) -> DemoTable:
-    """A study with simulated votes, closed and rated, and its table as files."""
+def vote_and_rate(scenarios: list[str], folder: Path) -> tuple[str, list[Path]]:
+    """Return the table of a study with simulated votes, and the files that it is written to."""
     study = Study.objects.filter(name=SIMULATED_STUDY).first()
     if study is None:
         asked = _study_asked(SIMULATED_STUDY, scenarios)
@@ -166,7 +157,7 @@ def vote_and_rate(scenarios: list[str], folder: Path) -> DemoTable:
     for chosen in FORMATS.values():
         files.append(folder / f"leaderboard.{chosen.suffix}")
         write_whole(files[-1], chosen.write(table))
-    return DemoTable(text=plain_text(table), files=tuple(files))
+    return plain_text(table), files
 
 
 def login_lines() -> list[str]:
@@ -201,13 +192,6 @@ def _person(username: str, role: str, *, is_simulated: bool = False) -> None:
 
 
 def _stand_in_address() -> str:
-    """The address that it had before, unless somebody else listens there now."""
-    kept = Endpoint.objects.filter(label=STAND_IN).first()
-    with socket.socket() as probe:
-        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        port = int(kept.base_url.rsplit(":", 1)[1].split("/")[0]) if kept else 0
-        try:
-            probe.bind(("127.0.0.1", port))
-        except OSError:
-            probe.bind(("127.0.0.1", 0))
+    """An address that nobody listens at."""
+    with socket.create_server(("127.0.0.1", 0)) as probe:
         return f"http://127.0.0.1:{probe.getsockname()[1]}/v1"

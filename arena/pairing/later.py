@@ -6,17 +6,16 @@ part. All are pure functions of what is planned so far and of a generator.
 Notation: P pairs, S scenarios, C contestants. Ratings are in logits.
 """
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from arena.errors import NothingToPlan
-from arena.pairing.order import CHECK, MAIN, REPEAT, BoolArray, FloatArray, IntArray
+from arena.pairing.order import CHECK, MAIN, REPEAT, BoolArray, FloatArray, IntArray, Slot
+from arena.pairing.plan import lay_out
 from arena.pairing.rules import Grid, PlannedMatchup, PlanRules
 
 Unit = tuple[int, int]
@@ -295,23 +294,6 @@ def _vote_on(
 # --- What follows on an expert's order so far ----------------------------------------------------
 
 
-@dataclass(slots=True, kw_only=True, eq=False)
-class _Item:
-    """Something to be shown, before it has a place.
-
-    Attributes:
-        again: Position of what a repeat shows again, if that is known already.
-        of: The item that a repeat shows again, if that is new as well.
-    """
-
-    kind: str
-    scenario: int
-    pair: int
-    chance: float
-    again: int | None = None
-    of: _Item | None = None
-
-
 def follow_on(
     rules: PlanRules,
     grid: Grid,
@@ -333,60 +315,50 @@ def follow_on(
     Returns:
         The showings, and the scenario gap that holds from the last known showing on.
     """
-    items = [_Item(kind=MAIN, scenario=u.scenario, pair=u.pair, chance=u.chance) for u in units]
-    items += _draw_repeats(rules, grid, so_far, items, rng)
+    items = [
+        Slot(kind=MAIN, scenario=unit.scenario, pair=unit.pair, chance=unit.chance)
+        for unit in units
+    ]
+    items += _draw_repeats(rules, grid, so_far, units, rng)
     items += _draw_checks(rules, grid, so_far, len(units), rng)
     order, gap = _find_order(items, [showing.scenario for showing in so_far], grid, rules, rng)
-    # Behind everything; positions that were handed over leave holes.
     start = so_far[-1].position + 1 if so_far else 1
-    position_of = {id(item): position for position, item in enumerate(order, start=start)}
-    again = [item.again if item.of is None else position_of[id(item.of)] for item in order]
-    sides = _deal_sides(rules, grid, so_far, list(zip(order, again, strict=True)), start, rng)
-    return [
-        PlannedMatchup(
-            expert=expert,
-            position=position,
-            scenario=grid.scenarios[item.scenario],
-            left=left,
-            right=right,
-            draw_probability=item.chance,
-            kind=item.kind,
-            repeats=repeated if item.kind == REPEAT else None,
-        )
-        for position, (item, repeated, (left, right)) in enumerate(
-            zip(order, again, sides, strict=True), start=start
-        )
-    ], gap
+    position_of = {index: position for position, index in enumerate(order, start=start)}
+    slots = [
+        item if item.of is None else replace(item, again=position_of[item.of])
+        for item in (items[index] for index in order)
+    ]
+    flips = _turn_mains(grid, so_far, slots, rng)
+    return lay_out(rules, grid, expert, slots, flips, so_far, rng), gap
 
 
 def _draw_repeats(
     rules: PlanRules,
     grid: Grid,
     so_far: Sequence[PlannedMatchup],
-    items: Sequence[_Item],
+    units: Sequence[Wanted],
     rng: np.random.Generator,
-) -> list[_Item]:
+) -> list[Slot]:
     """Draw hidden repeats: of what was shown long enough ago, else of what comes now."""
     done = {showing.repeats for showing in so_far if showing.kind == REPEAT}
     mains = [showing for showing in so_far if showing.kind == MAIN]
-    count = min(round(rules.repeat_share * (len(mains) + len(items))) - len(done), len(items))
+    count = min(round(rules.repeat_share * (len(mains) + len(units))) - len(done), len(units))
     if count < 1:
         return []
     latest = (so_far[-1].position + 1 if so_far else 1) - rules.repeat_distance
     old = [s for s in mains if s.position <= latest and s.position not in done]
     offered = [
-        _Item(kind=REPEAT, scenario=w.scenario, pair=w.pair, chance=0.0, again=showing.position)
-        for showing, w in zip(old, units_of(grid, old), strict=True)
+        Slot(kind=REPEAT, scenario=wanted.scenario, pair=wanted.pair, again=showing.position)
+        for showing, wanted in zip(old, units_of(grid, old), strict=True)
     ]
     if len(offered) < count:
         offered = [
-            _Item(kind=REPEAT, scenario=item.scenario, pair=item.pair, chance=0.0, of=item)
-            for item in items
+            Slot(kind=REPEAT, scenario=wanted.scenario, pair=wanted.pair, of=index)
+            for index, wanted in enumerate(units)
         ]
-    chosen = [offered[index] for index in rng.permutation(len(offered))[:count]]
-    for item in chosen:
-        item.chance = len(chosen) / len(offered)
-    return chosen
+    chance = count / len(offered)
+    drawn = rng.permutation(len(offered))[:count]
+    return [replace(offered[index], chance=chance) for index in drawn]
 
 
 def _draw_checks(
@@ -395,29 +367,23 @@ def _draw_checks(
     so_far: Sequence[PlannedMatchup],
     more: int,
     rng: np.random.Generator,
-) -> list[_Item]:
+) -> list[Slot]:
     shown = {showing.scenario for showing in so_far if showing.kind == CHECK}
     mains = sum(showing.kind == MAIN for showing in so_far) + more
-    unused = [check for check in rules.checks if check.scenario not in shown]
+    unused = [check.scenario for check in rules.checks if check.scenario not in shown]
     count = min(max(round(rules.check_share * mains) - len(shown), 0), len(unused))
-    return [
-        _Item(
-            kind=CHECK,
-            scenario=grid.column_of_scenario[unused[index].scenario],
-            pair=-1,
-            chance=1.0 / len(unused),
-        )
-        for index in rng.permutation(len(unused))[:count]
-    ]
+    columns = grid.column_of_scenario
+    drawn = [columns[unused[index]] for index in rng.permutation(len(unused))[:count]]
+    return [Slot(kind=CHECK, scenario=n, pair=-1, chance=1.0 / len(unused)) for n in drawn]
 
 
 def _find_order(
-    items: Sequence[_Item],
+    items: Sequence[Slot],
     before: Sequence[str],
     grid: Grid,
     rules: PlanRules,
     rng: np.random.Generator,
-) -> tuple[list[_Item], int]:
+) -> tuple[list[int], int]:
     """Order the items with the largest gap that can be kept, also to what was shown before."""
     bases = [int(base) for base in grid.bases]
     last = [bases[grid.column_of_scenario[name]] for name in before[-rules.scenario_gap :]]
@@ -430,19 +396,19 @@ def _find_order(
 
 
 def _try_order(
-    items: Sequence[_Item],
+    items: Sequence[Slot],
     last: list[int],
     gap: int,
     rng: np.random.Generator,
     bases: Sequence[int],
-) -> list[_Item] | None:
+) -> list[int] | None:
     """The fullest allowed scenario first; a repeat only after what it shows. None if it sticks."""
-    waiting: dict[int, list[_Item]] = {}
-    for index in rng.permutation(len(items)):
-        waiting.setdefault(items[index].scenario, []).append(items[index])
+    waiting: dict[int, list[int]] = {}
+    for index in rng.permutation(len(items)).tolist():
+        waiting.setdefault(items[index].scenario, []).append(index)
     for queue in waiting.values():  # taken from the end: what is repeated comes before its repeat
-        queue.sort(key=lambda item: item.of is None)
-    recent, order = list(last), list[_Item]()
+        queue.sort(key=lambda index: items[index].of is None)
+    recent, order = list(last), list[int]()
     for _ in items:
         barred = set(recent[-gap:]) if gap else set()
         open_ = [place for place in waiting if waiting[place] and bases[place] not in barred]
@@ -454,42 +420,20 @@ def _try_order(
     return order
 
 
-def _deal_sides(
-    rules: PlanRules,
-    grid: Grid,
-    so_far: Sequence[PlannedMatchup],
-    order: Sequence[tuple[_Item, int | None]],
-    start: int,
-    rng: np.random.Generator,
-) -> list[tuple[str, str]]:
-    """Left and right of every item: what was on the left more often goes to the right.
-
-    A repeat is turned around; checks have the broken picture on either side in turn.
-    """
-    ahead: Counter[frozenset[str]] = Counter()
-    left_of = {showing.position: showing.left for showing in so_far}
+def _turn_mains(
+    grid: Grid, so_far: Sequence[PlannedMatchup], slots: Sequence[Slot], rng: np.random.Generator
+) -> list[bool]:
+    """Say which main showings to turn around: what was on the left more often goes right."""
+    lead: Counter[frozenset[str]] = Counter()
     for showing in so_far:
         if showing.kind == MAIN:
-            names = frozenset((showing.left, showing.right))
-            ahead[names] += 1 if showing.left < showing.right else -1
-    checks = {check.scenario: (check.good, check.broken) for check in rules.checks}
-    broken_left = bool(rng.random() < 0.5)
-    made = []
-    for position, (item, repeated) in enumerate(order, start=start):
-        if item.kind == CHECK:
-            sides = checks[grid.scenarios[item.scenario]]
-            turn, broken_left = broken_left, not broken_left
-        else:
-            sides = grid.pairs[item.pair]
-            lead = ahead[frozenset(sides)]
-            turn = (
-                left_of[repeated or 0] == sides[0]
-                if item.kind == REPEAT
-                else (lead > 0 or (lead == 0 and bool(rng.random() < 0.5)))
-            )
-        if item.kind == MAIN:
-            ahead[frozenset(sides)] += -1 if turn else 1
-        left, right = sides[::-1] if turn else sides
-        left_of[position] = left
-        made.append((left, right))
-    return made
+            pair = frozenset((showing.left, showing.right))
+            lead[pair] += 1 if showing.left < showing.right else -1
+    flips = []
+    for slot in slots:
+        if slot.kind == MAIN:
+            pair = frozenset(grid.pairs[slot.pair])
+            flip = lead[pair] > 0 or (lead[pair] == 0 and bool(rng.random() < 0.5))
+            lead[pair] += -1 if flip else 1
+            flips.append(flip)
+    return flips

@@ -25,12 +25,16 @@ class Slot:
         kind: "main", "repeat" or "check".
         pair: The row of the pair, -1 for a check.
         of: For a repeat, the index of the slot that it shows again.
+        again: The same as a position in the expert's order, once it is known.
+        chance: How likely it was drawn.
     """
 
     kind: str
     pair: int
     scenario: int
     of: int | None = None
+    again: int | None = None
+    chance: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

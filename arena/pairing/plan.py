@@ -18,6 +18,9 @@ A unit is a scenario with a pair of contestants. The plan is made in five steps:
 Notation: E experts, P pairs, S scenarios.
 """
 
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+
 import numpy as np
 
 from arena.pairing.order import (
@@ -75,7 +78,9 @@ def plan(rules: PlanRules) -> MatchupPlan:
     matchups = [
         matchup
         for expert, order, flips in zip(rules.experts, orders, flipped, strict=True)
-        for matchup in _matchups(rules, grid, probability, expert, order, flips, rng)
+        for matchup in lay_out(
+            rules, grid, expert, _with_chances(rules, probability, order), flips, (), rng
+        )
     ]
     return MatchupPlan(matchups=tuple(matchups), scenario_gap=gap, identical=grid.identical)
 
@@ -112,46 +117,72 @@ def _extras(rules: PlanRules, grid: Grid, mine: BoolArray, rng: np.random.Genera
     )
 
 
-def _matchups(
+def _with_chances(rules: PlanRules, probability: FloatArray, order: Sequence[Slot]) -> list[Slot]:
+    """An expert's order with how likely each showing was drawn, and what repeats show again."""
+    repeats = sum(slot.kind == REPEAT for slot in order)
+    chances = {
+        CHECK: 1.0 / max(len(rules.checks), 1),
+        REPEAT: repeats / max(len(order) - repeats, 1),
+    }
+    return [
+        replace(
+            slot,
+            again=None if slot.of is None else slot.of + 1,
+            chance=chances.get(slot.kind, float(probability[slot.pair, slot.scenario])),
+        )
+        for slot in order
+    ]
+
+
+def lay_out(
     rules: PlanRules,
     grid: Grid,
-    probability: FloatArray,
     expert: str,
-    order: list[Slot],
-    flips: BoolArray,
+    slots: Sequence[Slot],
+    flips: Iterable[bool],
+    so_far: Sequence[PlannedMatchup],
     rng: np.random.Generator,
 ) -> list[PlannedMatchup]:
-    """One expert's order as showings; checks have the broken picture on either side in turn."""
-    repeats = sum(slot.kind == REPEAT for slot in order)
-    turned: dict[int, bool] = {}
-    waiting = list(flips)
+    """Make an expert's next showings.
+
+    A repeat is turned around; checks have the broken picture on either side in turn.
+
+    Args:
+        rules: Of the study.
+        grid: What can be shown.
+        expert: Who sees them.
+        slots: In their order.
+        flips: Whether each main showing is turned around.
+        so_far: What the expert has been shown.
+        rng: Says on which side the first broken picture is.
+    """
+    left_of = {showing.position: showing.left for showing in so_far}
+    # Behind everything; positions that were handed over leave holes.
+    start = so_far[-1].position + 1 if so_far else 1
+    waiting = iter(flips)
     checks = {check.scenario: (check.good, check.broken) for check in rules.checks}
     broken_left = bool(rng.random() < 0.5) if rules.checks else False
     made = []
-    for index, slot in enumerate(order):
+    for position, slot in enumerate(slots, start=start):
         if slot.kind == CHECK:
             sides, flip = checks[grid.scenarios[slot.scenario]], broken_left
             broken_left = not broken_left
-            chance = 1.0 / len(rules.checks)
         else:
             sides = grid.pairs[slot.pair]
-            # A repeat is always later than what it repeats.
-            flip = not turned[slot.of] if slot.of is not None else bool(waiting.pop(0))
-            chance = float(probability[slot.pair, slot.scenario])
-            if slot.kind == REPEAT:
-                chance = repeats / (len(order) - repeats)
-        turned[index] = flip
+            is_repeat = slot.again is not None
+            flip = left_of[slot.again or 0] == sides[0] if is_repeat else bool(next(waiting))
         left, right = sides[::-1] if flip else sides
+        left_of[position] = left
         made.append(
             PlannedMatchup(
                 expert=expert,
-                position=index + 1,
+                position=position,
                 scenario=grid.scenarios[slot.scenario],
                 left=left,
                 right=right,
-                draw_probability=chance,
+                draw_probability=slot.chance,
                 kind=slot.kind,
-                repeats=None if slot.of is None else slot.of + 1,
+                repeats=slot.again,
             )
         )
     return made

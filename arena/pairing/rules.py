@@ -285,28 +285,37 @@ def check_rules(rules: PlanRules, grid: Grid) -> None:
     Raises:
         NothingToPlan: The text has the numbers.
     """
-    if rules.seed < 0:
-        raise NothingToPlan(f"The seed must be 0 or more, not {rules.seed}.")
-    if rules.votes_per_expert < 1:
-        raise NothingToPlan(f"Votes per expert must be 1 or more, not {rules.votes_per_expert}.")
-    if not rules.experts:
-        raise NothingToPlan("There is nobody to vote: name at least one expert.")
-    if len(set(rules.experts)) < len(rules.experts):
-        raise NothingToPlan("An expert is named twice.")
-    if not grid.pairs:
-        contestants = len({entry.contestant for entry in rules.entries})
-        raise NothingToPlan(
-            f"A comparison needs two contestants with pictures, not {contestants}."
-        )
-    _check_extras(rules, grid)
-    units = int(grid.showable.sum())
-    if units < rules.votes_per_expert:
-        same = f" (and {len(grid.identical)} with identical pictures)" if grid.identical else ""
-        raise NothingToPlan(
-            f"Nobody sees the same pair of a scenario twice: {len(grid.scenarios)} scenarios have "
-            f"{units} different pairs to show{same}, but each expert is to judge "
-            f"{rules.votes_per_expert}."
-        )
+    check_share("repeats", rules.repeat_share, MOST_REPEATS)
+    check_share("what two experts judge", rules.overlap_share, MOST_OVERLAP)
+    check_share(ATTENTION_CHECKS, rules.check_share, MOST_CHECKS)
+    check_share("the adaptive part", rules.adaptive_share, MOST_ADAPTIVE)
+    contestants = len({entry.contestant for entry in rules.entries})
+    checked = [check.scenario for check in rules.checks]
+    votes, units, same = rules.votes_per_expert, int(grid.showable.sum()), len(grid.identical)
+    refusals = {
+        f"The seed must be 0 or more, not {rules.seed}.": rules.seed < 0,
+        f"Votes per expert must be 1 or more, not {votes}.": votes < 1,
+        "There is nobody to vote: name at least one expert.": not rules.experts,
+        "An expert is named twice.": len(set(rules.experts)) < len(rules.experts),
+        f"A comparison needs two contestants with pictures, not {contestants}.": not grid.pairs,
+        "At least 20 % of the adaptive draws are uniform, else no vote could be weighted; not "
+        f"{rules.uniform_share:.0%}.": not 0.2 <= rules.uniform_share <= 1,
+        "For pairs that two experts judge there must be two.": rules.overlap_share > 0
+        and len(rules.experts) < 2,
+        "Targets are given by contestant or by pair, not both.": bool(rules.appearances)
+        and bool(rules.pair_votes),
+        "Targets fix every vote, so none are left for an adaptive part.": rules.adaptive_share > 0
+        and bool(rules.appearances or rules.pair_votes),
+        "Each check is on a scenario of its own out of those of the study.": len(set(checked))
+        < len(checked)
+        or not set(checked) <= set(grid.scenarios),
+        f"Nobody sees the same pair of a scenario twice: {len(grid.scenarios)} scenarios have "
+        f"{units} different pairs to show (and {same} with identical pictures), but each expert "
+        f"is to judge {votes}.": units < votes,
+    }
+    for sentence, is_refused in refusals.items():
+        if is_refused:
+            raise NothingToPlan(sentence)
 
 
 def check_share(part: str, share: float, most: float) -> None:
@@ -317,31 +326,6 @@ def check_share(part: str, share: float, most: float) -> None:
     """
     if not 0 <= share <= most:
         raise NothingToPlan(f"The share of {part} goes from 0 to {most:.0%}, not {share:.1%}.")
-
-
-def _check_extras(rules: PlanRules, grid: Grid) -> None:
-    check_share("repeats", rules.repeat_share, MOST_REPEATS)
-    check_share("what two experts judge", rules.overlap_share, MOST_OVERLAP)
-    check_share(ATTENTION_CHECKS, rules.check_share, MOST_CHECKS)
-    check_share("the adaptive part", rules.adaptive_share, MOST_ADAPTIVE)
-    places = [check.scenario for check in rules.checks]
-    has_targets = bool(rules.appearances or rules.pair_votes)
-    refusals = {
-        "At least 20 % of the adaptive draws are uniform, else no vote could be weighted; not "
-        f"{rules.uniform_share:.0%}.": not 0.2 <= rules.uniform_share <= 1,
-        "For pairs that two experts judge there must be two.": rules.overlap_share > 0
-        and len(rules.experts) < 2,
-        "Targets are given by contestant or by pair, not both.": bool(rules.appearances)
-        and bool(rules.pair_votes),
-        "Targets fix every vote, so none are left for an adaptive part.": has_targets
-        and rules.adaptive_share > 0,
-        "Each check is on a scenario of its own out of those of the study.": not set(places)
-        <= set(grid.scenarios)
-        or len(set(places)) < len(places),
-    }
-    for sentence, is_refused in refusals.items():
-        if is_refused:
-            raise NothingToPlan(sentence)
 
 
 def pair_totals(rules: PlanRules, grid: Grid) -> IntArray:

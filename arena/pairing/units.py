@@ -7,7 +7,6 @@ import itertools
 import math
 from collections import deque
 from collections.abc import Sequence
-from itertools import product
 
 import numpy as np
 
@@ -121,9 +120,6 @@ def even_out(chosen: BoolArray, showable: BoolArray, aim: IntArray) -> None:
             chosen[giver, column], chosen[taker, column] = False, True
 
 
-# --- Private -----------------------------------------------------------------------------------
-
-
 def _chain(level: IntArray, can_give: BoolArray) -> list[int] | None:
     """The shortest way by `can_give` (P, P) from a row down to one at least two lower."""
     for source in np.argsort(-level, kind="stable"):
@@ -174,22 +170,31 @@ def votes_by_appearances(
     Raises:
         NothingToPlan: No numbers of votes have these sums.
     """
-    wanted = _fitted(appearances.astype(float), capacity.astype(float))
-    votes = np.minimum(np.floor(wanted + 1e-9).astype(np.int64), capacity)
-    lacking = appearances - votes.sum(axis=1)
-    rows, columns = np.triu_indices(len(names), 1)
-    for best in np.argsort(-(wanted - votes)[rows, columns], kind="stable"):
-        i, j = rows[best], columns[best]
-        if lacking[i] > 0 and lacking[j] > 0 and votes[i, j] < capacity[i, j]:
-            _add(votes, i, j, 1)
-            lacking[[i, j]] -= 1
-    while lacking.any():
-        if not _mend(votes, lacking, wanted, capacity):
-            left = np.flatnonzero(lacking).tolist()
-            short = ", ".join(f"{names[i]} {appearances[i]}" for i in left)
-            raise NothingToPlan(
-                f"These appearances can't be reached with the pairs that can be shown: {short}."
-            )
+    from scipy.optimize import Bounds, LinearConstraint, milp  # slow to load
+
+    low, high = np.triu_indices(len(names), 1)
+    most = capacity[low, high]
+    wanted = _fitted(appearances.astype(float), capacity.astype(float))[low, high]
+    ends = np.zeros((len(names), len(low)))
+    ends[low, np.arange(len(low))] = ends[high, np.arange(len(low))] = 1.0
+    each, nothing = np.eye(len(low)), np.zeros_like(ends)
+    found = milp(  # whole votes, then how far each is from what is wanted: the least in all
+        np.repeat([0.0, 1.0], len(low)),
+        integrality=np.repeat([1, 0], len(low)),
+        bounds=Bounds(0.0, np.concatenate([most, np.full(len(low), np.inf)])),
+        constraints=[
+            LinearConstraint(np.hstack([ends, nothing]), appearances, appearances),
+            LinearConstraint(np.hstack([each, -each]), ub=wanted),
+            LinearConstraint(np.hstack([each, each]), lb=wanted),
+        ],
+    )
+    if found.x is None:
+        targets = ", ".join(f"{name} {n}" for name, n in zip(names, appearances, strict=True))
+        raise NothingToPlan(
+            f"These appearances can't be reached with the pairs that can be shown: {targets}."
+        )
+    votes = np.zeros_like(capacity)
+    votes[low, high] = votes[high, low] = np.rint(found.x[: len(low)]).astype(np.int64)
     return votes
 
 
@@ -247,66 +252,10 @@ def _fitted(sums: FloatArray, capacity: FloatArray) -> FloatArray:
     return shares
 
 
-def _mend(votes: IntArray, lacking: IntArray, wanted: FloatArray, capacity: IntArray) -> bool:
-    """Give two more appearances by moving a vote: +(i, k), -(k, l), +(l, j); False if none can.
-
-    Too many appearances are mended the other way around.
-    """
-    sign = 1 if (lacking > 0).any() else -1
-    open_ = np.flatnonzero(lacking * sign > 0)
-    i = int(open_[0])
-    j = int(open_[1]) if len(open_) > 1 else i
-    if i == j and abs(lacking[i]) < 2:
-        return False
-    if i != j and 0 <= votes[i, j] + sign <= capacity[i, j]:
-        moves = [[(i, j, sign)]]
-    else:
-        others = [n for n in range(len(lacking)) if n not in (i, j)]
-        moves = [
-            [(i, k, sign), (k, o, -sign), (o, j, sign)]
-            for k, o in product(others, others)
-            if k != o
-        ]
-    fits = [
-        move
-        for move in moves
-        if all(0 <= votes[a, b] + change <= capacity[a, b] for a, b, change in move)
-    ]
-    if not fits:
-        return False
-    best = min(fits, key=lambda move: _strain(move, votes, wanted))
-    for a, b, change in best:
-        _add(votes, a, b, change)
-    lacking[i] -= sign
-    lacking[j] -= sign
-    return True
-
-
-def _strain(move: list[tuple[int, int, int]], votes: IntArray, wanted: FloatArray) -> float:
-    """How much further from the wanted shares a move leads."""
-    return float(
-        sum(
-            abs(votes[a, b] + change - wanted[a, b]) - abs(votes[a, b] - wanted[a, b])
-            for a, b, change in move
-        )
-    )
-
-
-def _add(votes: IntArray, i: int, j: int, change: int) -> None:
-    votes[i, j] += change
-    votes[j, i] += change
-
-
 _MOST_AT_ONCE = 250
 """Units of an expert that are held against each other at a time."""
 _TRIES = 8
 """Rounds over all experts without an exchange, after which there is none."""
-
-
-def overlap_of(chosen: BoolArray) -> tuple[int, int]:
-    """How many units of a plan (E, P, S) somebody judges, and how many two experts or more."""
-    judges = chosen.sum(axis=0)
-    return int((judges > 0).sum()), int((judges > 1).sum())
 
 
 def bring_together(
@@ -333,10 +282,10 @@ def bring_together(
         )
         idle = 0 if moved else idle + 1
         if idle == _TRIES:
-            judged, shared = overlap_of(chosen)
             raise NothingToPlan(
                 f"Of the pairs that are judged, {share:.0%} are to be judged by two experts or "
-                f"more; with these experts, votes and pictures {shared} of {judged} are reached. "
+                f"more; with these experts, votes and pictures {int((judges > 1).sum())} of "
+                f"{int((judges > 0).sum())} are reached. "
                 "Ask for less, or for more votes per expert."
             )
 

@@ -11,8 +11,9 @@ other and puts the others above it, below it or nowhere.
 Notation: C contestants, R rows, P pairs, B rounds, which are the last axis.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, fields, replace
+from functools import partial
 from typing import Self
 
 import numpy as np
@@ -115,24 +116,23 @@ def _blocks(rounds: int, width: int) -> Iterator[int]:
 
 def _cluster_draws(
     votes: Comparisons, unit: Unit, seed: int
-) -> list[tuple[Callable[[int], NDArray[np.float32]], IntArray]]:
+) -> Sequence[tuple[Callable[[int], NDArray[np.float32]], IntArray]]:
     """For each kind of cluster what draws further rounds of it, and (R,) which one a row is in."""
     children = dict(zip(Unit.TWO_WAY.kinds, np.random.SeedSequence(seed).spawn(2), strict=True))
-
-    def drawing(clusters: int, rng: np.random.Generator) -> Callable[[int], NDArray[np.float32]]:
-        def draw(rounds: int) -> NDArray[np.float32]:
-            place = rng.integers(0, clusters, size=(rounds, clusters)).T * rounds
-            place += np.arange(rounds)
-            drawn = np.bincount(place.ravel(), minlength=clusters * rounds)
-            return drawn.reshape(clusters, rounds).astype(np.float32)
-
-        return draw
-
     found = []
     for kind in unit.kinds:
         codes, of_row = np.unique(getattr(votes, kind), return_inverse=True)
-        found.append((drawing(len(codes), np.random.default_rng(children[kind])), of_row))
+        rng = np.random.default_rng(children[kind])
+        found.append((partial(_draw_clusters, rng, len(codes)), of_row))
     return found
+
+
+def _draw_clusters(rng: np.random.Generator, clusters: int, rounds: int) -> NDArray[np.float32]:
+    """(G, B) how often each cluster is drawn."""
+    place = rng.integers(0, clusters, size=(rounds, clusters)).T * rounds
+    place += np.arange(rounds)
+    drawn = np.bincount(place.ravel(), minlength=clusters * rounds)
+    return drawn.reshape(clusters, rounds).astype(np.float32)
 
 
 # --- Ratings of rounds ---------------------------------------------------------------------------

@@ -7,7 +7,7 @@ from 0; `names` gives the contestants' names.
 """
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, fields, replace
 
 import numpy as np
@@ -20,17 +20,6 @@ BoolArray = NDArray[np.bool_]
 
 WIN, TIE, LOSS = 1.0, 0.5, 0.0
 """What the first contestant of a comparison scores."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Comparison:
-    """One vote: what `first` scored against `second`, who judged, and on which scenario."""
-
-    first: str
-    second: str
-    score: float
-    expert: str = ""
-    scenario: str = ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -106,47 +95,6 @@ class PairCounts:
     def scores(self) -> FloatArray:
         """(P,) what low scored; a tie is half a win."""
         return np.asarray(self.outcomes[:, 0] + 0.5 * self.outcomes[:, 1])
-
-
-def as_arrays(names: Sequence[str], votes: Iterable[Comparison]) -> Comparisons:
-    """Number the names and put the votes into arrays, a row each, in the given order.
-
-    Experts and scenarios are numbered in the order of their names, so that the order of the votes
-    changes nothing.
-
-    Args:
-        names: Every contestant, also those without votes.
-        votes: One entry a vote.
-
-    Raises:
-        ValueError: A name is not in `names` or there twice, a contestant meets itself, or a score
-            is none of 1, 0.5 and 0; the text has the number of the vote.
-    """
-    number = {name: index for index, name in enumerate(names)}
-    if len(number) < len(names):
-        raise ValueError("a contestant is named twice")
-    votes = list(votes)
-    experts = {name: n for n, name in enumerate(sorted({vote.expert for vote in votes}))}
-    scenarios = {name: n for n, name in enumerate(sorted({vote.scenario for vote in votes}))}
-    rows = []
-    for count, vote in enumerate(votes, start=1):
-        ends = vote.first, vote.second
-        if strange := [name for name in ends if name not in number]:
-            raise ValueError(f"vote {count}: {strange[0]!r} is none of {', '.join(names)}")
-        if vote.first == vote.second:
-            raise ValueError(f"vote {count}: {vote.first!r} is compared with itself")
-        if vote.score not in (WIN, TIE, LOSS):
-            raise ValueError(f"vote {count}: a score is 1, 0.5 or 0, not {vote.score!r}")
-        rows.append((*map(number.get, ends), experts[vote.expert], scenarios[vote.scenario]))
-    first, second, expert, scenario = np.array(rows, dtype=np.int64).reshape(-1, 4).T.copy()
-    return Comparisons(
-        names=tuple(names),
-        first=first,
-        second=second,
-        expert=expert,
-        scenario=scenario,
-        score=np.array([vote.score for vote in votes], dtype=np.float64),
-    )
 
 
 def _array_names() -> list[str]:

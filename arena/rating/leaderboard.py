@@ -3,13 +3,11 @@
 In: `Comparisons` of named contestants, as arrays. Out: a `Leaderboard`: for each of them a `Line`
 with rating, interval and rank, and what must be said with the numbers.
 
-    votes = as_arrays(names, [Comparison(first="a", second="b", score=1.0, expert="e", ...), ...])
+    votes = Comparisons(names=("a", "b"), first=first, second=second, score=score, ...)  # arrays
     board = rate(votes)  # the default: Bradley-Terry, two-way, intervals in closed form
     board = rate(votes, unit=Unit.VOTE, rounds=PAPER_ROUNDS)  # the paper's mode
     board.lines[i].rating, .lower, .upper, .rank  # None where the votes do not determine them
     board.status, board.explanation, board.warnings  # always shown with the numbers
-
-Votes that were grouped elsewhere go into `Comparisons` directly, with their `count`.
 """
 
 import math
@@ -32,7 +30,7 @@ from arena.rating.rules import (
     Rules,
     TooManyContestants,
     Unit,
-    default_intervals,
+    choose_rules,
 )
 
 __all__ = ["Intervals", "Leaderboard", "Line", "Method", "Unit", "rate"]
@@ -142,14 +140,11 @@ def rate(
         raise TooManyContestants(
             f"at most {MOST_CONTESTANTS} contestants can be rated together, not {len(votes.names)}"
         )
-    if unit is None:
-        unit = Unit.VOTE if method is Method.ELO else Unit.TWO_WAY
-    if votes.covariates.shape[1]:
-        intervals = intervals or Intervals.CLOSED_FORM
-        if method is not Method.BRADLEY_TERRY or intervals is not Intervals.CLOSED_FORM:
-            raise ValueError("covariates need Bradley-Terry with intervals in closed form")
-    intervals = intervals or default_intervals(method, unit)
-    return _rate(votes, Rules(method, unit, intervals, rounds, seed))
+    is_adjusted = bool(votes.covariates.shape[1])
+    rules = choose_rules(
+        method, unit, intervals, is_adjusted=is_adjusted, rounds=rounds, seed=seed
+    )
+    return _rate(votes, rules)
 
 
 def _rate(votes: Comparisons, rules: Rules) -> Leaderboard:

@@ -10,20 +10,27 @@ from dataclasses import dataclass
 UNKNOWN = "--"
 MINUS = "\N{MINUS SIGN}"
 
-_ESCAPES = {
-    "\\": r"\textbackslash{}",
-    "{": r"\{",
-    "}": r"\}",
-    "&": r"\&",
-    "%": r"\%",
-    "$": r"\$",
-    "#": r"\#",
-    "_": r"\_",
-    "~": r"\textasciitilde{}",
-    "^": r"\textasciicircum{}",
-    "<": r"\textless{}",
-    ">": r"\textgreater{}",
-}
+_ESCAPES = str.maketrans(
+    {
+        "\\": r"\textbackslash{}",
+        "{": r"\{",
+        "}": r"\}",
+        "&": r"\&",
+        "%": r"\%",
+        "$": r"\$",
+        "#": r"\#",
+        "_": r"\_",
+        "~": r"\textasciitilde{}",
+        "^": r"\textasciicircum{}",
+        "<": r"\textless{}",
+        ">": r"\textgreater{}",
+        "∞": r"$\infty$",
+        "≤": r"$\leq$",
+        "≥": r"$\geq$",
+        "–": "--",
+        "±": r"$\pm$",
+    }
+)
 
 HEADS = ("Model", "Rank", "Elo", "95% CI", "Votes")
 """Of the paper's table."""
@@ -38,11 +45,6 @@ _SYMMETRIC = 1e-6
 """Points by which sides may differ for the sake of rounding."""
 
 
-def rating_text(rating: float | None) -> str:
-    """The rating as a whole number, two hyphens without one."""
-    return UNKNOWN if rating is None else str(round(rating))
-
-
 def whole_percent(share: float) -> int:
     """A share in whole percent, the same wherever it stands; two shares of one make a hundred.
 
@@ -50,16 +52,6 @@ def whole_percent(share: float) -> int:
     votes are 58 %, and the 0.425 beside them 42 %.
     """
     return round(round(100.0 * share, 9))
-
-
-def rank_text(rank: int | None) -> str:
-    """The rank, or two hyphens without one."""
-    return UNKNOWN if rank is None else str(rank)
-
-
-def places_text(best: int | None, worst: int | None) -> str:
-    """The places between two, 1–3, one alone, or two hyphens without any."""
-    return rank_text(best) if best is None or best == worst else f"{best}–{worst}"
 
 
 def interval_text(rating: float | None, lower: float | None, upper: float | None) -> str:
@@ -137,6 +129,7 @@ def latex_table(
         label: For references to it.
     """
     right = " r" * (len(heads) - 2)
+    titles = [rf"\textbf{{{escape(head)}}}{_UPWARDS.get(head, '')}" for head in heads]
     across = rf"\multicolumn{{{len(heads)}}}{{p{{0.8\linewidth}}}}"
     lines = [
         r"% \usepackage{booktabs} and \usepackage[table]{xcolor}",
@@ -144,9 +137,9 @@ def latex_table(
         _BEGIN,
         rf"    \begin{{tabular}}{{l>{{\columncolor{{llm_blue!20}}}}c{right}}}",
         r"    \toprule",
-        "    " + " & ".join(_head(head) for head in heads) + r"\\",
+        "    " + " & ".join(titles) + r"\\",
         r"    \midrule",
-        *("    " + " & ".join([model, *map(_in_tex, rest)]) + r"\\" for model, *rest in rows),
+        *("    " + " & ".join([model, *map(escape, rest)]) + r"\\" for model, *rest in rows),
         r"    \bottomrule",
         *(rf"    {across}{{\footnotesize {escape(note)}}}\\" for note in notes),
         r"    \end{tabular}",
@@ -157,26 +150,9 @@ def latex_table(
     return "\n".join(lines) + "\n"
 
 
-def _head(head: str) -> str:
-    return rf"\textbf{{{escape(head)}}}{_UPWARDS.get(head, '')}"
-
-
-def _in_tex(number: str) -> str:
-    """A printed number; the signs of open intervals are mathematics."""
-    for sign, command in (
-        ("∞", r"$\infty$"),
-        ("≤", r"$\leq$"),
-        ("≥", r"$\geq$"),
-        ("–", "--"),
-        ("±", r"$\pm$"),
-    ):
-        number = number.replace(sign, command)
-    return number
-
-
 def escape(text: str) -> str:
     """Text that TeX prints as it is."""
-    return "".join(_ESCAPES.get(letter, letter) for letter in one_line(text))
+    return one_line(text).translate(_ESCAPES)
 
 
 def one_line(text: str) -> str:
@@ -226,17 +202,20 @@ class Line:
     @property
     def rank_text(self) -> str:
         """The rank, or two hyphens without one."""
-        return rank_text(self.rank)
+        return UNKNOWN if self.rank is None else str(self.rank)
 
     @property
     def ranks_text(self) -> str:
         """The places that are left with all pairs judged at once: 1–3, or 1 alone."""
-        return places_text(self.rank_best, self.rank_worst)
+        if self.rank_best is None:
+            return UNKNOWN
+        is_one = self.rank_best == self.rank_worst
+        return str(self.rank_best) if is_one else f"{self.rank_best}–{self.rank_worst}"
 
     @property
     def elo_text(self) -> str:
         """The rating as a whole number."""
-        return rating_text(self.rating)
+        return UNKNOWN if self.rating is None else str(round(self.rating))
 
     @property
     def interval_text(self) -> str:

@@ -23,7 +23,7 @@ from arena.rating.comparisons import (
 )
 from arena.rating.models import ELO_PER_LOGIT
 from arena.rating.rules import Unit
-from arena.rating.sandwich import Pulls, clusters_of, plain_covariance
+from arena.rating.sandwich import Pulls, clusters_of, design_of, plain_covariance
 
 _MOST_STEPS = 60
 _TOLERANCE = 1e-10
@@ -58,33 +58,29 @@ def fit_with_columns(votes: Comparisons, columns: FloatArray) -> LogisticFit | N
     Returns:
         None where the votes determine no finite answer, or columns say the same as others.
     """
-    contestants, extra = len(votes.names), columns.shape[1]
+    contestants = len(votes.names)
     # Columns of very different size would look like columns that say the same.
     scale = np.sqrt((columns**2 * votes.count[:, None]).mean(axis=0))
     if not (scale > 0.0).all():
         return None
-    scaled = columns / scale
-    parameters = np.zeros(contestants + extra)
+    design = design_of(votes, np.ones(len(votes)), columns / scale)
+    parameters = np.zeros(design.shape[1])
+    longest = np.inf
     for _ in range(_MOST_STEPS):
-        slope, curvature = _derivatives(votes, scaled, parameters)
-        inverse = _inverse(curvature)
-        if inverse is None:
-            return None
-        step = inverse @ slope
-        longest = float(np.abs(step).max(initial=0.0))
-        parameters = parameters + step * min(1.0, _LONGEST_STEP / max(longest, 1e-300))
-        if np.abs(parameters).max() > _FAR:
+        expected = expit(design @ parameters)
+        weight = votes.count * expected * (1.0 - expected)
+        inverse = _invert((design.T @ (design * weight[:, None])).toarray())
+        if inverse is None or np.abs(parameters).max() > _FAR:
             return None
         if longest < _TOLERANCE:
             break
+        step = inverse @ (design.T @ (votes.count * (votes.score - expected)))
+        longest = float(np.abs(step).max(initial=0.0))
+        parameters += step * min(1.0, _LONGEST_STEP / max(longest, 1e-300))
     else:
-        return None
-    inverse = _inverse(_derivatives(votes, scaled, parameters)[1])
-    if inverse is None:
         return None
     units = np.concatenate([np.ones(contestants), 1.0 / scale])
     inverse = units[:, None] * inverse * units
-    expected = _expected(votes, scaled, parameters)
     surprise = votes.score - expected
     strengths = parameters[:contestants]
     return LogisticFit(
@@ -92,13 +88,22 @@ def fit_with_columns(votes: Comparisons, columns: FloatArray) -> LogisticFit | N
         coefficients=parameters[contestants:] / scale,
         pulls=Pulls(
             votes=votes,
-            surprise=surprise,
+            slopes=design_of(votes, surprise, surprise[:, None] * columns),
             information=expected * (1.0 - expected),
-            besides=surprise[:, None] * columns,
             inverse=inverse,
             back=inverse[:contestants],
         ),
     )
+
+
+def _invert(curvature: FloatArray) -> FloatArray | None:
+    """(K, K) on the space of mean strengths zero; None where another direction is flat, too."""
+    values, directions = np.linalg.eigh(curvature)
+    if len(values) > 1 and values[1] < _SINGULAR * max(values[-1], 1e-300):
+        return None
+    inverse = np.zeros_like(values)
+    inverse[1:] = 1.0 / values[1:]
+    return np.asarray((directions * inverse) @ directions.T)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -176,52 +181,3 @@ def side_bias(votes: Comparisons) -> SideBias:
         left=share(votes.score[decided] == 1.0, votes.expert[decided]),
         clusters=clusters,
     )
-
-
-# --- Steps ---------------------------------------------------------------------------------------
-
-
-def _expected(votes: Comparisons, columns: FloatArray, parameters: FloatArray) -> FloatArray:
-    """(R,) what the first of each row is expected to score in one vote."""
-    lead = parameters[votes.first] - parameters[votes.second]
-    return np.asarray(expit(lead + columns @ parameters[len(votes.names) :]))
-
-
-def _derivatives(
-    votes: Comparisons, columns: FloatArray, parameters: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """(K,) slope and (K, K) curvature of the likelihood."""
-    contestants, size = len(votes.names), len(parameters)
-    expected = _expected(votes, columns, parameters)
-    pull = votes.count * (votes.score - expected)
-    weight = votes.count * expected * (1.0 - expected)
-    between = np.bincount(votes.first * contestants + votes.second, weight, contestants**2)
-    between = between.reshape(contestants, contestants)
-    curvature = np.zeros((size, size))
-    inner = -(between + between.T)
-    inner[np.diag_indices(contestants)] = -inner.sum(axis=1)
-    curvature[:contestants, :contestants] = inner
-    weighted = columns * weight[:, None]
-    curvature[:contestants, contestants:] = _of_ends(votes, weighted)
-    curvature[contestants:, :contestants] = curvature[:contestants, contestants:].T
-    curvature[contestants:, contestants:] = weighted.T @ columns
-    slope = np.concatenate([_of_ends(votes, pull[:, None])[:, 0], columns.T @ pull])
-    return slope, curvature
-
-
-def _of_ends(votes: Comparisons, values: FloatArray) -> FloatArray:
-    """(C, Q): a row's values count for its first contestant, and against its second."""
-    sums = np.zeros((len(votes.names), values.shape[1]))
-    np.add.at(sums, votes.first, values)
-    np.subtract.at(sums, votes.second, values)
-    return sums
-
-
-def _inverse(curvature: FloatArray) -> FloatArray | None:
-    """(K, K) on the space of mean strengths zero; None where another direction is flat, too."""
-    values, directions = np.linalg.eigh(curvature)
-    if len(values) > 1 and values[1] < _SINGULAR * max(values[-1], 1e-300):
-        return None
-    inverse = np.zeros_like(values)
-    inverse[1:] = 1.0 / values[1:]
-    return np.asarray((directions * inverse) @ directions.T)

@@ -88,17 +88,16 @@ def agreement(votes: Comparisons, *, rounds: int, seed: int) -> Agreement:
     drawn = rng.multinomial(len(found), chance, size=rounds) @ sums
     whole = sums.sum(axis=0)[None]
     several = len(np.unique(scenario[is_shared])) > 1
-    alpha, alpha_interval = (
-        _estimate(partial(_alpha, metric=metric), whole, drawn, several)
-        for metric in DifferenceMetric
-    )
+    measures: dict[str, Callable[[FloatArray], FloatArray]] = {
+        "alpha": partial(_alpha, metric=DifferenceMetric.NOMINAL),
+        "alpha_interval": partial(_alpha, metric=DifferenceMetric.INTERVAL),
+        "percent": _percent,
+        "ac1": _ac1,
+    }
     return Agreement(
-        alpha=alpha,
-        alpha_interval=alpha_interval,
-        percent=_estimate(_percent, whole, drawn, several),
         units=int(is_shared.sum()),
         judgements=int(table[is_shared].sum()),
-        ac1=_estimate(_ac1, whole, drawn, several),
+        **{name: _estimate(measure, whole, drawn, several) for name, measure in measures.items()},
     )
 
 
@@ -156,11 +155,7 @@ def _alpha(sums: FloatArray, metric: DifferenceMetric) -> FloatArray:
     seen = sums[:, : VALUES * VALUES].reshape(-1, VALUES, VALUES)
     place = np.arange(VALUES)
     gap = place[:, None] - place[None, :]
-    far = (
-        (gap != 0).astype(np.float64)
-        if metric is DifferenceMetric.NOMINAL
-        else gap.astype(float) ** 2
-    )
+    far = (gap != 0).astype(np.float64) if metric is DifferenceMetric.NOMINAL else gap**2.0
     totals = seen.sum(axis=2)
     n = totals.sum(axis=1)
     observed = (seen * far).sum(axis=(1, 2))
@@ -236,10 +231,30 @@ def raters(votes: Comparisons, *, ms: FloatArray, without: FloatArray) -> tuple[
             none; see `arena.rating.influence`.
     """
     agreed, others = agreement_with_others(votes)
-    return tuple(
-        _rater(votes, expert, ms, without[expert], agreed, others)
-        for expert in np.unique(votes.expert).tolist()
-    )
+    won_left = votes.score == 1.0
+    found = []
+    for expert in np.unique(votes.expert).tolist():
+        own = votes.expert == expert
+        timed = ms[own & ~np.isnan(ms)]
+        decided = own & (votes.score != 0.5)
+        lead = without[expert][votes.first] - without[expert][votes.second]
+        foreseen = decided & ~np.isnan(lead) & (lead != 0.0)
+        shared = own & others
+        found.append(
+            Rater(
+                expert=expert,
+                votes=int(own.sum()),
+                median_ms=float(np.median(timed)) if len(timed) else None,
+                fast=float((timed < FAST_MS).mean()) if len(timed) else None,
+                ties=float((votes.score[own] == 0.5).mean()),
+                left=_share_of(won_left[decided]),
+                agreement=_mean(agreed[shared]),
+                shared=int(shared.sum()),
+                favourites=_share_of(won_left[foreseen] == (lead[foreseen] > 0)),
+                decided=int(foreseen.sum()),
+            )
+        )
+    return tuple(found)
 
 
 def agreement_with_others(votes: Comparisons) -> tuple[FloatArray, BoolArray]:
@@ -255,35 +270,6 @@ def agreement_with_others(votes: Comparisons) -> tuple[FloatArray, BoolArray]:
     value = unit * VALUES + counts.outcome_of
     equal = _how_many(value) - _how_many(value * experts + votes.expert)
     return np.asarray(equal / np.maximum(total, 1)), np.asarray(total > 0)
-
-
-def _rater(
-    votes: Comparisons,
-    expert: int,
-    ms: FloatArray,
-    strengths: FloatArray,
-    agreed: FloatArray,
-    others: BoolArray,
-) -> Rater:
-    own = votes.expert == expert
-    timed = ms[own & ~np.isnan(ms)]
-    decided = own & (votes.score != 0.5)
-    won_left = votes.score == 1.0
-    lead = strengths[votes.first] - strengths[votes.second]
-    foreseen = decided & ~np.isnan(lead) & (lead != 0.0)
-    shared = own & others
-    return Rater(
-        expert=expert,
-        votes=int(own.sum()),
-        median_ms=float(np.median(timed)) if len(timed) else None,
-        fast=float((timed < FAST_MS).mean()) if len(timed) else None,
-        ties=float((votes.score[own] == 0.5).mean()),
-        left=_of(won_left[decided]),
-        agreement=_mean(agreed[shared]),
-        shared=int(shared.sum()),
-        favourites=_of(won_left[foreseen] == (lead[foreseen] > 0)),
-        decided=int(foreseen.sum()),
-    )
 
 
 def _how_many(keys: IntArray) -> IntArray:
@@ -303,7 +289,7 @@ def _mean(values: FloatArray) -> Estimate:
     return Estimate(value=value, lower=max(value - half, 0.0), upper=min(value + half, 1.0))
 
 
-def _of(hits: BoolArray) -> Estimate:
+def _share_of(hits: BoolArray) -> Estimate:
     return wilson(int(hits.sum()), len(hits)) if len(hits) else Estimate(value=None)
 
 

@@ -72,13 +72,9 @@ def unit_for(*, judges: bool, items: bool) -> Unit:
     return Unit.SCENARIO if items else Unit.VOTE
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Rules:
-    """How to rate; the fields are the arguments of `leaderboard.rate`.
-
-    Raises:
-        ValueError: Fewer than one round, or online Elo by more than resampled single votes.
-    """
+    """How to rate; the fields are those of `leaderboard.rate`."""
 
     method: Method
     unit: Unit
@@ -86,10 +82,36 @@ class Rules:
     rounds: int
     seed: int
 
-    def __post_init__(self) -> None:
-        if self.rounds < 1:
-            raise ValueError(f"a bootstrap needs at least 1 round, not {self.rounds}")
-        if self.method is Method.ELO and self.unit is not Unit.VOTE:
-            raise ValueError(f"online Elo resamples single votes only, not by {self.unit}")
-        if self.method is Method.ELO and self.intervals is Intervals.CLOSED_FORM:
-            raise ValueError("online Elo has no intervals in closed form, only resamples")
+
+def choose_rules(
+    method: Method,
+    unit: Unit | None,
+    intervals: Intervals | None,
+    *,
+    is_adjusted: bool,
+    rounds: int,
+    seed: int,
+) -> Rules:
+    """Fill in what is left open.
+
+    Raises:
+        ValueError: The choices do not go together; the text says what does.
+    """
+    unit = unit or (Unit.VOTE if method is Method.ELO else Unit.TWO_WAY)
+    fitting = Intervals.CLOSED_FORM if is_adjusted else default_intervals(method, unit)
+    intervals = intervals or fitting
+    is_closed = intervals is Intervals.CLOSED_FORM
+    refusals = {
+        f"a bootstrap needs at least 1 round, not {rounds}": rounds < 1,
+        f"online Elo resamples single votes only, not by {unit}": method is Method.ELO
+        and unit is not Unit.VOTE,
+        "online Elo has no intervals in closed form, only resamples": method is Method.ELO
+        and is_closed,
+        "only Bradley-Terry with intervals in closed form can be adjusted for covariates": (
+            is_adjusted and not (method is Method.BRADLEY_TERRY and is_closed)
+        ),
+    }
+    for sentence, is_refused in refusals.items():
+        if is_refused:
+            raise ValueError(sentence)
+    return Rules(method=method, unit=unit, intervals=intervals, rounds=rounds, seed=seed)

@@ -15,8 +15,8 @@ Notation: R rows, C contestants, K parameters (C strengths, and what a model has
 clusters. Strengths are logarithms of odds, covariances squared Elo points.
 """
 
-from dataclasses import dataclass, replace
-from typing import Self
+from dataclasses import dataclass, fields, replace
+from typing import Any, Self, TypeVar
 
 import numpy as np
 
@@ -37,7 +37,6 @@ expert with nearly all votes would make the estimate as large as chance likes.""
 
 _FAR = 1e9
 """Degrees of freedom of what is as good as known."""
-_NUMBERS_AT_ONCE = 2_000_000
 
 
 # --- What votes pull -----------------------------------------------------------------------------
@@ -49,18 +48,16 @@ class Pulls:
 
     Attributes:
         votes: Of contestants who all have votes.
-        surprise: (R,) what `first` scored above what was expected, in one vote; `second` the
-            opposite.
+        slopes: (R, K) sparse, of one vote of each row: what `first` scored above what was
+            expected, the opposite for `second`, and the slopes by further parameters.
         information: (R,) how much a vote of the row says of the difference of the two.
-        besides: (R, K - C) the slopes by a model's further parameters, in one vote.
         inverse: (K, K) of the likelihood's curvature.
         back: (C, K) from slopes to strengths; with more rows also to further parameters.
     """
 
     votes: Comparisons
-    surprise: FloatArray
+    slopes: Any
     information: FloatArray
-    besides: FloatArray
     inverse: FloatArray
     back: FloatArray
 
@@ -72,12 +69,15 @@ class Pulls:
 
     def by_row(self) -> FloatArray:
         """(C, C) the sandwich of independent votes."""
-        rows = np.arange(len(self.surprise))
-        return self._squares(rows, len(rows), np.sqrt(self.votes.count))
+        return self._square(self.slopes * np.sqrt(self.votes.count)[:, None])
 
     def by_cluster(self, cluster_of: IntArray, clusters: int) -> FloatArray:
         """(C, C) the pulls of each of G clusters added up and squared."""
-        return self._squares(cluster_of, clusters, self.votes.count.astype(np.float64))
+        from scipy.sparse import csr_array
+
+        rows = np.arange(len(cluster_of))
+        members = csr_array((self.votes.count, (cluster_of, rows)), shape=(clusters, len(rows)))
+        return self._square(members @ self.slopes)
 
     def concentration(self, cluster_of: IntArray, clusters: int) -> tuple[FloatArray, FloatArray]:
         """(C,), (C,) sums of squared and of cubed shares of each contestant's information.
@@ -97,24 +97,27 @@ class Pulls:
         )
         return np.minimum(squares, 1.0), cubes.astype(np.float64)
 
-    def _squares(self, cluster_of: IntArray, clusters: int, weight: FloatArray) -> FloatArray:
-        """(C, C) the sum over clusters of their weighted and summed slopes times themselves."""
-        size = len(self.inverse)
-        pull = self.surprise * weight
-        further = np.arange(len(self.votes.names), size)
-        ends = [self.votes.first, self.votes.second, *(np.full(len(pull), n) for n in further)]
-        pulls = np.concatenate([pull, -pull, *(self.besides * weight[:, None]).T])
-        place = np.tile(cluster_of, len(ends)) * size + np.concatenate(ends)
-        if clusters * size <= _NUMBERS_AT_ONCE:
-            sums = np.bincount(place, pulls, clusters * size).reshape(-1, size)
-            squares = sums.T @ sums
-        else:
-            from scipy.sparse import coo_array  # slow to load, and for large tables alone
-
-            of_cells = (pulls, (place // size, place % size))
-            table = coo_array(of_cells, shape=(clusters, size)).tocsr()
-            squares = (table.T @ table).toarray()
+    def _square(self, slopes: Any) -> FloatArray:
+        """(C, C) of sums of slopes (G, K), sparse, in squared points."""
+        squares = (slopes.T @ slopes).toarray()
         return np.asarray(ELO_PER_LOGIT**2 * self.back @ squares @ self.back.T)
+
+
+def design_of(votes: Comparisons, weight: FloatArray, columns: FloatArray) -> Any:
+    """(R, C + Q) sparse: a weight (R,) for the first, its opposite for the second, then columns.
+
+    Args:
+        votes: R rows on C contestants.
+        weight: (R,).
+        columns: (R, Q) further ones.
+    """
+    from scipy.sparse import csr_array, hstack  # slow to load
+
+    rows = np.tile(np.arange(len(votes)), 2)
+    places = (rows, np.concatenate([votes.first, votes.second]))
+    values = np.concatenate([weight, -weight])
+    ends = csr_array((values, places), shape=(len(votes), len(votes.names)))
+    return csr_array(hstack([ends, csr_array(columns)])) if columns.size else ends
 
 
 def pulls_of_model(
@@ -124,13 +127,13 @@ def pulls_of_model(
     size = len(votes.names)
     expected, tied = chances(size, answer, votes.first, votes.second)
     inverse = inverse_curvature(met, games, answer)
+    surprise = votes.score - expected
     has_ties = len(answer) > size
-    is_tie = votes.score == TIE
+    by_ties = ((votes.score == TIE) - tied)[:, None] if has_ties else np.empty((len(votes), 0))
     return Pulls(
         votes=votes,
-        surprise=votes.score - expected,
+        slopes=design_of(votes, surprise, by_ties),
         information=expected - 0.25 * tied - expected**2,
-        besides=(is_tie - tied)[:, None] if has_ties else np.empty((len(votes), 0)),
         inverse=inverse,
         back=inverse[:size],
     )
@@ -186,18 +189,6 @@ class Component:
     own_degrees: FloatArray
     degrees: FloatArray
 
-    def among(self, members: IntArray) -> Self:
-        """The same for some of the contestants alone."""
-        places = np.ix_(members, members)
-        return replace(
-            self,
-            covariance=self.covariance[places],
-            common=self.common[places],
-            own_share=self.own_share[members],
-            own_degrees=self.own_degrees[members],
-            degrees=self.degrees[members],
-        )
-
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Spread:
@@ -217,21 +208,27 @@ class Spread:
     base: FloatArray
     components: tuple[Component, ...]
 
-    def among(self, members: IntArray) -> Self:
+    def among(self, members: IntArray) -> "Spread":
         """The same for some of the contestants alone."""
-        places = np.ix_(members, members)
-        return replace(
-            self,
-            covariance=self.covariance[places],
-            degrees=self.degrees[members],
-            common=self.common[places],
-            base=self.base[places],
-            components=tuple(component.among(members) for component in self.components),
-        )
+        components = tuple(_restrict(component, members) for component in self.components)
+        return replace(_restrict(self, members), components=components)
 
     def half_widths(self) -> FloatArray:
         """(C,) of the 95 % intervals, in points."""
         return np.asarray(t_quantile(self.degrees) * np.sqrt(self.covariance.diagonal()))
+
+
+_Arrays = TypeVar("_Arrays", Component, Spread)
+
+
+def _restrict(value: _Arrays, members: IntArray) -> _Arrays:
+    """Return the rows, and columns, of members in every array."""
+    arrays: dict[str, Any] = {
+        column.name: array[np.ix_(*[members] * array.ndim)]
+        for column in fields(value)
+        if isinstance(array := getattr(value, column.name), np.ndarray)
+    }
+    return replace(value, **arrays)
 
 
 def spread_of(pulls: Pulls, unit: Unit, reference: BoolArray | None = None) -> Spread:

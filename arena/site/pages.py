@@ -62,7 +62,7 @@ def _expert(request: HttpRequest) -> HttpResponse:
         "finished": [line for line in is_open if not line.left],
         "closed": closed,
         "cancelled": [line for line in lines if line.study.state == Study.State.CANCELLED],
-        "labellings": queries.of_expert(expert),
+        "labellings": queries.find_labellings(tasks__expert=expert),
         "readable": {
             line.study.pk: results_access(user=expert, study=line.study) is ResultsAccess.FULL
             for line in closed

@@ -132,57 +132,25 @@ def p_value(value: float) -> str:
 
 
 @register.filter
-def p_cell(value: float) -> str:
-    """The same under a head that says p."""
-    return p_value(value).removeprefix("= ")
-
-
-@register.filter
 def seconds(milliseconds: float) -> str:
     """One digit after the point; Django's own filter cuts off."""
     return f"{milliseconds / 1000:.1f}"
 
 
-@register.filter
-def dollars(amount: float) -> str:
-    """Four digits after the point, more where there would be none but zeros."""
-    if 0 < amount < 0.0001:
-        return "less than $0.0001"
-    return f"${amount:,.4f}" if amount < 1 else f"${amount:,.2f}"
+_WRITTEN: dict[str, Callable[[float], str]] = {
+    "number": lambda value: with_minus(f"{value:z.2f}"),
+    "percent": lambda value: f"{whole_percent(value)} %",
+    "points": lambda value: with_minus(f"{value:+.0f}") if round(value) else "0",
+    "tenths": lambda value: with_minus(f"{value:+.1f}") if round(value, 1) else "0.0",
+}
 
 
 @register.filter
-def estimate(found: Estimate | None) -> str:
-    """A number with its interval: 0.31 (0.28 to 0.34)."""
-    return _with_interval(found, lambda value: with_minus(f"{value:z.2f}"))
-
-
-@register.filter
-def estimate_percent(found: Estimate | None) -> str:
-    """The same in percent."""
-    return _with_interval(found, lambda value: f"{whole_percent(value)} %")
-
-
-@register.filter
-def estimate_points(found: Estimate | None) -> str:
-    """The same in points, with its sign."""
-    return _with_interval(
-        found, lambda value: with_minus(f"{value:+.0f}") if round(value) else "0"
-    )
-
-
-@register.filter
-def estimate_tenths(found: Estimate | None) -> str:
-    """Points with one digit after the point and their sign, none at zero."""
-    return _with_interval(
-        found, lambda value: with_minus(f"{value:+.1f}") if round(value, 1) else "0.0"
-    )
-
-
-def _with_interval(found: Estimate | None, written: Callable[[float], str]) -> str:
+def estimate(found: Estimate | None, form: str = "number") -> str:
+    """A number with its interval: 0.31 (0.28 to 0.34), or in percent or points."""
     if not found or found.value is None:
         return "unknown"
-    text = written(found.value)
+    write = _WRITTEN[form]
     if found.lower is None or found.upper is None:
-        return text
-    return f"{text} ({written(found.lower)} to {written(found.upper)})"
+        return write(found.value)
+    return f"{write(found.value)} ({write(found.lower)} to {write(found.upper)})"

@@ -161,10 +161,9 @@ class VotesView(ApiView):
         """
         n, outcome = given.pop("n"), OUTCOMES[given.pop("outcome")]
         decision = decision_of(matchup_code=given.pop("matchup"), outcome=outcome, **given)
-        received = receive_vote(expert=self.user, decision=decision, ahead=n)
-        progress, coming = received.progress, received.coming
-        if len(coming) < n:  # this vote may allow more pairs to be planned
-            coming = next_pairs(study=received.study, expert=self.user, n=n)
+        received = receive_vote(expert=self.user, decision=decision)
+        progress = received.progress
+        coming = next_pairs(study=received.study, expert=self.user, n=n)
         return Response(
             {
                 "saved": progress.voted,

@@ -22,7 +22,14 @@ from pydantic import TypeAdapter
 from augment.errors import InvalidDocument
 from augment.formats import sandbox
 from augment.formats.nuplan_log import tokens_in
-from augment.formats.readers import READERS, Timeline, reader_of, recognise, timeline_of
+from augment.formats.readers import (
+    READERS,
+    Timeline,
+    find_input,
+    reader_of,
+    recognise,
+    timeline_of,
+)
 from augment.formats.reading import Moment, Reader, Reading
 from augment.scene.codec import (
     recording_from_document,
@@ -114,12 +121,12 @@ class UntrustedInput:
 def _answer(request: dict[str, Any]) -> tuple[str, Any]:
     path, name, folder = Path(request["path"]), request["format"], Path(request["folder"])
     # Names without a place on this machine, as they are said in reasons.
-    if path.is_file() and path.open("rb").read(4) == b"PK\x03\x04":
+    if path.is_file() and zipfile.is_zipfile(path):
         (folder / path.stem).mkdir()
         unpack_zip(path, folder / path.stem)
         os.chdir(folder)
         candidates = [reader_of(name)] if name else list(READERS.values())
-        reader, path = find_input(Path(path.stem), candidates)
+        reader, path = find_input(Path(path.stem), candidates, is_deep=True)
     else:
         os.chdir(path.parent)
         path = Path(path.name)
@@ -216,28 +223,6 @@ def _check_entries(entries: list[zipfile.ZipInfo], bounds: ZipBounds) -> None:
             problem = "is encrypted, or packed in another way than the usual one"
         if problem:
             raise InvalidDocument(WHAT, [(repr(name[:80]), problem)])
-
-
-def find_input(folder: Path, readers: list[Reader]) -> tuple[Reader, Path]:
-    """Return what in an unpacked folder one of the readers takes, and which.
-
-    The folder itself comes first, then what lies in it, level by level.
-
-    Raises:
-        InvalidDocument: Nothing in it is in one of the formats, or several things are.
-    """
-    level = [folder]
-    while level:
-        found = [(r, path) for path in sorted(level) for r in readers if r.recognises(path)]
-        if len(found) == 1:
-            return found[0]
-        if found:
-            names = [f"{path.relative_to(folder).as_posix()} ({r.name})" for r, path in found[:5]]
-            text = f"holds {len(found)} recordings, one is needed: {', '.join(names)}"
-            raise InvalidDocument(WHAT, [("", text)])
-        level = [below for path in level if path.is_dir() for below in path.iterdir()]
-    known = ", ".join(f"{reader.name}: {reader.title}" for reader in readers)
-    raise InvalidDocument(WHAT, [("", f"nothing in it is {known}")])
 
 
 if __name__ == "__main__":

@@ -18,7 +18,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from augment.errors import InvalidDocument
 from augment.formats.documents import read_json
-from augment.formats.reading import Log, LoggedTrack, Reader, speeds, tracks_of
+from augment.formats.reading import Log, Reader, speeds, tracks_of
 from augment.formats.road_map import RoadMap, Segment
 from augment.formats.values import WHAT, FloatArray, fault_at, look_up, read_finite
 from augment.scene.entities import AgentType, AreaKind
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 LICENCE = "CC BY-NC-SA 4.0"
 WORLD = "Argoverse 2 city frame"
 BOXES, POSES = "annotations.feather", "city_SE3_egovehicle.feather"
-EGO_SIZE_M = {"length_m": 4.877, "width_m": 1.852}
+EGO_SIZE_M = (4.877, 1.852)
 REAR_AXLE_TO_CENTER_M = 1.42
 """The fleet's car, a Ford Fusion: half its length less the overhang behind the rear axle."""
 EGO = "EGO_VEHICLE"
@@ -128,12 +128,8 @@ class ArgoverseSensor(Reader):
         )
         yield Log(
             times_s=times_s,
-            ego=LoggedTrack(
-                name=EGO,
-                type=AgentType.EGO_VEHICLE,
-                states=np.column_stack([center, heading, speeds(times_s, center)]),
-                **EGO_SIZE_M,
-            ),
+            ego=np.column_stack([center, heading, speeds(times_s, center)]),
+            ego_size_m=EGO_SIZE_M,
             tracks=[*tracks_of(table[table["kind"] != EGO], TYPE_OF, times_s).values()],
             map_at=lambda _: _read_map(path / "map"),
             world=WORLD,
@@ -175,9 +171,8 @@ class ArgoverseMotion(Reader):
         ego = look_up(tracks, ego_id, "track_id")
         yield Log(
             times_s=times_s,
-            ego=LoggedTrack(
-                name=ego_id, type=AgentType.EGO_VEHICLE, states=ego.states, **EGO_SIZE_M
-            ),
+            ego=ego.states,
+            ego_size_m=EGO_SIZE_M,
             tracks=[track for name, track in tracks.items() if name != ego_id],
             map_at=lambda _: _read_map(file.parent),
             world=WORLD,

@@ -2,8 +2,8 @@
 
 A path is a log's .db; its map lies under a folder `maps` beside it or above it, as the data set
 is laid out: maps/<location>/<version>/map.gpkg. `item` is the token of a lidar_pc, or
-`tag:<scenario type>` for the first frame that has the tag, `tag:<scenario type>:<number>` for
-another of them, counted from 0. Tokens are BLOBs; here they are their hexadecimal text.
+`tag:<scenario type>` for the first frame that has the tag. Tokens are BLOBs; here they are their
+hexadecimal text.
 `ego_pose` gives the rear axle, boxes their centre; velocities of the ego are in its own frame.
 Rows of 20 Hz are taken at 10 Hz.
 """
@@ -50,13 +50,7 @@ class NuPlan(Reader):
 
     name = "nuplan"
     title = "nuPlan log (.db file, with maps/ beside or above it)"
-
-    def recognises(self, path: Path) -> bool:
-        """A SQLite file by its name and first bytes."""
-        if path.suffix.lower() != ".db" or not path.is_file():
-            return False
-        with path.open("rb") as file:
-            return file.read(16) == b"SQLite format 3\0"
+    suffix, marker = ".db", b"SQLite format 3\0"
 
     def moments(self, path: Path, *, every_s: float) -> Iterator[Moment]:
         """Frames that far apart."""
@@ -78,13 +72,8 @@ class NuPlan(Reader):
             lights, notes = _lights(base, token), list(_tag_notes(base, token))
         yield Log(
             times_s=times_s,
-            ego=LoggedTrack(
-                name="ego",
-                type=AgentType.EGO_VEHICLE,
-                length_m=EGO_LENGTH_M,
-                width_m=EGO_WIDTH_M,
-                states=ego,
-            ),
+            ego=ego,
+            ego_size_m=(EGO_LENGTH_M, EGO_WIDTH_M),
             tracks=[*tracks.values()],
             map_at=lambda _: city_around(
                 _map_of(path, location, version),
@@ -138,16 +127,7 @@ def _token(base: sqlite3.Connection, item: str | None) -> str:
             problem = f"{item[:40]!r} is neither a token of 16 hex digits nor tag:TYPE"
             raise fault_at("item", problem)
         return item.lower()
-    tag, number = None if item is None else item.removeprefix(TAG), 0
-    counted = re.fullmatch(r"(.+):(\d{1,9})", tag or "")
-    if counted:
-        tag, number = counted[1], int(counted[2])
-    tokens = _tokens(base, tag)
-    if number >= len(tokens):
-        raise fault_at(
-            "item", f"{len(tokens)} frames have the tag {tag!r}, from 0 on; not {number}"
-        )
-    return tokens[number][0]
+    return _tokens(base, None if item is None else item.removeprefix(TAG))[0][0]
 
 
 def _tokens(base: sqlite3.Connection, tag: str | None) -> list[tuple[str, int]]:

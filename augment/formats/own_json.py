@@ -32,13 +32,7 @@ class OwnJson(Reader):
     name = "json"
     title = "scene in the own JSON (file)"
     has_items = False
-
-    def recognises(self, path: Path) -> bool:
-        """A JSON file that names the format."""
-        if path.suffix.lower() != ".json" or not path.is_file():
-            return False
-        with path.open("rb") as file:
-            return SCENE_FORMAT.encode() in file.read(10_000)
+    suffix, marker = ".json", SCENE_FORMAT.encode()
 
     def moments(self, path: Path, *, every_s: float) -> Iterator[Moment]:
         """The one."""

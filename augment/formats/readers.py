@@ -17,11 +17,12 @@ from augment.formats.argoverse2 import ArgoverseMotion, ArgoverseSensor
 from augment.formats.commonroad.scenario import CommonRoad
 from augment.formats.nuplan_log import NuPlan
 from augment.formats.own_json import OwnJson
-from augment.formats.reading import Moment, Reader, Reading
+from augment.formats.reading import Moment, Reader
 from augment.formats.scenarionet.scenario import ScenarioNet
 from augment.formats.waymo.scenario import WaymoMotion
 from augment.geometry.frames import Pose
 from augment.scene.lane_graph import AnyLane
+from augment.scene.recording import Recording
 
 READERS: dict[str, Reader] = {
     reader.name: reader
@@ -51,22 +52,43 @@ def reader_of(name: str) -> Reader:
 
 
 def recognise(path: Path) -> Reader:
-    """The reader of the format that a file or folder looks like.
+    """Return the reader of the format that a file or folder looks like.
 
     Raises:
         InvalidDocument: There is nothing, or it looks like none of the formats, or like several.
     """
     if not path.exists():
         raise InvalidDocument("input", [(str(path), "is not there")])
-    try:
-        readers = [reader for reader in READERS.values() if reader.recognises(path)]
-    except OSError as fault:
-        raise InvalidDocument("input", [(str(path), fault.strerror or str(fault))]) from None
-    if len(readers) == 1:
-        return readers[0]
-    known = ", ".join(f"{reader.name}: {reader.title}" for reader in READERS.values())
-    said = "none of the formats" if not readers else " and ".join(one.name for one in readers)
-    raise InvalidDocument("input", [(str(path), f"looks like {said}; name one of {known}")])
+    return find_input(path, list(READERS.values()), is_deep=False)[0]
+
+
+def find_input(path: Path, readers: list[Reader], *, is_deep: bool) -> tuple[Reader, Path]:
+    """Return what one of the readers takes, and which: the path, or what lies in it.
+
+    Args:
+        path: A file or folder.
+        readers: Who may read it.
+        is_deep: Whether it may lie in the folder, level by level.
+
+    Raises:
+        InvalidDocument: Nothing is in one of the formats, or several things are.
+    """
+    level = [path]
+    while level:
+        found = [
+            (reader, one) for one in sorted(level) for reader in readers if reader.recognises(one)
+        ]
+        if len(found) == 1:
+            return found[0]
+        if found:
+            names = [
+                f"{one.relative_to(path.parent)} ({reader.name})" for reader, one in found[:5]
+            ]
+            text = f"holds {len(found)} recordings, one is needed: {', '.join(names)}"
+            raise InvalidDocument("input", [("", text)])
+        level = [below for one in level if is_deep and one.is_dir() for below in one.iterdir()]
+    known = ", ".join(f"{reader.name}: {reader.title}" for reader in readers)
+    raise InvalidDocument("input", [(str(path), f"looks like none of the formats: {known}")])
 
 
 EVERY_S = 0.5
@@ -80,7 +102,7 @@ _ROAD_POINT_EVERY_M = 4.0
 _MOST_ROADS = 600
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(slots=True, kw_only=True)
 class Stop:
     """A moment that can become t0.
 
@@ -149,16 +171,17 @@ def _look(track: RecordingPart, reader: Reader, path: Path, until_s: float) -> N
     """Find the ego's places by reading the first moment that has none, again and again."""
     frame: Pose | None = None
     for _ in range(_LOOKS_OF_A_TRACK):
-        unseen = [index for index, stop in enumerate(track.stops) if stop.place_m is None]
+        unseen = [stop for stop in track.stops if stop.place_m is None]
         if not unseen or time.process_time() > until_s:
             return
-        moment = track.stops[unseen[0]].moment
+        moment = unseen[0].moment
         reading = reader.read(path, item=moment.item, frame=moment.frame, name="look")
         here = reading.scene.origin.pose
         track.is_seen = True
         frame = frame or here
         seen = frame.pose_to_local(here)
-        _fill_in(track, unseen[0], reading, seen)
+        unseen[0].place_m = (seen.x_m, seen.y_m)
+        _fill_in(unseen, reading.recording, seen)
         ways: list[AnyLane] = [*reading.scene.lanes, *reading.scene.connectors]
         for way in ways[: _MOST_ROADS - len(track.roads_m)]:
             every_m = max(_ROAD_POINT_EVERY_M, way.centerline.length_m / 60.0)
@@ -166,20 +189,15 @@ def _look(track: RecordingPart, reader: Reader, path: Path, until_s: float) -> N
             track.roads_m.append([(round(x, 1), round(y, 1)) for x, y in points_m.tolist()])
 
 
-def _fill_in(track: RecordingPart, first: int, reading: Reading, seen: Pose) -> None:
-    """The ego's places from this moment on, as far as its recording tells them."""
-    moment = track.stops[first].moment
-    track.stops[first] = Stop(moment=moment, place_m=(seen.x_m, seen.y_m))
-    recording = reading.recording
-    if recording is None or moment.time_s is None:
+def _fill_in(unseen: list[Stop], recording: Recording | None, seen: Pose) -> None:
+    """The ego's places after the first of these moments, as far as its recording tells them."""
+    start_s = unseen[0].moment.time_s
+    if recording is None or start_s is None:
         return
     places_m = seen.to_parent(recording.ego[:, :2])
-    for index in range(first + 1, len(track.stops)):
-        later = track.stops[index].moment
-        if later.time_s is None:
-            continue
-        away_s = np.abs(recording.times_s - (later.time_s - moment.time_s))
+    for stop in unseen[1:]:
+        away_s = np.abs(recording.times_s - ((stop.moment.time_s or 0.0) - start_s))
         nearest = int(np.argmin(away_s))
         x_m, y_m = places_m[nearest].tolist()
         if away_s[nearest] < 0.06 and np.isfinite([x_m, y_m]).all():
-            track.stops[index] = Stop(moment=later, place_m=(x_m, y_m))
+            stop.place_m = (x_m, y_m)

@@ -99,7 +99,8 @@ class Log:
 
     Attributes:
         times_s: (T,) ascending.
-        ego: Its states are those of the ego's geometric centre.
+        ego: (T, 4), as a track's states, of the ego's geometric centre.
+        ego_size_m: Its length and width.
         map_at: The map with the lights of a frame, as far as the ego can see at least.
         world: What the source's frame is called.
         title: The data set and the part of it.
@@ -111,7 +112,8 @@ class Log:
     """
 
     times_s: FloatArray
-    ego: LoggedTrack
+    ego: FloatArray
+    ego_size_m: tuple[float, float]
     tracks: Sequence[LoggedTrack]
     map_at: Callable[[int], RoadMap]
     world: str
@@ -124,10 +126,10 @@ class Log:
 
     def moments(self, every_s: float) -> Iterator[Moment]:
         """Yield the steps that far apart in which the ego is there."""
-        frames = np.flatnonzero(np.isfinite(self.ego.states).all(axis=1)).tolist()
+        frames = np.flatnonzero(np.isfinite(self.ego).all(axis=1)).tolist()
         times_s = self.times_s[frames].tolist()
         for index in frames_every(times_s, every_s):
-            time_s = times_s[index] - times_s[0]
+            time_s = times_s[index] - times_s[0] if len(times_s) > 1 else None
             yield Moment(item=self.item, frame=frames[index], time_s=time_s)
 
     def reading_at(self, frame: int, name: str) -> Reading:
@@ -147,11 +149,13 @@ class Log:
         tracks = _tracks(self, frame, origin)
         scene = Scene(
             name=name,
-            ego=_ego(self.ego, frame),
+            ego=_ego(self, frame),
             traffic_side=road.traffic_side,
             origin=Origin.at(origin, frame=self.world),
             provenance=f"{self.title}, step {frame} of {len(self.times_s)}; {self.licence}",
-            agents=tuple(_agent(track) for track in tracks if _is_near(track)),
+            agents=tuple(
+                _agent(track) for track in tracks if np.hypot(*track.states[0, :2]) <= RADIUS_M
+            ),
             lanes=road.lanes,
             connectors=road.connectors,
             areas=road.areas,
@@ -161,7 +165,7 @@ class Log:
         if sizeless:
             kind = SceneNoteKind.SOME_BOX_SIZES
             notes.append(Note(kind=kind, number=sizeless, of=len(self.tracks)))
-        here = self.ego.states[frame, :2]
+        here = self.ego[frame, :2]
         away_m = [np.hypot(*(track.states[frame, :2] - here)) for track in self.tracks]
         far = road.far + sum(bool(distance_m > RADIUS_M) for distance_m in away_m)
         if far:
@@ -176,7 +180,7 @@ class Log:
             scene=_on_lanes(scene),
             recording=Recording(
                 times_s=np.round(self.times_s[frame:] - self.times_s[frame], 6),
-                ego=_local(self.ego.states[frame:], origin),
+                ego=_local(self.ego[frame:], origin),
                 tracks=tracks,
             ),
             notes=tuple(notes),
@@ -187,8 +191,8 @@ class Log:
         steps = len(self.times_s)
         if not 0 <= frame < steps:
             raise fault_at("frame", f"{frame} is not there; there are 0 to {steps - 1}")
-        x_m, y_m, heading_rad, _ = self.ego.states[frame].tolist()
-        if not np.isfinite(self.ego.states[frame]).all():
+        x_m, y_m, heading_rad, _ = self.ego[frame].tolist()
+        if not np.isfinite(self.ego[frame]).all():
             raise fault_at("frame", f"{frame} has no ego in it")
         return Pose(x_m=x_m, y_m=y_m, heading_rad=wrap(heading_rad))
 
@@ -200,15 +204,21 @@ class Reader:
         name: How the format is called where one is asked for.
         title: What it is, for people.
         has_items: Whether a path can hold several parts.
+        suffix, marker: What its files end in, and what stands near their beginning.
     """
 
     name: str
     title: str
     has_items = True
+    suffix = ""
+    marker = b""
 
     def recognises(self, path: Path) -> bool:
         """Return whether the file or folder looks like this format; nothing is raised."""
-        raise NotImplementedError
+        if path.suffix.lower() != self.suffix or not path.is_file():
+            return False
+        with path.open("rb") as file:
+            return self.marker in file.read(10_000)
 
     def logs(self, path: Path, item: str | None) -> Iterator[Log]:
         """Yield the part of that name, or all in the source's order for None.
@@ -314,11 +324,11 @@ def _tracks(log: Log, frame: int, origin: Pose) -> tuple[Track, ...]:
 
     Within one step the nearest comes first.
     """
-    for one in (log.ego, *log.tracks):
-        if (np.abs(one.states) > FURTHEST).any():
-            raise fault_at(one.name, f"has a number over {FURTHEST:.0e}")
+    for states in (log.ego, *(track.states for track in log.tracks)):
+        if (np.abs(states) > FURTHEST).any():
+            raise fault_at("tracks", f"has a number over {FURTHEST:.0e}")
     met = []
-    ego = log.ego.states[frame:, :2]
+    ego = log.ego[frame:, :2]
     # Where the ego's way is not known, near is near to where it was.
     seen = np.isfinite(ego).all(axis=1)
     ego = ego[np.maximum.accumulate(np.where(seen, np.arange(len(ego)), 0))]
@@ -355,20 +365,17 @@ def _local(states: FloatArray, origin: Pose) -> FloatArray:
     return local
 
 
-def _is_near(track: Track) -> bool:
-    return bool(np.hypot(*track.states[0, :2]) <= RADIUS_M)
-
-
-def _ego(ego: LoggedTrack, frame: int) -> TrafficAgent:
+def _ego(log: Log, frame: int) -> TrafficAgent:
+    length_m, width_m = log.ego_size_m
     return TrafficAgent(
         id="Agent1",
         type=AgentType.EGO_VEHICLE,
         x_m=0.0,
         y_m=0.0,
         heading_rad=0.0,
-        width_m=round(ego.width_m, 3),
-        length_m=round(ego.length_m, 3),
-        speed_mps=round(float(ego.states[frame, 3]), 3),
+        width_m=round(width_m, 3),
+        length_m=round(length_m, 3),
+        speed_mps=round(float(log.ego[frame, 3]), 3),
     )
 
 

@@ -14,7 +14,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import IO, Any
 
@@ -111,27 +111,20 @@ def _wait(
 ) -> int:
     """Run the module and return its status, negative for a signal."""
     given = {key: os.environ[key] for key in _PASSED_ON if key in os.environ}
-    process = subprocess.Popen(
-        [sys.executable, "-m", module, json.dumps(_as_document(limits))],
-        stdin=asked,
-        stdout=answer,
-        stderr=log,
-        cwd=_ROOT,
-        env=given | _SINGLE_THREAD | _FRUGAL,
-        start_new_session=True,
-    )
     try:
-        return process.wait(limits.deadline_s)
+        done = subprocess.run(
+            [sys.executable, "-m", module, json.dumps(asdict(limits))],
+            stdin=asked,
+            stdout=answer,
+            stderr=log,
+            cwd=_ROOT,
+            env=given | _SINGLE_THREAD | _FRUGAL,
+            timeout=limits.deadline_s,
+            check=False,
+        )
     except subprocess.TimeoutExpired:
         return -signal.SIGALRM
-    finally:
-        if process.poll() is None:
-            os.killpg(process.pid, signal.SIGKILL)
-            process.wait()
-
-
-def _as_document(limits: ProcessLimits) -> dict[str, int]:
-    return {name: getattr(limits, name) for name in ProcessLimits.__slots__}
+    return done.returncode
 
 
 def _limit_this_process(limits: ProcessLimits) -> None:
@@ -150,17 +143,15 @@ def _limit_this_process(limits: ProcessLimits) -> None:
 
 def _reason(status: int, limits: ProcessLimits) -> str:
     """Why the process ended, empty where it has a fault of its own."""
-    if status == _NO_MEMORY:
-        return f"takes more than {limits.memory_bytes >> 20} MB of memory to read"
-    if status == -signal.SIGXCPU:
-        return f"takes more than {limits.cpu_s} s of computing to read"
-    if status == -signal.SIGALRM:
-        return f"was not read within {limits.deadline_s} s"
-    if status == -signal.SIGKILL:
-        return "was not read: the system ended its reader, most likely for want of memory"
-    if status < 0:
+    reasons = {
+        _NO_MEMORY: f"takes more than {limits.memory_bytes >> 20} MB of memory to read",
+        -signal.SIGXCPU: f"takes more than {limits.cpu_s} s of computing to read",
+        -signal.SIGALRM: f"was not read within {limits.deadline_s} s",
+        -signal.SIGKILL: "was not read: the system ended its reader, most likely for memory",
+    }
+    if status < 0 and status not in reasons:
         return f"crashes its reader ({signal.Signals(-status).name})"
-    return ""
+    return reasons.get(status, "")
 
 
 def _answer_in(answer: IO[bytes], name: str) -> Any:

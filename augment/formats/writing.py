@@ -14,17 +14,9 @@ import numpy as np
 from augment.errors import InvalidDocument
 from augment.formats.interplan.file import InterplanSource
 from augment.geometry.polyline import Polyline
+from augment.scene import entities
 from augment.scene.codec import scene_to_document
-from augment.scene.entities import (
-    AgentType,
-    Area,
-    AreaKind,
-    LaneConnector,
-    Modification,
-    ScenarioType,
-    Scene,
-    apply,
-)
+from augment.scene.entities import LaneConnector, Scene
 from augment.scene.lane_graph import AnyLane
 from augment.scene.motion import SETS_OUT_WITHIN_M, Motion, MotionSource, Movement, motion_of
 from augment.scene.recording import Recording
@@ -47,8 +39,8 @@ class Cell:
 
     name: str
     scene: Scene
-    type: ScenarioType | None
-    modification: Modification
+    type: entities.ScenarioType | None
+    modification: entities.Modification
     keeps_traffic: bool = False
     stem: str = "scenario"
     made_on: date = date(1970, 1, 1)
@@ -62,7 +54,7 @@ class Cell:
         Raises:
             InvalidModification: The change does not fit the scene.
         """
-        return apply(self.scene, self.modification)
+        return entities.apply(self.scene, self.modification)
 
     @cached_property
     def motion(self) -> Motion:
@@ -128,15 +120,15 @@ class LossReport:
         if names:
             self.lose(f"{', '.join(names)}: {text}", changes_scene=changes_scene)
 
-    def lose_types(self, texts: Mapping[AgentType, str]) -> None:
+    def lose_types(self, texts: Mapping[entities.AgentType, str]) -> None:
         """Add one line for all agents of each of these types."""
         for kind, text in texts.items():
             others = [other.agent for other in self._cell.motion.others]
             self.lose_of([agent.id for agent in others if agent.type is kind], text)
 
-    def lose_areas(self, areas: Iterable[Area], text: str) -> None:
+    def lose_areas(self, areas: Iterable[entities.Area], text: str) -> None:
         """Add one line for all areas of a kind, which the text names by {}."""
-        by_kind: dict[AreaKind, list[str]] = defaultdict(list)
+        by_kind: dict[entities.AreaKind, list[str]] = defaultdict(list)
         for area in areas:
             by_kind[area.kind].append(area.id)
         for kind, names in by_kind.items():
@@ -193,10 +185,8 @@ def report_motion(cell: Cell, report: LossReport, *, can_trigger: bool = False) 
         can_trigger: Whether the format can let people set out when the ego comes near.
     """
     motion = cell.motion
-    if motion.ego.source is MotionSource.HELD_SPEED:
-        report.lose("the ego was not recorded; it is let hold its speed along its lane")
-    elif motion.ego.source is MotionSource.STANDING:
-        report.lose("the ego was not recorded; it stands, as it does at t0")
+    if motion.ego.source in _ASSUMED:
+        report.lose(f"the ego was not recorded; {_ASSUMED[motion.ego.source]}")
     elif cell.recording is not None:
         unseen = ~cell.recording.ego_is_seen
         if unseen.any():
@@ -207,21 +197,17 @@ def report_motion(cell: Cell, report: LossReport, *, can_trigger: bool = False) 
     names = [other.agent.id for other in motion.others if other.source is MotionSource.HELD_SPEED]
     report.lose_of(names, "not recorded; let hold the speed of t0 along the lane, or straight on")
     walkers = [other for other in motion.others if other.agent.walk_to_m is not None]
-    names = [walker.agent.id for walker in walkers if walker.stands]
-    report.lose_of(
-        names,
-        f"has a walk but stands: the ego never comes within {SETS_OUT_WITHIN_M:g} m",
-        changes_scene=True,
-    )
-    if can_trigger:
-        return
-    for walker in walkers:
-        if not walker.stands:
-            at_s = motion.times_s[int((walker.states[:, 3] > 0.0).argmax())]
-            report.lose(
-                f"{walker.agent.id} sets out {at_s:g} s after t0, whatever the ego does; "
-                f"with us it does when the ego is within {SETS_OUT_WITHIN_M:g} m"
-            )
+    waiting = [walker.agent.id for walker in walkers if walker.stands]
+    text = f"has a walk but stands: the ego never comes within {SETS_OUT_WITHIN_M:g} m"
+    report.lose_of(waiting, text, changes_scene=True)
+    walking = [walker.agent.id for walker in walkers if not walker.stands and not can_trigger]
+    report.lose_of(walking, "sets out at a fixed time, not when the ego comes near")
+
+
+_ASSUMED = {
+    MotionSource.HELD_SPEED: "it is let hold its speed along its lane",
+    MotionSource.STANDING: "it stands, as it does at t0",
+}
 
 
 def appears_later(movement: Movement) -> bool:

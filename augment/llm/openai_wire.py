@@ -34,9 +34,7 @@ from augment.llm.wire_transport import (
     ACCEPTED,
     CONNECT_TIMEOUT_S,
     LOOK_EVERY_S,
-    OutOfTime,
     Transport,
-    UnusableBody,
     Watch,
     WireFault,
     watch_over,
@@ -171,23 +169,17 @@ class OpenAIWire(AbstractContextManager["OpenAIWire"]):
             fault = Abandoned(why) if watch.has_written else why
         except InvalidDocument as error:
             fault = NotSent(error.problems[0][1])
-        except UnusableBody as error:
-            is_packed = "unpacked" in str(error)
-            fault = _unusable(str(error), retryable=is_packed)
         except WireFault as error:
             # Where nothing was written there is nothing to be billed.
             kind = ModelFault if watch.has_written else NotSent
-            fault = kind(
-                f"the endpoint {error}" if isinstance(error, OutOfTime) else str(error),
-                retryable=True,
-            )
+            fault = kind(str(error), retryable=error.retryable, status=error.status)
         except openai.OpenAIError as error:
             fault = ModelFault(f"the request failed: {type(error).__name__}", retryable=False)
         except RecursionError:
-            fault = _unusable("is nested too deeply to be read", status=None)
+            fault = ModelFault("the answer is nested too deeply to be read", retryable=True)
         except ValueError:
             # A body that is no JSON comes through as a bare JSONDecodeError.
-            fault = _unusable("is not valid JSON", status=None)
+            fault = ModelFault("the endpoint's answer is not valid JSON", retryable=True)
         # Outside the handlers, so that nothing of the package's errors (which hold the request
         # with its headers) hangs on ours.
         if isinstance(fault, ModelFault):
@@ -336,10 +328,6 @@ def _client(
             trust_env=False,
         ),
     )
-
-
-def _unusable(what: str, *, retryable: bool = True, status: int | None = 200) -> ModelFault:
-    return ModelFault(f"the endpoint's answer {what}", retryable=retryable, status=status)
 
 
 def _refused(message: str, code: str, param: str, sent: Collection[str]) -> str | None:

@@ -37,7 +37,17 @@ _MOST_CONNECTIONS = 100
 
 
 class WireFault(Exception):
-    """The call has no answer; the text says why and holds nothing of the request."""
+    """The call has no answer.
+
+    Args:
+        text: Why, with nothing of the request.
+        retryable: Whether the same request may succeed later.
+        status: Of a success whose body can't be read.
+    """
+
+    def __init__(self, text: str, *, retryable: bool = True, status: int | None = None) -> None:
+        super().__init__(text)
+        self.retryable, self.status = retryable, status
 
 
 class OutOfTime(WireFault):
@@ -88,7 +98,8 @@ class Watch:
         """
         now = self._clock()
         if now >= self._ends_at:
-            raise OutOfTime(f"took too long to answer: more than {self._longest_s:g} s")
+            limit = f"more than {self._longest_s:g} s"
+            raise OutOfTime(f"the endpoint took too long to answer: {limit}")
         if now >= self._looks_at:
             self._looks_at = now + self._look_every_s
             self._still_wanted()
@@ -111,7 +122,8 @@ class Watch:
 
     def too_long(self) -> UnusableBody:
         """Return the fault of an answer beyond the limit."""
-        return UnusableBody(f"is longer than {self.most_bytes / 1e6:g} MB")
+        text = f"the endpoint's answer is longer than {self.most_bytes / 1e6:g} MB"
+        return UnusableBody(text, retryable=False, status=200)
 
 
 _WATCH: ContextVar[Watch] = ContextVar("watch over this thread's call")
@@ -208,7 +220,8 @@ def _body_of(answer: httpcore2.Response) -> bytes:
     assert isinstance(answer.stream, Iterable)
     try:
         if packing.lower() != b"identity":
-            raise UnusableBody(f"can't be unpacked: {packing.decode('latin-1')[:80]}")
+            name = packing.decode("latin-1")[:80]
+            raise UnusableBody(f"the endpoint's answer can't be unpacked: {name}", status=200)
         for chunk in answer.stream:
             body += chunk
             if len(body) > watch.most_bytes:

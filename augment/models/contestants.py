@@ -186,9 +186,6 @@ class CallLease(models.Model):
             models.Index(fields=("endpoint", "finished_at", "expires_at")),
         )
 
-    def __str__(self) -> str:
-        return str(self.token)
-
 
 class Contestant(models.Model):
     """Who is rated."""
@@ -298,6 +295,3 @@ class Probe(Work):
                 condition=models.Q(state__in=("queued", "running")),
             ),
         )
-
-    def __str__(self) -> str:
-        return f"probe of {self.model}"

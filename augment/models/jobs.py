@@ -171,9 +171,6 @@ class Augmentation(Work):
             models.Index(fields=("state", "sent_at")),
         )
 
-    def __str__(self) -> str:
-        return str(self.code)
-
 
 class Attempt(models.Model):
     """One try at an augmentation, from claim to outcome; a killed worker leaves it unfinished."""
@@ -200,9 +197,6 @@ class Attempt(models.Model):
                 condition=Q(finished_at=None) | Q(finished_at__gte=F("started_at")),
             ),
         )
-
-    def __str__(self) -> str:
-        return f"attempt {self.number}"
 
 
 class IntentReading(Work):
@@ -241,9 +235,6 @@ class IntentReading(Work):
                 | Q(state__in=("read", "accepted"), document__isnull=False),
             ),
         )
-
-    def __str__(self) -> str:
-        return f"reading of {self.scenario_id} by {self.model}"
 
 
 class ModelCall(models.Model):
@@ -320,9 +311,6 @@ class ModelCall(models.Model):
             ),
         )
 
-    def __str__(self) -> str:
-        return f"call {self.number}"
-
     @property
     def is_cached(self) -> bool:
         """Whether it was answered from the store."""
@@ -353,9 +341,6 @@ class TranscriptNote(models.Model):
         constraints = (
             models.UniqueConstraint(name="note_number_is_unique", fields=("attempt", "number")),
         )
-
-    def __str__(self) -> str:
-        return f"{self.kind} after call {self.after_call}"
 
 
 class Simulation(Work):
@@ -433,6 +418,3 @@ class Simulation(Work):
             ),
         )
         indexes = (models.Index(fields=("state", "sent_at")),)
-
-    def __str__(self) -> str:
-        return str(self.code)

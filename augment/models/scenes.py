@@ -196,9 +196,6 @@ class SceneUpload(Work):
             ),
         )
 
-    def __str__(self) -> str:
-        return self.name
-
 
 class UploadMoment(Work):
     """A moment of an upload: drawn for whoever chooses, and kept as a scene if they want it."""
@@ -237,6 +234,3 @@ class UploadMoment(Work):
                 condition=Q(state__in=["queued", "drawn", "keeping", "kept", "failed"]),
             ),
         )
-
-    def __str__(self) -> str:
-        return f"{self.upload}, {self.item} {self.frame}"

@@ -215,9 +215,6 @@ class Event(AppendOnly):
         ordering = ("-at", "-pk")
         indexes = (models.Index(fields=("object_kind", "object_code")),)
 
-    def __str__(self) -> str:
-        return f"{self.verb} {self.object_kind} {self.object_code}"
-
 
 class Worker(models.Model):
     """A worker process: when it was last heard, and whether it brings lost work back.
@@ -237,6 +234,3 @@ class Worker(models.Model):
     class Meta:
         ordering = ("-seen_at",)
         indexes = (models.Index(fields=("seen_at",)),)
-
-    def __str__(self) -> str:
-        return self.name

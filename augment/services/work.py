@@ -235,14 +235,36 @@ class WorkKind(ABC, Generic[Row]):
         return True
 
     def work(self, held: Lease[Row]) -> None:
-        """Work on a row that was taken."""
+        """Work on a row that was taken; however the work ends, the row is settled or given back.
+
+        An error with a sentence fails the row with it, an unforeseen one with its class and text.
+        A worker that shuts down (WorkerStopping, SystemExit, KeyboardInterrupt) gives the row
+        back, and so does one whose job has no room for the next call. A lost lease ends quietly:
+        the new holder brings the outcome.
+        """
         row = self.rows.select_related(*self.related).get(pk=held.pk)
         settled = None
         try:
-            with held.kept_alive(), outcome_on_crash(held):
+            with held.kept_alive():
                 outcome = self.run(row, held)
                 if outcome is not None and held.settle(outcome):
                     settled = outcome
+        except LeaseLost as error:
+            logger.warning("Stopped work on %s: %s", held, error)
+        except WorkerStopping as error:
+            logger.info("Gave %s back: %s.", held, error)
+            held.release(reason=str(error))
+        except BudgetSpent as error:
+            held.release(end=TryEnd.STOPPED, reason=str(error))
+        except AugmentError as error:
+            held.settle(Settlement(state=FAILED, reason=str(error)))
+        except Exception as error:
+            logger.exception("Work on %s broke.", held)
+            reason = f"unexpected: {type(error).__name__}: {error}"
+            held.settle(Settlement(state=FAILED, reason=reason))
+        except BaseException:
+            held.release()
+            raise
         finally:
             self.over(row, settled)
 
@@ -290,35 +312,6 @@ KINDS: dict[str, WorkKind[Any]] = {}
 def register(*kinds: WorkKind[Any]) -> None:
     """Let workers take these kinds, and recover what is lost of them."""
     KINDS.update({kind.name: kind for kind in kinds})
-
-
-@contextmanager
-def outcome_on_crash(held: Lease[Any]) -> Iterator[None]:
-    """Settle or release the row when the work on it breaks.
-
-    An error with a sentence fails the row with it, an unforeseen one with its class and text. A
-    worker that shuts down (WorkerStopping, SystemExit, KeyboardInterrupt) gives the row back, and
-    so does one whose job has no room for the next call. A lost lease ends quietly: the new holder
-    brings the outcome.
-    """
-    try:
-        yield
-    except LeaseLost as error:
-        logger.warning("Stopped work on %s: %s", held, error)
-    except WorkerStopping as error:
-        logger.info("Gave %s back: %s.", held, error)
-        held.release(reason=str(error))
-    except BudgetSpent as error:
-        held.release(end=TryEnd.STOPPED, reason=str(error))
-    except AugmentError as error:
-        held.settle(Settlement(state=FAILED, reason=str(error)))
-    except Exception as error:
-        logger.exception("Work on %s broke.", held)
-        reason = f"unexpected: {type(error).__name__}: {error}"
-        held.settle(Settlement(state=FAILED, reason=reason))
-    except BaseException:
-        held.release()
-        raise
 
 
 @transaction.atomic

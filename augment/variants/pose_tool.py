@@ -18,29 +18,15 @@ from functools import cached_property
 from typing import Annotated, Any
 
 import numpy as np
-from pydantic import (
-    AfterValidator,
-    BaseModel,
-    BeforeValidator,
-    ConfigDict,
-    Field,
-    TypeAdapter,
-    ValidationError,
-)
+import pydantic
+from pydantic import Field
 
 from augment.checks import Ground
 from augment.errors import ToolError
 from augment.geometry.frames import Box, Pose, overlap
+from augment.prompts import vectors
 from augment.prompts.calls import TOOL
-from augment.prompts.vectors import (
-    DEFAULT_RADIUS_M,
-    LaneCurve,
-    ShortNames,
-    curve_from,
-    lane_curves,
-    short_names,
-    shown_agents,
-)
+from augment.prompts.vectors import DEFAULT_RADIUS_M, LaneCurve
 from augment.scene.entities import LENGTH_WIDTH_M, AgentType, Scene, TrafficAgent
 from augment.scene.schema import problems_of
 
@@ -64,17 +50,19 @@ _TOUCH_M = 0.01
 _SEARCHED_M, _STEP_M = 50.0, 0.5
 _MOST_LISTED = 80
 
-_Several = (BeforeValidator(lambda value: value if isinstance(value, list) else [value]),)
+_Several = (pydantic.BeforeValidator(lambda value: value if isinstance(value, list) else [value]),)
 _Many = Field(min_length=1, max_length=MOST_PLACES)
 _Along = Annotated[float, Field(ge=-FURTHEST_M, le=FURTHEST_M)]
 _Aside = Annotated[float, Field(ge=-WIDEST_M, le=WIDEST_M)]
-_Kind = Annotated[str, Field(pattern=f"^({'|'.join(OBJECT_TYPES)})$"), AfterValidator(AgentType)]
+_Kind = Annotated[
+    str, Field(pattern=f"^({'|'.join(OBJECT_TYPES)})$"), pydantic.AfterValidator(AgentType)
+]
 
 
-class _Call(BaseModel):
+class _Call(pydantic.BaseModel):
     """The arguments of a call; one value counts as a list of it."""
 
-    model_config = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False)
+    model_config = pydantic.ConfigDict(strict=True, extra="forbid", allow_inf_nan=False)
 
     lane: Any
     start: str
@@ -83,7 +71,9 @@ class _Call(BaseModel):
     object: Annotated[list[_Kind], *_Several, _Many] = [AgentType.VEHICLE]
 
 
-_CONTROL = TypeAdapter(list[tuple[_Along, _Along]], config=ConfigDict(allow_inf_nan=False))
+_CONTROL = pydantic.TypeAdapter(
+    list[tuple[_Along, _Along]], config=pydantic.ConfigDict(allow_inf_nan=False)
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -197,7 +187,7 @@ class PoseTool:
         """
         try:
             call = _Call.model_validate(arguments)
-        except ValidationError as fault:
+        except pydantic.ValidationError as fault:
             return {"error": "; ".join(f"{place}: {text}" for place, text in problems_of(fault))}
         lists: list[list[Any]] = [call.distance_m, call.lateral_m, call.object]
         count = max(map(len, lists))
@@ -225,17 +215,17 @@ class PoseTool:
     @cached_property
     def curves(self) -> dict[str, LaneCurve]:
         """The shown lanes and connectors by short id."""
-        return lane_curves(self.scene, self._names, self.radius_m)
+        return vectors.lane_curves(self.scene, self._names, self.radius_m)
 
     @cached_property
     def agents(self) -> dict[str, TrafficAgent]:
         """The shown agents by short id."""
-        shown = shown_agents(self.scene, self.radius_m)
+        shown = vectors.shown_agents(self.scene, self.radius_m)
         return {self._names.agents[agent.id]: agent for agent in shown}
 
     @cached_property
-    def _names(self) -> ShortNames:
-        return short_names(self.scene)
+    def _names(self) -> vectors.ShortNames:
+        return vectors.short_names(self.scene)
 
     @cached_property
     def _ground(self) -> Ground:
@@ -262,7 +252,11 @@ class PoseTool:
             return self.curves[lane], 0.0
         control = None
         try:
-            control = None if isinstance(lane, str) else curve_from(_CONTROL.validate_python(lane))
+            control = (
+                None
+                if isinstance(lane, str)
+                else vectors.curve_from(_CONTROL.validate_python(lane))
+            )
         except ValueError:
             raise ToolError(TOOL, "lane must be an id, or the control points of a piece") from None
         for curve in self.curves.values():

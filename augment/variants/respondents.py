@@ -6,15 +6,8 @@ from enum import StrEnum
 from functools import partial
 from typing import Protocol, TypeVar
 
-from augment.errors import (
-    Abandoned,
-    ModelFault,
-    ModelRefused,
-    NotSent,
-    ParameterRefused,
-    ReplyUnreadable,
-    Unwanted,
-)
+from augment import errors
+from augment.errors import ModelFault, ModelRefused
 from augment.llm.client import ChatClient, Patience
 from augment.llm.costs import cut_of
 from augment.llm.messages import DEFAULT_MAX_TOKENS, Message, Reply, Request, Tool, ToolChoice
@@ -140,7 +133,7 @@ class Respondents:
         Args:
             role: Who is asked.
             messages: What is asked.
-            reader: From a text to what it says, raising ReplyUnreadable.
+            reader: From a text to what it says, raising errors.ReplyUnreadable.
             again: The conversation that asks once more: from the one so far, the answer's text
                 and what is wrong with it.
             tools: Named where the conversation holds calls; none can be called any more.
@@ -150,7 +143,7 @@ class Respondents:
             What was read, the conversation that led to the answer, and the answer.
 
         Raises:
-            ReplyUnreadable: No answer can be read.
+            errors.ReplyUnreadable: No answer can be read.
             ModelRefused: The model declined, or its endpoint's filter did.
             ModelFault: The wire broke for good.
         """
@@ -160,12 +153,12 @@ class Respondents:
         while True:
             try:
                 return reader(reply.text), messages, reply
-            except ReplyUnreadable as unreadable:
+            except errors.ReplyUnreadable as unreadable:
                 problems = list(unreadable.problems)
                 if reply.is_cut_off:
                     problems.insert(0, "the answer was cut off at its length limit: be shorter")
                 if asked == self.re_asks:
-                    raise ReplyUnreadable(problems) from None
+                    raise errors.ReplyUnreadable(problems) from None
             messages = again(messages, reply.text, problems)
             max_tokens *= 2 if reply.is_cut_off else 1
             asked += 1
@@ -212,7 +205,7 @@ class Respondents:
             ContextTruncated: There is an answer, but to a part of the prompt.
             ModelFault: The last attempt broke, or the fault is one that does not pass.
             BudgetSpent: The transcript's budget has no room for the next attempt.
-            Unwanted: Nobody needs the reply any more.
+            errors.Unwanted: Nobody needs the reply any more.
         """
         client = self.client_of(role).client
         while True:
@@ -221,7 +214,7 @@ class Respondents:
                 return self.transcript.known(role, sent, version) or self._attempt(
                     role, sent, version
                 )
-            except ParameterRefused:
+            except errors.ParameterRefused:
                 if client.fitted(request) == sent:
                     raise
 
@@ -233,16 +226,16 @@ class Respondents:
             try:
                 sending = partial(self.transcript.sending, number)
                 reply = respondent.client.complete(request, sending=sending)
-            except Unwanted as why:
-                self.transcript.broke(number, NotSent(f"not sent: {why}"))
+            except errors.Unwanted as why:
+                self.transcript.broke(number, errors.NotSent(f"not sent: {why}"))
                 raise
-            except Abandoned as fault:
+            except errors.Abandoned as fault:
                 self.transcript.broke(number, fault)
                 raise fault.why from None
             except ModelFault as fault:
                 self.transcript.broke(number, fault)
                 wait_s = self.patience.wait_s(fault, attempt=attempt)
-                if wait_s is None or isinstance(fault, ParameterRefused):
+                if wait_s is None or isinstance(fault, errors.ParameterRefused):
                     raise
                 self.patience.sleep(wait_s)
                 attempt += 1

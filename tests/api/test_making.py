@@ -12,8 +12,6 @@ from django.test import Client
 from augment.models import BaseScene, Probe, Scenario, SceneUpload
 from augment.scene.codec import modification_to_document, scene_to_document
 from augment.scene.entities import Modification
-from augment.services.endpoints.known_endpoints import EndpointRequest, ensure_endpoint
-from augment.services.endpoints.known_models import model_at
 from augment.services.endpoints.probing import ABILITIES
 from augment.services.scenarios import uploads
 from augment.services.scenarios import uploads as upload_moments
@@ -146,12 +144,3 @@ def test_a_model_of_a_new_endpoint_is_probed(admin: Client, sent: list[tuple[str
     assert sent == [("enqueue_probe", Probe.objects.get().pk)]
     error_of(send(admin, there), 409, "conflict")
     assert admin.get(API + there).json()["state"] == "queued"
-
-
-def test_an_analyst_reads_probes_and_changes_no_endpoint(analyst: Client) -> None:
-    site = ensure_endpoint(EndpointRequest(label="here", base_url="http://127.0.0.1:9/v1"))
-    model = model_at(endpoint=site, model="m")
-    Probe.objects.create(model=model)
-    assert analyst.get(f"{API}models/{model.code}/probe").status_code == 200
-    for path in ("endpoints", f"endpoints/{site.code}/models", f"models/{model.code}/probe"):
-        error_of(send(analyst, path), 403, "forbidden")

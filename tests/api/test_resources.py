@@ -166,7 +166,7 @@ def test_an_experts_studies_tell_of_no_contestant() -> None:
 def test_an_analyst_reads_and_rates_and_changes_nothing_else() -> None:
     here = world()
     analyst = program_of(people()["analyst"])
-    for path in ("jobs", f"studies/{here.study.code}/close", "people"):
+    for path in ("jobs", f"studies/{here.study.code}/close", "people", "endpoints"):
         error_of(send(analyst, path), 403, "forbidden")
     close_study(study=here.study)
     assert send(analyst, f"studies/{here.study.code}/snapshots", rounds=20).status_code == 201

@@ -141,14 +141,6 @@ def test_a_token_needs_no_csrf_token_and_a_session_does() -> None:
     assert made.status_code == 201, made.content
 
 
-def test_an_analysts_token_of_an_admin_changes_nothing() -> None:
-    asking = program_of(people()["admin"], "analyst")
-    person = {"username": "grace", "role": "expert"}
-    answer = asking.post(reverse("api-people"), person, content_type="application/json")
-    error_of(answer, 403, "forbidden")
-    assert asking.get(reverse("api-jobs")).status_code == 200
-
-
 def test_use_is_remembered_and_limited_by_role(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(links.REQUESTS, "expert", 3)
     accounts = people()

@@ -6,7 +6,6 @@ from pathlib import Path
 
 import pytest
 from django.core.management import CommandError, call_command
-from django.urls import reverse
 
 from augment.models import Augmentation, Contestant, GenerationJob, Scenario
 from augment.scene.codec import intent_to_document, modification_to_document
@@ -15,7 +14,7 @@ from augment.scene.intent import Intent
 from augment.services.scenarios.pictures import store
 from augment.services.scenarios.scenes import reference_of
 from tests.jobs import rows
-from tests.web.cast import people, png, signed_in
+from tests.web.cast import png
 
 pytestmark = pytest.mark.django_db
 
@@ -107,18 +106,3 @@ def test_pairs_wordings_and_refusals_come_as_files(tmp_path: Path) -> None:
     assert json.loads(out.read_text())["rows"][0]["scenarios"] == 7
     with pytest.raises(CommandError, match="elephants"):
         exported(job, "elephants", tmp_path)
-
-
-def test_the_page_shows_all_three_and_an_empty_job_says_so() -> None:
-    staff = signed_in(people()["admin"])
-    shown = staff.get(reverse("analyses", args=[a_job().code])).content.decode()
-    assert "−1.30" in shown
-    assert "0.0156" in shown
-    assert all(f'id="{part}"' in shown for part in ("pairs", "wordings", "refusals"))
-    empty = GenerationJob.objects.create(name="Nothing")
-    shown = staff.get(reverse("analyses", args=[empty.code])).content.decode()
-    assert "No two contestants" in shown
-    assert "Nobody has refused" in shown
-    assert (
-        staff.get(reverse("job-export", args=[empty.code, "analyses-x", "csv"])).status_code == 404
-    )

@@ -107,13 +107,6 @@ def test_the_same_job_gives_the_same_bytes(name: str) -> None:
     assert b"2026" not in first[:400]
 
 
-def test_the_command_writes_what_it_is_asked_for(tmp_path: Path) -> None:
-    job = a_job()
-    assert "ann" in run("displacement", job.code, "--by", "contestant", "--out", "-")
-    run("displacement", "Round 1", "--format", "pdf", "--out", tmp_path / "box.pdf")
-    assert (tmp_path / "box.pdf").read_bytes().startswith(b"%PDF")
-
-
 # The sheet of samples
 
 SHEET = ("samples", "Round 1", "--scenarios", "works", "parked", "--contestants", "sim", "ann")

@@ -70,18 +70,6 @@ def test_a_fault_is_named_with_its_line_and_nothing_is_kept(
     assert not ImportedVote.objects.exists()
 
 
-def test_a_missing_column_and_a_taken_name_are_refused(tmp_path: Path) -> None:
-    path = written(tmp_path, "x,y", head="model_a,model_b")
-    with pytest.raises(CommandError, match="no column 'winner'"):
-        call_command("import_votes", str(path))
-    with pytest.raises(CommandError, match="can't be read"):
-        call_command("import_votes", str(tmp_path / "nowhere.csv"))
-    path = written(tmp_path, *lines())
-    call_command("import_votes", str(path), name="Elsewhere")
-    with pytest.raises(CommandError, match="a study named 'Elsewhere' already"):
-        call_command("import_votes", str(path), name="Elsewhere")
-
-
 def test_what_was_exported_can_be_imported_and_gives_the_same_table(tmp_path: Path) -> None:
     study = import_votes(path=written(tmp_path, *lines()), name="First").study
     first = rate(study=study, rounds=100, seed=3)

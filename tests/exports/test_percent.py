@@ -4,7 +4,7 @@ import pytest
 
 from arena.rating.comparisons import Estimate
 from arena.rating.lines import whole_percent
-from arena.templatetags.results import estimate_percent, percent
+from arena.templatetags.results import estimate, percent
 
 
 @pytest.mark.parametrize(
@@ -17,4 +17,4 @@ def test_a_half_goes_to_the_even_number(share: float, shown: int) -> None:
 
 def test_pages_print_it_so() -> None:
     assert percent(0.575) == "58 %"
-    assert "58 %" in estimate_percent(Estimate(value=0.575, lower=0.425, upper=0.995))
+    assert "58 %" in estimate(Estimate(value=0.575, lower=0.425, upper=0.995), "percent")

@@ -42,24 +42,6 @@ def lines(snapshot: Snapshot) -> list[tuple[Any, ...]]:
     )
 
 
-def test_a_snapshot_has_a_line_per_contestant_that_agrees_with_a_count() -> None:
-    study = voted_study()
-    snapshot = rate(study=study, seed=5)
-    assert snapshot.votes_counted == 36
-    assert snapshot.votes_left_out == {}
-    assert [line[0] for line in lines(snapshot)] == ["ann", "bob", "cid"]
-    for standing in snapshot.standings.all():
-        slug = standing.slug
-        votes = Vote.objects.filter(matchup__study=study)
-        wins = votes.filter(winner__contestant__slug=slug).count()
-        left = votes.filter(shown_left__contestant__slug=slug)
-        right = votes.filter(shown_right__contestant__slug=slug)
-        ties = (left | right).filter(outcome="equal").count()
-        assert (standing.wins, standing.ties) == (wins, ties)
-        assert standing.votes == left.count() + right.count() == 24
-    assert Event.objects.filter(verb="rate").count() == 1
-
-
 def test_the_same_votes_and_seed_give_the_same_standings() -> None:
     study = voted_study()
     one, again, other = (rate(study=study, seed=seed, unit="vote") for seed in (5, 5, 6))

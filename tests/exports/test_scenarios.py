@@ -95,12 +95,6 @@ def test_every_format_comes_as_one_zip_with_its_manifest(
     assert "Warning: Made from data that must not be used commercially: junction" in said
 
 
-def test_the_same_job_gives_the_same_bytes(job: GenerationJob, tmp_path: Path) -> None:
-    for name in ("one.zip", "two.zip"):
-        export("--format", "scenarionet", "--out", str(tmp_path / name))
-    assert (tmp_path / "one.zip").read_bytes() == (tmp_path / "two.zip").read_bytes()
-
-
 def test_the_own_format_comes_back_exactly(job: GenerationJob, tmp_path: Path) -> None:
     export("--format", "json", "--out", str(tmp_path / "own.zip"))
     with zipfile.ZipFile(tmp_path / "own.zip") as archive:

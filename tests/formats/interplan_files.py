@@ -5,8 +5,8 @@ from pathlib import Path
 from typing import Any
 
 from augment.formats.documents import read_yaml
-from augment.formats.interplan.file import WHAT, ReadEntry, file_of, read_entry
-from augment.scene.entities import Scene
+from augment.formats.interplan.file import WHAT, file_of, read_entry
+from augment.scene.entities import Modification, Scene
 from tests.formats.nuplan_files import CITIES, token, write_log, write_map
 
 CITY = "sg-one-north"
@@ -163,8 +163,8 @@ def write_folder(root: Path, city: str = CITY) -> Path:
     return root
 
 
-def entries_of(text: str, scenes: Mapping[str, Scene]) -> list[ReadEntry]:
-    """The special scenarios of the tokens that have a scene."""
+def entries_of(text: str, scenes: Mapping[str, Scene]) -> list[tuple[Modification, list[str]]]:
+    """The special scenarios of the tokens that have a scene, as changes with what they lose."""
     by_token = file_of(read_yaml(text, what=WHAT)).modification_details_dictionary
     return [
         read_entry(token, index, entry, scenes[token])

@@ -26,13 +26,6 @@ _XYZ = "x FLOAT, y FLOAT, z FLOAT"
 COLUMNS = {
     "log": f"{_ONLY}, vehicle_name VARCHAR(64), date VARCHAR(64), timestamp INTEGER, "
     "logfile VARCHAR(64), location VARCHAR(64), map_version VARCHAR(64)",
-    "camera": f"{_ONLY}, log_token BLOB, channel VARCHAR(64), model VARCHAR(64), "
-    "translation BLOB, rotation BLOB, intrinsic BLOB, distortion BLOB, width INTEGER, "
-    "height INTEGER",
-    "lidar": f"{_ONLY}, log_token BLOB, channel VARCHAR(64), model VARCHAR(64), "
-    "translation BLOB, rotation BLOB",
-    "image": f"{_ONLY}, next_token BLOB, prev_token BLOB, ego_pose_token BLOB, "
-    "camera_token BLOB, filename_jpg VARCHAR(128), timestamp INTEGER",
     "lidar_pc": f"{_ONLY}, next_token BLOB, prev_token BLOB, ego_pose_token BLOB NOT NULL, "
     "lidar_token BLOB, scene_token BLOB, filename VARCHAR(128), timestamp INTEGER",
     "ego_pose": f"{_ONLY}, timestamp INTEGER, {_XYZ}, qw FLOAT, qx FLOAT, qy FLOAT, qz FLOAT, "
@@ -49,7 +42,7 @@ COLUMNS = {
     "traffic_light_status": f"{_ONLY}, lidar_pc_token BLOB NOT NULL, "
     "lane_connector_id INTEGER, status VARCHAR(8)",
 }
-"""The twelve tables as they are published, tokens as their only index."""
+"""The tables that are read as they are published, tokens as their only index."""
 UNREAD = frozenset(
     ["next_token", "prev_token", "epsg"]
     + [f"{name}_{axis}" for name in ("acceleration", "angular_rate") for axis in "xyz"]

@@ -47,35 +47,39 @@ def agent_changes(
     before: Sequence[TrafficAgent], after: Sequence[TrafficAgent]
 ) -> Iterator[Change]:
     """The same of agents alone, their walks included."""
-    left = list(after)
+    pairs, odd = _paired(before, after)
+    yield from odd
+    for agent, found in pairs:
+        yield from _of_agent(agent, found, agent.speed_mps)
+        yield from _of_walk(agent, found)
+
+
+def _paired(
+    before: Sequence[TrafficAgent], after: Sequence[TrafficAgent]
+) -> tuple[list[tuple[TrafficAgent, TrafficAgent]], list[Change]]:
+    """Who is found again by place, and who is missing or made up."""
+    left, pairs, odd = list(after), [], []
     for agent in before:
         place = (agent.x_m, agent.y_m)
         found = min(left, key=lambda one: _apart((one.x_m, one.y_m), place), default=None)
         if found is None or _apart((found.x_m, found.y_m), place) > NEAR_M:
-            yield Change(agent.id, "missing", agent.type)
-            continue
-        left.remove(found)
-        yield from _of_agent(agent, found, agent.speed_mps)
-        yield from _of_walk(agent, found)
-    yield from (Change(one.id, "made up") for one in left)
+            odd.append(Change(agent.id, "missing", agent.type))
+        else:
+            left.remove(found)
+            pairs.append((agent, found))
+    return pairs, [*odd, *(Change(one.id, "made up") for one in left)]
 
 
 def _of_agents(cell: Cell, reading: Reading) -> Iterator[Change]:
-    left = list(reading.scene.agents)
     by_name = {one.agent.id: one for one in cell.motion.others}
-    for agent in cell.after.agents:
-        place = (agent.x_m, agent.y_m)
-        found = min(left, key=lambda one: _apart((one.x_m, one.y_m), place), default=None)
-        if found is None or _apart((found.x_m, found.y_m), place) > NEAR_M:
-            yield Change(agent.id, "missing", agent.type)
-            continue
-        left.remove(found)
+    pairs, odd = _paired(cell.after.agents, reading.scene.agents)
+    yield from odd
+    for agent, found in pairs:
         # What stands before it sets out stands at t0.
         yield from _of_agent(agent, found, float(by_name[agent.id].states[0, 3]))
         yield from _of_walk(agent, found)
         if not _same_motion(by_name[agent.id], reading, found.id):
             yield Change(agent.id, "motion")
-    yield from (Change(one.id, "made up") for one in left)
     here = {agent.id for agent in cell.after.agents}
     tracks = [] if reading.recording is None else reading.recording.tracks
     for name, later in by_name.items():

@@ -82,8 +82,6 @@ def test_folder_and_file_are_recognised(folder: Path) -> None:
     [
         ({"object_type": "tank"}, "unknown 'tank'"),
         ({"position_x": float("nan")}, "needs finite numbers"),
-        ({"position_x": 1e300}, "needs finite numbers"),
-        ({"timestep": -1}, "needs steps from 0 to 9999"),
         ({"timestep": 2**40}, "needs steps from 0 to 9999"),
         ({"track_id": None}, "a value is missing"),
     ],

@@ -3,23 +3,16 @@
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
-from xml.etree import ElementTree as ET
 
 import pytest
 
 from augment.formats.commonroad.writer import write
-from augment.formats.writing import Cell
 from augment.geometry.polyline import Polyline
-from augment.scene.entities import Lane, LaneConnector
 from tests.formats.cells import OF_EACH_TYPE, cell, crossing, recorded_street
 from tests.formats.receivers import told_by
 from tests.recorded import recorded
 
 NAME = "street--rule.xml"
-
-
-def document(given: Cell) -> ET.Element:
-    return ET.fromstring(write([given]).files[NAME])
 
 
 def test_commonroad_io_loads_every_file_and_the_schema_allows_it(
@@ -67,23 +60,6 @@ def check_crossing(told: dict[str, Any]) -> None:
     assert told["turns"] == [[[5], [4]]]
 
 
-def test_a_recorded_edge_keeps_all_its_points() -> None:
-    left = Polyline([(0.0, 2.0), (30.0, 2.5), (60.0, 2.0)])
-    right = Polyline([(0.0, -2.0), (60.0, -2.0)])
-    lane = Lane(
-        id="Lane1",
-        centerline=Polyline([(0.0, 0.0), (60.0, 0.0)]),
-        width_m=4.2,
-        left_boundary=left,
-        right_boundary=right,
-    )
-    given = cell(replace(crossing(), lanes=(lane,), connectors=()), added=())
-    bound = document(given).find("lanelet/leftBound")
-    assert bound is not None
-    points = [(float(p[0].text or ""), float(p[1].text or "")) for p in bound]
-    assert points == [(0.0, 2.0), (30.0, 2.5), (60.0, 2.0)]
-
-
 def test_a_scene_without_lanes_is_refused_and_the_others_are_written() -> None:
     bare = cell(replace(crossing(), lanes=(), connectors=()), stem="bare", name="bare by rule")
     made = write([bare, cell()])
@@ -91,17 +67,3 @@ def test_a_scene_without_lanes_is_refused_and_the_others_are_written() -> None:
     assert [str(one) for one in made.refused] == [
         "bare by rule: CommonRoad needs at least one lane, and this scene has none"
     ]
-
-
-def test_connectors_that_share_a_lane_make_one_intersection() -> None:
-    scene = crossing()
-    back = LaneConnector(
-        id="Connector3",
-        from_lane="Lane3",
-        to_lane="Lane2",
-        centerline=Polyline([(28.0, 60.0), (50.0, 60.0), (36.0, 0.0)]),
-        width_m=3.5,
-    )
-    root = document(cell(replace(scene, connectors=(*scene.connectors, back))))
-    (intersection,) = root.findall("intersection")
-    assert len(intersection.findall("incoming")) == 2

@@ -3,24 +3,19 @@
 import json
 import re
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
-from xml.etree import ElementTree as ET
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from augment.formats.readers import READERS
 from augment.formats.writers import WRITERS, writer_named
-from augment.formats.writing import Cell, Written
+from augment.formats.writing import Written
 from augment.scene.codec import recording_from_document
-from augment.scene.motion import MotionSource
 from augment.scene.recording import Recording
 from tests.formats.cells import cell, crossing, recorded_street
-from tests.formats.receivers import told_by
-from tests.formats.sanity import check_sanity, loaded
+from tests.formats.sanity import loaded
 from tests.scenes import curve, junction, scene, vehicle
 
 SCENES = (scene(), curve(), junction(), crossing())
@@ -84,16 +79,6 @@ def test_what_is_not_finite_is_refused_and_the_rest_is_written(form: str) -> Non
     check_finite_files(written)
 
 
-def test_a_gap_is_crossed_and_after_the_last_step_the_ego_goes_on() -> None:
-    before, recording = recorded_street()
-    recording.ego[5:8] = np.nan
-    recording.ego[20:] = np.nan
-    made = cell(before, recording=recording, added=())
-    assert made.motion.ego.states[:, 0] == pytest.approx(8.0 * made.motion.times_s)
-    lines = [loss.text for loss in writer_named("commonroad")([made]).losses]
-    assert any("not recorded at 14 of 31 steps" in line for line in lines)
-
-
 def test_a_drive_that_nobody_recorded_is_not_in_our_own_json() -> None:
     before, recording = recorded_street()
     recording.ego[1:] = np.nan
@@ -102,55 +87,3 @@ def test_a_drive_that_nobody_recorded_is_not_in_our_own_json() -> None:
     assert (
         recording_from_document(json.loads(written)).ego_is_seen.tolist() == [True] + [False] * 30
     )
-
-
-@pytest.fixture
-def without_ego(realdata: Path) -> Cell:
-    """A recorded CommonRoad scene, whose ego is a planning problem that nobody drove."""
-    (path,) = (realdata / "commonroad").glob("*.xml")
-    reading = READERS["commonroad"].read(path, item=None, frame=None, name="log")
-    assert reading.recording is not None
-    assert not reading.recording.shows_ego
-    made = cell(reading.scene, recording=reading.recording, keeps_traffic=True, added=())
-    assert made.motion.ego.source is MotionSource.HELD_SPEED
-    return made
-
-
-def test_every_receiver_finds_an_unrecorded_ego_at_every_step(
-    without_ego: Cell, tmp_path: Path
-) -> None:
-    written = {form: writer_named(form)([without_ego]) for form in WRITERS}
-    for form in ("commonroad", "openscenario", "scenarionet"):
-        said = [loss.text for loss in written[form].losses]
-        assert any("the ego was not recorded" in line for line in said)
-    for one in written.values():
-        check_finite_files(one)
-        for name, content in one.files.items():
-            (tmp_path / name).write_bytes(content)
-    stem, steps = without_ego.stem, len(without_ego.motion.times_s)
-    (told,) = told_by(tmp_path / f"{stem}.xml")
-    assert told["faults"] == []
-    goal = [*without_ego.motion.ego.states[-1, :2], steps - 1]
-    assert told["goals"][0] == pytest.approx(goal, abs=1e-6)
-    for checked in told_by(tmp_path / f"{stem}.xosc"):
-        assert checked["issues"] == []
-    check_openscenario(tmp_path / f"{stem}.xosc", steps)
-    (pickled,) = tmp_path.glob("sd_*.pkl")
-    scenario = loaded(pickled.read_bytes())
-    check_sanity(scenario)
-    ego = scenario["tracks"][scenario["metadata"]["sdc_id"]]
-    assert ego["state"]["valid"].tolist() == [True] * steps
-    back = READERS["scenarionet"].read(pickled, item=None, frame=None, name="back")
-    assert back.recording is not None
-    assert back.recording.ego_is_seen.all()
-
-
-def check_openscenario(file: Path, steps: int) -> None:
-    root = ET.parse(file)
-    (group,) = (
-        group
-        for group in root.iter("ManeuverGroup")
-        if group.find("*/EntityRef[@entityRef='Agent1']") is not None
-    )
-    assert not list(group.iter("DeleteEntityAction"))
-    assert len(list(group.iter("Vertex"))) == steps

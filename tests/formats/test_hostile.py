@@ -9,16 +9,13 @@ from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
 from pathlib import Path
-from threading import Thread
 from typing import NamedTuple
 
 import pytest
 
 from augment.errors import InvalidDocument
 from augment.formats.apart import UntrustedInput
-from augment.formats.readers import READERS
-from tests.formats.av2_logs import write_log
-from tests.formats.hostile_files import HOSTILE, scenarionet_of_nested_tuples_as_a_key
+from tests.formats.hostile_files import HOSTILE
 
 MOST_CPU_S = 10.0
 MOST_MB = 1024
@@ -63,18 +60,3 @@ def test_a_hostile_file_is_refused_in_good_time_and_a_gigabyte(
     assert re.match(r"This .* can't be read: ", refusal.reason)
     assert refusal.cpu_s < MOST_CPU_S
     assert refusal.most_mb < MOST_MB
-
-
-def test_a_frozen_reader_leaves_time_to_read_another_file(tmp_path: Path) -> None:
-    _, hostile = scenarionet_of_nested_tuples_as_a_key(tmp_path)
-
-    def freeze() -> None:
-        with pytest.raises(InvalidDocument, match="computing"):
-            read(hostile, "scenarionet")
-
-    frozen = Thread(target=freeze)
-    frozen.start()
-    log = UntrustedInput(path=write_log(tmp_path / "log"))
-    assert log.read(item=None, frame=None, name="street")[0] == READERS["av2"].name
-    assert frozen.is_alive()
-    frozen.join()

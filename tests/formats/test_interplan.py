@@ -5,11 +5,9 @@ import pytest
 import yaml
 
 from augment.errors import Conflict
-from augment.formats.documents import read_yaml
-from augment.formats.interplan.file import WHAT, ReadEntry, file_of, token_of
+from augment.formats.interplan.file import token_of
 from augment.formats.interplan.writer import interplan_text as write
 from augment.formats.writing import Cell
-from augment.geometry.frames import difference
 from augment.scene.entities import (
     AgentType,
     Modification,
@@ -43,10 +41,10 @@ def tellable(slug: str) -> tuple[TrafficAgent, ...]:
     return tuple(one for one in entry(slug).reference.added if one.type not in UNTOLD)
 
 
-def read_again(one: Cell) -> ReadEntry:
+def read_again(one: Cell) -> Modification:
     text, _ = write([one])
     scene = without_traffic(one.scene)
-    (found,) = entries_of(text, {token_of(scene.name): scene})
+    ((found, _),) = entries_of(text, {token_of(scene.name): scene})
     return found
 
 
@@ -56,97 +54,44 @@ def first(slug: str) -> TrafficAgent:
 
 @pytest.mark.parametrize("slug", SLUGS)
 def test_a_reference_comes_back_within_a_centimetre_and_a_milliradian(slug: str) -> None:
-    wanted, found = entry(slug), read_again(cell(slug))
-    assert found.type is wanted.type
-    for made, given in zip(found.modification.added, tellable(slug), strict=True):
-        assert made.type is given.type
-        assert (made.x_m, made.y_m) == pytest.approx((given.x_m, given.y_m), abs=0.01)
-        assert abs(difference(made.heading_rad, given.heading_rad)) < 0.001
+    found, wanted = read_again(cell(slug)).added, tellable(slug)
+    assert [change for change in agent_changes(wanted, found) if change.aspect != "velocity"] == []
+    for made, given in zip(found, wanted, strict=True):
         assert made.lane_id == given.lane_id
-        assert (made.length_m, made.width_m) == (given.length_m, given.width_m)
         assert made.speed_mps == pytest.approx(given.speed_mps, abs=0.02)
-        assert (made.walk_to_m is None) == (given.walk_to_m is None)
-        if made.walk_to_m is not None and given.walk_to_m is not None:
-            assert made.walk_to_m == pytest.approx(given.walk_to_m, abs=0.01)
 
 
 def test_plain_yaml_shows_interplans_keys() -> None:
-    slug = "roadworks-mill-junction"
-    text, _ = write([cell(slug), cell("jaywalker-terrace-row")])
+    text, _ = write([cell("roadworks-mill-junction"), cell("jaywalker-terrace-row")])
     document = yaml.safe_load(text)
-    assert list(document) == [
-        "accel_max",
-        "decel_max",
-        "scenario_specifics",
-        "modification_details_dictionary",
-    ]
-    by_token = document["modification_details_dictionary"]
+    by_token = document.pop("modification_details_dictionary")
+    assert document == {"accel_max": 1.0, "decel_max": 2.0, "scenario_specifics": None}
     assert list(by_token) == [token_of("mill-junction"), token_of("terrace-row")]
     details = by_token[token_of("mill-junction")]
-    assert list(details) == [
-        "extra_agents_to_spawn",
-        "roadblock_locations_to_spawn_agents",
-        "goal",
-        "spawn_in_intersection",
-        "special_scenario",
-    ]
-    assert details["goal"] == {"left": None, "right": None, "straight": None}
-    zone = details["special_scenario"]["0"]
+    zone = details.pop("special_scenario")["0"]
+    assert details == {
+        "extra_agents_to_spawn": [],
+        "roadblock_locations_to_spawn_agents": [],
+        "goal": {"left": None, "right": None, "straight": None},
+        "spawn_in_intersection": False,
+    }
     assert list(zone) == ["type", "cones", "pedestrian"]
     assert zone["type"] == "approaching_construction_zone"
     assert [len(cone) for cone in zone["cones"]] == [2] * 4
     (worker,) = zone["pedestrian"]
     assert math.dist(worker[:2], worker[2:4]) == pytest.approx(1.0, abs=0.001)
     assert worker[4] is None
-    # interPlan's facts: a special scenario without density loses every recorded vehicle, with
-    # "config: a1" too, so nothing is promised.
-    kept = by_token[token_of("terrace-row")]["special_scenario"]["0"]
-    assert list(kept) == ["type", "pedestrian"]
+    assert f'"{token_of("mill-junction")}":' in text, "some look like numbers"
 
 
-@pytest.mark.parametrize("keeps_traffic", [True, False])
-@pytest.mark.parametrize("slug", SLUGS[:1])
-def test_kept_traffic_that_interplan_removes_is_said_in_report_and_file(
-    slug: str, keeps_traffic: bool
-) -> None:
-    one = cell(slug, keeps_traffic=keeps_traffic)
+def test_kept_traffic_that_interplan_removes_is_said_in_report_and_file() -> None:
+    one = cell(SLUGS[0], keeps_traffic=True)
     text, losses = write([one])
-    said = [loss.text for loss in losses if loss.changes_scene]
-    if keeps_traffic:
-        number = len(one.scene.agents)
-        assert number > 0
-        assert said == [
-            f"the recorded traffic, which this scenario keeps ({number} agents), is gone: "
-            "interPlan removes all of it from every special scenario"
-        ]
-        assert f"#   lost: {said[0]}\n" in text.replace("# lost", "#   lost")
-    else:
-        assert said == []
+    (said,) = (loss.text for loss in losses if loss.changes_scene)
+    assert f"which this scenario keeps ({len(one.scene.agents)} agents), is gone" in said
+    assert f"# lost: {said}\n" in text
+    # Not by "config: a1" either: interPlan deletes all vehicles then too.
     assert "config" not in text.partition("accel_max")[2]
-
-
-def test_signs_and_barriers_are_named_as_left_out() -> None:
-    slug = "roadworks-mill-junction"
-    _, losses = write([cell(slug, *entry(slug).reference.added)])
-    assert [loss.text.partition(": ")[2] for loss in losses if loss.changes_scene] == [
-        "there is no key for a CONSTRUCTION_SIGN there",
-        "there is no key for a BARRIER there",
-    ]
-
-
-def test_places_are_in_the_frame_of_the_scenes_origin() -> None:
-    slug = "overtake-mill-junction"
-    text, _ = write([cell(slug)])
-    details = yaml.safe_load(text)["modification_details_dictionary"][token_of("mill-junction")]
-    ((x_m, y_m, yaw_rad),) = details["special_scenario"]["0"]["stopped_vehicle"]
-    origin = whole_scene("mill-junction").origin.pose
-    assert math.dist((x_m, y_m), (origin.x_m, origin.y_m)) == pytest.approx(24.0, abs=0.01)
-    assert difference(yaw_rad, origin.heading_rad) == pytest.approx(0.0, abs=0.001)
-
-
-def test_tokens_are_quoted_because_some_look_like_numbers() -> None:
-    text, _ = write([cell(SLUGS[0])])
-    assert f'"{token_of(entry(SLUGS[0]).scene)}":' in text
 
 
 def test_several_of_one_scene_are_numbered_and_named_in_comments() -> None:
@@ -156,14 +101,6 @@ def test_several_of_one_scene_are_numbered_and_named_in_comments() -> None:
     assert f"# {token}-s1 plane-tree-street: another" in text
     with pytest.raises(Conflict, match="at most 100"):
         write([same] * 101)
-
-
-def test_a_walk_of_no_length_becomes_a_step_along_the_heading() -> None:
-    given = first("jaywalker-plane-tree-street")
-    still = replace(given, walk_to_m=(given.x_m, given.y_m), speed_mps=0.0)
-    back = read_again(cell("jaywalker-plane-tree-street", still)).modification.added[0]
-    assert abs(difference(back.heading_rad, still.heading_rad)) < 0.001
-    assert back.walk_to_m is None
 
 
 def test_a_name_with_control_characters_leaves_a_file_that_can_be_read() -> None:
@@ -197,18 +134,12 @@ modification_details_dictionary:
         - [{x_m}, {y_m}, {x_m + 8}, {y_m}, 12]
         - [{x_m}, {y_m}, {x_m}, {y_m}, null]
 """
-    (found,) = entries_of(text, {AB: scene})
-    assert found.id == f"{AB}-s0"
-    assert found.type is ScenarioType.JAYWALKER
-    assert found.left_out == (
+    ((found, left_out),) = entries_of(text, {AB: scene})
+    assert left_out == [
         "pedestrian 0 starts at iteration 12",
         "pedestrian 1 walks 0 m, which gives it no direction",
-    )
-    assert found.modification.added[0].speed_mps == pytest.approx(8.0 / 15.0, abs=0.01)
-    file = file_of(read_yaml(text, what=WHAT))
-    assert file.left_out == ("key colour", "scenario_specifics")
-    details = file.modification_details_dictionary[AB]
-    assert details.left_out == ("spawn_in_intersection", "key weather")
+    ]
+    assert found.added[0].speed_mps == pytest.approx(8.0 / 15.0, abs=0.01)
 
 
 ODD = {
@@ -237,8 +168,8 @@ def test_what_interplan_changes_has_a_line_with_its_name(odd: str, kind: Scenari
     given = cells.cell(added=(ODD[odd], cone("Agent10", 20.0, -1.0)), type=kind)
     text, losses = write([given])
     scene = without_traffic(given.scene)
-    (found,) = entries_of(text, {token_of(scene.name): scene})
-    wanted, got = given.modification.added, found.modification.added
+    ((found, _),) = entries_of(text, {token_of(scene.name): scene})
+    wanted, got = given.modification.added, found.added
     assert len(got) == (1 if odd in ("missing", "another scene") else 2)
     changed = {change.name for change in agent_changes(wanted, got)}
     if odd != "walk" or kind is ScenarioType.JAYWALKER:

@@ -2,14 +2,15 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from augment.formats.readers import READERS
-from augment.formats.road_map import Segment, crossing_segments, fill_widths
+from augment.formats.road_map import RoadMap, Segment, complete_map, crossing_segments, fill_widths
+from augment.formats.roads import road_around
+from augment.geometry.frames import Pose
 from augment.scene.entities import TurnType
+from augment.scene.recording import SceneNoteKind
 
 Points = Sequence[tuple[float, float]]
 
@@ -72,41 +73,12 @@ def test_an_assumed_width_inside_becomes_the_mean_of_its_ends() -> None:
     assert still == 1, "a lane that lies in no intersection keeps what was assumed"
 
 
-def write_2018b(path: Path) -> Path:
-    """The crossing as lanelets of the older dialect, which has no intersections."""
-    numbers = {name: number for number, name in enumerate(CROSSING, start=1)}
-    lanelets = []
-    for name, one in CROSSING.items():
-        assert one.centerline is not None
-        line = one.centerline
-        ways = np.gradient(line, axis=0)
-        normals = np.column_stack([-ways[:, 1], ways[:, 0]]) / np.hypot(*ways.T)[:, None]
-        bounds = "".join(
-            f"<{tag}>"
-            + "".join(f"<point><x>{x}</x><y>{y}</y></point>" for x, y in line + side * normals)
-            + f"</{tag}>"
-            for tag, side in (("leftBound", 1.75), ("rightBound", -1.75))
-        )
-        after = "".join(f'<successor ref="{numbers[key]}"/>' for key in map(str, one.successors))
-        lanelets.append(f'<lanelet id="{numbers[name]}">{bounds}{after}</lanelet>')
-    start = (
-        "<position><point><x>-20</x><y>-2</y></point></position>"
-        "<orientation><exact>0</exact></orientation><time><exact>0</exact></time>"
-        "<velocity><exact>5</exact></velocity>"
-    )
-    path.write_text(
-        '<commonRoad commonRoadVersion="2018b" benchmarkID="T" timeStepSize="0.1">'
-        + "".join(lanelets)
-        + f'<planningProblem id="99"><initialState>{start}</initialState></planningProblem>'
-        + "</commonRoad>"
-    )
-    return path
-
-
-def test_the_older_dialect_of_commonroad_has_connectors_with_turns(tmp_path: Path) -> None:
-    file = write_2018b(tmp_path / "crossing.xml")
-    scene = READERS["commonroad"].read(file, item=None, frame=None, name="crossing").scene
-    turns = sorted(one.turn_type for one in scene.connectors)
+def test_a_map_that_does_not_tell_has_connectors_with_turns() -> None:
+    told = RoadMap(place="map", segments=tuple(CROSSING.values()), tells_crossings=False)
+    city, notes = complete_map(told)
+    road = road_around(city, Pose(x_m=-20.0, y_m=-2.0, heading_rad=0.0))
+    turns = sorted(one.turn_type for one in road.connectors)
     assert turns == sorted([TurnType.STRAIGHT] * 2 + [TurnType.LEFT] * 2 + [TurnType.RIGHT])
-    assert all(one.from_lane and one.to_lane for one in scene.connectors)
-    assert len(scene.lanes) == len(CROSSING) - 5
+    assert all(one.from_lane and one.to_lane for one in road.connectors)
+    assert len(road.lanes) == len(CROSSING) - 5
+    assert SceneNoteKind.NO_INTERSECTIONS not in {note.kind for note in notes}

@@ -137,44 +137,6 @@ def test_tags_are_notes(log: Path) -> None:
     assert notes[SceneNoteKind.SCENARIO_TAGS].names == ("high_magnitude_speed",)
 
 
-def test_feature_ids_may_be_texts_and_logs_may_name_the_city_otherwise(log: Path) -> None:
-    (file,) = log.parent.glob("maps/*/*/map.gpkg")
-    wanted = scene_to_document(read(log).scene)
-    for name, change in (
-        (file, "UPDATE lanes_polygons SET left_boundary_fid = '' || left_boundary_fid"),
-        (file, "UPDATE lane_connectors SET exit_lane_fid = 1.0"),
-        (log, "UPDATE log SET location = 'one-north'"),
-    ):
-        base = sqlite3.connect(name)
-        base.execute(change)
-        base.commit()
-        base.close()
-    found = scene_to_document(read(log).scene)
-    for made in (wanted, found):
-        made.pop("origin")
-    assert found == wanted
-
-
-def test_every_frame_with_a_tag_can_be_taken(log: Path) -> None:
-    base = sqlite3.connect(log)
-    row = (token(5001), token(115), "high_magnitude_speed", None)
-    base.execute("INSERT INTO scenario_tag VALUES (?, ?, ?, ?)", row)
-    base.commit()
-    base.close()
-    for item, wanted in (("", 110), (":0", 110), (":1", 115)):
-        found = read(log, f"tag:high_magnitude_speed{item}").moment.item
-        assert found == token(wanted).hex()
-    assert "2 frames have the tag 'high_magnitude_speed', from 0 on; not 2" in fault_of(
-        log, "tag:high_magnitude_speed:2"
-    )
-
-
-def test_moments_are_tokens(log: Path) -> None:
-    found = [one.item for one in NuPlan().moments(log, every_s=0.5)]
-    assert found == [token(100).hex(), token(110).hex(), token(120).hex()]
-    assert NuPlan().recognises(log)
-
-
 def test_what_is_not_there_is_named(log: Path, tmp_path: Path) -> None:
     assert "there is no lidar_pc 00000000000003e7" in fault_of(log, token(999).hex())
     assert "neither a token of 16 hex digits" in fault_of(log, "x")
@@ -186,56 +148,29 @@ def test_what_is_not_there_is_named(log: Path, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("change", "said"),
+    ("file", "change", "said"),
     [
-        ("DROP TABLE track", "no such table: track"),
-        ("ALTER TABLE lidar_box DROP COLUMN yaw", "no such column: yaw"),
-        ("DELETE FROM log", "log: has no row"),
-        ("DELETE FROM ego_pose", "has no pose for lidar_pc"),
-        ("UPDATE category SET name = 'tank'", "unknown 'tank'"),
-        ("UPDATE ego_pose SET x = 'west'", "array of numbers"),
-        ("UPDATE ego_pose SET x = 1e300", "needs finite numbers"),
-        ("UPDATE ego_pose SET qw = 9e999", "needs finite numbers"),
-        ("UPDATE lidar_pc SET timestamp = 'noon'", "no whole number"),
-        ("UPDATE traffic_light_status SET lane_connector_id = 'x'", "no whole number"),
-        ("UPDATE lidar_box SET vx = 'fast'", "array of numbers"),
-        ("DELETE FROM lidar_pc", "there is no lidar_pc"),
-        ("UPDATE log SET logfile = CAST(x'80' AS TEXT)", "can't be read as a database"),
-        ("UPDATE log SET location = '../../etc'", "is no name of a map"),
+        ("made.db", "DROP TABLE track", "no such table: track"),
+        ("made.db", "DELETE FROM log", "log: has no row"),
+        ("made.db", "DELETE FROM ego_pose", "has no pose for lidar_pc"),
+        ("made.db", "UPDATE category SET name = 'tank'", "unknown 'tank'"),
+        ("made.db", "UPDATE ego_pose SET x = 'west'", "array of numbers"),
+        ("made.db", "UPDATE ego_pose SET qw = 9e999", "needs finite numbers"),
+        ("made.db", "UPDATE lidar_pc SET timestamp = 'noon'", "no whole number"),
+        ("made.db", "UPDATE log SET logfile = CAST(x'80' AS TEXT)", "can't be read as a database"),
+        ("made.db", "UPDATE log SET location = '../../etc'", "is no name of a map"),
+        ("map.gpkg", "UPDATE meta SET value = 'EPSG:3857'", "is no UTM zone"),
+        ("map.gpkg", "UPDATE baseline_paths SET geom = substr(geom, 1, 30)", "broken geometry"),
+        ("map.gpkg", "UPDATE gpkg_geometry_columns SET srs_id = 3857", "which is not read"),
+        ("map.gpkg", "UPDATE baseline_paths SET lane_fid = -1.5", "is no feature id"),
     ],
 )
-def test_a_broken_log_says_what_is_wrong(log: Path, change: str, said: str) -> None:
-    base = sqlite3.connect(log)
+def test_a_broken_log_or_map_says_what_is_wrong(
+    log: Path, file: str, change: str, said: str
+) -> None:
+    (path,) = log.parent.rglob(file)
+    base = sqlite3.connect(path)
     base.executescript(change)
     base.commit()
     base.close()
     assert said in fault_of(log)
-
-
-@pytest.mark.parametrize(
-    ("change", "said"),
-    [
-        ("DELETE FROM meta", "is no UTM zone"),
-        ("UPDATE meta SET value = 'EPSG:3857'", "is no UTM zone"),
-        ("UPDATE baseline_paths SET geom = x'4750'", "broken geometry"),
-        ("UPDATE baseline_paths SET geom = substr(geom, 1, 30)", "broken geometry"),
-        ("UPDATE gpkg_geometry_columns SET srs_id = 3857", "EPSG:3857, which is not read"),
-        ("DROP TABLE lanes_polygons", "no such table: lanes_polygons"),
-        ("UPDATE baseline_paths SET geom = zeroblob(40)", "does not begin with GP"),
-        ("UPDATE baseline_paths SET lane_fid = 'x'", "is no feature id"),
-        ("UPDATE baseline_paths SET lane_fid = -1.5", "is no feature id"),
-    ],
-)
-def test_a_broken_map_says_what_is_wrong(log: Path, change: str, said: str) -> None:
-    (file,) = log.parent.glob("maps/*/*/map.gpkg")
-    base = sqlite3.connect(file)
-    base.executescript(change)
-    base.commit()
-    base.close()
-    assert said in fault_of(log)
-
-
-def test_what_is_no_database_is_refused(tmp_path: Path) -> None:
-    file = tmp_path / "made.db"
-    file.write_bytes(b"SQLite format 3\0" + b"x" * 5000)
-    assert "can't be read as a database" in fault_of(file)

@@ -1,7 +1,5 @@
 """What every log has in common, however it was read."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -26,7 +24,8 @@ def test_cones_never_move_however_their_boxes_jitter(kind: AgentType, speed_mps:
     )
     log = Log(
         times_s=np.zeros(1),
-        ego=replace(jittering, type=AgentType.EGO_VEHICLE, states=np.zeros((1, 4))),
+        ego=np.zeros((1, 4)),
+        ego_size_m=(4.8, 2.0),
         tracks=(jittering,),
         map_at=lambda _: RoadMap(place="map", segments=()),
         world="world",

@@ -85,9 +85,6 @@ def knot() -> Scene:
     """What no scene of the catalogue has: odd turns, lights, widths, ends, neighbours."""
     base = crossing()
     ahead, left = base.connectors
-    bend = Polyline(
-        [(60.0 + 20.0 * np.sin(a), 20.0 * np.cos(a) - 30.0) for a in (0.0, 0.5, 1.0, 1.5)]
-    )
     lanes = (
         replace(base.lanes[0], right_neighbor="Lane4", speed_limit_mps=8.33),
         replace(base.lanes[1], successors=("Lane5",), speed_limit_mps=27.7777),
@@ -100,9 +97,7 @@ def knot() -> Scene:
             left_boundary=Polyline([(100.0, 2.0), (110.0, 3.0), (120.0, 3.0)]),
             right_boundary=Polyline([(100.0, -2.0), (120.0, -1.0)]),
         ),
-        # After a way through the junction alone, and bending: a lane nevertheless.
-        Lane(id="Lane6", centerline=bend, width_m=3.5, successors=("Lane7",)),
-        Lane(id="Lane7", centerline=Polyline([bend.points_m[-1], (80.0, -40.0)]), width_m=3.5),
+        Lane(id="Lane6", centerline=Polyline([(60.0, -10.0), (80.0, -40.0)]), width_m=3.5),
     )
     connectors = (
         replace(ahead, turn_type=TurnType.RIGHT, traffic_light=TrafficLight.YELLOW),

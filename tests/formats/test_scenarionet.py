@@ -6,17 +6,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from augment.errors import InvalidDocument
 from augment.formats.reading import Reading
 from augment.formats.scenarionet.scenario import ScenarioNet
-from augment.formats.scenarionet.unpickling import read_pickle
 from augment.scene.codec import scene_to_document
 from augment.scene.entities import AreaKind, TrafficLight, TrafficSide, TurnType
 from augment.scene.recording import SceneNoteKind
-from tests.properties import examples
 
 
 def moving(x: float, speed: float, steps: int = 3, **fields: object) -> dict[str, Any]:
@@ -129,23 +125,13 @@ class Evil:
         return os.system, ("touch /tmp/it-ran",)
 
 
-class Eval:
-    """Evaluates when it is unpickled."""
-
-    def __reduce__(self) -> tuple[object, tuple[str]]:
-        return eval, ("1/0",)
-
-
 @pytest.mark.parametrize(
     ("block", "said"),
     [
         (pickle.dumps(Evil()), "system is not on the list"),
-        (pickle.dumps({"tracks": Eval()}, protocol=2), "eval is not on the list"),
         (pickle.dumps(np.zeros(2, dtype=[("a", "f8")])), "are not read"),
         (b"\x80\x04r\xff\xff\xff\xffN.", "can't be unpickled safely"),
         (b"\x80\x04\x82\x01.", "unregistered extension"),
-        (b"", "can't be unpickled safely"),
-        (b"hello", "can't be unpickled safely"),
         (pickle.dumps([1, 2]), "tracks: is missing"),
         (pickle.dumps({"tracks": {}}), "map_features: is missing"),
     ],
@@ -154,15 +140,6 @@ def test_hostile_pickles_are_refused(tmp_path: Path, block: bytes, said: str) ->
     file = tmp_path / "evil.pkl"
     file.write_bytes(block)
     assert said in fault_of(file)
-
-
-def test_an_array_that_claims_more_than_it_holds_is_refused(tmp_path: Path) -> None:
-    block = pickle.dumps(np.zeros(3), protocol=2)
-    at = block.index(b"K\x03\x85")
-    file = tmp_path / "claims.pkl"
-    file.write_bytes(block[:at] + b"\x8a\x06\xff\xff\xff\xff\xff\x00\x85" + block[at + 3 :])
-    with pytest.raises(InvalidDocument, match="can't be unpickled safely"):
-        read_pickle(file)
 
 
 @pytest.mark.parametrize(
@@ -174,7 +151,6 @@ def test_an_array_that_claims_more_than_it_holds_is_refused(tmp_path: Path) -> N
         ({"map_features": {"a": {"polyline": []}}}, "needs a type"),
         ({"map_features": {"a": strip(0, 1, polyline=np.zeros(4))}}, "needs 2 numbers a row"),
         ({"map_features": {"a": strip(0.0, 1e300)}}, "up to 1e+08"),
-        ({"map_features": {"a": strip(0.0, float("nan"))}}, "finite"),
         ({"dynamic_map_states": {"a": {"state": {"object_state": ["BLUE"]}}}}, "'BLUE'"),
     ],
 )
@@ -183,26 +159,3 @@ def test_odd_descriptions_are_refused(tmp_path: Path, change: dict[str, Any], sa
     if "sdc_id" not in made["metadata"]:
         made["metadata"] = description()["metadata"]
     assert said in fault_of(store(tmp_path, made))
-
-
-@given(st.data())
-@examples(60)
-def test_any_change_of_a_pickle_is_read_or_refused(
-    tmp_path_factory: pytest.TempPathFactory, data: st.DataObject
-) -> None:
-    block = bytearray(pickle.dumps(description(), protocol=4))
-    for _ in range(data.draw(st.integers(1, 5))):
-        block[data.draw(st.integers(0, len(block) - 1))] = data.draw(st.integers(0, 255))
-    file = tmp_path_factory.getbasetemp() / "changed.pkl"
-    file.write_bytes(block[: data.draw(st.integers(0, len(block)))] or bytes(block))
-    try:
-        scene_to_document(read(file).scene)
-    except InvalidDocument:
-        return
-
-
-def test_nothing_is_opened_to_recognise_it(tmp_path: Path) -> None:
-    file = tmp_path / "made.pkl"
-    file.write_bytes(pickle.dumps(Evil()))
-    assert ScenarioNet().recognises(file)
-    assert not Path("/tmp/it-ran").exists()

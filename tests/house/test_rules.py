@@ -22,7 +22,7 @@ HEAVY = {
     "scenariogeneration": ("augment.formats",),
     "matplotlib": ("arena.jobs.exports", "arena.results.exports"),
     "scipy.interpolate": ("augment.fake_llm",),
-    "scipy.optimize": ("augment.metrics",),
+    "scipy.optimize": ("augment.metrics", "arena.pairing"),
     "scipy.signal": ("augment.simulation",),
     "scipy.sparse": ("arena.rating",),
     "scipy.spatial": ("augment.formats", "augment.simulation"),

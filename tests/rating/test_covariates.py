@@ -91,7 +91,7 @@ def test_what_says_no_more_than_who_was_shown_is_left_out_and_said() -> None:
     "rules", [{"method": Method.DAVIDSON}, {"intervals": Intervals.RESAMPLES}]
 )
 def test_other_methods_take_no_covariates(rules: dict[str, object]) -> None:
-    with pytest.raises(ValueError, match="covariates need Bradley-Terry"):
+    with pytest.raises(ValueError, match="can be adjusted for covariates"):
         rate(adjusted()[1], **rules)  # type: ignore[arg-type]
 
 

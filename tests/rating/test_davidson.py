@@ -2,7 +2,6 @@
 
 import math
 
-import numpy as np
 import pytest
 
 from arena.rating.chains import Status
@@ -25,17 +24,6 @@ def test_without_ties_it_is_bradley_terry() -> None:
     one, other = (by_votes(votes, method=m) for m in (Method.DAVIDSON, Method.BRADLEY_TERRY))
     assert [line.rating for line in one.lines] == [line.rating for line in other.lines]
     assert one.tie_strength is None
-
-
-def test_the_order_stays_and_the_spread_grows_with_ties() -> None:
-    votes = simulated([1080.0, 1030.0, 1000.0, 960.0, 930.0], 6000, 2, ties=0.6)
-    half_wins = np.array([line.rating for line in by_votes(votes).lines], dtype=np.float64)
-    davidson = np.array(
-        [line.rating for line in by_votes(votes, method=Method.DAVIDSON, rounds=300).lines],
-        dtype=np.float64,
-    )
-    assert np.argsort(davidson).tolist() == np.argsort(half_wins).tolist()
-    assert np.ptp(davidson) > 1.5 * np.ptp(half_wins)
 
 
 def test_it_has_intervals_by_every_unit() -> None:

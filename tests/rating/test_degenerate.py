@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from arena.rating.chains import Status
-from arena.rating.comparisons import Comparison, Comparisons, as_arrays
+from arena.rating.comparisons import Comparisons
 from arena.rating.leaderboard import Leaderboard, Method, rate
-from arena.rating.rules import Intervals, TooManyContestants, Unit
-from tests.rating.votes import by_votes, named, versus
+from arena.rating.rules import TooManyContestants, Unit
+from tests.rating.votes import as_arrays, by_votes, named, versus
 
 
 def unrated(board: Leaderboard) -> bool:
@@ -26,10 +26,6 @@ def test_no_votes(method: Method) -> None:
     assert (board.status, board.explanation) == (Status.NO_VOTES, "There are no votes to rate.")
     assert unrated(board)
     assert [line.note for line in board.lines] == ["no votes", "no votes"]
-
-
-def test_no_contestants() -> None:
-    assert by_votes(as_arrays((), [])).status is Status.NO_VOTES
 
 
 def test_one_contestant() -> None:
@@ -108,17 +104,6 @@ def test_a_few_rounds_without_ratings_are_counted_and_leave_both_bounds() -> Non
     assert board.lines[0].lower is not None
 
 
-def test_a_single_expert_leaves_nothing_to_resample_by_expert() -> None:
-    rules = {"unit": Unit.EXPERT, "rounds": 50, "intervals": Intervals.RESAMPLES}
-    board = by_votes(named(versus("a", "b", 6, 0, 5)), **rules)
-    assert board.status is Status.NO_INTERVALS
-    assert "No intervals can be given" in board.explanation
-    assert [(line.lower, line.upper, line.rank) for line in board.lines] == [
-        (None, None, None)
-    ] * 2
-    assert "no interval and no rank" in board.lines[0].note
-
-
 @pytest.mark.parametrize("method", Method)
 @pytest.mark.parametrize("score", ["win", "tie"])
 def test_a_single_vote_has_no_interval_of_zero_width(method: Method, score: str) -> None:
@@ -130,42 +115,12 @@ def test_a_single_vote_has_no_interval_of_zero_width(method: Method, score: str)
     assert all(line.rank is None for line in board.lines)
 
 
-@pytest.mark.parametrize(
-    ("vote", "sentence"),
-    [
-        (Comparison(first="a", second="a", score=1.0), "vote 2: 'a' is compared with itself"),
-        (Comparison(first="a", second="x", score=1.0), "vote 2: 'x' is none of a, b"),
-        (Comparison(first="a", second="b", score=0.7), "vote 2: a score is 1, 0.5 or 0, not 0.7"),
-    ],
-)
-def test_votes_that_make_no_sense_are_refused_with_their_number(
-    vote: Comparison, sentence: str
-) -> None:
-    good = Comparison(first="a", second="b", score=0.5)
-    with pytest.raises(ValueError, match=sentence):
-        as_arrays(("a", "b"), [good, vote])
-
-
 def test_rules_that_make_no_sense_are_refused() -> None:
     votes = named(versus("a", "b", 6, 0, 5))
     with pytest.raises(ValueError, match="at least 1 round, not 0"):
         by_votes(votes, rounds=0)
     with pytest.raises(ValueError, match="single votes only, not by scenario"):
         by_votes(votes, method=Method.ELO, unit=Unit.SCENARIO)
-    with pytest.raises(ValueError, match="named twice"):
-        as_arrays(("a", "a"), [])
-
-
-def test_experts_who_cancel_themselves_out_leave_no_degrees_of_freedom() -> None:
-    votes = [
-        Comparison(first=first, second=second, score=score, expert=expert, scenario="s")
-        for first, second, expert in (("c", "b", "x"), ("b", "a", "y"))
-        for score in (0.0, 1.0)
-    ]
-    board = rate(as_arrays(("a", "b", "c"), votes), unit=Unit.EXPERT, rounds=30)
-    assert [line.rating for line in board.lines] == pytest.approx([1000.0] * 3)
-    bounds = [bound for line in board.lines for bound in (line.lower, line.upper)]
-    assert all(bound is None or math.isfinite(bound) for bound in bounds)
 
 
 def test_more_than_two_thousand_contestants_are_refused() -> None:

@@ -7,11 +7,10 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from arena.rating.comparisons import LOSS, TIE, WIN, Comparison, Comparisons, as_arrays, tally
+from arena.rating.comparisons import LOSS, TIE, WIN, Comparisons, tally
 from arena.rating.leaderboard import Leaderboard, Method
-from arena.rating.rules import Unit
 from tests.properties import examples
-from tests.rating.votes import by_votes
+from tests.rating.votes import Comparison, as_arrays, by_votes
 
 NAMES = ("a", "b", "c", "d")
 votes_of_four = st.lists(
@@ -93,15 +92,6 @@ def test_every_vote_twice_leaves_the_ratings(drawn: list[tuple[list[str], float,
     )
 
 
-@given(votes_of_four, st.sampled_from(Unit))
-@examples(60)
-def test_the_mean_is_1000_whatever_the_unit(
-    drawn: list[tuple[list[str], float, str]], unit: Unit
-) -> None:
-    board = by_votes(as_arrays(NAMES, as_votes(drawn)), rounds=20, unit=unit)
-    assert np.mean(list(ratings(board).values())) == pytest.approx(1000, abs=1e-6)
-
-
 @given(votes_of_four)
 @examples(60)
 def test_counts_add_up(drawn: list[tuple[list[str], float, str]]) -> None:
@@ -131,14 +121,3 @@ def some_votes() -> Comparisons:
         expert=rng.integers(0, 5, 300),
         scenario=rng.integers(0, 7, 300),
     )
-
-
-@pytest.mark.parametrize("unit", Unit)
-def test_a_block_of_rounds_draws_what_single_rounds_draw(unit: Unit) -> None:
-    few, many = (
-        by_votes(some_votes(), rounds=40, unit=unit),
-        by_votes(some_votes(), rounds=41, unit=unit),
-    )
-    assert [line.rating for line in few.lines] == [line.rating for line in many.lines]
-    widths = [(line.upper or 0) - (line.lower or 0) for line in few.lines]
-    assert min(widths) > 0

@@ -7,11 +7,11 @@ import pytest
 
 from arena.rating.bootstrap import percentile_interval
 from arena.rating.chains import Status
-from arena.rating.comparisons import Comparison, Comparisons, as_arrays
+from arena.rating.comparisons import Comparisons
 from arena.rating.leaderboard import Intervals, Leaderboard, Line, Method, rate
 from arena.rating.ranking import ranks, shown_ranks
 from arena.rating.rules import Unit
-from tests.rating.votes import by_votes, named, versus
+from tests.rating.votes import Comparison, as_arrays, by_votes, named, versus
 
 NINE = tuple("abcdefghi")
 POINTS = 400.0 / np.log(10.0)
@@ -169,21 +169,6 @@ def test_groups_within_a_round_are_rated_as_if_alone(method: Method) -> None:
         assert found.upper - found.lower == pytest.approx(width, rel=0.12)
         assert found.rank == before.rank
     assert line_of(board, "c").lower is None
-
-
-def test_a_message_names_three_contestants_at_most() -> None:
-    weak = [v for n in range(12) for v in versus("z", f"w{n:02}", 5, 0, 1)]
-    for votes in (
-        weak,
-        weak + versus("y", "z", 0, 0, 5) + versus("x", "z", 0, 1, 2),
-        [v for n in range(12) for v in versus(f"p{n:02}", f"q{n:02}", 5, 1, 1)],
-        [v for n in range(12) for v in versus("z", f"w{n:02}", 5, 0, 0)],
-        [v for n in range(12) for v in versus("z", f"w{n:02}", 0, 0, 5)],
-    ):
-        reasons = by_votes(named(votes), rounds=100).reasons
-        assert reasons
-        for reason in reasons:
-            assert sum(f"{kind}{n:02}" in reason for kind in "wpq" for n in range(12)) <= 6
 
 
 # --- The pieces ----------------------------------------------------------------------------------

@@ -172,7 +172,10 @@ def test_squares_of_clusters_are_those_of_their_sums(clusters: int, contestants:
     cluster_of = np.random.default_rng(1).integers(0, clusters, len(votes))
     cluster_of[:900] = 7  # one cluster pulls at nearly all
     sums = np.zeros((clusters, contestants))
-    np.add.at(sums, (cluster_of, votes.first), pulls.surprise)
-    np.subtract.at(sums, (cluster_of, votes.second), pulls.surprise)
+    surprise = votes.score - 1.0 / (
+        1.0 + np.exp(-np.subtract(*fit(votes)[[votes.first, votes.second]]))
+    )
+    np.add.at(sums, (cluster_of, votes.first), surprise)
+    np.subtract.at(sums, (cluster_of, votes.second), surprise)
     ratings = ELO_PER_LOGIT * sums @ pulls.back.T
     assert pulls.by_cluster(cluster_of, clusters) == pytest.approx(ratings.T @ ratings)

@@ -2,11 +2,11 @@ import numpy as np
 import pytest
 import statsmodels.api as sm
 
-from arena.rating.comparisons import Comparison, Comparisons, count_wins
+from arena.rating.comparisons import Comparisons, count_wins
 from arena.rating.influence import bradley_terry, rank_changes, without_each_expert
 from arena.rating.logistic import side_bias
 from arena.rating.models import ELO_PER_LOGIT
-from tests.rating.votes import fit, named, simulated, versus
+from tests.rating.votes import Comparison, fit, named, simulated, versus
 
 PAPERS = [1042.0, 1039, 1025, 1011, 1003, 998, 984, 953, 941]
 

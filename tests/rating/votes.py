@@ -1,23 +1,45 @@
 """Votes for tests of ratings."""
 
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from arena.rating import models
-from arena.rating.comparisons import (
-    LOSS,
-    TIE,
-    WIN,
-    Comparison,
-    Comparisons,
-    FloatArray,
-    as_arrays,
-    count_pairs,
-)
+from arena.rating.comparisons import LOSS, TIE, WIN, Comparisons, FloatArray, IntArray, count_pairs
 from arena.rating.leaderboard import Leaderboard, rate
 from arena.rating.models import ELO_PER_LOGIT
 from arena.rating.rules import Unit
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Comparison:
+    """One vote: what `first` scored against `second`, who judged, and on which scenario."""
+
+    first: str
+    second: str
+    score: float
+    expert: str = ""
+    scenario: str = ""
+
+
+def as_arrays(names: Sequence[str], votes: Sequence[Comparison]) -> Comparisons:
+    """A row a vote; experts and scenarios are numbered in the order of their names."""
+
+    def number(known: Iterable[str], wanted: list[str]) -> IntArray:
+        order = {name: place for place, name in enumerate(known)}
+        return np.array([order[name] for name in wanted], dtype=np.int64)
+
+    experts, scenarios = ([getattr(v, kind) for v in votes] for kind in ("expert", "scenario"))
+    return Comparisons(
+        names=tuple(names),
+        first=number(names, [vote.first for vote in votes]),
+        second=number(names, [vote.second for vote in votes]),
+        score=np.array([vote.score for vote in votes], dtype=np.float64),
+        expert=number(sorted(set(experts)), experts),
+        scenario=number(sorted(set(scenarios)), scenarios),
+    )
 
 
 def versus(first: str, second: str, wins: int, ties: int, losses: int) -> list[Comparison]:

@@ -75,7 +75,7 @@ def test_the_adjusted_table_stands_with_its_effects(study: Study) -> None:
 def test_what_can_not_be_adjusted_for_is_refused(study: Study) -> None:
     with pytest.raises(UnknownName, match="side, objects, vehicles"):
         ratings.rate_now(study=study, covariates=["length"])
-    with pytest.raises(Conflict, match="Only Bradley-Terry with intervals in closed form"):
+    with pytest.raises(Conflict, match="only Bradley-Terry with intervals in closed form"):
         ratings.rate_now(study=study, covariates=["side"], method="davidson")
     with pytest.raises(CommandError, match="invalid choice"):
         call_command("rate", str(study.code), "--adjust", "length")

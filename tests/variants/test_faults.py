@@ -17,13 +17,12 @@ from augment.fake_llm.server import MODELS, FakeServer, running
 from augment.llm.client import Patience
 from augment.llm.openai_wire import OpenAIWire
 from augment.variants.pipeline import run
-from augment.variants.recipes import GEO, RECIPES, find_recipe
+from augment.variants.recipes import find_recipe
 from augment.variants.respondents import ModelRole, RespondentClient
 from tests.intents import intents
 from tests.scenes import scene
 from tests.variants.memory import MemoryTranscript
 
-ROOT = Path(__file__).resolve().parents[2]
 WISH = "Add a parked vehicle 21.4 m ahead of the ego in its lane."
 with (Path(__file__).parent / "faults.csv").open(encoding="utf-8", newline="") as _file:
     FAULTS = list(csv.DictReader(_file))
@@ -76,19 +75,3 @@ def test_every_model_of_the_stand_in_has_its_row() -> None:
     }
     # Its mistakes are of all kinds and it comes to all outcomes.
     assert named == MODELS.keys() - {"fake-careless"}
-
-
-def test_the_page_on_the_method_names_every_recipe_and_its_parts() -> None:
-    page = (ROOT / "docs" / "method.md").read_text(encoding="utf-8")
-    rows = {
-        cells[0].strip("` "): cells
-        for cells in (line.strip("|").split("|") for line in page.splitlines())
-        if len(cells) == 6
-    }
-    for slug, one in RECIPES.items():
-        _, lanes, tool, review, counts, origin = rows[slug]
-        assert ("Bezier" in lanes) is (one.lane_format == "bezier")
-        assert ("pose_on_lane" in tool) is (one.tools == "pose")
-        assert review.strip() == (one.review.name if one.review else "none")
-        assert ("of equals the last" in counts) is (one.keep == "best")
-        assert ("ours" in origin) is (one.review is GEO.review)

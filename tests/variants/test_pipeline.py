@@ -1,43 +1,20 @@
-import random
-from collections.abc import Iterable
-
 import pytest
 
 from augment.errors import ModelFault
-from augment.llm.client import Patience
 from augment.llm.messages import Reply, Speaker
 from augment.prompts.fill import prompt_version
-from augment.variants.pipeline import Outcome, OutcomeStatus, run
+from augment.variants.pipeline import OutcomeStatus, run
 from augment.variants.recipes import OTM
 from augment.variants.respondents import RespondentClient
 from tests.llm.scripted import ScriptedClient
 from tests.scenes import scene
 from tests.variants.memory import MemoryTranscript
-from tests.variants.playing import GOOD, agent, answer, block
-
-
-class Run:
-    """One run on the street, with everything that it did."""
-
-    def __init__(self, answers: Iterable[str | Reply | ModelFault]) -> None:
-        self.client = ScriptedClient(answers)
-        self.transcript = MemoryTranscript()
-        self.waits: list[float] = []
-
-    def outcome(self) -> Outcome:
-        return run(
-            OTM,
-            scene=scene(),
-            instruction="Add a parked car 21.4 m ahead.",
-            modifier=RespondentClient(client=self.client, model="some-model"),
-            transcript=self.transcript,
-            patience=Patience(sleep=self.waits.append, rng=random.Random(0)),
-        )
+from tests.variants.playing import GOOD, Play, agent, answer, block
 
 
 def test_one_good_answer_is_one_call_and_a_modification() -> None:
-    made = Run([GOOD])
-    outcome = made.outcome()
+    made = Play("otm", [GOOD])
+    outcome = made.outcome
     assert outcome.status is OutcomeStatus.DONE
     assert outcome.modification is not None
     assert [a.id for a in outcome.modification.added] == ["Agent2"]
@@ -45,14 +22,14 @@ def test_one_good_answer_is_one_call_and_a_modification() -> None:
     assert outcome.reason == ""
     (call,) = made.transcript.calls
     assert (call.number, call.role, call.prompt_version) == (1, "modifier", prompt_version())
-    assert call.request.model == "some-model"
+    assert call.request.model == "m"
     assert call.reply is not None
     assert call.reply.text == GOOD
 
 
 def test_an_unreadable_answer_is_asked_for_once_more_with_its_faults() -> None:
-    made = Run([answer(block(agent(x_m="21.4"))), GOOD])
-    assert made.outcome().status is OutcomeStatus.DONE
+    made = Play("otm", [answer(block(agent(x_m="21.4"))), GOOD])
+    assert made.outcome.status is OutcomeStatus.DONE
     second = made.client.requests[1].messages
     assert [m.speaker for m in second] == [
         Speaker.SYSTEM,
@@ -64,8 +41,8 @@ def test_an_unreadable_answer_is_asked_for_once_more_with_its_faults() -> None:
 
 
 def test_a_cut_off_answer_is_asked_for_again_with_twice_the_room() -> None:
-    made = Run([Reply(text=GOOD[:-40], finish_reason="length"), GOOD])
-    assert made.outcome().status is OutcomeStatus.DONE
+    made = Play("otm", [Reply(text=GOOD[:-40], finish_reason="length"), GOOD])
+    assert made.outcome.status is OutcomeStatus.DONE
     first, second = made.client.requests
     assert second.max_tokens == 2 * first.max_tokens
     assert "cut off at its length limit" in second.messages[-1].text
@@ -76,8 +53,13 @@ def test_the_transcript_has_the_answer_before_anybody_reads_it() -> None:
         def answered(self, number: int, reply: Reply, fault: ModelFault | None = None) -> None:
             raise KeyboardInterrupt
 
-    made = Run(["nothing that could be read"])
-    made.transcript = Stops()
+    client = ScriptedClient(["nothing that could be read"])
     with pytest.raises(KeyboardInterrupt):
-        made.outcome()
-    assert len(made.client.requests) == 1
+        run(
+            OTM,
+            scene=scene(),
+            instruction="Add a parked car.",
+            modifier=RespondentClient(client=client, model="m"),
+            transcript=Stops(),
+        )
+    assert len(client.requests) == 1

@@ -1,7 +1,7 @@
 import pytest
 
 from augment.prompts.vectors import LaneFormat
-from augment.variants.recipes import FC, PAPER, TQA, Keep, Recipe, Tools, find_recipe
+from augment.variants.recipes import FC, TQA, Keep, Recipe, Tools, find_recipe
 
 
 @pytest.mark.parametrize("name", ["otm", "OTM", " Otm "])
@@ -12,18 +12,6 @@ def test_a_recipe_is_found_in_any_case(name: str) -> None:
         Tools.NONE,
         None,
     )
-
-
-def test_the_papers_four_are_its_table() -> None:
-    assert [
-        (one.slug, one.lane_format.value, one.review and one.review.name) for one in PAPER
-    ] == [
-        ("otm", "polyline", None),
-        ("fc", "bezier", None),
-        ("tqa", "polyline", "text"),
-        ("vqa", "polyline", "visual"),
-    ]
-    assert [one.slug for one in PAPER if one.tools is Tools.POSE] == ["fc"]
 
 
 def test_a_combination_has_the_parts_of_both() -> None:

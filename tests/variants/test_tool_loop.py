@@ -35,7 +35,6 @@ def test_calls_in_an_answer_are_answered_in_order_and_then_read_on() -> None:
     ("line", "said"),
     [
         ('{"call": "pose_on_lane", "arguments": {"lane": "Lane1"', "one line of the form"),
-        ('{"call": "pose_on_lane"}', "no other keys"),
         ('{"call": "pose_on_lane", "arguments": {}, "why": 1}', "no other keys"),
         ('{"call": 3, "arguments": {}}', "has the form"),
         (call("nearest_lane"), "there is no function 'nearest_lane'; there is pose_on_lane"),
@@ -124,10 +123,3 @@ def test_native_calls_are_answered_one_by_one_and_come_back_as_they_were() -> No
     ]
     assert json.loads(told[0].text)["y_m"] == 0.5
     assert (second.tool_choice, play.x_m) == (ToolChoice.AUTO, 21.4)
-
-
-def test_broken_native_arguments_are_told_and_go_back_as_none() -> None:
-    play = Play("fc", [native('{"lane": "Lane1"'), car(21.4)], native=True)
-    said, told = play.client.requests[1].messages[2:]
-    assert said.calls[0].arguments == "{}"
-    assert "the arguments are not JSON" in json.loads(told.text)["error"]

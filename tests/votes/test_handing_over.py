@@ -52,7 +52,7 @@ class Ballots:
         """One vote in whatever thread; gone is what was handed over in the meantime."""
         decision = decision_of(matchup_code=matchup.code, key=uuid.uuid4(), outcome="left")
         try:
-            receive_vote(expert=expert, decision=decision, ahead=4)
+            receive_vote(expert=expert, decision=decision)
         except NotYours:
             self.refused.append(matchup.code)
         else:

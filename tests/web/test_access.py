@@ -11,129 +11,67 @@ from tests.web.cast import people, signed_in, status, world
 
 pytestmark = pytest.mark.django_db
 
-PAGES: dict[str, tuple[int, int, int]] = {
-    # address: admin, analyst, expert
-    "home": (200, 200, 200),
-    "jobs": (200, 200, 403),
-    "job-new": (200, 403, 403),
-    "job": (200, 200, 403),
-    "job-progress": (200, 200, 403),
-    "metrics": (200, 401, 401),
-    "job-export": (200, 200, 403),
-    "transcripts-export": (200, 200, 403),
-    "scenarios-export": (404, 404, 403),  # nothing was written yet
-    "analyses": (200, 200, 403),
-    "drives": (200, 200, 403),
-    "drive": (200, 200, 403),
-    "drive-file": (404, 404, 403),  # nothing was driven yet
-    "faults": (200, 200, 403),
-    "label": (403, 403, 404),
-    "augmentation": (200, 200, 403),
-    "transcript": (200, 200, 403),
-    "asked-image": (404, 404, 403),
-    "contestants": (200, 200, 403),
-    "contestant-new": (200, 403, 403),
-    "contestant": (200, 200, 403),
-    "endpoints": (200, 200, 403),
-    "endpoint-new": (200, 403, 403),
-    "endpoint": (200, 200, 403),
-    "endpoint-model": (200, 200, 403),
-    "audit": (200, 403, 403),
-    "audit-export": (200, 403, 403),
-    "people": (200, 403, 403),
-    "person-forget": (200, 403, 403),  # a question
-    "password": (200, 200, 200),
-    "scenes": (200, 200, 403),
-    "scene": (200, 200, 403),
-    "upload": (200, 200, 403),
-    "api-tokens": (200, 200, 200),
-    "scenarios": (200, 200, 403),
-    "scenario": (200, 200, 403),
-    "intent": (200, 200, 403),
-    "scenario-new": (200, 200, 403),
-    "intent-edit": (200, 200, 403),
-    "scenario-edit": (200, 200, 403),
-    "scenarios-bulk": (200, 200, 403),
-    "prompts": (200, 200, 403),
-    "prompt-image": (404, 404, 403),  # a modifier is shown none
-    "reference-edit": (200, 200, 403),
-    "correct": (200, 200, 403),
-    "picture": (200, 200, 403),
-    "studies": (200, 200, 403),
-    "study-plan": (200, 200, 403),
-    "import-votes": (200, 403, 403),
-    "study-new": (200, 403, 403),
-    "study-draft": (200, 403, 403),
-    "study": (200, 200, 403),
-    "preregistration": (200, 200, 403),
-    "experts": (200, 403, 403),
-    "enrolment": (200, 403, 403),
-    "enrolment-voters": (404, 403, 403),  # no link was made
-    "results": (200, 200, 403),  # a page that asks whether to look early
-    "results-tab": (200, 200, 403),
-    "results-votes": (403, 403, 403),
-    "results-votes-file": (403, 403, 403),
-    "results-vote": (403, 403, 403),
-    "shown-picture": (403, 403, 403),
-    "results-export": (403, 403, 403),
-    "study-file": (404, 404, 403),  # nothing was written yet
-    "vote": (403, 403, 404),
-    "vote-practice": (403, 403, 404),
-    "vote-skipped": (403, 403, 404),
-    "matchup-image": (200, 403, 404),
-    "replay": (404, 403, 404),  # the study plays no drives
-}
-ACTIONS: dict[str, tuple[int, int, int]] = {
-    "job-retry": (302, 403, 403),
-    "job-retry-cause": (302, 403, 403),
-    "job-pause": (302, 403, 403),
-    "contestant-retired": (302, 403, 403),
-    "endpoint-model-new": (302, 403, 403),
-    "endpoint-probe": (302, 403, 403),
-    "catalogue-load": (302, 403, 403),
-    "scene-send": (302, 302, 403),
-    "edit-check": (422, 422, 403),
-    "upload-show": (302, 302, 403),
-    "upload-remove": (302, 404, 403),  # gone by then
-    "moment-keep": (302, 302, 403),
-    "job-simulate": (302, 403, 403),
-    "scenarios-write": (302, 302, 403),
-    "study-write": (302, 302, 403),
-    "invite": (200, 403, 403),
-    "person-link": (200, 403, 403),
-    "person-change": (302, 403, 403),
-    "api-token-revoke": (404, 404, 404),  # somebody else's
-    "revoke": (302, 403, 403),
-    "author": (302, 403, 403),
-    "set-intent": (302, 302, 403),
-    "scenario-retired": (302, 403, 403),
-    "scenario-delete": (200, 403, 403),
-    "scene-delete": (200, 403, 403),
-    "intent-read": (302, 403, 403),
-    "job-cancel": (200, 403, 403),
-    "job-resume": (302, 403, 403),
-    "study-rate": (403, 403, 403),
-    "rating-again": (403, 403, 403),
-    "results-open": (302, 302, 403),
-    "checks-draw": (302, 403, 403),
-    "study-close": (200, 403, 403),
-    "study-cancel": (200, 403, 403),
-    "study-again": (302, 403, 403),
-    "study-draft-discard": (302, 403, 403),
-    "study-hand-over": (302, 403, 403),
-    "labelling-close": (404, 403, 403),
-    "theme": (302, 302, 302),
-    "language": (302, 302, 302),
-}
+STAFF, ADMIN = (200, 200, 403), (200, 403, 403)
+"""What an admin, an analyst and an expert are answered who take part in nothing."""
+
+
+def _table(names: dict[tuple[int, int, int], str]) -> dict[str, tuple[int, int, int]]:
+    return {name: status for status, of_it in names.items() for name in of_it.split()}
+
+
+PAGES = _table(
+    {
+        STAFF: (
+            "jobs job job-progress job-export transcripts-export analyses drives drive faults "
+            "augmentation transcript contestants contestant endpoints endpoint endpoint-model "
+            "scenes scene upload scenarios scenario intent scenario-new intent-edit "
+            "scenario-edit scenarios-bulk prompts reference-edit correct picture studies "
+            "study-plan study preregistration results results-tab"
+        ),
+        ADMIN: (
+            "job-new contestant-new endpoint-new audit audit-export people person-forget "
+            "import-votes study-new study-draft experts enrolment"
+        ),
+        (404, 404, 403): "scenarios-export drive-file asked-image prompt-image study-file",
+        (403, 403, 403): (
+            "results-votes results-votes-file results-vote shown-picture results-export"
+        ),
+        (403, 403, 404): "label vote vote-practice vote-skipped",
+        (200, 200, 200): "home password api-tokens",
+        (200, 401, 401): "metrics",
+        (404, 403, 403): "enrolment-voters",
+        (200, 403, 404): "matchup-image",
+        (404, 403, 404): "replay",
+    }
+)
+"""By GET."""
+
+ACTIONS = _table(
+    {
+        (403, 403, 403): "study-rate rating-again",  # before anybody looks early
+        (302, 403, 403): (
+            "job-retry job-retry-cause job-pause contestant-retired endpoint-model-new "
+            "endpoint-probe catalogue-load job-simulate person-change revoke author author-back "
+            "scenario-retired intent-read job-resume checks-draw study-again "
+            "study-draft-discard study-hand-over"
+        ),
+        (302, 302, 403): (
+            "scene-send upload-show moment-keep scenarios-write study-write set-intent "
+            "results-open"
+        ),
+        ADMIN: (
+            "invite person-link scenario-delete scene-delete job-cancel study-close study-cancel"
+        ),
+        (302, 302, 302): "theme language",
+        (422, 422, 403): "edit-check",
+        (302, 404, 403): "upload-remove",
+        (404, 404, 404): "api-token-revoke",
+        (404, 403, 403): "labelling-close",
+    }
+)
+"""By POST."""
 OPEN_TO_THE_WORLD = {
-    "login",
-    "logout",
-    "enrol",
-    "invitation",
-    "healthz",
-    "readyz",
-    "metrics",
-    "first",
+    *("login", "logout", "enrol", "invitation", "healthz", "readyz", "metrics", "first"),
     "welcome",
 }
 

@@ -48,6 +48,8 @@ def test_no_list_can_be_filtered_by_what_it_does_not_show(asked: str) -> None:
 
 def test_every_class_of_the_admin_refuses_such_filters() -> None:
     for model, page in admin.site._registry.items():
+        if model._meta.app_label != "augment":
+            continue
         for name in (related.name for related in model._meta.related_objects):
             assert not page.lookup_allowed(f"{name}__pk", "1", None), (model, name)  # type: ignore[arg-type]
 

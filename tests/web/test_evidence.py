@@ -100,24 +100,6 @@ def test_the_votes_on_the_most_disputed_pair_come_first(rated: Snapshot, analyst
         assert b"".join(analyst.get(address))[:4] == b"\x89PNG"
 
 
-def test_the_picture_that_lost_most_comes_first(rated: Snapshot) -> None:
-    search = VoteSearch(contestant="bob", order="lost")
-    votes = list(vote_page(rated, search, 1))
-    lost = []
-    for given in votes:
-        score = next(side.score for side in (given.left, given.right) if side.slug == "bob")
-        assert score is not None
-        lost.append(score.lost_share)
-    assert votes[0].scenario == "place-0"
-    assert lost[0] == 1.0
-    assert lost == sorted(lost, reverse=True)
-    standing = rated.standings.get(slug="bob")
-    bob = Augmentation.objects.filter(contestant__slug="bob")[0].contestant_id
-    scores = [s for key, s in read_evidence(rated).pictures.items() if key.contestant == bob]
-    assert sum(score.wins for score in scores) == standing.wins
-    assert sum(score.losses for score in scores) == standing.losses
-
-
 def test_votes_by_scenario_are_walked_through_in_that_order(rated: Snapshot) -> None:
     search = VoteSearch(order="scenario")
     listed = [vote for number in (1, 2) for vote in vote_page(rated, search, number)]

@@ -95,18 +95,6 @@ def test_progress_is_counted_and_not_sent_again_while_nothing_changes() -> None:
     assert changed.json()["settled"] == 1
 
 
-def test_an_augmentations_page_shows_its_numbers_and_escapes_what_came_from_outside() -> None:
-    job = rows.launch()
-    row = rows.only_row(job)
-    rows.leased(row).settle(rows.done(), now=rows.NOON)
-    Augmentation.objects.filter(pk=row.pk).update(notes="<script>alert(1)</script>")
-    shown = signed_in(people()["analyst"]).get(reverse("augmentation", args=[row.code]))
-    page = shown.content.decode()
-    assert "20.00" in page
-    assert "traffic cone" in page
-    assert "<script>alert(1)" not in page
-
-
 # --- Whether anybody works -----------------------------------------------------------------------
 
 

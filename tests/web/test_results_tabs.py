@@ -43,7 +43,7 @@ def test_every_tab_reads_the_snapshot_with_few_queries(
 ) -> None:
     for tab in TABS:
         page(analyst, study, tab)  # templates are compiled once
-        with django_assert_max_num_queries(12):
+        with django_assert_max_num_queries(13):
             page(analyst, study, tab)
 
 

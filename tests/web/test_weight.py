@@ -14,25 +14,14 @@ STATIC = Path(settings.BASE_DIR) / "static"
 MOST_BYTES = 40 * 1024
 
 
-def weight(name: str) -> int:
-    """Return the bytes of a script or a style sheet as it is sent: compressed."""
-    return len(gzip.compress((STATIC / name).read_bytes()))
-
-
 @pytest.mark.django_db
-def test_scripts_and_styles_of_the_voting_page_weigh_at_most_40_kb() -> None:
+def test_the_voting_page_loads_at_most_40_kb_and_names_every_module_of_its_script() -> None:
     here = world()
     shown = signed_in(here.expert).get(reverse("vote", args=[here.study.code])).content.decode()
     loaded = set(re.findall(r'(?:src|href)="/static/([^"]+\.(?:js|css))"', shown))
     assert {"js/vote.js", "css/vote.css"} <= loaded
-    sizes = {name: weight(name) for name in sorted(loaded)}
-    assert sum(sizes.values()) <= MOST_BYTES, (sum(sizes.values()), sizes)
-
-
-@pytest.mark.django_db
-def test_the_page_names_every_module_that_its_script_imports() -> None:
-    here = world()
-    shown = signed_in(here.expert).get(reverse("vote", args=[here.study.code])).content.decode()
+    sizes = {name: len(gzip.compress((STATIC / name).read_bytes())) for name in sorted(loaded)}
+    assert sum(sizes.values()) <= MOST_BYTES, sizes
     named = set(re.findall(r'modulepreload" href="/static/js/([\w-]+\.js)"', shown))
     imported: set[str] = set()
     for script in ("vote.js", *named):

@@ -3,9 +3,9 @@
 import json
 import platform
 from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import asdict
 from importlib import metadata
+from pathlib import Path
 
 from django.core.files.base import ContentFile
 from django.utils.text import slugify
@@ -71,11 +71,10 @@ class ScenarioFiles(FileWork[ScenarioFile]):
     model = ScenarioFile
     related = ("job",)
 
-    @contextmanager
-    def made(self, row: ScenarioFile) -> Iterator[MadeFile]:
-        """All scenarios of the job in the format."""
+    def make(self, row: ScenarioFile, folder: Path) -> MadeFile:
+        """Return all scenarios of the job in the format."""
         exported = export_job(row.job, file_format=row.format)
-        yield made_of(exported, slugify(row.job.name) or str(row.job.code))
+        return made_of(exported, slugify(row.job.name) or str(row.job.code))
 
 
 SCENARIO_FILES = ScenarioFiles()

@@ -11,8 +11,8 @@ from django.views.decorators.http import require_http_methods, require_POST, req
 
 from arena.jobs.pages.measures import displacement_section, driving_section
 from arena.jobs.queries import MARKS, VIEWS, Part, grid_part
-from arena.jobs.services import files_of
 from arena.jobs.services import retry_cause as retry_one_cause
+from arena.models import ScenarioFile
 from arena.site.access import ADMIN, STAFF, allow_only, user_of
 from arena.site.acts import Confirmation, ask, is_sure, refusals_told, send_later
 from arena.site.forms import CapsForm
@@ -87,7 +87,7 @@ def job_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
 
 def _measure(request: HttpRequest, job: GenerationJob) -> dict[str, object]:
     """Return the context of all that a settled job is measured by."""
-    files = files_of(job)
+    files = {row.format: row for row in ScenarioFile.objects.filter(job=job).order_by("pk")}
     measured: dict[str, object] = {
         "scenario_files": [(form, files.get(form)) for form in FORMATS],
         "displacement": displacement_section(request, job),

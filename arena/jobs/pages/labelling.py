@@ -117,7 +117,7 @@ def faults_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         "job": job,
         "form": form,
         "table": fault_table(job),
-        "labellings": queries.labellings_of(job),
+        "labellings": queries.find_labellings(job=job),
     }
     return render(request, "label/job.html", context, status=422 if form.errors else 200)
 

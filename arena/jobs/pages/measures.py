@@ -81,10 +81,9 @@ def simulate_job(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
 def drives_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """List the drives of a job that were made one way, page by page."""
     job = get_object_or_404(GenerationJob, code=code)
-    known = options_driven(job)
-    way = _way_asked(request, known)
+    known, way = _ways(request, job)
     drives = Simulation.objects.filter(drives_of_job(job)).defer("trace")
-    rows = (known[way] if known else Options()).of(drives)
+    rows = known[way].of(drives)
     related = rows.select_related("scenario", "augmentation__contestant")
     ordered = related.order_by(
         "scenario__type", "scenario__slug", "augmentation__contestant__name"
@@ -128,19 +127,15 @@ def drive_trace(request: HttpRequest, code: uuid.UUID, form: str) -> HttpRespons
 
 def driving_section(request: HttpRequest, job: GenerationJob) -> dict[str, object]:
     """Return the context of the driving part of a job's page."""
-    known = options_driven(job)
-    chosen = _way_asked(request, known)
+    known, chosen = _ways(request, job)
     score = choice_asked(request, "score", list(SCORES)) or NUPLAN
-    table = driving.driving_table(job, score=score, **_how_driven(request, job))
-    ways = [
-        {
-            "planner": PLANNERS.get(one.planner, one.planner),
-            "offsets": OFFSETS[one.offsets] if one.planner == PDM_CLOSED else "",
-            "is_reactive": one.is_reactive,
-            "is_shown": number == chosen,
-        }
-        for number, one in enumerate(known)
-    ]
+    table = driving.driving_table(job, options=known[chosen], score=score)
+    ways = []
+    for way in known:
+        planner = PLANNERS.get(way.planner, way.planner)
+        offsets = OFFSETS[way.offsets] if way.planner == PDM_CLOSED else ""
+        words = (planner, offsets, "reactive" if way.is_reactive else "")
+        ways.append(" · ".join(filter(None, words)))
     return {
         **driving.shown_driving(table),
         "forms": driving.FORMATS,
@@ -151,15 +146,11 @@ def driving_section(request: HttpRequest, job: GenerationJob) -> dict[str, objec
     }
 
 
-def _how_driven(request: HttpRequest, job: GenerationJob) -> dict[str, Any]:
-    """Return the way of driving that the address asks for, the last one unless it says so."""
-    known = options_driven(job)
-    return {"options": known[_way_asked(request, known)]} if known else {}
-
-
-def _way_asked(request: HttpRequest, known: list[Options]) -> int:
+def _ways(request: HttpRequest, job: GenerationJob) -> tuple[list[Options], int]:
+    """Return how the job was driven, the last way first, and which the address asks for."""
+    known = options_driven(job) or [Options()]
     numbers = [str(number) for number in range(len(known))]
-    return int(choice_asked(request, "driven", numbers) or 0)
+    return known, int(choice_asked(request, "driven", numbers) or 0)
 
 
 def _driven(code: uuid.UUID) -> Simulation:
@@ -186,7 +177,8 @@ def export_table(request: HttpRequest, code: uuid.UUID, name: str, form: str) ->
         raise Http404
     options: dict[str, Any] = {}
     if name.startswith("driving-"):
-        options = _how_driven(request, job)
+        known, way = _ways(request, job)
+        options = {"options": known[way]}
     elif name.startswith("displacement-") and request.GET.get("types") == "all":
         options = {"types": types_named(["all"])}
     stem = f"{slugify(job.name) or 'job'}-{name}" + "-all-types" * ("types" in options)

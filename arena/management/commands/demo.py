@@ -59,19 +59,18 @@ class Command(TerminalCommand):
                 look = partial(_look_at, supervisor)
                 demo.generate(scenarios, self.stdout.write, look)
                 folder = settings.VAR_DIR / "demo"
-                board = demo.vote_and_rate(scenarios, folder)
+                text, files = demo.vote_and_rate(scenarios, folder)
                 demo.start_drives()
-                self._show(board, web, time.monotonic() - started, serve=serve)
+                self.stdout.write(f"\n{text}\n\nTables: {', '.join(map(str, files))}")
+                self._show(web, time.monotonic() - started, serve=serve)
                 if serve and not supervisor.is_stopping:
                     supervisor.watch()
             finally:
                 supervisor.stop()
 
-    def _show(self, board: demo.DemoTable, web: Web, took_s: float, *, serve: bool) -> None:
+    def _show(self, web: Web, took_s: float, *, serve: bool) -> None:
         where = "Scenario Arena is at" if serve else "“make serve” serves it at"
         lines = [
-            f"\n{board.text}\n",
-            f"Tables:   {', '.join(map(str, board.files))}",
             f"The demo took {took_s:.0f} s.\n",
             f"{where} {web.address}",
             *demo.login_lines(),

@@ -1,8 +1,5 @@
 """Files of a study, as a worker writes them."""
 
-import tempfile
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 from django.core.files import File
@@ -11,7 +8,7 @@ from django.utils.text import slugify
 
 from arena.exports.files import zip_folder
 from arena.jobs.exports.files import made_of
-from arena.models import Study, StudyFile
+from arena.models import StudyFile
 from arena.results.exports.sheets import contact_sheet
 from arena.results.exports.study_folder import write_study
 from arena.results.queries.access import snapshot_to_export
@@ -27,31 +24,24 @@ class StudyFiles(FileWork[StudyFile]):
     model = StudyFile
     related = ("study",)
 
-    @contextmanager
-    def made(self, row: StudyFile) -> Iterator[MadeFile]:
+    def make(self, row: StudyFile, folder: Path) -> MadeFile:
         """Make what the row's kind says, unless the study has changed since somebody asked."""
         if reason := why_not(row.study, row.kind):
             raise Conflict(reason)
-        slug = slugify(row.study.name) or "study"
-        with tempfile.TemporaryDirectory() as folder:
-            made = _make(Kind(row.kind), row.study, slug, Path(folder))
-            with made.content:
-                yield made
+        study, slug = row.study, slugify(row.study.name) or "study"
+        if row.kind == Kind.INTERPLAN:
+            origin = ExportOrigin(kind="study", name=study.name, code=str(study.code))
+            rows, many = shown_augmentations(study), study.shows_all_samples
+            return made_of(export_rows(rows, origin, "interplan", many=many), slug)
+        if row.kind == Kind.CONTACT_SHEET:
+            places = study.scenarios.defer("reference").order_by("type", "slug")
+            content = contact_sheet(snapshot_to_export(study), list(places))
+            return MadeFile(name=f"{slug}-contact-sheet.pdf", content=ContentFile(content))
+        write_study(study, folder / "study", say=lambda line: None)
+        packed = folder / "study.zip"
+        with packed.open("wb") as file:
+            zip_folder(folder / "study", file)
+        return MadeFile(name=f"{slug}-study.zip", content=File(packed.open("rb")))
 
 
 STUDY_FILES = StudyFiles()
-
-
-def _make(kind: Kind, study: Study, slug: str, folder: Path) -> MadeFile:
-    if kind is Kind.INTERPLAN:
-        origin = ExportOrigin(kind="study", name=study.name, code=str(study.code))
-        rows, many = shown_augmentations(study), study.shows_all_samples
-        return made_of(export_rows(rows, origin, "interplan", many=many), slug)
-    if kind is Kind.CONTACT_SHEET:
-        places = study.scenarios.defer("reference").order_by("type", "slug")
-        content = contact_sheet(snapshot_to_export(study), list(places))
-        return MadeFile(name=f"{slug}-contact-sheet.pdf", content=ContentFile(content))
-    write_study(study, folder / "study", say=lambda line: None)
-    packed = tempfile.TemporaryFile()  # noqa: SIM115 - it is closed when it is stored
-    zip_folder(folder / "study", packed)
-    return MadeFile(name=f"{slug}-study.zip", content=File(packed))

@@ -57,29 +57,42 @@ def leaderboard_sheet(table: LeaderboardTable) -> Sheet:
 
 def leaderboard_json(table: LeaderboardTable) -> bytes:
     """Return an object whose `standings` is a list of {model, rank, rating, lower, upper, ...}."""
-    rating = table.snapshot
-    method = _method(table)
-    method.pop("covariates", None)
-    seed = method.pop("seed")
     return json_bytes(
-        {
-            "format": "scenario-arena/leaderboard",
-            "version": 1,
-            "study": table.study,
-            "simulated": table.is_simulated,
-            "early": table.early,
-            "method": method | {"degenerate_rounds": rating.degenerate_rounds, "seed": seed},
-            "votes": {
-                "counted": rating.votes_counted,
-                "left_out": table.left_out,
-                "sha256": rating.votes_sha256,
-            },
-            "preregistration": table.preregistration or None,
-            "hypotheses": [_hypothesis(answer) for answer in table.hypotheses],
-            "status": " ".join(table.reasons),
-            "standings": [_standing(table, row) for row in table.rows],
-        }
+        _document(table) | {"standings": [_standing(table, row) for row in table.rows]}
     )
+
+
+def _document(table: LeaderboardTable) -> dict[str, Any]:
+    """Return what JSON files say of a rating beside its lines."""
+    rating = table.snapshot
+    # Older ratings had no word for resamples.
+    notes: dict[str, Any] = {"intervals": rating.intervals} if table.is_closed_form else {}
+    if table.covariates:
+        notes["covariates"] = table.covariates
+    return {
+        "format": "scenario-arena/leaderboard",
+        "version": 1,
+        "study": table.study,
+        "simulated": table.is_simulated,
+        "early": table.early,
+        "method": {
+            "name": rating.method,
+            "text": table.method_text,
+            "resampling_unit": rating.resampling_unit,
+            **notes,
+            "rounds": rating.rounds,
+            "degenerate_rounds": rating.degenerate_rounds,
+            "seed": rating.seed,
+        },
+        "votes": {
+            "counted": rating.votes_counted,
+            "left_out": table.left_out,
+            "sha256": rating.votes_sha256,
+        },
+        "preregistration": table.preregistration or None,
+        "hypotheses": [_hypothesis(answer) for answer in table.hypotheses],
+        "status": " ".join(table.reasons),
+    }
 
 
 def plain_text(table: LeaderboardTable) -> str:
@@ -184,7 +197,7 @@ def bundle_files(snapshot: Snapshot) -> dict[str, bytes]:
     if table.hypotheses:
         files["hypotheses.csv"] = csv_of(HYPOTHESES, table.hypotheses)
     files["statistics.json"] = json_bytes(_statistics(results), sort_keys=True)
-    files[MANIFEST] = json_bytes(_manifest(snapshot, table, files), sort_keys=True)
+    files[MANIFEST] = json_bytes(_manifest(table, files), sort_keys=True)
     return files
 
 
@@ -252,52 +265,22 @@ def _hypothesis_line(answer: Answered) -> str:
     return f"{text}: {answer.verdict} ({', '.join(numbers) or 'unrated'})."
 
 
-def _method(table: LeaderboardTable) -> dict[str, Any]:
-    """Return how the rating was made; older ones had no word for resamples."""
-    rating = table.snapshot
-    method: dict[str, Any] = {
-        "name": rating.method,
-        "text": table.method_text,
-        "resampling_unit": rating.resampling_unit,
-    }
-    if table.is_closed_form:
-        method["intervals"] = rating.intervals
-    if table.covariates:
-        method["covariates"] = table.covariates
-    return method | {"rounds": rating.rounds, "seed": rating.seed}
-
-
-def _manifest(
-    snapshot: Snapshot, table: LeaderboardTable, files: dict[str, bytes]
-) -> dict[str, Any]:
-    judges = snapshot.results.judges
-    filters: dict[str, Any] = dict(snapshot.filters)
+def _manifest(table: LeaderboardTable, files: dict[str, bytes]) -> dict[str, Any]:
+    rating, judges = table.snapshot, table.snapshot.results.judges
+    filters: dict[str, Any] = dict(rating.filters)
     if "experts" in filters:  # by pseudonym, as votes are
         filters["experts"] = sorted(
             judges.get(code, "without votes") for code in filters["experts"]
         )
     if "authors" in filters:
         filters["authors"] = len(filters["authors"])
-    frozen = {"file": FILE_NAME, "sha256": table.preregistration}
-    return {
+    return _document(table) | {
         "format": "scenario-arena/rating",
-        "version": 1,
-        "study": table.study,
-        "rating": str(snapshot.code),
-        "rated_at": snapshot.made_at.isoformat(),
-        "simulated": table.is_simulated,
-        "early": table.early,
-        "preregistration": frozen if table.preregistration else None,
+        "rating": str(rating.code),
+        "rated_at": rating.made_at.isoformat(),
         "warnings": table.warnings,
-        "method": _method(table),
         "filters": filters,
-        "votes": {
-            "counted": snapshot.votes_counted,
-            "left_out": table.left_out,
-            "sha256": snapshot.votes_sha256,
-            "file": "votes.csv",
-        },
-        "versions": snapshot.versions,
+        "versions": rating.versions,
         "files": {
             name: {"sha256": digest_of(content), "bytes": len(content)}
             for name, content in files.items()

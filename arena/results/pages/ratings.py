@@ -45,13 +45,14 @@ def results_page(request: HttpRequest, code: uuid.UUID, tab: str = "table") -> H
     """One tab of a rating; of an open study only for staff who opened its results."""
     study = get_object_or_404(Study.objects.select_related("vote_file"), code=code)
     user = user_of(request)
-    access = results_access(user=user, study=study)
+    role = role_of(user)
+    access = results_access(user=user, study=study, role=role)
     if access is ResultsAccess.NONE:
         raise PermissionDenied
     if access is ResultsAccess.EARLY:
         context = {"study": study, "is_expert": votes_in(user, study)}
         return render(request, "results/gate.html", context)
-    is_staff = role_of(user) in STAFF
+    is_staff = role in STAFF
     if tab not in TABS:
         raise Http404
     if tab not in FOR_EXPERTS and not is_staff:
@@ -201,5 +202,5 @@ def _chosen(request: HttpRequest, study: Study, ratings: list[Snapshot]) -> Snap
     code = _asked_rating(request) or next(iter(ready), None)
     if code is None:
         return None
-    rows = Snapshot.objects.select_related("study", "made_by__person")
+    rows = Snapshot.objects.select_related("study__vote_file", "made_by__person")
     return get_object_or_404(rows, study=study, code=code, state=Snapshot.State.READY)

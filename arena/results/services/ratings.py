@@ -17,7 +17,7 @@ from arena.models import EarlyLook, ImportedVote, Snapshot, Standing, Study, Vot
 from arena.models.ratings import stored_values
 from arena.rating.comparisons import Comparisons
 from arena.rating.leaderboard import Leaderboard, Method, rate
-from arena.rating.rules import Intervals, TooManyContestants, Unit, default_intervals, unit_for
+from arena.rating.rules import Intervals, TooManyContestants, Unit, choose_rules, unit_for
 from arena.rating.snapshot_document import VERSION as RESULTS_VERSION
 from arena.rating.snapshot_document import Adjustment, CovariateEffect, Results
 from arena.results.queries.access import votes_in
@@ -291,9 +291,18 @@ def _planned(
     if not 0 <= seed < 2**63:
         raise Conflict(f"A seed goes from 0 to 2^63 - 1, not {seed}.")
     chosen = _read_word(Method, method, "method")
-    drawn = _read_word(Unit, unit or _default_unit(study, chosen), "resampling unit")
-    if chosen is Method.ELO and drawn is not Unit.VOTE:
-        raise Conflict(f"Online Elo resamples single votes only; '{drawn.value}' needs bt.")
+    wanted = _read_word(Intervals, intervals, "kind of intervals") if intervals else None
+    try:
+        rules = choose_rules(
+            chosen,
+            _read_word(Unit, unit or _default_unit(study, chosen), "resampling unit"),
+            wanted,
+            is_adjusted=bool(covariates),
+            rounds=rounds,
+            seed=seed,
+        )
+    except ValueError as error:
+        raise Conflict(f"This can't be rated: {error}.") from error
     known = WITHOUT_PICTURES if is_imported(study) else COVARIATES
     for name in covariates:
         if name not in known:
@@ -302,10 +311,10 @@ def _planned(
         study=study,
         state=Snapshot.State.QUEUED,
         progress=0,
-        method=chosen,
+        method=rules.method,
         rounds=rounds,
-        resampling_unit=drawn,
-        intervals=_intervals(intervals, chosen, drawn, is_adjusted=bool(covariates)),
+        resampling_unit=rules.unit,
+        intervals=rules.intervals,
         covariates=[name for name in known if name in covariates],
         seed=seed,
         filters=replace(filters or Filters(), authors=authors_of(study)).as_document(),
@@ -320,22 +329,6 @@ def _read_word(words: type[Word], name: str, what: str) -> Word:
     if name not in list(words):
         raise UnknownName(what, name, [word.value for word in words])
     return words(name)
-
-
-def _intervals(name: str | None, method: Method, unit: Unit, *, is_adjusted: bool) -> Intervals:
-    if is_adjusted:
-        if method is not Method.BRADLEY_TERRY or name == Intervals.RESAMPLES:
-            raise Conflict(
-                "Only Bradley-Terry with intervals in closed form can be adjusted for what "
-                "was shown."
-            )
-        return Intervals.CLOSED_FORM
-    if name is None:
-        return default_intervals(method, unit)
-    chosen = _read_word(Intervals, name, "kind of intervals")
-    if method is Method.ELO and chosen is not Intervals.RESAMPLES:
-        raise Conflict("Online Elo has no intervals in closed form, only resamples.")
-    return chosen
 
 
 def _default_unit(study: Study, method: Method) -> Unit:

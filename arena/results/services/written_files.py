@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import hashlib
+import tempfile
 from abc import abstractmethod
-from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from functools import partial
-from pathlib import PurePath
+from pathlib import Path, PurePath
 from typing import TypeVar
 
 from django.contrib.auth.models import User
@@ -53,13 +53,15 @@ class FileWork(WorkKind[Row]):
     """The work of writing one kind of file."""
 
     @abstractmethod
-    def made(self, row: Row) -> AbstractContextManager[MadeFile]:
-        """The file of a row, while it is open."""
+    def make(self, row: Row, folder: Path) -> MadeFile:
+        """Return the file of a row; the folder is there as long as it is needed."""
 
     def run(self, row: Row, held: Lease[Row]) -> None:
         """Make it and keep it."""
-        with self.made(row) as made:
-            keep_file(row, held, made)
+        with tempfile.TemporaryDirectory() as folder:
+            made = self.make(row, Path(folder))
+            with made.content:
+                keep_file(row, held, made)
 
 
 @transaction.atomic

@@ -16,7 +16,7 @@ from arena.site.access import STAFF, act_for, form_for, user_of
 from arena.site.acts import refusals_in, send_later
 from arena.site.forms import offer, read_json
 from augment.errors import AugmentError, Conflict
-from augment.models import Augmentation, BaseScene, Scenario
+from augment.models import Augmentation, BaseScene, Contestant, Scenario
 from augment.models.scenes import DENSITIES, GOALS
 from augment.services.judging.findings import check_edit
 from augment.services.running import by_hand
@@ -212,7 +212,7 @@ def correct_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
             return redirect("augmentation", code=made.code)
         except AugmentError as error:
             problem = str(error)
-    people = by_hand.human_contestants()
+    people = Contestant.objects.filter(kind=Contestant.Kind.HUMAN, retired_at=None)
     correction = {"original": original, "people": people, "slug": slug, "notes": notes}
     return _editor(request, original.scenario, given, problem, correction)
 

@@ -35,7 +35,6 @@ from arena.studies.services.pictures import (
 )
 from arena.voting.queries.ballots import upcoming
 from arena.voting.queries.showings import LEGEND
-from arena.voting.services.casting import mark_served
 from arena.voting.services.shown_pictures import find_frames, frames_shown, sides_of
 from augment.models import Augmentation, Scenario
 from augment.services.events import log_change
@@ -245,15 +244,12 @@ def votes_left(study: Study, expert: User) -> int:
 
 
 def next_pairs(*, study: Study, expert: User, n: int) -> list[Matchup]:
-    """Return the expert's next matchups, marked as served, planned first where it is needed."""
+    """Return the expert's next matchups, planned first where it is needed."""
     if study.state != Study.State.OPEN:
         return []
     coming = upcoming(study=study, expert=expert, n=n)
     if len(coming) < n and plan_batch(study=study, expert=expert):
         coming = upcoming(study=study, expert=expert, n=n)
-    if any(matchup.served_at is None for matchup in coming):
-        with transaction.atomic():
-            mark_served(matchups=coming)
     return coming
 
 

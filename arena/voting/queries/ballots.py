@@ -88,7 +88,7 @@ def upcoming(*, study: Study, expert: User, n: int) -> list[Matchup]:
     """Return the next matchups of this expert, at most n, with what a browser needs of them."""
     rows = Matchup.objects.filter(study=study, expert=expert, votes=None)
     needed = (
-        *("code", "study_id", "expert_id", "position", "kind", "view", "served_at"),
+        *("code", "study_id", "expert_id", "position", "kind", "view"),
         *("left_token", "right_token", "original_token", "original_image"),
         "scenario__instruction",
     )

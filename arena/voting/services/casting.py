@@ -5,7 +5,7 @@ decision sent again; or an error that says why nothing was stored.
 """
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from datetime import timedelta
 from uuid import UUID
@@ -18,7 +18,7 @@ from django.utils import timezone
 
 from arena.errors import AlreadyDecided, InvalidVote, StudyNotOpen, TooFast
 from arena.models import AIDS, Matchup, Study, Vote
-from arena.voting.queries.ballots import VotingProgress, hold_matchup, upcoming, voting_state
+from arena.voting.queries.ballots import VotingProgress, hold_matchup, voting_state
 from arena.voting.services.turns import in_turn
 from augment.errors import Conflict
 from augment.services.texts import make_storable
@@ -49,14 +49,11 @@ class Received:
     Attributes:
         study: As it is now; columns that a vote does not need are loaded when asked for.
         progress: The expert's, after the vote.
-        coming: What is planned for the expert next, marked as served; nothing where the study
-            has closed.
     """
 
     vote: Vote
     study: Study
     progress: VotingProgress
-    coming: Sequence[Matchup]
 
 
 def decision_of(
@@ -127,58 +124,38 @@ def cast_vote(*, expert: User, decision: Decision) -> Vote:
         Conflict: The key belongs to another vote, or `supersedes` names none of this matchup's.
         InvalidVote: The study does not allow it.
     """
-    return _store(expert, decision, None).vote
+    return _store(expert, decision, is_paced=False).vote
 
 
-def receive_vote(*, expert: User, decision: Decision, ahead: int = 0) -> Received:
+def receive_vote(*, expert: User, decision: Decision) -> Received:
     """Store what an expert's browser sent, at a pace that a person can keep.
 
     The limit (ARENA_VOTES_PER_S over five seconds) counts stored votes, so it holds for any
     number of web processes.
 
-    Args:
-        expert: Whose vote it is.
-        decision: What was decided.
-        ahead: How many matchups to look ahead, at most.
-
     Raises:
         TooFast: The account votes faster than that; nothing was stored.
         DatabaseBusy: It could not be written within VOTE_WAIT_S; nothing was stored.
-        ArenaError: As in `cast_vote`.
-        Conflict: As in `cast_vote`.
+        AugmentError: As in `cast_vote`.
     """
-    return _store(expert, decision, ahead)
-
-
-def mark_served(*, matchups: Sequence[Matchup]) -> None:
-    """Remember when matchups went out to their expert for the first time; within a transaction.
-
-    Those that somebody holds are left out: they are being decided or handed over, and whoever
-    holds one may wait for a row of ours.
-    """
-    fresh = [matchup.pk for matchup in matchups if matchup.served_at is None]
-    if fresh:
-        rows = Matchup.objects.filter(pk__in=fresh, served_at=None)
-        free = rows.select_for_update(skip_locked=True).values_list("pk", flat=True)
-        Matchup.objects.filter(pk__in=list(free)).update(served_at=timezone.now())
+    return _store(expert, decision, is_paced=True)
 
 
 # --- Private -----------------------------------------------------------------------------------
 
 
-def _store(expert: User, decision: Decision, ahead: int | None) -> Received:
-    """Store in turn; without a number of matchups to look ahead the pace has no limit."""
-    with in_turn(within_s=None if ahead is None else settings.VOTE_WAIT_S):
+def _store(expert: User, decision: Decision, *, is_paced: bool) -> Received:
+    with in_turn(within_s=settings.VOTE_WAIT_S if is_paced else None):
         try:
-            return _write(expert, decision, ahead)
+            return _write(expert, decision, is_paced)
         except IntegrityError:
             # Another request stored the same key or decided the same matchup in between. That
             # one counts; looked at again, this one is its replay or too late.
-            return _write(expert, decision, ahead)
+            return _write(expert, decision, is_paced)
 
 
 @transaction.atomic
-def _write(expert: User, decision: Decision, ahead: int | None) -> Received:
+def _write(expert: User, decision: Decision, is_paced: bool) -> Received:
     matchup = hold_matchup(expert=expert, code=decision.matchup)
     known = list(
         Vote.objects.filter(Q(key=decision.key) | Q(matchup_id=matchup.pk))
@@ -197,13 +174,9 @@ def _write(expert: User, decision: Decision, ahead: int | None) -> Received:
     study, progress, just_now = voting_state(study_pk=matchup.study_id, expert=expert, since=since)
     if is_new:
         _check_allowed(decision, study)
-        if ahead is not None and just_now > settings.VOTES_PER_S * PACE_WINDOW.total_seconds():
+        if is_paced and just_now > settings.VOTES_PER_S * PACE_WINDOW.total_seconds():
             raise TooFast(math.ceil(PACE_WINDOW.total_seconds() / 2))
-    coming: list[Matchup] = []
-    if ahead and study.state == Study.State.OPEN:
-        coming = upcoming(study=study, expert=expert, n=ahead)
-        mark_served(matchups=coming)
-    return Received(vote=vote, study=study, progress=progress, coming=coming)
+    return Received(vote=vote, study=study, progress=progress)
 
 
 def _insert(matchup: Matchup, expert: User, decision: Decision, old: Vote | None) -> Vote:

@@ -1,23 +1,20 @@
 """Lanelets, signs, lights and intersections of CommonRoad XML as segments and areas.
 
-What an intersection names as the successors of its incoming lanelets lies in it, and what follows
-these in a bend. In a file without intersections, lanelets of forks and merges that cross others
-do. Turn types are those that it names; a light holds for the ways in its direction.
+What an intersection names as the successors of its incoming lanelets lies in it. In a file
+without intersections, lanelets of forks and merges that cross others do. Turn types are those
+that it names; a light holds for the ways in its direction.
 """
 
 import math
 from collections import Counter
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from xml.etree.ElementTree import Element
 
 import numpy as np
 
 from augment.formats.road_map import RoadMap, Segment
-from augment.formats.roads import midline
 from augment.formats.values import FURTHEST, FloatArray, fault_at, look_up, read_finite
-from augment.geometry.polyline import Polyline
 from augment.scene.entities import AreaKind, TrafficLight, TurnType
-from augment.scene.lane_graph import turn_type_of
 
 SPEED_SIGNS = frozenset({"274", "R2-1"})
 """The speed limit of Germany (and of Zamunda), and of the United States; values in m/s."""
@@ -38,34 +35,6 @@ COLOURS = {
 }
 _TURNS = {"Straight": TurnType.STRAIGHT, "Left": TurnType.LEFT, "Right": TurnType.RIGHT}
 """By the ends of an incoming's children; a light's direction has the same words."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Light:
-    """One light.
-
-    Attributes:
-        cycle: The colour of each step of a cycle.
-        offset: The step at which the cycle begins.
-        direction: "all", or words like "leftStraight".
-    """
-
-    cycle: tuple[TrafficLight, ...]
-    offset: int
-    direction: str
-
-    def holds_for(self, turn: TurnType | None) -> bool:
-        """Return whether a way of that turn obeys this light."""
-        words = [word.lower() for word, kind in _TURNS.items() if kind is turn]
-        if not words or self.direction in ("", "all"):
-            return True
-        return words[0] in self.direction.lower()
-
-    def state_at(self, step: int) -> TrafficLight:
-        """Return the colour at a time step."""
-        if not self.cycle:
-            return TrafficLight.UNKNOWN
-        return self.cycle[(step - self.offset) % len(self.cycle)]
 
 
 # Numbers and references
@@ -122,14 +91,14 @@ def network_of(root: Element, step: int) -> RoadMap:
         InvalidDocument: A lanelet, sign or light breaks the format.
     """
     limits, left_out = _limits(root)
-    lights = dict(_light(element) for element in root.findall("trafficLight"))
+    lights = dict(_light(element, step) for element in root.findall("trafficLight"))
     elements = {whole(one.get("id"), "lanelet"): one for one in root.findall("lanelet")}
     kinds = {
         key: {(kind.text or "").strip() for kind in one.findall("laneletType")}
         for key, one in elements.items()
     }
     lanelets = {key: _segment(key, one, limits) for key, one in elements.items()}
-    inside = _inside(root, lanelets, {key for key in kinds if "intersection" in kinds[key]})
+    inside = _inside(root, {key for key in kinds if "intersection" in kinds[key]})
     segments, areas = [], []
     for key, one in lanelets.items():
         for kind in sorted(kinds[key] & AREA_OF.keys())[:1]:
@@ -144,15 +113,18 @@ def network_of(root: Element, step: int) -> RoadMap:
             named = [
                 n for e in (elements[key], *before) for n in _references(e, "trafficLightRef")
             ]
-            shown = [lights[n] for n in named if n in lights and lights[n].holds_for(turn)]
-            light = shown[0].state_at(step) if shown else light
+            known = [lights[number] for number in named if number in lights]
+            shown = [colour for colour, way in known if _holds_for(way, turn)]
+            light = shown[0] if shown else light
         segments.append(replace(one, crosses=key in inside, turn=turn, light=light))
     return RoadMap(
         place="lanelet",
         segments=tuple(segments),
         areas=tuple(areas),
         left_out=left_out,
-        tells_crossings=bool(inside),  # the dialect of 2018b has no intersections
+        tells_crossings=any(
+            one.crosses for one in segments
+        ),  # the dialect of 2018b has no intersections
     )
 
 
@@ -172,7 +144,8 @@ def _limits(root: Element) -> tuple[dict[int, float], Counter[str]]:
     return limits, others
 
 
-def _light(element: Element) -> tuple[int, Light]:
+def _light(element: Element, step: int) -> tuple[int, tuple[TrafficLight, str]]:
+    """The number of a light, its colour at a time step, and the direction that it is for."""
     light_id = whole(element.get("id"), "trafficLight")
     place = f"trafficLight {light_id}"
     cycle: list[TrafficLight] = []
@@ -182,12 +155,16 @@ def _light(element: Element) -> tuple[int, Light]:
         if not 0 <= steps <= 100_000:
             raise fault_at(place, f"a duration of {steps} steps is none")
         cycle += [colour] * steps
-    is_off = element.findtext("active", "").strip() == "false"
-    return light_id, Light(
-        cycle=() if is_off else tuple(cycle),
-        offset=whole(element.findtext("cycle/timeOffset", "0"), f"{place}.timeOffset"),
-        direction=element.findtext("direction", "").strip(),
-    )
+    offset = whole(element.findtext("cycle/timeOffset", "0"), f"{place}.timeOffset")
+    is_off = element.findtext("active", "").strip() == "false" or not cycle
+    shown = TrafficLight.UNKNOWN if is_off else cycle[(step - offset) % len(cycle)]
+    return light_id, (shown, element.findtext("direction", "").strip())
+
+
+def _holds_for(direction: str, turn: TurnType | None) -> bool:
+    """Whether a way of that turn obeys a light: "all", or words like "leftStraight"."""
+    words = [word.lower() for word, kind in _TURNS.items() if kind is turn]
+    return not words or direction in ("", "all") or words[0] in direction.lower()
 
 
 def _segment(key: int, element: Element, limits: dict[int, float]) -> Segment:
@@ -214,34 +191,10 @@ def _segment(key: int, element: Element, limits: dict[int, float]) -> Segment:
     )
 
 
-def _inside(
-    root: Element, lanelets: dict[int, Segment], marked: set[int]
-) -> dict[int, TurnType | None]:
+def _inside(root: Element, marked: set[int]) -> dict[int, TurnType | None]:
     """What lies in an intersection, with its turn where the file tells it."""
     named: dict[int, TurnType | None] = dict.fromkeys(marked)
     for incoming in root.findall("intersection/incoming"):
         for word, turn in _TURNS.items():
             named |= dict.fromkeys(_references(incoming, f"successors{word}"), turn)
-    inside = {key: turn for key, turn in named.items() if key in lanelets}
-    # Where the file says itself what is an intersection, no bend has to tell.
-    waiting = [] if marked else list(inside)
-    while waiting:
-        for name in lanelets[waiting.pop()].successors:
-            key = int(name)
-            if key not in lanelets or key in inside:
-                continue
-            one = lanelets[key]
-            if set(one.predecessors) <= inside.keys() and one.successors and _bends(one):
-                inside[key] = None
-                waiting.append(key)
-    return inside
-
-
-def _bends(one: Segment) -> bool:
-    assert one.left is not None
-    assert one.right is not None
-    try:
-        line = midline(Polyline(one.left), Polyline(one.right))
-    except ValueError:
-        return False  # it is refused where the road is built
-    return turn_type_of(line) is not TurnType.STRAIGHT
+    return named

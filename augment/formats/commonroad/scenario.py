@@ -17,7 +17,7 @@ from augment.formats.commonroad.network import network_of, points_of, real, whol
 from augment.formats.documents import read_xml
 from augment.formats.reading import LONGEST_GAP_S, Log, LoggedTrack, Reader
 from augment.formats.road_map import left_out_notes
-from augment.formats.values import WHAT, FloatArray, fault_at, look_up
+from augment.formats.values import WHAT, fault_at, look_up
 from augment.scene.entities import EGO_LENGTH_M, EGO_WIDTH_M, AgentType
 from augment.scene.recording import Note, SceneNoteKind
 
@@ -83,13 +83,7 @@ class CommonRoad(Reader):
 
     name = "commonroad"
     title = "CommonRoad scenario, 2018b or 2020a (XML file)"
-
-    def recognises(self, path: Path) -> bool:
-        """An XML file that begins as the format does."""
-        if path.suffix.lower() != ".xml" or not path.is_file():
-            return False
-        with path.open("rb") as file:
-            return b"<commonRoad" in file.read(4_000)
+    suffix, marker = ".xml", b"<commonRoad"
 
     def logs(self, path: Path, item: str | None) -> Iterator[Log]:
         """One for each planning problem, and where there is none for each vehicle."""
@@ -113,7 +107,8 @@ class CommonRoad(Reader):
             ]
             yield Log(
                 times_s=np.arange(steps, dtype=np.float64) * step_s,
-                ego=ego.track(steps),
+                ego=ego.track(steps).states,
+                ego_size_m=ego.size_m,
                 tracks=[one.track(steps) for one in obstacles if one is not ego],
                 map_at=lambda frame: network_of(root, frame),
                 world=f"CommonRoad scenario frame of {benchmark}",
@@ -179,40 +174,20 @@ def _obstacles(root: Element) -> tuple[list[Obstacle], list[Note]]:
 
 
 def _state(element: Element | None, place: str) -> tuple[int, State]:
-    """The time step, and where something is then."""
+    """The time step, and where something is then; 0 for what is not given."""
     if element is None:
         raise fault_at(place, "needs an initialState")
-    heading_rad, step, speed_mps = (
-        _value(element, name, place) for name in ("orientation", "time", "velocity")
-    )
+    names = ("time", "position/point/x", "position/point/y", "orientation", "velocity")
+    texts = [element.findtext(f"{name}/exact", element.findtext(name)) for name in names]
+    if texts[1] is None:
+        raise fault_at(place, "a position needs a point")
+    values = [
+        real(text or "0", f"{place}.{name}") for text, name in zip(texts, names, strict=True)
+    ]
+    step, x_m, y_m, heading_rad, speed_mps = values
     if not 0.0 <= step <= MOST_STEPS:
         raise fault_at(place, f"a time step lies from 0 to {MOST_STEPS}, not at {step:g}")
-    x_m, y_m = _center(element, place).tolist()
     return round(step), (x_m, y_m, heading_rad, abs(speed_mps))
-
-
-def _value(parent: Element, name: str, place: str) -> float:
-    """A value given exactly or as an interval, whose middle is taken; 0 where it is not given."""
-    element = parent.find(name)
-    if element is None:
-        return 0.0
-    ends = [element.findtext(end) for end in ("intervalStart", "intervalEnd")]
-    given = ends if None not in ends else [element.findtext("exact", element.text or "")]
-    return sum(real(text, f"{place}.{name}") for text in given) / len(given)
-
-
-def _center(state: Element, place: str) -> FloatArray:
-    """The point (2,) of a position, else the centre of its first shape."""
-    for parent in ("position", "position/polygon"):
-        given = state.find(parent)
-        points = np.empty((0, 2)) if given is None else points_of(given, place)
-        if len(points):
-            return np.asarray(points.mean(axis=0))
-    for name in ("position/rectangle/center", "position/circle/center"):
-        point = state.find(name)
-        if point is not None:
-            return np.array([real(point.findtext(axis), place) for axis in "xy"])
-    raise fault_at(place, "a position needs a point, or a shape with a centre")
 
 
 def _size(element: Element, place: str) -> tuple[float, float]:

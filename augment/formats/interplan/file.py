@@ -94,12 +94,6 @@ class Details(_Part):
     spawn_in_intersection: bool | None = None
     special_scenario: dict[_Index, SpecialScenario] | None = None
 
-    @property
-    def left_out(self) -> tuple[str, ...]:
-        """What changes nothing here; an export says it again."""
-        spawns = ["spawn_in_intersection"] if self.spawn_in_intersection else []
-        return (*spawns, *(f"key {key}" for key in self.model_extra or {}))
-
 
 class File(_Part):
     """The whole file; in the published one the two accelerations refer to another: "${...}"."""
@@ -108,12 +102,6 @@ class File(_Part):
     decel_max: float | str | None = None
     scenario_specifics: Any = None
     modification_details_dictionary: dict[_Token, Details]
-
-    @property
-    def left_out(self) -> tuple[str, ...]:
-        """What stands at the top and says nothing here."""
-        specifics = [] if self.scenario_specifics is None else ["scenario_specifics"]
-        return (*(f"key {key}" for key in self.model_extra or {}), *specifics)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -133,21 +121,6 @@ class InterplanSource:
     entry: Mapping[str, Any] = field(default_factory=dict)
     details: Mapping[str, Any] = field(default_factory=dict)
     file: Mapping[str, Any] = field(default_factory=dict)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ReadEntry:
-    """One special scenario as a modification.
-
-    Attributes:
-        id: interPlan's own name: base token, "-s" and the index.
-        left_out: What of it a modification can't say.
-    """
-
-    id: str
-    type: ScenarioType
-    modification: Modification
-    left_out: tuple[str, ...]
 
 
 # Reading
@@ -178,7 +151,9 @@ def place_of(token: str, index: str | int, *steps: str | int) -> str:
     return path("modification_details_dictionary", token, "special_scenario", str(index), *steps)
 
 
-def read_entry(token: str, index: str | int, entry: SpecialScenario, scene: Scene) -> ReadEntry:
+def read_entry(
+    token: str, index: str | int, entry: SpecialScenario, scene: Scene
+) -> tuple[Modification, list[str]]:
     """Return a special scenario as a change: vehicles, buses, cones, pedestrians.
 
     Boxes get our own usual sizes, cones the direction of the ego's way.
@@ -188,6 +163,9 @@ def read_entry(token: str, index: str | int, entry: SpecialScenario, scene: Scen
         index: Of the special scenario.
         entry: The special scenario.
         scene: In the file's frame, without the traffic that interPlan removes.
+
+    Returns:
+        The change, and what of the special scenario it can't say.
 
     Raises:
         InvalidDocument: An object is nowhere near the scene.
@@ -217,7 +195,9 @@ def read_entry(token: str, index: str | int, entry: SpecialScenario, scene: Scen
             add(kind, place(x_m, y_m, key, number), heading_rad)
     for number, cone in enumerate(entry.cones):
         point = place(*cone, "cones", number)
-        add(AgentType.TRAFFIC_CONE, point, cone_heading(ground, *point))
+        # A cone has no direction in the file.
+        way_rad = 0.0 if ground.route is None else ground.route.locate(*point).tangent_rad
+        add(AgentType.TRAFFIC_CONE, point, way_rad)
     for number, (x_m, y_m, to_x_m, to_y_m, iteration) in enumerate(entry.pedestrian):
         start = place(x_m, y_m, "pedestrian", number)
         end = place(to_x_m, to_y_m, "pedestrian", number)
@@ -229,12 +209,8 @@ def read_entry(token: str, index: str | int, entry: SpecialScenario, scene: Scen
             left_out.append(f"pedestrian {number} walks 0 m, which gives it no direction")
         if iteration is not None:
             left_out.append(f"pedestrian {number} starts at iteration {iteration}")
-    return ReadEntry(
-        id=f"{token}-s{index}",
-        type=entry.type,
-        modification=Modification(added=tuple(added)),
-        left_out=(*left_out, *(f"key {key}" for key in entry.model_extra or {})),
-    )
+    left_out += [f"key {key}" for key in entry.model_extra or {}]
+    return Modification(added=tuple(added)), left_out
 
 
 def _agent(
@@ -317,11 +293,6 @@ def goal_place(source: Mapping[str, Any] | None, goal: str, scene: Scene) -> Poi
 def _to_local(scene: Scene, x_m: float, y_m: float) -> Point:
     x_m, y_m = scene.origin.pose.to_local(np.array([[x_m, y_m]]))[0].tolist()
     return x_m, y_m
-
-
-def cone_heading(ground: Ground, x_m: float, y_m: float) -> float:
-    """Return the direction of the ego's way beside a place: a cone has none in the file."""
-    return 0.0 if ground.route is None else ground.route.locate(x_m, y_m).tangent_rad
 
 
 # The suffix of options

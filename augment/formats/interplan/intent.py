@@ -5,9 +5,8 @@ interPlan's keys can hold comes up: vehicles and buses that stand, cones, people
 """
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
 from statistics import median
 
 import numpy as np
@@ -16,6 +15,7 @@ from augment.checks.ground import Ground
 from augment.checks.lanes_across import Band, LanesAcross
 from augment.checks.registry import check_against_intent
 from augment.geometry.frames import difference
+from augment.scene import intent as wish
 from augment.scene.entities import (
     AgentType,
     Modification,
@@ -25,34 +25,11 @@ from augment.scene.entities import (
     TrafficAgent,
     TurnType,
 )
-from augment.scene.intent import (
-    Bearing,
-    Body,
-    ConesRequest,
-    CrashedCar,
-    CrashRequest,
-    Facing,
-    Intent,
-    LaneChoice,
-    Lateral,
-    LateralTarget,
-    Length,
-    Nearness,
-    Relation,
-    Request,
-    Shape,
-    Side,
-    Spot,
-    VehicleRequest,
-    WalkRequest,
-)
 
 _STRAIGHT_DEG = 5.0
 _BESIDE_M = 0.1
 _ON_ROAD_M = 1.0
 _ROW_M, _TAPER_M = 1.0, 1.0
-_RING_GAP_DEG = 100.0
-"""Cones with no wider gap than this around their middle stand in a ring."""
 _LEADS = {
     ScenarioType.CONSTRUCTION_ZONE: "Put up a construction zone",
     ScenarioType.ACCIDENT_SITE: "Show the site of an accident",
@@ -61,16 +38,16 @@ _LEADS = {
     ScenarioType.OVERTAKE: "Have the ego overtake what stands in its lane",
 }
 _LANES = {
-    LaneChoice.OWN: "in the ego's lane",
-    LaneChoice.LEFT: "in the next lane to the left",
-    LaneChoice.RIGHT: "in the next lane to the right",
-    LaneChoice.ONCOMING: "in the oncoming lane",
+    wish.LaneChoice.OWN: "in the ego's lane",
+    wish.LaneChoice.LEFT: "in the next lane to the left",
+    wish.LaneChoice.RIGHT: "in the next lane to the right",
+    wish.LaneChoice.ONCOMING: "in the oncoming lane",
 }
 
 
 def describe_reference(
     kind: ScenarioType, reference: Modification, scene: Scene
-) -> tuple[str, Intent | None]:
+) -> tuple[str, wish.Intent | None]:
     """Return the sentence that asks for a reference, and the same as an intent.
 
     Args:
@@ -87,17 +64,16 @@ def describe_reference(
     sentence = _sentence(kind, reference, lanes, scene)
     if lanes is None:
         return sentence, None
-    full = Intent(requests=tuple(_requests(kind, reference, lanes)), route=lanes.route.turn)
+    full = wish.Intent(requests=tuple(_requests(reference, lanes)), route=lanes.route.turn)
     if not full.requests:
         return sentence, None
 
-    def count_faults(intent: Intent) -> int:
+    def count_faults(intent: wish.Intent) -> int:
         findings = check_against_intent(ground, reference, intent)
         return sum(one.is_fault for one in findings)
 
-    looser: list[Callable[[Request], Request]] = [_without_offsets, _without_lane]
-    intents = [replace(full, requests=tuple(map(step, full.requests))) for step in looser]
-    return sentence, min([full, *intents], key=count_faults)  # of equal ones the first
+    looser = replace(full, requests=tuple(map(_looser, full.requests)))
+    return sentence, min([full, looser], key=count_faults)  # of equal ones the first
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -109,7 +85,7 @@ class _Place:
     """
 
     ahead_m: float
-    lane: LaneChoice | None
+    lane: wish.LaneChoice | None
     band: Band | None
     left_m: float
     tangent_rad: float
@@ -117,14 +93,14 @@ class _Place:
 
 def _place_at(point: Point, lanes: LanesAcross) -> _Place:
     here = lanes.route.locate(*point)
-    for choice in LaneChoice:
+    for choice in wish.LaneChoice:
         band = lanes.band(choice, here.ahead_m)
         if band is not None and abs(here.left_m - band.left_m) <= band.width_m / 2.0:
             left_m, tangent_rad = here.left_m - band.left_m, band.tangent_rad
             break
     else:
         choice, left_m, tangent_rad = None, here.left_m, here.tangent_rad
-        band = lanes.band(LaneChoice.OWN, here.ahead_m)
+        band = lanes.band(wish.LaneChoice.OWN, here.ahead_m)
     return _Place(
         ahead_m=here.ahead_m, lane=choice, band=band, left_m=left_m, tangent_rad=tangent_rad
     )
@@ -137,52 +113,47 @@ def _place_of(agent: TrafficAgent, lanes: LanesAcross) -> _Place:
 # The intent
 
 
-def _requests(
-    kind: ScenarioType, reference: Modification, lanes: LanesAcross
-) -> Iterator[Request]:
+def _requests(reference: Modification, lanes: LanesAcross) -> Iterator[wish.Request]:
     added = sorted(reference.added, key=lambda one: lanes.route.locate_agent(one).ahead_m)
     cones = [agent for agent in added if agent.type is AgentType.TRAFFIC_CONE]
     people = [agent for agent in added if agent.type is AgentType.PEDESTRIAN]
     vehicles = [agent for agent in added if agent.type in (AgentType.VEHICLE, AgentType.BUS)]
     if cones:
         yield _cones(cones, any(agent.walk_to_m is None for agent in people), lanes)
-    if kind is ScenarioType.ACCIDENT_SITE and len(vehicles) > 1:
-        yield _crash(vehicles, lanes)
-    else:
-        yield from (_vehicle(agent, lanes) for agent in vehicles)
+    yield from (_vehicle(agent, lanes) for agent in vehicles)
     yield from (_walk(agent, lanes) for agent in people if agent.walk_to_m is not None)
 
 
-def _spot(place: _Place) -> Spot:
-    return Spot(
+def _spot(place: _Place) -> wish.Spot:
+    return wish.Spot(
         distance=_length(abs(place.ahead_m)),
-        relation=Relation.AHEAD if place.ahead_m >= 0.0 else Relation.BEHIND,
-        lane=place.lane or LaneChoice.OWN,
+        relation=wish.Relation.AHEAD if place.ahead_m >= 0.0 else wish.Relation.BEHIND,
+        lane=place.lane or wish.LaneChoice.OWN,
     )
 
 
-def _length(metres: float) -> Length:
-    return Length(low_m=round(metres, 1), high_m=round(metres, 1))
+def _length(metres: float) -> wish.Length:
+    return wish.Length(low_m=round(metres, 1), high_m=round(metres, 1))
 
 
-def _boundary(left_m: float) -> LateralTarget:
-    return LateralTarget.LEFT_BOUNDARY if left_m > 0.0 else LateralTarget.RIGHT_BOUNDARY
+def _boundary(left_m: float) -> wish.LateralTarget:
+    return wish.LateralTarget.LEFT_BOUNDARY if left_m > 0.0 else wish.LateralTarget.RIGHT_BOUNDARY
 
 
-def _vehicle(agent: TrafficAgent, lanes: LanesAcross) -> VehicleRequest:
+def _vehicle(agent: TrafficAgent, lanes: LanesAcross) -> wish.VehicleRequest:
     place = _place_of(agent, lanes)
     facing, turn_deg = _turned(agent, place)
     lateral = None
     if abs(place.left_m) >= _BESIDE_M:
         outside = place.lane is None
-        lateral = Lateral(
+        lateral = wish.Lateral(
             target=_boundary(place.left_m),
-            nearness=Nearness.OUTSIDE if outside else None,
+            nearness=wish.Nearness.OUTSIDE if outside else None,
             offset=None if outside else _length(abs(place.left_m)),
         )
-    return VehicleRequest(
+    return wish.VehicleRequest(
         spot=replace(_spot(place), lateral=lateral),
-        body=Body.BUS if agent.type is AgentType.BUS else Body.VEHICLE,
+        body=wish.Body.BUS if agent.type is AgentType.BUS else wish.Body.VEHICLE,
         facing=facing,
         turn_deg=turn_deg,
         speed_mps=0.0,
@@ -190,21 +161,21 @@ def _vehicle(agent: TrafficAgent, lanes: LanesAcross) -> VehicleRequest:
     )
 
 
-def _turned(agent: TrafficAgent, place: _Place) -> tuple[Facing, float]:
+def _turned(agent: TrafficAgent, place: _Place) -> tuple[wish.Facing, float]:
     """Where something looks against its lane, and how many degrees besides."""
     turn_deg = math.degrees(difference(agent.heading_rad, place.tangent_rad))
     is_against = abs(turn_deg) > 90.0
     off_deg = round((turn_deg - 180.0 * is_against + 180.0) % 360.0 - 180.0)
-    facing = Facing.AGAINST_LANE if is_against else Facing.WITH_LANE
+    facing = wish.Facing.AGAINST_LANE if is_against else wish.Facing.WITH_LANE
     return facing, float(off_deg) if abs(off_deg) >= _STRAIGHT_DEG else 0.0
 
 
-def _walk(agent: TrafficAgent, lanes: LanesAcross) -> WalkRequest:
+def _walk(agent: TrafficAgent, lanes: LanesAcross) -> wish.WalkRequest:
     start = lanes.route.locate(agent.x_m, agent.y_m)
     end = lanes.route.locate(*(agent.walk_to_m or (0.0, 0.0)))
-    return WalkRequest(
+    return wish.WalkRequest(
         spot=replace(_spot(_place_of(agent, lanes)), lane=None),
-        start=Side.LEFT if start.left_m > end.left_m else Side.RIGHT,
+        start=wish.Side.LEFT if start.left_m > end.left_m else wish.Side.RIGHT,
         count=1,
         speed_mps=agent.speed_mps or None,
         drift_m=round(end.ahead_m - start.ahead_m, 1),
@@ -212,93 +183,48 @@ def _walk(agent: TrafficAgent, lanes: LanesAcross) -> WalkRequest:
     )
 
 
-def _cones(cones: Sequence[TrafficAgent], has_worker: bool, lanes: LanesAcross) -> ConesRequest:
+def _cones(
+    cones: Sequence[TrafficAgent], has_worker: bool, lanes: LanesAcross
+) -> wish.ConesRequest:
+    """Cones in a line along the way, in a row across it, or in a taper."""
     points = np.array([(cone.x_m, cone.y_m) for cone in cones])
     located = [lanes.route.locate_agent(cone) for cone in cones]
-    places = np.array([(place.ahead_m, place.left_m) for place in located])
-    shape, first = _shape(places), _place_of(cones[0], lanes)
-    if shape is Shape.RING:
-        x_m, y_m = points.mean(axis=0).tolist()
-        first = _place_at((x_m, y_m), lanes)
-    spot = _spot(first)
-    if shape is Shape.LINE:
+    aside_m = located[0].left_m - located[-1].left_m
+    shape = wish.Shape.TAPER if abs(aside_m) >= _TAPER_M else wish.Shape.LINE
+    if located[-1].ahead_m - located[0].ahead_m < _ROW_M:
+        shape = wish.Shape.ROW
+    first = _place_of(cones[0], lanes)
+    lateral, spacing = None, None
+    if shape is wish.Shape.LINE:
         centre_m = 0.0 if first.band is None else first.band.width_m / 4.0
         is_central = abs(first.left_m) < centre_m
-        target = LateralTarget.LANE_CENTRE if is_central else _boundary(first.left_m)
-        spot = replace(spot, lateral=Lateral(target=target))
-    spacing = None
+        target = wish.LateralTarget.LANE_CENTRE if is_central else _boundary(first.left_m)
+        lateral = wish.Lateral(target=target)
     if len(cones) > 1:
         apart_m = np.hypot(*(points[:, None] - points).T)
         np.fill_diagonal(apart_m, np.inf)
         spacing = _length(median(apart_m.min(axis=0).tolist()))
-    start = Side.LEFT if places[0, 1] > places[-1, 1] else Side.RIGHT
-    return ConesRequest(
-        spot=spot,
+    start = wish.Side.LEFT if aside_m > 0.0 else wish.Side.RIGHT
+    return wish.ConesRequest(
+        spot=replace(_spot(first), lateral=lateral),
         shape=shape,
         count=len(cones),
         spacing=spacing,
-        start=start if shape is Shape.TAPER else None,
+        start=start if shape is wish.Shape.TAPER else None,
         has_worker=has_worker,
     )
 
 
-def _shape(places: np.ndarray[tuple[int, int], np.dtype[np.float64]]) -> Shape:
-    """How cones stand by their places (ahead, left), in their order ahead."""
-    if len(places) > 3:
-        ahead_m, left_m = (places - places.mean(axis=0)).T
-        angles = np.sort(np.arctan2(left_m, ahead_m))
-        gaps = np.diff(angles, append=angles[0] + 2.0 * math.pi)
-        if math.degrees(gaps.max()) < _RING_GAP_DEG:
-            return Shape.RING
-    if np.ptp(places[:, 0]) < _ROW_M:
-        return Shape.ROW
-    return Shape.TAPER if abs(places[0, 1] - places[-1, 1]) >= _TAPER_M else Shape.LINE
-
-
-def _crash(vehicles: Sequence[TrafficAgent], lanes: LanesAcross) -> CrashRequest:
-    first = _place_of(vehicles[0], lanes)
-    facing, turn_deg = _turned(vehicles[0], first)
-    return CrashRequest(
-        spot=_spot(first),
-        count=len(vehicles),
-        body=Body.VEHICLE,
-        facing=facing if not turn_deg else None,
-        others=tuple(_crashed(one, before, lanes) for before, one in pairwise(vehicles)),
-    )
-
-
-def _crashed(one: TrafficAgent, before: TrafficAgent, lanes: LanesAcross) -> CrashedCar:
-    here, there = (lanes.route.locate_agent(agent) for agent in (before, one))
-    ahead_m, left_m = there.ahead_m - here.ahead_m, there.left_m - here.left_m
-    if abs(ahead_m) >= abs(left_m):
-        bearing = Bearing.AHEAD if ahead_m > 0.0 else Bearing.BEHIND
-    else:
-        bearing = Bearing.LEFT if left_m > 0.0 else Bearing.RIGHT
-    return CrashedCar(
-        gap=_length(math.dist((before.x_m, before.y_m), (one.x_m, one.y_m))),
-        bearing=bearing,
-        turn_deg=float(round(math.degrees(difference(one.heading_rad, before.heading_rad)))),
-        is_signed=True,
-    )
-
-
-def _without_offsets(request: Request) -> Request:
-    """Without what says how things stand across their lane and to each other."""
-    spot = replace(request.spot, lateral=None)
+def _looser(request: wish.Request) -> wish.Request:
+    """Without what says how things stand across the road and to each other."""
+    spot = replace(request.spot, lateral=None, lane=None)
     match request:
-        case VehicleRequest():
-            return replace(request, spot=spot)
-        case WalkRequest():
+        case wish.WalkRequest():
             return replace(request, drift_m=None, on_road=False)
-        case ConesRequest():
+        case wish.ConesRequest():
             return replace(request, spot=spot, spacing=None, start=None)
-        case CrashRequest():
-            return replace(request, facing=None, others=())
-
-
-def _without_lane(request: Request) -> Request:
-    bare = _without_offsets(request)
-    return replace(bare, spot=replace(bare.spot, lane=None))
+        case _:
+            return replace(request, spot=spot)
 
 
 # The sentence

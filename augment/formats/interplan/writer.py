@@ -12,21 +12,18 @@ from typing import Any
 import numpy as np
 
 from augment.errors import Conflict
-from augment.formats.interplan.file import (
-    FURTHEST_FROM_EGO_M,
-    MOST_ENTRIES,
-    OBJECTS,
-    InterplanSource,
-    ReadEntry,
-    SpecialScenario,
-    config_of,
-    read_entry,
-    token_of,
-    yaml_text,
-)
+from augment.formats.interplan import file as interplan
+from augment.formats.interplan.file import InterplanSource
 from augment.formats.writing import Cell, Loss, LossReport, Written
 from augment.geometry.frames import difference, wrap
-from augment.scene.entities import AgentType, Point, ScenarioType, TrafficAgent, without_traffic
+from augment.scene.entities import (
+    AgentType,
+    Modification,
+    Point,
+    ScenarioType,
+    TrafficAgent,
+    without_traffic,
+)
 
 BUS_LENGTH_M = 7.0
 """A vehicle from here on is written as a bus: clearly longer than any car."""
@@ -81,7 +78,7 @@ def interplan_text(cells: Iterable[Cell]) -> tuple[str, tuple[Loss, ...]]:
         for token, special in by_token.items()
     }
     file = next((source.file for source in given.values() if source.file), None)
-    return yaml_text(documents, comments, file), tuple(losses)
+    return interplan.yaml_text(documents, comments, file), tuple(losses)
 
 
 def _numbered(entries: Sequence["_Entry"]) -> list[str]:
@@ -99,12 +96,12 @@ def _numbered(entries: Sequence["_Entry"]) -> list[str]:
     made = []
     for entry, number in zip(entries, numbers, strict=True):
         used = taken[entry.token]
-        free = (str(one) for one in range(MOST_ENTRIES) if str(one) not in used)
+        free = (str(one) for one in range(interplan.MOST_ENTRIES) if str(one) not in used)
         index = number or next(free, None)
         if index is None:
             raise Conflict(
-                f"interPlan numbers at most {MOST_ENTRIES} special scenarios for a scene, and "
-                f"{entry.cell.scene.name} has more; write fewer contestants at a time."
+                f"interPlan numbers at most {interplan.MOST_ENTRIES} special scenarios for a "
+                f"scene, and {entry.cell.scene.name} has more; write fewer contestants at a time."
             )
         used.add(index)
         made.append(index)
@@ -116,7 +113,7 @@ class _Entry:
 
     def __init__(self, cell: Cell, kind: ScenarioType) -> None:
         self.cell, self.kind = cell, kind
-        self.source = cell.source or InterplanSource(token=token_of(cell.scene.name))
+        self.source = cell.source or InterplanSource(token=interplan.token_of(cell.scene.name))
         self.token = self.source.token
         self.report = LossReport(cell)
 
@@ -125,17 +122,17 @@ class _Entry:
         """Whether the change is the one that stands in interPlan's file."""
         if self.source.index is None:
             return False
-        return self._read(self.source.entry).modification == self.cell.modification
+        return self._read(self.source.entry) == self.cell.modification
 
-    def _read(self, entry: Mapping[str, Any]) -> ReadEntry:
+    def _read(self, entry: Mapping[str, Any]) -> Modification:
         scene = without_traffic(self.cell.scene)
-        special = SpecialScenario.model_validate(entry)
-        return read_entry(self.token, self.source.index or "0", special, scene)
+        special = interplan.SpecialScenario.model_validate(entry)
+        return interplan.read_entry(self.token, self.source.index or "0", special, scene)[0]
 
     def written(self) -> dict[str, Any]:
         """InterPlan's keys, those without objects left out."""
         given = dict(self.source.entry)
-        config = config_of(self.cell.scene.options, given.pop("config", None) or "")
+        config = interplan.config_of(self.cell.scene.options, given.pop("config", None) or "")
         head = {"type": self.kind.value} | ({"config": config} if config else {})
         if self.is_unchanged:
             return head | {key: value for key, value in given.items() if key != "type"}
@@ -154,14 +151,16 @@ class _Entry:
             self._lose(f"{name} is removed; interPlan removes all recorded traffic")
         for agent in by_key.pop("", ()):
             self._lose(f"{agent.id} is left out: there is no key for a {agent.type} there")
-        rows = {key: [self._row(key, agent) for agent in by_key[key]] for key in OBJECTS}
+        rows = {key: [self._row(key, agent) for agent in by_key[key]] for key in interplan.OBJECTS}
         objects = {key: lists for key, lists in rows.items() if lists}
-        there = self._read({"type": self.kind.value, **objects}).modification.added
-        here = [agent for key in OBJECTS for agent in by_key[key]]
+        there = self._read({"type": self.kind.value, **objects}).added
+        here = [agent for key in interplan.OBJECTS for agent in by_key[key]]
         for agent, found in zip(here, there, strict=True):
             for text, changes_scene in _changes(agent, found):
                 self._lose(f"{agent.id} {text}", changes_scene=changes_scene)
-        rest = {key: value for key, value in given.items() if key not in ("type", *OBJECTS)}
+        rest = {
+            key: value for key, value in given.items() if key not in ("type", *interplan.OBJECTS)
+        }
         return {**head, **objects, **rest}
 
     def _lose(self, text: str, *, changes_scene: bool = True) -> None:
@@ -195,7 +194,7 @@ class _Entry:
 
 def _key_of(agent: TrafficAgent) -> str:
     """The key under which interPlan has such a thing, empty where it has none."""
-    if math.hypot(agent.x_m, agent.y_m) > FURTHEST_FROM_EGO_M:
+    if math.hypot(agent.x_m, agent.y_m) > interplan.FURTHEST_FROM_EGO_M:
         return ""
     if agent.type is AgentType.VEHICLE and agent.length_m >= BUS_LENGTH_M:
         return "stopped_bus"

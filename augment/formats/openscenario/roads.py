@@ -12,16 +12,10 @@ from xml.etree import ElementTree as ET
 
 import numpy as np
 
-from augment.formats.writing import (
-    CannotExpress,
-    Cell,
-    LossReport,
-    bounds_of,
-    group_connectors,
-    ways_of,
-)
+from augment.formats import writing
+from augment.formats.writing import Cell, LossReport
 from augment.geometry.polyline import FloatArray, Polyline
-from augment.scene.entities import Lane, LaneConnector, Scene, TrafficLight, TrafficSide
+from augment.scene.entities import LaneConnector, Scene, TrafficLight, TrafficSide
 from augment.scene.lane_graph import AnyLane, LaneGraph
 
 NARROWEST_M: Final = 0.1
@@ -39,16 +33,16 @@ def map_of(cell: Cell, report: LossReport) -> bytes:
     """Return the file.
 
     Raises:
-        CannotExpress: The scene has no lane, or one that no road can follow.
+        writing.CannotExpress: The scene has no lane, or one that no road can follow.
     """
     from scenariogeneration import xodr
 
     scene = cell.after
-    if not ways_of(scene):
-        raise CannotExpress("OpenDRIVE needs at least one road, and this scene has no lane")
-    roads = {way.id: _Road.of(way, n) for n, way in enumerate(ways_of(scene), start=1)}
+    if not writing.ways_of(scene):
+        raise writing.CannotExpress("OpenDRIVE needs at least one road, and there is no lane")
+    roads = {way.id: _Road.of(way, n) for n, way in enumerate(writing.ways_of(scene), start=1)}
     connecting = [one for one in scene.connectors if _is_connecting(one, roads)]
-    groups = dict(enumerate(group_connectors(connecting), start=_FIRST_JUNCTION))
+    groups = dict(enumerate(writing.group_connectors(connecting), start=_FIRST_JUNCTION))
     links = _Links(roads)
     report.lose_of(
         links.join_lanes(scene, {one.id for one in connecting}),
@@ -92,9 +86,11 @@ class _Road:
         """Lay out a way by itself."""
         points = way.centerline.points_m
         tangents = directions(points)
-        edges = np.column_stack([_offsets(edge, points, tangents) for edge in bounds_of(way)])
+        edges = np.column_stack(
+            [_offsets(edge, points, tangents) for edge in writing.bounds_of(way)]
+        )
         if (edges[:, 0] - edges[:, 1] < NARROWEST_M).any():
-            raise CannotExpress(f"{way.id} has no width somewhere between its edges")
+            raise writing.CannotExpress(f"{way.id} has no width somewhere between its edges")
         return cls(way=way, number=number, points=points, tangents=tangents, edges=edges)
 
     def leads_to(self, other: "_Road") -> bool:
@@ -126,8 +122,6 @@ def _is_connecting(one: LaneConnector, roads: Mapping[str, _Road]) -> bool:
     """Whether both its ends are lanes that it really reaches."""
     before, after = (roads.get(name or "") for name in (one.from_lane, one.to_lane))
     if before is None or after is None:
-        return False
-    if not (isinstance(before.way, Lane) and isinstance(after.way, Lane)):
         return False
     return before.leads_to(roads[one.id]) and roads[one.id].leads_to(after)
 
@@ -181,7 +175,7 @@ class _Links:
 def _road(xodr: Any, road: _Road, side: int, links: _Links) -> Any:
     """One lane beside the reference line, on its right or, in left-hand traffic, its left."""
     if ((road.tangents[:-1] * road.tangents[1:]).sum(axis=1) < _SHARPEST).any():
-        raise CannotExpress(
+        raise writing.CannotExpress(
             f"{road.way.id} turns too sharply between two points for a smooth road"
         )
     view, way = xodr.PlanView(), road.way
@@ -272,7 +266,7 @@ def _text(root: ET.Element, cell: Cell) -> bytes:
     """The file; its header has no time of day, but extent and origin."""
     header = root.find("header")
     assert header is not None
-    points = np.vstack([way.centerline.points_m for way in ways_of(cell.after)])
+    points = np.vstack([way.centerline.points_m for way in writing.ways_of(cell.after)])
     pose = cell.after.origin.pose
     header.set("date", f"{cell.made_on.isoformat()}T00:00:00")
     extent = (*points.max(axis=0), *points.min(axis=0))

@@ -13,16 +13,9 @@ from xml.etree import ElementTree as ET
 
 import numpy as np
 
+from augment.formats import writing
 from augment.formats.openscenario.roads import map_of
-from augment.formats.writing import (
-    Cell,
-    LossReport,
-    Written,
-    appears_later,
-    has_gaps,
-    report_motion,
-    write_each,
-)
+from augment.formats.writing import Cell, LossReport
 from augment.scene.entities import AgentType, TrafficAgent
 from augment.scene.motion import SETS_OUT_WITHIN_M, FloatArray, Movement, walking_pace_mps
 
@@ -46,9 +39,9 @@ _HEIGHT_M = {AgentType.BUS: 3.0, AgentType.TRAFFIC_CONE: 0.5, AgentType.BARRIER:
 _USUAL_HEIGHT_M, _MASS_KG, _FASTEST_MPS = 1.8, 1000.0, 70.0
 
 
-def write(cells: Sequence[Cell]) -> Written:
+def write(cells: Sequence[Cell]) -> writing.Written:
     """For each cell a scenario and its map; a map that no road can follow is refused."""
-    return write_each(cells, _write_one)
+    return writing.write_each(cells, _write_one)
 
 
 # Private
@@ -128,7 +121,7 @@ def _init(xosc: Any, everyone: Sequence[Movement]) -> Any:
     init = xosc.Init()
     now = xosc.TransitionDynamics(xosc.DynamicsShapes.step, xosc.DynamicsDimension.time, 0.0)
     for one in everyone:
-        if appears_later(one):
+        if writing.appears_later(one):
             continue
         name, state = one.agent.id, one.states[0]
         init.add_init_action(name, xosc.TeleportAction(_position(xosc, one.agent, state)))
@@ -216,8 +209,8 @@ def _at(xosc: Any, name: str, at_s: float) -> Any:
 
 
 def _report(cell: Cell, report: LossReport) -> None:
-    report_motion(cell, report, can_trigger=True)
-    names = [other.agent.id for other in cell.motion.others if has_gaps(other)]
+    writing.report_motion(cell, report, can_trigger=True)
+    names = [other.agent.id for other in cell.motion.others if writing.has_gaps(other)]
     report.lose_of(names, "goes and comes back; goes straight on in between")
     obstacles = [kind for kind, name in _THINGS.items() if name == "obstacle"]
     report.lose_types({kind: f"a {kind} becomes an obstacle" for kind in obstacles})

@@ -85,15 +85,13 @@ class ScenarioNet(Reader):
 
     name = "scenarionet"
     title = "ScenarioNet scenario description (pickle file), or a data set of them (folder)"
+    suffix, marker = ENDING, b"\x80"
 
     def recognises(self, path: Path) -> bool:
-        """A pickle by its name and first byte, not opened as one; a folder by its files."""
+        """A pickle by its name and first bytes, not opened as one; a folder by its files."""
         if path.is_dir():
             return (path / SUMMARY).is_file() or any(path.glob(_SCENARIOS))
-        if path.suffix.lower() != ENDING or not path.is_file():
-            return False
-        with path.open("rb") as file:
-            return file.read(1) == b"\x80"
+        return super().recognises(path)
 
     def logs(self, path: Path, item: str | None) -> Iterator[Log]:
         """The scenario of a file, or one or all of a folder's."""
@@ -174,13 +172,8 @@ def _log(path: Path, item: str | None) -> Log:
     own = str(metadata.get("provenance") or "licence not named")[:300]
     return Log(
         times_s=times_s,
-        ego=LoggedTrack(
-            name=ego.name,
-            type=AgentType.EGO_VEHICLE,
-            length_m=max(ego.length_m, ego.width_m),
-            width_m=min(ego.length_m, ego.width_m),
-            states=ego.states,
-        ),
+        ego=ego.states,
+        ego_size_m=(max(ego.length_m, ego.width_m), min(ego.length_m, ego.width_m)),
         tracks=[track for track in tracks.values() if np.isfinite(track.states).any()],
         map_at=lambda frame: _city(description, frame, city),
         world=f"ScenarioNet frame of {data_set} {city}".strip(),

@@ -16,9 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from augment.errors import InvalidDocument
-
-WHAT = "ScenarioNet file"
+from augment.formats.values import fault_at
 
 _KIND = re.compile(r"[<>=|]?(?:[?]|[biuf](?:1|2|4|8)|[US][0-9]{1,4}|b1|O|O8)")
 _FAULTS = (
@@ -69,12 +67,6 @@ class _Array:
         return self
 
 
-class _Name:
-    """A name that is only ever handed on."""
-
-    __slots__ = ()
-
-
 def _build_scalar(kind: Any, block: Any) -> Any:
     return _Array().fill(block, kind, (), "C").value.item()
 
@@ -96,15 +88,15 @@ def _encode(text: str, coding: str = "latin1") -> bytes:
     return text.encode("latin1")
 
 
-_ALLOWED: dict[str, Any] = {
-    "numpy.ndarray": _Name(),
+_ALLOWED: dict[str, Any] = {  # None: a name that is only ever handed on
+    "numpy.ndarray": None,
     "numpy.dtype": _Kind,
     "collections.defaultdict": _build_dictionary,
     "collections.OrderedDict": _build_dictionary,
-    "builtins.int": _Name(),
+    "builtins.int": None,
     "builtins.set": set,
-    "__builtin__.int": _Name(),
-    "__builtin__.long": _Name(),
+    "__builtin__.int": None,
+    "__builtin__.long": None,
     "__builtin__.set": set,
     "_codecs.encode": _encode,
     "numpy.core.multiarray._reconstruct": _Array,
@@ -131,8 +123,7 @@ def read_pickle(path: Path) -> Any:
     try:
         return _plain(_Unpickler(io.BytesIO(path.read_bytes()), encoding="latin1").load())
     except (OSError, *_FAULTS) as fault:
-        problem = f"can't be unpickled safely: {str(fault)[:200]}"
-        raise InvalidDocument(WHAT, [(path.name, problem)]) from None
+        raise fault_at(path.name, f"can't be unpickled safely: {str(fault)[:200]}") from None
 
 
 def _plain(value: Any) -> Any:

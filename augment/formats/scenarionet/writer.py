@@ -12,15 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from augment.formats.writing import (
-    Cell,
-    LossReport,
-    Written,
-    bounds_of,
-    report_motion,
-    ways_of,
-    write_each,
-)
+from augment.formats import writing
+from augment.formats.writing import Cell, LossReport
 from augment.scene.entities import (
     AgentType,
     AreaKind,
@@ -68,7 +61,7 @@ _HEIGHTS_M = {
 _HEIGHT_M = 1.777
 
 
-def write(cells: Sequence[Cell]) -> Written:
+def write(cells: Sequence[Cell]) -> writing.Written:
     """A data set: a file for each cell, the summary and the mapping."""
     summaries: dict[str, dict[str, Any]] = {}
 
@@ -78,7 +71,7 @@ def write(cells: Sequence[Cell]) -> Written:
         summaries[name] = document["metadata"]
         return {name: write_pickle(document)}
 
-    made = write_each(cells, write_one)
+    made = writing.write_each(cells, write_one)
     index = {
         SUMMARY_FILE: write_pickle(summaries),
         MAPPING_FILE: write_pickle(dict.fromkeys(summaries, "")),
@@ -102,11 +95,8 @@ def describe(cell: Cell, report: LossReport) -> dict[str, Any]:
             "metadrive_processed": False,
             "coordinate": "right-handed",
             "ts": motion.times_s.copy(),
-            "sample_rate": motion.step_s,
             "sdc_id": scene.ego.id,
-            "source_file": scene.name,
             "current_time_index": 0,
-            "tracks_to_predict": {},
             "traffic_side": scene.traffic_side.value,
             "provenance": scene.provenance,
         },
@@ -132,7 +122,7 @@ def write_pickle(document: object) -> bytes:
 
 def _report(cell: Cell, report: LossReport) -> None:
     scene, connectors = cell.after, cell.after.connectors
-    report_motion(cell, report)
+    writing.report_motion(cell, report)
     report.lose_types(_BECOMES)
     text = "left out: there is no type for a {} area"
     report.lose_areas([area for area in scene.areas if area.kind not in _AREAS], text)
@@ -142,7 +132,7 @@ def _report(cell: Cell, report: LossReport) -> None:
     report.lose_of(odd, "the turn type is not said, and the line looks otherwise")
     dark = [one.id for one in connectors if one.traffic_light is TrafficLight.NONE]
     report.lose_of(dark, "that it has no light is not said")
-    if any(way.left_boundary or way.right_boundary for way in ways_of(scene)):
+    if any(way.left_boundary or way.right_boundary for way in writing.ways_of(scene)):
         report.lose("the edges of lanes are written as outlines, not as a left and a right one")
     if scene.traffic_side is TrafficSide.LEFT:
         report.lose("that people drive on the left stands in the metadata, where few stacks look")
@@ -168,14 +158,7 @@ def _track(movement: Movement) -> dict[str, Any]:
             "width": np.where(present, agent.width_m, 0.0),
             "height": np.where(present, height_m, 0.0),
         },
-        "metadata": {
-            "type": _TYPES[agent.type],
-            "track_length": steps,
-            "object_id": agent.id,
-            "original_id": agent.id,
-            "dataset": DATASET,
-            "motion": movement.source.value,
-        },
+        "metadata": {"type": _TYPES[agent.type], "object_id": agent.id, "dataset": DATASET},
     }
 
 
@@ -186,20 +169,15 @@ def _light(connector: LaneConnector, steps: int) -> dict[str, Any]:
         "state": {"object_state": [_LIGHTS[connector.traffic_light]] * steps},
         "lane": connector.id,
         "stop_point": np.array([*start, 0.0]),
-        "metadata": {
-            "type": "TRAFFIC_LIGHT",
-            "track_length": steps,
-            "object_id": connector.id,
-            "dataset": DATASET,
-        },
+        "metadata": {"type": "TRAFFIC_LIGHT", "object_id": connector.id, "dataset": DATASET},
     }
 
 
 def _map_features(scene: Scene) -> dict[str, dict[str, Any]]:
     graph = LaneGraph(scene)
     features: dict[str, dict[str, Any]] = {}
-    for way in ways_of(scene):
-        points_m, (left, right) = way.centerline.points_m, bounds_of(way)
+    for way in writing.ways_of(scene):
+        points_m, (left, right) = way.centerline.points_m, writing.bounds_of(way)
         beside = (way.left_neighbor, way.right_neighbor) if isinstance(way, Lane) else (None, None)
         features[way.id] = {
             "type": "LANE_SURFACE_STREET" if isinstance(way, Lane) else "LANE_SURFACE_UNSTRUCTURE",

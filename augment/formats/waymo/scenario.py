@@ -3,7 +3,8 @@
 `item` is the number of a record in the file, `frame` a step of it; without one the step that the
 scenario calls its current one (1.1 s after its start). Coordinates are the data set's own, x and
 y. A record is its length (8 bytes, little endian), the length's checksum (4), the payload and the
-payload's checksum (4); `scenario.proto` has the parts of the message that are read.
+payload's checksum (4); `scenario.proto` has the parts of the message
+that are read, `scenario.desc` the same as protoc writes it.
 """
 
 import struct
@@ -13,7 +14,9 @@ from typing import Any
 
 import google_crc32c
 import numpy as np
+from google.protobuf.descriptor_pb2 import FileDescriptorSet
 from google.protobuf.message import DecodeError
+from google.protobuf.message_factory import GetMessages
 
 from augment.formats.reading import Log, LoggedTrack, Reader
 from augment.formats.road_map import WIDEST_M, RoadMap, Segment, edge_of, left_out_notes, width_of
@@ -25,7 +28,6 @@ from augment.formats.values import (
     read_numbers,
     read_times,
 )
-from augment.formats.waymo.scenario_pb2 import Scenario
 from augment.scene.entities import AgentType, AreaKind, TrafficLight
 from augment.scene.recording import SceneNoteKind
 
@@ -44,6 +46,8 @@ MPS_OF_MPH = 0.44704
 _RED, _YELLOW, _GREEN = TrafficLight.RED, TrafficLight.YELLOW, TrafficLight.GREEN
 LIGHT_OF = dict(enumerate((_RED, _YELLOW, _GREEN, _RED, _YELLOW, _GREEN, _RED, _YELLOW), start=1))
 """LANE_STATE_*: arrows and round lights alike; flashing ones as what they ask for."""
+_MESSAGES = FileDescriptorSet.FromString((Path(__file__).parent / "scenario.desc").read_bytes())
+Scenario: Any = GetMessages(_MESSAGES.file)["scenario_arena.waymo.Scenario"]
 _HEAD, _FOOT = struct.Struct("<QI"), struct.Struct("<I")
 _STATE = ("center_x", "center_y", "heading", "velocity_x", "velocity_y", "length", "width")
 
@@ -76,7 +80,8 @@ class WaymoMotion(Reader):
             kinds = [track.object_type for track in scenario.tracks]
             yield Log(
                 times_s=times_s,
-                ego=ego,
+                ego=ego.states,
+                ego_size_m=(ego.length_m, ego.width_m),
                 tracks=[
                     one
                     for one, kind in zip(tracks, kinds, strict=True)

@@ -14,7 +14,7 @@ from augment.scene.entities import Modification
 from augment.services.events import log_change
 from augment.services.scenarios.editing import read_edit
 from augment.services.scenarios.scenes import check_slug
-from augment.services.texts import LONGEST_NOTES, check_prose, one_line
+from augment.services.texts import LONGEST_NOTES, check_prose
 
 BY_HAND = "by-hand"
 NAME = "Corrected by hand"
@@ -28,7 +28,6 @@ def keep_correction(
     document: object,
     *,
     slug: str = BY_HAND,
-    name: str = "",
     notes: str = "",
     actor: User | None = None,
 ) -> Augmentation:
@@ -38,12 +37,11 @@ def keep_correction(
         original: What is corrected; it stays as it is.
         document: The modification as it should be.
         slug: Of the contestant that it counts for; made if there is none.
-        name: What a new contestant is called.
         notes: Why it was corrected, or nothing.
         actor: Whose hand it was.
 
     Raises:
-        InvalidDocument: The document, the slug, the name or the notes break their format.
+        InvalidDocument: The document, the slug or the notes break their format.
         InvalidModification: The modification does not fit the scene.
         Conflict: Nothing was changed, nothing is left, or the slug is that of somebody who is no
             person or retired.
@@ -56,7 +54,7 @@ def keep_correction(
         raise Conflict("Nothing was corrected: it is as it was.")
     if notes:
         check_prose("notes", notes, what="correction", longest=LONGEST_NOTES)
-    contestant = _find_or_add_person(slug, name)
+    contestant = _find_or_add_person(slug)
     actor_pk = actor.pk if actor else None
     job = GenerationJob.objects.create(
         name=f"By hand: {original.scenario.slug}", launched_by_id=actor_pk
@@ -77,11 +75,6 @@ def keep_correction(
     return row
 
 
-def human_contestants() -> list[Contestant]:
-    """Return the contestants that corrections can count for."""
-    return list(Contestant.objects.filter(kind=Kind.HUMAN, retired_at=None))
-
-
 def starting_document(original: Augmentation) -> dict[str, object]:
     """Return the modification that a correction begins with."""
     stored = original.modification
@@ -90,13 +83,12 @@ def starting_document(original: Augmentation) -> dict[str, object]:
     )
 
 
-def _find_or_add_person(slug: str, name: str) -> Contestant:
+def _find_or_add_person(slug: str) -> Contestant:
     check_slug(slug, what="contestant")
-    row = Contestant.objects.filter(slug=slug).first()
-    if row is None:
-        shown = one_line("name", name or (NAME if slug == BY_HAND else slug), what="contestant")
-        return Contestant.objects.create(slug=slug, name=shown, kind=Kind.HUMAN)
-    problem = "is no person" if row.kind != Kind.HUMAN else "is retired" if row.retired_at else ""
-    if problem:
-        raise Conflict(f"“{row.name}” {problem}; choose another slug.")
+    name = NAME if slug == BY_HAND else slug
+    row, _ = Contestant.objects.get_or_create(
+        slug=slug, defaults={"name": name, "kind": Kind.HUMAN}
+    )
+    if row.kind != Kind.HUMAN or row.retired_at:
+        raise Conflict(f"“{row.name}” is no person or is retired; choose another slug.")
     return row

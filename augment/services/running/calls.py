@@ -10,10 +10,10 @@ import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import asdict
-from datetime import datetime
 from typing import Any, NamedTuple
 
 from django.db import OperationalError, connection, transaction
+from django.db.models import QuerySet
 from django.utils import timezone
 
 from augment.errors import (
@@ -71,37 +71,6 @@ def insist_wanted(held: Lease[Augmentation], *, lock: bool = False) -> None:
         raise JobCancelled
 
 
-def find_earlier_answer(
-    *,
-    request_hash: str,
-    augmentation_pk: int,
-    attempt_pk: int,
-    is_fresh: bool,
-    since: datetime | None = None,
-) -> ModelCall | None:
-    """Return the last call that answered the same request, None where it is to be asked.
-
-    Args:
-        request_hash: Of the request.
-        augmentation_pk: The row that asks; an attempt that was stopped is replayed for it.
-        attempt_pk: The attempt that asks.
-        is_fresh: Whether only that replay counts: each earlier answer once, none of this attempt.
-        since: The row is asked anew: as if fresh, and no answer from before counts.
-    """
-    calls = ModelCall.objects.filter(
-        request_hash=request_hash, served_from=None, answer__isnull=False, fault=""
-    )
-    if since is not None:
-        calls = calls.filter(started_at__gte=since)
-    if is_fresh or since is not None:
-        calls = (
-            calls.filter(attempt__augmentation=augmentation_pk)
-            .exclude(attempt=attempt_pk)
-            .exclude(copies__attempt=attempt_pk)
-        )
-    return calls.order_by("-pk").first()
-
-
 def sentence_of(fault: ModelFault) -> str:
     """Return what broke, with the HTTP status where there was one."""
     text = str(fault)
@@ -150,10 +119,6 @@ class CallTranscript(ABC):
         """
 
     @abstractmethod
-    def earlier_answer(self, request_hash: str) -> ModelCall | None:
-        """Return the call whose answer serves that request again."""
-
-    @abstractmethod
     def reserve(self, worst: WorstCase, price: Price | None) -> budget.Room:
         """Take room for a call.
 
@@ -169,6 +134,12 @@ class CallTranscript(ABC):
     def note(self, kind: NoteKind, document: dict[str, object]) -> None:
         """Store what happened since the last call."""
 
+    def answers_to(self, request_hash: str) -> QuerySet[ModelCall]:
+        """Return the calls whose answer may serve that request again."""
+        return ModelCall.objects.filter(
+            request_hash=request_hash, served_from=None, answer__isnull=False, fault=""
+        )
+
     def known(self, role: ModelRole, request: Request, prompt_version: str) -> Reply | None:
         """Return this request's earlier answer, recorded as a call that cost nothing.
 
@@ -176,7 +147,7 @@ class CallTranscript(ABC):
             LeaseLost: Another worker has the row now.
         """
         columns = self._columns(role, request, prompt_version)
-        earlier = self.earlier_answer(columns["request_hash"])
+        earlier = self.answers_to(columns["request_hash"]).order_by("-pk").first()
         if earlier is None:
             return None
         now = timezone.now()
@@ -347,14 +318,18 @@ class RowTranscript(CallTranscript):
     def insist(self) -> None:
         insist_wanted(self._held, lock=True)
 
-    def earlier_answer(self, request_hash: str) -> ModelCall | None:
-        return find_earlier_answer(
-            request_hash=request_hash,
-            augmentation_pk=self._row.pk,
-            attempt_pk=self._attempt.pk,
-            is_fresh=self._row.job.is_fresh,
-            since=self._row.asked_anew_at,
-        )
+    def answers_to(self, request_hash: str) -> QuerySet[ModelCall]:
+        """Return them; of a fresh row its own attempts' alone, each once, to be replayed.
+
+        A row that is asked anew is fresh, and no answer from before counts.
+        """
+        calls, since = super().answers_to(request_hash), self._row.asked_anew_at
+        if since is not None:
+            calls = calls.filter(started_at__gte=since)
+        if self._row.job.is_fresh or since is not None:
+            own = calls.filter(attempt__augmentation=self._row)
+            calls = own.exclude(attempt=self._attempt).exclude(copies__attempt=self._attempt)
+        return calls
 
     def reserve(self, worst: WorstCase, price: Price | None) -> budget.Room:
         return budget.reserve(job_pk=self._row.job_id, worst=worst, price=price)

@@ -9,14 +9,14 @@ from django.db import transaction
 from augment.errors import BudgetSpent, LeaseLost, ModelFault, ReplyUnreadable, UnknownName
 from augment.llm.client import ChatClient
 from augment.llm.costs import Price, WorstCase
-from augment.models import Endpoint, IntentReading, ModelCall, Scenario
+from augment.models import Endpoint, IntentReading, Scenario
 from augment.scene.codec import intent_to_document
 from augment.services.clock import DATABASE_TIME
 from augment.services.endpoints.client import EndpointClient, Queue, wire_to
 from augment.services.endpoints.known_endpoints import find_endpoint
 from augment.services.events import log_change
-from augment.services.running import budget
-from augment.services.running.calls import CallTranscript, find_earlier_answer, sentence_of
+from augment.services.running.budget import Room
+from augment.services.running.calls import CallTranscript, sentence_of
 from augment.services.work import Lease, Settlement, WorkKind
 from augment.variants.pipeline import ask_for_intent
 from augment.variants.respondents import NoteKind
@@ -134,14 +134,9 @@ class ReadingTranscript(CallTranscript):
         if not self._held.is_held(lock=True):
             raise LeaseLost
 
-    def earlier_answer(self, request_hash: str) -> ModelCall | None:
-        return find_earlier_answer(
-            request_hash=request_hash, augmentation_pk=0, attempt_pk=0, is_fresh=False
-        )
-
-    def reserve(self, worst: WorstCase, price: Price | None) -> budget.Room:
+    def reserve(self, worst: WorstCase, price: Price | None) -> Room:
         made = self._reading.calls.exclude(sent_at=None).count()
-        return budget.Room.TAKEN if made < MOST_CALLS else budget.Room.SPENT
+        return Room.TAKEN if made < MOST_CALLS else Room.SPENT
 
     def limit(self) -> str:
         return f"{MOST_CALLS} calls"

@@ -84,7 +84,7 @@ def launch(request: JobRequest, actor: User | None = None) -> GenerationJob:
     """
     name = one_line("name", request.name, what="job")
     check_bounds(request)
-    loosen_unanswered(_in_order(Contestant.objects.all(), request.contestants, "contestant"))
+    loosen_unanswered(Contestant.objects.filter(slug__in=request.contestants))
     who = _in_order(Contestant.objects.all(), request.contestants, "contestant")
     where = _in_order(Scenario.objects.all(), request.scenarios, "scenario")
     refuse_impossible(who, where)

@@ -82,31 +82,29 @@ class TranscriptStep:
     def parameters(self) -> dict[str, Any]:
         """What was asked for beside the messages."""
         request = {} if self.call is None else self.call.request
-        return {
-            name: value for name, value in request.items() if name not in ("messages", "model")
-        }
+        return {name: request[name] for name in request if name not in ("messages", "model")}
 
     @property
     def answer_text(self) -> str | None:
         """The answer as a page shows it, None where there is none."""
-        if self.call is None or self.call.answer is None:
-            return None
-        return shorten(self.call.answer, LONGEST_SHOWN)
+        answer = None if self.call is None else self.call.answer
+        return None if answer is None else shorten(answer, LONGEST_SHOWN)
 
     @property
     def extras_text(self) -> str:
         """What else the answer carried, such as native tool calls."""
-        if self.call is None or not self.call.extras:
-            return ""
-        return shorten(_pretty(self.call.extras), LONGEST_SHOWN)
+        extras = None if self.call is None else self.call.extras
+        return shorten(_pretty(extras), LONGEST_SHOWN) if extras else ""
 
     @property
     def note_text(self) -> str:
         """The note's document with one line for each part."""
-        lines = []
-        for name, part in (self.note.document if self.note else {}).items():
-            text = part if isinstance(part, str) else _pretty(part)
-            lines.append(f"{name}:\n{indent(text, '  ')}" if "\n" in text else f"{name}: {text}")
+        parts = {} if self.note is None else self.note.document
+        texts = {n: part if isinstance(part, str) else _pretty(part) for n, part in parts.items()}
+        lines = [
+            f"{name}:\n{indent(text, '  ')}" if "\n" in text else f"{name}: {text}"
+            for name, text in texts.items()
+        ]
         return shorten("\n".join(lines), LONGEST_SHOWN)
 
 

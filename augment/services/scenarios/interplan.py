@@ -25,7 +25,6 @@ from augment.models import BaseScene, Scenario
 from augment.scene.codec import intent_to_document, modification_to_document
 from augment.scene.entities import Scene, SceneOptions, without_traffic
 from augment.scene.intent import IntentOrigin
-from augment.scene.recording import Note, SceneNoteKind
 from augment.services.scenarios.scene_imports import keep_reading
 from augment.services.scenarios.scenes import add_scenario
 
@@ -76,7 +75,7 @@ def import_interplan(
         for token in by_token
         if token not in wanted
     ]
-    for text in (*file.left_out, *left_out):
+    for text in left_out:
         yield ImportStep(StepKind.LEFT_OUT, f"Left out: {text}.")
     logs: dict[str, Path] = {}
     paths = sorted((data or folder).rglob("*.db"))
@@ -122,9 +121,6 @@ def _keep_token(
     try:
         recorded = UntrustedInput(path=log, format=NuPlan.name)
         source, reading = recorded.read(item=token, frame=None, name=f"interplan-{token}")
-        if details.left_out:
-            note = Note(kind=SceneNoteKind.INTERPLAN_LEFT_OUT, names=details.left_out)
-            reading = replace(reading, notes=(*reading.notes, note))
         row, _ = keep_reading(reading, source=source, path=log, actor=actor)
     except AugmentError as fault:
         yield from _skip_all(token, details, str(fault))
@@ -166,25 +162,26 @@ def _keep_entry(
     actor: User | None,
 ) -> ImportStep:
     token, slug = row.source_item, f"{row.slug}-s{kept['index']}"
-    read = interplan_file.read_entry(token, kept["index"], entry, scene)
-    left_out = f"; left out: {', '.join(read.left_out)}" if read.left_out else ""
-    if Scenario.objects.filter(slug=slug, base_scene=row, type=read.type.value).exists():
-        return ImportStep(StepKind.OLD, f"{read.id}: {slug} was there already{left_out}")
+    name = f"{token}-s{kept['index']}"
+    reference, losses = interplan_file.read_entry(token, kept["index"], entry, scene)
+    left_out = f"; left out: {', '.join(losses)}" if losses else ""
+    if Scenario.objects.filter(slug=slug, base_scene=row, type=entry.type.value).exists():
+        return ImportStep(StepKind.OLD, f"{name}: {slug} was there already{left_out}")
     density, goal = interplan_file.options_of(entry.config)
     details = interplan_file.Details.model_validate(kept["details"])
     traffic = interplan_file.traffic_of(
-        entry, details, scene, seed=token, clear_of=read.modification.added
+        entry, details, scene, seed=token, clear_of=reference.added
     )
     goal_m = interplan_file.goal_place(kept, goal or "", scene)
     options = SceneOptions(density=density, goal=goal, goal_m=goal_m)
     driven = replace(scene, agents=traffic, options=options)
-    instruction, intent = describe_reference(read.type, read.modification, driven)
+    instruction, intent = describe_reference(entry.type, reference, driven)
     add_scenario(
         scene=row.slug,
-        type=read.type.value,
+        type=entry.type.value,
         instruction=instruction,
         slug=slug,
-        reference=modification_to_document(read.modification),
+        reference=modification_to_document(reference),
         intent=None if intent is None else intent_to_document(intent),
         intent_origin=IntentOrigin.DERIVED,
         density=density,
@@ -193,4 +190,4 @@ def _keep_entry(
         interplan=kept,
         actor=actor,
     )
-    return ImportStep(StepKind.NEW, f"{read.id}: {slug}{left_out}")
+    return ImportStep(StepKind.NEW, f"{name}: {slug}{left_out}")
