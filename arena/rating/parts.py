@@ -88,14 +88,27 @@ def rate_part(votes: Comparisons, rules: Rules) -> Rated:
     if found is None or (votes.score == 0.5).all():
         return replace(plain, explanation=(remarks.NO_INTERVALS,))
     average = float(point.rating[reference].mean())
-    rank = shown_ranks(found.lower, found.upper, average=average)
-    has_lower, has_upper = ~np.isnan(found.lower), ~np.isnan(found.upper)
-    best, worst = rank_sets(above_by_bounds(found.above, found.lower, found.upper))
-    is_open = ~(has_lower & has_upper & (rank > 0))
-    is_adjusted = bool(point.coefficients) or not votes.covariates.size
     said = remarks.warnings(
         votes, rules=rules, rounds=values.shape[1], degenerate=plain.degenerate
     )
+    rated = _with_intervals(plain, found, average)
+    is_open = np.array([bool(note) for note in rated.note])
+    return replace(
+        rated,
+        explanation=(
+            *(() if point.coefficients or not votes.covariates.size else (remarks.NOT_ADJUSTED,)),
+            *((remarks.who_is_open(votes, is_open),) if is_open.any() else ()),
+        ),
+        warnings=(*plain.warnings, *said),
+    )
+
+
+def _with_intervals(plain: Rated, found: "_Intervals", average: float) -> Rated:
+    """Add bounds and ranks, and why some are missing."""
+    rank = shown_ranks(found.lower, found.upper, average=average)
+    best, worst = rank_sets(above_by_bounds(found.above, found.lower, found.upper))
+    has_lower, has_upper = ~np.isnan(found.lower), ~np.isnan(found.upper)
+    known = zip(has_lower.tolist(), has_upper.tolist(), (rank > 0).tolist(), strict=True)
     return replace(
         plain,
         lower=found.lower,
@@ -105,16 +118,9 @@ def rate_part(votes: Comparisons, rules: Rules) -> Rated:
         rank_worst=np.where(has_lower | has_upper, worst, 0),
         note=tuple(
             remarks.note_on_bounds(has_lower=lower, has_upper=upper, has_rank=ranked)
-            for lower, upper, ranked in zip(
-                has_lower.tolist(), has_upper.tolist(), (rank > 0).tolist(), strict=True
-            )
+            for lower, upper, ranked in known
         ),
         separation=found.separation,
-        explanation=(
-            *(() if is_adjusted else (remarks.NOT_ADJUSTED,)),
-            *((remarks.who_is_open(votes, is_open),) if is_open.any() else ()),
-        ),
-        warnings=(*plain.warnings, *said),
     )
 
 

@@ -172,8 +172,6 @@ class Pick:
     """A road user of the scene, by what a sentence says of it.
 
     Attributes:
-        side: On which side of the ego's lane.
-        lane: In which lane.
         relation: Whether it is counted ahead of the ego or behind it, the nearest first.
         ordinal: Which of those that fit; 1 is the nearest.
         every: All that fit.
@@ -245,11 +243,6 @@ class Length:
         """Return a length of the range, evenly drawn."""
         return float(rng.uniform(self.low_m, self.high_m))
 
-    @property
-    def middle_m(self) -> float:
-        """Midway between its ends."""
-        return (self.low_m + self.high_m) / 2.0
-
     def __str__(self) -> str:
         about = "about " if self.is_approximate else ""
         if self.is_range:
@@ -283,7 +276,6 @@ class Spot:
         landmark: A road user of the scene of whom the distance runs.
         mark: A place of the map of which the distance runs.
         lane: None where no lane is said, or none is meant (walks).
-        lateral: Where across the lane; None where nothing is said.
     """
 
     distance: Length | None = None
@@ -316,6 +308,15 @@ class Spot:
         return (low_m, high_m) if self.relation is Relation.AHEAD else (-high_m, -low_m)
 
 
+_Turned = TypeVar("_Turned", "VehicleRequest", "Move")
+
+
+def _check_turn(turned: _Turned) -> _Turned:
+    if turned.turn_deg and turned.facing is None:
+        raise ValueError("turn_deg needs a facing that it is counted from")
+    return turned
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class VehicleRequest:
     """Vehicles that stand (speed 0) or move; the first of them at the spot.
@@ -324,7 +325,6 @@ class VehicleRequest:
         name: What an anchor calls it by; empty where none does. So for all requests.
         turn_deg: On top of `facing`, positive to the left.
         count: More than one stand in a row along the lane, each further one further on.
-        spacing: Between the centres of neighbours in a row.
     """
 
     kind: Literal["vehicles"] = "vehicles"
@@ -337,10 +337,7 @@ class VehicleRequest:
     count: Count | None = None
     spacing: Length | None = None
 
-    @model_validator(mode="after")
-    def _turns_from_something(self) -> Self:
-        _check_turn(self)
-        return self
+    _is_turned_from_something = model_validator(mode="after")(_check_turn)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -377,8 +374,6 @@ class ConesRequest:
         ends_in_middle: A taper ends in the middle of the lane, not at its other boundary.
         both_sides: A line of `count` cones along each boundary of the lane.
         reach_m: From the first cone to the last along the lane, None where the spacing says it.
-        post: Where the worker stands.
-        post_side: To which side of the cones.
     """
 
     kind: Literal["cones"] = "cones"
@@ -402,7 +397,6 @@ class CrashedCar:
 
     Attributes:
         gap: Between the two centres.
-        bearing: Where it stands, seen from the one before.
         turn_deg: Against the one before, positive to the left.
         is_signed: The sentence names the side that it is turned to.
     """
@@ -456,8 +450,9 @@ class Move:
             raise ValueError("one road user is moved, not every one")
         if self.spot.anchor is not None:
             raise ValueError("a move is counted from the ego, a landmark or a mark")
-        _check_turn(self)
         return self
+
+    _is_turned_from_something = model_validator(mode="after")(_check_turn)
 
     @property
     def vehicle_request(self) -> VehicleRequest:
@@ -502,8 +497,3 @@ class Intent:
         if self.unmet is not None and asks:
             raise ValueError("what can't be met asks for nothing else")
         return self
-
-
-def _check_turn(turned: VehicleRequest | Move) -> None:
-    if turned.turn_deg and turned.facing is None:
-        raise ValueError("turn_deg needs a facing that it is counted from")

@@ -1,10 +1,7 @@
 """Big ratings are a worker's job: the task, and what happens without a queue."""
 
-from datetime import timedelta
-
 import pytest
 from django.urls import reverse
-from django.utils import timezone
 
 from arena.models import Snapshot
 from arena.results.services.ratings import RATINGS, is_big, plan_snapshot
@@ -32,22 +29,6 @@ def test_the_task_computes_what_was_planned_and_a_second_message_changes_nothing
     assert (snapshot.state, snapshot.votes_counted) == (Snapshot.State.READY, 6)
     assert snapshot.standings.count() == 3
     RATINGS.perform(0)  # a row that is gone is no fault
-
-
-def test_of_two_workers_with_the_same_message_the_first_to_end_counts() -> None:
-    snapshot = planned()
-    kept: list[int] = []
-
-    slow = RATINGS.take(snapshot.pk, now=timezone.now() - timedelta(minutes=1))
-    assert slow is not None
-    RATINGS.take_back_lost()
-    assert RATINGS.perform(snapshot.pk)
-    kept.extend(snapshot.standings.order_by("pk").values_list("pk", flat=True))
-    RATINGS.work(slow)
-    snapshot.refresh_from_db()
-    assert (snapshot.state, snapshot.progress) == (Snapshot.State.READY, 100)
-    assert list(snapshot.standings.order_by("pk").values_list("pk", flat=True)) == kept
-    assert len(kept) == 3
 
 
 def test_a_rating_that_breaks_in_an_unforeseen_way_says_so_and_can_be_asked_for_again(

@@ -15,7 +15,7 @@ from arena.results.services.ratings import votes_of
 from arena.results.services.vote_files import COLUMNS, digest_of, vote_rows, votes_csv
 from arena.studies.services.opening import close_study
 from augment.errors import Conflict
-from augment.models import Contestant, Scenario
+from augment.models import Scenario
 from augment.scene.entities import ScenarioType
 from tests.append_only import rewriting
 from tests.study_rows import a_study, matchups_of, vote
@@ -40,22 +40,6 @@ def test_filters_choose_by_type_and_expert_and_count_what_they_leave_out() -> No
     assert len(counted(study, experts=(str(eva.code),))) == 6
     found = vote_set(study, filters=Filters(experts=(str(eva.code),)), last=last_vote_of(study))
     assert found.left_out == {"filtered": 6}
-
-
-@pytest.mark.parametrize(("left", "right"), [("ann", "bob"), ("bob", "ann"), ("cid", "bob")])
-def test_a_simulated_contestant_on_either_side_keeps_a_vote_out(left: str, right: str) -> None:
-    study = a_study(votes_per_expert=9)
-    Contestant.objects.filter(slug="ann").update(kind=Contestant.Kind.SIMULATED)
-    rows = study.matchups.filter(left__contestant__slug=left, right__contestant__slug=right)
-    vote(rows[0])
-    found = vote_set(study, filters=Filters(), last=last_vote_of(study))
-    is_real = "ann" not in (left, right)
-    assert len(found.counted) == is_real
-    assert found.left_out == ({} if is_real else {"simulated": 1})
-    study.allow_simulated = True
-    study.save()
-    allowed = vote_set(study, filters=Filters(), last=last_vote_of(study))
-    assert (len(allowed.counted), allowed.left_out) == (1, {})
 
 
 def test_votes_after_the_frozen_one_do_not_count_nor_supersede() -> None:

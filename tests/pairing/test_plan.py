@@ -166,15 +166,6 @@ def test_an_odd_number_of_showings_leaves_no_side_ahead_over_all_experts() -> No
     assert Counter(m.left for m in made.matchups)["c0"] == 9
 
 
-@pytest.mark.parametrize("seed", range(5))
-def test_sides_are_a_fair_coin_for_every_contestant(seed: int) -> None:
-    made = plan(rules(9, 50, 9, 640, seed))
-    shown = Counter(m.left for m in made.matchups) + Counter(m.right for m in made.matchups)
-    left = Counter(m.left for m in made.matchups)
-    chi_square = sum((left[c] - shown[c] / 2) ** 2 / (shown[c] / 4) for c in shown)
-    assert chi_square < 27.9, "nine degrees of freedom, one in a thousand"
-
-
 def test_too_few_units_are_refused_with_both_numbers() -> None:
     with pytest.raises(NothingToPlan, match=r"5 different pairs .*and 1 with.* is to judge 6"):
         plan(rules(3, 2, 1, 6, same=frozenset({(0, 1), (1, 1)})))

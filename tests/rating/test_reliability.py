@@ -108,19 +108,6 @@ def test_of_experts_with_as_many_votes_each_it_is_the_t_interval_of_their_shares
     assert (found.lower, found.upper) == pytest.approx((max(lower, 0.0), min(upper, 1.0)))
 
 
-def test_experts_who_differ_widen_the_interval_of_a_share() -> None:
-    hits = np.array([True] * 50 + [False] * 50)
-    alike = np.tile(np.arange(10), 10)
-    apart = np.repeat(np.arange(10), 10)
-    one, other = share(hits, alike), share(hits, apart)
-    assert one.value == other.value == 0.5
-    assert one.lower is not None
-    assert other.lower is not None
-    assert other.lower < one.lower
-    assert share(hits, np.zeros(100, dtype=np.int64)) == wilson(50, 100)
-    assert share(hits[:0], alike[:0]).value is None
-
-
 # --- One expert and the others -----------------------------------------------------------------
 
 

@@ -28,22 +28,15 @@ from augment.scene.entities import (
 from augment.scene.lane_graph import LaneGraph
 from augment.simulation.drive import ExpertKind, expert_of, run
 from augment.simulation.pdm_closed import ORIGINAL_OFFSETS_M, PdmClosed
-from augment.simulation.planning import IdmPlanner, Plan, Situation
+from augment.simulation.planning import IdmPlanner
 from augment.simulation.road import Road, find_route
 from augment.simulation.score import collisions, progress_ratio, score_drive
-from augment.simulation.states import EgoBody, X, Y
+from augment.simulation.states import X, Y
 from augment.simulation.traffic import DriveSetting
 from tests.properties import examples
 from tests.recorded import recorded
 from tests.scenes import junction, moved_scene, pedestrian, vehicle
-from tests.simulation.short_recordings import (
-    LENGTHS_S,
-    ConstantSpeed,
-    cut,
-    half_speed_drives,
-    recorded_street,
-)
-from tests.simulation.worlds import street
+from tests.simulation.worlds import ConstantSpeed, recorded_street, street
 
 
 def bend() -> Scene:
@@ -135,28 +128,15 @@ def test_the_expert_is_an_idm_drive_without_the_change() -> None:
     assert 40.0 < expert.progress_m < 50.0
 
 
-class Straight:
-    """Keeps speed and heading."""
-
-    def start(self, road: Road, body: EgoBody) -> None:
-        self.road = road
-
-    def plan(self, situation: Situation) -> Plan:
-        x, y, heading, speed = situation.ego[:4]
-        way = speed * 0.1 * np.arange(20)
-        cos, sin = np.cos(heading), np.sin(heading)
-        return Plan(poses=np.stack([x + way * cos, y + way * sin, np.full(20, heading)], axis=1))
-
-
 def test_a_planner_of_ones_own_is_driven() -> None:
-    drive = run(DriveSetting(scene=street()), Straight(), steps=10)
+    drive = run(DriveSetting(scene=street()), ConstantSpeed(8.0), steps=10)
     assert drive.boxes[-1, 0] == pytest.approx(8.0, abs=1e-6)
 
 
 def test_an_ego_off_every_lane_can_not_be_driven() -> None:
     lost = replace(street(), ego=replace(street().ego, y_m=-30.0))
     with pytest.raises(CannotDrive, match="no lane"):
-        run(DriveSetting(scene=lost), Straight())
+        run(DriveSetting(scene=lost), ConstantSpeed(8.0))
 
 
 @pytest.mark.parametrize(
@@ -178,20 +158,26 @@ def test_a_drive_takes_the_way_to_the_goal_where_there_is_one(
 
 
 def test_half_the_experts_speed_scores_alike_however_long_was_recorded() -> None:
-    drives = list(half_speed_drives(*recorded_street()))
-    assert [one.recorded_s for one in drives] == list(LENGTHS_S)
-    assert [one.expert.progress_m for one in drives] == pytest.approx([120.0] * len(drives))
-    ratios = [progress_ratio(one.drive, one.expert) for one in drives]
-    assert ratios == pytest.approx([ratios[-1]] * len(drives), abs=1e-6)
+    road = Road(*recorded_street())
+    ratios, scores = [], []
+    for length_s in (3.0, 6.0, 8.0, 15.0):
+        scene, recording = recorded_street(length_s)
+        setting = DriveSetting(scene=scene, recording=recording)
+        expert = expert_of(setting, road)
+        assert expert.progress_m == pytest.approx(120.0)
+        drive = run(setting, ConstantSpeed(4.0), road=road)
+        assert drive.outlasts_recording == (length_s < 15.0)
+        ratios.append(progress_ratio(drive, expert))
+        scores.append(score_drive(drive, expert).value)
+    assert ratios == pytest.approx([ratios[-1]] * 4, abs=1e-6)
     assert 0.5 < ratios[-1] < 0.55
-    assert [one.score for one in drives] == pytest.approx([drives[-1].score] * len(drives))
-    assert [one.drive.outlasts_recording for one in drives] == [True, True, True, False]
+    assert scores == pytest.approx([scores[-1]] * 4)
 
 
 @pytest.mark.parametrize("reactive", [False, True])
 def test_who_stands_stays_and_who_moves_goes_on_along_its_lane(reactive: bool) -> None:
-    scene, recording = recorded_street()
-    setting = DriveSetting(scene=scene, recording=cut(recording, 3.0), reactive=reactive)
+    scene, recording = recorded_street(3.0)
+    setting = DriveSetting(scene=scene, recording=recording, reactive=reactive)
     drive = run(setting, ConstantSpeed(4.0))
     before, last = drive.objects[30], drive.objects[-1]
     assert set(last.ids) == set(before.ids) == {"Agent2", "Agent3"}
@@ -203,23 +189,23 @@ def test_who_stands_stays_and_who_moves_goes_on_along_its_lane(reactive: bool) -
 
 
 def test_a_recording_of_one_moment_measures_by_an_idm_drive() -> None:
-    scene, recording = recorded_street()
-    setting = DriveSetting(scene=scene, recording=cut(recording, 0.0))
+    scene, recording = recorded_street(0.0)
+    setting = DriveSetting(scene=scene, recording=recording)
     expert = expert_of(setting, Road(scene))
     assert expert.kind is ExpertKind.IDM
     assert len(run(setting, ConstantSpeed(4.0), steps=5).objects[-1]) == 2
 
 
 def test_an_expert_who_stops_or_meets_the_end_of_the_map_goes_no_further() -> None:
-    scene, recording = recorded_street()
+    scene, recording = recorded_street(6.0)
     stopped = recording.ego.copy()
     stopped[20:] = stopped[20]
-    setting = DriveSetting(scene=scene, recording=cut(replace(recording, ego=stopped), 6.0))
+    setting = DriveSetting(scene=scene, recording=replace(recording, ego=stopped))
     assert expert_of(setting, Road(scene)).progress_m == pytest.approx(16.0)
     short = replace(scene, lanes=tuple(replace(lane) for lane in scene.lanes))
     road = Road(short)
     road.end_m = float(road.centreline.beside(np.array([[50.0, 0.0]]))[0][0])
-    setting = DriveSetting(scene=short, recording=cut(recording, 3.0))
+    setting = DriveSetting(scene=short, recording=recording)
     assert expert_of(setting, road).progress_m < 50.0
 
 

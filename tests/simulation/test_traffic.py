@@ -7,19 +7,13 @@ import numpy as np
 import pytest
 
 from augment.geometry.polyline import Polyline
-from augment.scene.entities import (
-    AgentType,
-    LaneConnector,
-    Modification,
-    TrafficAgent,
-    TrafficLight,
-)
-from augment.scene.recording import Recording, Track
+from augment.scene.entities import LaneConnector, Modification, TrafficAgent, TrafficLight
+from augment.scene.recording import Recording
 from augment.simulation.road import Road
 from augment.simulation.states import Objects, start_state
 from augment.simulation.traffic import DriveSetting, Traffic
 from tests.scenes import pedestrian, vehicle
-from tests.simulation.worlds import BODY, street
+from tests.simulation.worlds import BODY, street, track
 
 
 def after(setting: DriveSetting, steps: int, *, ego_speed_mps: float = 0.0) -> list[Objects]:
@@ -107,15 +101,9 @@ def recorded(reactive: bool = False, modification: Modification | None = None) -
     passing[10:21, 0] -= 0.8 * np.arange(11)
     ego = np.zeros((151, 4))
     ego[:, 0] = times * 5.0
-    tracks = (
-        Track(
-            agent_id="Agent2", type=AgentType.VEHICLE, length_m=4.8, width_m=2.0, states=stopping
-        ),
-        Track(
-            agent_id="Agent3", type=AgentType.VEHICLE, length_m=4.8, width_m=2.0, states=passing
-        ),
-    )
-    agent = replace(vehicle("Agent2", 20.0, 0.0), speed_mps=6.0)
+    cars = vehicle("Agent2", 20.0, 0.0), vehicle("Agent3", 30.0, 3.5)
+    tracks = track(cars[0], stopping), track(cars[1], passing)
+    agent = replace(cars[0], speed_mps=6.0)
     return DriveSetting(
         scene=replace(street(), agents=(agent,)),
         modification=modification or Modification(),

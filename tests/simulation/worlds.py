@@ -7,11 +7,14 @@ import numpy as np
 
 from augment.geometry.polyline import Polyline
 from augment.scene.entities import Lane, Scene, TrafficAgent
+from augment.scene.recording import Recording, Track
 from augment.simulation.drive import Drive
+from augment.simulation.planning import Plan, Situation
 from augment.simulation.road import Road
 from augment.simulation.states import (
     HEADING,
     SPEED,
+    STEP_S,
     EgoBody,
     FloatArray,
     Objects,
@@ -19,7 +22,7 @@ from augment.simulation.states import (
     Y,
     objects_of,
 )
-from tests.scenes import EGO, scene
+from tests.scenes import EGO, scene, vehicle
 
 BODY = EgoBody()
 LIMIT_MPS = 10.0
@@ -64,3 +67,35 @@ def driven(
 def rows(agents: Sequence[TrafficAgent], count: int) -> list[Objects]:
     start = objects_of(agents)
     return [replace(start, boxes=start.later(np.array(0.1 * step))) for step in range(count)]
+
+
+class ConstantSpeed:
+    """A planner that follows the route's centreline at one speed."""
+
+    def __init__(self, speed_mps: float) -> None:
+        self._way_m = speed_mps * STEP_S * np.arange(41, dtype=np.float64)
+
+    def start(self, road: Road, body: EgoBody) -> None:
+        self._line = road.centreline
+
+    def plan(self, situation: Situation) -> Plan:
+        return Plan(poses=self._line.poses(self._line.station_of(situation.ego) + self._way_m))
+
+
+def track(agent: TrafficAgent, states: FloatArray) -> Track:
+    size = {"length_m": agent.length_m, "width_m": agent.width_m}
+    return Track(agent_id=agent.id, type=agent.type, states=states, **size)
+
+
+def recorded_street(length_s: float = 15.0) -> tuple[Scene, Recording]:
+    """The ego at 8 m/s, a car 40 m ahead as fast, one parked beside the lane 60 m ahead."""
+    ahead = replace(vehicle("Agent2", 40.0, 0.0), speed_mps=8.0, lane_id="Lane1")
+    scene = replace(street(), agents=(ahead, vehicle("Agent3", 60.0, -3.2)))
+    times_s = np.arange(round(length_s / STEP_S) + 1, dtype=np.float64) * STEP_S
+    ego, *others = (
+        np.array([agent.x_m, agent.y_m, 0.0, agent.speed_mps])
+        + times_s[:, None] * np.array([agent.speed_mps, 0.0, 0.0, 0.0])
+        for agent in scene.everyone
+    )
+    tracks = tuple(track(*row) for row in zip(scene.agents, others, strict=True))
+    return scene, Recording(times_s=times_s, ego=ego, tracks=tracks)

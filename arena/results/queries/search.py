@@ -13,6 +13,7 @@ from arena.results.queries.votes import (
     AUTOMATIC,
     AUTOMATIC_TIE,
     COUNTED,
+    IMPORTED_OUTCOMES,
     RATED,
     Filters,
     Judged,
@@ -161,16 +162,10 @@ _VOTE_OUTCOMES: dict[str, list[str]] = {
     "decided": ["left", "right"],
     "skip": ["skip"],
 }
-_FILE = ImportedVote.Outcome
-_LINE_OUTCOMES: dict[str, list[str]] = {
-    "left": [_FILE.FIRST],
-    "right": [_FILE.SECOND],
-    "equal": [_FILE.TIE, _FILE.BOTH_BAD],
-    "tied": [_FILE.TIE, _FILE.BOTH_BAD],
-    "decided": [_FILE.FIRST, _FILE.SECOND],
-    "both_miss": [_FILE.BOTH_BAD],
-    "skip": [],
-}
+_LINE_OUTCOMES = {
+    name: [stored for stored, meant in IMPORTED_OUTCOMES.items() if meant in wanted]
+    for name, wanted in _VOTE_OUTCOMES.items()
+} | {"both_miss": [ImportedVote.Outcome.BOTH_BAD.value]}
 
 
 def _by_mark(rows: QuerySet[Any], mark: str) -> QuerySet[Any]:

@@ -3,14 +3,12 @@
 Votes of a study and votes of a file look alike from here on.
 """
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from enum import StrEnum
-from typing import Any, NamedTuple, TypeVar, cast
+from typing import Any, NamedTuple, Self, TypeVar, cast
 
 from django.db.models import Case, F, Max, Model, Q, QuerySet, Value, When
 from django.db.models.fields import CharField
@@ -33,18 +31,12 @@ IMPORTED = "imported"
 RATED = (Vote.Outcome.LEFT.value, Vote.Outcome.EQUAL.value, Vote.Outcome.RIGHT.value)
 """Outcomes that say something; a skip does not."""
 
-IMPORTED_OUTCOMES = dict(
-    zip(
-        (
-            ImportedVote.Outcome.FIRST.value,
-            ImportedVote.Outcome.TIE.value,
-            ImportedVote.Outcome.SECOND.value,
-            ImportedVote.Outcome.BOTH_BAD.value,
-        ),
-        (*RATED, Vote.Outcome.EQUAL.value),
-        strict=True,
-    )
-)
+IMPORTED_OUTCOMES: dict[str, str] = {
+    ImportedVote.Outcome.FIRST: Vote.Outcome.LEFT,
+    ImportedVote.Outcome.TIE: Vote.Outcome.EQUAL,
+    ImportedVote.Outcome.SECOND: Vote.Outcome.RIGHT,
+    ImportedVote.Outcome.BOTH_BAD: Vote.Outcome.EQUAL,
+}
 
 KINDS = (MAIN, REPEAT)
 """What may be rated: planned showings, and on demand the hidden repeats of them."""
@@ -160,7 +152,7 @@ class Filters:
         }
 
     @classmethod
-    def of_document(cls, document: dict[str, Any]) -> Filters:
+    def of_document(cls, document: dict[str, Any]) -> Self:
         """What `as_document` wrote; older snapshots left settled pairs out."""
         return cls(
             types=tuple(document.get("types", ())),
@@ -257,32 +249,15 @@ def current_votes(study: Study, filters: Filters, last: int | None) -> list[Judg
             for first, second, outcome, judge, item, mark in lines.values_list(*names)
         ]
     rows: QuerySet[Any] = _mark_votes(study, filters, last)
-    rows = (
-        rows.exclude(Q(mark=LeftOut.SUPERSEDED.value))
-        .order_by("pk")
-        .values_list(
-            "expert__person__code",
-            "expert__person__pseudonym",
-            "matchup__scenario__slug",
-            "matchup__scenario__type",
-            "matchup__kind",
-            "shown_left__contestant__slug",
-            "shown_right__contestant__slug",
-            "outcome",
-            "both_miss",
-            "is_simulated",
-            F("mark"),
-            "ms_visible",
-            "matchup",
-            "matchup__repeat_of",
-            "at",
-            "matchup__position",
-            "aids",
-            "comment",
-            "shown_left__code",
-            "shown_right__code",
-        )
+    columns = (
+        *("expert__person__code", "expert__person__pseudonym"),
+        *("matchup__scenario__slug", "matchup__scenario__type", "matchup__kind"),
+        *("shown_left__contestant__slug", "shown_right__contestant__slug"),
+        *("outcome", "both_miss", "is_simulated", F("mark"), "ms_visible"),
+        *("matchup", "matchup__repeat_of", "at", "matchup__position", "aids", "comment"),
+        *("shown_left__code", "shown_right__code"),
     )
+    current = rows.exclude(Q(mark=LeftOut.SUPERSEDED.value)).order_by("pk")
     return [
         vote._replace(
             judge=str(vote.judge),
@@ -290,7 +265,7 @@ def current_votes(study: Study, filters: Filters, last: int | None) -> list[Judg
             left_code=str(vote.left_code),
             right_code=str(vote.right_code),
         )
-        for vote in (Judged(*row) for row in rows)
+        for vote in map(Judged._make, current.values_list(*columns))
     ]
 
 
@@ -334,10 +309,15 @@ def settled_ties(study: Study, votes: Iterable[Judged], filters: Filters) -> lis
             both_miss=False,
             is_simulated=first.is_simulated,
         )
+        is_asked_for = (
+            MAIN in filters.kinds
+            and tie.type in (filters.types or (tie.type,))
+            and judge in (filters.experts or (judge,))
+        )
         is_made_up = tie.is_simulated or not simulated.isdisjoint((left, right))
         if is_made_up and not study.allow_simulated:
             tie = tie._replace(mark=LeftOut.SIMULATED.value)
-        elif not _is_asked_for(tie, filters):
+        elif not is_asked_for:
             tie = tie._replace(mark=LeftOut.FILTERED.value)
         ties.append(tie._replace(mark=AUTOMATIC_TIE) if filters.leave_out_settled else tie)
     return ties
@@ -416,14 +396,6 @@ def _check_names(filters: Filters, votes: Sequence[Judged]) -> None:
         for name in names:
             if name not in known:
                 raise UnknownName(what, name, known)
-
-
-def _is_asked_for(tie: Judged, filters: Filters) -> bool:
-    return (
-        MAIN in filters.kinds
-        and (not filters.types or tie.type in filters.types)
-        and (not filters.experts or tie.judge in filters.experts)
-    )
 
 
 def _mark_votes(study: Study, filters: Filters, last: int | None) -> QuerySet[Vote]:

@@ -1,8 +1,8 @@
 """What a rating can adjust for, as columns beside its votes: the side, and how much was shown."""
 
+from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -39,39 +39,25 @@ def with_covariates(
         return comparisons
     columns: dict[str, FloatArray] = {SIDE: np.ones(len(votes))}
     if set(names) - {SIDE}:
-        counts = _counts({code for vote in votes for code in (vote.left_code, vote.right_code)})
-        nothing = (0, 0)
-        both = np.array(
-            [
-                np.subtract(
-                    counts.get(vote.left_code, nothing), counts.get(vote.right_code, nothing)
-                )
-                for vote in votes
-            ],
-            dtype=np.float64,
-        ).reshape(-1, 2)
-        columns |= {OBJECTS: both[:, 0], VEHICLES: both[:, 1]}
+        counts = _count_changes(
+            {code for vote in votes for code in (vote.left_code, vote.right_code)}
+        )
+        more = np.array([counts[vote.left_code] - counts[vote.right_code] for vote in votes])
+        columns[OBJECTS], columns[VEHICLES] = more.reshape(-1, 2).T
     return replace(comparisons, covariates=np.column_stack([columns[name] for name in names]))
 
 
-# --- Private -----------------------------------------------------------------------------------
-
-
-def _counts(codes: set[str]) -> dict[str, tuple[int, int]]:
-    """Objects and vehicles that an augmentation adds or moves, by its code."""
-    found: dict[str, tuple[int, int]] = {}
+def _count_changes(codes: set[str]) -> defaultdict[str, FloatArray]:
+    """(2,) objects and vehicles that an augmentation adds or moves, by its code."""
+    found: defaultdict[str, FloatArray] = defaultdict(lambda: np.zeros(2))
     known = sorted(code for code in codes if code)
     for first in range(0, len(known), _AT_ONCE):
         rows = Augmentation.objects.filter(code__in=known[first : first + _AT_ONCE])
         for code, document in rows.values_list("code", "modification"):
-            found[str(code)] = _of_document(document)
+            changed = [*(document or {}).get("add", []), *(document or {}).get("move", [])]
+            vehicles = sum(agent["type"] in _VEHICLES for agent in changed)
+            found[str(code)] = np.array([len(changed), vehicles], dtype=np.float64)
     return found
-
-
-def _of_document(document: dict[str, Any] | None) -> tuple[int, int]:
-    """An empty modification changes nothing."""
-    changed = [*(document or {}).get("add", []), *(document or {}).get("move", [])]
-    return len(changed), sum(agent["type"] in _VEHICLES for agent in changed)
 
 
 def settled_remark(study: Study, votes: VoteSet, *, left_out: bool) -> str:
