@@ -6,10 +6,9 @@ expert the matchups in their order, each with its two sides.
 A unit is a scenario with a pair of contestants. The plan is made in five steps:
 
 1. every expert gets a quota of each scenario and of each pair; quotas differ by at most 1 within
-   an expert and over all experts, as far as there are enough units (units.py), unless the rules
-   say how often a contestant or a pair is to be judged (targets.py),
-2. units are chosen that meet both quotas; what the first choice misses is mended by exchanges,
-   and so is what the rules want two experts to judge (overlap.py),
+   an expert and over all experts, as far as there are enough units,
+2. units are chosen that meet both quotas (units.py); what the first choice misses is mended by
+   exchanges, and so is what the rules want two experts to judge,
 3. hidden repeats and attention checks are drawn on top,
 4. each expert's units are put in an order that keeps a scenario away from itself (order.py),
 5. sides are dealt so that each pair is shown either way round equally often, to +-1; a repeat is
@@ -42,15 +41,8 @@ from arena.pairing.rules import (
     PlannedMatchup,
     PlanRules,
     check_rules,
-    pair_totals,
 )
-from arena.pairing.units import (
-    bring_together,
-    choose_units,
-    choose_wanted,
-    draw_probability,
-    share_out,
-)
+from arena.pairing.units import bring_together, choose_units, draw_probability
 
 __all__ = ["Check", "Entry", "MatchupPlan", "PlanRules", "PlannedMatchup", "plan"]
 
@@ -66,7 +58,10 @@ def plan(rules: PlanRules) -> MatchupPlan:
     grid = rules.grid
     check_rules(rules, grid)
     rng = np.random.default_rng(rules.seed)
-    chosen, probability = _chosen(rules, grid, rng)
+    experts, votes = len(rules.experts), rules.votes_at_once
+    chosen = choose_units(grid.showable, experts, votes, rng)
+    bring_together(chosen, grid.showable, rules.overlap_share, rng)
+    probability = draw_probability(grid.showable, votes)
     extras = [_extras(rules, grid, mine, rng) for mine in chosen]
     orders, gap = put_in_order(
         chosen, extras, rules.scenario_gap, rules.repeat_distance, rng, grid.bases
@@ -83,23 +78,6 @@ def plan(rules: PlanRules) -> MatchupPlan:
         )
     ]
     return MatchupPlan(matchups=tuple(matchups), scenario_gap=gap, identical=grid.identical)
-
-
-def _chosen(
-    rules: PlanRules, grid: Grid, rng: np.random.Generator
-) -> tuple[BoolArray, FloatArray]:
-    """The units of every expert (E, P, S), and how likely each unit (P, S) is a given showing."""
-    experts, votes = len(rules.experts), rules.votes_at_once
-    if not rules.appearances and not rules.pair_votes:
-        chosen = choose_units(grid.showable, experts, votes, rng)
-        bring_together(chosen, grid.showable, rules.overlap_share, rng)
-        return chosen, draw_probability(grid.showable, votes)
-    totals = pair_totals(rules, grid)
-    chosen = choose_wanted(grid.showable, share_out(totals, experts, rng), rng)
-    bring_together(chosen, grid.showable, rules.overlap_share, rng)
-    places = np.maximum(grid.showable.sum(axis=1), 1)
-    shares = np.where(grid.showable, (totals / totals.sum() / places)[:, None], 0.0)
-    return chosen, shares
 
 
 def _extras(rules: PlanRules, grid: Grid, mine: BoolArray, rng: np.random.Generator) -> Extras:

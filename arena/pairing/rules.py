@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 from random import Random
@@ -13,7 +12,6 @@ import numpy as np
 
 from arena.errors import NothingToPlan
 from arena.pairing.order import MAIN, BoolArray, IntArray
-from arena.pairing.units import votes_by_appearances
 
 DEFAULT_SCENARIO_GAP = 5
 """How many other matchups an expert judges before a scenario comes again."""
@@ -66,10 +64,6 @@ class PlanRules:
     Attributes:
         votes_per_expert: The quota; repeats and checks come on top of it.
         scenario_gap: Matchups wanted between two showings of a scenario to one expert.
-        appearances: (contestant, n): in how many votes each contestant is to appear over all
-            experts. Empty for a balanced plan.
-        pair_votes: (contestant, contestant, n): how many votes each pair gets over all experts.
-            Empty for a balanced plan; not beside `appearances`.
         repeat_share: Hidden repeats as a share of the quota.
         repeat_distance: Matchups wanted between a pair and its repeat.
         overlap_share: Of the units that are planned at once, those that two experts or more
@@ -88,8 +82,6 @@ class PlanRules:
     votes_per_expert: int
     seed: int
     scenario_gap: int = DEFAULT_SCENARIO_GAP
-    appearances: tuple[tuple[str, int], ...] = ()
-    pair_votes: tuple[tuple[str, str, int], ...] = ()
     repeat_share: float = 0.0
     repeat_distance: int = 30
     overlap_share: float = 0.0
@@ -198,36 +190,6 @@ def grid_of(entries: tuple[Entry, ...], alike: tuple[tuple[str, str, str], ...] 
     return Grid(scenarios=scenarios, pairs=pairs, showable=showable, identical=tuple(identical))
 
 
-_OF_ONE = re.compile(r"([a-z0-9-]+)\s*[=:\s]\s*(\d+)")
-_OF_TWO = re.compile(r"([a-z0-9-]+)\s+(?:vs\.?|against)\s+([a-z0-9-]+)\s*[=:\s]\s*(\d+)")
-
-Appearances = tuple[tuple[str, int], ...]
-PairVotes = tuple[tuple[str, str, int], ...]
-
-
-def read_targets(lines: Iterable[str]) -> tuple[Appearances, PairVotes]:
-    """What lines like "interplan 1960" or "interplan vs gpt-4o-otm 330" say; empty ones nothing.
-
-    Raises:
-        NothingToPlan: A line says neither.
-    """
-    of_one, of_two = [], []
-    for line in lines:
-        text = line.strip()
-        if not text:
-            continue
-        if match := _OF_TWO.fullmatch(text):
-            of_two.append((match[1], match[2], int(match[3])))
-        elif match := _OF_ONE.fullmatch(text):
-            of_one.append((match[1], int(match[2])))
-        else:
-            raise NothingToPlan(
-                f"'{text}' is no target: write CONTESTANT NUMBER, or CONTESTANT vs "
-                "CONTESTANT NUMBER."
-            )
-    return tuple(of_one), tuple(of_two)
-
-
 Triple = tuple[str, str, str]
 """Scenario (or sample of one) and two contestants."""
 
@@ -302,10 +264,6 @@ def check_rules(rules: PlanRules, grid: Grid) -> None:
         f"{rules.uniform_share:.0%}.": not 0.2 <= rules.uniform_share <= 1,
         "For pairs that two experts judge there must be two.": rules.overlap_share > 0
         and len(rules.experts) < 2,
-        "Targets are given by contestant or by pair, not both.": bool(rules.appearances)
-        and bool(rules.pair_votes),
-        "Targets fix every vote, so none are left for an adaptive part.": rules.adaptive_share > 0
-        and bool(rules.appearances or rules.pair_votes),
         "Each check is on a scenario of its own out of those of the study.": len(set(checked))
         < len(checked)
         or not set(checked) <= set(grid.scenarios),
@@ -326,59 +284,3 @@ def check_share(part: str, share: float, most: float) -> None:
     """
     if not 0 <= share <= most:
         raise NothingToPlan(f"The share of {part} goes from 0 to {most:.0%}, not {share:.1%}.")
-
-
-def pair_totals(rules: PlanRules, grid: Grid) -> IntArray:
-    """Votes of every pair (P,) over all experts, where the rules say how often.
-
-    Raises:
-        NothingToPlan: The wanted numbers can't be met; the text has them.
-    """
-    experts, votes = len(rules.experts), len(rules.experts) * rules.votes_per_expert
-    capacity = experts * grid.showable.sum(axis=1)
-    totals = (
-        _by_pair(rules, grid, votes)
-        if rules.pair_votes
-        else _by_contestant(rules, grid, votes, capacity)
-    )
-    for pair, wanted, most in zip(grid.pairs, totals, capacity, strict=True):
-        if wanted > most:
-            raise NothingToPlan(
-                f"{pair[0]} against {pair[1]} is to get {int(wanted)} votes, but {experts} "
-                f"experts on {int(most) // experts} scenarios can give {int(most)}."
-            )
-    return totals
-
-
-def _by_pair(rules: PlanRules, grid: Grid, votes: int) -> IntArray:
-    totals = np.zeros(len(grid.pairs), dtype=np.int64)
-    rows = grid.row_of_pair
-    for first, second, wanted in rules.pair_votes:
-        if (names := frozenset((first, second))) not in rows:
-            raise NothingToPlan(f"{first} against {second} is no pair of this study.")
-        totals[rows[names]] += wanted
-    if totals.sum() != votes:
-        raise NothingToPlan(
-            f"The targets add up to {totals.sum():,} votes, but the experts' quotas to {votes:,}."
-        )
-    return totals
-
-
-def _by_contestant(rules: PlanRules, grid: Grid, votes: int, capacity: IntArray) -> IntArray:
-    names = sorted({name for pair in grid.pairs for name in pair})
-    wanted = dict(rules.appearances)
-    if set(wanted) != set(names) or len(wanted) < len(rules.appearances):
-        odd = tuple(sorted(set(wanted) ^ set(names))) or ("one is named twice",)
-        raise NothingToPlan(f"Each contestant of the study needs one target: {', '.join(odd)}.")
-    given = sum(wanted.values())
-    if given != 2 * votes:
-        raise NothingToPlan(
-            f"The targets add up to {given:,} appearances, but the experts' quotas to "
-            f"{2 * votes:,}."
-        )
-    most = np.zeros((len(names), len(names)), dtype=np.int64)
-    rows, columns = np.triu_indices(len(names), 1)  # in the order of the pairs
-    most[rows, columns] = most[columns, rows] = capacity
-    sums = np.array([wanted[name] for name in names], dtype=np.int64)
-    found: IntArray = votes_by_appearances(names, sums, most)[rows, columns]
-    return found

@@ -6,7 +6,6 @@ Notation: E experts, P pairs, S scenarios.
 import itertools
 import math
 from collections import deque
-from collections.abc import Sequence
 
 import numpy as np
 
@@ -149,107 +148,6 @@ def _level(capacity: IntArray, total: int) -> FloatArray:
         level += poured
         left -= poured.sum()
     return level
-
-
-ROUNDS = 2000
-"""Of the proportional fitting; it stops earlier when it is exact."""
-
-
-def votes_by_appearances(
-    names: Sequence[str], appearances: IntArray, capacity: IntArray
-) -> IntArray:
-    """Votes of every pair (C, C), symmetric, whose row sums are the wanted appearances exactly.
-
-    The pairs are as independent as the sums allow (proportional fitting), then rounded.
-
-    Args:
-        names: Of the contestants, for the error.
-        appearances: (C,) in how many votes each contestant is to appear.
-        capacity: (C, C) how many votes each pair can have at most, symmetric, 0 on the diagonal.
-
-    Raises:
-        NothingToPlan: No numbers of votes have these sums.
-    """
-    from scipy.optimize import Bounds, LinearConstraint, milp  # slow to load
-
-    low, high = np.triu_indices(len(names), 1)
-    most = capacity[low, high]
-    wanted = _fitted(appearances.astype(float), capacity.astype(float))[low, high]
-    ends = np.zeros((len(names), len(low)))
-    ends[low, np.arange(len(low))] = ends[high, np.arange(len(low))] = 1.0
-    each, nothing = np.eye(len(low)), np.zeros_like(ends)
-    found = milp(  # whole votes, then how far each is from what is wanted: the least in all
-        np.repeat([0.0, 1.0], len(low)),
-        integrality=np.repeat([1, 0], len(low)),
-        bounds=Bounds(0.0, np.concatenate([most, np.full(len(low), np.inf)])),
-        constraints=[
-            LinearConstraint(np.hstack([ends, nothing]), appearances, appearances),
-            LinearConstraint(np.hstack([each, -each]), ub=wanted),
-            LinearConstraint(np.hstack([each, each]), lb=wanted),
-        ],
-    )
-    if found.x is None:
-        targets = ", ".join(f"{name} {n}" for name, n in zip(names, appearances, strict=True))
-        raise NothingToPlan(
-            f"These appearances can't be reached with the pairs that can be shown: {targets}."
-        )
-    votes = np.zeros_like(capacity)
-    votes[low, high] = votes[high, low] = np.rint(found.x[: len(low)]).astype(np.int64)
-    return votes
-
-
-def share_out(totals: IntArray, experts: int, rng: np.random.Generator) -> IntArray:
-    """The votes of each pair per expert (E, P): equal to one, each expert with the same sum.
-
-    Args:
-        totals: (P,) votes over all experts; their sum is a multiple of the experts.
-        experts: How many there are.
-        rng: Says who gets the odd ones.
-    """
-    shares = np.tile(totals // experts, (experts, 1))
-    turn = int(rng.integers(experts))
-    for pair in rng.permutation(len(totals)):
-        for _ in range(int(totals[pair] % experts)):
-            shares[turn % experts, pair] += 1
-            turn += 1
-    return shares
-
-
-def choose_wanted(showable: BoolArray, of_pair: IntArray, rng: np.random.Generator) -> BoolArray:
-    """Units per expert, (E, P, S), with exactly `of_pair` (E, P) votes of every pair.
-
-    Scenarios are as equal as those counts allow; within a pair, scenarios that few experts judge
-    go first.
-    """
-    experts, pairs = of_pair.shape
-    votes = int(of_pair[0].sum())
-    used = showable & (of_pair.sum(axis=0) > 0)[:, None]
-    of_scenario = quotas(used.sum(axis=0), experts, votes, rng)
-    chosen = np.zeros((experts, pairs, showable.shape[1]), dtype=bool)
-    judges = np.zeros(showable.shape)
-    for expert in range(experts):
-        mine = chosen[expert]
-        order = np.argsort(-of_pair[expert] - rng.random(pairs))
-        _fill(mine.T, showable.T, judges.T, order, of_pair[expert], of_scenario[expert], rng)
-        even_out(mine.T, showable.T, of_scenario[expert])
-        judges += mine
-    return chosen
-
-
-# --- Private -----------------------------------------------------------------------------------
-
-
-def _fitted(sums: FloatArray, capacity: FloatArray) -> FloatArray:
-    """The independent shares (C, C) with these row sums, none above its capacity."""
-    weight = np.sqrt(np.maximum(sums, 0.0))
-    for _ in range(ROUNDS):
-        shares: FloatArray = np.minimum(np.outer(weight, weight), capacity)
-        rows = shares.sum(axis=1)
-        if np.abs(rows - sums).max() < 1e-9:
-            break
-        scale = np.divide(sums, rows, out=np.zeros_like(sums), where=rows > 0)
-        weight = np.clip(weight * np.sqrt(scale), 0.0, 1e9)
-    return shares
 
 
 _MOST_AT_ONCE = 250

@@ -6,8 +6,6 @@ from typing import Any
 from django import forms
 from django.contrib.auth.models import User
 
-from arena.errors import NothingToPlan
-from arena.pairing.rules import read_targets
 from arena.site.forms import ChoiceForm, form_field, offer
 from arena.studies.services.drafts import SWITCHES
 from arena.studies.services.outlook import ESTIMATE_INPUTS, StudyEstimate
@@ -38,15 +36,6 @@ class StudyForm(ChoiceForm):
             one.name for one in PLAN_INPUTS if one.kind not in (InputKind.TEXT, InputKind.NAMES)
         ]
         return [self[name] for name in sorted(names, key=lambda name: name in SWITCHES)]
-
-    def clean_targets(self) -> list[str]:
-        """Refuse targets that can't be read."""
-        lines: list[str] = self.cleaned_data["targets"]
-        try:
-            read_targets(lines)
-        except NothingToPlan as error:
-            raise forms.ValidationError(str(error)) from error
-        return lines
 
     def study_plan(self) -> StudyPlan:
         """Return what is to be opened, once the form is valid; an empty number is 0."""

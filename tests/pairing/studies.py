@@ -5,35 +5,17 @@ from collections import Counter, defaultdict
 from arena.pairing.order import CHECK, MAIN, REPEAT
 from arena.pairing.plan import Check, Entry, MatchupPlan, PlannedMatchup, PlanRules
 
-APPEARANCES = {
-    "interplan": 1960,
-    "gpt-4o-otm": 1720,
-    "gemini-vqa": 720,
-    "gemini-tqa": 600,
-    "llama-tqa": 600,
-    "gemini-fc": 1360,
-    "llama-fc": 1360,
-    "gemini-otm": 1600,
-    "llama-otm": 1600,
-}
-"""In how many of the paper's 5,760 votes each of its contestants appears."""
+CONTESTANTS = (
+    *("interplan", "gpt-4o-otm", "gemini-vqa", "gemini-tqa", "llama-tqa"),
+    *("gemini-fc", "llama-fc", "gemini-otm", "llama-otm"),
+)
+"""Those of the paper's study of 5,760 votes by nine experts on 50 scenarios."""
 
 
 def paper_rules(seed: int, *, votes: int = 640, experts: int = 9, **more: object) -> PlanRules:
-    """The paper's study, or one with its proportions and other numbers.
-
-    Args:
-        seed: Of the plan.
-        votes: Of each expert; targets are scaled to them, the first takes what rounding leaves.
-        experts: How many vote.
-        more: Other rules.
-    """
-    total = 2 * votes * experts
-    targets = {name: total * wanted // 11_520 for name, wanted in APPEARANCES.items()}
-    targets["interplan"] += total - sum(targets.values())
+    """A study of the paper's size, or one with other numbers and other rules."""
     scenarios = [f"scenario-{number:02}" for number in range(50)]
     given: dict[str, object] = {
-        "appearances": tuple(targets.items()),
         "repeat_share": 0.05,
         "check_share": 0.02,
         "checks": tuple(
@@ -45,7 +27,7 @@ def paper_rules(seed: int, *, votes: int = 640, experts: int = 9, **more: object
         entries=tuple(
             Entry(scenario=scenario, contestant=name, picture=f"{scenario} {name}")
             for scenario in scenarios
-            for name in APPEARANCES
+            for name in CONTESTANTS
         ),
         experts=tuple(f"expert-{number}" for number in range(1, experts + 1)),
         votes_per_expert=votes,

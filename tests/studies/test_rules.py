@@ -1,6 +1,4 @@
-"""Studies with targets, repeats, attention checks and automatic ties, as rows."""
-
-from collections import Counter
+"""Studies with repeats, attention checks and automatic ties, as rows."""
 
 import pytest
 
@@ -60,14 +58,6 @@ def test_checks_show_the_reference_against_a_broken_one() -> None:
         assert shown == {"reference", "check"}
     assert not study.contestants.filter(kind="check").exists()
     assert study.matchups.exclude(kind="check").filter(left__contestant__kind="check").count() == 0
-
-
-def test_targets_by_contestant_are_met_in_the_rows() -> None:
-    targets = {"ann": 20, "bob": 15, "cid": 13}
-    study = opened(cast_of(), targets=[f"{slug} {votes}" for slug, votes in targets.items()])
-    shown = Counter(study.matchups.values_list("left__contestant__slug", flat=True))
-    shown += Counter(study.matchups.values_list("right__contestant__slug", flat=True))
-    assert shown == targets
 
 
 def test_a_study_opened_before_these_rules_is_read_without_them() -> None:

@@ -59,7 +59,6 @@ def test_a_draft_keeps_every_field_as_it_stands(admin: Client) -> None:
         "name": "Round 1",
         "contestants": ["bob"],
         "experts": ["finn"],
-        "targets": "ann lots",
         "scenarios": ["place-0", "place-3"],
         "votes_per_expert": "",
         "seed": "77",
@@ -75,7 +74,7 @@ def test_a_draft_keeps_every_field_as_it_stands(admin: Client) -> None:
     assert answer.headers["Location"] == page_of(draft)
     shown = admin.get(page_of(draft))
     assert shown.status_code == 200, "what is not finished is no error yet"
-    for name in ("name", "seed", "repeats", "checks", "targets", "hypotheses"):
+    for name in ("name", "seed", "repeats", "checks", "hypotheses"):
         assert value(shown, name) == sent[name], name
     assert value(shown, "votes_per_expert") == "", "no number comes back that was deleted"
     for name in ("contestants", "experts", "scenarios"):
@@ -155,7 +154,6 @@ def a_rich_study() -> Study:
     given = {
         "repeats": 25,
         "overlap": 10,
-        "targets": ["ann 20", "bob 15", "cid 13"],
         "allow_both_miss": True,
         "hypotheses": ["ann above bob", "It is so."],
     }

@@ -19,14 +19,7 @@ from django.utils import timezone
 from arena.errors import StudyNotOpen
 from arena.models import Study
 from arena.pairing.plan import Check, Entry, MatchupPlan, PlanRules, plan
-from arena.pairing.rules import (
-    ATTENTION_CHECKS,
-    MOST_CHECKS,
-    Triple,
-    check_share,
-    draw_shown,
-    read_targets,
-)
+from arena.pairing.rules import ATTENTION_CHECKS, MOST_CHECKS, Triple, check_share, draw_shown
 from arena.people.queries import experts as expert_accounts
 from arena.rating.snapshot_document import VERSION as RESULTS_VERSION
 from arena.results.services.vote_files import VERSION as VOTES_VERSION
@@ -172,14 +165,11 @@ def _rules(
         require_checks(checks, wanted=wanted)
     alike = () if study_plan.show_alike else alike_pairs(cells)
     alike_shown = draw_shown(alike, entries, seed=study_plan.seed)
-    appearances, pair_votes = read_targets(study_plan.targets)
     rules = PlanRules(
         entries=entries,
         experts=tuple(expert.username for expert in experts),
         votes_per_expert=study_plan.votes_per_expert,
         seed=study_plan.seed,
-        appearances=appearances,
-        pair_votes=pair_votes,
         checks=checks,
         alike=tuple(sorted(set(alike) - set(alike_shown))),
         **shares,

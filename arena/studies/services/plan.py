@@ -186,13 +186,6 @@ class StudyPlan:
         "first vote.",
         most=MOST_ADAPTIVE,
     )
-    targets: tuple[str, ...] = input_field(
-        InputKind.LINES,
-        "Targets",
-        "Empty for a balanced plan. Else one for each contestant, “reference=120”: in how many "
-        "votes of all experts it appears. Or one for each pair, “reference vs rule-placer=40”.",
-        default=(),
-    )
     hypotheses: tuple[str, ...] = input_field(
         InputKind.LINES,
         "Hypotheses",
@@ -278,7 +271,6 @@ def plan_of(study: Study) -> StudyPlan:
         experts=tuple(rules.get("experts", ())),
         votes_per_expert=study.votes_per_expert,
         seed=study.seed,
-        targets=_target_lines(rules),
         hypotheses=tuple(one.text for one in hypotheses_of(study)),
         samples=SampleRule(rules.get("samples", SampleRule.ONE)),
         jobs=tuple(job["code"] for job in rules.get("jobs", ())),
@@ -286,8 +278,3 @@ def plan_of(study: Study) -> StudyPlan:
         **{name: round(100 * rules.get(share, 0), 6) for name, share in SHARES.items()},
         **{name: getattr(study, name) for name in SWITCH_COLUMNS},
     )
-
-
-def _target_lines(rules: Mapping[str, Any]) -> tuple[str, ...]:
-    by_pair = [f"{one} vs {other} {votes}" for one, other, votes in rules.get("pair_votes", ())]
-    return (*(f"{slug} {votes}" for slug, votes in rules.get("appearances", ())), *by_pair)

@@ -58,8 +58,6 @@ def rules_of(study: Study) -> PlanRules:
     return PlanRules(
         entries=tuple(Entry(**entry) for entry in kept["entries"]),
         experts=tuple(kept["experts"]),
-        appearances=tuple((name, votes) for name, votes in kept.get("appearances", ())),
-        pair_votes=tuple((one, other, n) for one, other, n in kept.get("pair_votes", ())),
         checks=tuple(Check(**check) for check in kept.get("checks", ())),
         alike=tuple((place, one, other) for place, one, other in kept.get("alike", ())),
         **{name: kept[name] for name in _PLAIN if name in kept},
