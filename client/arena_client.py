@@ -52,7 +52,7 @@ class Arena:
 
     Args:
         address: Of the installation, without a path.
-        token: Of the page “API tokens”; empty for `first` and `welcome`, which give one.
+        token: Of the page “API tokens”; empty to post to `first` and `welcome`, which give one.
         timeout_s: For one request.
         patience_s: How long to retry while the server is busy or limits the rate.
     """
@@ -104,15 +104,6 @@ class Arena:
 
     # --- What takes more than one request ------------------------------------------------------
 
-    def first(self, link: str, *, username: str, password: str) -> Arena:
-        """Make the first admin by the link that `serve` prints; return a client for them."""
-        made = self.post("first", link=link, username=username, password=password)
-        return self._as(made["token"])
-
-    def welcome(self, link: str, *, password: str) -> Arena:
-        """Set a new account's password by its link; return a client for that account."""
-        return self._as(self.post("welcome", link=link, password=password)["token"])
-
     def wait_for(self, path: str, *states: str, every_s: float = 1, within_s: float = 3600) -> Any:
         """Poll a row until it has one of these states, or a job until it is over; return it.
 
@@ -146,9 +137,6 @@ class Arena:
         return self.post("votes", key=key, matchup=pair["matchup"], outcome=outcome, **more)
 
     # --- Private -------------------------------------------------------------------------------
-
-    def _as(self, token: str) -> Arena:
-        return Arena(self.address, token, timeout_s=self.timeout_s, patience_s=self.patience_s)
 
     def _address(self, path: str, query: dict[str, object]) -> str:
         if not path.startswith(PREFIX):

@@ -6,7 +6,6 @@ from typing import Any
 
 from django.conf import settings
 from django.db.backends.base.base import BaseDatabaseWrapper
-from django.db.backends.signals import connection_created
 from django.http import HttpRequest, HttpResponse
 from django.http.response import HttpResponseBase
 
@@ -38,12 +37,8 @@ class BusyMiddleware:
         return None
 
 
-def limit_connections() -> None:
-    """Limit how long connections of a web server wait for locks; workers may wait longer."""
-    connection_created.connect(_limit)
-
-
-def _limit(connection: BaseDatabaseWrapper, **_: Any) -> None:
+def limit_connection(connection: BaseDatabaseWrapper, **_: Any) -> None:
+    """Limit how long a new connection of a web server waits for locks; workers may wait longer."""
     limit_waiting(connection, settings.VOTE_WAIT_S)
 
 

@@ -89,34 +89,22 @@ class EndpointFactsForm(RequestForm):
         )
 
 
-def _ability(label: str) -> forms.TypedChoiceField:
-    return forms.TypedChoiceField(
-        required=False,
-        label=label,
-        choices=[("", "unknown"), ("yes", "yes"), ("no", "no")],
-        coerce=lambda word: word == "yes",
-        empty_value=None,
-    )
+ABILITIES = {
+    "vision": "Sees pictures",
+    "native_tools": "Calls functions natively",
+    "json_schema": "Keeps to a JSON schema",
+    "temperature": "Temperature may be chosen",
+}
 
 
 class ModelForm(forms.ModelForm):  # type: ignore[type-arg]
     """What somebody knows of a model; what is left empty is unknown."""
 
-    vision = _ability("Sees pictures")
-    native_tools = _ability("Calls functions natively")
-    json_schema = _ability("Keeps to a JSON schema")
-    temperature = _ability("Temperature may be chosen")
-
     class Meta:
         model = EndpointModel
         fields = MODEL_FACTS
-
-    def __init__(self, *args: Any, **kwargs: Any) -> None:
-        super().__init__(*args, **kwargs)
-        words = {True: "yes", False: "no"}
-        for name, value in self.initial.items():
-            if isinstance(value, bool):
-                self.initial[name] = words[value]
+        labels = ABILITIES
+        widgets = {name: forms.NullBooleanSelect(attrs={"class": "input"}) for name in ABILITIES}
 
 
 # --- Contestants -------------------------------------------------------------------------------

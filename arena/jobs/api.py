@@ -111,8 +111,6 @@ class UseDocument(serializers.Serializer[Any]):
     tokens_in = serializers.IntegerField(allow_null=True)
     tokens_out = serializers.IntegerField(allow_null=True)
     usd = serializers.DecimalField(None, 9, allow_null=True)
-    usd_most = serializers.DecimalField(None, 9, allow_null=True)
-    answered = serializers.IntegerField(help_text="Rows whose answers are in the store already.")
 
 
 class EstimateLineDocument(UseDocument):

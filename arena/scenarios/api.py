@@ -65,18 +65,10 @@ class ScenarioDocument(RowDocument[Scenario]):
 
 
 class NewScenarioDocument(ScenarioDocument, WarnedDocument):
-    """A new scenario; the forms of its documents are those of the files on its page."""
-
-    reference = serializers.DictField(allow_null=True, help_text="The reference modification.")
-    intent = serializers.DictField(allow_null=True, help_text="What the instruction asks for.")
-    density = serializers.CharField(source="traffic_density", help_text="Of spawned traffic.")
-    goal = serializers.CharField(help_text="left, right, straight; empty for none.")
+    """A new scenario."""
 
     class Meta(ScenarioDocument.Meta):
-        fields = (
-            *ScenarioDocument.Meta.fields,
-            *("reference", "intent", "keep_traffic", "density", "goal", "warnings"),
-        )
+        fields = (*ScenarioDocument.Meta.fields, "warnings")
 
 
 class ScenarioBody(StrictSerializer):

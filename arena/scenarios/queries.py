@@ -9,7 +9,7 @@ from typing import Any
 
 from django.db.models import QuerySet
 
-from augment.models import Augmentation, Contestant, Scenario, SceneUpload, UploadMoment
+from augment.models import Augmentation, Contestant, Scenario, UploadMoment
 from augment.services.scenarios.scenes import type_choices
 
 
@@ -120,15 +120,6 @@ _AROUND_M = 35.0
 _LEAST_M = 90.0
 
 
-def track_maps(upload: SceneUpload) -> list[dict[str, Any]]:
-    """Return every part of what was read: its moments, and the road under them as an SVG drawing.
-
-    `roads` and `way` are points of polylines, `box` is a viewBox (metres, y down), `dot` half the
-    width of a dot; `x` and `y` of a stop are None off the map.
-    """
-    return [_map(number, track) for number, track in enumerate(upload.tracks)]
-
-
 def place_of(maps: list[dict[str, Any]], moment: UploadMoment) -> list[dict[str, Any]]:
     """Return the part and the stop that a moment is; empty for one that is not among them."""
     places = ([track, stop] for track in maps for stop in track["stops"])
@@ -136,7 +127,12 @@ def place_of(maps: list[dict[str, Any]], moment: UploadMoment) -> list[dict[str,
     return next((one for one in places if (one[1]["item"], one[1]["frame"]) == wanted), [])
 
 
-def _map(number: int, track: dict[str, Any]) -> dict[str, Any]:
+def track_map(number: int, track: dict[str, Any]) -> dict[str, Any]:
+    """Return a part of a recording: its moments, and the road under them as an SVG drawing.
+
+    `roads` and `way` are points of polylines, `box` is a viewBox (metres, y down), `dot` half the
+    width of a dot; `x` and `y` of a stop are None off the map.
+    """
     places = [stop["place_m"] for stop in track["stops"]]
     points = [(None, None) if place is None else (place[0], -place[1]) for place in places]
     stops = [

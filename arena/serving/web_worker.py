@@ -60,9 +60,13 @@ class Connection(HTTPChannel):  # type: ignore[misc] # Waitress has no types
 class BufferingWorker(Worker):  # type: ignore[misc] # gunicorn has no types
     """Waitress on gunicorn's sockets, with as many threads as gunicorn's setting says."""
 
+    def init_process(self) -> None:
+        """End with gunicorn, even where it is killed before the application is loaded."""
+        die_with_parent()
+        super().init_process()
+
     def run(self) -> None:
         """Serve until gunicorn says stop, or is gone."""
-        die_with_parent()
         self._map: dict[int, Any] = {}
         server = create_server(
             self.wsgi,

@@ -11,13 +11,16 @@ COLUMNS = ("at", "actor", "verb", "object_kind", "object_code", "before", "after
 
 def audit_csv(events: Iterable[Event]) -> Iterator[bytes]:
     """Yield one line an act; what changed is JSON in a cell, empty where there was nothing."""
-    return csv_parts(COLUMNS, map(_cells, events))
-
-
-def _cells(event: Event) -> list[str]:
-    actor = "" if event.actor is None else event.actor.person.pseudonym
-    changes = (event.before, event.after)
-    return [
-        *(event.at.isoformat(), actor, event.verb, event.object_kind, event.object_code),
-        *("" if part is None else json.dumps(part, ensure_ascii=False) for part in changes),
-    ]
+    lines = (
+        [
+            event.at.isoformat(),
+            "" if event.actor is None else event.actor.person.pseudonym,
+            *(event.verb, event.object_kind, event.object_code),
+            *(
+                part and json.dumps(part, ensure_ascii=False)
+                for part in (event.before, event.after)
+            ),
+        ]
+        for event in events
+    )
+    return csv_parts(COLUMNS, lines)

@@ -121,21 +121,16 @@ def list_steps(counts: dict[str, int]) -> list[dict[str, Any]]:
 
 
 @require_POST
-def theme(request: HttpRequest) -> HttpResponse:
-    """Keep how the pages look, then go back to where the switch was pressed."""
-    chosen = request.POST.get("theme")
-    if chosen in set(Theme):
-        keep_preference(user_of(request), theme=chosen)
-    return _back(request)
+def choose(request: HttpRequest, what: str) -> HttpResponse:
+    """Keep the theme or the language with the account, then go back to where it was chosen.
 
-
-@require_POST
-def language(request: HttpRequest) -> HttpResponse:
-    """Keep the language with the account, and in this browser for the pages before the login."""
-    chosen, answer = request.POST.get("language"), _back(request)
-    if chosen in set(Language):
-        keep_preference(user_of(request), language=chosen)
-        keep_language(answer, Language(chosen))
+    The language is kept in this browser as well, for the pages before the login.
+    """
+    chosen, answer = request.POST.get(what, ""), _back(request)
+    if chosen in set(Theme if what == "theme" else Language):
+        keep_preference(user_of(request), **{what: chosen})
+        if what == "language":
+            keep_language(answer, Language(chosen))
     return answer
 
 

@@ -56,15 +56,12 @@ def mark(row: Augmentation | GenerationJob | Study) -> Mark:
 def job_mark(counts: JobCounts) -> Mark:
     """The mark of a job: what broke is not green, what was cancelled may still run."""
     states, job = GenerationJob.State, counts.job
+    done = counts.by_state[Augmentation.State.DONE]
     if job.state == states.FINISHED and counts.failed:
-        if counts.failed == counts.total:
-            return Mark(tone="bad", icon="icons/failed.svg", label="Failed")
-        return Mark(tone="warn", icon="icons/failed.svg", label="Finished in part")
-    if (
-        job.state == states.FINISHED
-        and not counts.by_state[Augmentation.State.DONE]
-        and counts.total
-    ):
+        is_all = counts.failed == counts.total
+        label = "Failed" if is_all else "Finished in part"
+        return Mark(tone="bad" if is_all else "warn", icon="icons/failed.svg", label=label)
+    if job.state == states.FINISHED and counts.total and not done:
         label = "Finished without a modification"
         return Mark(tone="warn", icon="icons/unreadable.svg", label=label)
     running = counts.by_state[Augmentation.State.RUNNING]

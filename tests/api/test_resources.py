@@ -104,6 +104,7 @@ def test_a_job_is_launched_by_the_pages_own_service(
     asking = program_of(people()["admin"])
     known = slugs(asking.get(API + "scenarios"))
     chosen = {"contestants": ["reference"], "scenarios": known}
+    assert send(asking, "jobs/estimate", **chosen).json()["rows"] == len(known)
     with django_capture_on_commit_callbacks() as later:
         answer = send(asking, "jobs", name="By API", samples=2, cap_calls=5, **chosen)
     assert answer.status_code == 201, answer.content

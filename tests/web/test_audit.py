@@ -3,12 +3,10 @@
 import csv
 import io
 import json
-import re
 from io import StringIO
 from pathlib import Path
 
 import pytest
-from django.conf import settings
 from django.core.management import CommandError, call_command
 from django.test import Client
 from django.urls import reverse
@@ -66,42 +64,6 @@ def test_acts_are_filtered_and_exported() -> None:
 
 
 # --- Early looks -------------------------------------------------------------------------------
-
-GIVES_RESULTS = re.compile(
-    r"\b(leaderboard_table|bundle_files|RATING_FILES|vote_table|vote_list_csv|snapshot_to_export"
-    r"|write_study|ask_for_study_file|unrated_votes|plan_snapshot|answer_hypotheses|known_of)\("
-    r"|services\.ratings import .*\brate_now\b"
-)
-IS_DOOR = re.compile(
-    r"arena/(web|api|admin|management|templatetags|site)/|arena/\w+/(api|pages)\b"
-)
-DOORS = {
-    "arena/results/api.py": "asks must_read_results",
-    "arena/management/commands/export.py": "refuses open studies",
-    "arena/management/commands/plan_study.py": "reads closed studies alone",
-    "arena/management/commands/rate.py": "--early, logged",
-    "arena/management/demo.py": "rates a study that it has closed",
-    "arena/management/exporting.py": "--early, logged",
-    "arena/studies/pages/planning.py": "reads what the reader may read",
-    "arena/results/pages/rating_form.py": "gives none: the page that asked leads to the gate",
-    "arena/results/pages/ratings.py": "the gate",
-    "arena/results/pages/evidence.py": "behind the gate",
-    "arena/studies/pages/studies.py": "asks results_access; what shows results needs it in full",
-}
-"""Every module of pages, API, admin and commands that makes something of results, and why nobody
-sees those of an open study through it without an early look."""
-
-
-def test_every_door_to_results_is_on_the_list() -> None:
-    root = Path(settings.BASE_DIR)
-    found = {
-        name
-        for path in (root / "arena").rglob("*.py")
-        if IS_DOOR.match(name := str(path.relative_to(root)))
-        if GIVES_RESULTS.search(path.read_text())
-    }
-    assert found == set(DOORS)
-
 
 TABS = ("table", "pairs", "types", "raters", "displacement", "cost", "log")
 GATED = ("results", *TABS)

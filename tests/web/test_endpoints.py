@@ -101,7 +101,7 @@ def test_a_key_goes_to_another_server_only_where_somebody_says_so(admin: Client)
 def test_a_model_keeps_what_somebody_knows_and_no_half_of_a_price(
     admin: Client, model: EndpointModel
 ) -> None:
-    known = {"model_class": "open_weight", "vision": "no", "price_in_usd": "0.5"}
+    known = {"model_class": "open_weight", "vision": "false", "price_in_usd": "0.5"}
     shown = post(admin, "endpoint-model", known, code=model.code)
     assert "a price needs both halves, a date and a source" in shown.lower()
     whole = known | {

@@ -77,8 +77,9 @@ def picture(request: HttpRequest, kind: str, code: uuid.UUID) -> HttpResponseBas
     """Answer with a picture by what it shows; experts' pictures have other addresses."""
     match kind:
         case "original":
-            rows = Scenario.objects.only("original_image")
-            name = get_object_or_404(rows, code=code).original_image
+            name = get_object_or_404(
+                Scenario.objects.only("original_image"), code=code
+            ).original_image
         case "augmentation":
             name = get_object_or_404(Augmentation.objects.only("image"), code=code).image
         case "marked":
@@ -87,8 +88,7 @@ def picture(request: HttpRequest, kind: str, code: uuid.UUID) -> HttpResponseBas
         case "moment":
             name = get_object_or_404(UploadMoment.objects.only("picture"), code=code).picture
         case "reference":
-            scenario = get_object_or_404(Scenario.objects.select_related("base_scene"), code=code)
-            name = reference_picture(scenario)
+            name = reference_picture(_scenario(code))
         case _ if kind in set(SceneView):
             scene = get_object_or_404(BaseScene.objects.defer("recording"), code=code)
             name = scene_picture(scene, SceneView(kind))

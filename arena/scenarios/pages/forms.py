@@ -13,9 +13,9 @@ from django.shortcuts import get_object_or_404, redirect, render
 from arena.scenarios import services
 from arena.scenarios.pages.uploads import look_at
 from arena.site.access import STAFF, act_for, form_for, user_of
-from arena.site.acts import refusals_in, send_later
+from arena.site.acts import refusals_in, refusals_told, send_later
 from arena.site.forms import offer, read_json
-from augment.errors import AugmentError, Conflict
+from augment.errors import Conflict
 from augment.models import Augmentation, BaseScene, Contestant, Scenario
 from augment.models.scenes import DENSITIES, GOALS
 from augment.services.judging.findings import check_edit
@@ -108,17 +108,15 @@ def edit_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
 @form_for(*STAFF)
 def bulk_page(request: HttpRequest) -> HttpResponse:
     """Add many scenarios from a CSV or YAML file, all or none."""
-    report, problem, most = None, "", bulk.MOST_ROWS_AT_ONCE
+    report, most = None, bulk.MOST_ROWS_AT_ONCE
     if request.method == "POST":
         table = request.FILES.get("file")
-        try:
+        with refusals_told(request):
             if table is None or services.was_too_large(request.META):
                 raise Conflict("Choose a CSV or YAML file; it may be too large.")
             name, actor = table.name or "", user_of(request)
             report = bulk.add_rows(name, table.read(), most=most, actor=actor)
-        except AugmentError as error:
-            problem = str(error)
-    context = {"report": report, "problem": problem, "most": most}
+    context = {"report": report, "most": most}
     return render(request, "scenarios/bulk.html", context)
 
 
@@ -129,22 +127,24 @@ def bulk_page(request: HttpRequest) -> HttpResponse:
 def intent_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Change what a scenario asks for."""
     scenario = get_object_or_404(Scenario, code=code)
-    problem = ""
     if request.method == "POST":
         fields = _entered_fields(request.POST)
-        try:
+        with refusals_told(request):
             document = intent_of_fields(fields)
             editing.enter_intent(scenario=scenario.slug, document=document, actor=user_of(request))
             messages.success(request, "The intent is set. It counts from now on.")
             return redirect("scenario", code=code)
-        except AugmentError as error:
-            problem = str(error)
     else:
         reading = editing.waiting_reading(scenario) if "reading" in request.GET else None
         document = reading.document if reading else scenario.intent
         fields = fields_of_intent(document) if document else IntentFields(rows=())
-    context = {"scenario": scenario, "problem": problem, **_intent_context(fields)}
-    return render(request, "scenarios/intent.html", context, status=422 if problem else 200)
+    context = {"scenario": scenario, **_intent_context(fields)}
+    return render(request, "scenarios/intent.html", context, status=_status(request))
+
+
+def _status(request: HttpRequest) -> int:
+    """Return the status of a page that shows its form: what was sent has been refused."""
+    return 422 if request.method == "POST" else 200
 
 
 def _entered_fields(posted: QueryDict) -> IntentFields:
@@ -178,18 +178,15 @@ def reference_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Draw or type the reference of a scenario; a refused one stays on the page."""
     scenario = _scenario(code)
     given: object = scenario.reference
-    problem = ""
     if request.method == "POST":
-        try:
+        with refusals_told(request):
             given = _document(request.POST.get("modification", ""))
             services.set_reference(scenario, given, actor=user_of(request))
             send_later(request, enqueue_scenario, scenario.pk)
             messages.success(request, "The reference is kept; a worker draws it.")
             return redirect("scenario", code=code)
-        except AugmentError as error:
-            problem = str(error)
     refusal = {"refusal": services.why_not_editable(scenario)}
-    return _editor(request, scenario, given, problem, refusal)
+    return _editor(request, scenario, given, refusal)
 
 
 @form_for(*STAFF)
@@ -200,9 +197,8 @@ def correct_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     slug = request.POST.get("contestant", "").strip() or by_hand.BY_HAND
     notes = request.POST.get("notes", "")
     given: object = by_hand.starting_document(original)
-    problem = ""
     if request.method == "POST":
-        try:
+        with refusals_told(request):
             given = _document(request.POST.get("modification", ""))
             made = by_hand.keep_correction(
                 original, given, slug=slug, notes=notes, actor=user_of(request)
@@ -210,11 +206,9 @@ def correct_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
             send_later(request, enqueue_job, made.job_id)
             messages.success(request, "The correction is kept; a worker draws it.")
             return redirect("augmentation", code=made.code)
-        except AugmentError as error:
-            problem = str(error)
     people = Contestant.objects.filter(kind=Contestant.Kind.HUMAN, retired_at=None)
     correction = {"original": original, "people": people, "slug": slug, "notes": notes}
-    return _editor(request, original.scenario, given, problem, correction)
+    return _editor(request, original.scenario, given, correction)
 
 
 @act_for(*STAFF, back="reference-edit")
@@ -246,7 +240,7 @@ def _scenario(code: uuid.UUID) -> Scenario:
 
 
 def _editor(
-    request: HttpRequest, scenario: Scenario, given: object, problem: str, more: dict[str, Any]
+    request: HttpRequest, scenario: Scenario, given: object, more: dict[str, Any]
 ) -> HttpResponse:
     stored = "" if given is None else json.dumps(given, indent=2)
     context = {
@@ -254,12 +248,11 @@ def _editor(
         "editor": editing.editor_document(scenario),
         "given": given,
         "text": request.POST.get("modification", stored),
-        "problem": problem,
         "types": [(one.value, one.value.replace("_", " ").lower()) for one in editing.PLACED],
         **look_at(request, scenario.base_scene, SceneView.BACKDROP),
         **more,
     }
-    return render(request, "scenarios/edit.html", context, status=422 if problem else 200)
+    return render(request, "scenarios/edit.html", context, status=_status(request))
 
 
 def _document(text: str | bytes) -> object:

@@ -87,7 +87,7 @@ def upload_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     asked = read_code(request.GET.get("moment", ""))
     moment = row.moments.select_related("scene").filter(code=asked).first()
     waits = row.state in row.UNDER_WAY or (moment is not None and moment.state in moment.UNDER_WAY)
-    maps = queries.track_maps(row)
+    maps = [queries.track_map(number, track) for number, track in enumerate(row.tracks)]
     context = {
         "upload": row,
         "maps": maps,
