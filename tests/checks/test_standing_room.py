@@ -12,14 +12,9 @@ from augment.geometry.frames import Pose, corners
 from augment.metrics.fault_guess import first_guess
 from augment.scene.entities import AgentType, Area, AreaKind, Scene, TrafficAgent
 from tests.checks.worlds import found_in, of_kind, severities
-from tests.scenes import EGO, cone, junction, pedestrian, scene, vehicle
+from tests.scenes import EGO, cone, pedestrian, scene, vehicle
 
 BUS = replace(vehicle("Agent2", 40.0, 0.0), type=AgentType.BUS, length_m=7.456, width_m=2.079)
-
-
-def test_connectors_are_road_as_well() -> None:
-    car = vehicle("Agent2", 28.0, 0.0)
-    assert not of_kind(found_in(junction(), car), FindingKind.OFF_ROAD)
 
 
 def test_where_the_map_has_no_walkways_people_off_it_are_a_fact() -> None:
@@ -201,11 +196,6 @@ def test_a_walk_leads_through_nothing_that_stands(
         assert one.agents == ("Agent2", "Agent3")
         assert one.measured["inside_m"] == pytest.approx(inside_m, abs=0.001)
         assert one.sentence() == f"The walk of Agent2 leads {inside_m:.1f} m through Agent3."
-
-
-def test_what_is_added_stands_in_the_way_as_well() -> None:
-    bus = replace(PARKED, type=AgentType.BUS)
-    assert of_kind(found_in(scene(), bus, WALKER), FindingKind.WALK_BLOCKED)
 
 
 def test_a_blocked_walk_is_a_fault_of_logic_unless_it_follows_from_a_heading() -> None:

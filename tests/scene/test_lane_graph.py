@@ -82,15 +82,6 @@ def test_an_unknown_lane_names_the_known_ones() -> None:
         LaneGraph(scene()).lane("Lane9")
 
 
-def test_a_lane_can_follow_another_with_no_connector_between() -> None:
-    first, second = scene().lanes
-    onward = replace(second, centerline=Polyline([(100.0, 0.0), (160.0, 0.0)]))
-    street = scene(lanes=(replace(first, successors=("Lane2",)), onward))
-    graph = LaneGraph(street)
-    assert graph.route("Lane1", 200.0) == ["Lane1", "Lane2"]
-    assert graph.predecessors("Lane2") == ("Lane1",)
-
-
 def merge(side: float, *, side_first: bool, connectors: bool) -> Scene:
     """A side road bends round 90 degrees into a straight road, from the right (-1) or left (+1).
 
