@@ -157,7 +157,7 @@ def _write_scenarios(page: Page, files: Path) -> None:
     page.goto("/scenarios/bulk/")
     page.set_input_files("[name=file]", files / "many.csv")
     page.get_by_role("button", name="Add them").click()
-    expect(page.get_by_text(f"{SCENARIOS - 1} scenarios are added.")).to_be_visible()
+    expect(page.get_by_text(f"{SCENARIOS - 1} scenarios are added")).to_be_visible()
 
 
 def _enter_models(page: Page, model: str) -> None:
