@@ -160,20 +160,14 @@ def store(
             left_image=left.image,
             right_image=right.image,
             original_image=frame.original_image,
-            # The same legend whichever side adds what.
-            view=frame.view
-            | {
-                LEGEND: {
-                    "scene": frame.legend,
-                    "pair": sorted(changes[left.pk] | changes[right.pk]),
-                }
-            },
+            view={**frame.view, LEGEND: {"scene": frame.legend, "pair": pair}},
             kind=one.kind,
             batch=batch,
             draw_probability=one.draw_probability,
         )
         for one in planned
         for frame, (left, right) in [(frames[one.scenario], sides_of(one, cells))]
+        for pair in [sorted(changes[left.pk] | changes[right.pk])]  # whichever side adds what
     ]
     firsts = [row for row in rows if row.kind != Matchup.Kind.REPEAT]
     Matchup.objects.bulk_create(firsts, batch_size=500)

@@ -34,7 +34,7 @@ LONGEST_CONSENT, LONGEST_ID = 5_000, 120
 def hand_over(
     *, study: Study, username: str, to: Sequence[str], actor: User | None = None
 ) -> dict[str, int]:
-    """Let others judge what an expert has not judged, re-planned in one go.
+    """Let others judge what an expert has not judged; return each taker's votes by username.
 
     The rows of the undecided matchups give way to new ones with fresh tokens, behind what the
     takers have; their sides are balanced anew. The expert's votes stay, and so do pairs that the
@@ -45,9 +45,6 @@ def hand_over(
         username: Whose matchups are handed over.
         to: Usernames of experts; who is new to the study joins it.
         actor: Who hands over, for the log.
-
-    Returns:
-        How many votes each taker is to give, by username.
 
     Raises:
         StudyNotOpen: The study takes no votes.
