@@ -236,6 +236,6 @@ def _rate(page: Page, study: str) -> str:
     page.click("button[name=sure]")
     page.goto(f"{study}results/")
     expect(page.get_by_role("table").first).to_be_visible()
-    answer = page.request.get(f"{study}results.latex")
+    answer = page.request.get(f"{study}rating/leaderboard.latex")
     assert answer.ok
     return answer.text()
