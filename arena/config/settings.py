@@ -77,7 +77,6 @@ AXES_LOCKOUT_CALLABLE = "arena.config.faults.answer_locked"
 # --- What it is made of ------------------------------------------------------------------------
 
 INSTALLED_APPS = [
-    "django.contrib.admin",
     "django.contrib.auth",
     "django.contrib.contenttypes",
     "django.contrib.sessions",

@@ -1,13 +1,8 @@
 """Every address of the product."""
 
-from django.contrib import admin
 from django.urls import include, path
 
-urlpatterns = [
-    path("admin/", admin.site.urls),
-    path("api/v1/", include("arena.api.urls")),
-    path("", include("arena.site.urls")),
-]
+urlpatterns = [path("api/v1/", include("arena.api.urls")), path("", include("arena.site.urls"))]
 
 handler400 = "arena.config.faults.answer_unreadable"
 handler403 = "arena.config.faults.answer_refused"

@@ -27,7 +27,7 @@ class Comparisons:
     """All votes; every array is (R,) and read-only.
 
     A row is one vote, or `count` votes of one expert on one scenario, pair, side and outcome: what
-    a GROUP BY of these gives. Only online Elo in recorded order looks at the order of the rows.
+    a GROUP BY of these gives. The order of the rows does not matter.
 
     Attributes:
         names: (C,) of the contestants.

@@ -29,13 +29,6 @@ from augment.scene.intent import (
 )
 from augment.scene.lane_graph import LanePosition
 
-_TYPES = {
-    Body.BUS: AgentType.BUS,
-    Body.BICYCLE: AgentType.BICYCLE,
-    Body.BARRIER: AgentType.BARRIER,
-    Body.CONSTRUCTION_SIGN: AgentType.CONSTRUCTION_SIGN,
-}
-"""Of the bodies that are no plain vehicle."""
 _SIZES_M = {Body.VAN: (5.4, 2.0), Body.TRUCK: (8.0, 2.4)}
 _FACING_RAD = {Facing.WITH_LANE: 0.0, Facing.AGAINST_LANE: math.pi, Facing.ACROSS: math.pi / 2.0}
 _EDGE_GAP_M = 0.1
@@ -67,9 +60,13 @@ _ASIDE_RAD = tuple(math.radians(sign * 8.0 * step) for step in range(6) for sign
 _COST_OF_TURN = 0.5
 
 
+def _type_of(body: Body) -> AgentType:
+    return AgentType.__members__.get(body.name, AgentType.VEHICLE)
+
+
 def _size_m(body: Body) -> tuple[float, float]:
-    """Length and width."""
-    return _SIZES_M.get(body) or LENGTH_WIDTH_M[_TYPES.get(body, AgentType.VEHICLE)]
+    """Return length and width."""
+    return _SIZES_M.get(body) or LENGTH_WIDTH_M[_type_of(body)]
 
 
 def place_vehicles(
@@ -92,7 +89,7 @@ def place_vehicles(
         place = ground.graph.place(centre.lane_id, centre.s_m, d_m)
         on_lane = abs(d_m) <= ground.lane(place).width_m / 2.0
         agent = build_agent(
-            _TYPES.get(body, AgentType.VEHICLE),
+            _type_of(body),
             place.pose.turned(turn_rad),
             place.lane_id if on_lane else None,
             _size_m(body),
@@ -155,7 +152,7 @@ def place_crash(
         poses = _chained(request, ground, distance_m, _SHIFTS_M[arrangement], rng)
     else:
         poses = _in_a_row(request, ground, distance_m, _LOOSER[arrangement])
-    kind = _TYPES.get(request.body, AgentType.VEHICLE)
+    kind = _type_of(request.body)
     size_m = _size_m(request.body)
     return tuple(build_agent(kind, pose, ground.lane_at(pose), size_m) for pose in poses)
 

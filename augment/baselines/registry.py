@@ -5,30 +5,22 @@ entry of PLACERS; slugs are kept in databases, so they stay.
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Protocol
+from typing import Any
 
 from augment.baselines import quantised, rule_placer
 from augment.baselines.rule_placer import Placement
-from augment.scene.entities import Modification, Scene
-from augment.scene.intent import Intent
+from augment.scene.entities import Modification
 
 RULE_PLACER = "rule-placer"
 SPACING_M = 0.6
 """Between the centres of the objects, so that a pile of several is seen as a pile."""
 
 
-class PlaceIntent(Protocol):
-    """Adds what is asked for to a scene."""
-
-    def __call__(self, scene: Scene, intent: Intent | None, /, *, seed: int) -> Placement:
-        """Place what is asked for, the same for the same seed.
-
-        Raises:
-            CannotPlace: It refuses, with the reason.
-        """
-        ...
+PlaceIntent = Callable[..., Placement]
+"""Takes a scene and an intent, and `seed` by its name; raises CannotPlace where it refuses."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,15 +58,9 @@ def break_reference(reference: Modification) -> Modification | None:
     """
     if not reference.changed:
         return None
+    across: dict[str, Any] = {"y_m": 0.0, "heading_rad": math.pi / 2, "lane_id": None}
     heaped = tuple(
-        replace(
-            agent,
-            x_m=SPACING_M * index,
-            y_m=0.0,
-            heading_rad=math.pi / 2,
-            lane_id=None,
-            walk_to_m=None,
-        )
+        replace(agent, x_m=SPACING_M * index, walk_to_m=None, **across)
         for index, agent in enumerate(reference.changed)
     )
     added = len(reference.added)

@@ -20,7 +20,7 @@ from augment.checks.lanes_across import LanesAcross, find_picked, list_absent, r
 from augment.checks.registry import check_against_intent
 from augment.errors import CannotPlace
 from augment.geometry.frames import overlap
-from augment.scene.entities import AgentType, Modification, Scene, TrafficAgent, TurnType, apply
+from augment.scene.entities import Modification, Scene, TrafficAgent, TurnType, apply
 from augment.scene.intent import (
     Body,
     ConesRequest,
@@ -38,7 +38,6 @@ _SHIFT_STEP_M = 0.25
 _SHIFT_EXACT_M = 0.5
 _SHIFT_ABOUT_M = 1.5
 """How far along the lane a placement may give way, for an exact and for an "about" distance."""
-_BODIES = {AgentType.BUS: Body.BUS, AgentType.BICYCLE: Body.BICYCLE}
 _NEEDS: dict[type[Request], tuple[str, str, str]] = {
     VehicleRequest: ("vehicles", "speed_mps", "whether they stand or how fast they drive"),
     WalkRequest: ("pedestrians", "start", "the side that they come from"),
@@ -199,9 +198,11 @@ class _Fitting:
 
 def _as_request(move: Move, agent: TrafficAgent) -> VehicleRequest:
     """Return a road user's move as the placement of a new one."""
-    return replace(
-        move.vehicle_request,
-        body=_BODIES.get(agent.type, Body.VEHICLE),
+    return VehicleRequest(
+        spot=move.spot,
+        body=Body.__members__.get(agent.type.name, Body.VEHICLE),
+        facing=move.facing,
+        turn_deg=move.turn_deg,
         speed_mps=agent.speed_mps if move.speed_mps is None else move.speed_mps,
     )
 

@@ -165,18 +165,11 @@ def list_of(text: str, title: str) -> dict[str, list[Any]]:
 
 def agent_of(name: str, vector: Sequence[Any]) -> entities.TrafficAgent:
     """Return the agent that a vector of the prompt describes."""
-    kind, x, y, heading, width, length, speed, lane = vector
-    return entities.TrafficAgent(
-        id=name,
-        type=entities.AgentType(kind),
-        x_m=float(x),
-        y_m=float(y),
-        heading_rad=float(heading),
-        width_m=float(width),
-        length_m=float(length),
-        speed_mps=float(speed),
-        lane_id=None if lane is None else str(lane),
-    )
+    kind, *numbers, lane = vector
+    names = ("x_m", "y_m", "heading_rad", "width_m", "length_m", "speed_mps")
+    fields: dict[str, Any] = dict(zip(names, map(float, numbers), strict=True))
+    lane_id = None if lane is None else str(lane)
+    return entities.TrafficAgent(id=name, type=entities.AgentType(kind), lane_id=lane_id, **fields)
 
 
 # Private

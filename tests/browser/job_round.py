@@ -47,7 +47,7 @@ def _launch_all(page: Page) -> None:
     page.click("#full")
     expect(page.locator("[name=name]")).to_have_value("Round 1")
     expect(page.locator("[name=scenarios]:checked")).to_have_count(SCENARIOS)
-    expect(page.get_by_text("Answered already")).to_be_visible()
+    expect(page.get_by_text("Cost expected")).to_be_visible()
     page.click("[data-launch]")
     expect(page.get_by_role("heading", name="Round 1", exact=True)).to_be_visible()
 
@@ -78,7 +78,7 @@ def _resume(page: Page) -> None:
 
 def _retry_the_cause(page: Page) -> None:
     page.get_by_role("button", name=f"Retry these {SCENARIOS}").click()
-    expect(page.get_by_text(f"Queued again: {SCENARIOS} with this cause.")).to_be_visible()
+    expect(page.get_by_text("What ended for this cause is queued again.")).to_be_visible()
     _ends_in_part(page)
     page.get_by_role("link", name="Pictures", exact=True).click()
     expect(page.locator("a.cell img").first).to_be_visible()

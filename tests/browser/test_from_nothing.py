@@ -157,7 +157,7 @@ def _write_scenarios(page: Page, files: Path) -> None:
     page.goto("/scenarios/bulk/")
     page.set_input_files("[name=file]", files / "many.csv")
     page.get_by_role("button", name="Add them").click()
-    expect(page.get_by_text(f"{SCENARIOS - 1} scenarios are added.")).to_be_visible()
+    expect(page.get_by_text(f"{SCENARIOS - 1} scenarios are added")).to_be_visible()
 
 
 def _enter_models(page: Page, model: str) -> None:
@@ -236,6 +236,6 @@ def _rate(page: Page, study: str) -> str:
     page.click("button[name=sure]")
     page.goto(f"{study}results/")
     expect(page.get_by_role("table").first).to_be_visible()
-    answer = page.request.get(f"{study}results.latex")
+    answer = page.request.get(f"{study}rating/leaderboard.latex")
     assert answer.ok
     return answer.text()

@@ -26,14 +26,12 @@ _XYZ = "x FLOAT, y FLOAT, z FLOAT"
 COLUMNS = {
     "log": f"{_ONLY}, vehicle_name VARCHAR(64), date VARCHAR(64), timestamp INTEGER, "
     "logfile VARCHAR(64), location VARCHAR(64), map_version VARCHAR(64)",
-    "lidar_pc": f"{_ONLY}, next_token BLOB, prev_token BLOB, ego_pose_token BLOB NOT NULL, "
+    "lidar_pc": f"{_ONLY}, ego_pose_token BLOB NOT NULL, "
     "lidar_token BLOB, scene_token BLOB, filename VARCHAR(128), timestamp INTEGER",
     "ego_pose": f"{_ONLY}, timestamp INTEGER, {_XYZ}, qw FLOAT, qx FLOAT, qy FLOAT, qz FLOAT, "
-    "vx FLOAT, vy FLOAT, vz FLOAT, acceleration_x FLOAT, acceleration_y FLOAT, "
-    "acceleration_z FLOAT, angular_rate_x FLOAT, angular_rate_y FLOAT, angular_rate_z FLOAT, "
-    "epsg INTEGER, log_token BLOB",
+    "vx FLOAT, vy FLOAT, vz FLOAT, log_token BLOB",
     "lidar_box": f"{_ONLY}, lidar_pc_token BLOB NOT NULL, track_token BLOB NOT NULL, "
-    f"next_token BLOB, prev_token BLOB, {_XYZ}, width FLOAT, length FLOAT, height FLOAT, "
+    f"{_XYZ}, width FLOAT, length FLOAT, height FLOAT, "
     "vx FLOAT, vy FLOAT, vz FLOAT, yaw FLOAT, confidence FLOAT",
     "track": f"{_ONLY}, category_token BLOB, width FLOAT, length FLOAT, height FLOAT",
     "category": f"{_ONLY}, name VARCHAR(64), description TEXT",
@@ -42,11 +40,7 @@ COLUMNS = {
     "traffic_light_status": f"{_ONLY}, lidar_pc_token BLOB NOT NULL, "
     "lane_connector_id INTEGER, status VARCHAR(8)",
 }
-"""The tables that are read as they are published, tokens as their only index."""
-UNREAD = frozenset(
-    ["next_token", "prev_token", "epsg"]
-    + [f"{name}_{axis}" for name in ("acceleration", "angular_rate") for axis in "xyz"]
-)
+"""Of the published tables those that are read, without neighbours in time and accelerations."""
 
 
 def token(number: int) -> bytes:
@@ -175,11 +169,7 @@ def write_log(root: Path, city: str, steps: int = 21) -> Path:
         base.execute(f"CREATE TABLE {table} ({columns}, PRIMARY KEY (token))")
 
     def add(table: str, *row: object) -> None:
-        """A row; what nobody reads (neighbours in time, accelerations) is left NULL."""
-        every = [one.split()[0] for one in COLUMNS[table].split(", ")]
-        names = [one for one in every if one not in UNREAD]
-        marks = ", ".join("?" * len(row))
-        base.execute(f"INSERT INTO {table} ({', '.join(names)}) VALUES ({marks})", row)
+        base.execute(f"INSERT INTO {table} VALUES ({', '.join('?' * len(row))})", row)
 
     add("log", token(1), "g", "2021", 0, "2021.05.12_made", city, city)
     add("category", token(50), "vehicle", "")

@@ -31,12 +31,12 @@ def decisions(section: str) -> dict[str, str]:
 
 
 def addresses(resolver: URLResolver, before: str = "") -> Iterator[tuple[str, URLPattern]]:
-    """Every address with its pattern, but those of Django's own admin."""
+    """Every address with its pattern."""
     for pattern in resolver.url_patterns:
         address = before + str(pattern.pattern)
         if isinstance(pattern, URLPattern):
             yield address, pattern
-        elif pattern.app_name != "admin":
+        else:
             yield from addresses(pattern, address)
 
 

@@ -30,7 +30,9 @@ LEADERBOARD = [
 ]
 """As the earlier version exported it."""
 VOTE_AGAIN = r"""
+import json
 import re
+import uuid
 from django.contrib.auth.models import User
 from django.test import Client
 from django.urls import reverse
@@ -43,9 +45,10 @@ pictures = re.findall(r'src="(/i/[^"]+)"', shown)
 assert len(pictures) >= 2, shown
 for picture in pictures:
     assert b"".join(expert.get(picture)).startswith(b"\x89PNG")
-value = r'name="{}"\s+value="([^"]+)"'
-ballot = {name: re.search(value.format(name), shown)[1] for name in ("key", "matchup")}
-assert expert.post(page, {**ballot, "outcome": "left"}).status_code == 302
+given = json.loads(re.search(r'<script id="given" [^>]*>(.*?)</script>', shown)[1])
+ballot = {"key": str(uuid.uuid4()), "matchup": given["pairs"][0]["matchup"], "outcome": "A"}
+answer = expert.post(given["urls"]["votes"], ballot, content_type="application/json")
+assert answer.status_code == 200, answer.content
 """
 
 

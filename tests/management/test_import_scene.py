@@ -38,7 +38,6 @@ def test_a_recorded_scene_is_imported_and_counted(tmp_path: Path) -> None:
     assert notes[0] == (
         "  No speed limits in this source: drives assume 15 m/s for the ego and 10 m/s for others."
     )
-    assert "  1 bicycle lanes of the map were left out." in notes
     assert Event.objects.filter(verb="import", after__frame=2).exists()
 
 
@@ -50,7 +49,8 @@ def test_a_scene_of_the_own_format_is_imported(tmp_path: Path) -> None:
     assert "The same scene is stored already, as 'crossing'" in refused(
         "json", file, "--slug", "crossing"
     )
-    assert "JSON scene has frame 0, not 3" in refused("json", file, "--slug", "x", "--frame", 3)
+    said = refused("json", file, "--slug", "x", "--frame", 3)
+    assert "a JSON scene has no parts and frame 0 alone" in said
 
 
 def test_a_broken_scene_is_refused_with_the_place(tmp_path: Path) -> None:

@@ -49,7 +49,7 @@ def test_a_recorded_scene_comes_with_its_recording(tmp_path: Path) -> None:
     assert (row.source, row.document["name"]) == ("av2", "made")
     recording = recording_from_document(row.recording)
     assert len(recording.times_s) == 4
-    assert "log log, frame 1 of 5" in row.provenance
+    assert "log log, step 1 of 5" in row.provenance
 
 
 @pytest.mark.parametrize(

@@ -27,7 +27,6 @@ handler500 = "arena.config.faults.answer_broken"
     ("address", "status"),
     [
         ("/", 200),
-        ("/admin/", 200),
         ("/jobs/", 200),
         (GONE, 404),
         ("/jobs", 301),

@@ -77,7 +77,6 @@ def test_every_intent_of_the_catalogue_comes_back_from_the_fields() -> None:
         ([row(rest="{}")], "requests[0]"),
         ([row(kind="walk", rest='{"colour": "red"}')], "colour"),
         ([row(kind="walk", lane="left", rest='{"spot": 3}')], "requests[0].spot"),
-        ([row(kind="walk")] * 21, "at most 20"),
     ],
 )
 def test_what_makes_no_intent_is_said_with_its_place(

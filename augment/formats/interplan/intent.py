@@ -57,7 +57,7 @@ def describe_reference(
 
     Returns:
         The intent is None where the ego is on no lane, or where nothing can be said as a request;
-        else the most detailed one that the reference itself meets.
+        else without offsets and lanes where the reference meets it better so.
     """
     ground = Ground.of(scene)
     lanes = LanesAcross.of(ground, scene.options.goal or TurnType.STRAIGHT)
@@ -67,13 +67,12 @@ def describe_reference(
     full = wish.Intent(requests=tuple(_requests(reference, lanes)), route=lanes.route.turn)
     if not full.requests:
         return sentence, None
-
-    def count_faults(intent: wish.Intent) -> int:
-        findings = check_against_intent(ground, reference, intent)
-        return sum(one.is_fault for one in findings)
-
     looser = replace(full, requests=tuple(map(_looser, full.requests)))
-    return sentence, min([full, looser], key=count_faults)  # of equal ones the first
+    faults = [
+        sum(one.is_fault for one in check_against_intent(ground, reference, intent))
+        for intent in (full, looser)
+    ]
+    return sentence, full if faults[0] <= faults[1] else looser
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

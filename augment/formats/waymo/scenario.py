@@ -78,6 +78,7 @@ class WaymoMotion(Reader):
                     raise fault_at(f"track {one.name}", text)
             ego = look_up(dict(enumerate(tracks)), scenario.sdc_track_index, "sdc_track_index")
             kinds = [track.object_type for track in scenario.tracks]
+            name = scenario.scenario_id[:100].decode("ascii", errors="replace")
             yield Log(
                 times_s=times_s,
                 ego=ego.states,
@@ -89,7 +90,7 @@ class WaymoMotion(Reader):
                 ],
                 map_at=lambda frame, scenario=scenario: city_of(scenario, frame),  # type: ignore[misc]
                 world="Waymo Open Motion scenario frame",
-                title=f"Waymo Open Motion data set, {path.name}, scenario {_id(scenario)}",
+                title=f"Waymo Open Motion data set, {path.name}, scenario {name}",
                 licence=LICENCE,
                 item=str(number),
                 frame=scenario.current_time_index,
@@ -151,10 +152,6 @@ def read_scenario(payload: bytes) -> Any:
         return Scenario.FromString(payload)
     except DecodeError as fault:
         raise fault_at("message", f"is broken: {fault}") from None
-
-
-def _id(scenario: Any) -> str:
-    return str(scenario.scenario_id[:100].decode("ascii", errors="replace"))
 
 
 def _track(index: int, track: Any) -> LoggedTrack:

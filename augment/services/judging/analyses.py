@@ -1,6 +1,6 @@
 """What the rows of a job say of its contestants: lines, repeats, pairs, wordings, refusals."""
 
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain
@@ -9,13 +9,12 @@ from statistics import fmean, median
 from django.db.models import Q
 
 from augment.checks import Severity
-from augment.errors import InvalidDocument, InvalidModification
 from augment.metrics import paired
 from augment.metrics.displacement import Displacement
 from augment.models import Augmentation, Contestant, GenerationJob
 from augment.services.endpoints.known_models import AUGMENTATION, Spending, sum_spending
 from augment.services.judging.displacement import Measured, of_job
-from augment.services.judging.findings import findings_of
+from augment.services.judging.findings import find_readable
 
 State = Augmentation.State
 
@@ -54,9 +53,10 @@ class JobAnalysis:
     @property
     def refusing(self) -> tuple[ContestantAnalysis, ...]:
         """Contestants with wishes that can't be met, or that refused."""
-        scored = [(one, one.refusals) for one in self.contestants if one.refusals is not None]
         return tuple(
-            one for one, score in scored if score.right or score.wrong or score.overlooked
+            one
+            for one in self.contestants
+            if (score := one.refusals) and (score.right or score.wrong or score.overlooked)
         )
 
     @property
@@ -134,8 +134,12 @@ def augmentation_lines(job: GenerationJob) -> Iterator[AugmentationLine]:
     rows = job.augmentations.select_related("scenario__base_scene")
     scenes = {row.pk: row for row in rows.defer("scenario__base_scene__recording")}
     for line in _lines(job):
-        wrong, doubtful = _count_faults(scenes[line.row.pk])
-        yield replace(line, wrong=wrong, doubtful=doubtful)
+        findings = find_readable(scenes[line.row.pk])
+        if findings is not None:
+            counts = Counter(finding.severity for finding in findings)
+            wrong, doubtful = counts[Severity.WRONG], counts[Severity.DOUBTFUL]
+            line = replace(line, wrong=wrong, doubtful=doubtful)
+        yield line
 
 
 def repeatability(job: GenerationJob) -> tuple[RepeatLine, ...]:
@@ -185,16 +189,6 @@ def _analyse(measured: Sequence[Measured], values: dict[str, float]) -> Contesta
         refusals=paired.score_refusals(answered) if answered else None,
         robustness=paired.measure_robustness(wordings),
     )
-
-
-def _count_faults(row: Augmentation) -> tuple[int, int] | tuple[None, None]:
-    if row.modification is None or row.state != State.DONE:
-        return None, None
-    try:
-        severities = [finding.severity for finding in findings_of(row)]
-    except (InvalidDocument, InvalidModification):
-        return None, None
-    return severities.count(Severity.WRONG), severities.count(Severity.DOUBTFUL)
 
 
 def _repeat_line(lines: Sequence[AugmentationLine]) -> RepeatLine:

@@ -120,14 +120,18 @@ def check_edit(scenario: Scenario, document: object, *, snapped: str = "") -> Ch
     )
 
 
-def guess_faults(row: Augmentation) -> frozenset[FaultClass] | None:
-    """Guess a row's faults by its findings; None without a modification that can be read."""
-    if row.modification is None:
-        return None
+def find_readable(row: Augmentation) -> tuple[Finding, ...] | None:
+    """Return the findings about a row; None without a modification that can be read."""
     try:
-        return first_guess(findings_of(row))
+        return None if row.modification is None else findings_of(row)
     except (InvalidDocument, InvalidModification):
         return None
+
+
+def guess_faults(row: Augmentation) -> frozenset[FaultClass] | None:
+    """Guess a row's faults by its findings; None without a modification that can be read."""
+    findings = find_readable(row)
+    return None if findings is None else first_guess(findings)
 
 
 def draw_marked(*, augmentation_pk: int) -> str:

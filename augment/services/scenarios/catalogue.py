@@ -21,12 +21,7 @@ from augment.scene import codec
 from augment.scene.entities import CatalogueSet, Scene, without_traffic
 from augment.scene.intent import IntentOrigin
 from augment.services.events import log_change
-from augment.services.scenarios.scenes import (
-    add_scenario,
-    check_reference,
-    check_slug,
-    content_hash,
-)
+from augment.services.scenarios import scenes as scene_rows
 
 SOURCE = "authored"
 Problems = list[tuple[str, str]]
@@ -63,7 +58,7 @@ def read_catalogue(folder: Path) -> tuple[dict[str, Scene], list[codec.Catalogue
             continue
         try:
             shown = scene if entry.keep_traffic else without_traffic(scene)
-            check_reference(shown, entry.reference)
+            scene_rows.check_reference(shown, entry.reference)
         except (InvalidModification, InvalidDocument) as fault:
             problems.append((f"{at}: reference", str(fault)))
     if problems:
@@ -81,7 +76,7 @@ def _read_files(
         try:
             made = parse(read_json(file, what=folder.name.removesuffix("s")))
             name = getattr(made, key)
-            check_slug(name, what="catalogue", key=key)
+            scene_rows.check_slug(name, what="catalogue", key=key)
             if name != file.stem:
                 text = f"expected {file.stem!r} as the file is called, got {name!r}"
                 raise InvalidDocument("catalogue", [(key, text)])
@@ -178,7 +173,7 @@ def _store_scene(scene: Scene, actor: User | None) -> CatalogueStep:
     wanted = {
         "document": document,
         "provenance": scene.provenance,
-        "content_hash": content_hash(document),
+        "content_hash": scene_rows.content_hash(document),
     }
     row, is_new = BaseScene.objects.get_or_create(
         slug=scene.name, defaults=wanted | {"source": SOURCE}
@@ -216,7 +211,7 @@ def _store_scenario(
     own = {"catalogue_set": which.value, "language": entry.language, "paraphrase_of": original}
     if row is None:
         origin = IntentOrigin.AUTHORED
-        row = add_scenario(
+        row = scene_rows.add_scenario(
             scene=entry.scene, slug=entry.slug, **said, intent_origin=origin, actor=actor
         )
         Scenario.objects.filter(pk=row.pk).update(**own)

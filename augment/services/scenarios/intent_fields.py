@@ -35,7 +35,6 @@ REST = "rest"
 """The field of a row for what the others don't hold, as JSON."""
 
 FIELDS = (*CHOICES, REST)
-MOST_REQUESTS = 20
 
 Row = dict[str, str]
 """By the names of FIELDS; what is empty says nothing."""
@@ -76,9 +75,6 @@ def intent_of_fields(given: IntentFields) -> dict[str, Any] | None:
     rest = _object(given.rest, REST)
     if not rows and not rest:
         return None
-    if len(rows) > MOST_REQUESTS:
-        problem = f"{len(rows)} are too many for the fields, at most {MOST_REQUESTS}"
-        raise InvalidDocument("intent", [("requests", problem)])
     document = _HEAD | rest | {"requests": [_request(f"requests[{n}]", row) for n, row in rows]}
     return intent_to_document(intent_from_document(document))
 

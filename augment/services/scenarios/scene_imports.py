@@ -148,6 +148,10 @@ def notes_of(scene: BaseScene) -> list[str]:
 
 def sentence_of(note: Note) -> str:
     """Return a loss or assumption as a sentence."""
+    if note.kind not in _TEXTS:  # of an earlier release
+        words = note.kind.replace("_", " ").capitalize()
+        details = ", ".join([*([str(note.number)] if note.number else []), *note.names])
+        return f"{words}: {details}." if details else f"{words}."
     values = {
         "number": note.number or 0,
         "of": note.of or 0,
@@ -173,13 +177,11 @@ _TEXTS: dict[SceneNoteKind, str] = {
     "ego and %(others)s m/s for others.",
     _Kind.SOME_SPEED_LIMITS: "%(number)s of %(of)s lanes have no speed limit: drives assume "
     "%(ego)s m/s for the ego and %(others)s m/s for others there.",
-    _Kind.SPEED_LIMITS_IGNORED: "%(number)s speed limits of %(value)s m/s were left out.",
     _Kind.NO_LIGHTS: "No traffic lights in this source.",
     _Kind.NO_WALKWAYS: "No sidewalks in this source.",
     _Kind.NO_DRIVABLE_AREAS: "No drivable areas in this source: only lanes can be driven on.",
     _Kind.NO_CONNECTIVITY: "No lane of this source has a successor.",
     _Kind.NO_INTERSECTIONS: "No intersections in this source: no turn types, no lights.",
-    _Kind.NO_BOX_SIZES: "No box sizes in this source: the usual ones of each class were taken.",
     _Kind.SOME_BOX_SIZES: "%(number)s of %(of)s objects got the usual size of their class.",
     _Kind.EGO_SIZE_ASSUMED: "The ego is assumed to be %(value)s m long.",
     _Kind.EGO_SIZE_SWAPPED: "The ego's length and width were swapped and put right.",
@@ -188,18 +190,10 @@ _TEXTS: dict[SceneNoteKind, str] = {
     _Kind.LANE_WIDTHS_ASSUMED: "%(number)s of %(of)s lanes have no boundaries on both sides: "
     "%(value)s m wide where no neighbour tells.",
     _Kind.TRAFFIC_SIDE_ASSUMED: "That people drive on the %(names)s is what the place says.",
-    _Kind.BICYCLE_LANES_LEFT_OUT: "%(number)s bicycle lanes of the map were left out.",
     _Kind.OBJECTS_LEFT_OUT: "%(number)s objects of no known class were left out: %(names)s.",
-    _Kind.CLASSES_MERGED: "Finer classes of this source count as ours: %(names)s.",
     _Kind.MAP_PARTS_LEFT_OUT: "%(number)s parts of the map were left out: %(names)s.",
     _Kind.FAR_PARTS_LEFT_OUT: "What is more than %(value)s m from the ego was left out.",
-    _Kind.LIGHTS_REPEATED: "%(number)s lights are programmed: their state is the cycle's at t0.",
-    _Kind.BOUNDARIES_TURNED: "%(number)s boundaries ran against their lane and were turned.",
-    _Kind.TURN_TYPES_CORRECTED: "%(number)s turn types were corrected by the connectors' shape.",
     _Kind.LONG_TIME_STEP: "Steps lie %(value)s s apart; a drive looks between them.",
-    _Kind.ROUTE: "The source's route leads over %(number)s roadblocks: %(names)s; not used.",
-    _Kind.ROUTE_NOT_IN_MAP: "%(number)s of %(of)s roadblocks are not in the map: %(names)s.",
-    _Kind.MISSION_GOAL: "The mission's goal lies %(names)s m ahead and to the left; not used.",
     _Kind.SCENARIO_TAGS: "Scenario tags of this moment: %(names)s.",
     _Kind.INTERPLAN_LEFT_OUT: "What interPlan says besides and is not used here: %(names)s.",
     _Kind.NON_COMMERCIAL: "The data's licence, %(names)s, does not allow commercial use.",

@@ -15,18 +15,8 @@ from augment.errors import Conflict, InvalidDocument, UnknownName
 from augment.formats.interplan.file import goal_place
 from augment.models import BaseScene, Scenario
 from augment.models.scenes import GOALS
-from augment.scene import codec
+from augment.scene import codec, entities
 from augment.scene.density import spawn_traffic
-from augment.scene.entities import (
-    Modification,
-    Scene,
-    TrafficAgent,
-    TrafficDensity,
-    TurnType,
-    apply,
-    check_fits,
-    without_traffic,
-)
 from augment.scene.entities import ScenarioType as ScenarioType
 from augment.scene.entities import in_type_order as in_type_order
 from augment.scene.intent import Intent, IntentOrigin
@@ -112,7 +102,7 @@ def add_scenario(
     keep_traffic: bool = False,
     density: str = "",
     goal: str = "",
-    traffic: Sequence[TrafficAgent] | None = None,
+    traffic: Sequence[entities.TrafficAgent] | None = None,
     interplan: dict[str, Any] | None = None,
     actor: User | None = None,
 ) -> Scenario:
@@ -203,7 +193,7 @@ def change_surroundings(
         Conflict: Traffic is to be kept and spawned.
     """
     before = scenario.keep_traffic, scenario.traffic_density
-    is_same_traffic = before == (keep_traffic, density or TrafficDensity.NONE)
+    is_same_traffic = before == (keep_traffic, density or entities.TrafficDensity.NONE)
     if is_same_traffic and scenario.goal == goal:
         return
     traffic = None
@@ -218,11 +208,11 @@ def _set_surroundings(
     keep_traffic: bool,
     density: str,
     goal: str,
-    traffic: Sequence[TrafficAgent] | None,
+    traffic: Sequence[entities.TrafficAgent] | None,
     reference: dict[str, Any] | None,
 ) -> None:
     """Keep them and the reference; spawned traffic stays whatever becomes of the reference."""
-    choices = {"density": (density, [*TrafficDensity]), "goal": (goal, [*GOALS])}
+    choices = {"density": (density, [*entities.TrafficDensity]), "goal": (goal, [*GOALS])}
     problems = [
         (name, f"{given!r} must be one of {', '.join(known)}")
         for name, (given, known) in choices.items()
@@ -230,41 +220,45 @@ def _set_surroundings(
     ]
     if problems:
         raise InvalidDocument("scenario", problems)
-    spawned = TrafficDensity(density or TrafficDensity.NONE)
-    if keep_traffic and spawned is not TrafficDensity.NONE:
+    spawned = entities.TrafficDensity(density or entities.TrafficDensity.NONE)
+    if keep_traffic and spawned is not entities.TrafficDensity.NONE:
         raise Conflict("Spawned traffic replaces the recorded one: choose one of the two.")
     scenario.keep_traffic, scenario.traffic_density = keep_traffic, spawned.value
-    scenario.goal = TurnType(goal).value if goal else ""
+    scenario.goal = entities.TurnType(goal).value if goal else ""
     change = None if reference is None else codec.modification_from_document(reference)
     if traffic is None:
         base = scenario.base_scene
         traffic = spawn_traffic(
-            without_traffic(codec.scene_from_document(base.document)),
+            entities.without_traffic(codec.scene_from_document(base.document)),
             spawned,
             seed=base.slug,
             clear_of=() if change is None else change.added,
         )
     scenario.spawned = None
     if traffic:
-        scenario.spawned = codec.modification_to_document(Modification(added=tuple(traffic)))
+        scenario.spawned = codec.modification_to_document(
+            entities.Modification(added=tuple(traffic))
+        )
     if change is not None:
         check_reference(scene_of(scenario), change)
         scenario.reference = codec.modification_to_document(change)
 
 
-def scene_of(scenario: Scenario) -> Scene:
+def scene_of(scenario: Scenario) -> entities.Scene:
     """The scene that contestants are asked to change, with the scenario's own traffic and goal."""
     scene = codec.scene_from_document(scenario.base_scene.document)
     if not scenario.keep_traffic:
-        scene = without_traffic(scene)
+        scene = entities.without_traffic(scene)
     if scenario.spawned is not None:
-        scene = apply(scene, codec.modification_from_document(scenario.spawned))
+        scene = entities.apply(scene, codec.modification_from_document(scenario.spawned))
     own = scene.options
-    density = own.density if scenario.keep_traffic else TrafficDensity(scenario.traffic_density)
+    density = (
+        own.density if scenario.keep_traffic else entities.TrafficDensity(scenario.traffic_density)
+    )
     options = replace(own, density=density)
     if scenario.goal:
         place_m = goal_place(scenario.interplan, scenario.goal, scene)
-        options = replace(options, goal=TurnType(scenario.goal), goal_m=place_m)
+        options = replace(options, goal=entities.TurnType(scenario.goal), goal_m=place_m)
     return replace(scene, options=options)
 
 
@@ -282,7 +276,7 @@ def scene_key(scenario: Scenario) -> str:
     return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()
 
 
-def reference_of(scenario: Scenario) -> Modification | None:
+def reference_of(scenario: Scenario) -> entities.Modification | None:
     """The human modification, None for a scenario without one."""
     if scenario.reference is None:
         return None
@@ -306,14 +300,14 @@ def seed_of(slug: str) -> int:
     return int.from_bytes(hashlib.sha256(slug.encode()).digest()[:4], "big")
 
 
-def check_reference(scene: Scene, modification: Modification) -> None:
+def check_reference(scene: entities.Scene, modification: entities.Modification) -> None:
     """Whether a modification fits the scene, with its lanes.
 
     Raises:
         InvalidModification: An agent does not fit.
         InvalidDocument: An agent names a lane that the scene does not have.
     """
-    check_fits(scene, modification)
+    entities.check_fits(scene, modification)
     known = LaneGraph(scene).lanes
     problems = [
         (f"{agent.id}.lane_id", f"{agent.lane_id!r} is not a lane or connector of the scene")

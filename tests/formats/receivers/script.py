@@ -57,12 +57,10 @@ def read_commonroad(file: str) -> dict[str, Any]:
     network = scenario.lanelet_network
     return {
         "faults": [],
-        "dt": scenario.dt,
         "lanelets": {
             one.lanelet_id: {
                 "center": one.center_vertices.tolist(),
                 "successor": one.successor,
-                "adj_right": one.adj_right,
                 "type": sorted(kind.value for kind in one.lanelet_type),
             }
             for one in network.lanelets
@@ -87,11 +85,6 @@ def read_commonroad(file: str) -> dict[str, Any]:
         "starts": [
             [*one.initial_state.position.tolist(), one.initial_state.velocity]
             for one in problems.planning_problem_dict.values()
-        ],
-        "goals": [
-            [goal.position.center.x, goal.position.center.y, goal.time_step.end]
-            for one in problems.planning_problem_dict.values()
-            for goal in one.goal.state_list
         ],
     }
 
