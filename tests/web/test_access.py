@@ -51,7 +51,7 @@ ACTIONS = _table(
         (403, 403, 403): "study-rate rating-again",  # before anybody looks early
         (302, 403, 403): (
             "job-retry job-retry-cause job-pause contestant-retired endpoint-model-new "
-            "endpoint-probe catalogue-load job-simulate person-change revoke author author-back "
+            "endpoint-probe catalogue-load job-simulate person-change revoke author "
             "scenario-retired intent-read job-resume checks-draw study-again "
             "study-draft-discard study-hand-over"
         ),
