@@ -7,13 +7,12 @@ from django.db import transaction
 from django.http import HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, redirect, render
 from django.urls import reverse
-from django.views.decorators.http import require_http_methods, require_POST, require_safe
 
 from arena.jobs.pages.measures import displacement_section, driving_section
 from arena.jobs.queries import MARKS, VIEWS, Part, grid_part
 from arena.jobs.services import retry_cause as retry_one_cause
 from arena.models import ScenarioFile
-from arena.site.access import ADMIN, STAFF, allow_only, user_of
+from arena.site.access import ADMIN, STAFF, act_for, form_for, page_for, user_of
 from arena.site.acts import Confirmation, ask, is_sure, refusals_told, send_later
 from arena.site.forms import CapsForm
 from arena.site.listing import choice_asked, page_asked, read_listing, read_page, search_asked
@@ -34,8 +33,7 @@ MEASURED_AT_ONCE = 1000
 _ASK_TO_MEASURE = frozenset({"measures", "by", "types", "checks"})
 
 
-@allow_only(*STAFF)
-@require_safe
+@page_for(*STAFF)
 def jobs_page(request: HttpRequest) -> HttpResponse:
     """List jobs with their bars, page by page."""
     choices = {
@@ -55,8 +53,7 @@ def jobs_page(request: HttpRequest) -> HttpResponse:
     return render(request, "jobs/list.html", context)
 
 
-@allow_only(*STAFF)
-@require_safe
+@page_for(*STAFF)
 def job_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Show progress, a part of the grid, and failures by their cause."""
     job = get_object_or_404(GenerationJob.objects.select_related("launched_by__person"), code=code)
@@ -99,59 +96,49 @@ def _measure(request: HttpRequest, job: GenerationJob) -> dict[str, object]:
     return measured
 
 
-@allow_only(ADMIN)
-@require_POST
-def retry_job(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
+@act_for(ADMIN, back="job")
+def retry_job(request: HttpRequest, code: uuid.UUID) -> None:
     """Queue again what failed."""
     job = get_object_or_404(GenerationJob, code=code)
-    with refusals_told(request), transaction.atomic():
+    with transaction.atomic():
         jobs.retry_failed(job=job, actor=user_of(request))
         send_later(request, enqueue_job, job.pk)
         messages.success(request, "What failed is queued again.")
-    return redirect("job", code=code)
 
 
-@allow_only(ADMIN)
-@require_POST
-def retry_cause(request: HttpRequest, code: uuid.UUID, key: str) -> HttpResponse:
+@act_for(ADMIN, back="job")
+def retry_cause(request: HttpRequest, code: uuid.UUID, key: str) -> None:
     """Queue again what ended for one cause; of an unreadable answer the last attempt counts."""
     job = get_object_or_404(GenerationJob, code=code)
-    with refusals_told(request), transaction.atomic():
+    with transaction.atomic():
         retry_one_cause(job, key=key, actor=user_of(request))
         send_later(request, enqueue_job, job.pk)
         messages.success(request, "What ended for this cause is queued again.")
-    return redirect("job", code=code)
 
 
-@allow_only(ADMIN)
-@require_POST
-def pause_job(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
+@act_for(ADMIN, back="job")
+def pause_job(request: HttpRequest, code: uuid.UUID) -> None:
     """Start nothing new; what is in flight ends."""
     job = get_object_or_404(GenerationJob, code=code)
-    with refusals_told(request):
-        jobs.pause(job, actor=user_of(request))
-        messages.success(request, "Paused: nothing new is started; what is in flight ends.")
-    return redirect("job", code=code)
+    jobs.pause(job, actor=user_of(request))
+    messages.success(request, "Paused: nothing new is started; what is in flight ends.")
 
 
-@allow_only(ADMIN)
-@require_POST
-def resume_job(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
+@act_for(ADMIN, back="job")
+def resume_job(request: HttpRequest, code: uuid.UUID) -> None:
     """Raise the caps that are given, then go on with what is left."""
     job = get_object_or_404(GenerationJob, code=code)
     form = CapsForm(request.POST)
     if not form.is_valid():
         messages.error(request, "A cap is a number; nothing was changed.")
-        return redirect("job", code=code)
-    with refusals_told(request), transaction.atomic():
+        return
+    with transaction.atomic():
         jobs.resume(job, higher=read_request(Caps, form.cleaned_data), actor=user_of(request))
         send_later(request, enqueue_job, job.pk)
         messages.success(request, "What is left is queued again.")
-    return redirect("job", code=code)
 
 
-@allow_only(ADMIN)
-@require_http_methods(["GET", "HEAD", "POST"])
+@form_for(ADMIN)
 def cancel_job(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Start nothing new; what is done stays. There is no way back, so ask first."""
     job = get_object_or_404(GenerationJob, code=code)

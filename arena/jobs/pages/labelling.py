@@ -20,7 +20,7 @@ from arena.jobs.pages.jobs import crumbs_of
 from arena.jobs.services import close_labelling, open_labelling, save_label
 from arena.models import FaultLabel, LabellingRound
 from arena.people.queries import by_pseudonym, experts, role_of
-from arena.site.access import ADMIN, EXPERT, STAFF, allow_only, user_of
+from arena.site.access import ADMIN, EXPERT, STAFF, allow_only, form_for, user_of
 from arena.site.acts import Confirmation, ask, is_sure, refusals_in, refusals_told
 from arena.site.forms import offer
 from arena.voting.queries.showings import original_beside
@@ -100,8 +100,7 @@ def _guess(label: FaultLabel) -> str:
     return f"The automatic checks had guessed: {', '.join(guessed) or 'no fault'}."
 
 
-@allow_only(*STAFF)
-@require_http_methods(["GET", "HEAD", "POST"])
+@form_for(*STAFF)
 def faults_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Show what was labelled in a job, and the form that opens a labelling."""
     job = get_object_or_404(GenerationJob, code=code)
@@ -122,8 +121,7 @@ def faults_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     return render(request, "label/job.html", context, status=422 if form.errors else 200)
 
 
-@allow_only(ADMIN)
-@require_http_methods(["GET", "HEAD", "POST"])
+@form_for(ADMIN)
 def close(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Take no more labels; there is no way back, so ask first."""
     labelling = get_object_or_404(LabellingRound.objects.select_related("job"), code=code)

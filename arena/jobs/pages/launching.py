@@ -10,11 +10,10 @@ from django.core.exceptions import ValidationError
 from django.db import transaction
 from django.http import HttpRequest, HttpResponse
 from django.shortcuts import redirect, render
-from django.views.decorators.http import require_http_methods
 
 from arena.contestants.pages import OptionsForm
 from arena.scenarios.queries import by_type, set_asked, set_choices
-from arena.site.access import ADMIN, allow_only, user_of
+from arena.site.access import ADMIN, form_for, user_of
 from arena.site.acts import refusals_in, send_later
 from arena.site.forms import ChoiceForm, Offer, offer
 from augment.models import Contestant, EndpointModel, GenerationJob
@@ -99,8 +98,7 @@ class LaunchForm(ChoiceForm, OptionsForm):
         return estimate(read_request(JobScope, self.cleaned_data), contestants)
 
 
-@allow_only(ADMIN)
-@require_http_methods(["GET", "HEAD", "POST"])
+@form_for(ADMIN)
 def new_job_page(request: HttpRequest) -> HttpResponse:
     """Choose contestants and scenarios, then launch."""
     form = _form(request, request.POST or None, initial=_like(request))

@@ -17,7 +17,7 @@ from django.http import (
 from django.shortcuts import get_object_or_404, redirect, render
 from django.urls import reverse
 from django.utils.text import slugify
-from django.views.decorators.http import require_POST, require_safe
+from django.views.decorators.http import require_POST
 
 from arena import tasks
 from arena.exports.files import CONTENT_TYPE
@@ -28,7 +28,7 @@ from arena.jobs.exports.tables import JOB_FILES
 from arena.jobs.queries import before_of
 from arena.jobs.services import ask_for_file
 from arena.models import ScenarioFile
-from arena.site.access import ADMIN, STAFF, allow_only, user_of
+from arena.site.access import ADMIN, STAFF, allow_only, page_for, user_of
 from arena.site.acts import refusals_told, send_later
 from arena.site.listing import choice_asked, read_page
 from augment.errors import UnknownName
@@ -76,8 +76,7 @@ def simulate_job(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     return redirect(reverse("job", args=[code]) + shown)
 
 
-@allow_only(*STAFF)
-@require_safe
+@page_for(*STAFF)
 def drives_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """List the drives of a job that were made one way, page by page."""
     job = get_object_or_404(GenerationJob, code=code)
@@ -93,8 +92,7 @@ def drives_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     return render(request, "drives/list.html", {"job": job, "page": page, "lines": lines})
 
 
-@allow_only(*STAFF)
-@require_safe
+@page_for(*STAFF)
 def drive_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Show one drive, beside the same scene before the change."""
     row = _driven(code)
@@ -110,8 +108,7 @@ def drive_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     return render(request, "drives/drive.html", context)
 
 
-@allow_only(*STAFF)
-@require_safe
+@page_for(*STAFF)
 def drive_trace(request: HttpRequest, code: uuid.UUID, form: str) -> HttpResponseBase:
     """Answer with the drive as JSON for the page, or as a moving picture or a strip of stills."""
     row = _driven(code)
@@ -168,8 +165,7 @@ def _metrics(row: Simulation | None) -> list[dict[str, Any]]:
 GROUPINGS = {By.CONTESTANT: "Contestant", By.TYPE: "Scenario type", By.VARIANT: "Variant"}
 
 
-@allow_only(*STAFF)
-@require_safe
+@page_for(*STAFF)
 def export_table(request: HttpRequest, code: uuid.UUID, name: str, form: str) -> HttpResponseBase:
     """Answer with a table as a file, with the options that its part of the page has."""
     job = get_object_or_404(GenerationJob, code=code)
@@ -185,8 +181,7 @@ def export_table(request: HttpRequest, code: uuid.UUID, name: str, form: str) ->
     return download(JOB_FILES[name].formats, form, stem, JOB_FILES[name].make(job, **options))
 
 
-@allow_only(*STAFF)
-@require_safe
+@page_for(*STAFF)
 def export_transcripts(request: HttpRequest, code: uuid.UUID) -> StreamingHttpResponse:
     """Answer with a line of JSON for each augmentation, sent while the rest is read."""
     job = get_object_or_404(GenerationJob, code=code)
@@ -198,8 +193,7 @@ def export_transcripts(request: HttpRequest, code: uuid.UUID) -> StreamingHttpRe
     )
 
 
-@allow_only(*STAFF)
-@require_safe
+@page_for(*STAFF)
 def analyses_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Show all three parts, on a page of their own: the bootstrap may take seconds."""
     job = get_object_or_404(GenerationJob, code=code)
@@ -221,8 +215,7 @@ def ask_for_scenarios(request: HttpRequest, code: uuid.UUID, form: str) -> HttpR
     return redirect(reverse("job", args=[code]) + "#scenario-files")
 
 
-@allow_only(*STAFF)
-@require_safe
+@page_for(*STAFF)
 def download_scenarios(request: HttpRequest, code: uuid.UUID) -> FileResponse:
     """Answer with a zip that is ready."""
     row = get_object_or_404(ScenarioFile, code=code, state=ScenarioFile.State.READY)

@@ -9,7 +9,6 @@ from django import forms
 from django.http import Http404, HttpRequest, HttpResponse, HttpResponseBase, StreamingHttpResponse
 from django.shortcuts import get_object_or_404, render
 from django.utils.text import slugify
-from django.views.decorators.http import require_safe
 
 from arena.models import Matchup, Snapshot, Study
 from arena.people.queries import natural_order
@@ -19,7 +18,7 @@ from arena.results.pages.ratings import get_readable_study, get_snapshot
 from arena.results.queries.evidence import neighbours, vote_in, vote_page
 from arena.results.queries.search import MARKS, ORDERS, OUTCOMES, PARTS, VoteSearch
 from arena.results.queries.votes import AUTOMATIC, COUNTED, is_imported
-from arena.site.access import STAFF, allow_only
+from arena.site.access import STAFF, page_for
 from arena.site.listing import page_asked
 from arena.site.pictures import sized_picture_response
 from arena.voting.queries.showings import picture_of_side
@@ -63,8 +62,7 @@ class VoteSearchForm(forms.Form):
         return VoteSearch.of_query(self.cleaned_data) if self.is_valid() else VoteSearch()
 
 
-@allow_only(*STAFF)
-@require_safe
+@page_for(*STAFF)
 def votes_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """One page of the votes that the address looks for, with their pictures."""
     snapshot, form, context = _asked(request, code)
@@ -74,8 +72,7 @@ def votes_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     return render(request, "results/votes.html", context)
 
 
-@allow_only(*STAFF)
-@require_safe
+@page_for(*STAFF)
 def votes_file(request: HttpRequest, code: uuid.UUID) -> HttpResponseBase:
     """All votes that the address looks for, as CSV."""
     snapshot, form, context = _asked(request, code)
@@ -89,8 +86,7 @@ def votes_file(request: HttpRequest, code: uuid.UUID) -> HttpResponseBase:
     )
 
 
-@allow_only(*STAFF)
-@require_safe
+@page_for(*STAFF)
 def single_vote_page(request: HttpRequest, code: uuid.UUID, vote: uuid.UUID) -> HttpResponse:
     """One vote: the pair as it was shown, what was decided how, and who drew what."""
     snapshot, form, context = _asked(request, code)
@@ -107,8 +103,7 @@ def single_vote_page(request: HttpRequest, code: uuid.UUID, vote: uuid.UUID) -> 
     return render(request, "results/vote.html", context)
 
 
-@allow_only(*STAFF)
-@require_safe
+@page_for(*STAFF)
 def shown_picture(
     request: HttpRequest, code: uuid.UUID, matchup: uuid.UUID, side: str
 ) -> HttpResponseBase:

@@ -6,7 +6,6 @@ from django.core.exceptions import PermissionDenied
 from django.http import Http404, HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, redirect, render
 from django.utils.text import slugify
-from django.views.decorators.http import require_POST, require_safe
 
 from arena import tasks
 from arena.errors import NoSnapshot
@@ -29,7 +28,7 @@ from arena.results.queries.evidence import count_settled
 from arena.results.queries.votes import is_imported
 from arena.results.services.rating_request import RatingRequest
 from arena.results.services.ratings import open_early
-from arena.site.access import ADMIN, ANALYST, EXPERT, STAFF, allow_only, user_of
+from arena.site.access import ADMIN, ANALYST, EXPERT, STAFF, act_for, page_for, user_of
 from arena.site.acts import refusals_told, tell_errors
 from arena.studies.pages.studies import export_place
 from augment.errors import UnknownName
@@ -39,8 +38,7 @@ SHOWN = 12
 """So many ratings can be chosen on the page; the log lists all."""
 
 
-@allow_only(ADMIN, ANALYST, EXPERT)
-@require_safe
+@page_for(ADMIN, ANALYST, EXPERT)
 def results_page(request: HttpRequest, code: uuid.UUID, tab: str = "table") -> HttpResponse:
     """One tab of a rating; of an open study only for staff who opened its results."""
     study = get_object_or_404(Study.objects.select_related("vote_file"), code=code)
@@ -96,46 +94,36 @@ def _of_rating(snapshot: Snapshot, tab: str, *, is_staff: bool) -> dict[str, obj
     }
 
 
-@allow_only(*STAFF)
-@require_POST
-def rate_study(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
+@act_for(*STAFF, back="results")
+def rate_study(request: HttpRequest, code: uuid.UUID) -> None:
     """Freeze a new rating of the votes as they are now; a big one is left to a worker."""
     study = get_readable_study(request, code)
     form = RatingForm(request.POST)
     if not form.is_valid():
         tell_errors(request, form)
-        return redirect("results", code=code)
-    with refusals_told(request):
-        choices = read_request(RatingRequest, form.cleaned_data).choices()
-        choices |= {"early": study.state == Study.State.OPEN, "actor": user_of(request)}
-        rate_or_send(request, study, **choices)
-    return redirect("results", code=code)
+        return
+    choices = read_request(RatingRequest, form.cleaned_data).choices()
+    choices |= {"early": study.state == Study.State.OPEN, "actor": user_of(request)}
+    rate_or_send(request, study, **choices)
 
 
-@allow_only(*STAFF)
-@require_POST
-def compute_again(request: HttpRequest, code: uuid.UUID, rating: uuid.UUID) -> HttpResponse:
+@act_for(*STAFF, back="results")
+def compute_again(request: HttpRequest, code: uuid.UUID, rating: uuid.UUID) -> None:
     """Send a rating that waits or failed to the workers once more; twice does no harm."""
     study = get_readable_study(request, code)
     snapshot = get_object_or_404(Snapshot, study=study, code=rating)
     snapshot.wait_again(progress=0)
-    with refusals_told(request):
-        tasks.send_snapshot(snapshot.pk)
-    return redirect("results", code=code)
+    tasks.send_snapshot(snapshot.pk)
 
 
-@allow_only(*STAFF)
-@require_POST
-def open_results_early(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
+@act_for(*STAFF, back="results")
+def open_results_early(request: HttpRequest, code: uuid.UUID) -> None:
     """The explicit, logged act; who votes in the study votes no longer."""
     study = get_object_or_404(Study, code=code)
-    with refusals_told(request):
-        open_early(study=study, actor=user_of(request))
-    return redirect("results", code=code)
+    open_early(study=study, actor=user_of(request))
 
 
-@allow_only(ADMIN, ANALYST, EXPERT)
-@require_safe
+@page_for(ADMIN, ANALYST, EXPERT)
 def rating_file(request: HttpRequest, code: uuid.UUID, name: str, form: str) -> HttpResponse:
     """A file of the rating that the address names, else of the newest.
 

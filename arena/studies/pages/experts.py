@@ -21,7 +21,7 @@ from arena.exports.cells import csv_text
 from arena.models import Enrolment, Invitation, Study
 from arena.people import links
 from arena.people.pages import find_account, link_page, with_own_language
-from arena.site.access import ADMIN, BACKEND, GONE, allow_only, user_of
+from arena.site.access import ADMIN, BACKEND, GONE, allow_only, form_for, user_of
 from arena.site.acts import Confirmation, ask, is_sure, refusals_in, refusals_told, tell_errors
 from arena.site.listing import read_page
 from arena.studies.queries import authorships_of, enrolled_voters, expert_lines, state_of
@@ -143,8 +143,7 @@ def mark(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     return redirect("experts", code=code)
 
 
-@allow_only(ADMIN)
-@require_http_methods(["GET", "HEAD", "POST"])
+@form_for(ADMIN)
 def forget_person(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Remove the identity of an account, plans of studies included; asks first."""
     user = find_account(code)

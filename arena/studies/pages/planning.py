@@ -5,17 +5,15 @@ from typing import Any
 
 from django.http import HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, render
-from django.views.decorators.http import require_safe
 
 from arena.models import Study
-from arena.site.access import STAFF, allow_only, user_of
+from arena.site.access import STAFF, page_for, user_of
 from arena.site.acts import refusals_told
 from arena.studies.forms import PlanningForm
 from arena.studies.services.outlook import ESTIMATE_INPUTS, StudyEstimate, foretell, known_of
 
 
-@allow_only(*STAFF)
-@require_safe
+@page_for(*STAFF)
 def planning_page(request: HttpRequest) -> HttpResponse:
     """The form with its answer below, filled in with what a study at hand says."""
     study, values = None, asdict(StudyEstimate())

@@ -13,7 +13,7 @@ from django.core.files.uploadedfile import UploadedFile
 from django.http import HttpRequest, HttpResponse, QueryDict
 from django.shortcuts import get_object_or_404, redirect, render
 from django.urls import reverse
-from django.views.decorators.http import require_http_methods, require_POST
+from django.views.decorators.http import require_POST
 
 from arena import tasks
 from arena.models import Study, StudyDraft
@@ -21,7 +21,7 @@ from arena.people.queries import by_pseudonym, experts
 from arena.results.services.vote_files import ImportedVotes, import_votes
 from arena.scenarios import queries
 from arena.scenarios.services import was_too_large
-from arena.site.access import ADMIN, allow_only, user_of
+from arena.site.access import ADMIN, act_for, allow_only, form_for, user_of
 from arena.site.acts import Confirmation, ask, is_sure, refusals_in, refusals_told, wants_to_change
 from arena.site.queries import usual_checks
 from arena.studies.forms import StudyForm
@@ -47,15 +47,13 @@ TOO_LARGE = (
 _ODD = re.compile(r"[^A-Za-z0-9._ -]+")
 
 
-@allow_only(ADMIN)
-@require_http_methods(["GET", "HEAD", "POST"])
+@form_for(ADMIN)
 def new_study_page(request: HttpRequest) -> HttpResponse:
     """Who competes on what, and who judges; opening plans every matchup."""
     return _set_up(request, None)
 
 
-@allow_only(ADMIN)
-@require_http_methods(["GET", "HEAD", "POST"])
+@form_for(ADMIN)
 def draft_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """The same form with what was saved, and what of it is gone meanwhile."""
     rows = StudyDraft.objects.select_related("changed_by__person")
@@ -72,27 +70,21 @@ def discard(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     return redirect("studies")
 
 
-@allow_only(ADMIN)
-@require_POST
+@act_for(ADMIN, back="study")
 def use_again(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """A new draft with the settings of a study."""
     study = get_object_or_404(Study, code=code)
-    with refusals_told(request):
-        draft = drafts.draft_like(study=study, actor=user_of(request))
-        messages.success(request, f"A draft with the settings of “{study.name}”.")
-        return redirect("study-draft", code=draft.code)
-    return redirect("study", code=code)
+    draft = drafts.draft_like(study=study, actor=user_of(request))
+    messages.success(request, f"A draft with the settings of “{study.name}”.")
+    return redirect("study-draft", code=draft.code)
 
 
-@allow_only(ADMIN)
-@require_POST
-def draw_checks(request: HttpRequest) -> HttpResponse:
+@act_for(ADMIN, back="study-new")
+def draw_checks(request: HttpRequest) -> None:
     """Have workers draw the attention checks that are missing; twice does no harm."""
-    with refusals_told(request):
-        tasks.send_checks(user_of(request).pk)
-        text = "Attention checks are being drawn. Reload this page in a moment."
-        messages.success(request, text)
-    return redirect("study-new")
+    tasks.send_checks(user_of(request).pk)
+    text = "Attention checks are being drawn. Reload this page in a moment."
+    messages.success(request, text)
 
 
 # --- The form ----------------------------------------------------------------------------------
@@ -213,8 +205,7 @@ class VoteFileForm(forms.Form):
         return file
 
 
-@allow_only(ADMIN)
-@require_http_methods(["GET", "HEAD", "POST"])
+@form_for(ADMIN)
 def upload_votes_page(request: HttpRequest) -> HttpResponse:
     """The form; what can't be read is said with its line, and nothing is kept."""
     form = VoteFileForm(request.POST or None, request.FILES or None)

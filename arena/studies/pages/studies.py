@@ -12,7 +12,7 @@ from django.http import FileResponse, Http404, HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, redirect, render
 from django.urls import reverse
 from django.utils.text import slugify
-from django.views.decorators.http import require_http_methods, require_POST, require_safe
+from django.views.decorators.http import require_POST
 
 from arena import tasks
 from arena.models import Study, StudyFile
@@ -26,7 +26,7 @@ from arena.results.services.written_files import (
     study_files_of,
     why_not,
 )
-from arena.site.access import ADMIN, STAFF, allow_only, user_of
+from arena.site.access import ADMIN, STAFF, act_for, allow_only, form_for, page_for, user_of
 from arena.site.acts import (
     WHY,
     Confirmation,
@@ -53,8 +53,7 @@ DRAFT = "draft"
 """What the list calls the state of a study that is still set up."""
 
 
-@allow_only(*STAFF)
-@require_safe
+@page_for(*STAFF)
 def studies_page(request: HttpRequest) -> HttpResponse:
     """Studies with their bars, page by page; before the first ones the drafts."""
     states = [(DRAFT, "Draft"), *Study.State.choices]
@@ -71,8 +70,7 @@ def studies_page(request: HttpRequest) -> HttpResponse:
     return render(request, "studies/list.html", context)
 
 
-@allow_only(*STAFF)
-@require_safe
+@page_for(*STAFF)
 def study_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """The rules, and how far each expert is."""
     study = _find_study(code)
@@ -102,8 +100,7 @@ def _find_study(code: uuid.UUID) -> Study:
     return get_object_or_404(Study.objects.select_related("vote_file"), code=code)
 
 
-@allow_only(*STAFF)
-@require_safe
+@page_for(*STAFF)
 def preregistration_file(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """What was frozen at the opening, byte for byte."""
     study = get_object_or_404(Study, code=code)
@@ -120,9 +117,8 @@ def preregistration_file(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
 # --- Acts --------------------------------------------------------------------------------------
 
 
-@allow_only(ADMIN)
-@require_POST
-def hand_over_pairs(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
+@act_for(ADMIN, back="study")
+def hand_over_pairs(request: HttpRequest, code: uuid.UUID) -> HttpResponse | None:
     """Let others judge what an expert has not judged; asks first."""
     study = get_object_or_404(Study, code=code)
     if wants_to_change(request):
@@ -145,15 +141,13 @@ def hand_over_pairs(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
             button="Hand over",
         )
         return ask(request, question)
-    with refusals_told(request):
-        taken = hand_over(study=study, username=giver, to=takers, actor=user_of(request))
-        shares = ", ".join(f"{name} {votes}" for name, votes in taken.items())
-        messages.success(request, f"Handed over: {shares}.")
-    return redirect("study", code=code)
+    taken = hand_over(study=study, username=giver, to=takers, actor=user_of(request))
+    shares = ", ".join(f"{name} {votes}" for name, votes in taken.items())
+    messages.success(request, f"Handed over: {shares}.")
+    return None
 
 
-@allow_only(ADMIN)
-@require_http_methods(["GET", "HEAD", "POST"])
+@form_for(ADMIN)
 def close(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Take no more votes, rate them with the defaults and show the table; asks first."""
     study = get_object_or_404(Study, code=code)
@@ -170,8 +164,7 @@ def close(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     return redirect("study", code=code)
 
 
-@allow_only(ADMIN)
-@require_http_methods(["GET", "HEAD", "POST"])
+@form_for(ADMIN)
 def cancel(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Give the study up, without results; its name has to be typed."""
     study = get_object_or_404(Study, code=code)
@@ -251,8 +244,7 @@ def ask_for_file(request: HttpRequest, code: uuid.UUID, kind: str) -> HttpRespon
     return redirect(reverse("study", args=[code]) + "#export")
 
 
-@allow_only(*STAFF)
-@require_safe
+@page_for(*STAFF)
 def download(request: HttpRequest, code: uuid.UUID, kind: str) -> FileResponse:
     """The newest one, once it is ready."""
     row = study_files_of(_study_for(request, code, kind)).get(kind)
