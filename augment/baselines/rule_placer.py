@@ -198,11 +198,9 @@ class _Fitting:
 
 def _as_request(move: Move, agent: TrafficAgent) -> VehicleRequest:
     """Return a road user's move as the placement of a new one."""
-    return VehicleRequest(
-        spot=move.spot,
+    return replace(
+        move.vehicle_request,
         body=Body.__members__.get(agent.type.name, Body.VEHICLE),
-        facing=move.facing,
-        turn_deg=move.turn_deg,
         speed_mps=agent.speed_mps if move.speed_mps is None else move.speed_mps,
     )
 

@@ -121,7 +121,7 @@ class UntrustedInput:
 def _answer(request: dict[str, Any]) -> tuple[str, Any]:
     path, name, folder = Path(request["path"]), request["format"], Path(request["folder"])
     # Names without a place on this machine, as they are said in reasons.
-    if path.is_file() and zipfile.is_zipfile(path):
+    if path.is_file() and (path.suffix.lower() == ".zip" or zipfile.is_zipfile(path)):
         (folder / path.stem).mkdir()
         unpack_zip(path, folder / path.stem)
         os.chdir(folder)

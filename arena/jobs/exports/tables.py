@@ -105,7 +105,7 @@ ANALYSES: dict[str, tuple[str, Columns]] = {
         {
             **_WHO,
             **{name: (f"robustness.{name}", WHOLE) for name in ("scenarios", "wordings")},
-            **{name: (f"robustness.{name}", NUMBER) for name in ("within_m", "median_range_m")},
+            "within_m": ("robustness.within_m", NUMBER),
         },
     ),
     "refusals": (
