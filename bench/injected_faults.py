@@ -6,7 +6,7 @@ every kind as often as every other, and COUNT right ones, jittered. Prints table
 
 import random
 import sys
-from collections import Counter, defaultdict
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import cache
@@ -49,7 +49,7 @@ class Tally:
     hits: Counter[FaultClass] = field(default_factory=Counter)
     false: Counter[FaultClass] = field(default_factory=Counter)
     missed: Counter[FaultClass] = field(default_factory=Counter)
-    named: dict[str, Counter[str]] = field(default_factory=lambda: defaultdict(Counter))
+    kinds: set[str] = field(default_factory=set)
     clean: int = 0
     right: int = 0
 
@@ -78,10 +78,7 @@ def measure(count: int, seed: int, *, among: tuple[Case, ...] | None = None) -> 
     for case, kind, change in _injections(chosen, count, rng):
         guessed = case.guess(change)
         tally.add(frozenset({LABELS[kind]}), guessed)
-        tally.named[kind]["n"] += 1
-        tally.named[kind]["named"] += LABELS[kind] in guessed
-        tally.named[kind]["alone"] += guessed == {LABELS[kind]}
-        tally.named[kind]["read"] += case.intent is not None
+        tally.kinds.add(kind)
     for number in range(count):
         case = chosen[number % len(chosen)]
         guessed = case.guess(jitter(case.route, case.reference, rng))
@@ -113,15 +110,6 @@ def class_table(tally: Tally) -> str:
     return table(["class", "precision", "recall"], rows)
 
 
-def kinds_table(tally: Tally) -> str:
-    """Return a row per kind of fault."""
-    kinds = [
-        [kind, label.value, *(str(tally.named[kind][name]) for name in _COUNTS)]
-        for kind, label in LABELS.items()
-    ]
-    return table(["kind", "true label", "n", "with intent", "class named", "and no other"], kinds)
-
-
 def report(tally: Tally, *, count: int, seed: int) -> str:
     """Return what docs/method.md shows, in Markdown."""
     read = sum(case.intent is not None for case in cases())
@@ -135,9 +123,6 @@ def report(tally: Tally, *, count: int, seed: int) -> str:
             table(["moved by", "called a position fault"], shifts),
         ]
     )
-
-
-_COUNTS = ("n", "read", "named", "alone")
 
 
 # Private
@@ -182,8 +167,7 @@ def _share(part: int, whole: int) -> float:
 
 def main(count: int = COUNT, seed: int = SEED) -> None:
     """Print all tables."""
-    tally = measure(count, seed)
-    print(report(tally, count=count, seed=seed), kinds_table(tally), sep="\n\n")
+    print(report(measure(count, seed), count=count, seed=seed))
 
 
 if __name__ == "__main__":

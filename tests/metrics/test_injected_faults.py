@@ -30,7 +30,7 @@ def test_precision_and_recall_are_above_nine_in_ten(tally: Tally, fault: FaultCl
 
 
 def test_every_kind_takes_part(tally: Tally) -> None:
-    assert set(tally.named) == set(MAKERS)
+    assert tally.kinds == set(MAKERS)
 
 
 def test_right_placements_are_left_alone(tally: Tally) -> None:
