@@ -43,6 +43,7 @@ class ContestantDocument(RowDocument[Contestant]):
     """A contestant; `frozen_options` are all of its options, from its first run on."""
 
     endpoint = serializers.CharField(source="endpoint.label", default=None, allow_null=True)
+    frozen_options = serializers.DictField(allow_null=True, read_only=True)
 
     class Meta:
         model = Contestant

@@ -119,7 +119,10 @@ def take_backup(path: Path, *, now: datetime, say: Say) -> Manifest:
 
 def find_media(folder: str = "") -> Iterator[str]:
     """Yield the names of all pictures; zips and thumbnails can be made again."""
-    folders, files = default_storage.listdir(folder)
+    try:
+        folders, files = default_storage.listdir(folder)
+    except FileNotFoundError:  # nothing has been drawn yet
+        return
     for name in sorted(files):
         if not name.startswith("."):  # half a file of a worker that was killed
             yield f"{folder}{name}"
@@ -155,7 +158,7 @@ def _fill(archive: zipfile.ZipFile, now: datetime, say: Say) -> Manifest:
             lines = map(stored_rows.as_line, stored_rows.read_values(model._base_manager.all()))
             manifest.rows[label] = add(f"{ROWS}{label}.jsonl", lines)
     say(f"rows: {sum(manifest.rows.values())} of {len(manifest.rows)} tables")
-    pictures = list(find_media()) if default_storage.exists("") else []  # a bucket always is
+    pictures = list(find_media())
     for name in pictures:
         with default_storage.open(name) as file:
             add(f"{MEDIA}{name}", iter(partial(file.read, CHUNK), b""))
