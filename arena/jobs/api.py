@@ -48,11 +48,7 @@ class CountsDocument(serializers.Serializer[Any]):
     total = serializers.IntegerField()
     settled = serializers.IntegerField()
     by_state = serializers.DictField(child=serializers.IntegerField())
-    is_over = serializers.SerializerMethodField()
-
-    def get_is_over(self, found: JobCounts) -> bool:
-        """Return whether nothing will change by itself."""
-        return not found.is_moving
+    is_over = serializers.BooleanField(help_text="Whether nothing will change by itself.")
 
 
 class JobDocument(CountsDocument):

@@ -61,11 +61,11 @@ def test_a_job_is_finished_when_nothing_is_under_way() -> None:
     held = leased(second)
     assert jobs.finish_if_over(job_pk=job.pk, now=NOON) == 0
     held.settle(failed(), now=NOON)
-    assert count_rows(job).is_moving, "it is not over yet"
+    assert not count_rows(job).is_over, "pages look on"
     assert jobs.finish_if_over(job_pk=job.pk, now=NOON) == 1
     assert jobs.finish_if_over(job_pk=job.pk, now=NOON) == 0
     job.refresh_from_db()
-    assert not count_rows(job).is_moving
+    assert count_rows(job).is_over
     assert (job.state, job.finished_at) == (GenerationJob.State.FINISHED, NOON)
 
 

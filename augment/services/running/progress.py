@@ -80,13 +80,14 @@ class JobCounts:
 
     @property
     def is_moving(self) -> bool:
-        """Whether anything will change by itself: not where all that is left is held.
+        """Whether any row will change by itself: not where all that is left is held."""
+        is_held = self.job.state in GenerationJob.HELD
+        return (self.running if is_held else self.under_way) > 0
 
-        A job still runs for a moment after the last of its rows is settled.
-        """
-        if self.job.state in GenerationJob.HELD:
-            return self.running > 0
-        return self.under_way > 0 or self.job.state == GenerationJob.State.RUNNING
+    @property
+    def is_over(self) -> bool:
+        """Whether nothing changes by itself; a job runs on for a moment after its last row."""
+        return not self.is_moving and self.job.state != GenerationJob.State.RUNNING
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
