@@ -94,7 +94,7 @@ def _shots() -> list[Shot]:
     shots = [
         Shot(name="login", who="", path="/login/"),
         Shot(name="home-of-an-expert", who="expert", path="/"),
-        Shot(name="home-of-an-analyst", who="analyst", path="/"),
+        Shot(name="home-of-an-researcher", who="researcher", path="/"),
         Shot(name="home-of-an-admin", who="admin", path="/"),
     ]
     for name in sorted(PAGES.keys() - ACTIONS.keys() - {"home", "drive", "results-vote"}):
@@ -117,7 +117,7 @@ def _sessions() -> dict[str, str]:
     from django.test import Client
 
     found = {}
-    for username in ("admin", "analyst", "expert"):
+    for username in ("admin", "researcher", "expert"):
         client = Client()
         client.force_login(User.objects.get(username=username))
         found[username] = client.cookies[settings.SESSION_COOKIE_NAME].value

@@ -14,7 +14,7 @@ from arena.people.queries import role_of
 
 SCHEME = "bearer"
 ADMINS = ("admin",)
-STAFF = ("admin", "analyst")
+STAFF = ("admin", "researcher")
 EXPERTS = ("expert",)
 
 

@@ -220,7 +220,7 @@ def endpoint_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
 
 
 def _sent_by_admin(request: HttpRequest) -> Any:
-    """Return what was posted, if anything; analysts may look and not change."""
+    """Return what was posted, if anything; researchers may look and not change."""
     if request.method == "POST" and role_of(request.user) != ADMIN:
         raise PermissionDenied
     return request.POST or None

@@ -49,7 +49,7 @@ RATED = (REFERENCE, "rule-placer", "sim-good-otm", "sim-careless-otm")
 """Who is voted on: with more, so few votes would leave no intervals."""
 
 SIMULATED_EXPERTS = tuple(f"sim-expert-{number}" for number in range(1, 6))
-PEOPLE = (("admin", "admin"), ("analyst", "analyst"), ("expert", "expert"))
+PEOPLE = (("admin", "admin"), ("researcher", "researcher"), ("expert", "expert"))
 JOB = "Demo: the catalogue"
 SIMULATED_STUDY = "Demo (simulated votes)"
 OPEN_STUDY = "Try it yourself"

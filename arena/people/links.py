@@ -31,7 +31,7 @@ MOST_ALIVE = 50
 """So many tokens one account may have at once."""
 
 WINDOW = timedelta(minutes=1)
-REQUESTS = {"admin": 1200, "analyst": 1200, "expert": 600}
+REQUESTS = {"admin": 1200, "researcher": 1200, "expert": 600}
 """So many requests a window, by the role of the token; counted in the database, so that it holds
 for all web servers together."""
 
@@ -164,7 +164,7 @@ def invite(*, study: Study, expert: User, actor: User | None = None) -> FreshLin
     if not may_be_let_in(expert):
         raise Conflict(
             f"{expert.get_username()} can't be invited by a link: links are for active "
-            "experts who are neither simulated nor analysts or admins."
+            "experts who are neither simulated nor researchers or admins."
         )
     # Held, so that of two links made at once the second one sees the first, which it replaces.
     Study.objects.select_for_update(no_key=True).get(pk=study.pk)

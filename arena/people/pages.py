@@ -38,10 +38,10 @@ from arena.people.queries import (
 )
 from arena.site.access import (
     ADMIN,
-    ANALYST,
     BACKEND,
     EXPERT,
     GONE,
+    RESEARCHER,
     STAFF,
     allow_only,
     keep_secret,
@@ -53,7 +53,7 @@ from arena.site.forms import offer
 PAGES = ["GET", "HEAD", "POST"]
 ROLE_NAMES = {
     "admin": gettext_lazy("Admin"),
-    "analyst": gettext_lazy("Analyst"),
+    "researcher": gettext_lazy("Researcher"),
     "expert": gettext_lazy("Expert"),
 }
 LANGUAGE_COOKIE = "django_language"
@@ -263,7 +263,7 @@ def _link_page(request: HttpRequest, user: User) -> HttpResponse:
 # --- One's own tokens --------------------------------------------------------------------------
 
 
-@allow_only(ADMIN, ANALYST, EXPERT)
+@allow_only(ADMIN, RESEARCHER, EXPERT)
 @never_cache
 @require_http_methods(PAGES)
 def tokens_page(request: HttpRequest) -> HttpResponse:
@@ -290,7 +290,7 @@ def tokens_page(request: HttpRequest) -> HttpResponse:
     return render(request, "api/tokens.html", context, status=422 if form.errors else 200)
 
 
-@allow_only(ADMIN, ANALYST, EXPERT)
+@allow_only(ADMIN, RESEARCHER, EXPERT)
 @require_POST
 def revoke_token(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Revoke one of one's own tokens."""

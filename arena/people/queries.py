@@ -11,10 +11,10 @@ from django.db.models import Q, QuerySet
 
 from arena.models import Person
 
-ROLES = ("admin", "analyst", "expert")
+ROLES = ("admin", "researcher", "expert")
 """The groups of accounts, the most powerful first."""
 
-TOKEN_ROLES = {"admin": ("admin", "analyst"), "analyst": ("analyst",), "expert": ("expert",)}
+TOKEN_ROLES = {"admin": ROLES[:2], "researcher": ROLES[1:2], "expert": ROLES[2:]}
 """The roles that a token may have, by the role of its owner. Staff know too much to vote, so
 that theirs is never an expert's."""
 
@@ -50,15 +50,15 @@ def role_given(user: User) -> str | None:
 def effective_role(role: str, owner_role: str | None) -> str | None:
     """Return what a token of that role opens while its owner has that role, None for nothing.
 
-    An admin's token opens what an analyst may once its owner is one.
+    An admin's token opens what a researcher may once its owner is one.
     """
     if role in TOKEN_ROLES.get(owner_role or "", ()):
         return role
-    return "analyst" if (role, owner_role) == ("admin", "analyst") else None
+    return "researcher" if (role, owner_role) == ("admin", "researcher") else None
 
 
 def experts() -> QuerySet[User]:
-    """Return active accounts that can be asked to vote: experts who are no analysts or admins.
+    """Return active accounts that can be asked to vote: experts who are no researchers or admins.
 
     Those may know which contestant made what, and their role opens no voting page. Who enrolled
     by a link for one study is asked for that one alone.
@@ -66,7 +66,7 @@ def experts() -> QuerySet[User]:
     found = User.objects.filter(
         is_active=True, is_superuser=False, groups__name="expert", enrolled=None
     )
-    found = found.exclude(groups__name__in=("admin", "analyst")).exclude(person=None)
+    found = found.exclude(groups__name__in=("admin", "researcher")).exclude(person=None)
     return found.select_related("person")
 
 

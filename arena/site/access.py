@@ -18,9 +18,9 @@ from augment.errors import AugmentError
 P = ParamSpec("P")
 View = Callable[Concatenate[HttpRequest, P], HttpResponseBase]
 
-ADMIN, ANALYST, EXPERT = "admin", "analyst", "expert"
+ADMIN, RESEARCHER, EXPERT = "admin", "researcher", "expert"
 
-STAFF = (ADMIN, ANALYST)
+STAFF = (ADMIN, RESEARCHER)
 """Who may know which contestant made what."""
 
 BACKEND = "arena.people.queries.AccountBackend"

@@ -42,9 +42,9 @@ def home(request: HttpRequest) -> HttpResponse:
     match role_of(request.user):
         case "expert":
             return _expert(request)
-        case "analyst":
+        case "researcher":
             use_english(request)
-            return _analyst(request)
+            return _researcher(request)
         case "admin":
             use_english(request)
             return _admin(request)
@@ -71,13 +71,13 @@ def _expert(request: HttpRequest) -> HttpResponse:
     return render(request, "home/expert.html", context)
 
 
-def _analyst(request: HttpRequest) -> HttpResponse:
+def _researcher(request: HttpRequest) -> HttpResponse:
     lines = studies.progress_of(studies.listed_studies())
     context = {
         "running": [line for line in lines if line.study.state == Study.State.OPEN],
         "closed": [line for line in lines if line.study.state == Study.State.CLOSED],
     }
-    return render(request, "home/analyst.html", context)
+    return render(request, "home/researcher.html", context)
 
 
 def _admin(request: HttpRequest) -> HttpResponse:

@@ -25,7 +25,7 @@ _SECTIONS: dict[str, tuple[Promise, frozenset[str]]] = {
 """Labels, and with which words the addresses of their pages begin."""
 _MENU = {
     "expert": ("home",),
-    "analyst": ("home", "scenarios", "contestants", "jobs", "studies"),
+    "researcher": ("home", "scenarios", "contestants", "jobs", "studies"),
     "admin": ("home", "scenarios", "contestants", "jobs", "studies", "people"),
 }
 

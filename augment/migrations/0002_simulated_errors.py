@@ -13,7 +13,7 @@ class Migration(migrations.Migration):
         migrations.AddField(
             model_name='augmentation',
             name='injected',
-            field=models.JSONField(blank=True, help_text='what a simulated contestant did wrong: {"class": ..., "fault": ...}; its true label, for analysts alone', null=True),
+            field=models.JSONField(blank=True, help_text='what a simulated contestant did wrong: {"class": ..., "fault": ...}; its true label, for researchers alone', null=True),
         ),
         migrations.AddField(
             model_name='contestant',

@@ -125,7 +125,7 @@ class Augmentation(Work):
         null=True,
         blank=True,
         help_text='what a simulated contestant did wrong: {"class": ..., "fault": ...}; its true '
-        "label, for analysts alone",
+        "label, for researchers alone",
     )
     corrects = models.ForeignKey(
         "self",

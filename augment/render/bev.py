@@ -5,7 +5,7 @@ bytes of a PNG.
 
 A voting picture carries no text but its scale and the distances at its edge, and its bytes depend
 on the scene, the change and the camera alone. Pictures with ids are for reviewers, those with
-marks at what the checks found for analysts, neither ever for a vote.
+marks at what the checks found for researchers, neither ever for a vote.
 """
 
 import math
@@ -292,7 +292,7 @@ def _closer(modification: Modification, camera: Camera) -> Camera | None:
     )
 
 
-# --- For analysts ------------------------------------------------------------------------------
+# --- For researchers ----------------------------------------------------------------------------
 
 
 def _draw_mark_of_fault(

@@ -19,7 +19,7 @@ def test_a_contestant_is_told_in_full_to_staff_alone() -> None:
     accounts = people()
     address = reverse("api-contestants")
     assert signed_in(accounts["expert"]).get(address).status_code == 403
-    (found,) = signed_in(accounts["analyst"]).get(address).json()["results"]
+    (found,) = signed_in(accounts["researcher"]).get(address).json()["results"]
     assert (found["slug"], found["retired_at"]) == ("one", None)
     assert (found["options"], found["frozen_options"]) == ({"temperature": 0.7}, None)
     assert (found["endpoint"], found["model"], found["roles"]) == ("here", "m", {})

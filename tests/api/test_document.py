@@ -49,5 +49,5 @@ def test_every_operation_tells_its_errors_in_the_one_shape() -> None:
 def test_staff_read_it() -> None:
     accounts = people()
     assert signed_in(accounts["expert"]).get(reverse("api-document")).status_code == 403
-    served = signed_in(accounts["analyst"]).get(reverse("api-document")).json()
+    served = signed_in(accounts["researcher"]).get(reverse("api-document")).json()
     assert served == json.loads(json.dumps(make_document(), default=str))

@@ -48,8 +48,8 @@ def _noting(found: list[tuple[str, int]], name: str) -> Callable[[int], None]:
 
 
 @pytest.fixture
-def analyst() -> Client:
-    return program_of(people()["analyst"])
+def reader() -> Client:
+    return program_of(people()["researcher"])
 
 
 @pytest.fixture
@@ -69,40 +69,40 @@ def upload(client: Client, content: bytes = STREET, **fields: object) -> Any:
 # --- Scenes ------------------------------------------------------------------------------------
 
 
-def test_a_recording_becomes_a_scene(analyst: Client, sent: list[tuple[str, int]]) -> None:
-    answer = upload(analyst)
+def test_a_recording_becomes_a_scene(reader: Client, sent: list[tuple[str, int]]) -> None:
+    answer = upload(reader)
     assert answer.status_code == 202, answer.content
     made = answer.json()
     assert (made["state"], made["tracks"], made["warnings"]) == ("queued", [], [])
     assert sent == [("enqueue_upload", SceneUpload.objects.get().pk)]
     uploads.UPLOADS.perform(sent.pop()[1])
     path = f"uploads/{made['code']}"
-    found = analyst.get(API + path).json()
+    found = reader.get(API + path).json()
     assert (found["state"], len(found["tracks"])) == ("read", 1)
     (stop,) = found["tracks"][0]["stops"]
     asked = {name: stop[name] for name in ("item", "frame")}
-    moment = send(analyst, path + "/moments", **asked).json()
-    assert send(analyst, path + "/moments", **asked).json()["code"] == moment["code"]
+    moment = send(reader, path + "/moments", **asked).json()
+    assert send(reader, path + "/moments", **asked).json()["code"] == moment["code"]
     upload_moments.MOMENTS.perform(sent.pop()[1])
     here = f"moments/{moment['code']}"
-    drawn = analyst.get(API + here).json()
+    drawn = reader.get(API + here).json()
     assert (drawn["state"], drawn["report"]["agents"], drawn["scene"]) == ("drawn", 1, None)
-    error_of(send(analyst, here + "/keep", slug="No Slug"), 400, "refused")
-    assert send(analyst, here + "/keep", slug="main-street").status_code == 202
+    error_of(send(reader, here + "/keep", slug="No Slug"), 400, "refused")
+    assert send(reader, here + "/keep", slug="main-street").status_code == 202
     upload_moments.MOMENTS.perform(sent.pop()[1])
-    assert analyst.get(API + here).json()["scene"] == "main-street"
+    assert reader.get(API + here).json()["scene"] == "main-street"
     assert BaseScene.objects.get().slug == "main-street"
 
 
 def test_a_file_that_can_not_be_taken_is_refused_before_anything_is_kept(
-    analyst: Client, settings: LazySettings
+    reader: Client, settings: LazySettings
 ) -> None:
-    assert list(error_of(upload(analyst, format="laser"), 422, "invalid")["fields"]) == ["format"]
-    empty = analyst.post(API + "uploads", {"format": ""})
+    assert list(error_of(upload(reader, format="laser"), 422, "invalid")["fields"]) == ["format"]
+    empty = reader.post(API + "uploads", {"format": ""})
     assert "file" in error_of(empty, 422, "invalid")["fields"]
-    error_of(send(analyst, "uploads", file="x"), 415, "unsupported_media_type")
+    error_of(send(reader, "uploads", file="x"), 415, "unsupported_media_type")
     settings.UPLOAD_MB = 1
-    error_of(upload(analyst, b" " * 1_000_001), 413, "too_large")
+    error_of(upload(reader, b" " * 1_000_001), 413, "too_large")
     assert not SceneUpload.objects.exists()
 
 
@@ -110,16 +110,16 @@ def test_a_file_that_can_not_be_taken_is_refused_before_anything_is_kept(
 
 
 def test_a_scenario_is_added_with_a_reference_that_fits(
-    analyst: Client, sent: list[tuple[str, int]]
+    reader: Client, sent: list[tuple[str, int]]
 ) -> None:
     add_scenario("street", reference=None)
     given = {"scene": "street-scene", "type": "cut_in", "instruction": "Place a car ahead."}
-    error_of(send(analyst, "scenarios", **given, goal="back"), 422, "invalid")
-    error_of(send(analyst, "scenarios", **given, reference={"add": "a car"}), 400, "refused")
-    error_of(send(analyst, "scenarios", **given, intent={"version": "x"}), 400, "refused")
+    error_of(send(reader, "scenarios", **given, goal="back"), 422, "invalid")
+    error_of(send(reader, "scenarios", **given, reference={"add": "a car"}), 400, "refused")
+    error_of(send(reader, "scenarios", **given, intent={"version": "x"}), 400, "refused")
     assert (Scenario.objects.count(), sent) == (1, [])
     chosen = {"slug": "mine", "density": "low", "goal": "left", "reference": CAR}
-    made = send(analyst, "scenarios", **given, **chosen).json()
+    made = send(reader, "scenarios", **given, **chosen).json()
     assert (made["slug"], made["type"], made["has_reference"]) == ("mine", "cut_in", True)
     row = Scenario.objects.get(slug="mine")
     assert (row.keep_traffic, row.traffic_density, row.goal) == (False, "low", "left")

@@ -71,7 +71,7 @@ def test_without_a_session_the_answer_is_401(study: Study) -> None:
     error_of(post(client, body_for(matchups_of(study, "eva")[0])), 401, "signed_out")
 
 
-@pytest.mark.parametrize("role", ["analyst", "admin"])
+@pytest.mark.parametrize("role", ["researcher", "admin"])
 def test_who_was_given_another_role_no_longer_votes(study: Study, role: str) -> None:
     User.objects.get(username="eva").groups.add(Group.objects.get_or_create(name=role)[0])
     client = signed_in("eva")

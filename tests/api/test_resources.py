@@ -45,7 +45,7 @@ def slugs(page: Any) -> list[str]:
 
 def test_pages_lose_no_row_and_repeat_none_while_rows_are_added() -> None:
     study = a_study()
-    asking = program_of(people()["analyst"])
+    asking = program_of(people()["researcher"])
     first = asking.get(API + "scenarios", {"limit": 4})
     study.scenarios.filter(slug="place-0").update(slug="a-new-first-one")
     second = asking.get(first.json()["next"])
@@ -56,7 +56,7 @@ def test_pages_lose_no_row_and_repeat_none_while_rows_are_added() -> None:
 
 def test_what_has_not_changed_is_304_and_what_has_is_not() -> None:
     job = rows.launch(scenarios=2, contestants=("reference",))
-    asking = program_of(people()["analyst"])
+    asking = program_of(people()["researcher"])
     for path in ("jobs", f"jobs/{job.code}", f"jobs/{job.code}/progress"):
         tag = asking.get(API + path).headers["ETag"]
         again = asking.get(API + path, headers={"If-None-Match": tag})
@@ -164,25 +164,25 @@ def test_an_experts_studies_tell_of_no_contestant() -> None:
     assert program_of(people()["expert"]).get(API + "studies").json()["results"] == []
 
 
-def test_an_analyst_reads_and_rates_and_changes_nothing_else() -> None:
+def test_a_researcher_reads_and_rates_and_changes_nothing_else() -> None:
     here = world()
-    analyst = program_of(people()["analyst"])
+    researcher = program_of(people()["researcher"])
     for path in ("jobs", f"studies/{here.study.code}/close", "people", "endpoints"):
-        error_of(send(analyst, path), 403, "forbidden")
+        error_of(send(researcher, path), 403, "forbidden")
     close_study(study=here.study)
-    assert send(analyst, f"studies/{here.study.code}/snapshots", rounds=20).status_code == 201
+    assert send(researcher, f"studies/{here.study.code}/snapshots", rounds=20).status_code == 201
 
 
 def test_results_of_an_open_study_need_an_early_look() -> None:
     here, accounts = world(), people()
     snapshot = rate(study=here.study, rounds=20, early=True)
-    asking, rating = program_of(accounts["analyst"]), f"studies/{here.study.code}/snapshots"
+    asking, rating = program_of(accounts["researcher"]), f"studies/{here.study.code}/snapshots"
     paths = [f"snapshots/{snapshot.code}", f"snapshots/{snapshot.code}/exports/leaderboard.csv"]
     for path in paths:
         error_of(asking.get(API + path), 403, "study_still_open")
     error_of(send(asking, rating), 403, "study_still_open")
     assert Snapshot.objects.count() == 1
-    open_early(study=here.study, actor=accounts["analyst"])
+    open_early(study=here.study, actor=accounts["researcher"])
     for path in paths:
         assert asking.get(API + path).status_code == 200
     assert send(asking, rating, rounds=20).json()["is_early"] is True

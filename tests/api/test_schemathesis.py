@@ -39,7 +39,7 @@ CHECKS: list[Any] = [
     checks.content_type_conformance,
     checks.response_schema_conformance,
 ]
-ROLES = ("anonymous", "expert", "analyst", "admin")
+ROLES = ("anonymous", "expert", "researcher", "admin")
 OF_EXPERTS = {"listStudies", "listMatchups", "getShownPicture"}
 OF_EXPERTS |= {"keepPreferences", "report", "vote"}
 EXPORTS = {"jobs": ("tool-calls", "csv"), "snapshots": ("leaderboard", "latex")}
@@ -98,11 +98,11 @@ def account(role: str, here: World) -> User | None:
 def ask_all(role: str, here: World) -> Seen:
     """Ask for every operation in a role; by its name, the statuses that came."""
     user = account(role, here)
-    reader = user if role in ("analyst", "admin") else people()["analyst"]
+    reader = user if role in ("researcher", "admin") else people()["researcher"]
     assert reader is not None
     headers = {} if user is None else {"Authorization": f"Bearer {secret_of(user)}"}
     rate(study=here.study, rounds=20, early=True)
-    if role in ("analyst", "admin"):
+    if role in ("researcher", "admin"):
         assert user is not None
         open_early(study=here.study, actor=user)
     document = schemathesis.openapi.from_wsgi(

@@ -30,18 +30,18 @@ def role_at(client: Client) -> str | None:
         return None
     if client.post(reverse("api-people")).status_code == 415:
         return "admin"
-    return "analyst" if client.get(reverse("api-jobs")).status_code == 200 else "expert"
+    return "researcher" if client.get(reverse("api-jobs")).status_code == 200 else "expert"
 
 
 def test_the_page_shows_a_new_token_once_and_keeps_only_its_hash() -> None:
     admin = people()["admin"]
     page = signed_in(admin)
-    given = {"name": "nightly export", "role": "analyst", "days": "7"}
+    given = {"name": "nightly export", "role": "researcher", "days": "7"}
     shown = page.post(reverse("api-tokens"), given).content.decode()
     row = ApiToken.objects.get()
     secret = shown.partition('id="secret" value="')[2].partition('"')[0]
     assert secret.startswith(links.PREFIX)
-    assert role_at(program(secret)) == "analyst"
+    assert role_at(program(secret)) == "researcher"
     stored = [str(value) for value in ApiToken.objects.values_list().get()]
     assert not any(secret in value for value in stored)
     listed = page.get(reverse("api-tokens")).content.decode()
@@ -54,15 +54,15 @@ def test_the_page_shows_a_new_token_once_and_keeps_only_its_hash() -> None:
 
 def test_nobody_revokes_somebody_elses() -> None:
     accounts = people()
-    secret = secret_of(accounts["analyst"])
+    secret = secret_of(accounts["researcher"])
     token = ApiToken.objects.get()
     answer = signed_in(accounts["admin"]).post(reverse("api-token-revoke", args=[token.code]))
     assert answer.status_code == 404
-    assert role_at(program(secret)) == "analyst"
+    assert role_at(program(secret)) == "researcher"
 
 
 @pytest.mark.parametrize(
-    ("owner", "role"), [("analyst", "admin"), ("expert", "analyst"), ("admin", "expert")]
+    ("owner", "role"), [("researcher", "admin"), ("expert", "researcher"), ("admin", "expert")]
 )
 def test_no_token_has_more_than_its_owner_and_staff_never_an_experts(
     owner: str, role: str
@@ -75,13 +75,13 @@ def test_no_token_has_more_than_its_owner_and_staff_never_an_experts(
     ("role", "owner", "opens"),
     [
         ("admin", "admin", "admin"),
-        ("analyst", "admin", "analyst"),
-        ("admin", "analyst", "analyst"),
-        ("analyst", "analyst", "analyst"),
+        ("researcher", "admin", "researcher"),
+        ("admin", "researcher", "researcher"),
+        ("researcher", "researcher", "researcher"),
         ("admin", "expert", None),
-        ("analyst", "expert", None),
+        ("researcher", "expert", None),
         ("expert", "expert", "expert"),
-        ("expert", "analyst", None),
+        ("expert", "researcher", None),
         ("expert", "admin", None),
         ("admin", None, None),
     ],
@@ -97,8 +97,8 @@ def test_a_demoted_owners_token_is_demoted_with_them() -> None:
     asking = program_of(accounts["admin"])
     assert role_at(asking) == "admin"
     another = api_admin()
-    set_role(user=accounts["admin"], role="analyst", actor=another)
-    assert role_at(asking) == "analyst"
+    set_role(user=accounts["admin"], role="researcher", actor=another)
+    assert role_at(asking) == "researcher"
     set_role(user=accounts["admin"], role="expert", actor=another)
     assert role_at(asking) is None
 
@@ -109,8 +109,8 @@ def api_admin() -> User:
 
 def test_a_paused_owners_token_opens_nothing() -> None:
     accounts = people()
-    asking = program_of(accounts["analyst"])
-    set_active(user=accounts["analyst"], is_active=False, actor=accounts["admin"])
+    asking = program_of(accounts["researcher"])
+    set_active(user=accounts["researcher"], is_active=False, actor=accounts["admin"])
     error_of(asking.get(STUDIES), 401, "signed_out")
 
 
@@ -144,7 +144,7 @@ def test_a_token_needs_no_csrf_token_and_a_session_does() -> None:
 def test_use_is_remembered_and_limited_by_role(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(links.REQUESTS, "expert", 3)
     accounts = people()
-    asking, other = program_of(accounts["expert"]), program_of(accounts["analyst"])
+    asking, other = program_of(accounts["expert"]), program_of(accounts["researcher"])
     assert ApiToken.objects.exclude(last_used_at=None).count() == 0
     assert [asking.get(STUDIES).status_code for _ in range(4)] == [200, 200, 200, 429]
     refused = asking.get(STUDIES)
@@ -159,7 +159,7 @@ def test_use_is_remembered_and_limited_by_role(monkeypatch: pytest.MonkeyPatch) 
 def test_a_request_is_counted_by_one_statement_so_that_none_between_is_refused(
     django_assert_num_queries: DjangoAssertNumQueries,
 ) -> None:
-    secret = secret_of(people()["analyst"])
+    secret = secret_of(people()["researcher"])
     role_at(program(secret))
     for began in (None, timezone.now() - timedelta(seconds=61), timezone.now()):
         ApiToken.objects.update(window_began_at=began)

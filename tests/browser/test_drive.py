@@ -19,9 +19,9 @@ pytestmark = [pytest.mark.browser, pytest.mark.django_db(transaction=True)]
 
 
 def opened(browser: Browser, address: str, row: Simulation, **options: Any) -> Page:
-    """The page of a drive, as an analyst sees it, with its traces loaded."""
+    """The page of a drive, as a researcher sees it, with its traces loaded."""
     client = Client()
-    client.force_login(people()["analyst"])
+    client.force_login(people()["researcher"])
     context = browser.new_context(base_url=address, **options)
     context.set_default_timeout(PATIENCE_MS)
     cookie = client.cookies[settings.SESSION_COOKIE_NAME].value

@@ -69,7 +69,7 @@ def desk(browser: Browser) -> Iterator[Desk]:
     scenario = add_scenario("street", scene=scene(), reference=None)
     draw_scene(scenario.base_scene_id)
     path = reverse("reference-edit", args=[scenario.code])
-    html = signed_in(people()["analyst"]).get(path).content
+    html = signed_in(people()["researcher"]).get(path).content
     with hold(browser, path, html) as held:
         yield Desk(held=held)
 

@@ -29,7 +29,7 @@ def test_an_older_moment_never_takes_the_place_of_a_newer_one(browser: Browser) 
     row.tracks[0]["stops"] *= 3
     row.save()
     path = reverse("upload", args=[row.code])
-    html = signed_in(people()["analyst"]).get(path).content
+    html = signed_in(people()["researcher"]).get(path).content
     with hold(browser, path, html) as held:
         button = held.page.get_by_role("button", name="Show")
         button.click()

@@ -45,12 +45,12 @@ def test_a_rating_that_breaks_in_an_unforeseen_way_says_so_and_can_be_asked_for_
     assert "Traceback" in caplog.text
     event = Event.objects.get(verb="rating failed")
     assert event.after == {"snapshot": str(snapshot.code), "why": snapshot.reason}
-    analyst = signed_in(people()["analyst"])
-    page = analyst.get(reverse("results", args=[snapshot.study.code])).content.decode()
+    researcher = signed_in(people()["researcher"])
+    page = researcher.get(reverse("results", args=[snapshot.study.code])).content.decode()
     assert "could not be computed: unexpected: TypeError" in page
     assert reverse("rating-again", args=[snapshot.study.code, snapshot.code]) in page
     Snapshot.objects.filter(pk=snapshot.pk).update(filters=kept)
-    analyst.post(reverse("rating-again", args=[snapshot.study.code, snapshot.code]))
+    researcher.post(reverse("rating-again", args=[snapshot.study.code, snapshot.code]))
     RATINGS.perform(snapshot.pk)
     snapshot.refresh_from_db()
     assert (snapshot.state, snapshot.reason != "", snapshot.progress) == ("ready", True, 100)

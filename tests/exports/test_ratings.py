@@ -64,7 +64,7 @@ def test_who_may_see_results() -> None:
     eva = matchups_of(study, "eva")[0].expert
     gus, ana, adi = (
         create_person(username=role, password="a password", role=role)
-        for role in ("expert", "analyst", "admin")
+        for role in ("expert", "researcher", "admin")
     )
 
     def access() -> list[str]:

@@ -207,7 +207,7 @@ def test_results_stay_closed_to_experts_while_the_study_is_open(eva: Client, stu
     assert eva.get(f"/studies/{study.code}/results/").status_code == 200
 
 
-@pytest.mark.parametrize("role", ["analyst", "admin"])
+@pytest.mark.parametrize("role", ["researcher", "admin"])
 def test_who_may_know_more_can_neither_vote_nor_look(eva: Client, study: Study, role: str) -> None:
     """An expert who was made more than that in the middle of a study."""
     given = eva.get(matchups_page(study)).json()[0]

@@ -96,7 +96,7 @@ def a_rated_study() -> Shown:
     study = close_study(study=study)
     Contestant.objects.filter(slug="interplan").update(kind=Contestant.Kind.REFERENCE)
     snapshot = rate(study=study, rounds=1000, seed=4)
-    client = signed_in(people()["analyst"])
+    client = signed_in(people()["researcher"])
     tabs = ("table", "pairs", "types", "raters")
     return Shown(
         votes=_votes(study),

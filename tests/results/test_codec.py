@@ -96,7 +96,7 @@ def test_what_can_not_be_read_is_refused_with_its_place(
 @pytest.mark.django_db
 def test_an_old_rating_opens_on_every_tab_and_exports_the_same_bytes() -> None:
     snapshot = stored(OLD["snapshot"]["results"])
-    staff = signed_in(people()["analyst"])
+    staff = signed_in(people()["researcher"])
     for tab in TABS:
         page = staff.get(reverse("results-tab", args=[snapshot.study.code, tab]))
         assert page.status_code == 200, tab
@@ -114,7 +114,7 @@ def test_an_old_rating_opens_on_every_tab_and_exports_the_same_bytes() -> None:
 @pytest.mark.django_db
 def test_a_rating_that_kept_its_standings_alone_opens_on_every_tab() -> None:
     snapshot = stored({})
-    staff = signed_in(people()["analyst"])
+    staff = signed_in(people()["researcher"])
     for tab in TABS:
         page = staff.get(reverse("results-tab", args=[snapshot.study.code, tab]))
         said = "keeps the table alone" in page.content.decode()

@@ -10,7 +10,7 @@ from arena.people.services import create_person
 pytestmark = pytest.mark.django_db
 
 
-@pytest.mark.parametrize("role", ["expert", "analyst"])
+@pytest.mark.parametrize("role", ["expert", "researcher"])
 def test_an_account_comes_with_its_role_by_two_queries(
     role: str, django_assert_num_queries: DjangoAssertNumQueries
 ) -> None:
@@ -24,10 +24,10 @@ def test_an_account_comes_with_its_role_by_two_queries(
 
 def test_of_several_roles_the_most_powerful_counts() -> None:
     person = create_person(username="eva", password=None, role="expert")
-    person.groups.add(Group.objects.get_or_create(name="analyst")[0])
+    person.groups.add(Group.objects.get_or_create(name="researcher")[0])
     found = AccountBackend().get_user(person.pk)
     assert found is not None
-    assert role_of(found) == "analyst"
+    assert role_of(found) == "researcher"
 
 
 def test_an_account_that_is_gone_or_not_active_is_nobody() -> None:

@@ -59,7 +59,7 @@ def test_the_adjusted_table_stands_with_its_effects(study: Study) -> None:
     ]
     assert "adjusted for side, objects" in leaderboard_table(snapshot).method_text
     assert b'"covariates": [\n      "side",' in bundle_files(snapshot)["manifest.json"]
-    shown = signed_in(people()["analyst"]).get(reverse("results", args=[study.code])).content
+    shown = signed_in(people()["researcher"]).get(reverse("results", args=[study.code])).content
     assert b"Adjusted for what was shown" in shown
     assert b"the number of objects" in shown
     columns = with_covariates(plain, votes.counted, COVARIATES).covariates

@@ -50,7 +50,7 @@ def test_links_are_taken_back_one_by_one(study: Study, eva: User) -> None:
     assert accept(token=his.token).expert.username == "finn"
 
 
-@pytest.mark.parametrize("role", ["analyst", "admin"])
+@pytest.mark.parametrize("role", ["researcher", "admin"])
 def test_who_became_more_than_an_expert_is_not_let_in(study: Study, eva: User, role: str) -> None:
     token = invite(study=study, expert=eva).token
     eva.groups.add(Group.objects.get_or_create(name=role)[0])

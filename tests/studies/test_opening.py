@@ -89,6 +89,6 @@ def test_simulated_contestants_take_part_only_when_allowed() -> None:
 def test_who_may_know_the_contestants_is_not_asked_to_vote() -> None:
     cast = cast_of()
     finn = User.objects.get(username="finn")
-    finn.groups.add(Group.objects.get_or_create(name="analyst")[0])
+    finn.groups.add(Group.objects.get_or_create(name="researcher")[0])
     with pytest.raises(UnknownName, match=r"Unknown expert 'finn'. Known: eva"):
         open_study(name="Round 1", votes_per_expert=3, seed=7, **cast)

@@ -108,7 +108,7 @@ def test_the_results_answer_the_pairs_and_every_export_names_the_hash() -> None:
     assert (
         files["hypotheses.csv"].decode().splitlines()[1].startswith("ann above cid,ann,cid,held,")
     )
-    person = people()["analyst"]
+    person = people()["researcher"]
     page = signed_in(person).get(reverse("results", args=[study.code])).content.decode()
     assert sha in page
     assert "contradicted" in page

@@ -16,7 +16,7 @@ from augment.services.scenarios.pictures import store
 from tests import study_rows
 from tests.jobs import rows
 
-ROLES = ("admin", "analyst", "expert")
+ROLES = ("admin", "researcher", "expert")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

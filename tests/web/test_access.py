@@ -12,7 +12,7 @@ from tests.web.cast import people, signed_in, status, world
 pytestmark = pytest.mark.django_db
 
 STAFF, ADMIN = (200, 200, 403), (200, 403, 403)
-"""What an admin, an analyst and an expert are answered who take part in nothing."""
+"""What an admin, a researcher and an expert are answered who take part in nothing."""
 
 
 def _table(names: dict[tuple[int, int, int], str]) -> dict[str, tuple[int, int, int]]:
@@ -133,7 +133,7 @@ def test_results_open_to_their_experts_and_to_staff_when_the_study_closes() -> N
     here, accounts = world(), people()
     close_study(study=here.study)
     url = reverse("results", args=[here.study.code])
-    assert signed_in(accounts["analyst"]).get(url).status_code == 200
+    assert signed_in(accounts["researcher"]).get(url).status_code == 200
     assert signed_in(here.expert).get(url).status_code == 200
     assert signed_in(accounts["expert"]).get(url).status_code == 403
 

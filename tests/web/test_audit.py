@@ -31,7 +31,7 @@ def _acts() -> tuple[Client, Study]:
     accounts = people()
     study = close_study(study=study_rows.a_study(), actor=accounts["admin"])
     log_event(
-        actor=accounts["analyst"],
+        actor=accounts["researcher"],
         verb="import",
         object_kind="scene",
         object_code="a-street",
@@ -59,7 +59,8 @@ def test_acts_are_filtered_and_exported() -> None:
     answer = client.get(reverse("audit-export"), {"object_kind": "scene"})
     assert answer.streaming
     (row,) = csv.DictReader(io.StringIO(str(answer.getvalue(), "utf-8")))
-    assert (row["verb"], row["object_code"], row["actor"]) == ("import", "a-street", "Analyst 1")
+    told = [row[name] for name in ("verb", "object_code", "actor")]
+    assert told == ["import", "a-street", "Researcher 1"]
     assert json.loads(row["after"]) == {"notes": "=1+1"}
 
 
@@ -100,7 +101,7 @@ def _rated_while_open() -> tuple[Study, dict[str, str]]:
 def test_no_page_shows_results_of_an_open_study_before_an_early_look() -> None:
     study, pages = _rated_while_open()
     accounts = people()
-    for role in ("admin", "analyst"):
+    for role in ("admin", "researcher"):
         client = signed_in(accounts[role])
         for name, address in pages.items():
             answer = client.get(address)
@@ -111,11 +112,11 @@ def test_no_page_shows_results_of_an_open_study_before_an_early_look() -> None:
             else:
                 assert answer.status_code in (403, 409), (role, name)
     assert not EarlyLook.objects.exists()
-    analyst = signed_in(accounts["analyst"])
-    analyst.post(reverse("results-open", args=[study.code]))
+    researcher = signed_in(accounts["researcher"])
+    researcher.post(reverse("results-open", args=[study.code]))
     look = Event.objects.get(verb="look early")
-    assert (look.actor, look.object_code) == (accounts["analyst"], str(study.code))
-    assert {name: analyst.get(address).status_code for name, address in pages.items()} == (
+    assert (look.actor, look.object_code) == (accounts["researcher"], str(study.code))
+    assert {name: researcher.get(address).status_code for name, address in pages.items()} == (
         dict.fromkeys(pages, 200)
     )
     admin = signed_in(accounts["admin"])

@@ -80,13 +80,13 @@ def test_an_admin_marks_an_author_and_takes_it_back_by_plain_forms(
 
 def test_staff_read_who_is_an_author() -> None:
     study = full_study(size=SIZE)
-    analyst = signed_in(people()["analyst"])
+    researcher = signed_in(people()["researcher"])
     mark(study, "expert-1", "gpt-4o-otm")
     rated(study)
-    raters = page(analyst, study, "results-tab", "raters")
+    raters = page(researcher, study, "results-tab", "raters")
     assert raters.count(">Author</span>") == 1
     assert "expert-1" not in raters
-    assert "marked an author" in page(analyst, study, "results-tab", "log")
+    assert "marked an author" in page(researcher, study, "results-tab", "log")
 
 
 # --- Experts -----------------------------------------------------------------------------------

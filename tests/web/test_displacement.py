@@ -17,12 +17,12 @@ pytestmark = pytest.mark.django_db
 
 
 def page(job: GenerationJob, query: str = "") -> str:
-    shown = signed_in(people()["analyst"]).get(reverse("job", args=[job.code]) + query)
+    shown = signed_in(people()["researcher"]).get(reverse("job", args=[job.code]) + query)
     text = re.sub(r"<[^>]+>", " ", shown.content.decode())
     return re.sub(r"\s+", " ", text)
 
 
-def page_of(row: Augmentation, role: str = "analyst") -> str:
+def page_of(row: Augmentation, role: str = "researcher") -> str:
     return signed_in(people()[role]).get(reverse("augmentation", args=[row.code])).content.decode()
 
 

@@ -49,8 +49,8 @@ def test_a_page_drives_with_the_projects_own_planners_alone(planner: str) -> Non
 def test_the_jobs_page_shows_scores() -> None:
     job = launched()
     driven(job)
-    analyst, page = signed_in(people()["analyst"]), reverse("job", args=[job.code])
-    shown = analyst.get(page).content.decode()
+    researcher, page = signed_in(people()["researcher"]), reverse("job", args=[job.code])
+    shown = researcher.get(page).content.decode()
     assert "own simulator; n: drives" in shown
     assert "Mean driving score (%)" in shown
     assert "25.0" in shown
@@ -71,7 +71,7 @@ def test_a_drive_can_be_taken_away_as_pictures(
     form: str, kind: str, frames: int, size: tuple[int, int]
 ) -> None:
     row = driven(launched())[-1]
-    answer = signed_in(people()["analyst"]).get(reverse("drive-file", args=[row.code, form]))
+    answer = signed_in(people()["researcher"]).get(reverse("drive-file", args=[row.code, form]))
     picture = Image.open(io.BytesIO(answer.content))
     assert picture.format == kind
     assert getattr(picture, "n_frames", 1) == frames

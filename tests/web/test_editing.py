@@ -21,14 +21,14 @@ CAR = json.dumps(modification_to_document(Modification(added=(vehicle("Added1", 
 
 
 @pytest.fixture
-def analyst(monkeypatch: pytest.MonkeyPatch) -> Client:
+def researcher(monkeypatch: pytest.MonkeyPatch) -> Client:
     """Signed in; what is sent to a worker is done at once."""
     monkeypatch.setattr("arena.scenarios.pages.uploads.enqueue_scene", draw_scene)
     monkeypatch.setattr("arena.scenarios.pages.forms.enqueue_scenario", draw_scenario)
     monkeypatch.setattr("arena.scenarios.pages.scenarios.enqueue_scenario", draw_scenario)
     monkeypatch.setattr("arena.scenarios.pages.forms.enqueue_job", run_job)
     monkeypatch.setattr("arena.site.acts.transaction.on_commit", lambda done: done())
-    return signed_in(people()["analyst"])
+    return signed_in(people()["researcher"])
 
 
 def run_job(job_pk: int) -> None:
@@ -47,10 +47,10 @@ def given(shown: str, name: str) -> object:
     return json.loads(found.group(1))
 
 
-def test_a_drawn_reference_is_kept_and_shown(analyst: Client) -> None:
+def test_a_drawn_reference_is_kept_and_shown(researcher: Client) -> None:
     here = busy()
     url = reverse("reference-edit", args=[here.code])
-    shown = analyst.post(url, {"modification": CAR}, follow=True).content.decode()
+    shown = researcher.post(url, {"modification": CAR}, follow=True).content.decode()
     assert "The reference is kept" in shown
     assert reverse("picture", args=["reference", here.code]) in shown
     here.refresh_from_db()
@@ -58,22 +58,22 @@ def test_a_drawn_reference_is_kept_and_shown(analyst: Client) -> None:
     assert here.reference["add"][0]["lane_id"] == "Lane1"
 
 
-def test_an_augmentation_is_corrected_and_both_say_so(analyst: Client) -> None:
+def test_an_augmentation_is_corrected_and_both_say_so(researcher: Client) -> None:
     row = launch().augmentations.get()
     runner.work_on(augmentation_pk=row.pk)
     url = reverse("correct", args=[row.code])
     page = reverse("augmentation", args=[row.code])
-    assert url in analyst.get(page).content.decode()
-    assert given(analyst.get(url).content.decode(), "modification") is not None
-    refused = analyst.post(url, {"modification": CAR, "contestant": "Not A Slug"})
+    assert url in researcher.get(page).content.decode()
+    assert given(researcher.get(url).content.decode(), "modification") is not None
+    refused = researcher.post(url, {"modification": CAR, "contestant": "Not A Slug"})
     assert refused.status_code == 422
-    shown = analyst.post(
+    shown = researcher.post(
         url, {"modification": CAR, "contestant": "by-hand", "notes": "too far left"}, follow=True
     ).content.decode()
     made = Augmentation.objects.get(corrects=row)
     assert (made.state, made.contestant.kind, made.notes) == ("done", "human", "too far left")
-    assert "Corrected by hand by the-analyst" in shown
+    assert "Corrected by hand by the-researcher" in shown
     assert page in shown
-    picture = analyst.get(reverse("picture", args=["augmentation", made.code]))
+    picture = researcher.get(reverse("picture", args=["augmentation", made.code]))
     assert b"".join(picture).startswith(b"\x89PNG")
-    assert reverse("augmentation", args=[made.code]) in analyst.get(page).content.decode()
+    assert reverse("augmentation", args=[made.code]) in researcher.get(page).content.decode()

@@ -44,8 +44,8 @@ def rated() -> Snapshot:
 
 
 @pytest.fixture
-def analyst() -> Client:
-    return signed_in(people()["analyst"])
+def reader() -> Client:
+    return signed_in(people()["researcher"])
 
 
 def grid(client: Client, snapshot: Snapshot, **query: str) -> str:
@@ -84,7 +84,7 @@ def test_disagreement_is_the_mean_distance_of_two_judgements(
     assert given.disagreement == pytest.approx(expected)
 
 
-def test_the_votes_on_the_most_disputed_pair_come_first(rated: Snapshot, analyst: Client) -> None:
+def test_the_votes_on_the_most_disputed_pair_come_first(rated: Snapshot, reader: Client) -> None:
     judged_twice = [score for score in read_evidence(rated).pairs.values() if score.votes > 1]
     agreement = rated.results.trust.agreement
     assert agreement is not None
@@ -92,12 +92,12 @@ def test_the_votes_on_the_most_disputed_pair_come_first(rated: Snapshot, analyst
     listed = list(vote_page(rated, VoteSearch(order="disputed"), 1))
     said = [vote.pair.disagreement for vote in listed if vote.pair]
     assert said == [1.0, 1.0, 0.5, 0.5, *[0.0] * 21]
-    first = first_card(grid(analyst, rated, order="disputed"))
+    first = first_card(grid(reader, rated, order="disputed"))
     assert "place-5" in first
     assert "disagreement 100 % of" in first
     assert len(pictures_in(first)) == 2
     for address in pictures_in(first):
-        assert b"".join(analyst.get(address))[:4] == b"\x89PNG"
+        assert b"".join(reader.get(address))[:4] == b"\x89PNG"
 
 
 def test_votes_by_scenario_are_walked_through_in_that_order(rated: Snapshot) -> None:

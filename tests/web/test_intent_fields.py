@@ -110,12 +110,12 @@ def test_the_page_shows_all_of_an_intent_and_takes_further_objects() -> None:
     scenario = add_scenario("street")
     document = intent_of_fields(fields_of_intent(CHAIN))
     editing.enter_intent(scenario=scenario.slug, document=document)
-    analyst, url = signed_in(people()["analyst"]), reverse("intent-edit", args=[scenario.code])
-    fields = sent_by(analyst.get(url).content.decode())
+    reader, url = (signed_in(people()["researcher"]), reverse("intent-edit", args=[scenario.code]))
+    fields = sent_by(reader.get(url).content.decode())
     assert fields["i_kind"] == ["vehicles", "walk", "", "", ""]
     assert intent_of_fields(_entered_fields(querydict(fields))) == document
     fields["i_kind"][2], fields["i_distance_m"][2], fields["i_start"][2] = "walk", "9", "right"
-    answer = analyst.post(url, fields)
+    answer = reader.post(url, fields)
     assert answer.status_code == 302, answer.content.decode()
     scenario.refresh_from_db()
     assert [one["kind"] for one in scenario.intent["requests"]] == ["vehicles", "walk", "walk"]  # type: ignore[index]

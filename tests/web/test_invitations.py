@@ -66,9 +66,9 @@ def test_the_button_signs_in_for_thirty_days_and_leads_to_the_first_pair(study: 
 
 
 def test_another_account_on_the_device_is_named_and_signed_out(study: Study) -> None:
-    client = signed_in(people()["analyst"])
+    client = signed_in(people()["researcher"])
     url = link(study)
-    assert "You are signed in as the-analyst" in text(client.get(url).content)
+    assert "You are signed in as the-researcher" in text(client.get(url).content)
     client.post(url)
     assert who(client) == "eva"
 

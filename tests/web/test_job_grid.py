@@ -59,35 +59,35 @@ def large_job(*, scenarios: int, contestants: int, samples: int = 1) -> Generati
 
 
 @pytest.fixture
-def analyst() -> Client:
-    return signed_in(people()["analyst"])
+def researcher() -> Client:
+    return signed_in(people()["researcher"])
 
 
-def page(analyst: Client, job: GenerationJob, query: str = "") -> str:
-    return analyst.get(reverse("job", args=[job.code]) + query).content.decode()
+def page(researcher: Client, job: GenerationJob, query: str = "") -> str:
+    return researcher.get(reverse("job", args=[job.code]) + query).content.decode()
 
 
 def test_ten_thousand_cells_cost_as_much_as_a_page_of_them(
-    analyst: Client, django_assert_max_num_queries: Questions
+    researcher: Client, django_assert_max_num_queries: Questions
 ) -> None:
     job = large_job(scenarios=100, contestants=20, samples=5)
     assert job.augmentations.count() == 10_000
     for query in ("", "?row=17&column=2", "?view=pictures", "?state=unreadable&q=street-09"):
         with django_assert_max_num_queries(17):  # type: ignore[attr-defined]
-            found = page(analyst, job, query)
+            found = page(researcher, job, query)
         assert 0 < len(CELL.findall(found)) <= 300
         assert len(found) < 300_000
         assert "Measure now" in found, "nothing is measured unasked"
 
 
-def test_every_cell_is_on_exactly_one_page(analyst: Client) -> None:
+def test_every_cell_is_on_exactly_one_page(researcher: Client) -> None:
     job = large_job(scenarios=7, contestants=12, samples=12)
     seen: list[str] = []
     for column in (1, 2):
         for sample in (1, 2):
             row = 1
             while True:
-                found = page(analyst, job, f"?row={row}&column={column}&sample={sample}")
+                found = page(researcher, job, f"?row={row}&column={column}&sample={sample}")
                 seen += re.findall(r'id="cell-([0-9a-f-]+)"', found)
                 row += 1
                 if f"row={row}&amp;" not in found and f"?row={row}" not in found:
@@ -106,11 +106,11 @@ def test_every_cell_is_on_exactly_one_page(analyst: Client) -> None:
     ],
 )
 def test_the_grid_is_narrowed_by_word_and_state(
-    analyst: Client, query: str, shown: list[str] | int
+    researcher: Client, query: str, shown: list[str] | int
 ) -> None:
     job = large_job(scenarios=3, contestants=2)
     first = job.augmentations.filter(scenario__slug="street-000").order_by("pk")[0]
     job.augmentations.filter(pk=first.pk).update(state=State.FAILED, reason="broke")
-    grid = page(analyst, job, query).split('id="grid"')[1]
+    grid = page(researcher, job, query).split('id="grid"')[1]
     found = re.findall(r'<th scope="row"><a[^>]*>(street-\d+)</a>', grid)
     assert found == shown if isinstance(shown, list) else len(found) == shown

@@ -101,12 +101,12 @@ def test_progress_is_counted_and_not_sent_again_while_nothing_changes() -> None:
 @pytest.fixture
 def staff() -> dict[str, Client]:
     made = people()
-    return {name: signed_in(made[name]) for name in ("admin", "analyst")}
+    return {name: signed_in(made[name]) for name in ("admin", "researcher")}
 
 
 def page(staff: dict[str, Client], name: str, job: GenerationJob) -> str:
     address = reverse(name, args=[job.code] if name == "job" else [])
-    return staff["analyst"].get(address).content.decode()
+    return staff["researcher"].get(address).content.decode()
 
 
 def is_worked_on(staff: dict[str, Client], job: GenerationJob) -> bool:

@@ -76,10 +76,10 @@ def test_the_scene_before_stays_out_where_it_shows_another_window(
     assert signed_in(eva).get(url).getvalue().startswith(b"\x89PNG")
 
 
-def test_an_admin_opens_a_labelling_and_an_analyst_reads_it(job: GenerationJob, eva: User) -> None:
+def test_an_admin_opens_a_labelling_that_staff_read(job: GenerationJob, eva: User) -> None:
     accounts, url = people(), reverse("faults", args=[job.code])
     sent = {"name": "Faults", "experts": ["eva"], "seed": "1"}
-    assert signed_in(accounts["analyst"]).post(url, sent).status_code == 403
+    assert signed_in(accounts["researcher"]).post(url, sent).status_code == 403
     admin = signed_in(accounts["admin"])
     assert admin.post(url, {**sent, "experts": []}).status_code == 422
     assert "is open" in admin.post(url, {**sent, "sure": "1"}, follow=True).content.decode()
@@ -89,10 +89,10 @@ def test_an_admin_opens_a_labelling_and_an_analyst_reads_it(job: GenerationJob, 
     signed_in(eva).post(
         reverse("label", args=[labelling.code]), {"task": labelling.tasks.all()[0].code}
     )
-    shown = signed_in(accounts["analyst"]).get(url).content.decode()
+    shown = signed_in(accounts["researcher"]).get(url).content.decode()
     assert "Cohen’s kappa" in shown
     assert "1 of 2" in shown
-    table = signed_in(accounts["analyst"]).get(
+    table = signed_in(accounts["researcher"]).get(
         reverse("job-export", args=[job.code, "faults", "csv"])
     )
     assert table.content.startswith(b"contestant,slug")

@@ -42,7 +42,7 @@ def test_files_are_the_same_in_every_language() -> None:
     for matchup in study.matchups.all():
         vote(matchup)
     rate(study=close_study(study=study), rounds=20)
-    reader = signed_in(people()["analyst"])
+    reader = signed_in(people()["researcher"])
     for form in ("csv", "json", "latex"):
         address = reverse("results-export", args=[study.code, "leaderboard", form])
         english, german = (

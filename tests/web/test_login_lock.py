@@ -31,7 +31,7 @@ def test_others_and_other_places_are_not_locked() -> None:
     people()
     for _ in range(5):
         attempt("wrong")
-    assert attempt("a password", "the-analyst").status_code == 302
+    assert attempt("a password", "the-researcher").status_code == 302
     assert attempt("a password", REMOTE_ADDR="192.0.2.7").status_code == 302
 
 

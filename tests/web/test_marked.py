@@ -39,16 +39,16 @@ def row() -> Augmentation:
 def test_the_page_has_the_picture_drawn_and_shows_it_with_the_same_numbers(
     row: Augmentation, django_capture_on_commit_callbacks: OnCommit
 ) -> None:
-    analyst, url = signed_in(people()["analyst"]), reverse("augmentation", args=[row.code])
+    researcher, url = signed_in(people()["researcher"]), reverse("augmentation", args=[row.code])
     with django_capture_on_commit_callbacks() as waiting:  # type: ignore[attr-defined]
-        before = analyst.get(url).content.decode()
+        before = researcher.get(url).content.decode()
     assert len(waiting) == 1
     assert "A worker is drawing the marks." in before
     assert 'content="2; url=?look=1"' in before
     name = draw_marked(augmentation_pk=row.pk)
     assert default_storage.exists(name)
     with django_capture_on_commit_callbacks() as waiting:  # type: ignore[attr-defined]
-        after = analyst.get(url).content.decode()
+        after = researcher.get(url).content.decode()
     assert not waiting
     picture = reverse("picture", args=["marked", row.code])
     assert picture in after
@@ -57,7 +57,7 @@ def test_the_page_has_the_picture_drawn_and_shows_it_with_the_same_numbers(
     assert found is not None
     assert after.count('class="number ') == len(found.faults) >= 2
     assert [line.kind for line in found.faults][:2] == ["asked_count", "asked_type"]
-    shown = analyst.get(picture)
+    shown = researcher.get(picture)
     assert shown.getvalue()[:4] == b"\x89PNG"
     shown.close()
 

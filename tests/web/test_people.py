@@ -70,12 +70,12 @@ def test_a_forged_or_old_first_link_opens_nothing(monkeypatch: pytest.MonkeyPatc
 
 def test_an_admin_makes_an_account_whose_owner_sets_the_password() -> None:
     admin = signed_in(people()["admin"])
-    answer = admin.post(reverse("people"), {"username": "grace", "role": "analyst"})
+    answer = admin.post(reverse("people"), {"username": "grace", "role": "researcher"})
     (link,) = re.findall(r"http://testserver(/welcome/[^/\"]+/)", answer.content.decode())
     guest = Client()
     assert "grace" in guest.get(link).content.decode()
     assert guest.post(link, TWICE).status_code == 302
-    assert guest.get(reverse("jobs")).status_code == 200, "signed in, and an analyst"
+    assert guest.get(reverse("jobs")).status_code == 200, "signed in, and a researcher"
     assert Client().get(link).status_code == 410, "it works once"
     assert can_sign_in("grace", PASSWORD)
 
@@ -130,12 +130,12 @@ def test_a_paused_account_is_signed_out_and_can_go_on_later() -> None:
 def test_a_role_is_changed_for_another_and_logged() -> None:
     accounts = people()
     expert = accounts["expert"]
-    change(accounts["admin"], expert, role="analyst")
+    change(accounts["admin"], expert, role="researcher")
     assert signed_in(expert).get(reverse("jobs")).status_code == 200
     (event,) = Event.objects.filter(verb="change role")
-    assert (event.before, event.after) == ({"role": "expert"}, {"role": "analyst"})
+    assert (event.before, event.after) == ({"role": "expert"}, {"role": "researcher"})
     change(accounts["admin"], expert, role="king")
-    assert {group.name for group in expert.groups.all()} == {"analyst"}
+    assert {group.name for group in expert.groups.all()} == {"researcher"}
 
 
 def test_nobody_pauses_demotes_or_forgets_themselves() -> None:
@@ -198,7 +198,7 @@ def test_the_newest_link_of_who_has_no_password_is_the_only_one() -> None:
     first, second = (make_welcome_token(grace, actor=admin) for _ in range(2))
     assert (is_open(first), is_open(second)) == (False, True)
     assert Event.objects.filter(verb="make link", actor=admin).count() == 2
-    set_role(user=grace, role="analyst", actor=admin)
+    set_role(user=grace, role="researcher", actor=admin)
     assert not is_open(second), "whoever had the link would get the new role"
     third = make_welcome_token(grace, actor=admin)
     set_active(user=grace, is_active=False, actor=admin)

@@ -44,7 +44,7 @@ def test_the_page_is_usable_without_any_study() -> None:
 def test_an_open_study_gives_its_numbers_but_nothing_of_its_results() -> None:
     study = _voted()
     rate(study=study, early=True)
-    known = known_of(study, people()["analyst"])
+    known = known_of(study, people()["researcher"])
     assert known == {"contestants": 3, "experts": 2, "scenarios": 6}
 
 

@@ -26,15 +26,15 @@ def server() -> Iterator[Scripted]:
 
 
 @pytest.fixture
-def analyst() -> Client:
-    return signed_in(people()["analyst"])
+def researcher() -> Client:
+    return signed_in(people()["researcher"])
 
 
 @pytest.mark.parametrize(
     ("variant", "options"), [("otm", {}), ("fc", {}), ("fc", {"protocol": "native"}), ("tqa", {})]
 )
 def test_the_page_shows_what_the_wire_then_carries(
-    analyst: Client, server: Scripted, variant: str, options: dict[str, object]
+    researcher: Client, server: Scripted, variant: str, options: dict[str, object]
 ) -> None:
     add(server, "asked", variant, **options)
     [row] = run("asked")
@@ -44,7 +44,7 @@ def test_the_page_shows_what_the_wire_then_carries(
         row.scenario, variant=variant, role="modifier", native_tools=bool(options)
     )
     assert [json.loads(tool) for tool in preview.tools] == sent.get("tools", [])
-    page = analyst.get(reverse("prompts", args=[row.scenario.code]), asked).content.decode()
+    page = researcher.get(reverse("prompts", args=[row.scenario.code]), asked).content.decode()
     shown = [
         html.unescape(one) for one in re.findall(r"<pre data-message[^>]*>(.*?)</pre>", page, re.S)
     ]
@@ -52,12 +52,12 @@ def test_the_page_shows_what_the_wire_then_carries(
     assert re.search(r"About [\d,]+ tokens of text", page)
 
 
-def test_a_viewer_s_picture_is_shown_and_nobody_is_asked(analyst: Client) -> None:
+def test_a_viewer_s_picture_is_shown_and_nobody_is_asked(researcher: Client) -> None:
     here = add_scenario("street")
     asked = {"variant": "vqa", "role": "viewer"}
     url = reverse("prompts", args=[here.code])
-    shown = analyst.get(url, asked).content.decode()
+    shown = researcher.get(url, asked).content.decode()
     assert "In which lane does each blue object stand?" in html.unescape(shown)
-    picture = analyst.get(reverse("prompt-image", args=[here.code, 0]), asked)
+    picture = researcher.get(reverse("prompt-image", args=[here.code, 0]), asked)
     assert picture.content.startswith(b"\x89PNG")
     assert not ModelCall.objects.exists()

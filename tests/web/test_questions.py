@@ -61,11 +61,11 @@ def test_every_question_is_for_admins_alone_and_no_crawler_acts() -> None:
     study = study_rows.a_study()
     job = GenerationJob.objects.all()[0]
     labelling = open_labelling(name="F", job=job, experts=["eva"], seed=1)
-    analyst = signed_in(people()["analyst"])
+    researcher = signed_in(people()["researcher"])
     for name, row in (("study-close", study), ("job-cancel", job), ("labelling-close", labelling)):
         page = reverse(name, args=[row.code])
-        assert analyst.get(page).status_code == 403
-        assert analyst.post(page, {"sure": "1"}).status_code == 403
+        assert researcher.get(page).status_code == 403
+        assert researcher.post(page, {"sure": "1"}).status_code == 403
     admin = signed_in(User.objects.get(username="the-admin"))
     admin.get(reverse("study-close", args=[study.code]), {"sure": "1"})
     study.refresh_from_db()

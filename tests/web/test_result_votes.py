@@ -34,8 +34,8 @@ def study() -> Study:
 
 
 @pytest.fixture
-def analyst() -> Client:
-    return signed_in(people()["analyst"])
+def reader() -> Client:
+    return signed_in(people()["researcher"])
 
 
 def listed(client: Client, study: Study, **search: str) -> str:
@@ -69,19 +69,19 @@ def links_of(page: str) -> dict[str, int | None]:
     "filters", [Filters(), Filters(leave_out_own=True, kinds=("main", "repeat"))]
 )
 def test_every_number_leads_to_as_many_votes(
-    study: Study, analyst: Client, filters: Filters
+    study: Study, reader: Client, filters: Filters
 ) -> None:
     rate(study=study, rounds=10, filters=filters)
     promised: dict[str, int | None] = {}
     for tab in TABS:
-        shown = analyst.get(reverse("results-tab", args=[study.code, tab]))
+        shown = reader.get(reverse("results-tab", args=[study.code, tab]))
         promised |= links_of(shown.content.decode())
     assert len(promised) > 50
     parts = set(re.findall(r"part=(\w+)", " ".join(promised)))
     assert {"alike", "repeats"} <= parts
     wrong = {}
     for address, number in promised.items():
-        answer = analyst.get(address)
+        answer = reader.get(address)
         assert answer.status_code == 200, address
         found = number_of(answer.content.decode())
         if number is not None and found != number:
@@ -89,21 +89,21 @@ def test_every_number_leads_to_as_many_votes(
     assert wrong == {}
 
 
-def test_the_file_has_the_votes_of_the_list(study: Study, analyst: Client) -> None:
+def test_the_file_has_the_votes_of_the_list(study: Study, reader: Client) -> None:
     rate(study=study, rounds=10, filters=Filters())
     address = reverse("results-votes-file", args=[study.code])
     pseudonyms = study.experts.values_list("person__pseudonym", flat=True)
     for search in ({}, {"mark": "left_out"}, {"contestant": "ann", "outcome": "lost"}):
-        answer = analyst.get(address, search)
+        answer = reader.get(address, search)
         content = b"".join(answer).decode()
         rows = list(csv.DictReader(io.StringIO(content)))
-        assert len(rows) == number_of(listed(analyst, study, **search)) > 0
+        assert len(rows) == number_of(listed(reader, study, **search)) > 0
         assert {row["judge"] for row in rows} <= {"", *pseudonyms}
-    skipped = b"".join(analyst.get(address, {"mark": "skip"})).decode()
+    skipped = b"".join(reader.get(address, {"mark": "skip"})).decode()
     assert skipped.count(",skip,cannot_judge,") == 2
 
 
-def test_a_vote_shows_the_pair_as_it_was_shown(study: Study, analyst: Client) -> None:
+def test_a_vote_shows_the_pair_as_it_was_shown(study: Study, reader: Client) -> None:
     rate(study=study, rounds=10)
     vote = Vote.objects.filter(comment__contains="kerb").order_by("pk")[0]
     shades = {"left": 10, "right": 200, "original": 90}
@@ -113,30 +113,30 @@ def test_a_vote_shows_the_pair_as_it_was_shown(study: Study, analyst: Client) ->
     vote.shown_left.refresh_from_db()
     type(vote.shown_left).objects.filter(pk=vote.shown_left_id).update(image="drawn-anew.png")
     page = " ".join(
-        analyst.get(reverse("results-vote", args=[study.code, vote.key])).content.decode().split()
+        reader.get(reverse("results-vote", args=[study.code, vote.key])).content.decode().split()
     )
     matchup = Matchup.objects.get(pk=vote.matchup_id)
     for side, shade in shades.items():
         address = reverse("shown-picture", args=[study.code, matchup.code, side])
         assert address in page
-        assert b"".join(analyst.get(address)) == png(shade)
+        assert b"".join(reader.get(address)) == png(shade)
     left, right = page.index("<b>A</b> is by"), page.index("<b>B</b> is by")
     assert left < page.index(vote.shown_left.contestant.name, left) < right
     assert page.index(vote.shown_right.contestant.name, right)
     for said in (vote.matchup.scenario.instruction, "The car stands on the kerb.", "0.4 s"):
         assert said in page, said
     address = reverse("shown-picture", args=[study.code, matchup.code, "upside-down"])
-    assert analyst.get(address).status_code == 404
+    assert reader.get(address).status_code == 404
 
 
-def test_a_vote_given_after_the_rating_is_none_of_it(study: Study, analyst: Client) -> None:
+def test_a_vote_given_after_the_rating_is_none_of_it(study: Study, reader: Client) -> None:
     snapshot = rate(study=study, rounds=10)
     newest = Vote.objects.latest("pk")
     Snapshot.objects.filter(pk=snapshot.pk).update(last_vote=newest.pk - 1)
-    assert analyst.get(reverse("results-vote", args=[study.code, newest.key])).status_code == 404
+    assert reader.get(reverse("results-vote", args=[study.code, newest.key])).status_code == 404
 
 
-def test_an_open_study_keeps_its_votes_until_an_early_look(analyst: Client) -> None:
+def test_an_open_study_keeps_its_votes_until_an_early_look(reader: Client) -> None:
     study = mixed_study(close=False)
     rate(study=study, rounds=10, early=True)
     vote = Vote.objects.latest("pk")
@@ -147,11 +147,11 @@ def test_an_open_study_keeps_its_votes_until_an_early_look(analyst: Client) -> N
         reverse("shown-picture", args=[study.code, vote.matchup.code, "left"]),
     ]
     hang(vote.shown_left, store(png(7)))
-    assert [analyst.get(address).status_code for address in addresses] == [403] * 4
+    assert [reader.get(address).status_code for address in addresses] == [403] * 4
     eva = signed_in(vote.expert)
-    analyst.post(reverse("results-open", args=[study.code]))
+    reader.post(reverse("results-open", args=[study.code]))
     for address in addresses:
-        answer = analyst.get(address)
+        answer = reader.get(address)
         b"".join(answer)
         assert answer.status_code == 200, address
         assert eva.get(address).status_code == 403

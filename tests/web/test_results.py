@@ -25,7 +25,7 @@ def judged(**cast: object) -> Study:
 
 
 def shown(study: Study, user: User | None = None, tab: str = "table") -> str:
-    reader = user or people()["analyst"]
+    reader = user or people()["researcher"]
     answer = signed_in(reader).get(reverse("results-tab", args=[study.code, tab]))
     assert answer.status_code == 200
     return answer.content.decode()
@@ -48,7 +48,7 @@ def test_what_is_simulated_is_said_on_every_page_of_the_study() -> None:
         study_rows.vote(matchup)
     study = close_study(study=study)
     rate(study=study, rounds=50)
-    reader = people()["analyst"]
+    reader = people()["researcher"]
     page = shown(study, reader)
     assert "Simulated votes and contestants count in this study." in page
     assert page.count("simulated</span>") == 3

@@ -34,20 +34,20 @@ def study() -> Study:
 
 
 @pytest.fixture
-def analyst() -> Client:
-    return signed_in(people()["analyst"])
+def reader() -> Client:
+    return signed_in(people()["researcher"])
 
 
 def test_every_tab_reads_the_snapshot_with_few_queries(
-    study: Study, analyst: Client, django_assert_max_num_queries: DjangoAssertNumQueries
+    study: Study, reader: Client, django_assert_max_num_queries: DjangoAssertNumQueries
 ) -> None:
     for tab in TABS:
-        page(analyst, study, tab)  # templates are compiled once
+        page(reader, study, tab)  # templates are compiled once
         with django_assert_max_num_queries(13):
-            page(analyst, study, tab)
+            page(reader, study, tab)
 
 
-def test_raters_are_pseudonyms_with_repeats_and_checks(analyst: Client) -> None:
+def test_raters_are_pseudonyms_with_repeats_and_checks(reader: Client) -> None:
     study = study_rows.a_study(votes_per_expert=9)
     first, second, third, *rest = study_rows.matchups_of(study, "eva")
     Matchup.objects.filter(pk=second.pk).update(
@@ -62,7 +62,7 @@ def test_raters_are_pseudonyms_with_repeats_and_checks(analyst: Client) -> None:
     repeats = snapshot.results.trust.repeats
     assert repeats is not None
     assert (repeats.number, repeats.same.value) == (1, 0.0), "left both times"
-    shown = page(analyst, study, "raters")
+    shown = page(reader, study, "raters")
     assert first.expert.person.pseudonym in shown
     assert "eva" not in shown
     assert "of 1 hidden repeat answered alike" in shown
@@ -85,7 +85,7 @@ def test_experts_read_the_table_but_nothing_about_each_other(study: Study) -> No
     assert expert.get(chart).status_code == 200
 
 
-def test_a_new_rating_is_asked_for_with_method_and_filters(study: Study, analyst: Client) -> None:
+def test_a_new_rating_is_asked_for_with_method_and_filters(study: Study, reader: Client) -> None:
     person = study.experts.order_by("pk")[0].person
     sent = {
         "method": "bt",
@@ -95,12 +95,12 @@ def test_a_new_rating_is_asked_for_with_method_and_filters(study: Study, analyst
         "types": [ScenarioType.NUDGE.value],
         "experts": [str(person.code)],
     }
-    analyst.post(reverse("study-rate", args=[study.code]), sent)
+    reader.post(reverse("study-rate", args=[study.code]), sent)
     made = study.snapshots.order_by("-pk")[0]
     assert (made.rounds, made.seed, made.resampling_unit) == (60, 9, "vote")
     assert made.filters["experts"] == [str(person.code)]
     assert 0 < made.votes_counted < 90
-    analyst.post(reverse("study-rate", args=[study.code]), {"rounds": "0"})
+    reader.post(reverse("study-rate", args=[study.code]), {"rounds": "0"})
     assert study.snapshots.count() == 2
 
 
@@ -109,21 +109,21 @@ def test_an_open_study_shows_a_gate_then_its_results_to_who_opened_them() -> Non
     for matchup in study.matchups.all():
         study_rows.vote(matchup)
     made = people()
-    analyst, admin = signed_in(made["analyst"]), signed_in(made["admin"])
+    reader, admin = signed_in(made["researcher"]), signed_in(made["admin"])
     study.experts.add(made["admin"])
     address = reverse("results", args=[study.code])
-    assert "Opening results ends your voting" not in analyst.get(address).content.decode()
+    assert "Opening results ends your voting" not in reader.get(address).content.decode()
     assert "Opening results ends your voting" in admin.get(address).content.decode()
-    assert analyst.post(reverse("study-rate", args=[study.code])).status_code == 403
-    analyst.post(reverse("results-open", args=[study.code]))
-    assert EarlyLook.objects.get().user == made["analyst"]
-    analyst.post(reverse("study-rate", args=[study.code]))
-    shown = analyst.get(address).content.decode()
+    assert reader.post(reverse("study-rate", args=[study.code])).status_code == 403
+    reader.post(reverse("results-open", args=[study.code]))
+    assert EarlyLook.objects.get().user == made["researcher"]
+    reader.post(reverse("study-rate", args=[study.code]))
+    shown = reader.get(address).content.decode()
     assert "you opened its results early" in shown
     assert "Early look" not in shown, "one note says that the study is open"
     early = study.snapshots.get()
     close_study(study=study)
-    shown = analyst.get(address, {"rating": str(early.code)}).content.decode()
+    shown = reader.get(address, {"rating": str(early.code)}).content.decode()
     assert "Early look: the study was still open." in shown
     Study.objects.filter(pk=study.pk).update(state=Study.State.OPEN)
     assert "still open" in admin.get(address).content.decode(), "each opens for themselves"

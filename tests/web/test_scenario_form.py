@@ -27,12 +27,12 @@ street-scene,jaywalking_pedestrian,Let somebody cross.,two,"{CHANGE.replace(chr(
 
 
 @pytest.fixture
-def analyst(monkeypatch: pytest.MonkeyPatch) -> Client:
+def reader(monkeypatch: pytest.MonkeyPatch) -> Client:
     """Signed in; what is sent to a worker is done at once."""
     monkeypatch.setattr("arena.scenarios.pages.uploads.enqueue_scene", draw_scene)
     monkeypatch.setattr("arena.scenarios.pages.forms.enqueue_scenario", draw_scenario)
     monkeypatch.setattr("arena.site.acts.transaction.on_commit", lambda done: done())
-    return signed_in(people()["analyst"])
+    return signed_in(people()["researcher"])
 
 
 @pytest.fixture
@@ -48,10 +48,10 @@ def send(client: Client, scene: BaseScene, **fields: str) -> tuple[str, Scenario
 
 
 def test_a_scenario_of_a_type_of_one_s_own_with_an_intent_by_fields(
-    analyst: Client, scene: BaseScene
+    reader: Client, scene: BaseScene
 ) -> None:
     shown, made = send(
-        analyst,
+        reader,
         scene,
         type="",
         own_type="parked_bus",
@@ -95,9 +95,9 @@ def test_a_scenario_of_a_type_of_one_s_own_with_an_intent_by_fields(
     ],
 )
 def test_what_can_not_be_is_told_and_nothing_is_lost(
-    analyst: Client, scene: BaseScene, fields: dict[str, str], problem: str
+    reader: Client, scene: BaseScene, fields: dict[str, str], problem: str
 ) -> None:
-    shown, made = send(analyst, scene, **{"slug": "kept-as-it-was", **fields})
+    shown, made = send(reader, scene, **{"slug": "kept-as-it-was", **fields})
     assert made is None
     assert problem in shown
     assert fields.get("slug", "kept-as-it-was") in shown
@@ -109,10 +109,10 @@ def upload(client: Client, text: str) -> str:
 
 
 @pytest.mark.usefixtures("scene")
-def test_a_file_is_added_as_a_whole_or_not_at_all(analyst: Client) -> None:
-    assert "Nothing was added" in upload(analyst, ROWS.replace("two", "One"))
+def test_a_file_is_added_as_a_whole_or_not_at_all(reader: Client) -> None:
+    assert "Nothing was added" in upload(reader, ROWS.replace("two", "One"))
     assert Scenario.objects.count() == 1
-    assert "2 scenarios are added" in upload(analyst, ROWS)
+    assert "2 scenarios are added" in upload(reader, ROWS)
     assert Scenario.objects.get(slug="two").reference is not None
 
 
@@ -133,20 +133,20 @@ def test_what_nothing_needs_is_deleted_and_else_is_said_what_needs_it(scene: Bas
     assert list(Scenario.objects.all()) == [place]
 
 
-def test_a_scenario_is_changed_until_something_needs_it(analyst: Client, scene: BaseScene) -> None:
-    _, made = send(analyst, scene, type="jaywalking_pedestrian")
+def test_a_scenario_is_changed_until_something_needs_it(reader: Client, scene: BaseScene) -> None:
+    _, made = send(reader, scene, type="jaywalking_pedestrian")
     assert made is not None
     page = reverse("scenario-edit", args=[made.code])
-    shown = analyst.get(page).content.decode()
+    shown = reader.get(page).content.decode()
     assert "Let a car cut in.</textarea>" in shown
     given = {"type": "jaywalking_pedestrian", "instruction": "Let a bus cut in.", "density": "low"}
-    assert "is changed" in analyst.post(page, given, follow=True).content.decode()
+    assert "is changed" in reader.post(page, given, follow=True).content.decode()
     made.refresh_from_db()
     assert (made.instruction, made.traffic_density) == ("Let a bus cut in.", "low")
     assert made.spawned is not None
     job = GenerationJob.objects.create(name="Round 1")
     job.scenarios.add(made)
-    refused = analyst.post(page, given | {"instruction": "Let a tram cut in."}).content.decode()
+    refused = reader.post(page, given | {"instruction": "Let a tram cut in."}).content.decode()
     assert "can’t be changed; it is needed by the job “Round 1”" in refused
     assert "Let a tram cut in." in refused
     made.refresh_from_db()

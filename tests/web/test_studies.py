@@ -42,7 +42,7 @@ def test_progress_is_shown_by_expert_and_says_nothing_of_who_leads() -> None:
     study = study_rows.a_study()
     for matchup in study_rows.matchups_of(study, "eva")[:4]:
         study_rows.vote(matchup)
-    page = signed_in(people()["analyst"]).get(reverse("study", args=[study.code]))
+    page = signed_in(people()["researcher"]).get(reverse("study", args=[study.code]))
     shown = page.content.decode()
     assert "4 of 9" in shown
     assert "4 of 18 votes" in shown
@@ -86,7 +86,7 @@ def test_an_admin_hands_over_what_an_expert_has_not_judged() -> None:
     assert "eva has nothing left to hand over." in again.content.decode()
     nobody = admin.post(url, {"giver": "finn"}, follow=True)
     assert "Choose who takes over." in nobody.content.decode()
-    assert signed_in(User.objects.get(username="the-analyst")).post(url).status_code == 403
+    assert signed_in(User.objects.get(username="the-researcher")).post(url).status_code == 403
 
 
 def test_attention_checks_are_drawn_by_a_worker_with_one_click(

@@ -126,7 +126,7 @@ def test_whoever_looked_early_may_have_the_sheet_but_not_the_whole(closed: Study
     client.post(reverse("study-write", args=[closed.code, "study"]))
     assert not StudyFile.objects.filter(kind="study").exists()
     assert "It is written once the study is closed" in shown(client, closed)
-    other = signed_in(User.objects.get(username="the-analyst"))
+    other = signed_in(User.objects.get(username="the-researcher"))
     address = reverse("study-file", args=[closed.code, "contact-sheet"])
     assert other.get(address).status_code == 403, "each looks on their own account"
 

@@ -62,16 +62,16 @@ def test_pages_ask_for_the_width_that_they_show(picture: bytes) -> None:
     scenario = add_scenario("street")
     scenario.original_image = store(picture)
     scenario.save()
-    analyst = signed_in(people()["analyst"])
+    researcher = signed_in(people()["researcher"])
     address = reverse("picture", args=["original", scenario.code])
     sizes = {
-        query: Image.open(io.BytesIO(b"".join(analyst.get(address + query)))).width
+        query: Image.open(io.BytesIO(b"".join(researcher.get(address + query)))).width
         for query in ("", "?v=1", "?width=400&v=1", "?width=800")
     }
     assert sizes == {"": 2400, "?v=1": 2400, "?width=400&v=1": 400, "?width=800": 800}
     for query in ("?width=2400", "?width=-1", "?width=400.0", "?width=x"):
-        assert analyst.get(address + query).status_code == 404
-    shown = analyst.get(reverse("scenarios")).content.decode()
+        assert researcher.get(address + query).status_code == 404
+    shown = researcher.get(reverse("scenarios")).content.decode()
     assert f"{address}?width=400&amp;v={scenario.original_image[-16:-4]} 400w" in shown
 
 

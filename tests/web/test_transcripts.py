@@ -22,7 +22,7 @@ def ran(row: Augmentation, model: Model | None = None) -> Augmentation:
 
 
 def page_of(row: Augmentation) -> str:
-    answer = signed_in(people()["analyst"]).get(reverse("augmentation", args=[row.code]))
+    answer = signed_in(people()["researcher"]).get(reverse("augmentation", args=[row.code]))
     assert answer.status_code == 200
     return " ".join(answer.content.decode().split())
 

@@ -21,8 +21,8 @@ STREET = json.dumps(scene_to_document(scene(agents=(vehicle("Agent2", 20.0, 0.0)
 
 
 @pytest.fixture
-def analyst() -> Client:
-    return signed_in(people()["analyst"])
+def researcher() -> Client:
+    return signed_in(people()["researcher"])
 
 
 @pytest.fixture(autouse=True)
@@ -47,38 +47,38 @@ def is_picture(client: Client, address: str) -> bool:
     return b"".join(answer).startswith(b"\x89PNG")
 
 
-def test_from_a_file_to_a_scene(analyst: Client) -> None:
-    assert "Choose the moment" in send(analyst)
+def test_from_a_file_to_a_scene(researcher: Client) -> None:
+    assert "Choose the moment" in send(researcher)
     row = SceneUpload.objects.get()
-    shown = analyst.post(
+    shown = researcher.post(
         reverse("upload-show", args=[row.code]), {"track": "0", "stop": "0"}, follow=True
     ).content.decode()
     moment = UploadMoment.objects.get()
     picture = reverse("picture", args=["moment", moment.code])
     assert picture in shown
-    assert is_picture(analyst, picture)
-    shown = analyst.post(
+    assert is_picture(researcher, picture)
+    shown = researcher.post(
         reverse("moment-keep", args=[moment.code]), {"slug": "main-street"}, follow=True
     ).content.decode()
     scene_row = BaseScene.objects.get()
     page = reverse("scene", args=[scene_row.code])
     assert (scene_row.slug, page in shown) == ("main-street", True)
-    analyst.get(page)
+    researcher.get(page)
     for view in ("kept", "cleared", "backdrop"):
-        assert is_picture(analyst, reverse("picture", args=[view, scene_row.code]))
-    assert "picture" in analyst.get(page).content.decode()
+        assert is_picture(researcher, reverse("picture", args=[view, scene_row.code]))
+    assert "picture" in researcher.get(page).content.decode()
 
 
-def test_what_can_not_be_read_says_why(analyst: Client) -> None:
-    shown = send(analyst, b"hello", "notes.txt")
+def test_what_can_not_be_read_says_why(researcher: Client) -> None:
+    shown = send(researcher, b"hello", "notes.txt")
     assert "It can’t be read." in shown
     assert gettempdir() not in shown
     assert "none of the formats" in shown
 
 
-def test_a_file_that_is_too_large_is_not_kept(analyst: Client, settings: LazySettings) -> None:
+def test_a_file_that_is_too_large_is_not_kept(researcher: Client, settings: LazySettings) -> None:
     settings.UPLOAD_MB = 1
-    shown = send(analyst, b" " * 1_000_001)
+    shown = send(researcher, b" " * 1_000_001)
     assert "a file of at most 1 MB" in shown
     assert not SceneUpload.objects.exists()
-    assert "Choose the moment" in send(analyst, STREET + b" " * (1_000_000 - len(STREET)))
+    assert "Choose the moment" in send(researcher, STREET + b" " * (1_000_000 - len(STREET)))

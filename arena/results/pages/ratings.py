@@ -28,7 +28,7 @@ from arena.results.queries.evidence import count_settled
 from arena.results.queries.votes import is_imported
 from arena.results.services.rating_request import RatingRequest
 from arena.results.services.ratings import open_early
-from arena.site.access import ADMIN, ANALYST, EXPERT, STAFF, act_for, page_for, user_of
+from arena.site.access import ADMIN, EXPERT, RESEARCHER, STAFF, act_for, page_for, user_of
 from arena.site.acts import refusals_told, tell_errors
 from arena.studies.pages.studies import export_place
 from augment.errors import UnknownName
@@ -38,7 +38,7 @@ SHOWN = 12
 """So many ratings can be chosen on the page; the log lists all."""
 
 
-@page_for(ADMIN, ANALYST, EXPERT)
+@page_for(ADMIN, RESEARCHER, EXPERT)
 def results_page(request: HttpRequest, code: uuid.UUID, tab: str = "table") -> HttpResponse:
     """One tab of a rating; of an open study only for staff who opened its results."""
     study = get_object_or_404(Study.objects.select_related("vote_file"), code=code)
@@ -123,7 +123,7 @@ def open_results_early(request: HttpRequest, code: uuid.UUID) -> None:
     open_early(study=study, actor=user_of(request))
 
 
-@page_for(ADMIN, ANALYST, EXPERT)
+@page_for(ADMIN, RESEARCHER, EXPERT)
 def rating_file(request: HttpRequest, code: uuid.UUID, name: str, form: str) -> HttpResponse:
     """A file of the rating that the address names, else of the newest.
 

@@ -201,7 +201,7 @@ TABS: dict[str, Callable[[Snapshot, LeaderboardTable], Context]] = {
     "log": fill_log,
 }
 FOR_EXPERTS = ("table", "pairs", "types")
-"""The tabs that not only analysts and admins see."""
+"""The tabs that not only researchers and admins see."""
 
 
 def show_adjustment(snapshot: Snapshot) -> list[Context] | None:

@@ -11,7 +11,7 @@ from arena.models import EarlyLook, Snapshot, Study
 from arena.people.queries import role_of
 from augment.models import Event
 
-STAFF = ("admin", "analyst")
+STAFF = ("admin", "researcher")
 
 
 class ResultsAccess(StrEnum):

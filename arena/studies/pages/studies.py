@@ -1,4 +1,4 @@
-"""Pages of studies for admins and analysts: progress, reports and files, never who leads."""
+"""Pages of studies for admins and researchers: progress, reports and files, never who leads."""
 
 import uuid
 from typing import Any

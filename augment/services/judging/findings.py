@@ -1,6 +1,6 @@
 """What the geometric checks say of a scene's change: findings, marked pictures, fault guesses.
 
-The reference and anybody's labels stay out of it. Marked pictures are for analysts, never for a
+The reference and anybody's labels stay out of it. Marked pictures are for researchers, never for a
 vote; the name of one says what is on it, so one that no longer fits the findings is never shown.
 """
 
