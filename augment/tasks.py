@@ -25,7 +25,6 @@ from kombu.exceptions import OperationalError
 from augment.errors import QueueRefused, QueueUnreachable
 from augment.services.clock import DATABASE_TIME, Moment
 from augment.services.endpoints.probing import PROBES
-from augment.services.judging.findings import draw_marked
 from augment.services.judging.simulations import DRIVES
 from augment.services.running import workers
 from augment.services.running.intent_readings import READINGS
@@ -49,7 +48,6 @@ REFUSALS = (redis.ResponseError, redis.AuthenticationError, redis.BusyLoadingErr
 register(AUGMENTATIONS, DRIVES, READINGS, PROBES, UPLOADS, MOMENTS)
 
 DRAWN: Mapping[str, Callable[[int], object]] = {
-    "marks": lambda pk: draw_marked(augmentation_pk=pk),
     "scene": pictures.draw_scene,
     "scenario": pictures.draw_scenario,
 }
@@ -165,7 +163,6 @@ enqueue_reading = sender(READINGS)
 enqueue_upload = sender(UPLOADS)
 enqueue_simulations = partial(enqueue, DRIVES)
 
-enqueue_marks = partial(send, draw, "marks")
 enqueue_scenario = partial(send, draw, "scenario")
 enqueue_scene = partial(send, draw, "scene")
 

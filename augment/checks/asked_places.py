@@ -56,7 +56,6 @@ def asked_distance(asked: Asked) -> Iterator[Finding]:
             f"The distance of {what} ahead along the ego's lane",
             ahead_m,
             wanted,
-            belongs_m=asked.route.position(wanted.nearest(ahead_m), asked.left_m(first)),
         )
 
 
@@ -120,9 +119,7 @@ def asked_across(asked: Asked) -> Iterator[Finding]:
             for agent in party.placed:
                 wanted = _wanted(asked, request.spot.lateral, band, agent.width_m / 2.0)
                 left_m = asked.left_m(agent) - band.left_m
-                place = band.left_m + wanted.nearest(left_m)
-                belongs_m = asked.route.position(asked.ahead_m(agent), place)
-                yield _across([agent], left_m, wanted, belongs_m=belongs_m)
+                yield _across([agent], left_m, wanted)
         elif isinstance(request, ConesRequest):
             yield from _cones(asked, party, request, band)
         elif not party.missing:  # else the nearest may be missing, and the others lie anywhere
@@ -134,12 +131,7 @@ def asked_across(asked: Asked) -> Iterator[Finding]:
 
 
 def _across(
-    agents: Sequence[TrafficAgent],
-    left_m: float,
-    wanted: Bounds,
-    *,
-    subject: str = "{agents[0]}",
-    belongs_m: Point | None = None,
+    agents: Sequence[TrafficAgent], left_m: float, wanted: Bounds, *, subject: str = "{agents[0]}"
 ) -> Finding:
     """A place across a lane; right but for left and right it is a fault of reasoning."""
     is_exchanged = not wanted.holds(left_m) and wanted.holds(-left_m)
@@ -149,7 +141,6 @@ def _across(
         f"The offset of {subject} to the left of the lane's centre",
         left_m,
         wanted,
-        belongs_m=belongs_m,
     )
 
 

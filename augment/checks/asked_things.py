@@ -7,7 +7,7 @@ from itertools import combinations
 from augment.checks.bodies import end_of_walk, name_type
 from augment.checks.finding import Finding, FindingKind, find
 from augment.checks.ground import STOPPED_BELOW_MPS
-from augment.checks.parties import SPEED_MPS, SPEED_SHARE, Asked, Bounds, apart_m, hold, middle_of
+from augment.checks.parties import SPEED_MPS, SPEED_SHARE, Asked, Bounds, apart_m, hold
 from augment.geometry.frames import difference
 from augment.scene.entities import TrafficAgent
 from augment.scene.intent import Body, CrashRequest, Facing, Side, VehicleRequest, WalkRequest
@@ -23,11 +23,9 @@ _FACING_DEG = {Facing.WITH_LANE: 0.0, Facing.AGAINST_LANE: 180.0, Facing.ACROSS:
 def asked_count(asked: Asked) -> Iterator[Finding]:
     """What is missing, and what nobody asked for."""
     for party in asked.parties:
-        here = party.everyone
-        belongs_m = None if here else middle_of(party.request.spot, asked.lanes)
         for role, number in party.missing:
             words = f"Asked for and not there: {role}, {number} of them."
-            yield find(FindingKind.ASKED_COUNT, False, here, words, belongs_m=belongs_m)
+            yield find(FindingKind.ASKED_COUNT, False, party.everyone, words)
     for agent in asked.surplus:
         words = f"{{agents[0]}}, {name_type(agent.type)}, is more than was asked for."
         yield find(FindingKind.ASKED_COUNT, False, [agent], words)

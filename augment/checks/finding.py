@@ -4,7 +4,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 
-from augment.scene.entities import Point, TrafficAgent
+from augment.scene.entities import TrafficAgent
 
 
 class FaultClass(StrEnum):
@@ -74,7 +74,6 @@ class Finding:
             missing altogether.
         template: Our own words with fields for `agents`, `lanes` and the numbers.
         lanes: Ids of lanes and connectors that the words name.
-        belongs_m: Where what was asked for would be, None where that is no one place.
         measured: Numbers by name, each name with its unit. Left, ahead and counter-clockwise are
             positive, in the words as well.
     """
@@ -84,7 +83,6 @@ class Finding:
     agents: tuple[str, ...]
     template: str
     lanes: tuple[str, ...] = ()
-    belongs_m: Point | None = None
     measured: Mapping[str, float] = field(default_factory=dict, hash=False)
 
     @property
@@ -119,7 +117,6 @@ def find(
     template: str,
     *,
     lanes: tuple[str, ...] = (),
-    belongs_m: Point | None = None,
     **measured: float,
 ) -> Finding:
     """Return the finding of a kind about some agents.
@@ -130,7 +127,6 @@ def find(
         agents: Whom it is about, or their ids.
         template: The words, as `Finding` has them.
         lanes: Ids of lanes that the words name.
-        belongs_m: Where what was asked for would be.
         **measured: What was measured.
     """
     if isinstance(severity, bool):
@@ -141,6 +137,5 @@ def find(
         agents=tuple(agent if isinstance(agent, str) else agent.id for agent in agents),
         template=template,
         lanes=lanes,
-        belongs_m=belongs_m,
         measured=measured,
     )

@@ -291,10 +291,6 @@ class Bounds:
         """Return whether a value is near enough."""
         return self.off(value) <= self.allowed
 
-    def nearest(self, value: float) -> float:
-        """Return the value of the range that is nearest to one."""
-        return min(max(value, self.low), self.high)
-
     def __str__(self) -> str:
         if math.isinf(self.high - self.low):
             return "at least 0" if self.low >= 0.0 else "at most 0"
@@ -309,7 +305,6 @@ def hold(
     wanted: Bounds,
     *,
     unit: str = "m",
-    belongs_m: Point | None = None,
 ) -> Finding:
     """Return what comes of holding a number against what is asked for.
 
@@ -320,18 +315,10 @@ def hold(
         value: The number.
         wanted: What it is to be.
         unit: Of the number.
-        belongs_m: Where what was asked for would be.
     """
     words = f"{what} is {value:.2f} {unit}; {wanted} {unit} is asked for."
-    return find(
-        kind,
-        wanted.holds(value),
-        agents,
-        words,
-        belongs_m=belongs_m,
-        value=value,
-        off=wanted.off(value),
-    )
+    off = wanted.off(value)
+    return find(kind, wanted.holds(value), agents, words, value=value, off=off)
 
 
 def apart_m(one: TrafficAgent, other: TrafficAgent) -> float:

@@ -4,28 +4,19 @@ In: a `Scene`, a `Modification` (an empty one draws the scene as it is) and a `C
 bytes of a PNG.
 
 A voting picture carries no text but its scale and the distances at its edge, and its bytes depend
-on the scene, the change and the camera alone. Pictures with ids are for reviewers, those with
-marks at what the checks found for researchers, neither ever for a vote.
+on the scene, the change and the camera alone. Pictures with ids are for reviewers and researchers,
+never for a vote.
 """
 
-import math
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
 
 from augment.render import palette
 from augment.render.camera import Camera
-from augment.render.canvas import Box, Canvas, Spot, box_around, overlap, stack_png, text_width_px
-from augment.render.labels import (
-    draw_badges,
-    draw_ghosts,
-    draw_labels,
-    mark_box,
-    place_badges,
-    within,
-)
+from augment.render.canvas import Box, Canvas, stack_png
+from augment.render.labels import draw_badges, draw_ghosts, draw_labels, place_badges
 from augment.render.legend import draw_legend
 from augment.render.marks import draw_mark, draw_motion, draw_walks, is_small
 from augment.render.palette import MarkStyle
@@ -44,7 +35,6 @@ from augment.scene.entities import (
     AgentType,
     LaneConnector,
     Modification,
-    Point,
     Scene,
     TrafficAgent,
     apply,
@@ -59,27 +49,6 @@ SMALL_PX = 60.0
 _LEAST_GAIN = 1.4
 _AROUND_M = 7.0
 _LEAST_WIDTH_M = 20.0
-_RADIUS_PX, _INSET_PX = 15.0, 18.0
-_GAP_PX = 3.0
-_MARGIN_PX = 5.0
-_STAMP_PX = 30
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class FaultMark:
-    """A finding in the picture.
-
-    Attributes:
-        number: As in the list beside the picture.
-        agents: Ids of whom it is about; ids that are not in the scene are passed over.
-        is_wrong: Whether it is wrong, not only doubtful.
-        belongs_m: Where what was asked for would be, None for nowhere.
-    """
-
-    number: int
-    agents: tuple[str, ...]
-    is_wrong: bool
-    belongs_m: Point | None = None
 
 
 def draw(scene: Scene, modification: Modification, camera: Camera) -> bytes:
@@ -142,45 +111,6 @@ def lanes_near(scene: Scene, agents: tuple[TrafficAgent, ...]) -> list[AnyLane]:
     }
     near = [lane for lane in lanes if gaps_m[lane.id] <= NEAR_M]
     return sorted(near, key=lambda lane: (gaps_m[lane.id], lane.id))
-
-
-def draw_annotated(
-    scene: Scene,
-    modification: Modification,
-    camera: Camera,
-    marks: Sequence[FaultMark],
-    *,
-    stamp: str = "",
-) -> bytes:
-    """Draw the scene after a change with numbered marks and everybody's id, as a PNG.
-
-    A mark stands at its agents; a dashed line leads to where what was asked for would be.
-
-    Args:
-        scene: The scene before the change.
-        modification: The change.
-        camera: The window that all pictures of the scenario share.
-        marks: What is marked.
-        stamp: A word across the picture, such as what it must not be taken for.
-
-    Raises:
-        InvalidModification: The change does not fit the scene.
-    """
-    ground, taken = _paint_scene(scene, modification, camera)
-    after = apply(scene, modification)
-    by_id = {agent.id: agent for agent in after.everyone}
-    boxes = [mark_box(ground, agent) for agent in (after.ego, *modification.changed)]
-    # The stamp stands above and below what happens in the middle.
-    for y in (_STAMP_PX + 14.0, ground.height_px - _STAMP_PX) if stamp else ():
-        at = (ground.width_px / 2.0, y)
-        ground.text(at, stamp, palette.STAMP, _STAMP_PX, halo=palette.HALO)
-        half_width = text_width_px(stamp, _STAMP_PX) / 2.0 + _MARGIN_PX
-        taken.append(box_around(at, half_width, _STAMP_PX / 2.0))
-    for mark in marks:
-        agents = [by_id[name] for name in mark.agents if name in by_id]
-        _draw_mark_of_fault(ground, mark, agents, taken, boxes)
-    draw_labels(ground, after, taken=taken)
-    return ground.png(halved=True)
 
 
 # --- The scene ---------------------------------------------------------------------------------
@@ -289,65 +219,4 @@ def _closer(modification: Modification, camera: Camera) -> Camera | None:
         y_min_m=y_m - width_m / shape / 2.0,
         y_max_m=y_m + width_m / shape / 2.0,
         px_per_m=camera.width_px / width_m,
-    )
-
-
-# --- For researchers ----------------------------------------------------------------------------
-
-
-def _draw_mark_of_fault(
-    ground: Canvas, mark: FaultMark, agents: list[TrafficAgent], taken: list[Box], boxes: list[Box]
-) -> None:
-    """Draw a ring round each agent and the number beside the first, else where one is missing."""
-    colour = palette.WRONG if mark.is_wrong else palette.DOUBTFUL
-    for agent in agents:
-        left, top, right, bottom = mark_box(ground, agent)
-        ring = np.array([[left, top], [right, top], [right, bottom], [left, bottom]])
-        outwards = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
-        ground.stroke(ring + _MARGIN_PX * outwards, colour, 2.0, closed=True)
-    belongs_px = None if mark.belongs_m is None else ground.at(*mark.belongs_m)
-    anchor = (_INSET_PX, _INSET_PX + 24.0)
-    if agents:
-        agent_px = ground.at(agents[0].x_m, agents[0].y_m)
-        anchor = _inside(ground, agent_px)
-        if belongs_px is not None:
-            ground.dashed(np.array([agent_px, belongs_px]), colour, 2.5, 7.0, 5.0)
-    elif belongs_px is not None:
-        anchor = _inside(ground, belongs_px)
-    if belongs_px is not None:
-        for slope in (7.0, -7.0):
-            arm = np.array([7.0, slope])
-            cross = np.array([belongs_px - arm, belongs_px + arm])
-            ground.stroke(cross, palette.PAPER, 5.0)
-            ground.stroke(cross, colour, 2.5)
-        taken.append(box_around(belongs_px, _RADIUS_PX, _RADIUS_PX))
-    spot = _free_spot(ground, anchor, taken, boxes)
-    if math.dist(spot, anchor) > 2.5 * _RADIUS_PX:
-        ground.stroke(np.array([spot, anchor]), colour, 1.5)
-    ground.disc(spot, _RADIUS_PX, colour, outline=palette.PAPER, outline_px=2.0)
-    ground.text(spot, str(mark.number), palette.PAPER, 18)
-    taken.append(box_around(spot, _RADIUS_PX, _RADIUS_PX))
-
-
-def _free_spot(ground: Canvas, anchor: Spot, taken: list[Box], boxes: list[Box]) -> Spot:
-    """Return the nearest spot round the anchor that covers no number and no agent, if it can."""
-    turns = [-math.pi / 2.0 + 2.0 * math.pi * step / 12.0 for step in range(12)]
-    spots = [
-        (anchor[0] + radius * math.cos(turn), anchor[1] + radius * math.sin(turn))
-        for radius in (1.2 * _RADIUS_PX * ring for ring in range(1, 14))
-        for turn in turns
-    ]
-    for blocked in (taken + boxes, taken):
-        for spot in spots:
-            box = box_around(spot, _RADIUS_PX, _RADIUS_PX)
-            if within(ground, box) and not any(overlap(box, one, _GAP_PX) for one in blocked):
-                return spot
-    return anchor
-
-
-def _inside(ground: Canvas, at_px: Spot) -> Spot:
-    """Return the point, or the nearest of the picture where it lies outside."""
-    return (
-        min(max(at_px[0], _INSET_PX), ground.width_px - _INSET_PX),
-        min(max(at_px[1], _INSET_PX), ground.height_px - _INSET_PX),
     )

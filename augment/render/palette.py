@@ -34,6 +34,7 @@ LANE_TEXT: Colour = (0, 0, 128)
 HALO: Colour = (255, 255, 255)
 GHOST: Colour = (142, 146, 153)
 
+# Nothing has these colours any more; they keep the numbers of those below as they were.
 WRONG: Colour = (170, 0, 110)
 DOUBTFUL: Colour = (150, 92, 0)
 STAMP: Colour = (120, 80, 165)

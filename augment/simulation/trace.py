@@ -162,7 +162,6 @@ def _road(drive: Drive) -> dict[str, Any]:
             for way, strip in zip(road.ways, road.strips, strict=True)
             if strip.intersects(window)
         ],
-        "end": _flat(road.centreline.poses(np.array([road.end_m]))[:, :2]),
     }
 
 

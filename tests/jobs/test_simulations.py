@@ -1,5 +1,6 @@
 """Drives as rows: planned once, leased once, kept with scores, told apart from failures."""
 
+import json
 import sys
 from datetime import timedelta
 from io import StringIO
@@ -87,7 +88,7 @@ def test_a_drive_keeps_both_scores_their_parts_and_the_way() -> None:
     assert after.document["criticality"]["least_distance_m"] == 0.0
     names = {metric["name"] for metric in after.document["metrics"]["nuplan"]}
     assert "no_ego_at_fault_collisions" in names
-    trace = simulations.trace_document(after)
+    trace = json.loads(simulations.drive_file(after))
     assert len(trace["ego"]["poses"]) == trace["steps"]
     assert [one["changed"] for one in trace["objects"]] == [True, True]
     assert {event["kind"] for event in trace["events"]} >= {"collision"}

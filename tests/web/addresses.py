@@ -23,7 +23,7 @@ def address(name: str, here: World) -> str:
     shown = here.study.matchups.filter(expert=here.expert).get(position=1)
     route = ROUTES[name]
     given: dict[str, Any] = {
-        "form": "json" if name in ("drive-file", "scenarios-write") else "csv",
+        "form": "json" if name == "scenarios-write" else "csv",
         "name": FORMS.get(name, ""),
         "kind": "augmentation" if name == "picture" else "interplan",
         "key": "0" * 16,

@@ -1,11 +1,9 @@
 """Simulating a job by its page, the table of driving scores, and the drives to look at."""
 
-import io
 from collections.abc import Callable
 
 import pytest
 from django.urls import reverse
-from PIL import Image
 
 from augment.models import GenerationJob, Simulation
 from tests.drives import driven, finished
@@ -56,23 +54,3 @@ def test_the_jobs_page_shows_scores() -> None:
     assert "25.0" in shown
     assert "75.0" in shown
     assert "compare contestants" in shown
-
-
-@pytest.mark.parametrize(
-    ("form", "kind", "frames", "size"),
-    [
-        # Before and after beneath each other and in step; a strip has a column of six for each.
-        ("gif", "GIF", 7, (672, 2 * 288 + 3)),
-        ("apng", "PNG", 7, (672, 2 * 288 + 3)),
-        ("png", "PNG", 1, (2 * 672 + 3, 6 * 288 + 5 * 3)),
-    ],
-)
-def test_a_drive_can_be_taken_away_as_pictures(
-    form: str, kind: str, frames: int, size: tuple[int, int]
-) -> None:
-    row = driven(launched())[-1]
-    answer = signed_in(people()["researcher"]).get(reverse("drive-file", args=[row.code, form]))
-    picture = Image.open(io.BytesIO(answer.content))
-    assert picture.format == kind
-    assert getattr(picture, "n_frames", 1) == frames
-    assert picture.size == size

@@ -42,7 +42,7 @@ from augment.services.judging.driving_scores import (
     options_driven,
 )
 from augment.services.judging.scenario_export import FORMATS
-from augment.services.judging.simulations import FILES, NUPLAN, SCORES, Options, drive_file
+from augment.services.judging.simulations import NUPLAN, SCORES, Options, drive_file
 from augment.tasks import enqueue_simulations
 
 PDM_CLOSED = Options().planner
@@ -101,7 +101,6 @@ def drive_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     context = {
         "drive": row,
         "before": before,
-        "files": FILES if row.state == Simulation.State.DONE else (),
         "metrics": [metric | {"before": old.get(metric["name"])} for metric in metrics],
         "labels": driving.SCORE_LABELS,
     }
@@ -109,16 +108,13 @@ def drive_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
 
 
 @page_for(*STAFF)
-def drive_trace(request: HttpRequest, code: uuid.UUID, form: str) -> HttpResponseBase:
-    """Answer with the drive as JSON for the page, or as a moving picture or a strip of stills."""
+def drive_trace(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
+    """Answer with the drive as JSON, which the page draws and anybody may save."""
     row = _driven(code)
-    if row.state != Simulation.State.DONE or form not in FILES:
+    if row.state != Simulation.State.DONE:
         raise Http404
-    content = drive_file(row, form, before=None if form == "json" else before_of(row))
-    answer = HttpResponse(content, content_type=FILES[form])
+    answer = HttpResponse(drive_file(row), content_type="application/json")
     answer["Cache-Control"] = "private, max-age=3600"
-    if form != "json":
-        answer["Content-Disposition"] = f'attachment; filename="{row.scenario.slug}.{form}"'
     return answer
 
 

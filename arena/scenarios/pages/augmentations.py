@@ -9,7 +9,6 @@ from django.shortcuts import get_object_or_404, render
 from arena.contestants.queries import asking_of
 from arena.scenarios.queries import modification_lines
 from arena.site.access import STAFF, page_for
-from arena.site.acts import looks_again, send_later
 from arena.site.pictures import picture_response, sized_picture_response
 from augment.errors import AugmentError
 from augment.models import Augmentation, BaseScene, Scenario, Simulation, UploadMoment
@@ -17,9 +16,13 @@ from augment.services.judging.displacement import of_augmentation
 from augment.services.judging.findings import check_augmentation
 from augment.services.running.calls import IMAGES
 from augment.services.running.transcript_records import totals_of, transcript_of, tries_of
-from augment.services.scenarios.pictures import SceneView, reference_picture, scene_picture
+from augment.services.scenarios.pictures import (
+    SceneView,
+    draw_with_ids,
+    reference_picture,
+    scene_picture,
+)
 from augment.services.scenarios.prompts import Shown, list_recipes, preview_prompt, prompt_version
-from augment.tasks import enqueue_marks
 
 
 @page_for(*STAFF)
@@ -27,10 +30,6 @@ def augmentation_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Show one augmentation with everything that led to it."""
     augmentation = _augmentation(code)
     tries, checked = tries_of(augmentation), check_augmentation(augmentation)
-    waits = checked is not None and bool(checked.picture) and not checked.is_drawn
-    look = looks_again(request, waits=waits)
-    if look == 1:
-        send_later(request, enqueue_marks, augmentation.pk)
     context = {
         "augmentation": augmentation,
         "lines": modification_lines(augmentation.modification),
@@ -38,7 +37,6 @@ def augmentation_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         "drive": augmentation.simulations.filter(state=Simulation.State.DONE).first(),
         "measured": of_augmentation(augmentation),
         "checked": checked,
-        "look": look,
         "tries": tries,
         "asking": asking_of(augmentation.contestant, augmentation.options),
         "totals": totals_of(tries),
@@ -82,9 +80,8 @@ def picture(request: HttpRequest, kind: str, code: uuid.UUID) -> HttpResponseBas
             ).original_image
         case "augmentation":
             name = get_object_or_404(Augmentation.objects.only("image"), code=code).image
-        case "marked":
-            checked = check_augmentation(_augmentation(code))
-            name = "" if checked is None else checked.picture
+        case "labelled":
+            return _labelled_picture(code)
         case "moment":
             name = get_object_or_404(UploadMoment.objects.only("picture"), code=code).picture
         case "reference":
@@ -95,6 +92,14 @@ def picture(request: HttpRequest, kind: str, code: uuid.UUID) -> HttpResponseBas
         case _:
             raise Http404
     return sized_picture_response(request, name)
+
+
+def _labelled_picture(code: uuid.UUID) -> HttpResponse:
+    try:
+        png = draw_with_ids(_augmentation(code))
+    except AugmentError as error:
+        raise Http404 from error
+    return HttpResponse(png, content_type="image/png")
 
 
 # --- Prompts -----------------------------------------------------------------------------------

@@ -1,17 +1,12 @@
-"""What the geometric checks say of a scene's change: findings, marked pictures, fault guesses.
+"""What the geometric checks say of a scene's change: findings and guesses of faults.
 
-The reference and anybody's labels stay out of it. Marked pictures are for researchers, never for a
-vote; the name of one says what is on it, so one that no longer fits the findings is never shown.
+The reference and anybody's labels stay out of it.
 """
 
-import hashlib
-import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
-
-from django.core.files.storage import default_storage
 
 from augment.checks import Finding as Finding
 from augment.checks import FindingKind as FindingKind
@@ -21,16 +16,11 @@ from augment.checks.registry import check_against_intent
 from augment.errors import InvalidDocument, InvalidModification
 from augment.metrics.fault_guess import first_guess
 from augment.models import Augmentation, Scenario
-from augment.render.bev import FaultMark, draw_annotated
 from augment.scene.codec import EGO_ID as EGO_ID
 from augment.scene.codec import modification_from_document, modification_to_document
 from augment.scene.entities import Scene
 from augment.services.scenarios.editing import editable_scene, read_edit, snap
-from augment.services.scenarios.pictures import camera_of, store_as
 from augment.services.scenarios.scenes import intent_of, scene_of
-
-_LOOK = 2
-"""Raised whenever the marked pictures look different."""
 
 _ORDER = (Severity.WRONG, Severity.DOUBTFUL, Severity.FACT)
 
@@ -43,21 +33,17 @@ class Checked:
         findings: Their sentences call agents by their ids in the modification.
         problem: Why nothing could be checked, empty where it was.
         is_against_intent: Whether the scenario has an intent that it was held against.
-        picture: The name of the picture that shows the faults by their numbers, empty without.
-        is_drawn: Whether that picture is there.
         modification: Of an edit, the document as it would be kept; None where it can't be.
     """
 
     findings: tuple[Finding, ...] = ()
     is_against_intent: bool = False
-    picture: str = ""
-    is_drawn: bool = False
     problem: str = ""
     modification: dict[str, Any] | None = None
 
     @property
     def faults(self) -> list[Finding]:
-        """What is wrong or doubtful, in the order of the numbers in the picture."""
+        """What is wrong or doubtful."""
         return [finding for finding in self.findings if finding.is_fault]
 
     @property
@@ -88,13 +74,7 @@ def check_augmentation(row: Augmentation) -> Checked | None:
         findings = findings_of(row)
     except (InvalidDocument, InvalidModification) as error:
         return Checked(problem=str(error))
-    name = _marked_name(row, findings)
-    return Checked(
-        findings=findings,
-        is_against_intent=row.scenario.intent is not None,
-        picture=name,
-        is_drawn=bool(name) and default_storage.exists(name),
-    )
+    return Checked(findings=findings, is_against_intent=row.scenario.intent is not None)
 
 
 def check_edit(scenario: Scenario, document: object, *, snapped: str = "") -> Checked:
@@ -134,43 +114,6 @@ def guess_faults(row: Augmentation) -> frozenset[FaultClass] | None:
     return None if findings is None else first_guess(findings)
 
 
-def draw_marked(*, augmentation_pk: int) -> str:
-    """Draw a row's marked picture unless it is there; returns its name, for workers.
-
-    Empty where there is nothing to mark.
-
-    Raises:
-        InvalidDocument: What is stored can't be read.
-        InvalidModification: The modification does not fit the scene.
-    """
-    rows = Augmentation.objects.select_related("contestant", "scenario__base_scene")
-    row = rows.get(pk=augmentation_pk)
-    if row.modification is None:
-        return ""
-    findings = findings_of(row)
-    name = _marked_name(row, findings)
-    if not name or default_storage.exists(name):
-        return name
-    marks = [
-        FaultMark(
-            number=number,
-            agents=fault.agents,
-            is_wrong=fault.severity is Severity.WRONG,
-            belongs_m=fault.belongs_m,
-        )
-        for number, fault in enumerate((one for one in findings if one.is_fault), start=1)
-    ]
-    png = draw_annotated(
-        scene_of(row.scenario),
-        modification_from_document(row.modification),
-        camera_of(row.scenario),
-        marks,
-        stamp="SIMULATED" if row.contestant.is_simulated else "",
-    )
-    store_as(name, png)
-    return name
-
-
 # --- Private -----------------------------------------------------------------------------------
 
 
@@ -186,22 +129,3 @@ def _ground(scene: Scene) -> Ground:
 
 def _worst_first(findings: Iterable[Finding]) -> tuple[Finding, ...]:
     return tuple(sorted(findings, key=lambda finding: _ORDER.index(finding.severity)))
-
-
-def _marked_name(row: Augmentation, findings: Sequence[Finding]) -> str:
-    """Return the name of the row's marked picture, drawn or not; empty without a fault."""
-    faults = [finding for finding in findings if finding.is_fault]
-    if not faults:
-        return ""
-    shown = {
-        "look": _LOOK,
-        "augmentation": str(row.code),
-        "modification": row.modification,
-        "reference": row.scenario.reference,
-        "simulated": row.contestant.is_simulated,
-        "faults": [
-            [fault.severity, fault.agents, fault.belongs_m, fault.sentence()] for fault in faults
-        ],
-    }
-    digest = hashlib.sha256(json.dumps(shown, sort_keys=True).encode()).hexdigest()
-    return f"marked/{digest}.png"

@@ -12,7 +12,6 @@ from django.db.models import QuerySet
 
 from augment.errors import Conflict
 from augment.models import Augmentation, GenerationJob, Scenario, Simulation
-from augment.render.film import animation, strip
 from augment.scene.codec import modification_from_document, recording_from_document
 from augment.scene.entities import Modification
 from augment.services.scenarios.scenes import reference_of, scene_of, type_of
@@ -175,35 +174,14 @@ def document_of(drove: Drive, scores: dict[ScoreKind, Score]) -> dict[str, Any]:
     }
 
 
-def trace_document(row: Simulation) -> dict[str, Any]:
-    """Return the drive to look at."""
-    document: dict[str, Any] = json.loads(zlib.decompress(bytes(row.trace or b"")))
-    return document
-
-
-FILES = {"json": "application/json", "gif": "image/gif", "apng": "image/apng", "png": "image/png"}
-"""Content types by the name of the form; png is the strip."""
-
-
-def drive_file(row: Simulation, form: str, *, before: Simulation | None = None) -> bytes:
-    """Return a driven row as a file.
-
-    Args:
-        row: With its trace.
-        form: One of `FILES`.
-        before: The same scene before the change, to be drawn above it.
-    """
-    traces = [trace_document(one) for one in (before, row) if one is not None]
-    if form == "json":
-        return json.dumps(traces[-1], separators=(",", ":")).encode()
-    if form == "png":
-        return strip(traces)
-    return animation(traces, file_format=form)
+def drive_file(row: Simulation) -> bytes:
+    """Return a driven row to look at, as a JSON file."""
+    return zlib.decompress(bytes(row.trace or b""))
 
 
 def blind_drive(row: Simulation) -> dict[str, Any]:
     """Return a driven row without anything that tells who changed the scene."""
-    return blind_trace(trace_document(row))
+    return blind_trace(json.loads(drive_file(row)))
 
 
 # --- Private -----------------------------------------------------------------------------------

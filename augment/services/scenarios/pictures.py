@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from augment.baselines.registry import break_reference
 from augment.models import Augmentation, BaseScene, Contestant, GenerationJob, Scenario
-from augment.render.bev import draw
+from augment.render.bev import draw, draw_for_review
 from augment.render.camera import AROUND_THE_EGO, LOOK, Camera, camera_for
 from augment.render.canvas import shrink, shrink_png
 from augment.render.legend import change_keys, scene_keys
@@ -150,6 +150,17 @@ def redraw(scenario: Scenario) -> int:
             )
     original_picture(scenario)
     return redrawn
+
+
+def draw_with_ids(row: Augmentation) -> bytes:
+    """Draw the picture of a row with everybody's id, for staff; it takes a tenth of a second.
+
+    Raises:
+        InvalidDocument: What is stored can't be read.
+        InvalidModification: The modification does not fit the scene.
+    """
+    scenario = row.scenario
+    return draw_for_review(scene_of(scenario), _shown(row), camera_of(scenario))[0]
 
 
 # --- Private -----------------------------------------------------------------------------------
