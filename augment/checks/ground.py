@@ -26,6 +26,8 @@ from augment.scene.entities import (
 )
 from augment.scene.lane_graph import AnyLane, Beside, LaneGraph, best_aligned
 
+SEAM_M = 0.3
+"""A gap between two pieces of ground up to this long is a seam of the map, not an edge."""
 VEHICLES = frozenset({AgentType.VEHICLE, AgentType.BUS, AgentType.EGO_VEHICLE})
 STOPPED_BELOW_MPS = 0.5
 CRASH_GAP_M = 1.5
@@ -64,6 +66,42 @@ class Surface:
         point = shapely.Point(x_m, y_m)
         _, distances = self._tree.query_nearest(point, return_distance=True, all_matches=False)
         return float(distances[0])
+
+    def reach_m(self, x_m: float, y_m: float, heading_rad: float, most_m: float) -> float | None:
+        """Return how far the surface goes on from a point in a direction, up to `most_m`.
+
+        Neighbouring pieces seldom meet exactly: gaps up to `SEAM_M` are passed over. None where
+        the point is not on the surface, or the surface ends nowhere within `most_m`.
+        """
+        reached_m = 0.0
+        is_on = False
+        for low_m, high_m in self._spans_m(x_m, y_m, heading_rad, most_m):
+            if low_m > reached_m + SEAM_M:
+                break
+            is_on = is_on or high_m >= 0.0
+            reached_m = max(reached_m, high_m)
+        return reached_m if is_on and reached_m < most_m - SEAM_M else None
+
+    def begins_m(self, x_m: float, y_m: float, heading_rad: float, most_m: float) -> float | None:
+        """Return how far off a point the surface begins in a direction, 0 on it.
+
+        None where it begins nowhere within `most_m`.
+        """
+        spans = self._spans_m(x_m, y_m, heading_rad, most_m)
+        return next((max(0.0, low_m) for low_m, high_m in spans if high_m > 0.0), None)
+
+    def _spans_m(
+        self, x_m: float, y_m: float, heading_rad: float, most_m: float
+    ) -> list[tuple[float, float]]:
+        """From where to where each piece lies under a ray; it begins a seam behind its point."""
+        step = np.array([math.cos(heading_rad), math.sin(heading_rad)])
+        start = np.array([x_m, y_m])
+        ray = shapely.LineString([start - SEAM_M * step, start + most_m * step])
+        near = self._pieces[self._tree.query(ray, predicate="intersects")]
+        parts = shapely.get_parts(shapely.intersection(near, ray))
+        parts = parts[shapely.get_type_id(parts) == shapely.GeometryType.LINESTRING]
+        spans = (((shapely.get_coordinates(part) - start) @ step).tolist() for part in parts)
+        return sorted((min(span), max(span)) for span in spans)
 
 
 def gaps_m(boxes_m: FloatArray) -> FloatArray:
