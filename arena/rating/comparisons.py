@@ -36,7 +36,6 @@ class Comparisons:
         score: What `first` scored: 1, 0.5 or 0.
         expert, scenario: Whose vote it is, and on what.
         count: How many votes the row stands for, at least 1; by default each for one.
-        covariates: (R, Q) what else may say who wins, seen from `first`; by default nothing.
     """
 
     names: tuple[str, ...]
@@ -46,14 +45,11 @@ class Comparisons:
     expert: IntArray
     scenario: IntArray
     count: IntArray = field(default_factory=lambda: np.empty(0, dtype=np.int64))
-    covariates: FloatArray = field(default_factory=lambda: np.empty((0, 0)))
     shown: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         if len(self.score) and not len(self.count):
             object.__setattr__(self, "count", np.ones(len(self.score), dtype=np.int64))
-        if len(self.covariates) != len(self.score):
-            object.__setattr__(self, "covariates", np.empty((len(self.score), 0)))
         if not self.shown:
             object.__setattr__(self, "shown", self.names)
         for name in _array_names():

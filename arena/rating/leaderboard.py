@@ -20,7 +20,6 @@ from arena.rating import remarks
 from arena.rating.chains import Chains, Status, chains_among, diagnose, ranks_across
 from arena.rating.comparisons import Comparisons, IntArray, count_pairs, restrict_to, tally
 from arena.rating.lines import Line
-from arena.rating.logistic import Coefficient
 from arena.rating.parts import Rated, rate_part
 from arena.rating.ranking import Separation
 from arena.rating.rules import (
@@ -57,8 +56,6 @@ class Leaderboard:
         degenerate_rounds: Bootstrap rounds whose votes did not determine everybody's rating.
         separation: All pairs judged at once, matrices (C, C), NaN for those without votes. None
             where there are no intervals, or several parts.
-        coefficients: Of the votes' covariates, in their order; none where these are not
-            determined, or in several parts.
     """
 
     lines: tuple[Line, ...]
@@ -78,7 +75,6 @@ class Leaderboard:
     tie_strength: float | None = None
     degenerate_rounds: int = 0
     separation: Separation | None = field(default=None, compare=False)
-    coefficients: tuple[Coefficient, ...] = ()
 
     @property
     def standings(self) -> tuple[Line, ...]:
@@ -121,8 +117,7 @@ def rate(
     status and the explanation say so.
 
     Args:
-        votes: What was voted; contestants without votes get a line without a rating. With
-            covariates the ratings are those of contestants who are alike in them.
+        votes: What was voted; contestants without votes get a line without a rating.
         method: Bradley-Terry, Davidson's tie model, or online Elo.
         rounds: Of the bootstrap; for intervals in closed form, of what is drawn to see who is
             determined and how far apart equals come to lie.
@@ -133,18 +128,13 @@ def rate(
 
     Raises:
         TooManyContestants: More than 2000.
-        ValueError: Fewer than one round, online Elo with a unit other than votes, or covariates
-            with another method than Bradley-Terry or with resampled intervals.
+        ValueError: Fewer than one round, or online Elo with a unit other than votes.
     """
     if len(votes.names) > MOST_CONTESTANTS:
         raise TooManyContestants(
             f"at most {MOST_CONTESTANTS} contestants can be rated together, not {len(votes.names)}"
         )
-    is_adjusted = bool(votes.covariates.shape[1])
-    rules = choose_rules(
-        method, unit, intervals, is_adjusted=is_adjusted, rounds=rounds, seed=seed
-    )
-    return _rate(votes, rules)
+    return _rate(votes, choose_rules(method, unit, intervals, rounds=rounds, seed=seed))
 
 
 def _rate(votes: Comparisons, rules: Rules) -> Leaderboard:
@@ -189,7 +179,6 @@ def _rate(votes: Comparisons, rules: Rules) -> Leaderboard:
         separation=whole.separation.among(present, len(lines))
         if whole and whole.separation
         else None,
-        coefficients=whole.coefficients if whole else (),
     )
 
 

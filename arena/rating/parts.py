@@ -18,7 +18,6 @@ from arena.rating.bootstrap import (
     rounds_to_draw,
 )
 from arena.rating.comparisons import BoolArray, Comparisons, FloatArray, IntArray, count_pairs
-from arena.rating.logistic import Coefficient, coefficients_of, fit_with_columns
 from arena.rating.models import Meetings, fit, resample_elo, to_elo
 from arena.rating.ranking import (
     Separation,
@@ -57,7 +56,6 @@ class Rated:
     note: tuple[str, ...]
     separation: Separation | None = None
     tie_strength: float | None = None
-    coefficients: tuple[Coefficient, ...] = ()
     degenerate: int = 0
     explanation: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
@@ -78,7 +76,6 @@ def rate_part(votes: Comparisons, rules: Rules) -> Rated:
     plain = Rated(
         rating=point.rating,
         tie_strength=point.tie_strength,
-        coefficients=point.coefficients,
         degenerate=rounds.degenerate,
         note=(remarks.NO_INTERVAL,) * len(votes.names),
         warnings=(remarks.ELO_NOTE,) if rules.method is Method.ELO else (),
@@ -95,10 +92,7 @@ def rate_part(votes: Comparisons, rules: Rules) -> Rated:
     is_open = np.array([bool(note) for note in rated.note])
     return replace(
         rated,
-        explanation=(
-            *(() if point.coefficients or not votes.covariates.size else (remarks.NOT_ADJUSTED,)),
-            *((remarks.who_is_open(votes, is_open),) if is_open.any() else ()),
-        ),
+        explanation=(remarks.who_is_open(votes, is_open),) if is_open.any() else (),
         warnings=(*plain.warnings, *said),
     )
 
@@ -132,26 +126,17 @@ class _Point:
     """Ratings (C,) of the data, and what else the model says.
 
     Attributes:
-        answer: (K,) of `models.fit`; of votes with covariates none.
+        answer: (K,) of `models.fit`; none of online Elo.
     """
 
     rating: FloatArray
     answer: FloatArray | None = None
     pulls: Pulls | None = None
     tie_strength: float | None = None
-    coefficients: tuple[Coefficient, ...] = ()
 
 
 def _fit_votes(votes: Comparisons, rules: Rules) -> _Point | None:
     """None where the votes determine no ratings in Davidson's model."""
-    if votes.covariates.size:
-        adjusted = fit_with_columns(votes, votes.covariates)
-        if adjusted is not None:
-            return _Point(
-                rating=to_elo(adjusted.strengths),
-                pulls=adjusted.pulls,
-                coefficients=coefficients_of(adjusted, rules.unit),
-            )
     counts = count_pairs(votes)
     met = Meetings(len(votes.names), counts)
     ties = counts.outcomes[:, 1].sum(keepdims=True).astype(np.float64)

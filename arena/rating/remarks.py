@@ -19,10 +19,6 @@ NO_DAVIDSON = (
     "Davidson's model has no finite ratings for these votes: some score one way by ties only. "
     "Bradley-Terry rates them."
 )
-NOT_ADJUSTED = (
-    "The votes do not determine what was to be adjusted for: it is the same in all votes, or "
-    "says no more than who was shown. The ratings stand without it."
-)
 NO_INTERVALS = (
     "No intervals can be given: there are too few votes, hardly any against some contestant, or "
     "nothing that could have come out otherwise."

@@ -84,13 +84,7 @@ class Rules:
 
 
 def choose_rules(
-    method: Method,
-    unit: Unit | None,
-    intervals: Intervals | None,
-    *,
-    is_adjusted: bool,
-    rounds: int,
-    seed: int,
+    method: Method, unit: Unit | None, intervals: Intervals | None, *, rounds: int, seed: int
 ) -> Rules:
     """Fill in what is left open.
 
@@ -98,18 +92,13 @@ def choose_rules(
         ValueError: The choices do not go together; the text says what does.
     """
     unit = unit or (Unit.VOTE if method is Method.ELO else Unit.TWO_WAY)
-    fitting = Intervals.CLOSED_FORM if is_adjusted else default_intervals(method, unit)
-    intervals = intervals or fitting
-    is_closed = intervals is Intervals.CLOSED_FORM
+    intervals = intervals or default_intervals(method, unit)
     refusals = {
         f"a bootstrap needs at least 1 round, not {rounds}": rounds < 1,
         f"online Elo resamples single votes only, not by {unit}": method is Method.ELO
         and unit is not Unit.VOTE,
         "online Elo has no intervals in closed form, only resamples": method is Method.ELO
-        and is_closed,
-        "only Bradley-Terry with intervals in closed form can be adjusted for covariates": (
-            is_adjusted and not (method is Method.BRADLEY_TERRY and is_closed)
-        ),
+        and intervals is Intervals.CLOSED_FORM,
     }
     for sentence, is_refused in refusals.items():
         if is_refused:

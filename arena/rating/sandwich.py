@@ -51,14 +51,12 @@ class Pulls:
         slopes: (R, K) sparse, of one vote of each row: what `first` scored above what was
             expected, the opposite for `second`, and the slopes by further parameters.
         information: (R,) how much a vote of the row says of the difference of the two.
-        inverse: (K, K) of the likelihood's curvature.
-        back: (C, K) from slopes to strengths; with more rows also to further parameters.
+        back: (C, K) from slopes to strengths.
     """
 
     votes: Comparisons
     slopes: Any
     information: FloatArray
-    inverse: FloatArray
     back: FloatArray
 
     def relative_to(self, reference: BoolArray) -> Self:
@@ -126,7 +124,6 @@ def pulls_of_model(
     """Those of Bradley-Terry or Davidson's model at an answer (K,) of `models.fit`."""
     size = len(votes.names)
     expected, tied = chances(size, answer, votes.first, votes.second)
-    inverse = inverse_curvature(met, games, answer)
     surprise = votes.score - expected
     has_ties = len(answer) > size
     by_ties = ((votes.score == TIE) - tied)[:, None] if has_ties else np.empty((len(votes), 0))
@@ -134,29 +131,8 @@ def pulls_of_model(
         votes=votes,
         slopes=design_of(votes, surprise, by_ties),
         information=expected - 0.25 * tied - expected**2,
-        inverse=inverse,
-        back=inverse[:size],
+        back=inverse_curvature(met, games, answer)[:size],
     )
-
-
-# --- The plain sandwich --------------------------------------------------------------------------
-
-
-def plain_covariance(pulls: Pulls, unit: Unit) -> FloatArray:
-    """(C, C) covariance in which each contestant stands for itself."""
-    kinds = [np.unique(getattr(pulls.votes, kind), return_inverse=True) for kind in unit.kinds]
-    if not kinds:
-        return without_negative_parts(pulls.by_row())
-    clusters = [(len(codes), of_row, 1.0) for codes, of_row in kinds]
-    if len(kinds) > 1:
-        (_, expert_of), (scenarios, scenario_of) = kinds
-        cells, cell_of = np.unique(expert_of * len(scenarios) + scenario_of, return_inverse=True)
-        clusters.append((len(cells), cell_of, -1.0))
-    squares = [
-        sign * pulls.by_cluster(of_row, number) * number / max(1, number - 1)
-        for number, of_row, sign in clusters
-    ]
-    return without_negative_parts(np.asarray(sum(squares)))
 
 
 def without_negative_parts(matrix: FloatArray) -> FloatArray:

@@ -13,9 +13,8 @@ from typing import Annotated, Any
 
 from pydantic import PlainValidator, TypeAdapter, ValidationError
 
-from arena.rating.comparisons import Estimate
-from arena.rating.logistic import SideBias
 from arena.rating.reliability import Agreement, Rater, Repeats
+from arena.rating.side import SideBias
 from augment.errors import InvalidDocument
 
 
@@ -44,28 +43,12 @@ def _joined(value: Any) -> Any:
 Kept = Annotated[str, PlainValidator(read_text)]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class CovariateEffect:
-    """What one unit of a covariate is worth, in Elo points, and how likely that is by chance."""
-
-    name: str
-    points: Estimate
-    p_value: float | None
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Adjustment:
-    """What a rating was adjusted for; without effects the votes do not determine any."""
-
-    effects: tuple[CovariateEffect, ...]
-
-
 VERSION = 4
-"""3 is without what a rating was adjusted for; 2 also without adjusted
-p-values and the measures that came with them; 1 also without the order of the board and without
-notes in the lines of types; a rating of version 0 kept its standings alone."""
+"""3 had not yet what ratings once were adjusted for; 2 is also without adjusted p-values and the
+measures that came with them; 1 also without the order of the board and without notes in the lines
+of types; a rating of version 0 kept its standings alone."""
 
-_SINCE_2, _SINCE_3, _SINCE_4, _SINCE_5 = {"since": 2}, {"since": 3}, {"since": 4}, {"since": 5}
+_SINCE_2, _SINCE_3, _SINCE_5 = {"since": 2}, {"since": 3}, {"since": 5}
 """Of fields that documents of earlier versions do not have, unless they say something."""
 
 
@@ -237,7 +220,6 @@ class Results:
     version: int = 0
     board: BoardRemarks = field(default_factory=BoardRemarks)
     trust: Trust = field(default_factory=Trust)
-    adjustment: Adjustment | None = field(default=None, metadata=_SINCE_4)
     pairs: tuple[PairRecord, ...] = ()
     types: tuple[TypeRating, ...] = ()
     displacement: tuple[DisplacementSummary, ...] = ()

@@ -4,8 +4,8 @@ import statsmodels.api as sm
 
 from arena.rating.comparisons import Comparisons, count_wins
 from arena.rating.influence import bradley_terry, rank_changes, without_each_expert
-from arena.rating.logistic import side_bias
 from arena.rating.models import ELO_PER_LOGIT
+from arena.rating.side import side_bias
 from tests.rating.votes import Comparison, fit, named, simulated, versus
 
 PAPERS = [1042.0, 1039, 1025, 1011, 1003, 998, 984, 953, 941]

@@ -6,7 +6,6 @@ from arena.rating.rules import Intervals, Unit
 from arena.results.exports.tables import leaderboard_table
 from arena.results.exports.writers import plain_text
 from arena.results.queries.votes import Filters
-from arena.results.services.covariates import COVARIATES
 from arena.results.services.ratings import DEFAULT_ROUNDS, log_early_look
 from arena.results.services.ratings import rate_now as rate
 from arena.studies.queries import study_named
@@ -32,13 +31,6 @@ class Command(TerminalCommand):
             "choices": [interval.value for interval in Intervals],
             "help": "closed (form, the default where votes hang together) or resamples",
         },
-        "--adjust": {
-            "nargs": "+",
-            "default": [],
-            "choices": COVARIATES,
-            "metavar": "WHAT",
-            "help": "rate contestants as if alike in: side, objects, vehicles",
-        },
         "--leave-out-own": {
             "action": "store_true",
             "help": "votes of authors on their own contestants do not count",
@@ -56,7 +48,6 @@ class Command(TerminalCommand):
             seed=options["seed"],
             unit=options["resample"],
             intervals=options["intervals"],
-            covariates=options["adjust"],
             filters=Filters(leave_out_own=options["leave_out_own"]),
             early=options["early"],
         )

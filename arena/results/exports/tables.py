@@ -92,16 +92,11 @@ class LeaderboardTable:
         return self.snapshot.is_early
 
     @property
-    def covariates(self) -> list[str]:
-        """What the ratings are adjusted for."""
-        adjustment = self.snapshot.results.adjustment
-        return [effect.name for effect in adjustment.effects] if adjustment else []
-
-    @property
     def method_text(self) -> str:
         """How the numbers came about, in one line."""
         rating = self.snapshot
-        adjusted = f", adjusted for {', '.join(self.covariates)}" if self.covariates else ""
+        # Earlier ratings could be adjusted for what was shown.
+        adjusted = f", adjusted for {', '.join(rating.covariates)}" if rating.covariates else ""
         unit = UNIT_TEXTS[rating.resampling_unit]
         intervals = (
             f"in closed form, clustered by {unit}"

@@ -67,8 +67,8 @@ def _document(table: LeaderboardTable) -> dict[str, Any]:
     rating = table.snapshot
     # Older ratings had no word for resamples.
     notes: dict[str, Any] = {"intervals": rating.intervals} if table.is_closed_form else {}
-    if table.covariates:
-        notes["covariates"] = table.covariates
+    if rating.covariates:
+        notes["covariates"] = rating.covariates
     return {
         "format": "scenario-arena/leaderboard",
         "version": 1,

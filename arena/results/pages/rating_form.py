@@ -10,9 +10,6 @@ from django.http import HttpRequest
 
 from arena import tasks
 from arena.models import Snapshot, Study
-from arena.results.pages.tabs import COVARIATE_LABELS
-from arena.results.queries.votes import is_imported
-from arena.results.services.covariates import COVARIATES, WITHOUT_PICTURES
 from arena.results.services.rating_request import RatingRequest
 from arena.results.services.ratings import Choices, is_big, plan_snapshot, rate_now
 from arena.site.forms import RequestForm, offer
@@ -41,11 +38,7 @@ class RatingForm(RequestForm):
         for name in ("method", "rounds", "seed"):
             self.fields[name].required = False
         offer(self, "types", type_choices())
-        offer(self, "adjust", COVARIATE_LABELS.items())
         names = snapshot.results.judges if snapshot is not None else {}
-        imported = snapshot is not None and is_imported(snapshot.study)
-        known = WITHOUT_PICTURES if imported else COVARIATES
-        self.adjustable = [(name, COVARIATE_LABELS[name]) for name in known]
         self.judges = sorted(names.items(), key=lambda item: item[1])
 
 

@@ -16,7 +16,7 @@ from arena.results.exports.tables import EARLY_LOOK, for_experts, leaderboard_ta
 from arena.results.exports.votes import VOTE_FORMATS, unrated_votes
 from arena.results.exports.writers import CHART_FORMATS, RATING_FILES
 from arena.results.pages.rating_form import RatingForm, rate_or_send
-from arena.results.pages.tabs import FOR_EXPERTS, TABS, show_adjustment
+from arena.results.pages.tabs import FOR_EXPERTS, TABS
 from arena.results.queries.access import (
     ResultsAccess,
     results_access,
@@ -89,7 +89,6 @@ def _of_rating(snapshot: Snapshot, tab: str, *, is_staff: bool) -> dict[str, obj
         "early_look": EARLY_LOOK,
         "settled": settled,
         "cast": snapshot.votes_counted - settled,
-        "adjusted": show_adjustment(snapshot),
         **TABS[tab](snapshot, table),
     }
 

@@ -23,12 +23,6 @@ FEW = 30
 """Fewer votes are too few to read much from."""
 LOG_LINES = 200
 
-COVARIATE_LABELS = {
-    "side": "being on the left",
-    "objects": "the number of objects",
-    "vehicles": "the number of vehicles",
-}
-
 
 def fill_table(snapshot: Snapshot, table: LeaderboardTable) -> Context:
     """The table with its intervals, and the lines that say how far it can be trusted."""
@@ -202,16 +196,6 @@ TABS: dict[str, Callable[[Snapshot, LeaderboardTable], Context]] = {
 }
 FOR_EXPERTS = ("table", "pairs", "types")
 """The tabs that not only researchers and admins see."""
-
-
-def show_adjustment(snapshot: Snapshot) -> list[Context] | None:
-    """What the covariates are worth; None where nothing was to be adjusted for."""
-    kept, labels = snapshot.results.adjustment, COVARIATE_LABELS
-    if kept is None:
-        return None
-    return [
-        {"label": labels.get(effect.name, effect.name), "kept": effect} for effect in kept.effects
-    ]
 
 
 # --- Private -----------------------------------------------------------------------------------

@@ -54,9 +54,6 @@ class RatingRequest:
         InputKind.WHOLE, "Rounds", least=1, most=MOST_ROUNDS, default=DEFAULT_ROUNDS
     )
     seed: int = input_field(InputKind.WHOLE, "Seed", least=0, most=HIGHEST_SEED, default=0)
-    adjust: Sequence[str] = input_field(
-        InputKind.NAMES, "Rate as if contestants were alike in", default=()
-    )
     types: Sequence[str] = input_field(InputKind.NAMES, "Scenario types", default=())
     experts: Sequence[str] = input_field(
         InputKind.NAMES, "Experts", "Codes as a rating names them; none for all.", default=()
@@ -81,7 +78,6 @@ class RatingRequest:
             method=self.method,
             unit=self.resample,
             intervals=self.intervals,
-            covariates=self.adjust,
             rounds=self.rounds,
             seed=self.seed,
             filters=Filters(

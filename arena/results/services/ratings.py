@@ -1,7 +1,7 @@
 """Rating a study: which votes, which method, which seed, now or by a worker, and what is kept."""
 
 import platform
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import TypedDict, TypeVar, Unpack
@@ -19,7 +19,7 @@ from arena.rating.comparisons import Comparisons
 from arena.rating.leaderboard import Leaderboard, Method, rate
 from arena.rating.rules import Intervals, TooManyContestants, Unit, choose_rules, unit_for
 from arena.rating.snapshot_document import VERSION as RESULTS_VERSION
-from arena.rating.snapshot_document import Adjustment, CovariateEffect, Results
+from arena.rating.snapshot_document import Results
 from arena.results.queries.access import votes_in
 from arena.results.queries.votes import (
     AUTOMATIC,
@@ -32,12 +32,7 @@ from arena.results.queries.votes import (
 )
 from arena.results.services import analysis
 from arena.results.services.analysis import VoteArrays, vote_arrays
-from arena.results.services.covariates import (
-    COVARIATES,
-    WITHOUT_PICTURES,
-    settled_remark,
-    with_covariates,
-)
+from arena.results.services.settled import settled_remark
 from arena.results.services.trust import board_remarks, trust
 from arena.results.services.vote_files import VERSION as VOTES_VERSION
 from arena.results.services.vote_files import digest_of, vote_rows, votes_csv
@@ -64,7 +59,6 @@ class Choices(TypedDict, total=False):
     seed: int
     unit: str | None
     intervals: str | None
-    covariates: Sequence[str]
     filters: Filters | None
     early: bool
     actor: User | None
@@ -109,7 +103,6 @@ def plan_snapshot(*, study: Study, **choices: Unpack[Choices]) -> Snapshot:
             two-way where the votes name experts and scenarios, else votes.
         intervals: "closed" or "resamples"; None for the closed form, but resamples of single
             votes and for online Elo.
-        covariates: What to adjust for: "side", "objects", "vehicles".
         filters: Which votes count; None for all main ones. Who is author of what is added to them
             here, so that later marks do not change the rating.
         early: Rate a study that is still open; the snapshot and the log say so.
@@ -119,8 +112,7 @@ def plan_snapshot(*, study: Study, **choices: Unpack[Choices]) -> Snapshot:
         StudyStillOpen: The study is open and nobody asked to look early.
         UnknownName: There is no such method, unit or kind of intervals, or a filter names what
             does not occur.
-        Conflict: Rounds or seed are out of range, online Elo is asked for another unit, or
-            covariates for another method than Bradley-Terry in closed form.
+        Conflict: Rounds or seed are out of range, or online Elo is asked for another unit.
     """
     snapshot = _planned(study=study, **choices)
     snapshot.save()
@@ -197,9 +189,7 @@ def compute(snapshot: Snapshot, report: Callable[[int], None]) -> Computed:
     votes = _vote_set(snapshot)
     arrays = vote_arrays(votes.entrants, votes.counted)
     report(20)
-    board = _rate(
-        snapshot, with_covariates(arrays.comparisons, votes.counted, snapshot.covariates)
-    )
+    board = _rate(snapshot, arrays.comparisons)
     report(60)
     snapshot.results = results = _results(snapshot, votes, arrays, board)
     report(90)
@@ -276,7 +266,6 @@ def _planned(
     seed: int = 0,
     unit: str | None = None,
     intervals: str | None = None,
-    covariates: Sequence[str] = (),
     filters: Filters | None = None,
     early: bool = False,
     actor: User | None = None,
@@ -297,16 +286,11 @@ def _planned(
             chosen,
             _read_word(Unit, unit or _default_unit(study, chosen), "resampling unit"),
             wanted,
-            is_adjusted=bool(covariates),
             rounds=rounds,
             seed=seed,
         )
     except ValueError as error:
         raise Conflict(f"This can't be rated: {error}.") from error
-    known = WITHOUT_PICTURES if is_imported(study) else COVARIATES
-    for name in covariates:
-        if name not in known:
-            raise UnknownName("covariate", name, list(known))
     return Snapshot(
         study=study,
         state=Snapshot.State.QUEUED,
@@ -315,7 +299,6 @@ def _planned(
         rounds=rounds,
         resampling_unit=rules.unit,
         intervals=rules.intervals,
-        covariates=[name for name in known if name in covariates],
         seed=seed,
         filters=replace(filters or Filters(), authors=authors_of(study)).as_document(),
         last_vote=last_vote_of(study),
@@ -389,7 +372,6 @@ def _results(
         version=RESULTS_VERSION,
         board=board_remarks(board, *filter(None, [remark])),
         trust=trust(arrays, votes, seed=snapshot.seed),
-        adjustment=_adjustment(snapshot.covariates, board),
         pairs=analysis.pairs(arrays.comparisons, votes.counted, planned),
         types=analysis.by_type(arrays, board),
         displacement=() if from_file else analysis.displacement(study),
@@ -400,17 +382,4 @@ def _results(
             if entrant.contestant is not None
         },
         judges={vote.judge: vote.judge_name for vote in votes.counted},
-    )
-
-
-def _adjustment(names: Sequence[str], board: Leaderboard) -> Adjustment | None:
-    """What a unit of each covariate is worth; None where nobody asked for it."""
-    if not names:
-        return None
-    effects = zip(names, board.coefficients, strict=False)
-    return Adjustment(
-        effects=tuple(
-            CovariateEffect(name=name, points=effect.points, p_value=effect.p_value)
-            for name, effect in effects
-        )
     )

@@ -8,9 +8,9 @@ import numpy as np
 from arena.rating.comparisons import Comparisons, IntArray, restrict_to, select_votes, tally
 from arena.rating.influence import bradley_terry, rank_changes, without_each_expert
 from arena.rating.leaderboard import Leaderboard
-from arena.rating.logistic import side_bias
 from arena.rating.ranking import Separation
 from arena.rating.reliability import Repeats, agreement, raters, repeat_consistency
+from arena.rating.side import side_bias
 from arena.rating.snapshot_document import BoardRemarks, PairP, PanelRater, Trust
 from arena.results.queries.votes import AUTOMATIC, VoteSet
 from arena.results.services.analysis import SCORES, VoteArrays

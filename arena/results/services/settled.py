@@ -1,0 +1,49 @@
+"""What a rating says of pairs that nobody can tell apart."""
+
+from arena.models import Study, Vote
+from arena.pairing.order import MAIN
+from arena.pairing.rules import scenario_of
+from arena.rating.lines import whole_percent
+from arena.results.queries.votes import AUTOMATIC, VoteSet
+
+
+def settled_remark(study: Study, votes: VoteSet, *, left_out: bool) -> str:
+    """Return what the table estimates where pairs were settled, empty where none was.
+
+    Args:
+        study: What was planned.
+        votes: That count.
+        left_out: Whether settled pairs are left out.
+    """
+    settled = len(study.rules.get("identical", ()))
+    if not settled:
+        return ""
+    ties = sum(vote.kind == AUTOMATIC for vote in votes.counted)
+    said = (
+        f"The table says how contestants compare where their pictures differ: {settled} pairs "
+        "that nobody can tell apart were not shown and are left out."
+        if left_out
+        else f"The table says how contestants compare over all pairs of pictures: {settled} "
+        f"pairs that nobody can tell apart were not shown and count as {ties} ties, as many a "
+        "pair as others have votes on average."
+    )
+    return f"{said} {_on_those_shown(study, votes)}".strip()
+
+
+def _on_those_shown(study: Study, votes: VoteSet) -> str:
+    """The tie share of alike pairs that experts were shown all the same."""
+    shown = {
+        (scenario_of(place), frozenset((one, other)))
+        for place, one, other in study.rules.get("alike_shown", ())
+    }
+    given = [
+        vote.outcome == Vote.Outcome.EQUAL
+        for vote in votes.counted
+        if vote.kind == MAIN and (vote.item, frozenset((vote.left, vote.right))) in shown
+    ]
+    if not given:
+        return ""
+    return (
+        f"Of {len(given)} votes on {len(shown)} such pairs that were shown all the same, "
+        f"{sum(given)} are ties ({whole_percent(sum(given) / len(given))} %)."
+    )
