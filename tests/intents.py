@@ -5,6 +5,7 @@ from functools import cache
 from typing import Any
 
 from augment.fake_llm.sight import same_text
+from augment.scene.entities import Scene
 from augment.scene.intent import (
     Body,
     ConesRequest,
@@ -24,7 +25,8 @@ from augment.scene.intent import (
     VehicleRequest,
     WalkRequest,
 )
-from tests.fixtures.shelf import HARD_SLUGS, SLUGS, entry
+from tests.fixtures.shelf import HARD_SLUGS, SLUGS, entry, shown_scene
+from tests.scenes import scene
 
 LEFT_EDGE, RIGHT_EDGE = LateralTarget.LEFT_BOUNDARY, LateralTarget.RIGHT_BOUNDARY
 
@@ -102,17 +104,18 @@ _WISH = re.compile(r"Add a parked (car|vehicle) ([0-9.]+) m ahead(?: of the ego 
 CONE = "Place a traffic cone on the ego's lane 20 m in front of the ego."
 
 
-def intents(instruction: str) -> Intent | None:
+def known(instruction: str) -> list[tuple[Scene, Intent]]:
     """The stand-in's list in tests: the catalogue, and the one wish that tests make."""
-    found = _WISH.fullmatch(same_text(instruction))
+    found = _WISH.fullmatch(instruction)
     if found:
-        return parked(float(found[2]), body=Body(found[1]))
-    if same_text(instruction) == CONE:
-        return cones(20.0, 1, Shape.LINE)
-    return _catalogue().get(same_text(instruction))
+        return [(scene(), parked(float(found[2]), body=Body(found[1])))]
+    if instruction == CONE:
+        return [(scene(), cones(20.0, 1, Shape.LINE))]
+    shelved = [entry(slug) for slug in _catalogue().get(instruction, ())]
+    return [(shown_scene(one.slug), one.intent) for one in shelved if one.intent is not None]
 
 
 @cache
-def _catalogue() -> dict[str, Intent]:
-    shelved = [entry(slug) for slug in (*SLUGS, *HARD_SLUGS)]
-    return {same_text(one.instruction): one.intent for one in shelved if one.intent is not None}
+def _catalogue() -> dict[str, list[str]]:
+    slugs = (*SLUGS, *HARD_SLUGS)
+    return {same_text(entry(slug).instruction): [slug] for slug in slugs}

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from augment.scene.codec import intent_from_document, modification_to_document, scene_to_document
-from augment.scene.entities import Modification
+from augment.scene.entities import Modification, Scene
 from augment.scene.intent import Intent
 from augment.services.scenarios.intent_fields import NEW_ROW, IntentFields, intent_of_fields
 from tests.scenes import scene, vehicle
@@ -31,10 +31,10 @@ def reference(ahead_m: int) -> dict[str, Any]:
     return modification_to_document(Modification(added=(vehicle("Agent2", float(ahead_m), -0.7),)))
 
 
-def intents(instruction: str) -> Intent | None:
+def known(instruction: str) -> list[tuple[Scene, Intent]]:
     """What the stand-in's models know of an instruction."""
     found = WISH.search(instruction)
-    return None if found is None else intent_from_document(asked(int(found[1])))
+    return [] if found is None else [(scene(), intent_from_document(asked(int(found[1]))))]
 
 
 def write_street(folder: Path) -> Path:

@@ -1,9 +1,7 @@
 """The typical mistakes of weak models, made on purpose and the same every time.
 
-A careless reader misreads the wish before it places anything; only what the paper set hardly
-asks for is misread. Then a right placement is bent in the frame of the lane ahead of the ego: s
-along it, d to its left. Which mistake is made depends on nothing but the prompt. Frame otherwise:
-ego frame.
+A right placement is bent in the frame of the lane ahead of the ego: s along it, d to its left.
+Which mistake is made depends on nothing but the prompt. Frame otherwise: ego frame.
 """
 
 import hashlib
@@ -14,22 +12,14 @@ from dataclasses import replace
 
 from augment.geometry.frames import wrap
 from augment.scene.ego_route import EgoRoute
-from augment.scene.entities import AgentType, Modification, Scene, TrafficAgent, TurnType
-from augment.scene.intent import Body, Intent, LaneChoice, Length, Relation, Spot, VehicleRequest
+from augment.scene.entities import AgentType, Modification, Scene, TrafficAgent
 
 SPARED_BY_TOOL = frozenset({"straight-line", "ego-heading"})
 """Mistakes that nobody makes who asks a function for poses on lanes."""
 
 _UNREADABLE_SHARE = 0.1
 _RIGHT_SHARE = 0.25
-# From the ego's heading to the lane's; no place of the paper set lies past so much.
-_REAL_TURN_RAD = math.radians(30.0)
 _NOTICEABLE_M, _NOTICEABLE_RAD = 1.0, 0.15
-# Of the wishes that can't be met so many are carried out somehow.
-_ATTEMPT_SHARE = 0.6
-_ATTEMPT_M = 20.0
-# What stands for no distance at all.
-_LEVEL_M = 8.0
 
 Agents = tuple[TrafficAgent, ...]
 _Mistake = Callable[[Agents, EgoRoute, random.Random], Agents]
@@ -45,48 +35,10 @@ def is_unreadable(rng: random.Random) -> bool:
     return rng.random() < _UNREADABLE_SHARE
 
 
-def misread(intent: Intent, rng: random.Random) -> Intent:
-    """Return the intent as a careless reader has it: with one mistake wherever one can be made."""
-    misreadings = []
-    if intent.unmet:
-        # What can't be met is done somehow: a car stands ahead.
-        ahead = Length(low_m=_ATTEMPT_M, high_m=_ATTEMPT_M)
-        spot = Spot(distance=ahead, relation=Relation.AHEAD, lane=LaneChoice.OWN)
-        request = VehicleRequest(spot=spot, body=Body.CAR, speed_mps=0.0, count=1)
-        misreadings.append(Intent(requests=(request,)))
-    if intent.route is not TurnType.STRAIGHT:
-        misreadings.append(replace(intent, route=TurnType.STRAIGHT))
-    others = {TurnType.LEFT: TurnType.RIGHT, TurnType.RIGHT: TurnType.LEFT}
-    if intent.route in others:
-        misreadings.append(replace(intent, route=others[intent.route]))
-    if any(_is_relative(one.spot) for one in (*intent.requests, *intent.moves)):
-        requests = (replace(one, spot=_from_ego(one.spot)) for one in intent.requests)
-        moves = (replace(one, spot=_from_ego(one.spot)) for one in intent.moves)
-        misreadings.append(replace(intent, requests=tuple(requests), moves=tuple(moves)))
-    if any(one.spot.landmark and one.spot.landmark.ordinal > 1 for one in intent.requests):
-        requests = (replace(one, spot=_first(one.spot)) for one in intent.requests)
-        misreadings.append(replace(intent, requests=tuple(requests)))
-    if not misreadings or (intent.unmet and rng.random() > _ATTEMPT_SHARE):
-        return intent
-    return rng.choice(misreadings)
-
-
 def too_far(scene: Scene, right: Modification) -> Modification:
     """Return the right modification, 8 m too far along the lanes."""
     route = EgoRoute.of(scene)
     return right if route is None else replace(right, added=_shifted(right.added, route, 8.0))
-
-
-def lay_straight(scene: Scene, right: Modification) -> Modification:
-    """Lay out whatever lies past a real turn of the lane straight ahead of the ego."""
-    route = EgoRoute.of(scene)
-    if route is None:
-        return right
-    laid: Agents = ()
-    for agent in right.changed:
-        is_past_turn = abs(wrap(route.locate_agent(agent).tangent_rad)) > _REAL_TURN_RAD
-        laid += straight_line((agent,), route) if is_past_turn else (agent,)
-    return _with(right, laid)
 
 
 def bend(
@@ -119,7 +71,7 @@ def bend(
     return _with(right, outcomes[name]), name
 
 
-def straight_line(agents: Agents, route: EgoRoute, rng: random.Random | None = None) -> Agents:
+def straight_line(agents: Agents, route: EgoRoute, rng: random.Random) -> Agents:
     """Lay the distance out straight ahead of the ego instead of along the lane."""
     places = [route.locate_agent(agent) for agent in agents]
     return tuple(
@@ -194,26 +146,6 @@ MISTAKES: dict[str, _Mistake] = {
 
 
 # Private
-
-
-def _is_relative(spot: Spot) -> bool:
-    return spot.landmark is not None or spot.mark is not None or spot.anchor is not None
-
-
-def _from_ego(spot: Spot) -> Spot:
-    """Count a distance from the ego, whatever it runs from."""
-    if not _is_relative(spot):
-        return spot
-    near = Length(low_m=_LEVEL_M, high_m=_LEVEL_M)
-    bare = replace(spot, anchor=None, landmark=None, mark=None, settings=())
-    return replace(bare, distance=spot.distance or near, relation=Relation.AHEAD)
-
-
-def _first(spot: Spot) -> Spot:
-    """Take the first road user of its kind for a later one."""
-    if spot.landmark is None:
-        return spot
-    return replace(spot, landmark=replace(spot.landmark, ordinal=1))
 
 
 def _with(right: Modification, agents: Agents) -> Modification:

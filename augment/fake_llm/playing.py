@@ -1,7 +1,7 @@
 """The stand-in's characters: each plays every role, in its own manner.
 
-It works the task out by its own rules. As a reviewer it compares with that; as a viewer it checks
-that there is a picture and says so: it is a stand-in without eyes.
+It places what the list of known tasks asks for by rules. As a reviewer it compares with that; as
+a viewer it checks that there is a picture and says so: it is a stand-in without eyes.
 Frame: ego frame.
 """
 
@@ -10,22 +10,21 @@ import math
 import re
 import struct
 from collections.abc import Callable, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, replace
 
 from augment.baselines.rule_placer import place
 from augment.errors import CannotPlace
 from augment.fake_llm import careless, sight
+from augment.fake_llm.sight import Heard, KnownTasks, Task
 from augment.fake_llm.wire import Calls, ChatRequest
 from augment.geometry.frames import difference, wrap
 from augment.prompts.calls import TOOL
+from augment.prompts.vectors import DEFAULT_RADIUS_M, lane_curves, short_names
 from augment.scene.codec import intent_to_parts
 from augment.scene.entities import AgentType, Modification, Scene, TrafficAgent
-from augment.scene.intent import Intent
 from augment.scene.lane_graph import LaneGraph
 from augment.variants.respondents import ModelRole
 
-SEES_NOTHING = "I can't find a scene and an instruction in what I was given."
 UNKNOWN = "I am a stand-in and read no English; this sentence is not on my list of intents."
 
 _MOST_CALLS = 8
@@ -35,7 +34,6 @@ _VEHICLES = frozenset({AgentType.VEHICLE, AgentType.BUS})
 _RATINGS = ("compliance", "realism", "logical_consistency")
 
 Problem = dict[str, str]
-_Bend = Callable[[sight.Task, Modification, sight.Heard], Modification]
 Answer = tuple[str, Calls]
 """A text, native calls of functions, or both."""
 
@@ -45,64 +43,54 @@ class Character:
     """A manner of playing every role.
 
     Attributes:
-        hear: What it takes the wish to be, given the task and what was heard.
-        bend: What becomes of a right modification, given the task and what was heard.
-        spoil: What becomes of a modifier's finished answer.
+        bend: What becomes of a right modification; None for an answer that nobody can read.
         judge: What a reviewer finds.
         never_stops: Whether it calls as long as it may, and longer.
     """
 
-    hear: Callable[[sight.Task, sight.Heard], Intent | None] = lambda task, _: task.intent
-    bend: _Bend = lambda task, right, _: right
-    spoil: Callable[[sight.Task, str, sight.Heard], str] = lambda task, text, _: text
-    judge: Callable[[sight.Task], list[Problem]] = lambda task: problems_of(task)
+    bend: Callable[[Task, Modification, Heard], Modification | None] = lambda _, right, __: right
+    judge: Callable[[Task], list[Problem]] = lambda task: problems_of(task)
     never_stops: bool = False
 
-    def answer(self, request: ChatRequest, intents: sight.Intents = sight.knows_nothing) -> Answer:
-        """Answer from the request and the list of intents alone."""
-        heard = sight.read_conversation(request)
+    def answer(self, request: ChatRequest, known: KnownTasks = sight.knows_nothing) -> Answer:
+        """Answer from the request and the list of known tasks alone."""
+        heard = sight.read_conversation(request, known)
+        task = heard.task
         if heard.role is ModelRole.VIEWER:
             return _describe_picture(request), ()
-        try:
-            if heard.role is ModelRole.READER:
-                intent = intents(sight.instruction_in(request.messages))
-                known = intent and _fenced("From my list:", intent_to_parts(intent))
-                return known or UNKNOWN, ()
-            task = sight.task_of(request.messages, intents)
-        except sight.NothingSeen:
-            return SEES_NOTHING, ()
+        if heard.role is ModelRole.READER:
+            return _fenced("From my list:", intent_to_parts(task.intent)) if task else UNKNOWN, ()
         if heard.role is ModelRole.MODIFIER:
-            return self._modify(task, heard)
+            return self._modify(heard)
+        problems = self.judge(task) if task else []
         if heard.role is ModelRole.REVIEWER:
-            return _rate(self.judge(task)), ()
+            return _rate(problems), ()
         if any(message.role == "assistant" for message in request.messages):
-            problems = self.judge(task)
             block = {"verdict": "feedback" if problems else "accept", "feedback": problems}
             return _fenced("I have weighed the answers.", block), ()
-        names = list(sight.list_of(task.prompt, "Added agents"))[:6]
-        questions = [f"In which lane does {name} stand?" for name in names]
+        names = [agent.id for agent in sight.added_agents(task.prompt)] if task else []
+        questions = [f"In which lane does {name} stand?" for name in names[:6]]
         questions += ["Do any two blue objects overlap?", "Is a blue object off the road?"]
         questions += ["Is the ego alone in its lane?"]
         return _fenced("I ask the viewer.", {"questions": questions[:8]}), ()
 
-    def _modify(self, task: sight.Task, heard: sight.Heard) -> Answer:
+    def _modify(self, heard: Heard) -> Answer:
         if self.never_stops and (heard.may_call or heard.called):
             return _call(heard, [{"lane": "Lane1", "start": "lane", "distance_m": 1.0}])
+        task = heard.task
+        if task is None:
+            return _write_answer(Modification(), UNKNOWN), ()
         try:
-            right = _placed(task, self.hear(task, heard))
+            right = place(task.scene, task.intent).modification
         except CannotPlace as refused:
-            reason = UNKNOWN if task.intent is None else refused.reason
-            return _write_answer(task, Modification(), f"I did not understand it: {reason}"), ()
-        numbered = (
-            replace(agent, id=f"Agent{task.first_new + number}")
-            for number, agent in enumerate(right.added)
-        )
-        placed = self.bend(task, replace(right, added=tuple(numbered)), heard)
+            return _write_answer(Modification(), f"I can't do it: {refused.reason}"), ()
+        placed = self.bend(task, right, heard)
+        if placed is None:
+            return "I know where it belongs, but not how to write it down.", ()
         wanted = _calls_for(task.scene, placed)
         if heard.may_call and wanted and not heard.results:
             return _call(heard, wanted)
-        placed = _with_results(task.scene, placed, heard.results)
-        return self.spoil(task, _write_answer(task, placed), heard), ()
+        return _write_answer(_with_results(task.scene, placed, heard.results)), ()
 
 
 def _rate(problems: list[Problem]) -> str:
@@ -117,17 +105,13 @@ def _rate(problems: list[Problem]) -> str:
     )
 
 
-def problems_of(task: sight.Task) -> list[Problem]:
-    """Return what is wrong with the work in the task, by the stand-in's own placement.
-
-    Nothing where it does not know what the wish asks for.
-    """
+def problems_of(task: Task) -> list[Problem]:
+    """Return what is wrong with the work in the task, by the stand-in's own placement."""
     try:
         right = list(place(task.scene, task.intent).modification.added)
     except CannotPlace:
         return []
-    vectors = sight.list_of(task.prompt, "Added agents").items()
-    added = [sight.agent_of(name, vector[:8]) for name, vector in vectors]
+    added = sight.added_agents(task.prompt)
     if len(added) != len(right):
         said = f"{len(added)} agents were added, {len(right)} were asked for."
         return [_problem(said, "Count.")]
@@ -144,31 +128,21 @@ def problems_of(task: sight.Task) -> list[Problem]:
 # --- Answers -----------------------------------------------------------------------------------
 
 
-def _write_answer(task: sight.Task, modification: Modification, remark: str = "") -> str:
+def _write_answer(modification: Modification, remark: str = "") -> str:
     """Write the paper's five sections around a modification."""
     steps = [
-        f"Step {number}: {agent.id} is at ({agent.x_m:.2f}, {agent.y_m:.2f}); the heading is "
-        f"{agent.heading_rad:.3f} rad."
+        f"Step {number}: {agent.id} is at ({agent.x_m:.2f}, {agent.y_m:.2f})."
         for number, agent in enumerate(modification.changed, start=1)
     ]
-    named = [("add", agent.id) for agent in modification.added]
-    named += [("move", agent.id) for agent in modification.moved]
-    named += [("remove", name) for name in modification.removed]
-    changes = [{"Action": action, "Modified_Agent": name} for action, name in named]
-    scene = task.scene
     block = {
         "add": [_fields(agent) for agent in modification.added],
         "move": [_fields(agent) for agent in modification.moved],
         "remove": list(modification.removed),
     }
-    insights = (
-        f"The scene has {len(scene.lanes)} lanes and {len(scene.connectors)} connectors; besides "
-        f"the ego there are {len(scene.agents)} agents. {remark}"
-    )
     return (
-        f"Insights: {insights.strip()}\n\n"
-        f"Summary: The user wants: {' '.join(task.instruction.split())}\n\n"
-        f"Modification Dict: {json.dumps(changes) if changes else 'none'}\n\n"
+        f"Insights: {remark or 'The wish is on my list.'}\n\n"
+        "Summary: What the user wants, by the list of intents.\n\n"
+        f"Modification Dict: {len(modification.changed)} agents are added or moved.\n\n"
         f"Modification Calculations:\n{chr(10).join(steps) or 'none'}\n\n"
         f"Modified Vectors:\n```json\n{json.dumps(block, indent=1)}\n```\n"
     )
@@ -200,15 +174,7 @@ def _describe_picture(request: ChatRequest) -> str:
     return "\n".join(lines + [f"{number}. cannot see" for number in range(2, count + 1)])
 
 
-# --- Placing and comparing ---------------------------------------------------------------------
-
-
-def _placed(task: sight.Task, taken_for: Intent | None) -> Modification:
-    """Place the wish as it was heard; what can't be placed is heard rightly."""
-    if taken_for != task.intent:
-        with suppress(CannotPlace):
-            return place(task.scene, taken_for).modification
-    return place(task.scene, task.intent).modification
+# --- Comparing ---------------------------------------------------------------------------------
 
 
 def _difference(agent: TrafficAgent, meant: TrafficAgent) -> Problem | None:
@@ -237,7 +203,7 @@ def _distance_m(one: TrafficAgent, other: TrafficAgent) -> float:
 # --- Calls of the function ---------------------------------------------------------------------
 
 
-def _call(heard: sight.Heard, wanted: Sequence[dict[str, object]]) -> Answer:
+def _call(heard: Heard, wanted: Sequence[dict[str, object]]) -> Answer:
     calls = [(TOOL, json.dumps(arguments)) for arguments in wanted]
     if heard.is_native:
         return "", tuple(calls)
@@ -246,28 +212,21 @@ def _call(heard: sight.Heard, wanted: Sequence[dict[str, object]]) -> Answer:
 
 
 def _calls_for(scene: Scene, modification: Modification) -> list[dict[str, object]]:
-    """Return the arguments of a call for each of the first added agents, in their order."""
-    graph, ego = LaneGraph(scene), scene.ego
+    """Return the arguments of a call for each of the first added agents, in their order.
+
+    None where one stands on no lane that the prompt shows.
+    """
+    graph = LaneGraph(scene)
+    shown = lane_curves(scene, short_names(scene), DEFAULT_RADIUS_M)
     wanted: list[dict[str, object]] = []
     for agent in modification.added[:_MOST_CALLS]:
         nearest = graph.nearest(agent.x_m, agent.y_m)
-        if nearest is None:
-            wanted.append({"lane": "Lane1", "start": "lane", "distance_m": 0.0})
-            continue
-        lane_id, at = nearest
-        start, distance_m = "lane", at.s_m
-        if lane_id == ego.lane_id:
-            start = ego.id
-            distance_m -= graph.lane(lane_id).centerline.project(ego.x_m, ego.y_m).s_m
-        wanted.append(
-            {
-                "lane": lane_id,
-                "start": start,
-                "distance_m": round(distance_m, 3),
-                "lateral_m": round(max(-30.0, min(30.0, at.d_m)), 3),
-                "object": agent.type.value,
-            }
-        )
+        if nearest is None or nearest[0] not in shown:
+            return []
+        at = shown[nearest[0]].project(agent.x_m, agent.y_m)
+        place = {"lane": nearest[0], "start": "lane", "distance_m": round(at.s_m, 3)}
+        lateral_m = round(max(-30.0, min(30.0, at.d_m)), 3)
+        wanted.append(place | {"lateral_m": lateral_m, "object": agent.type.value})
     return wanted
 
 
@@ -295,41 +254,21 @@ def _with_results(
 # --- The characters ----------------------------------------------------------------------------
 
 
-def _all_told(task: sight.Task, heard: sight.Heard) -> str:
-    """Return the prompt and all feedback: a new round is a new throw of the dice."""
-    return "\n".join([task.prompt, *heard.feedback])
-
-
-def _mishear(task: sight.Task, heard: sight.Heard) -> Intent | None:
-    if task.intent is None:
-        return None
-    return careless.misread(
-        task.intent, careless.dice(f"{_all_told(task, heard)}\nas it was heard")
-    )
-
-
-def _bend(task: sight.Task, right: Modification, heard: sight.Heard) -> Modification:
-    rng = careless.dice(_all_told(task, heard))
+def _bend(task: Task, right: Modification, heard: Heard) -> Modification | None:
+    rng = careless.dice(heard.all_told)
     if careless.is_unreadable(rng):
-        return right
-    has_tool = heard.called or heard.may_call
-    shown = right if has_tool else careless.lay_straight(task.scene, right)
-    spared = careless.SPARED_BY_TOOL if has_tool else frozenset()
-    return careless.bend(task.scene, shown, rng, spared)[0]
+        return None
+    spared = careless.SPARED_BY_TOOL if heard.called or heard.may_call else frozenset()
+    return careless.bend(task.scene, right, rng, spared)[0]
 
 
-def _mumble(task: sight.Task, text: str, heard: sight.Heard) -> str:
-    rng = careless.dice(_all_told(task, heard))
-    return text.partition("```")[0] if careless.is_unreadable(rng) else text
-
-
-def _overlook(task: sight.Task) -> list[Problem]:
+def _overlook(task: Task) -> list[Problem]:
     """Find all problems or, as often, none."""
     return problems_of(task) if careless.dice(task.prompt).random() < 0.5 else []
 
 
 GOOD = Character()
-CARELESS = Character(hear=_mishear, bend=_bend, spoil=_mumble, judge=_overlook)
+CARELESS = Character(bend=_bend, judge=_overlook)
 LEARNING = Character(
     bend=lambda task, right, heard: (
         right if heard.feedback else careless.too_far(task.scene, right)

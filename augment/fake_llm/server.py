@@ -1,8 +1,8 @@
 """The stand-in's HTTP server and its models, whose names choose the behaviour.
 
-`fake-good` and `fake-careless` play every role; `fake-qa-...` are wrong at first or
-for ever; `fake-tool-loop` calls without end; each of the others breaks in one way
-that real servers do. It also answers the tiny questions of a probe.
+`fake-good` and `fake-careless` play every role; `fake-qa-...` are wrong at first or for ever;
+`fake-tool-loop` calls without end; each of the others breaks in one way that real servers do. It
+also answers the tiny questions of a probe.
 """
 
 import json
@@ -10,15 +10,16 @@ import re
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import replace
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any
 
 from augment.fake_llm import careless, playing, wire
-from augment.fake_llm.sight import Intents, knows_nothing
+from augment.fake_llm.sight import KnownTasks, knows_nothing
 
 WINDOW_TOKENS = 2048
 """The context window of `fake-cuts-context`."""
+
+SLOW = "fake-slow"
 
 _KEPT_CHARACTERS = 6000
 _LONGEST_BODY = 32_000_000
@@ -29,9 +30,8 @@ class FakeServer(ThreadingHTTPServer):
 
     Args:
         host, port: Where it listens; port 0 takes a free one.
-        latency_s: How long every answer takes at least.
         slow_s: How long `fake-slow` takes.
-        intents: What an instruction asks for, by its text.
+        known: The scenes and intents of an instruction, by its text.
 
     Raises:
         OSError: The address is taken or is none of this computer's.
@@ -44,11 +44,10 @@ class FakeServer(ThreadingHTTPServer):
         host: str = "127.0.0.1",
         port: int = 0,
         *,
-        latency_s: float = 0.0,
         slow_s: float = 30.0,
-        intents: Intents = knows_nothing,
+        known: KnownTasks = knows_nothing,
     ) -> None:
-        self.latency_s, self.slow_s, self.intents = latency_s, slow_s, intents
+        self.slow_s, self.known = slow_s, known
         self.stopping = threading.Event()
         self._seen: set[str] = set()
         self._lock = threading.Lock()
@@ -104,9 +103,8 @@ class _Handler(BaseHTTPRequestHandler):
         """List the models."""
         models = [{"id": name, "object": "model", "owned_by": "fake"} for name in MODELS]
         is_list = self.path.rstrip("/") == "/v1/models"
-        self._send(
-            wire.as_json({"object": "list", "data": models}) if is_list else self._no_path()
-        )
+        listed = wire.Response(document={"object": "list", "data": models})
+        self._send(listed if is_list else wire.error(404, "GET /v1/models lists the models"))
 
     def do_POST(self) -> None:
         """Answer a conversation."""
@@ -117,37 +115,31 @@ class _Handler(BaseHTTPRequestHandler):
             return
         body = self.rfile.read(int(length))
         if self.path != "/v1/chat/completions":
-            self._send(self._no_path())
+            self._send(wire.error(404, "POST to /v1/chat/completions"))
             return
         try:
             request = wire.chat_request(body)
         except wire.BadRequest as refused:
-            self._send(wire.error(400, str(refused), param=refused.param))
+            self._send(wire.error(400, str(refused)))
             return
+        if request.model == SLOW:
+            self.server.stopping.wait(self.server.slow_s)
         self._send(MODELS.get(request.model, _unknown)(request, self.server))
 
     def log_message(self, format: str, *args: object) -> None:
         """Stay quiet: a request may hold what nobody wants in a log."""
 
-    def _no_path(self) -> wire.Response:
-        shown = json.dumps(self.path[:80])
-        return wire.error(
-            404, f"There is no {shown}; POST to /v1/chat/completions", code="not_found"
-        )
-
     def _send(self, response: wire.Response) -> None:
-        self.server.stopping.wait(max(self.server.latency_s, response.wait_s))
+        body = json.dumps(response.document).encode()
         try:
             self.send_response(response.status)
-            self.send_header("Content-Type", response.content_type)
-            self.send_header("Content-Length", str(len(response.body)))
+            self.send_header("Content-Type", "application/json")
+            self.send_header("Content-Length", str(len(body)))
             for name, value in response.headers.items():
                 self.send_header(name, value)
             self.end_headers()
-            self.wfile.write(response.body[: response.cut_at])
+            self.wfile.write(body)
         except (BrokenPipeError, ConnectionResetError):
-            self.close_connection = True
-        if response.cut_at is not None:
             self.close_connection = True
 
 
@@ -158,13 +150,13 @@ Behaviour = Callable[[wire.ChatRequest, FakeServer], wire.Response]
 
 def _unknown(request: wire.ChatRequest, server: FakeServer) -> wire.Response:
     message = f"The model {request.model!r} does not exist. Known: {', '.join(sorted(MODELS))}."
-    return wire.error(404, message, param="model", code="model_not_found")
+    return wire.error(404, message, code="model_not_found")
 
 
 def _as(character: playing.Character) -> Behaviour:
     def played(request: wire.ChatRequest, server: FakeServer) -> wire.Response:
-        text, calls = _probed(request) or character.answer(request, server.intents)
-        return wire.as_json(wire.completion(request, text or None, calls=calls))
+        text, calls = _probed(request) or character.answer(request, server.known)
+        return wire.completion(request, text or None, calls=calls)
 
     return played
 
@@ -197,49 +189,30 @@ _good = _as(playing.GOOD)
 
 def _no_vision(request: wire.ChatRequest, server: FakeServer) -> wire.Response:
     if any(message.images for message in request.messages):
-        return wire.error(400, "This model does not support image input.", param="messages")
+        return wire.error(400, "This model does not support image input.")
     return _good(request, server)
 
 
 def _cuts_context(request: wire.ChatRequest, server: FakeServer) -> wire.Response:
     """Answer as servers do that keep to their window without a word: the front is gone."""
-    if wire.prompt_tokens_of(request) <= WINDOW_TOKENS:
+    if request.tokens <= WINDOW_TOKENS:
         return _good(request, server)
     last = request.messages[-1]
     kept = last.model_copy(update={"content": last.text[-_KEPT_CHARACTERS:]})
-    cut = _good(request.model_copy(update={"messages": [kept]}), server)
-    return wire.as_json(json.loads(cut.body) | {"usage": wire.usage(WINDOW_TOKENS, 9)})
-
-
-def _good_but(change: Callable[[wire.Response, FakeServer], wire.Response]) -> Behaviour:
-    """Answer well and then spoil the response."""
-    return lambda request, server: change(_good(request, server), server)
-
-
-def _halved(whole: wire.Response, server: FakeServer) -> wire.Response:
-    return replace(whole, body=whole.body[: len(whole.body) // 2])
-
-
-def _dropped(whole: wire.Response, server: FakeServer) -> wire.Response:
-    return replace(whole, cut_at=len(whole.body) // 2)
-
-
-def _without_usage(whole: wire.Response, server: FakeServer) -> wire.Response:
-    document = json.loads(whole.body)
-    del document["usage"]
-    return wire.as_json(document)
+    text, _ = playing.GOOD.answer(request.model_copy(update={"messages": [kept]}), server.known)
+    return wire.completion(request, text, usage=(WINDOW_TOKENS, 9))
 
 
 def _cut_off(request: wire.ChatRequest, server: FakeServer) -> wire.Response:
-    text, _ = playing.GOOD.answer(request, server.intents)
+    text, _ = playing.GOOD.answer(request, server.known)
     middle = text.find("```json") + len("```json") + 40
-    return wire.as_json(wire.completion(request, text[:middle], finish_reason="length"))
+    return wire.completion(request, text[:middle], finish_reason="length")
 
 
 def _garbage(request: wire.ChatRequest, server: FakeServer) -> wire.Response:
     rng = careless.dice(request.model_dump_json())
     alphabet = '{}[]",:0123456789.-eE\n\\`#*abcXYZ \u00e9\u2028\x00add"move"remove"call"'
-    return wire.as_json(wire.completion(request, "".join(rng.choices(alphabet, k=2000))))
+    return wire.completion(request, "".join(rng.choices(alphabet, k=2000)))
 
 
 def _always(response: wire.Response) -> Behaviour:
@@ -247,24 +220,12 @@ def _always(response: wire.Response) -> Behaviour:
     return lambda request, server: response
 
 
-def _complete(
-    text: str | None, changes: dict[str, object] | None = None, **more: str
-) -> Behaviour:
+def _complete(text: str | None, **more: str) -> Behaviour:
     """Complete every request with that text."""
-    return lambda request, server: wire.as_json(
-        wire.completion(request, text, **more) | (changes or {})  # type: ignore[arg-type]
-    )
+    return lambda request, server: wire.completion(request, text, **more)  # type: ignore[arg-type]
 
 
-def _too_many(retry_after: str) -> Behaviour:
-    headers = {"Retry-After": retry_after}
-    message, code = "Rate limit reached.", "rate_limit_exceeded"
-    return _always(wire.error(429, message, kind="requests", code=code, headers=headers))
-
-
-_500 = _always(wire.error(500, "The server had an error.", kind="server_error"))
-_QUOTA, _TOO_LONG = "insufficient_quota", "context_length_exceeded"
-_LIST_ERROR = {"error": {"code": 400, "message": "Invalid value.", "status": "INVALID_ARGUMENT"}}
+_500 = _always(wire.error(500, "The server had an error."))
 
 MODELS: dict[str, Behaviour] = {
     "fake-good": _good,
@@ -275,31 +236,19 @@ MODELS: dict[str, Behaviour] = {
     "fake-garbage": _garbage,
     "fake-no-vision": _no_vision,
     "fake-cuts-context": _cuts_context,
+    SLOW: _good,
     "fake-500": _500,
     "fake-500-then-ok": lambda request, server: (_500 if server.is_first(request) else _good)(
         request, server
     ),
-    "fake-429": _too_many("1"),
-    "fake-429-long": _too_many("600"),
+    "fake-429": _always(
+        wire.error(429, "Rate limit reached.", "rate_limit_exceeded", {"Retry-After": "1"})
+    ),
     "fake-quota": _always(
-        wire.error(429, "You exceeded your current quota.", kind=_QUOTA, code=_QUOTA)
+        wire.error(429, "You exceeded your current quota.", "insufficient_quota")
     ),
-    "fake-context": _always(
-        wire.error(400, "This model's maximum context length is 4096 tokens.", code=_TOO_LONG)
-    ),
-    "fake-list-error": _always(wire.as_json([_LIST_ERROR], status=400)),
-    "fake-html": _always(
-        wire.Response(body=b"<html><body>Sign in</body></html>", content_type="text/html")
-    ),
-    "fake-slow": _good_but(lambda whole, server: replace(whole, wait_s=server.slow_s)),
-    "fake-broken-json": _good_but(_halved),
-    "fake-dropped": _good_but(_dropped),
-    "fake-no-choices": _complete("", {"choices": []}),
-    "fake-no-usage": _good_but(_without_usage),
     "fake-refuse": _complete(None, refusal="I can't help with that."),
     "fake-filtered": _complete(None, finish_reason="content_filter"),
-    "fake-prose": _complete(
-        "The car should stand some way ahead of the ego, a little to the side of its lane."
-    ),
+    "fake-prose": _complete("The car should stand some way ahead of the ego, a little aside."),
     "fake-cut-off": _cut_off,
 }

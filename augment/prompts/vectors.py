@@ -14,11 +14,12 @@ import json
 import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 from enum import StrEnum
 from functools import cached_property
 from itertools import count
 from string import ascii_letters
+from typing import Any
 
 import numpy as np
 
@@ -37,6 +38,10 @@ Vector = list[object]
 
 _COMPASS = ("East", "Northeast", "North", "Northwest", "West", "Southwest", "South", "Southeast")
 _BOUNDARY_TOLERANCE_M = 0.1
+_WITH_IDS = (
+    *(entities.Scene, entities.Modification, entities.TrafficAgent),
+    *(entities.Lane, entities.LaneConnector),
+)
 # The end of a whole number; ids and words of ours have no dot.
 _WHOLE = re.compile(r"(?<=[0-9])\.0(?=[],])")
 
@@ -84,6 +89,18 @@ def short_names(scene: entities.Scene) -> ShortNames:
         | _shorten((connector.id for connector in scene.connectors), "Connector"),
         areas=_shorten((area.id for area in scene.areas), "Area"),
     )
+
+
+def with_short_ids(value: Any, names: ShortNames) -> Any:
+    """Return a scene, or a part of one, with short ids wherever the scene's own stand in it."""
+    if isinstance(value, str):
+        return names.agents.get(value) or names.lanes.get(value, value)
+    if isinstance(value, tuple):
+        return tuple(with_short_ids(part, names) for part in value)
+    if isinstance(value, _WITH_IDS):
+        changes = {part.name: getattr(value, part.name) for part in fields(value)}
+        return replace(value, **{n: with_short_ids(part, names) for n, part in changes.items()})
+    return value
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -6,11 +6,10 @@ decides. Geometric, our own: the deterministic checks speak, no model does; wher
 an intent they are held against it as well.
 """
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass
 from functools import partial
-from typing import Any
 
 from augment.checks import Ground, Severity
 from augment.checks.registry import check_against_intent
@@ -18,10 +17,10 @@ from augment.errors import ModelRefused, ReplyUnreadable, ReviewUnusable
 from augment.llm.messages import DEFAULT_MAX_TOKENS
 from augment.prompts import fill
 from augment.prompts.reply import read_questions, read_ratings, read_sight, read_verdict
-from augment.prompts.vectors import DEFAULT_RADIUS_M, short_names
+from augment.prompts.vectors import DEFAULT_RADIUS_M, short_names, with_short_ids
 from augment.render.bev import draw_for_review
 from augment.render.camera import WIDTH_PX, camera_for
-from augment.scene.entities import Lane, LaneConnector, Modification, Scene, TrafficAgent
+from augment.scene.entities import Modification, Scene
 from augment.scene.intent import Intent
 from augment.variants.respondents import ModelRole, Respondents
 
@@ -237,7 +236,7 @@ def pictures(
     reviewed, never on a reference.
     """
     names = short_names(scene)
-    shown, change = (_rename(one, names.agents | names.lanes) for one in (scene, modification))
+    shown, change = (with_short_ids(one, names) for one in (scene, modification))
     return draw_for_review(shown, change, camera_for(shown, change).at_width(width_px))
 
 
@@ -276,15 +275,3 @@ def _unusable(who: str) -> Iterator[None]:
         raise ReviewUnusable(f"{who}: {'; '.join(unreadable.problems)}") from unreadable
     except ModelRefused as refused:
         raise ReviewUnusable(f"{who} declined: {refused}") from refused
-
-
-def _rename(value: Any, names: Mapping[str, str]) -> Any:
-    """Return a value of a scene with other ids wherever these stand in it."""
-    if isinstance(value, str):
-        return names.get(value, value)
-    if isinstance(value, tuple):
-        return tuple(_rename(one, names) for one in value)
-    if isinstance(value, Scene | Modification | TrafficAgent | Lane | LaneConnector):
-        parts = {part.name: getattr(value, part.name) for part in fields(value)}
-        return replace(value, **{name: _rename(part, names) for name, part in parts.items()})
-    return value

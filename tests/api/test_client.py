@@ -9,7 +9,7 @@ import pytest
 
 from augment.fake_llm.server import FakeServer, running
 from client.arena_client import ApiError, Arena
-from tests.parked import intents, write_street
+from tests.parked import known, write_street
 from tests.processes import wait_until
 from tests.stack import Home
 
@@ -20,7 +20,7 @@ DOCS = Path(__file__).parents[2] / "docs" / "api.md"
 
 @pytest.fixture
 def model() -> Iterator[FakeServer]:
-    with running(intents=intents) as serving:
+    with running(known=known) as serving:
         yield serving
 
 

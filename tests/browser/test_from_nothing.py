@@ -19,11 +19,12 @@ from playwright.sync_api import Browser, Page, expect
 
 from augment.fake_llm.server import FakeServer, running
 from augment.llm.questions import Ability
+from augment.scene.entities import Scene
 from augment.scene.intent import Intent
 from tests.browser.booth import DESK, ready
 from tests.browser.chromium import PATIENCE_MS, chromium
 from tests.browser.job_round import CONTESTANTS, SCENARIOS, run_round
-from tests.parked import TYPE, asked, intents, reference, wish, write_street
+from tests.parked import TYPE, asked, known, reference, wish, write_street
 from tests.processes import wait_until
 from tests.stack import Home
 
@@ -39,9 +40,9 @@ class StandIn:
 
     gate: threading.Event = field(default_factory=threading.Event)
 
-    def intents(self, instruction: str) -> Intent | None:
+    def known(self, instruction: str) -> list[tuple[Scene, Intent]]:
         self.gate.wait(timeout=120)
-        return intents(instruction)
+        return known(instruction)
 
 
 @pytest.fixture
@@ -53,7 +54,7 @@ def stand_in() -> StandIn:
 
 @pytest.fixture
 def model(stand_in: StandIn) -> Iterator[FakeServer]:
-    with running(intents=stand_in.intents) as serving:
+    with running(known=stand_in.known) as serving:
         yield serving
         stand_in.gate.set()
 

@@ -3,10 +3,10 @@ from collections.abc import Iterator
 import pytest
 
 from augment.fake_llm.server import FakeServer, running
-from tests.intents import intents
+from tests.intents import known
 
 
 @pytest.fixture
 def server() -> Iterator[FakeServer]:
-    with running(slow_s=3600.0, intents=intents) as serving:
+    with running(slow_s=3600.0, known=known) as serving:
         yield serving

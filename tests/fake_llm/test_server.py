@@ -6,20 +6,16 @@ import socket
 import subprocess
 import sys
 from collections.abc import Mapping
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from augment.fake_llm.server import FakeServer
-from augment.fake_llm.sight import task_of
-from augment.fake_llm.wire import BadRequest, SpokenMessage, chat_request
+from augment.fake_llm.wire import BadRequest, chat_request
 from augment.llm.messages import Message, Request, Speaker, data_url
-from augment.prompts.fill import modifier_messages
 from augment.render.camera import camera_for
-from augment.scene.entities import Scene, TrafficSide
 from tests.render.pictures import draw_original
-from tests.scenes import cone, junction, scene, vehicle
+from tests.scenes import scene
 
 HELLO = {"role": "user", "content": "Hello"}
 
@@ -73,72 +69,29 @@ def test_what_our_own_client_sends_is_accepted() -> None:
 
 
 @pytest.mark.parametrize(
-    ("sent", "param"),
+    ("sent", "place"),
     [
-        (b"", None),
-        (b"[" * 100_000, None),
-        (b"[]", ""),
-        (body(model=""), "model"),
+        (b"", "the body"),
+        (b"[" * 100_000, "the body"),
         (body(model=None), "model"),
         (body(messages=[]), "messages"),
         (body(colour="red"), "colour"),
         (body(stream=True), "stream"),
         (body(temperature="0"), "temperature"),
-        (body(temperature=3.0), "temperature"),
         (body(max_completion_tokens=0), "max_completion_tokens"),
         (body(messages=[HELLO | {"role": "robot"}]), "messages.0.role"),
-        (body(messages=[HELLO | {"name": "x"}]), "messages.0.name"),
-        (body(messages=[{"role": "user"}]), "messages.0.content"),
         (body(messages=[HELLO | {"content": " "}]), "messages.0.content"),
-        (body(messages=[HELLO | {"content": []}]), None),
         (body(messages=[HELLO, {"role": "assistant", "content": "Hi"}]), "messages"),
-        (
-            body(messages=[{"role": "system", "content": [{"type": "text", "text": "a"}]}, HELLO]),
-            "messages.0.content",
-        ),
-        (body(messages=[HELLO | {"content": [{"type": "audio"}]}]), None),
+        (body(messages=[HELLO | {"role": "tool", "tool_call_id": "c1"}]), "messages.0"),
         (
             body(messages=[HELLO | {"content": [PNG | {"image_url": {"url": "http://a/b.png"}}]}]),
-            None,
+            "messages.0.content",
         ),
     ],
 )
-def test_a_request_that_breaks_the_rules_is_refused(sent: bytes, param: str | None) -> None:
-    with pytest.raises(BadRequest) as raised:
+def test_a_request_that_breaks_the_rules_is_refused(sent: bytes, place: str) -> None:
+    with pytest.raises(BadRequest, match=f"^{place}"):
         chat_request(sent)
-    assert str(raised.value)
-    if param is not None:
-        assert raised.value.param == param
-
-
-WISH = "Add a parked car 17 m ahead.\nIt stands 0.4 m left of the centre."
-
-
-def messages(shown: Scene, wish: str = WISH) -> list[SpokenMessage]:
-    return [
-        SpokenMessage.model_validate(message.to_document())
-        for message in modifier_messages(shown, wish)
-    ]
-
-
-def test_the_scene_and_the_wish_are_read_back() -> None:
-    shown = replace(
-        junction(),
-        agents=(vehicle("Agent2", 12.0, 0.0, 0.1), cone("Agent6", 30.0, 2.0)),
-        traffic_side=TrafficSide.LEFT,
-        areas=scene().areas,
-    )
-    task = task_of(messages(shown))
-    assert (task.instruction, task.first_new) == (WISH, 7)
-    assert task.scene.traffic_side is TrafficSide.LEFT
-    assert [a.id for a in task.scene.agents] == ["Agent2", "Agent6"]
-    assert task.scene.agents[0] == shown.agents[0]
-    assert task.scene.ego.lane_id == "Lane1"
-    assert [(w.id, w.from_lane, w.to_lane, w.turn_type) for w in task.scene.connectors] == [
-        (w.id, w.from_lane, w.to_lane, w.turn_type) for w in shown.connectors
-    ]
-    assert [w.width_m for w in task.scene.connectors] == [3.5, 3.5]
-    assert [(a.id, a.kind) for a in task.scene.areas] == [(a.id, a.kind) for a in shown.areas]
 
 
 MANAGE = Path(__file__).parents[2] / "manage.py"

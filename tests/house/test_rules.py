@@ -21,7 +21,6 @@ HEAVY = {
     "pyarrow": ("augment.formats", "arena.exports", "arena.rating.votes_file"),
     "scenariogeneration": ("augment.formats",),
     "matplotlib": ("arena.jobs.exports", "arena.results.exports"),
-    "scipy.interpolate": ("augment.fake_llm",),
     "scipy.optimize": ("augment.metrics", "arena.pairing"),
     "scipy.signal": ("augment.simulation",),
     "scipy.sparse": ("arena.rating",),

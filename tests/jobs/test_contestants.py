@@ -34,7 +34,7 @@ from augment.services.running import jobs, runner
 from augment.services.running.choosing import find_obstacle
 from augment.services.running.jobs import JobRequest
 from augment.variants.respondents import ModelRole
-from tests.intents import intents
+from tests.intents import known
 from tests.jobs.models import llama_job, ran
 from tests.jobs.rows import add_scenario, only_row
 from tests.llm.recorder import recorder
@@ -213,7 +213,7 @@ def test_a_key_goes_to_another_host_only_when_told_twice_and_is_logged() -> None
 
 @pytest.fixture(scope="module")
 def server() -> Iterator[FakeServer]:
-    with running(intents=intents) as serving:
+    with running(known=known) as serving:
         yield serving
 
 
@@ -301,7 +301,7 @@ def test_a_cap_in_money_needs_the_price_of_every_role() -> None:
 
 
 def test_each_role_is_asked_at_its_own_endpoint(server: FakeServer) -> None:
-    with running(intents=intents) as other:
+    with running(known=known) as other:
         ensure_endpoint(EndpointRequest(label="a", base_url=server.url, is_simulated=True))
         ensure_endpoint(EndpointRequest(label="b", base_url=other.url, is_simulated=True))
         contestants.add_contestant(

@@ -21,7 +21,7 @@ from augment.services.endpoints.known_endpoints import EndpointRequest, ensure_e
 from augment.services.running import intent_readings
 from augment.services.running.intent_readings import READINGS, plan_reading, read_intent
 from augment.services.scenarios.editing import accept_reading
-from tests.intents import cones, intents
+from tests.intents import cones, known
 from tests.jobs.rows import add_scenario
 from tests.llm.scripted import ScriptedClient
 
@@ -102,7 +102,7 @@ def run(*arguments: str) -> str:
 
 def test_the_command_reads_through_the_wire_shows_statements_and_accepts(tmp_path: Path) -> None:
     add_scenario("street", intent=None, intent_origin="")
-    with running(intents=intents) as server:
+    with running(known=known) as server:
         ensure_endpoint(EndpointRequest(label="stand-in", base_url=server.url))
         said = run("--endpoint", "stand-in", "--model", "fake-good")
     assert "- cones: 20 m ahead of the ego\n" in said

@@ -162,6 +162,24 @@ def test_a_packing_that_nobody_asked_for_is_named(packing: str) -> None:
     assert f"can't be unpacked: {packing}" in str(broken)
 
 
+@pytest.mark.parametrize(
+    ("body", "status", "kind", "retryable", "text"),
+    [
+        (b'[{"error": {"message": "Bad value."}}]', "400 Bad", "json", False, "Bad value."),
+        (b'{"choices": []}', "200 OK", "json", True, "without a choice"),
+        (b'{"choices"', "200 OK", "json", True, "not valid JSON"),
+        (b"<p>Sign in</p>", "200 OK", "html", False, "instead of JSON"),
+    ],
+)
+def test_what_is_no_answer_says_why(
+    body: bytes, status: str, kind: str, retryable: bool, text: str
+) -> None:
+    said = f"HTTP/1.1 {status}\r\nContent-Type: text/{kind}\r\nContent-Length: {len(body)}"
+    said = said.replace("text/json", "application/json")
+    broken = fault(lambda connection: connection.sendall(f"{said}\r\n\r\n".encode() + body))
+    assert (broken.retryable, text in str(broken)) == (retryable, True), broken
+
+
 @pytest.mark.parametrize("deep", ["[" * 100_000, '{"a":' * 100_000, "[" * 90_000 + "]" * 90_000])
 def test_json_that_nests_without_end_is_a_fault(deep: str) -> None:
     broken = fault(whole(deep.encode()))

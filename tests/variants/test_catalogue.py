@@ -19,7 +19,7 @@ from augment.variants.respondents import RespondentClient
 from tests.baselines.test_rule_placer import placed
 from tests.checks.worlds import findings
 from tests.fixtures.shelf import SLUGS, entry, shown_scene
-from tests.intents import intents
+from tests.intents import known
 from tests.variants.memory import MemoryTranscript
 
 CALLS_OF_GOOD = {
@@ -41,7 +41,7 @@ SOME = [next(slug for slug in SLUGS if slug.startswith(kind)) for kind in KINDS]
 
 @pytest.fixture(scope="module")
 def server() -> Iterator[FakeServer]:
-    with running(intents=intents) as serving:
+    with running(known=known) as serving:
         yield serving
 
 

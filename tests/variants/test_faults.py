@@ -19,7 +19,7 @@ from augment.llm.openai_wire import OpenAIWire
 from augment.variants.pipeline import run
 from augment.variants.recipes import find_recipe
 from augment.variants.respondents import ModelRole, RespondentClient
-from tests.intents import intents
+from tests.intents import known
 from tests.scenes import scene
 from tests.variants.memory import MemoryTranscript
 
@@ -31,7 +31,7 @@ REVIEWS = {None: "none", True: "accepted", False: "not accepted"}
 
 @pytest.fixture(scope="module")
 def server() -> Iterator[FakeServer]:
-    with running(slow_s=30.0, intents=intents) as serving:
+    with running(slow_s=30.0, known=known) as serving:
         yield serving
 
 

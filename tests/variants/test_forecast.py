@@ -14,7 +14,7 @@ from augment.variants.recipes import FC, OTM, RECIPES, TQA, VQA
 from augment.variants.respondents import ModelRole, RespondentClient
 from augment.variants.showing import CallRange, calls_of
 from tests.fixtures.shelf import entry, shown_scene
-from tests.intents import intents
+from tests.intents import known
 from tests.variants.memory import MemoryTranscript
 
 SLUG = "overtake-terrace-row"
@@ -34,7 +34,7 @@ class Playing:
     def complete(self, request: Request, *, sending: Sending = watch_nothing) -> Reply:
         sending()
         body = json.dumps(request.to_document()).encode()
-        said, _ = self._character.answer(chat_request(body), intents)
+        said, _ = self._character.answer(chat_request(body), known)
         return Reply(text=said, model="m", finish_reason="stop")
 
 

@@ -9,7 +9,7 @@ from typing import Any
 from django.core.management.base import CommandError
 
 from augment.fake_llm.server import MODELS, running
-from augment.services.scenarios.prompts import StoredIntents
+from augment.services.scenarios.prompts import stored_tasks
 from augment.services.terminal import TerminalCommand
 
 _STOP = (signal.SIGINT, signal.SIGTERM)
@@ -28,19 +28,13 @@ class Command(TerminalCommand):
     arguments = {
         "--port": {"type": int, "default": 8099, "help": "0 takes a free one"},
         "--host": {"default": "127.0.0.1"},
-        "--latency": {"type": float, "default": 0.0, "help": "seconds before an answer"},
     }
 
     def handle(self, *args: Any, **options: Any) -> None:
         """Serve until SIGINT or SIGTERM."""
         host, port = options["host"], options["port"]
         try:
-            with (
-                _until_signalled() as wait,
-                running(
-                    host, port, latency_s=options["latency"], intents=StoredIntents()
-                ) as server,
-            ):
+            with _until_signalled() as wait, running(host, port, known=stored_tasks) as server:
                 self.stdout.write(f"The stand-in language model listens on {server.url}")
                 self.stdout.flush()
                 wait()

@@ -7,7 +7,7 @@ from augment.fake_llm.sight import same_text
 from augment.models import Scenario
 from augment.prompts.fill import prompt_version as prompt_version
 from augment.scene.codec import intent_from_document
-from augment.scene.entities import Modification
+from augment.scene.entities import Modification, Scene
 from augment.scene.intent import Intent
 from augment.services.scenarios.scenes import reference_of, scene_of
 from augment.variants.options import ContestantOptions, recipe_with
@@ -61,24 +61,16 @@ def preview_prompt(
     )
 
 
-class StoredIntents:
-    """The intents of all scenarios, by the texts of their instructions, for the stand-in model.
+def stored_tasks(instruction: str) -> list[tuple[Scene, Intent]]:
+    """Return scene and intent of the scenarios with that instruction, for the stand-in model.
 
-    Asked from the threads of a server: each leaves no connection behind. What was found once is
-    remembered; what was not is looked for again, because scenarios and intents come later.
+    Asked from the threads of a server: each leaves no connection behind.
     """
-
-    def __init__(self) -> None:
-        self._found: dict[str, Intent] = {}
-
-    def __call__(self, instruction: str) -> Intent | None:
-        """Return the intent of the first scenario with that instruction, None for none."""
-        text = same_text(instruction)
-        if text not in self._found:
-            try:
-                rows = Scenario.objects.exclude(intent=None).order_by("-pk")
-                for words, document in rows.values_list("instruction", "intent"):
-                    self._found[same_text(words)] = intent_from_document(document)
-            finally:
-                connection.close()
-        return self._found.get(text)
+    try:
+        rows = Scenario.objects.exclude(intent=None).order_by("-pk")
+        texts = rows.values_list("pk", "instruction")
+        pks = [pk for pk, text in texts if same_text(text) == same_text(instruction)]
+        alike = rows.filter(pk__in=pks).select_related("base_scene")
+        return [(scene_of(row), intent_from_document(row.intent)) for row in alike]
+    finally:
+        connection.close()
