@@ -20,11 +20,12 @@ that theirs is never an expert's."""
 
 
 class AccountBackend(ModelBackend):
-    """Django's accounts and passwords; who is signed in is loaded with the roles."""
+    """Django's accounts and passwords; who is signed in is loaded with person and roles."""
 
     def get_user(self, user_id: Any) -> User | None:
         """Return the account of a session, None where it is gone or not active."""
-        user = User.objects.prefetch_related("groups").filter(pk=user_id).first()
+        accounts = User.objects.select_related("person").prefetch_related("groups")
+        user = accounts.filter(pk=user_id).first()
         return user if user is not None and self.user_can_authenticate(user) else None
 
 
@@ -140,7 +141,7 @@ def profile_of(user: User | AnonymousUser) -> Profile | None:
     """Return what the page's frame shows of a person; None where nobody is signed in."""
     if not user.is_authenticated:
         return None
-    person = Person.objects.filter(user=user).first()
+    person: Person | None = getattr(user, "person", None)
     stored = person.preferences.get("theme") if person else None
     return Profile(
         name=person.pseudonym if person else user.get_username(),
@@ -151,6 +152,6 @@ def profile_of(user: User | AnonymousUser) -> Profile | None:
 
 def language_of(user: User) -> Language | None:
     """Return the language that a person chose; None follows the browser."""
-    person = Person.objects.filter(user=user).only("preferences").first()
+    person: Person | None = getattr(user, "person", None)
     stored = person.preferences.get("language") if person else None
     return Language(stored) if stored in set(Language) else None

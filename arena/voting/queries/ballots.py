@@ -64,8 +64,8 @@ def hold_matchup(*, expert: User, code: UUID) -> Matchup:
     rows = Matchup.objects.select_for_update(of=("self",)).filter(code=code, expert=expert)
     matchup = (
         rows.exclude(study__early_looks__user=expert)
-        .select_related("study", "expert__person")
-        .only("study__name", "study__state", "left", "right", "expert__person__is_simulated")
+        .select_related("study")
+        .only("study__name", "study__state", "left", "right")
         .first()
     )
     if matchup is None:

@@ -194,7 +194,7 @@ def _insert(matchup: Matchup, expert: User, decision: Decision, old: Vote | None
         comment=decision.comment,
         aids=decision.aids,
         supersedes=old,
-        is_simulated=matchup.expert.person.is_simulated,
+        is_simulated=expert.person.is_simulated,
         ms_visible=decision.ms_visible,
     )
     vote.save(force_insert=True)
