@@ -121,7 +121,7 @@ def download(
 # --- Tables with one line a row ----------------------------------------------------------------
 
 Value = str | Callable[[Any], object]
-"""A dotted path of attributes, or a function of a line."""
+"""A dotted path of attributes or keys, or a function of a line."""
 Columns = Mapping[str, tuple[Value, str]]
 """By name: the value, and what the column holds."""
 
@@ -171,7 +171,8 @@ def read_value(line: Any, value: Value, digits: int | None = 4) -> object:
     else:
         read = line
         for name in value.split("."):
-            read = None if read is None else getattr(read, name)
+            if read is not None:
+                read = read[name] if isinstance(read, dict) else getattr(read, name)
     match read:
         case Enum():
             return read.value

@@ -11,7 +11,7 @@ from django.utils.text import slugify
 from arena.errors import StudyStillOpen
 from arena.exports.formats import Export, format_named
 from arena.jobs.exports.files import scenario_zip, zip_name
-from arena.jobs.exports.tables import ANALYSES, JOB_FILES
+from arena.jobs.exports.tables import JOB_FILES
 from arena.models import Snapshot, Study
 from arena.results.exports.sheets import SHEET_FORMATS, contact_sheet, find_cells, sample_sheet
 from arena.results.exports.votes import VOTE_FORMATS, unrated_votes
@@ -22,7 +22,8 @@ from arena.results.services.ratings import log_early_look
 from arena.studies.queries import study_named
 from augment.errors import Conflict, UnknownName
 from augment.services.judging import scenario_export, simulations
-from augment.services.judging.displacement import By, types_named
+from augment.services.judging.analyses import ANALYSES
+from augment.services.judging.displacement import By
 from augment.services.judging.driving_scores import options_driven
 from augment.services.judging.simulations import SCORES
 from augment.services.running.choosing import find_job
@@ -140,9 +141,10 @@ def _write_plain(options: Chosen, say: Say) -> ExportedFile:
 
 def _write_displacement(options: Chosen, say: Say) -> ExportedFile:
     """Write how far from the references: in groups, or one row an object."""
-    by, types = options["by"], options["types"]
-    name = "displacement-objects" if by == BY_OBJECT else f"displacement-by-{by}"
-    return _write_table(name, options, types=None if types is None else types_named(types))
+    by = options["by"]
+    return _write_table(
+        "displacement-objects" if by == BY_OBJECT else f"displacement-by-{by}", options
+    )
 
 
 def _write_driving(options: Chosen, say: Say) -> ExportedFile:
@@ -168,19 +170,6 @@ def _write_samples(options: Chosen, say: Say) -> ExportedFile:
     shown = {"scenarios": options["scenarios"], "contestants": options["contestants"]}
     cells = find_cells(find_job(options["job"]), sample=options["sample"], **shown)
     return ExportedFile(sample_sheet(cells, file_format=form, **shown), form, False)
-
-
-def _write_modifications(options: Chosen, say: Say) -> ExportedFile:
-    """Write all modifications of a job as interPlan's YAML."""
-    exported = scenario_export.export_job(
-        find_job(options["job"]), file_format="interplan", contestant=options["contestant"]
-    )
-    losses = (*exported.missing, *exported.written.refused, *exported.written.losses)
-    for loss in losses:
-        say(f"Lost: {loss}.")
-    say(f"{len(losses)} things could not be said in interPlan's format.")
-    (content,) = exported.written.files.values()
-    return ExportedFile(content, "yaml", True)
 
 
 def _write_scenarios(options: Chosen, say: Say) -> ExportedFile:
@@ -252,7 +241,6 @@ KINDS: dict[str, ExportKind] = {
         "how far from the references",
         _write_displacement,
         _option("--by", "grouped by, or a row an object", choices=[*By, BY_OBJECT], default="type")
-        | _option("--types", "scenario types, or all; by variant a few unless given", nargs="+")
         | _format(JOB_FILES["displacement-by-type"].formats),
     ),
     "samples": ExportKind(
@@ -290,12 +278,6 @@ KINDS: dict[str, ExportKind] = {
         _write_analyses,
         _option("--part", "which", choices=list(ANALYSES), required=True)
         | _format(JOB_FILES["analyses-pairs"].formats),
-    ),
-    "modifications": ExportKind(
-        "job",
-        "what a job's contestants made",
-        _write_modifications,
-        _format(["interplan"], choices=["interplan"], default="interplan") | _CONTESTANT,
     ),
     "scenarios": ExportKind(
         "job",

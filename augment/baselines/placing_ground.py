@@ -23,7 +23,6 @@ _GAP_M = 1.5
 _WIDEST_M = 30.0
 _BESIDE_LANES_M = 4.0
 _ALONG_RAD = math.radians(30.0)
-_ONCOMING_WITHIN_M = 15.0
 SIGNS = {Side.LEFT: 1.0, Side.RIGHT: -1.0}
 
 
@@ -66,7 +65,8 @@ class PlacingGround:
         lanes = LanesAcross.of(ground, turn)
         if lanes is None:
             raise CannotPlace("The ego stands on no lane of the map.")
-        self.route, self.graph, self.side_sign = lanes.route, ground.graph, lanes.side_sign
+        self._lanes, self.route, self.graph = lanes, lanes.route, ground.graph
+        self.side_sign = lanes.side_sign
         self.kerb = Side(scene.traffic_side.value)
         self._drivable, self._walkways = (
             shapely.union_all(
@@ -107,14 +107,12 @@ class PlacingGround:
         place = self.along(distance_m)
         if lane in (None, LaneChoice.OWN):
             return place
-        if lane is LaneChoice.ONCOMING:
-            lane_id, words = self._oncoming(place.pose), "oncoming lane"
-        else:
-            lane_id, words = self.neighbour(place, Side(lane)), f"lane on the {lane}"
-        if lane_id is None or lane_id not in self.graph.lanes:
+        band = self._lanes.band(lane, distance_m)
+        if band is None:
+            words = "oncoming lane" if lane is LaneChoice.ONCOMING else f"lane on the {lane}"
             raise CannotPlace(f"The map has no {words} beside the ego's lane there.")
-        s_m = self.graph.lane(lane_id).centerline.project(place.pose.x_m, place.pose.y_m).s_m
-        return self.graph.place(lane_id, s_m)
+        line = self.graph.lane(band.lane_id).centerline
+        return self.graph.place(band.lane_id, line.project(place.pose.x_m, place.pose.y_m).s_m)
 
     def neighbour(self, place: LanePosition, side: Side) -> str | None:
         """Return the lane of the same direction on that side of the place's lane."""
@@ -149,20 +147,6 @@ class PlacingGround:
         return end_m if end_m - lanes_m <= _BESIDE_LANES_M else lanes_m
 
     # Private
-
-    def _oncoming(self, pose: Pose) -> str | None:
-        """The nearest way across the road that leads the other way."""
-        for step in range(1, int(_ONCOMING_WITHIN_M / _STEP_M)):
-            for d_m in (step * _STEP_M, -step * _STEP_M):
-                x_m, y_m = pose.beside(d_m)
-                lane_id = self.graph.under(x_m, y_m, pose.heading_rad + math.pi)
-                if lane_id is None:
-                    continue
-                line = self.graph.lane(lane_id).centerline
-                heading_rad = line.heading_at(line.project(x_m, y_m).s_m)
-                if abs(difference(heading_rad, pose.heading_rad)) > math.radians(135.0):
-                    return lane_id
-        return None
 
     def _runs_along(self, lane: AnyLane, pose: Pose) -> bool:
         place = lane.centerline.project(pose.x_m, pose.y_m)

@@ -56,6 +56,7 @@ _SIGHTS = {
 class Band:
     """A lane at one station: where its centre is, left of the route, and how it runs there."""
 
+    lane_id: str
     left_m: float
     width_m: float
     tangent_rad: float
@@ -93,7 +94,9 @@ class LanesAcross:
             own = best_aligned([lane for lane in near if lane.covers], tangent_rad)
             if own is None:
                 return None
-            return Band(left_m=0.0, width_m=own.width_m, tangent_rad=tangent_rad)
+            return Band(
+                lane_id=own.lane_id, left_m=0.0, width_m=own.width_m, tangent_rad=tangent_rad
+            )
         return min(
             (band for lane in near if (band := _band(lane, tangent_rad, choice))),
             key=lambda band: abs(band.left_m),
@@ -123,7 +126,9 @@ def _band(lane: Beside, tangent_rad: float, choice: LaneChoice) -> Band | None:
     }
     if lane.beyond_m > _JOINT_M or abs(left_m) < _SAME_LANE_M or not fits[choice]:
         return None
-    return Band(left_m=left_m, width_m=lane.width_m, tangent_rad=lane.tangent_rad)
+    return Band(
+        lane_id=lane.lane_id, left_m=left_m, width_m=lane.width_m, tangent_rad=lane.tangent_rad
+    )
 
 
 def find_picked(lanes: LanesAcross, pick: Pick) -> tuple[TrafficAgent, ...]:

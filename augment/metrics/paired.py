@@ -5,7 +5,6 @@ samples of one cell. Values in metres.
 """
 
 import math
-from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
@@ -115,29 +114,6 @@ def find_p_by_signed_ranks(differences: NDArray[np.float64]) -> float | None:
     return float(wilcoxon(unequal).pvalue)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class SampleSpread:
-    """One number a sample, over everything that was asked in it.
-
-    Attributes:
-        mean: Over the samples.
-        sd: Between the samples (divided by n - 1), None for a single one.
-        values: One a sample, in their order.
-    """
-
-    mean: float
-    sd: float | None
-    values: tuple[float, ...]
-
-
-def spread_of(values: Sequence[float]) -> SampleSpread | None:
-    """Mean and standard deviation between samples, None without values."""
-    if not values:
-        return None
-    sd = float(np.std(values, ddof=1)) if len(values) > 1 else None
-    return SampleSpread(mean=float(np.mean(values)), sd=sd, values=tuple(values))
-
-
 def within_sd(groups: Iterable[Sequence[float]]) -> float | None:
     """The pooled standard deviation of values within their groups; None without a repeat.
 
@@ -148,72 +124,3 @@ def within_sd(groups: Iterable[Sequence[float]]) -> float | None:
         return None
     squares = sum(float(np.var(group, ddof=1)) * (len(group) - 1) for group in repeated)
     return math.sqrt(squares / sum(len(group) - 1 for group in repeated))
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Robustness:
-    """One contestant over all scenarios with at least two wordings that were measured.
-
-    Attributes:
-        scenarios: How many those are.
-        wordings: How many wordings they have together.
-        within_m: The pooled standard deviation within a scenario.
-    """
-
-    scenarios: int
-    wordings: int
-    within_m: float
-
-
-def measure_robustness(values: Mapping[str, Sequence[float]]) -> Robustness | None:
-    """The spread within scenarios, None where no scenario has two wordings.
-
-    Args:
-        values: By scenario, one for each of its wordings.
-    """
-    several = [wordings for wordings in values.values() if len(wordings) > 1]
-    within_m = within_sd(several)
-    if within_m is None:
-        return None
-    wordings = sum(map(len, several))
-    return Robustness(scenarios=len(several), wordings=wordings, within_m=within_m)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class RefusalScore:
-    """The answers of one contestant, counted.
-
-    Attributes:
-        right: Refused, and the wish can't be met.
-        wrong: Refused, and the wish can be met.
-        overlooked: Not refused, and the wish can't be met.
-        rest: Not refused, and the wish can be met.
-    """
-
-    right: int
-    wrong: int
-    overlooked: int
-    rest: int
-
-    @property
-    def precision(self) -> float | None:
-        """The share of the refusals that are right, None without a refusal."""
-        refused = self.right + self.wrong
-        return self.right / refused if refused else None
-
-    @property
-    def recall(self) -> float | None:
-        """The share of the wishes that can't be met which were refused, None without any."""
-        unmet = self.right + self.overlooked
-        return self.right / unmet if unmet else None
-
-
-def score_refusals(answers: Iterable[tuple[bool, bool]]) -> RefusalScore:
-    """Count answers: of each whether it was refused, and whether the wish can't be met."""
-    counts = Counter(answers)
-    return RefusalScore(
-        right=counts[True, True],
-        wrong=counts[True, False],
-        overlooked=counts[False, True],
-        rest=counts[False, False],
-    )

@@ -10,8 +10,7 @@ from augment.metrics.paired import (
     adjust_holm,
     compare_all,
     find_p_by_signed_ranks,
-    measure_robustness,
-    score_refusals,
+    within_sd,
 )
 
 DIFFERENCES = (0.9, -0.2, 1.4, 2.2, -0.5, 3.1, 0.7, 1.1)
@@ -79,28 +78,7 @@ def test_the_interval_is_that_of_all_resamples_at_once(n: int, rounds: int) -> N
     assert (found.low_m, found.high_m) == (low, high), "to the last bit"
 
 
-def test_the_spread_over_wordings_is_within_scenarios_alone() -> None:
+def test_what_varies_within_groups_is_pooled_over_them() -> None:
     """Two scenarios far apart, each with a variance of 1: (1 + 1 + 1 + 1) / (2 + 2) by hand."""
-    found = measure_robustness({"a": [1.0, 2.0, 3.0], "b": [11.0, 12.0, 13.0], "c": [50.0]})
-    assert found is not None
-    assert (found.scenarios, found.wordings) == (2, 6)
-    assert found.within_m == pytest.approx(1.0)
-    assert measure_robustness({"a": [1.0], "b": []}) is None
-
-
-@pytest.mark.parametrize(
-    ("answers", "precision", "recall"),
-    [
-        ([(True, True), (True, False), (False, True), (False, False)], 0.5, 0.5),
-        ([(True, True), (True, True), (False, False)], 1.0, 1.0),
-        ([(False, True), (False, True)], None, 0.0),
-        ([(True, False)], 0.0, None),
-        ([], None, None),
-    ],
-)
-def test_refusals_are_counted_by_what_they_refuse(
-    answers: list[tuple[bool, bool]], precision: float | None, recall: float | None
-) -> None:
-    found = score_refusals(answers)
-    assert (found.precision, found.recall) == (precision, recall)
-    assert found.right + found.wrong + found.overlooked + found.rest == len(answers)
+    assert within_sd([[1.0, 2.0, 3.0], [11.0, 12.0, 13.0], [50.0]]) == pytest.approx(1.0)
+    assert within_sd([[1.0], []]) is None

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import pytest
 
+from arena.jobs.exports.tables import JOB_FILES, repeat_sheet
 from arena.results.exports.sheets import find_cells
 from augment.errors import UnknownName
 from augment.models import Augmentation, GenerationJob
@@ -54,18 +55,17 @@ def test_a_job_has_a_row_for_every_sample() -> None:
 
 
 def test_what_varies_between_samples() -> None:
-    first, second = repeatability(job())
+    made = job()
+    first, second = repeatability(made)
     # By hand: means over the matched objects of each sample.
-    assert first.displacement_m is not None
-    assert first.displacement_m.values == pytest.approx((0.2, 0.5))
-    assert first.displacement_m.mean == pytest.approx(0.35)
-    assert first.displacement_m.sd == pytest.approx(math.sqrt(2) * 0.15)
+    assert first["displacement_m_values"] == pytest.approx((0.2, 0.5))
+    assert first["displacement_m_mean"] == pytest.approx(0.35)
+    assert first["displacement_m_sd"] == pytest.approx(math.sqrt(2) * 0.15)
     # Variances 0.02 and 0.08, pooled over one degree of freedom each.
-    assert first.within_m == pytest.approx(math.sqrt(0.05))
-    assert first.missed is not None
-    assert (first.missed.mean, first.missed.sd) == (0.0, 0.0)
-    assert second.missed is not None
-    assert second.missed.values == (0.0, 0.5)
-    assert second.displacement_m is not None
-    assert second.displacement_m.values == pytest.approx((0.2, 0.5))
-    assert first.usd is None
+    assert first["within_m"] == pytest.approx(math.sqrt(0.05))
+    assert (first["missed_mean"], first["missed_sd"]) == (0.0, 0.0)
+    assert second["missed_values"] == (0.0, 0.5)
+    assert second["displacement_m_values"] == pytest.approx((0.2, 0.5))
+    assert first["usd_mean"] is None
+    line = JOB_FILES["repeats"].formats["csv"].write(repeat_sheet(made)).decode().splitlines()[1]
+    assert line == "a,a,no,2,0.35,0.212132,0.2 0.5,0.0,0.0,0 0,,,,0.223607"

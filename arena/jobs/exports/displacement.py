@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -77,40 +77,27 @@ class DisplacementTable:
     @property
     def remarks(self) -> tuple[str, ...]:
         """Sentences that belong beneath every form of it, beside the scenario types."""
-        is_papers = self.by is By.VARIANT and set(self.types) == set(PLACED_EXACTLY)
         return (
             "Distances between centres, in metres, of objects matched within their class so that "
             "their sum is smallest; each matched object counts once.",
             "Missing and surplus objects are counted and have no distance; an unreadable or "
             "refused answer misses all.",
-            *([PAPERS_CHOICE] if is_papers else []),
+            *([PAPERS_CHOICE] if self.by is By.VARIANT else []),
             *(f"Not measured: {number} ({why})." for why, number in self.left_out.items()),
             *([SIMULATED_NOTE] if self.simulated else []),
         )
 
 
-def displacement_table(
-    job: GenerationJob, *, by: By, types: Sequence[str] | None = None
-) -> DisplacementTable:
-    """Return the table of a job; one query.
-
-    Args:
-        job: Whose augmentations are measured.
-        by: What to group by, beside the contestant.
-        types: The scenario types that count; None for the paper's choice: by variant those whose
-            places are definite, else all.
-    """
+def displacement_table(job: GenerationJob, *, by: By) -> DisplacementTable:
+    """Return the table of a job, grouped by that and the contestant; one query."""
     measured = of_job(job)
     every = in_type_order([*ScenarioType, *(one.row.scenario.type for one in measured)])
-    if types is None:
-        types = PLACED_EXACTLY if by is By.VARIANT else list(every)
-    chosen = tuple(name for name in every if name in set(types))
     left_out = Counter(one.why_not.value for one in measured if one.why_not is not None)
     return DisplacementTable(
         job=job.name,
         by=by,
-        types=chosen,
-        groups=tuple(groups(measured, by=by, types=chosen)),
+        types=PLACED_EXACTLY if by is By.VARIANT else tuple(every),
+        groups=tuple(groups(measured, by=by)),
         left_out=dict(sorted(left_out.items())),
     )
 
@@ -176,16 +163,10 @@ OBJECTS: Columns = {
 """`object` is matched, missing or surplus; places are in the ego frame."""
 
 
-def object_sheet(job: GenerationJob, *, types: Collection[str] | None = None) -> Sheet:
-    """Return the displacement of a job with one row an object.
-
-    Args:
-        job: Whose augmentations are measured.
-        types: The scenario types that count; None for all.
-    """
-    found = objects_of(job)
-    lines = (line for line in found if types is None or line.row.scenario.type in types)
-    return sheet_of(lines, OBJECTS, name="displacement-objects", key="objects", number=".4f")
+def object_sheet(job: GenerationJob) -> Sheet:
+    """Return the displacement of a job with one row an object."""
+    name = "displacement-objects"
+    return sheet_of(objects_of(job), OBJECTS, name=name, key="objects", number=".4f")
 
 
 # --- Box plots ---------------------------------------------------------------------------------

@@ -19,8 +19,15 @@ from arena.exports.formats import (
 from arena.jobs.exports import displacement, driving, faults
 from arena.jobs.exports.files import TRANSCRIPT_FORMATS
 from augment.models import GenerationJob
-from augment.services.judging.analyses import analyse_job, augmentation_lines, repeatability
+from augment.services.judging.analyses import (
+    ANALYSES,
+    SEED,
+    answers_of,
+    augmentation_lines,
+    repeatability,
+)
 from augment.services.judging.displacement import By
+from augment.services.judging.driving_scores import scores_of_job
 from augment.services.judging.simulations import SCORES
 from augment.services.running.progress import tool_calls
 
@@ -37,11 +44,6 @@ def _count(name: str) -> Callable[[Any], int | None]:
 def _options(line: Any) -> str | None:
     options = line.row.options
     return None if options is None else json.dumps(options, sort_keys=True)
-
-
-def _samples(line: Any) -> int:
-    spreads = [getattr(line, name) for name in MEASURES]
-    return max((len(spread.values) for spread in spreads if spread is not None), default=0)
 
 
 AUGMENTATIONS: Columns = {
@@ -63,20 +65,18 @@ AUGMENTATIONS: Columns = {
 }
 """`contestant` is the slug, `options` a JSON object; `wrong` and `doubtful` count findings."""
 
-MEASURES = ("displacement_m", "missed", "usd", "wrong")
 REPEATS: Columns = {
-    "contestant": ("slug", TEXT),
-    "name": ("name", TEXT),
-    "simulated": ("is_simulated", YES_NO),
-    "samples": (_samples, WHOLE),
+    **{name: (name, TEXT) for name in ("contestant", "name")},
+    "simulated": ("simulated", YES_NO),
+    "samples": ("samples", WHOLE),
     **{
-        f"{name}_{part}": (f"{name}.{part}", TEXT if part == "values" else NUMBER)
-        for name in MEASURES
+        f"{name}_{part}": (f"{name}_{part}", TEXT if part == "values" else NUMBER)
+        for name in ("displacement_m", "missed", "usd")
         for part in ("mean", "sd", "values")
     },
     "displacement_within_scenario_sd_m": ("within_m", NUMBER),
 }
-"""`sd` is between samples, `values` has one number a sample; see `RepeatLine`."""
+"""`sd` is between samples, `values` has one number a sample; see `repeatability`."""
 
 TOOL_CALLS: Columns = {
     **{name: (name, TEXT) for name in ("contestant", "name", "scenario", "augmentation")},
@@ -84,40 +84,29 @@ TOOL_CALLS: Columns = {
     **{name: (name, WHOLE) for name in ("attempted", "understood", "mended")},
 }
 
-_WHO: Columns = {"contestant": ("slug", TEXT), "simulated": ("is_simulated", YES_NO)}
-_REFUSALS = ("right", "wrong", "overlooked")
-ANALYSES: dict[str, tuple[str, Columns]] = {
-    "pairs": (
-        "pairs",
-        {
-            "first": ("first", TEXT),
-            "second": ("second", TEXT),
-            "scenarios": ("scenarios", WHOLE),
-            "median_difference_m": ("median_m", NUMBER),
-            "low_m": ("low_m", NUMBER),
-            "high_m": ("high_m", NUMBER),
-            "p_wilcoxon": ("p", NUMBER),
-            "p_holm": ("p_holm", NUMBER),
-        },
-    ),
-    "wordings": (
-        "reworded",
-        {
-            **_WHO,
-            **{name: (f"robustness.{name}", WHOLE) for name in ("scenarios", "wordings")},
-            "within_m": ("robustness.within_m", NUMBER),
-        },
-    ),
-    "refusals": (
-        "refusing",
-        {
-            **_WHO,
-            **{name: (f"refusals.{name}", WHOLE) for name in _REFUSALS},
-            **{name: (f"refusals.{name}", NUMBER) for name in ("precision", "recall")},
-        },
-    ),
+_WHO: Columns = {"contestant": ("contestant", TEXT), "simulated": ("simulated", YES_NO)}
+ANALYSIS_COLUMNS: dict[str, Columns] = {
+    "pairs": {
+        "first": ("first", TEXT),
+        "second": ("second", TEXT),
+        "scenarios": ("scenarios", WHOLE),
+        "median_difference_m": ("median_m", NUMBER),
+        "low_m": ("low_m", NUMBER),
+        "high_m": ("high_m", NUMBER),
+        "p_wilcoxon": ("p", NUMBER),
+        "p_holm": ("p_holm", NUMBER),
+    },
+    "wordings": {
+        **_WHO,
+        **{name: (name, WHOLE) for name in ("scenarios", "wordings")},
+        "within_m": ("within_m", NUMBER),
+    },
+    "refusals": {
+        **_WHO,
+        **{name: (name, WHOLE) for name in ("right", "wrong", "overlooked")},
+        **{name: (name, NUMBER) for name in ("precision", "recall")},
+    },
 }
-"""The parts of an analysis: the attribute that holds their lines, and their columns."""
 
 
 def augmentation_sheet(job: GenerationJob) -> Sheet:
@@ -140,10 +129,8 @@ def tool_call_sheet(job: GenerationJob) -> Sheet:
 
 def analysis_sheet(job: GenerationJob, *, part: str) -> Sheet:
     """Return one part of a job's analysis; its bootstrap has a seed, which JSON names."""
-    attribute, columns = ANALYSES[part]
-    analysis = analyse_job(job)
-    facts = {"part": part, "seed": analysis.seed}
-    lines = getattr(analysis, attribute)
+    lines, facts = ANALYSES[part](answers_of(job)), {"part": part, "seed": SEED}
+    columns = ANALYSIS_COLUMNS[part]
     return sheet_of(lines, columns, digits=6, name="analysis", number="g", facts=facts)
 
 
@@ -164,7 +151,7 @@ JOB_TABLES = {
         for by in By
     },
     **{
-        f"driving-{score}": Export(driving.FORMATS, partial(driving.driving_table, score=score))
+        f"driving-{score}": Export(driving.FORMATS, partial(scores_of_job, score=score))
         for score in SCORES
     },
     **{

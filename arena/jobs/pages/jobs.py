@@ -30,7 +30,7 @@ JOBS_AT_ONCE = 25
 MEASURED_AT_ONCE = 1000
 """Of a job with more augmentations the page measures nothing until somebody asks for it."""
 
-_ASK_TO_MEASURE = frozenset({"measures", "by", "types", "checks"})
+_ASK_TO_MEASURE = frozenset({"measures", "by", "checks"})
 
 
 @page_for(*STAFF)

@@ -34,12 +34,13 @@ from arena.site.listing import choice_asked, read_page
 from augment.errors import UnknownName
 from augment.models import GenerationJob, Simulation
 from augment.services.judging import simulations
-from augment.services.judging.analyses import analyse_job
-from augment.services.judging.displacement import By, types_named
+from augment.services.judging.analyses import ANALYSES, SEED, answers_of
+from augment.services.judging.displacement import By
 from augment.services.judging.driving_scores import (
     drives_of_job,
     least_clearance_m,
     options_driven,
+    scores_of_job,
 )
 from augment.services.judging.scenario_export import FORMATS
 from augment.services.judging.simulations import NUPLAN, SCORES, Options, drive_file
@@ -122,7 +123,7 @@ def driving_section(request: HttpRequest, job: GenerationJob) -> dict[str, objec
     """Return the context of the driving part of a job's page."""
     known, chosen = _ways(request, job)
     score = choice_asked(request, "score", list(SCORES)) or NUPLAN
-    table = driving.driving_table(job, options=known[chosen], score=score)
+    table = scores_of_job(job, options=known[chosen], score=score)
     ways = []
     for way in known:
         planner = PLANNERS.get(way.planner, way.planner)
@@ -135,7 +136,7 @@ def driving_section(request: HttpRequest, job: GenerationJob) -> dict[str, objec
         "ways": ways,
         "driven": chosen,
         "choices": {"planner": PLANNERS.items(), "offsets": OFFSETS.items()},
-        "asked": table.scores.options,
+        "asked": table.options,
     }
 
 
@@ -171,9 +172,7 @@ def export_table(request: HttpRequest, code: uuid.UUID, name: str, form: str) ->
     if name.startswith("driving-"):
         known, way = _ways(request, job)
         options = {"options": known[way]}
-    elif name.startswith("displacement-") and request.GET.get("types") == "all":
-        options = {"types": types_named(["all"])}
-    stem = f"{slugify(job.name) or 'job'}-{name}" + "-all-types" * ("types" in options)
+    stem = f"{slugify(job.name) or 'job'}-{name}"
     return download(JOB_FILES[name].formats, form, stem, JOB_FILES[name].make(job, **options))
 
 
@@ -193,7 +192,9 @@ def export_transcripts(request: HttpRequest, code: uuid.UUID) -> StreamingHttpRe
 def analyses_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Show all three parts, on a page of their own: the bootstrap may take seconds."""
     job = get_object_or_404(GenerationJob, code=code)
-    context = {"job": job, "analysis": analyse_job(job), "forms": list(TABLE_FORMATS)}
+    answers = answers_of(job)
+    parts = {part: analyse(answers) for part, analyse in ANALYSES.items()}
+    context = {"job": job, "seed": SEED, "forms": list(TABLE_FORMATS), **parts}
     return render(request, "jobs/analyses.html", context)
 
 
@@ -225,16 +226,11 @@ def download_scenarios(request: HttpRequest, code: uuid.UUID) -> FileResponse:
 def displacement_section(request: HttpRequest, job: GenerationJob) -> dict[str, object]:
     """Return the context of the displacement part of a job's page: by contestant unless asked."""
     by = By(choice_asked(request, "by", list(By)) or By.CONTESTANT)
-    is_all = request.GET.get("types") == "all"
-    types = types_named(["all"]) if is_all else None
     return {
-        "table": displacement.displacement_table(job, by=by, types=types),
+        "table": displacement.displacement_table(job, by=by),
         "by": by,
         "labels": GROUPINGS,
         "forms": displacement.FORMATS,
         "object_forms": TABLE_FORMATS,
         "name": f"displacement-by-{by}",
-        "query": "?types=all" * is_all,
-        "has_choice": by is By.VARIANT,
-        "is_all": is_all,
     }

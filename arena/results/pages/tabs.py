@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any
 
-from arena.jobs.exports.driving import DrivingTable, shown_driving
+from arena.jobs.exports.driving import shown_driving
 from arena.jobs.queries import shown_augmentations
 from arena.models import Snapshot
 from arena.people.queries import natural_order
@@ -141,10 +141,7 @@ def fill_driving(snapshot: Snapshot, table: LeaderboardTable) -> Context:
         return {"drivings": []}
     ids = shown_augmentations(snapshot.study)
     found = [
-        DrivingTable(
-            title=snapshot.study.name,
-            scores=scores_of_augmentations(ids, options=Options(), score=score),
-        )
+        scores_of_augmentations(ids, title=snapshot.study.name, options=Options(), score=score)
         for score in SCORES
     ]
     return {"drivings": [shown_driving(one) for one in found if one.lines]}

@@ -10,7 +10,7 @@ from arena.results.queries.votes import Filters
 from arena.results.services.ratings import DEFAULT_ROUNDS, MOST_ROUNDS, Choices
 from arena.studies.services.plan import HIGHEST_SEED
 from augment.services.inputs import InputKind, input_field
-from augment.services.judging.displacement import types_named
+from augment.services.scenarios.scenes import types_named
 
 METHODS = {
     Method.BRADLEY_TERRY.value: "Bradley-Terry",

@@ -1,4 +1,4 @@
-"""Drive a job's results, or one scenario, in closed loop and print the driving scores."""
+"""Drive a job's results, or one scenario, in closed loop; `export driving` has the means."""
 
 from typing import Any
 
@@ -6,12 +6,7 @@ from django.db import transaction
 
 from augment.models import Scenario, Simulation
 from augment.services.judging import simulations
-from augment.services.judging.driving_scores import (
-    DrivingScores,
-    clearance_text,
-    least_clearance_m,
-    scores_of_job,
-)
+from augment.services.judging.driving_scores import clearance_text, least_clearance_m
 from augment.services.judging.simulations import SCORES, Options
 from augment.services.running.choosing import find_job
 from augment.services.terminal import TerminalCommand
@@ -19,7 +14,7 @@ from augment.tasks import check_broker, enqueue_simulations
 
 
 class Command(TerminalCommand):
-    """simulate JOB|SCENARIO [--planner P] [--offsets O] [--reactive] [--score S] [--queue]."""
+    """simulate JOB|SCENARIO [--planner P] [--offsets O] [--reactive] [--queue]."""
 
     help = (
         "Let a planner drive every result of a job, with the scenes before the change and with "
@@ -41,12 +36,11 @@ class Command(TerminalCommand):
             "action": "store_true",
             "help": "recorded vehicles answer to the ego instead of being replayed",
         },
-        "--score": {"default": "nuplan", "choices": list(SCORES)},
         "--queue": {"action": "store_true", "help": "leave the drives to the workers and return"},
     }
 
     def handle(self, *args: Any, **options: Any) -> None:
-        """Plan the rows, drive them here or queue them, then say the scores."""
+        """Plan the rows, then drive them here, one line each, or queue them."""
         how = Options(
             planner=options["planner"], offsets=options["offsets"], is_reactive=options["reactive"]
         )
@@ -69,32 +63,16 @@ class Command(TerminalCommand):
             return
         for number, pk in enumerate(waiting, start=1):
             simulations.Drives(also).perform(pk)
-            self._say(pk, f"{number}/{len(waiting)}", options["score"])
-        if job is not None:
-            self._table(scores_of_job(job, options=how, score=options["score"]))
+            self._say(pk, f"{number}/{len(waiting)}")
 
-    def _say(self, pk: int, place: str, score: str) -> None:
+    def _say(self, pk: int, place: str) -> None:
         row = Simulation.objects.select_related("scenario", "augmentation__contestant").get(pk=pk)
         subject = row.get_subject_display()
         who = subject if row.augmentation is None else row.augmentation.contestant.name
-        value = getattr(row, SCORES[score])
         result = row.reason or "driven by a worker"
-        if value is not None:
+        if row.state == Simulation.State.DONE:
+            nuplan, interplan = (100.0 * (getattr(row, name) or 0.0) for name in SCORES.values())
             clearance = clearance_text(least_clearance_m(row))
-            result = f"{100.0 * value:.1f}, clearance {clearance}"
+            result = f"nuPlan {nuplan:.1f}, interPlan {interplan:.1f}, clearance {clearance}"
         self.stdout.write(f"[{place}] {row.scenario.slug}, {who}: {result}")
         self.stdout.flush()
-
-    def _table(self, table: DrivingScores) -> None:
-        width = max([len(line.name) for line in table.lines], default=10)
-        head = f"{'mean driving score, %':{width}}  score  before  drives  failed  clearance"
-        self.stdout.write(head)
-        for line in table.lines:
-            mean, before = (
-                "-" if value is None else f"{100.0 * value:.1f}"
-                for value in (line.mean, line.before)
-            )
-            self.stdout.write(
-                f"{line.name:{width}}  {mean:>5}  {before:>6}  {line.drives:>6}  {line.failed:>6}"
-                f"  {clearance_text(line.least_clearance_m)}"
-            )

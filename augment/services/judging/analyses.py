@@ -1,10 +1,14 @@
-"""What the rows of a job say of its contestants: lines, repeats, pairs, wordings, refusals."""
+"""What the rows of a job say of its contestants: lines, repeats, pairs, wordings, refusals.
+
+Rows of tables are dicts. None is unknown or undefined, never zero.
+"""
 
 from collections import Counter, defaultdict
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain
-from statistics import fmean, median
+from statistics import fmean, median, stdev
+from typing import Any
 
 from django.db.models import Q
 
@@ -17,52 +21,13 @@ from augment.services.judging.displacement import Measured, of_job
 from augment.services.judging.findings import find_readable
 
 State = Augmentation.State
+Row = dict[str, Any]
+Answers = Mapping[str, Sequence[Measured]]
+"""What each contestant answered, by its slug."""
 
 SEED = 2026
+"""Of the bootstrap."""
 MISSES = (State.UNREADABLE, State.REFUSED)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ContestantAnalysis:
-    """One contestant.
-
-    Attributes:
-        refusals: None where no scenario of the job says whether its wish can be met.
-        robustness: None where no scenario has two wordings that were measured.
-    """
-
-    slug: str
-    name: str
-    is_simulated: bool
-    refusals: paired.RefusalScore | None
-    robustness: paired.Robustness | None
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class JobAnalysis:
-    """All contestants, and every pair of them.
-
-    Attributes:
-        seed: Of the bootstrap.
-    """
-
-    contestants: tuple[ContestantAnalysis, ...]
-    pairs: tuple[paired.PairedComparison, ...]
-    seed: int
-
-    @property
-    def refusing(self) -> tuple[ContestantAnalysis, ...]:
-        """Contestants with wishes that can't be met, or that refused."""
-        return tuple(
-            one
-            for one in self.contestants
-            if (score := one.refusals) and (score.right or score.wrong or score.overlooked)
-        )
-
-    @property
-    def reworded(self) -> tuple[ContestantAnalysis, ...]:
-        """Contestants that answered some wish in several wordings."""
-        return tuple(one for one in self.contestants if one.robustness is not None)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -82,53 +47,6 @@ class AugmentationLine:
     doubtful: int | None = None
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class RepeatLine:
-    """What varies between one contestant's samples. None is unknown, never zero.
-
-    Attributes:
-        displacement_m: The mean over the sample's matched objects.
-        within_m: The pooled standard deviation, within a scenario, of its mean displacement.
-        missed: The share of the sample's answers that were unreadable or refused.
-        usd: What the sample cost; None where no model was asked or a price is unknown.
-    """
-
-    slug: str
-    name: str
-    is_simulated: bool
-    displacement_m: paired.SampleSpread | None
-    within_m: float | None
-    missed: paired.SampleSpread | None
-    usd: paired.SampleSpread | None
-
-    @property
-    def missed_percent(self) -> paired.SampleSpread | None:
-        """The share in percent, for people."""
-        if self.missed is None:
-            return None
-        return paired.spread_of([100.0 * value for value in self.missed.values])
-
-
-def analyse_job(job: GenerationJob, *, seed: int = SEED) -> JobAnalysis:
-    """Analyse the contestants of a job but for the reference; one query.
-
-    A scenario's value is the median over its samples of the mean displacement of their matched
-    objects; a sample with none has no value.
-    """
-    by_contestant: defaultdict[str, list[Measured]] = defaultdict(list)
-    for one in of_job(job):
-        if one.row.contestant.kind != Contestant.Kind.REFERENCE:
-            by_contestant[one.row.contestant.slug].append(one)
-    values = {slug: _values_of(measured) for slug, measured in by_contestant.items()}
-    return JobAnalysis(
-        contestants=tuple(
-            _analyse(measured, values[slug]) for slug, measured in sorted(by_contestant.items())
-        ),
-        pairs=paired.compare_all(values, seed=seed),
-        seed=seed,
-    )
-
-
 def augmentation_lines(job: GenerationJob) -> Iterator[AugmentationLine]:
     """Yield every row of a job, by scenario, contestant and sample; three queries."""
     rows = job.augmentations.select_related("scenario__base_scene")
@@ -142,13 +60,93 @@ def augmentation_lines(job: GenerationJob) -> Iterator[AugmentationLine]:
         yield line
 
 
-def repeatability(job: GenerationJob) -> tuple[RepeatLine, ...]:
-    """Return a line for each contestant, by slug; rows under way or failed don't count."""
+def repeatability(job: GenerationJob) -> list[Row]:
+    """Return what varies between the samples of each contestant, of rows that have an outcome.
+
+    The displacement of a sample is the mean over its matched objects; `within_m` is the pooled
+    standard deviation, within a scenario, of its mean displacement. `missed` is the share of
+    answers that were unreadable or refused.
+    """
     by_contestant: dict[str, list[AugmentationLine]] = defaultdict(list)
     for line in _lines(job):
         if line.row.state in Augmentation.SHOWABLE:
             by_contestant[line.row.contestant.slug].append(line)
-    return tuple(_repeat_line(lines) for _, lines in sorted(by_contestant.items()))
+    return [_repeat_line(lines) for _, lines in sorted(by_contestant.items())]
+
+
+# --- Analyses ----------------------------------------------------------------------------------
+
+
+def answers_of(job: GenerationJob) -> Answers:
+    """Return all outcomes of a job, measured, but those of the reference; one query."""
+    answers: defaultdict[str, list[Measured]] = defaultdict(list)
+    for one in of_job(job):
+        is_reference = one.row.contestant.kind == Contestant.Kind.REFERENCE
+        if one.row.state in Augmentation.SHOWABLE and not is_reference:
+            answers[one.row.contestant.slug].append(one)
+    return dict(sorted(answers.items()))
+
+
+def compare_pairs(answers: Answers) -> Sequence[paired.PairedComparison]:
+    """Compare all contestants with each other on the scenarios that both placed something in.
+
+    A scenario's value is the median over its samples of the mean displacement of their matched
+    objects.
+    """
+    values = {slug: _values_of(measured) for slug, measured in answers.items()}
+    return paired.compare_all(values, seed=SEED)
+
+
+def measure_wordings(answers: Answers) -> list[Row]:
+    """Return the spread within a wish of whoever answered some wish in several wordings."""
+    lines = []
+    for measured in answers.values():
+        scenarios = {one.row.scenario.slug: one.row.scenario for one in measured}
+        wishes: defaultdict[int, list[float]] = defaultdict(list)
+        for slug, value in _values_of(measured).items():
+            wishes[scenarios[slug].paraphrase_of_id or scenarios[slug].pk].append(value)
+        several = [values for values in wishes.values() if len(values) > 1]
+        if several:
+            line = {
+                "scenarios": len(several),
+                "wordings": sum(map(len, several)),
+                "within_m": paired.within_sd(several),
+            }
+            lines.append(_who(measured[0].row) | line)
+    return lines
+
+
+def count_refusals(answers: Answers) -> list[Row]:
+    """Return how right the refusals were of whoever refused, or had to.
+
+    Right ones are of wishes that can't be met; such a wish that was not refused is overlooked.
+    Scenarios without an intent don't count.
+    """
+    lines = []
+    for measured in answers.values():
+        counts = Counter(
+            (one.row.state == State.REFUSED, bool(intent.get("unmet")))
+            for one in measured
+            if (intent := one.row.scenario.intent) is not None
+        )
+        right, wrong, overlooked = counts[True, True], counts[True, False], counts[False, True]
+        if right or wrong or overlooked:
+            line = {
+                "right": right,
+                "wrong": wrong,
+                "overlooked": overlooked,
+                "precision": right / (right + wrong) if right or wrong else None,
+                "recall": right / (right + overlooked) if right or overlooked else None,
+            }
+            lines.append(_who(measured[0].row) | line)
+    return lines
+
+
+ANALYSES: Mapping[str, Callable[[Answers], Sequence[Any]]] = {
+    "pairs": compare_pairs,
+    "wordings": measure_wordings,
+    "refusals": count_refusals,
+}
 
 
 # --- Private -----------------------------------------------------------------------------------
@@ -171,27 +169,12 @@ def _values_of(measured: Sequence[Measured]) -> dict[str, float]:
     return {slug: median(values) for slug, values in sorted(samples.items())}
 
 
-def _analyse(measured: Sequence[Measured], values: dict[str, float]) -> ContestantAnalysis:
-    contestant = measured[0].row.contestant
-    scenarios = {one.row.scenario.slug: one.row.scenario for one in measured}
-    wordings: defaultdict[str, list[float]] = defaultdict(list)
-    for slug, value in values.items():
-        wordings[str(scenarios[slug].paraphrase_of_id or scenarios[slug].pk)].append(value)
-    answered = [
-        (one.row.state == State.REFUSED, bool((one.row.scenario.intent or {}).get("unmet")))
-        for one in measured
-        if one.row.state in Augmentation.SHOWABLE and one.row.scenario.intent is not None
-    ]
-    return ContestantAnalysis(
-        slug=contestant.slug,
-        name=contestant.name,
-        is_simulated=contestant.is_simulated,
-        refusals=paired.score_refusals(answered) if answered else None,
-        robustness=paired.measure_robustness(wordings),
-    )
+def _who(row: Augmentation) -> Row:
+    who = row.contestant
+    return {"contestant": who.slug, "name": who.name, "simulated": who.is_simulated}
 
 
-def _repeat_line(lines: Sequence[AugmentationLine]) -> RepeatLine:
+def _repeat_line(lines: Sequence[AugmentationLine]) -> Row:
     by_sample: dict[int, list[AugmentationLine]] = defaultdict(list)
     by_scenario: dict[int, list[float]] = defaultdict(list)
     for line in lines:
@@ -199,22 +182,27 @@ def _repeat_line(lines: Sequence[AugmentationLine]) -> RepeatLine:
         if line.displacement is not None and line.displacement.mean_m is not None:
             by_scenario[line.row.scenario_id].append(line.displacement.mean_m)
     samples = [by_sample[number] for number in sorted(by_sample)]
-    contestant = lines[0].row.contestant
-    return RepeatLine(
-        slug=contestant.slug,
-        name=contestant.name,
-        is_simulated=contestant.is_simulated,
-        displacement_m=_spread([_distance_m(sample) for sample in samples]),
-        within_m=paired.within_sd(by_scenario.values()),
-        missed=_spread([fmean(line.row.state in MISSES for line in one) for one in samples]),
-        usd=_spread([_usd(sample) for sample in samples]),
-    )
+    missed = [fmean(line.row.state in MISSES for line in sample) for sample in samples]
+    return {
+        **_who(lines[0].row),
+        "samples": len(samples),
+        **_spread("displacement_m", [_distance_m(sample) for sample in samples]),
+        **_spread("missed", missed),
+        **_spread("usd", [_usd(sample) for sample in samples]),
+        "within_m": paired.within_sd(by_scenario.values()),
+    }
 
 
-def _spread(values: Sequence[float | None]) -> paired.SampleSpread | None:
-    """Return None where a sample has no value: the rest would be another comparison."""
+def _spread(name: str, values: Sequence[float | None]) -> Row:
+    """Return mean, standard deviation and values of a measure, one a sample.
+
+    None where a sample has no value: the rest would be another comparison.
+    """
     known = [value for value in values if value is not None]
-    return paired.spread_of(known) if len(known) == len(values) else None
+    if len(known) < len(values):
+        return dict.fromkeys((f"{name}_mean", f"{name}_sd", f"{name}_values"))
+    sd = stdev(known) if len(known) > 1 else None
+    return {f"{name}_mean": fmean(known), f"{name}_sd": sd, f"{name}_values": tuple(known)}
 
 
 def _distance_m(lines: Sequence[AugmentationLine]) -> float | None:

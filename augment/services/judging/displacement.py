@@ -8,14 +8,14 @@ from itertools import combinations
 
 from django.db.models import QuerySet
 
-from augment.errors import InvalidDocument, UnknownName
+from augment.errors import InvalidDocument
 from augment.metrics.displacement import CLASS_OF, ObjectClass, Summary, are_alike, displacement
 from augment.metrics.displacement import Displacement as Displacement
 from augment.metrics.displacement import summarise as summarise
 from augment.models import Augmentation, GenerationJob
 from augment.scene.codec import modification_from_document
 from augment.scene.entities import Modification, ScenarioType, TrafficAgent
-from augment.services.scenarios.scenes import type_choices, type_rank
+from augment.services.scenarios.scenes import type_rank
 from augment.variants.recipes import SPELLING, spell_variant
 
 State = Augmentation.State
@@ -120,22 +120,18 @@ def of_augmentation(row: Augmentation) -> Measured:
     return _measure([row])[0]
 
 
-def groups(
-    measured: Iterable[Measured], *, by: By, types: Collection[str] | None = None
-) -> list[Group]:
+def groups(measured: Iterable[Measured], *, by: By) -> list[Group]:
     """Sum up what was measured: by type in the catalogue's order, else by name.
 
     Args:
         measured: What has no displacement is left out.
-        by: What to group by, beside the contestant.
-        types: The scenario types that count; None for the paper's choice: by variant the three
-            whose places are definite, else all.
+        by: What to group by, beside the contestant. By variant only the types count whose places
+            are definite, as in the paper.
     """
-    if types is None and by is By.VARIANT:
-        types = PLACED_EXACTLY
     cells: defaultdict[tuple[int, str, str, str], list[Measured]] = defaultdict(list)
     for one in measured:
-        if one.displacement is not None and (types is None or one.row.scenario.type in types):
+        counts = by is not By.VARIANT or one.row.scenario.type in PLACED_EXACTLY
+        if counts and one.displacement is not None:
             rank, heading = _group_of(one.row, by)
             contestant = one.row.contestant
             cells[rank, heading.lower(), contestant.name.lower(), contestant.slug].append(one)
@@ -164,21 +160,6 @@ def _sum_up(cell: Sequence[Measured], by: By) -> Group:
         is_simulated=row.contestant.is_simulated,
         summary=summarise([one.displacement for one in cell if one.displacement is not None]),
     )
-
-
-def types_named(names: Sequence[str]) -> tuple[str, ...]:
-    """Return scenario types by their names, or all there are by the word `all`.
-
-    Raises:
-        UnknownName: There is no such type.
-    """
-    known = [name for name, _ in type_choices()]
-    if list(names) == ["all"]:
-        return tuple(known)
-    for name in names:
-        if name not in known:
-            raise UnknownName("scenario type", name, ["all", *known])
-    return tuple(names)
 
 
 def objects_of(job: GenerationJob) -> Iterator[DisplacedObject]:

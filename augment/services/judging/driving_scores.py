@@ -67,9 +67,10 @@ class DrivingLine:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DrivingScores:
-    """The table.
+    """The table of a job or a study.
 
     Attributes:
+        title: Its name.
         lines: The unmodified scenes, the reference, then contestants by how much they lower the
             score, the most first.
         under_way: How many drives wait or run.
@@ -78,6 +79,7 @@ class DrivingScores:
         codes: By the key of an augmentation the code of its drive.
     """
 
+    title: str
     score: str
     options: Options
     lines: tuple[DrivingLine, ...]
@@ -92,19 +94,35 @@ class DrivingScores:
         """How many have an outcome."""
         return self.total - self.under_way
 
+    @property
+    def types(self) -> list[str]:
+        """The scenario types that were driven, in their order."""
+        every = self.lines[0].by_type if self.lines else ()
+        means = {kind: [line.by_type[kind] for line in self.lines] for kind in every}
+        return [kind for kind, found in means.items() if any(mean is not None for mean in found)]
 
-def scores_of_job(job: GenerationJob, *, options: Options, score: str) -> DrivingScores:
-    """Return the table of a job; one query for its drives."""
-    return _scores(drives_of_job(job), options, score)
+
+def scores_of_job(
+    job: GenerationJob, *, options: Options | None = None, score: str
+) -> DrivingScores:
+    """Return the table of a job; two queries.
+
+    Args:
+        job: Whose results were driven.
+        options: How they were driven; None for the way in which they were driven last.
+        score: One of `SCORES`.
+    """
+    options = options or next(iter(options_driven(job)), Options())
+    return _scores(job.name, drives_of_job(job), options, score)
 
 
 def scores_of_augmentations(
-    ids: Collection[int], *, options: Options, score: str
+    ids: Collection[int], *, title: str, options: Options, score: str
 ) -> DrivingScores:
     """Return the table of the augmentations with these keys, with their scenes."""
     scenarios = Scenario.objects.filter(augmentations__in=ids)
     scenes = Q(augmentation=None, scenario__in=scenarios)
-    return _scores(Q(augmentation__in=ids) | scenes, options, score)
+    return _scores(title, Q(augmentation__in=ids) | scenes, options, score)
 
 
 def drives_of_job(job: GenerationJob) -> Q:
@@ -143,7 +161,7 @@ def options_driven(job: GenerationJob) -> list[Options]:
 # --- Private -----------------------------------------------------------------------------------
 
 
-def _scores(which: Q, options: Options, score: str) -> DrivingScores:
+def _scores(title: str, which: Q, options: Options, score: str) -> DrivingScores:
     drives = options.of(Simulation.objects.filter(which))
     read = drives.select_related("scenario", "augmentation__contestant").only(*_COLUMNS)
     rows = list(read.order_by("pk"))
@@ -160,6 +178,7 @@ def _scores(which: Q, options: Options, score: str) -> DrivingScores:
     lines = [_line(cell, before, score, kinds) for cell in cells.values()]
     failures = Counter(row.reason for row in rows if row.state == State.FAILED)
     return DrivingScores(
+        title=title,
         score=score,
         options=options,
         lines=tuple(sorted(lines, key=_place)),

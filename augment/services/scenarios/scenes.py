@@ -34,6 +34,21 @@ def type_choices() -> list[tuple[str, str]]:
     return [*((one.value, one.label) for one in ScenarioType), *labels.items()]
 
 
+def types_named(names: Sequence[str]) -> tuple[str, ...]:
+    """Return scenario types by their names, or all there are by the word `all`.
+
+    Raises:
+        UnknownName: There is no such type.
+    """
+    known = [name for name, _ in type_choices()]
+    if list(names) == ["all"]:
+        return tuple(known)
+    for name in names:
+        if name not in known:
+            raise UnknownName("scenario type", name, ["all", *known])
+    return tuple(names)
+
+
 def type_label(name: str) -> str:
     """Return what people read for a type; a type that nobody knows is its own label."""
     return dict(type_choices()).get(name, name)
