@@ -2,7 +2,14 @@
 
 from arena.models.files import ScenarioFile, StudyFile
 from arena.models.people import ApiToken, Person, fresh_token
-from arena.models.ratings import EarlyLook, ImportedVote, Snapshot, Standing, VoteFile
+from arena.models.ratings import (
+    EarlyLook,
+    ImportedVote,
+    SharedRating,
+    Snapshot,
+    Standing,
+    VoteFile,
+)
 from arena.models.studies import Matchup, Study
 from arena.models.taking_part import (
     Authorship,
@@ -41,6 +48,7 @@ __all__ = [
     "PracticePair",
     "Report",
     "ScenarioFile",
+    "SharedRating",
     "Snapshot",
     "Standing",
     "Study",

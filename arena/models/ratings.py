@@ -10,6 +10,7 @@ from django.db import models
 from django.db.models import F, Q
 from django.utils import timezone
 
+from arena.models.people import Coded, fresh_token
 from arena.models.studies import Study
 from arena.rating.lines import Line
 from arena.rating.snapshot_document import Results, read_results, results_document
@@ -157,6 +158,16 @@ STORED = tuple(
 def stored_values(line: Line | Standing) -> dict[str, Any]:
     """Return what a line says in the fields that are stored."""
     return {name: getattr(line, name) for name in STORED}
+
+
+class SharedRating(Coded):
+    """A link by which anybody reads the table of a rating, until it is taken back.
+
+    Its token is kept as it is, so that the link can be shown again.
+    """
+
+    snapshot = models.OneToOneField(Snapshot, on_delete=models.CASCADE, related_name="shared")
+    token = models.CharField(max_length=40, unique=True, default=fresh_token)
 
 
 class EarlyLook(AppendOnly):

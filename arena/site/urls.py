@@ -8,6 +8,8 @@ from arena.jobs.urls import urlpatterns as JOBS
 from arena.people import pages as people
 from arena.results.pages import evidence as results_votes
 from arena.results.pages import ratings as results
+from arena.results.pages.comparison import comparison_page
+from arena.results.pages.shared import shared_file, shared_page
 from arena.scenarios.urls import urlpatterns as SCENARIOS
 from arena.site import pages
 from arena.studies.pages import experts, planning, setup, studies
@@ -84,6 +86,7 @@ urlpatterns: list[URLPattern] = [
         results_votes.shown_picture,
         name="shown-picture",
     ),
+    path("studies/<uuid:code>/results/compare/", comparison_page, name="results-compare"),
     path("studies/<uuid:code>/results/<slug:tab>/", results.results_page, name="results-tab"),
     path("studies/<uuid:code>/files/<slug:kind>/write/", studies.ask_for_file, name="study-write"),
     path("studies/<uuid:code>/files/<slug:kind>/", studies.download, name="study-file"),
@@ -92,6 +95,14 @@ urlpatterns: list[URLPattern] = [
         results.rating_file,
         name="results-export",
     ),
+    path("studies/<uuid:code>/rating/<uuid:rating>/share/", results.share, name="results-share"),
+    path(
+        "studies/<uuid:code>/rating/<uuid:rating>/unshare/",
+        results.unshare,
+        name="results-unshare",
+    ),
+    path("shared/<str:token>/", shared_page, name="shared-results"),
+    path("shared/<str:token>/table.<slug:form>", shared_file, name="shared-file"),
     path("studies/<uuid:code>/rate/", results.rate_study, name="study-rate"),
     path("studies/<uuid:code>/rate/<uuid:rating>/", results.compute_again, name="rating-again"),
 ]

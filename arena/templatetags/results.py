@@ -9,7 +9,6 @@ from arena.models import Vote
 from arena.models.votes import AID_LABELS
 from arena.rating.comparisons import Estimate
 from arena.rating.lines import whole_percent, with_minus
-from arena.results.exports.tables import Column, Row
 from augment.services.judging.driving_scores import clearance_text
 from augment.services.scenarios.scenes import type_label
 
@@ -41,6 +40,8 @@ _LABELS: dict[str, dict[str, str]] = {
         "rate early": "rated early",
         "rating failed": "a rating failed",
         "look early": "looked at results early",
+        "share results": "made a public link",
+        "stop sharing results": "took the public link back",
         "hand over": "handed over",
         "plan batch": "planned a batch",
         "simulate votes": "simulated votes",
@@ -99,12 +100,6 @@ def counted(number: int, forms: str) -> str:
     """Fill in the singular or the plural, as in `3|counted:"{} vote | {} votes"`."""
     one, many = forms.split(" | ")
     return (one if number == 1 else many).format(number)
-
-
-@register.filter
-def printed(row: Row, column: Column) -> str:
-    """What stands in a column of the table."""
-    return with_minus(column.text(row))
 
 
 @register.filter

@@ -34,7 +34,8 @@ PAGES = _table(
         ),
         (404, 404, 403): "scenarios-export drive-file asked-image prompt-image study-file",
         (403, 403, 403): (
-            "results-votes results-votes-file results-vote shown-picture results-export"
+            "results-votes results-votes-file results-vote shown-picture results-export "
+            "results-compare"
         ),
         (403, 403, 404): "label vote vote-practice vote-skipped",
         (200, 200, 200): "home password api-tokens",
@@ -48,7 +49,11 @@ PAGES = _table(
 
 ACTIONS = _table(
     {
-        (403, 403, 403): "study-rate rating-again",  # before anybody looks early
+        (
+            403,
+            403,
+            403,
+        ): "study-rate rating-again results-share results-unshare",  # before anybody looks early
         (302, 403, 403): (
             "job-retry job-retry-cause job-pause contestant-retired endpoint-model-new "
             "endpoint-probe catalogue-load job-simulate person-change revoke author "
@@ -71,7 +76,18 @@ ACTIONS = _table(
 )
 """By POST."""
 OPEN_TO_THE_WORLD = {
-    *("login", "logout", "enrol", "invitation", "healthz", "readyz", "metrics", "first"),
+    *(
+        "shared-results",
+        "shared-file",
+        "login",
+        "logout",
+        "enrol",
+        "invitation",
+        "healthz",
+        "readyz",
+        "metrics",
+        "first",
+    ),
     "welcome",
 }
 

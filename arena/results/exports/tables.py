@@ -124,6 +124,13 @@ class LeaderboardTable:
         return list(filter(None, self.snapshot.results.board.warnings))
 
     @property
+    def told_apart(self) -> list[tuple[int, int]] | None:
+        """The pairs that differ with all judged at once, by places; None where none was judged."""
+        place = {row.slug: number for number, row in enumerate(self.rows)}
+        above = self.snapshot.results.board.above
+        return None if above is None else [(place[a], place[b]) for a, b in above]
+
+    @property
     def frozen_text(self) -> str:
         """What was frozen before the first vote, in one line; empty without."""
         return f"preregistered: sha256 {self.preregistration}" if self.preregistration else ""
@@ -205,8 +212,7 @@ class Column:
         field: Of a contestant's row, or of the whole table.
         key: In JSON.
         printed: Its head in LaTeX and in the terminal.
-        page: Its head on the page.
-        text_field: What is printed, in LaTeX, in the terminal and on the page.
+        text_field: What is printed, in LaTeX and in the terminal.
         identifies: Says whose line it is, which stands first in JSON and where it is printed.
     """
 
@@ -215,7 +221,6 @@ class Column:
     field: str
     key: str = ""
     printed: str = ""
-    page: str = ""
     text_field: str = ""
     identifies: bool = False
 
@@ -234,25 +239,18 @@ def _column(name: str, kind: str = TEXT, **more: Any) -> Column:
 
 
 COLUMNS = (
-    _column("rank", WHOLE, printed="Rank", page="Rank", text_field="rank_text"),
-    _column("model", printed="Model", page="Contestant", identifies=True),
+    _column("rank", WHOLE, printed="Rank", text_field="rank_text"),
+    _column("model", printed="Model", identifies=True),
     Column(
-        name="elo",
-        kind=NUMBER,
-        field="rating",
-        key="rating",
-        printed="Elo",
-        page="Elo",
-        text_field="elo_text",
+        name="elo", kind=NUMBER, field="rating", key="rating", printed="Elo", text_field="elo_text"
     ),
     _column("lower", NUMBER),
     _column("upper", NUMBER),
-    Column(field="interval_text", printed="95% CI", page="95 % CI"),
-    _column("votes", WHOLE, printed="Votes", page="Votes"),
-    Column(field="score_text", page="Score"),
-    _column("wins", WHOLE, page="Won"),
-    _column("ties", WHOLE, page="Tied"),
-    _column("losses", WHOLE, page="Lost"),
+    Column(field="interval_text", printed="95% CI"),
+    _column("votes", WHOLE, printed="Votes"),
+    _column("wins", WHOLE),
+    _column("ties", WHOLE),
+    _column("losses", WHOLE),
     _column("slug", identifies=True),
     _column("kind", identifies=True),
     _column("simulated", YES_NO, identifies=True),
@@ -269,7 +267,6 @@ COLUMNS = (
 )
 
 IN_FILES = tuple(column for column in COLUMNS if column.name)
-ON_PAGE = tuple(column for column in COLUMNS if column.page)
 _WHOSE_FIRST = sorted(COLUMNS, key=lambda column: not column.identifies)
 IN_JSON = tuple(column for column in _WHOSE_FIRST if column.key)
 PRINTED = tuple(column for column in _WHOSE_FIRST if column.printed)

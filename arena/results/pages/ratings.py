@@ -1,10 +1,12 @@
 """The results of a study: its tabs, its files, a new rating, and opening them early."""
 
 import uuid
+from collections.abc import Callable
 
 from django.core.exceptions import PermissionDenied
 from django.http import Http404, HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, redirect, render
+from django.urls import reverse
 from django.utils.text import slugify
 
 from arena import tasks
@@ -12,11 +14,10 @@ from arena.errors import NoSnapshot
 from arena.exports.formats import download
 from arena.models import Snapshot, Study
 from arena.people.queries import role_of
-from arena.results.exports.tables import EARLY_LOOK, for_experts, leaderboard_table
 from arena.results.exports.votes import VOTE_FORMATS, unrated_votes
 from arena.results.exports.writers import CHART_FORMATS, RATING_FILES
 from arena.results.pages.rating_form import RatingForm, rate_or_send
-from arena.results.pages.tabs import FOR_EXPERTS, TABS
+from arena.results.pages.tabs import FOR_EXPERTS, TABS, describe
 from arena.results.queries.access import (
     ResultsAccess,
     results_access,
@@ -24,10 +25,10 @@ from arena.results.queries.access import (
     snapshots_of,
     votes_in,
 )
-from arena.results.queries.evidence import count_settled
 from arena.results.queries.votes import is_imported
 from arena.results.services.rating_request import RatingRequest
 from arena.results.services.ratings import open_early
+from arena.results.services.sharing import share_rating, stop_sharing
 from arena.site.access import ADMIN, EXPERT, RESEARCHER, STAFF, act_for, page_for, user_of
 from arena.site.acts import refusals_told, tell_errors
 from arena.studies.pages.studies import export_place
@@ -73,24 +74,13 @@ def results_page(request: HttpRequest, code: uuid.UUID, tab: str = "table") -> H
         context["form"] = RatingForm(snapshot=snapshot)
         # Votes from a file have no page of a study, where the files are otherwise.
         context["export"] = export_place(study, user) if is_imported(study) else None
+    if is_staff and (link := getattr(snapshot, "shared", None)):
+        address = reverse("shared-results", args=[link.token])
+        context["shared_address"] = request.build_absolute_uri(address)
     if snapshot is not None:
-        context |= _of_rating(snapshot, tab, is_staff=is_staff)
+        told = describe(snapshot, is_staff=is_staff)
+        context |= told | TABS[tab](snapshot, told["table"])
     return render(request, "results/page.html", context)
-
-
-def _of_rating(snapshot: Snapshot, tab: str, *, is_staff: bool) -> dict[str, object]:
-    """Return what the page shows of a rating."""
-    table = leaderboard_table(snapshot)
-    if not is_staff:
-        table = for_experts(table)
-    settled = count_settled(snapshot)
-    return {
-        "table": table,
-        "early_look": EARLY_LOOK,
-        "settled": settled,
-        "cast": snapshot.votes_counted - settled,
-        **TABS[tab](snapshot, table),
-    }
 
 
 @act_for(*STAFF, back="results")
@@ -113,6 +103,18 @@ def compute_again(request: HttpRequest, code: uuid.UUID, rating: uuid.UUID) -> N
     snapshot = get_object_or_404(Snapshot, study=study, code=rating)
     snapshot.wait_again(progress=0)
     tasks.send_snapshot(snapshot.pk)
+
+
+@act_for(*STAFF, back="results")
+def share(request: HttpRequest, code: uuid.UUID, rating: uuid.UUID) -> HttpResponse:
+    """Make the link by which anybody reads the table of this rating."""
+    return _change_link(request, code, rating, share_rating)
+
+
+@act_for(*STAFF, back="results")
+def unshare(request: HttpRequest, code: uuid.UUID, rating: uuid.UUID) -> HttpResponse:
+    """Take it back."""
+    return _change_link(request, code, rating, stop_sharing)
 
 
 @act_for(*STAFF, back="results")
@@ -175,6 +177,14 @@ def get_snapshot(request: HttpRequest, study: Study) -> Snapshot:
         raise Http404 from error
 
 
+def _change_link(
+    request: HttpRequest, code: uuid.UUID, rating: uuid.UUID, change: Callable[..., object]
+) -> HttpResponse:
+    study = get_readable_study(request, code)
+    change(snapshot_to_export(study, rating), actor=user_of(request))
+    return redirect(f"{reverse('results', args=[code])}?rating={rating}")
+
+
 def _asked_rating(request: HttpRequest) -> uuid.UUID | None:
     wanted = request.GET.get("rating")
     try:
@@ -189,5 +199,5 @@ def _chosen(request: HttpRequest, study: Study, ratings: list[Snapshot]) -> Snap
     code = _asked_rating(request) or next(iter(ready), None)
     if code is None:
         return None
-    rows = Snapshot.objects.select_related("study__vote_file", "made_by__person")
+    rows = Snapshot.objects.select_related("study__vote_file", "made_by__person", "shared")
     return get_object_or_404(rows, study=study, code=code, state=Snapshot.State.READY)

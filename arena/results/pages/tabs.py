@@ -9,9 +9,18 @@ from arena.jobs.queries import shown_augmentations
 from arena.models import Snapshot
 from arena.people.queries import natural_order
 from arena.rating.snapshot_document import PairRecord, PanelRater
+from arena.rating.verdict import verdict
 from arena.results.exports.charts import scatters_of
-from arena.results.exports.tables import ON_PAGE, LeaderboardTable, Row
+from arena.results.exports.tables import (
+    EARLY_LOOK,
+    LeaderboardTable,
+    Row,
+    for_experts,
+    leaderboard_table,
+)
+from arena.results.pages.plots import plot
 from arena.results.queries.access import log_of, names_in_log, snapshots_of
+from arena.results.queries.evidence import count_settled
 from arena.results.queries.votes import AUTOMATIC, Filters
 from augment.models import EndpointModel, Simulation
 from augment.services.judging.driving_scores import scores_of_augmentations
@@ -24,17 +33,30 @@ FEW = 30
 LOG_LINES = 200
 
 
+def describe(snapshot: Snapshot, *, is_staff: bool) -> Context:
+    """What every tab shows of a rating: its table, and what this says in one sentence."""
+    table = leaderboard_table(snapshot)
+    if not is_staff:
+        table = for_experts(table)
+    settled = count_settled(snapshot)
+    cast = snapshot.votes_counted - settled
+    return {
+        "table": table,
+        "answer": verdict(table.rows, cast, table.told_apart),
+        "early_look": EARLY_LOOK,
+        "settled": settled,
+        "cast": cast,
+    }
+
+
 def fill_table(snapshot: Snapshot, table: LeaderboardTable) -> Context:
     """The table with its intervals, and the lines that say how far it can be trusted."""
     trust = snapshot.results.trust
     moves = [line.moves for line in trust.raters if line.moves is not None]
-    return {
-        "columns": ON_PAGE,
-        "has_bounds": any(row.has_bound for row in table.rows),
+    return plot(table.rows) | {
         "largest_move": max(moves, default=None),
         "ties": round((trust.tie_share or 0.0) * snapshot.votes_counted),
         "all_tied": trust.tie_share == 1.0,
-        "has_places": any(row.rank_best != row.rank_worst for row in table.rows),
     }
 
 

@@ -1,0 +1,122 @@
+"""The answer of a rated table in one sentence: who can't be told apart, who is worse than whom.
+
+In: the lines of a table, best first, and the pairs that it tells apart. Out: plain English.
+"""
+
+from collections.abc import Collection, Sequence
+
+from arena.rating.lines import Line
+
+Pairs = Collection[tuple[int, int]]
+"""Who is above whom, by places in the table from 0, the better one first."""
+
+MOST_NAMED = 6
+"""Of more contestants the number is said instead of their names."""
+MOST_CLAUSES = 5
+"""What comes after so many is left to the table."""
+
+_ALL = ("", "", "both", "all three", "all four", "all five", "all six", "all seven", "all eight")
+
+
+def verdict(lines: Sequence[Line], votes: int, apart: Pairs | None) -> str:
+    """What a table says, in one sentence.
+
+    Args:
+        lines: Best first; who has no votes is passed over.
+        votes: How many were counted.
+        apart: Who differs with all pairs judged at once. None where nothing was judged so: then
+            the intervals decide, and for who has none the rank.
+    """
+    judged = [place for place, line in enumerate(lines) if line.votes]
+    if not judged:
+        return "There are no votes to rate."
+    counted = f" with {votes} vote{'' if votes == 1 else 's'}"
+    if len(judged) == 1:
+        return f"{lines[judged[0]].name} has nobody to be compared with."
+    pairs = by_intervals(lines) if apart is None else apart
+    names = [line.name for line in lines]
+    parts = sorted({lines[place].part for place in judged} - {-1})
+    if len(parts) < 2:
+        return f"{_compare(names, judged, pairs, counted)}."
+    groups = [[place for place in judged if lines[place].part == part] for part in parts]
+    said = "; ".join(_compare(names, group, pairs, "") for group in groups)
+    return f"{votes} votes leave {len(parts)} groups that can’t be compared: {said}."
+
+
+def by_intervals(lines: Sequence[Line]) -> Pairs:
+    """Who is above whom by the lower bound of the one and the upper bound of the other.
+
+    Who was rated with nobody has no bounds. A rank then says how many are above, and where no more
+    have a smaller rank, it is these.
+    """
+    ranks = [line.rank for line in lines if line.rank is not None]
+
+    def is_above(one: Line, other: Line) -> bool:
+        if one.part == other.part != -1:
+            return None not in (one.lower, other.upper) and (one.lower or 0) > (other.upper or 0)
+        if -1 not in (one.part, other.part) or one.rank is None or other.rank is None:
+            return False
+        return one.rank < other.rank == 1 + sum(rank < other.rank for rank in ranks)
+
+    places = range(len(lines))
+    return [(a, b) for a in places for b in places if is_above(lines[a], lines[b])]
+
+
+# --- Private -----------------------------------------------------------------------------------
+
+
+def _compare(names: Sequence[str], places: Sequence[int], apart: Pairs, counted: str) -> str:
+    """The clauses about contestants that were compared with each other, the best ones first."""
+    best, *rest = _tiers(places, apart)
+    is_chain = len(best) == 1 and len(rest) == len(places) - 1
+    if is_chain and all((a, b) in apart for a in places for b in places if a < b) and rest[1:]:
+        order = ", then ".join(names[place] for place in places)
+        return f"The order is {order}: all are told apart{counted}"
+    if len(best) > 1:
+        said = [f"{_named(names, best, len(places))} can’t be told apart{counted}"]
+    else:
+        below = [place for place in places if (best[0], place) in apart]
+        all_others = f"{_ALL[len(below)]} others" if len(below) < len(_ALL) else "all others"
+        worse = all_others if 1 < len(below) == len(places) - 1 else _named(names, below)
+        said = [f"{names[best[0]]} is better than {worse}{counted}"]
+    before = list(best)
+    for tier in rest:
+        by_betters: dict[tuple[int, ...], list[int]] = {}
+        for place in tier:
+            betters = tuple(better for better in before if (better, place) in apart)
+            by_betters.setdefault(betters, []).append(place)
+        for betters, members in by_betters.items():
+            verb = "is" if len(members) == 1 else "are"
+            if list(betters) != best or len(best) > 1:
+                whom = _better_ones(names, betters, before)
+                said.append(f"{_named(names, members)} {verb} worse than {whom}")
+            elif len(members) > 1:
+                said.append(f"{_named(names, members)} can’t be told apart")
+        before += tier
+    more = ["the table has the rest"] if len(said) > MOST_CLAUSES else []
+    return "; ".join(said[:MOST_CLAUSES] + more)
+
+
+def _tiers(places: Sequence[int], apart: Pairs) -> list[list[int]]:
+    """Those whom nobody is above, then those whom nobody of the rest is above, and so on."""
+    left, tiers = list(places), []
+    while left:
+        tier = [one for one in left if not any((other, one) in apart for other in left)]
+        tiers.append(tier)
+        left = [one for one in left if one not in tier]
+    return tiers
+
+
+def _named(names: Sequence[str], places: Sequence[int], total: int = 0) -> str:
+    if len(places) > MOST_NAMED:
+        of = "The" if len(places) == total else f"{len(places)} of the" if total else ""
+        number = total or len(places)
+        return f"{of} {number} contestants".strip()
+    *first, last = (names[place] for place in places)
+    return f"{', '.join(first)} and {last}" if first else last
+
+
+def _better_ones(names: Sequence[str], betters: Sequence[int], before: Sequence[int]) -> str:
+    if 1 < len(betters) == len(before) < len(_ALL):
+        return _ALL[len(betters)]
+    return _named(names, betters)

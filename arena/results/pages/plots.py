@@ -1,0 +1,52 @@
+"""Intervals of a table drawn on its page: where each lies on the axis that all lines share."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from arena.results.exports.tables import Row
+
+MOST_TICKS = 5
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Mark:
+    """A rating and its interval in percent of the axis; without a bound it reaches to the edge."""
+
+    lower: float
+    rating: float
+    upper: float
+
+
+def plot(rows: Sequence[Row]) -> dict[str, Any]:
+    """Lines with their marks, None for who has no rating, and the ticks of the axis."""
+    known = [value for row in rows for value in row.interval if value is not None]
+    step = _step(max(known, default=1000.0) - min(known, default=1000.0))
+    first = math.floor(min(known, default=1000.0) / step)
+    last = max(math.ceil(max(known, default=1000.0) / step), first + 1)
+
+    def place(value: float | None, default: float) -> float:
+        at = 100.0 * (value / step - first) / (last - first) if value is not None else default
+        return round(at, 2)
+
+    def mark(row: Row) -> Mark | None:
+        if row.rating is None:
+            return None
+        return Mark(
+            lower=place(row.lower, 0.0),
+            rating=place(row.rating, 0.0),
+            upper=place(row.upper, 100.0),
+        )
+
+    ticks = [
+        (round(number * step), place(number * step, 0.0)) for number in range(first, last + 1)
+    ]
+    return {"lines": [{"row": row, "mark": mark(row)} for row in rows], "ticks": ticks}
+
+
+def _step(width: float) -> float:
+    """Points between ticks: 1, 2 or 5 times a power of ten, so that there are few."""
+    least = max(width, 1.0) / (MOST_TICKS - 1)
+    power = 10.0 ** math.floor(math.log10(least))
+    return next(step for factor in (1, 2, 5, 10) if (step := factor * power) >= least)
