@@ -49,11 +49,8 @@ PAGES = _table(
 
 ACTIONS = _table(
     {
-        (
-            403,
-            403,
-            403,
-        ): "study-rate rating-again results-share results-unshare",  # before anybody looks early
+        # before anybody looks early
+        (403, 403, 403): "study-rate rating-again results-share results-unshare",
         (302, 403, 403): (
             "job-retry job-retry-cause job-pause contestant-retired endpoint-model-new "
             "endpoint-probe catalogue-load job-simulate person-change revoke author "
@@ -76,19 +73,8 @@ ACTIONS = _table(
 )
 """By POST."""
 OPEN_TO_THE_WORLD = {
-    *(
-        "shared-results",
-        "shared-file",
-        "login",
-        "logout",
-        "enrol",
-        "invitation",
-        "healthz",
-        "readyz",
-        "metrics",
-        "first",
-    ),
-    "welcome",
+    *("login", "logout", "enrol", "invitation", "healthz", "readyz", "metrics", "first"),
+    *("welcome", "shared-results", "shared-file"),
 }
 
 
