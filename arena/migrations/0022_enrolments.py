@@ -67,9 +67,7 @@ class Migration(migrations.Migration):
                     ),
                 ),
             ],
-            options={
-                "ordering": ("-made_at", "-pk"),
-            },
+            options={"ordering": ("-made_at", "-pk")},
         ),
         migrations.CreateModel(
             name="EnrolledVoter",
@@ -124,9 +122,7 @@ class Migration(migrations.Migration):
                     ),
                 ),
             ],
-            options={
-                "ordering": ("enrolled_at", "pk"),
-            },
+            options={"ordering": ("enrolled_at", "pk")},
         ),
         migrations.AddConstraint(
             model_name="enrolment",

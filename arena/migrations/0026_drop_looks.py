@@ -4,14 +4,6 @@ from django.db import migrations
 
 
 class Migration(migrations.Migration):
+    dependencies = [("arena", "0025_drop_webhooks")]
 
-    dependencies = [
-        ('arena', '0025_drop_webhooks'),
-    ]
-
-    operations = [
-        migrations.RemoveField(
-            model_name='study',
-            name='looks',
-        ),
-    ]
+    operations = [migrations.RemoveField(model_name="study", name="looks")]

@@ -14,11 +14,7 @@ def renamed(old, new):
 
 
 class Migration(migrations.Migration):
-
-    dependencies = [
-        ("arena", "0029_work"),
-        ("auth", "0012_alter_user_first_name_max_length"),
-    ]
+    dependencies = [("arena", "0029_work"), ("auth", "0012_alter_user_first_name_max_length")]
 
     operations = [
         migrations.RemoveConstraint(model_name="apitoken", name=KNOWN),
@@ -27,8 +23,7 @@ class Migration(migrations.Migration):
             model_name="apitoken",
             name="role",
             field=models.CharField(
-                choices=[(name, name) for name in ("admin", "researcher", "expert")],
-                max_length=10,
+                choices=[(name, name) for name in ("admin", "researcher", "expert")], max_length=10
             ),
         ),
         migrations.AddConstraint(

@@ -10,7 +10,7 @@ from django.db import models
 from django.db.models import F, Q
 from django.utils import timezone
 
-from arena.models.people import Coded, fresh_token
+from arena.models.people import fresh_token
 from arena.models.studies import Study
 from arena.rating.lines import Line
 from arena.rating.snapshot_document import Results, read_results, results_document
@@ -160,7 +160,7 @@ def stored_values(line: Line | Standing) -> dict[str, Any]:
     return {name: getattr(line, name) for name in STORED}
 
 
-class SharedRating(Coded):
+class SharedRating(models.Model):
     """A link by which anybody reads the table of a rating, until it is taken back.
 
     Its token is kept as it is, so that the link can be shown again.
