@@ -36,7 +36,7 @@ class Reliability(StrEnum):
 class Judgement:
     """The word and its reasons, as one line."""
 
-    standing: Reliability
+    reliability: Reliability
     reason: str
 
 
@@ -47,12 +47,12 @@ def judge_rater(rater: PanelRater) -> Judgement:
         Reliability.UNCERTAIN: _doubts(rater),
         Reliability.RELIABLE: _good_signs(rater),
     }
-    for standing, reasons in found.items():
+    for reliability, reasons in found.items():
         said = [reason for reason, holds in reasons.items() if holds]
         if said:
-            return Judgement(standing=standing, reason="; ".join(said))
+            return Judgement(reliability=reliability, reason="; ".join(said))
     reason = "no checks, no hidden repeats, and nobody to compare with"
-    return Judgement(standing=Reliability.UNCERTAIN, reason=reason)
+    return Judgement(reliability=Reliability.UNCERTAIN, reason=reason)
 
 
 # --- Private -----------------------------------------------------------------------------------

@@ -20,7 +20,7 @@ def judged(**more: Any) -> tuple[Reliability, str]:
         **{"repeats": (0, 0), "checks": (0, 0)},
     }
     found = judge_rater(PanelRater(**usual | more))
-    return found.standing, found.reason
+    return found.reliability, found.reason
 
 
 @pytest.mark.parametrize(

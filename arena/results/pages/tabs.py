@@ -1,5 +1,6 @@
 """The tabs of the results page: each makes what its template needs of a snapshot and its table."""
 
+from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any
@@ -8,6 +9,7 @@ from arena.jobs.exports.driving import shown_driving
 from arena.jobs.queries import shown_augmentations
 from arena.models import Snapshot
 from arena.people.queries import natural_order
+from arena.rating.panel import Reliability, judge_rater
 from arena.rating.snapshot_document import PairRecord, PanelRater
 from arena.rating.verdict import verdict
 from arena.results.exports.charts import scatters_of
@@ -119,17 +121,30 @@ def fill_types(snapshot: Snapshot, table: LeaderboardTable) -> Context:
 
 
 def fill_raters(snapshot: Snapshot, table: LeaderboardTable) -> Context:
-    """Agreement, repeats, sides, and the panel of experts."""
+    """A judgement of each expert, who needs a look first; agreement, repeats, sides, figures."""
     trust = snapshot.results.trust
     lines = [line for line in trust.raters if line.judge != AUTOMATIC]
     authors = {judge for judge, _ in Filters.of_document(snapshot.filters).authors}
+    panel = [
+        {
+            "rater": line,
+            "is_author": line.judge in authors,
+            "judgement": judge_rater(line),
+            **_counts(line),
+        }
+        for line in sorted(lines, key=lambda line: natural_order(line.name))
+    ]
+    urgency = list(Reliability)
+    panel.sort(key=lambda line: urgency.index(line["judgement"].reliability))
+    numbers = Counter(line["judgement"].reliability for line in panel)
     return {
         "trust": trust,
         "all_tied": trust.tie_share == 1.0,
-        "panel": [
-            {"rater": line, "is_author": line.judge in authors, **_counts(line)}
-            for line in sorted(lines, key=lambda line: natural_order(line.name))
-        ],
+        "panel": panel,
+        "numbers": [(word, numbers[word]) for word in urgency if numbers[word]],
+        "has_times": any(line.median_ms is not None for line in lines),
+        "has_repeats": any(line.repeats[0] for line in lines),
+        "has_checks": any(line.checks[0] or line.checks_skipped for line in lines),
         "automatic": sum(line.votes for line in trust.raters if line.judge == AUTOMATIC),
         "automatic_judge": AUTOMATIC,
     }
