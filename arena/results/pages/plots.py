@@ -11,7 +11,7 @@ MOST_TICKS = 5
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Mark:
+class PlacedInterval:
     """A rating and its interval in percent of the axis; without a bound it reaches to the edge."""
 
     lower: float
@@ -30,10 +30,10 @@ def plot(rows: Sequence[Row]) -> dict[str, Any]:
         at = 100.0 * (value / step - first) / (last - first) if value is not None else default
         return round(at, 2)
 
-    def mark(row: Row) -> Mark | None:
+    def mark(row: Row) -> PlacedInterval | None:
         if row.rating is None:
             return None
-        return Mark(
+        return PlacedInterval(
             lower=place(row.lower, 0.0),
             rating=place(row.rating, 0.0),
             upper=place(row.upper, 100.0),
