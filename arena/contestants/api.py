@@ -109,7 +109,7 @@ class EndpointModelDocument(RowDocument[EndpointModel]):
     class Meta:
         model = EndpointModel
         fields = (
-            *("code", "endpoint", "model", "model_class", "vision", "native_tools", "json_schema"),
+            *("code", "endpoint", "model", "model_class", "vision", "native_tools"),
             *("temperature", "reasoning_effort", "context_tokens", "max_output_tokens"),
             *("price_in_usd", "price_out_usd", "price_as_of", "price_source"),
         )

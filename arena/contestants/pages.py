@@ -82,17 +82,10 @@ class EndpointFactsForm(RequestForm):
 
     inputs = inputs_of(EndpointFacts)
 
-    def __init__(self, *args: Any, **kwargs: Any) -> None:
-        super().__init__(*args, **kwargs)
-        self.fields["move_key"] = forms.BooleanField(
-            required=False, label="Its key may go to another server than so far"
-        )
-
 
 ABILITIES = {
     "vision": "Sees pictures",
     "native_tools": "Calls functions natively",
-    "json_schema": "Keeps to a JSON schema",
     "temperature": "Temperature may be chosen",
 }
 
@@ -200,12 +193,8 @@ def endpoint_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     form = EndpointFactsForm(_sent_by_admin(request), initial=model_to_dict(row))
     if form.is_valid():
         with refusals_in(form):
-            known_endpoints.change_endpoint(
-                row,
-                facts=read_request(EndpointFacts, form.cleaned_data),
-                may_move_key=form.cleaned_data["move_key"],
-                actor=user_of(request),
-            )
+            facts = read_request(EndpointFacts, form.cleaned_data)
+            known_endpoints.change_endpoint(row, facts=facts, actor=user_of(request))
             messages.success(request, "Kept. It counts for the next call.")
             return redirect("endpoint", code=row.code)
     context = {

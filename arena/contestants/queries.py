@@ -3,8 +3,9 @@
 from typing import Any
 
 from augment.models import Contestant, EndpointModel, Probe
+from augment.services.endpoints.contestants import OPTION_INPUTS
 from augment.services.endpoints.probing import ABILITIES
-from augment.services.endpoints.treatments import OPTIONS, left_out, options_of
+from augment.services.endpoints.treatments import left_out, options_of
 
 
 def probe_lines(model: EndpointModel, probe: Probe | None) -> list[dict[str, Any]]:
@@ -34,20 +35,6 @@ def probe_lines(model: EndpointModel, probe: Probe | None) -> list[dict[str, Any
     return lines
 
 
-LABELS = {
-    "temperature": "Temperature",
-    "seed": "Seed",
-    "reasoning_effort": "Reasoning effort",
-    "max_output_tokens": "Longest answer",
-    "protocol": "Calls of the function",
-    "rounds": "Rounds at most",
-    "accepted_from": "Content from a mean rating of",
-    "radius_m": "Radius",
-    "prompt_version": "Prompt version",
-    "picture_px": "Width of the viewer’s picture",
-}
-
-
 def asking_of(
     contestant: Contestant, made_with: dict[str, Any] | None = None
 ) -> dict[str, Any] | None:
@@ -63,21 +50,12 @@ def asking_of(
     lacking = left_out(contestant)
     lines = [
         {
-            "label": LABELS[name],
-            "value": _value(name, options[name]),
-            "is_chosen": name in contestant.options,
-            "left_out": [role for role, names in lacking.items() if name in names],
+            "label": one.label,
+            "value": one.shown(options[one.name]),
+            "is_chosen": one.name in contestant.options,
+            "left_out": [role for role, names in lacking.items() if one.name in names],
         }
-        for name in OPTIONS
-        if name in options
+        for one in OPTION_INPUTS
+        if one.name in options
     ]
     return {"lines": lines, "is_frozen": contestant.frozen_options is not None}
-
-
-def _value(name: str, value: object) -> str:
-    if isinstance(value, float):
-        value = f"{value:g}"
-    if name == "protocol":
-        return "natively" if value == "native" else "in the answer"
-    units = {"max_output_tokens": "%s tokens", "radius_m": "%s m", "picture_px": "%s px"}
-    return units.get(name, "%s") % value

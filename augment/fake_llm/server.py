@@ -169,10 +169,6 @@ def _probed(request: wire.ChatRequest) -> tuple[str, wire.Calls] | None:
         return match[1], ()
     if text.startswith("Write a story"):
         return "A car stood on the road. " * 3, ()  # about as long as the limit allows
-    if match := re.fullmatch(r"How much is (\d+) and (\d+) together\?", text):
-        total = int(match[1]) + int(match[2])
-        as_object = request.response_format is not None
-        return (json.dumps({"sum": total}) if as_object else f"That makes {total}."), ()
     if (match := re.search(r"double the number (\d+)", text)) and request.tools:
         name = request.tools[0]["function"]["name"]
         return "", ((name, json.dumps({"number": int(match[1])})),)

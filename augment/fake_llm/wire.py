@@ -76,7 +76,6 @@ class ChatRequest(_Strict):
     seed: int | None = None
     tools: Annotated[list[dict[str, Any]], Field(min_length=1)] | None = None
     tool_choice: Literal["auto", "none"] | None = None
-    response_format: dict[str, object] | None = None
     stream: Literal[False] = False
 
     @property

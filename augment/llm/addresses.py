@@ -8,7 +8,6 @@ it, and where it leads is decided by whoever translates.
 
 import socket
 from collections.abc import Callable
-from contextlib import suppress
 from ipaddress import IPv4Address, IPv6Address, IPv6Network, ip_address
 from typing import Any
 from urllib.parse import urlsplit
@@ -62,19 +61,6 @@ def check_base_url(base_url: str) -> str:
     if problem:
         raise InvalidDocument("endpoint", [("base_url", problem)])
     return base_url.rstrip("/")
-
-
-def check_resolved(base_url: str, *, resolve: Resolve = socket.getaddrinfo) -> None:
-    """Look where the name leads today; a name that nobody knows leads nowhere and passes.
-
-    Whoever owns a name can change it after this look: who connects asks `addresses_of`.
-
-    Raises:
-        InvalidDocument: One of its addresses is forbidden.
-    """
-    # ValueError also where the address can't be taken apart, UnicodeError among them.
-    with suppress(OSError, ValueError):
-        addresses_of(urlsplit(base_url).hostname or "", resolve=resolve)
 
 
 def addresses_of(

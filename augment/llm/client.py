@@ -92,16 +92,14 @@ class ModelProfile:
     """The abilities of a model at an endpoint.
 
     Attributes:
-        native_tools, vision, json_schema, temperature: None where nobody knows.
-        refused: Names of further parameters that it does not take.
+        native_tools, vision: None where nobody knows.
+        refused: Names of parameters that it does not take.
         reasoning_effort: Sent with each request, empty for none.
         max_output_tokens: No answer may be asked to be longer, None without a limit.
     """
 
     native_tools: bool | None = None
     vision: bool | None = None
-    json_schema: bool | None = None
-    temperature: bool | None = None
     refused: frozenset[str] = frozenset()
     reasoning_effort: str = ""
     max_output_tokens: int | None = None
@@ -117,25 +115,17 @@ class ModelProfile:
         effort = request.reasoning_effort or self.reasoning_effort or None
         taken = [name for name in LengthName if name not in self.refused]
         name = request.length_name if request.length_name in taken else taken[0]
-        limits = [request.max_tokens]
-        if self.max_output_tokens is not None:
-            limits.append(self.max_output_tokens)
         return replace(
             request,
-            max_tokens=min(limits),
-            temperature=None if self.temperature is False else request.temperature,
+            max_tokens=min(request.max_tokens, self.max_output_tokens or request.max_tokens),
+            temperature=None if "temperature" in self.refused else request.temperature,
             seed=None if "seed" in self.refused else request.seed,
             reasoning_effort=None if "reasoning_effort" in self.refused else effort,
-            answer_schema=None if self.json_schema is False else request.answer_schema,
             length_name=name,
         )
 
     def without(self, parameter: str) -> ModelProfile:
         """The same model, that does not take this parameter."""
-        if parameter == "temperature":
-            return replace(self, temperature=False)
-        if parameter == "response_format":
-            return replace(self, json_schema=False)
         return replace(self, refused=self.refused | {parameter})
 
     def _check(self, request: Request) -> None:

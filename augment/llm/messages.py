@@ -122,33 +122,14 @@ class ToolChoice(StrEnum):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class AnswerSchema:
-    """The JSON schema that an answer must fit."""
-
-    name: str
-    schema: dict[str, object]
-
-    def to_document(self) -> dict[str, object]:
-        """The schema as a `response_format` of the OpenAI-compatible wire."""
-        return {
-            "type": "json_schema",
-            "json_schema": {"name": self.name, "schema": self.schema, "strict": True},
-        }
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class Request:
     """One question to one model; it knows neither address nor key.
 
     Attributes:
         max_tokens: The most that the answer may have, reasoning included.
         temperature, seed, reasoning_effort: Left out of the request where None.
-        tools: What the model may call natively. Servers drop one of the two where tools and a
-            schema of the answer come together, so a request never has both.
+        tools: What the model may call natively.
         tool_choice: Counts only where there are tools.
-
-    Raises:
-        ValueError: It has both.
     """
 
     model: str
@@ -159,12 +140,7 @@ class Request:
     reasoning_effort: str | None = None
     tools: tuple[Tool, ...] = ()
     tool_choice: ToolChoice = ToolChoice.AUTO
-    answer_schema: AnswerSchema | None = None
     length_name: LengthName = LengthName.MAX_COMPLETION_TOKENS
-
-    def __post_init__(self) -> None:
-        if self.tools and self.answer_schema is not None:
-            raise ValueError("a request has tools or a schema of the answer, never both")
 
     def to_document(self, *, image_url: ImageUrl = data_url) -> dict[str, object]:
         """The body of the request on the OpenAI-compatible wire, ready for JSON."""
@@ -180,8 +156,6 @@ class Request:
         if self.tools:
             document["tools"] = [tool.to_document() for tool in self.tools]
             document["tool_choice"] = self.tool_choice.value
-        if self.answer_schema is not None:
-            document["response_format"] = self.answer_schema.to_document()
         return document
 
 

@@ -27,7 +27,7 @@ from augment.errors import (
     ParameterRefused,
     Unwanted,
 )
-from augment.llm.addresses import Resolve, check_resolved
+from augment.llm.addresses import Resolve
 from augment.llm.client import Sending, watch_nothing
 from augment.llm.messages import LengthName, Reply, Request, ToolCall, shorten
 from augment.llm.wire_transport import (
@@ -71,7 +71,7 @@ _PASSING = frozenset({408, 409, 425, 429})
 _SPENT = frozenset({"insufficient_quota", "billing_hard_limit_reached", "billing_not_active"})
 _LENGTHS = frozenset(LengthName)
 # What a request can do without, or say in another way.
-_DROPPABLE = frozenset({"temperature", "seed", "reasoning_effort", "response_format"}) | _LENGTHS
+_DROPPABLE = frozenset({"temperature", "seed", "reasoning_effort"}) | _LENGTHS
 _NOT_TAKEN = frozenset({"unsupported_parameter", "unknown_parameter"})
 _SAYS_UNKNOWN = re.compile(
     r"unsupported|unknown|unrecognized|unexpected|not (supported|permitted|allowed)|"
@@ -97,9 +97,8 @@ class OpenAIWire(AbstractContextManager["OpenAIWire"]):
         resolve: From a name to addresses.
 
     Raises:
-        ModelFault: The key can't be sent, the host's name leads to a forbidden address today, or
-            OPENAI_CUSTOM_HEADERS is set: the package would add those headers to requests to
-            whatever host, and who set them meant OpenAI's.
+        ModelFault: The key can't be sent, or OPENAI_CUSTOM_HEADERS is set: the package would add
+            those headers to requests to whatever host, and who set them meant OpenAI's.
     """
 
     def __init__(
@@ -120,11 +119,6 @@ class OpenAIWire(AbstractContextManager["OpenAIWire"]):
             problem = "OPENAI_CUSTOM_HEADERS is set and would be sent to every endpoint; unset it"
         elif not (key.isascii() and key.isprintable() and " " not in key):
             problem = "the key has characters that no key may have"
-        else:
-            try:
-                check_resolved(base_url, resolve=resolve)
-            except InvalidDocument as error:
-                problem = error.problems[0][1]
         if problem:
             raise ModelFault(problem, retryable=False)
         self._key = key

@@ -2,12 +2,9 @@
 
 import uuid
 
-import django.core.validators
 import django.db.models.deletion
 from django.conf import settings
 from django.db import migrations, models
-
-import augment.models.contestants
 
 
 class Migration(migrations.Migration):
@@ -99,11 +96,11 @@ class Migration(migrations.Migration):
                 ('id', models.BigAutoField(auto_created=True, primary_key=True, serialize=False, verbose_name='ID')),
                 ('code', models.UUIDField(default=uuid.uuid4, editable=False, unique=True)),
                 ('label', models.SlugField(help_text='lower-case letters, digits and hyphens', max_length=80, unique=True)),
-                ('base_url', models.CharField(help_text='for example https://api.openai.com/v1', max_length=200, validators=[augment.models.contestants.is_served_from])),
-                ('key_variable', models.CharField(blank=True, help_text='the environment variable that holds the key; empty where none is needed', max_length=80, validators=[augment.models.contestants.names_a_variable])),
+                ('base_url', models.CharField(help_text='for example https://api.openai.com/v1', max_length=200)),
+                ('key_variable', models.CharField(blank=True, help_text='the environment variable that holds the key; empty where none is needed', max_length=80)),
                 ('is_simulated', models.BooleanField(default=False, help_text="the project's own stand-in: what it answers counts as simulated")),
-                ('max_concurrency', models.PositiveSmallIntegerField(default=4, help_text='so many calls may be under way at once, over all workers', validators=[django.core.validators.MinValueValidator(1)])),
-                ('requests_per_minute', models.PositiveIntegerField(blank=True, help_text='so many calls may start within a minute, over all workers; empty: no limit', null=True, validators=[django.core.validators.MinValueValidator(1)])),
+                ('max_concurrency', models.PositiveSmallIntegerField(default=4, help_text='so many calls may be under way at once, over all workers')),
+                ('requests_per_minute', models.PositiveIntegerField(blank=True, help_text='so many calls may start within a minute, over all workers; empty: no limit', null=True)),
             ],
             options={
                 'ordering': ('label',),

@@ -1,42 +1,13 @@
 """Who is rated."""
 
-import re
 import uuid
 
 from django.core.exceptions import ValidationError
-from django.core.validators import MinValueValidator
 from django.db import models
 from django.db.models import Q
 
-from augment.errors import InvalidDocument
-from augment.llm.addresses import check_base_url
 from augment.models.scenes import SLUG_HELP
 from augment.models.work import Work, account_column
-
-NOT_A_VARIABLE = "the name of an environment variable is needed, not the key"
-
-
-def is_served_from(base_url: str) -> None:
-    """Refuse an address that no model is served from.
-
-    Raises:
-        ValidationError: It is none, it carries a secret, or it leads to a link-local or metadata
-            address.
-    """
-    try:
-        check_base_url(base_url)
-    except InvalidDocument as error:
-        raise ValidationError([problem for _, problem in error.problems]) from error
-
-
-def names_a_variable(name: str) -> None:
-    """Refuse what can't be the name of an environment variable.
-
-    Raises:
-        ValidationError: It can't; the value is not repeated, because it may be the key itself.
-    """
-    if not re.fullmatch(r"[A-Za-z_][A-Za-z0-9_]{0,79}", name):
-        raise ValidationError(NOT_A_VARIABLE)
 
 
 class Endpoint(models.Model):
@@ -44,29 +15,21 @@ class Endpoint(models.Model):
 
     code = models.UUIDField(default=uuid.uuid4, unique=True, editable=False)
     label = models.SlugField(max_length=80, unique=True, help_text=SLUG_HELP)
-    base_url = models.CharField(
-        max_length=200,
-        validators=[is_served_from],
-        help_text="for example https://api.openai.com/v1",
-    )
+    base_url = models.CharField(max_length=200, help_text="for example https://api.openai.com/v1")
     key_variable = models.CharField(
         max_length=80,
         blank=True,
-        validators=[names_a_variable],
         help_text="the environment variable that holds the key; empty where none is needed",
     )
     is_simulated = models.BooleanField(
         default=False, help_text="the project's own stand-in: what it answers counts as simulated"
     )
     max_concurrency = models.PositiveSmallIntegerField(
-        default=4,
-        validators=[MinValueValidator(1)],
-        help_text="so many calls may be under way at once, over all workers",
+        default=4, help_text="so many calls may be under way at once, over all workers"
     )
     requests_per_minute = models.PositiveIntegerField(
         null=True,
         blank=True,
-        validators=[MinValueValidator(1)],
         help_text="so many calls may start within a minute, over all workers; empty: no limit",
     )
 
@@ -83,10 +46,6 @@ class Endpoint(models.Model):
     def __str__(self) -> str:
         return self.label
 
-    def clean(self) -> None:
-        """Write the address as services do, without a slash at its end."""
-        self.base_url = self.base_url.rstrip("/")
-
 
 class EndpointModel(models.Model):
     """What is known of one model at one endpoint. Unknown is null, never guessed, never zero."""
@@ -102,7 +61,7 @@ class EndpointModel(models.Model):
     model_class = models.CharField(max_length=20, choices=ModelClass.choices, blank=True)
     native_tools = models.BooleanField(null=True, blank=True)
     vision = models.BooleanField(null=True, blank=True)
-    json_schema = models.BooleanField(null=True, blank=True)
+    json_schema = models.BooleanField(null=True, blank=True)  # of earlier probes; unused
     temperature = models.BooleanField(null=True, blank=True, help_text="may be chosen")
     refused_parameters = models.JSONField(
         default=list, blank=True, help_text="what it answered 400 to and is not sent again"

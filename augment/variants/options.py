@@ -34,6 +34,7 @@ class Rule:
     """What is to know of an option besides its name.
 
     Attributes:
+        label: What people call it, with its unit.
         words: A value in a name for people.
         slug: A value as a part of a slug.
         kind: What a value is.
@@ -42,6 +43,7 @@ class Rule:
         without: Why a recipe may have no use for it; empty where all have one.
     """
 
+    label: str
     words: str
     slug: str
     kind: type = int
@@ -72,11 +74,14 @@ class Rule:
 
 
 RULES = {
-    "temperature": Rule("temperature {:g}", "t{:g}", float, 0, 2),
-    "seed": Rule("seed {}", "s{}", most=HIGHEST_SEED - MOST_SAMPLES),
-    "reasoning_effort": Rule("effort {}", "{}-effort", str, choices=EFFORTS),
-    "max_output_tokens": Rule("answers to {} tokens", "{}-tokens", int, 1, 1_000_000),
+    "temperature": Rule("Temperature", "temperature {:g}", "t{:g}", float, 0, 2),
+    "seed": Rule("Seed", "seed {}", "s{}", most=HIGHEST_SEED - MOST_SAMPLES),
+    "reasoning_effort": Rule("Reasoning effort", "effort {}", "{}-effort", str, choices=EFFORTS),
+    "max_output_tokens": Rule(
+        "Longest answer, tokens", "answers to {} tokens", "{}-tokens", int, 1, 1_000_000
+    ),
     "protocol": Rule(
+        "Function calls: native, or written in the prompt's form",
         "{} calls",
         "{}",
         ToolProtocol,
@@ -84,19 +89,22 @@ RULES = {
         without="calls no function, so it has no protocol",
     ),
     "rounds": Rule(
-        "{} rounds", "{}-rounds", int, 1, MOST_ROUNDS, without="has no review, so it has one round"
+        "Rounds at most",
+        *("{} rounds", "{}-rounds", int, 1, MOST_ROUNDS),
+        without="has no review, so it has one round",
     ),
     "accepted_from": Rule(
-        "content from {:g}",
-        "from-{:g}",
-        float,
-        1,
-        5,
+        "Mean rating that the reviewer accepts",
+        *("content from {:g}", "from-{:g}", float, 1, 5),
         without="has no text review, so nothing is rated",
     ),
-    "radius_m": Rule("{:g} m", "{:g}m", float, 20, 300),
-    "prompt_version": Rule("prompts {}", "p{}", str, most=12),
-    "picture_px": Rule("pictures {} px", "{}px", int, 300, 2400, without="shows no picture"),
+    "radius_m": Rule("Radius of the scene in the prompt, m", "{:g} m", "{:g}m", float, 20, 300),
+    "prompt_version": Rule("Prompt version", "prompts {}", "p{}", str, most=12),
+    "picture_px": Rule(
+        "Width of the viewer's picture, px",
+        *("pictures {} px", "{}px", int, 300, 2400),
+        without="shows no picture",
+    ),
 }
 NAMES = tuple(RULES)
 _DEFAULTS: dict[str, Any] = {**asdict(Limits()), "protocol": ToolProtocol.PROMPT}

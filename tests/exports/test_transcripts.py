@@ -19,7 +19,7 @@ def job() -> GenerationJob:
     """One augmentation that asked twice."""
     made = llama_job(price="2")
     row = Augmentation.objects.get(job=made)
-    runner.work_on(augmentation_pk=row.pk, worker="w", connect=Model(after_a_second_look))
+    runner.Augmentations(Model(after_a_second_look)).perform(row.pk, worker="w")
     return made
 
 

@@ -143,7 +143,7 @@ def ran(
 ) -> Augmentation:
     """Run a row, or the only one of a job; both are read anew."""
     row = work if isinstance(work, Augmentation) else only_row(work)
-    assert runner.work_on(augmentation_pk=row.pk, worker="w", connect=connect or Wire())
+    assert runner.Augmentations(connect or Wire()).perform(row.pk, worker="w")
     row.refresh_from_db()
     work.refresh_from_db()
     return row

@@ -77,5 +77,5 @@ def run(*slugs: str, samples: int = 1) -> list[Augmentation]:
         JobRequest(name="J", contestants=slugs, scenarios=["street"], samples=samples)
     )
     for row in job.augmentations.order_by("contestant__slug", "sample"):
-        runner.work_on(augmentation_pk=row.pk)
+        runner.AUGMENTATIONS.perform(row.pk)
     return list(job.augmentations.order_by("contestant__slug", "sample"))

@@ -314,7 +314,7 @@ def test_without_earlier_runs_only_the_calls_are_known() -> None:
 
 def test_after_a_run_it_is_what_was_used() -> None:
     job = llama_job(price="1")
-    runner.work_on(augmentation_pk=only_row(job).pk, connect=Model())
+    runner.Augmentations(Model()).perform(only_row(job).pk)
     for slug in ("other", "another"):
         add_scenario(slug)
     (line,) = estimate(JobScope(contestants=["llama"], scenarios=["other", "another"])).lines

@@ -54,7 +54,7 @@ def test_a_call_in_flight_ends_with_its_job_and_gives_its_place_back(
     with speaking(drip(head("Content-Length: 100000"), b" ")) as server:
         Endpoint.objects.update(base_url=server.url)
         row = only_row(job)
-        assert runner.work_on(augmentation_pk=row.pk)
+        assert runner.AUGMENTATIONS.perform(row.pk)
     row.refresh_from_db()
     job.refresh_from_db()
     assert (row.state, row.reason) == (State.CANCELLED, "The job was cancelled.")

@@ -73,9 +73,7 @@ def run_all(job: GenerationJob, model: Model, watcher: Watcher) -> None:
     def work(number: int) -> None:
         try:
             while True:
-                runner.work_on(
-                    augmentation_pk=waiting.get_nowait(), worker=f"{number}", connect=model
-                )
+                runner.Augmentations(model).perform(waiting.get_nowait(), worker=f"{number}")
                 watcher()
         except queue.Empty:
             return

@@ -1,5 +1,5 @@
 from collections.abc import Iterator
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from decimal import Decimal
 from io import StringIO
 from typing import Any
@@ -28,7 +28,6 @@ from augment.services.endpoints.known_endpoints import (
     change_endpoint,
     ensure_endpoint,
     may_hold_key,
-    move_of,
 )
 from augment.services.running import jobs, runner
 from augment.services.running.choosing import find_obstacle
@@ -155,7 +154,7 @@ def test_a_variable_that_is_not_for_keys_is_never_read(
     with recorder() as server:
         # As if it were written into the table by hand, or from before there was a rule.
         Endpoint.objects.update(base_url=server.url, key_variable=variable)
-        runner.work_on(augmentation_pk=row.pk)
+        runner.AUGMENTATIONS.perform(row.pk)
     row.refresh_from_db()
     assert server.heard == []
     assert row.state == Augmentation.State.FAILED
@@ -164,14 +163,6 @@ def test_a_variable_that_is_not_for_keys_is_never_read(
 
 
 # --- Another host ------------------------------------------------------------------------------
-
-OLD, NEW = "https://models.example:443", "https://thief.example:443"
-
-
-def keyed() -> Endpoint:
-    return Endpoint.objects.create(
-        label="local", base_url="https://models.example/v1", key_variable="MY_API_KEY"
-    )
 
 
 @pytest.mark.parametrize(
@@ -184,31 +175,18 @@ def keyed() -> Endpoint:
         ("https://models.example.evil/v1", "MY_API_KEY", True),
         ("https://thief.example/v1", "", False),
         ("https://models.example/v2", "MY_API_KEY", False),
-        ("https://MODELS.example:443/v1", "MY_API_KEY", False),
         ("https://models.example/v1", "OTHER_API_KEY", False),
     ],
 )
-def test_when_a_key_would_go_to_another_server(
-    base_url: str, key_variable: str, moves: bool
-) -> None:
-    found = move_of(endpoint=keyed(), base_url=base_url, key_variable=key_variable)
-    assert (found is not None) is moves
-
-
-def test_a_key_goes_to_another_host_only_when_told_twice_and_is_logged() -> None:
-    row = keyed()
-    facts = EndpointFacts(base_url="https://thief.example/v1", key_variable="MY_API_KEY")
-    with pytest.raises(Conflict, match=f"went to {OLD} and would go to {NEW}. Say"):
-        change_endpoint(row, facts=facts)
-    assert Endpoint.objects.get().base_url == "https://models.example/v1"
-    assert not Event.objects.exists()
-    change_endpoint(row, facts=facts, may_move_key=True)
-    assert Endpoint.objects.get().base_url == "https://thief.example/v1"
-    event = Event.objects.get(verb="move key")
-    assert (event.before, event.after) == (
-        {"server": OLD},
-        {"server": NEW, "key_variable": "MY_API_KEY"},
+def test_a_key_never_goes_to_another_server(base_url: str, key_variable: str, moves: bool) -> None:
+    row = Endpoint.objects.create(
+        label="local", base_url="https://models.example/v1", key_variable="MY_API_KEY"
     )
+    facts = EndpointFacts(base_url=base_url, key_variable=key_variable)
+    with pytest.raises(Conflict, match="must not go") if moves else nullcontext():
+        change_endpoint(row, facts=facts)
+    row.refresh_from_db()
+    assert (row.base_url == base_url) is not moves
 
 
 @pytest.fixture(scope="module")

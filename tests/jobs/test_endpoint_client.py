@@ -79,7 +79,7 @@ def test_a_worker_goes_through_the_limits_and_the_profile() -> None:
         add_model("m", endpoint=endpoint, model="m")
         add_scenario("street")
         row = only_row(jobs.launch(JobRequest(name="R", contestants=["m"], scenarios=["street"])))
-        runner.work_on(augmentation_pk=row.pk)
+        runner.AUGMENTATIONS.perform(row.pk)
         assert all("temperature" not in body for body in server.bodies)
         assert CallLease.objects.count() == len(server.bodies) == ModelCall.objects.count() > 0
     row.refresh_from_db()

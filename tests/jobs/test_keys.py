@@ -52,7 +52,7 @@ def test_a_planted_key_is_found_nowhere(
     row = only_row(llama_job())
     with recorder(status, body) as server:
         Endpoint.objects.update(base_url=server.url, key_variable="PLANTED_API_KEY")
-        runner.work_on(augmentation_pk=row.pk, worker="w")
+        runner.AUGMENTATIONS.perform(row.pk, worker="w")
         assert server.heard[0]["authorization"] == f"Bearer {KEY}", "it was planted"
     row.refresh_from_db()
     assert row.state in (Augmentation.State.UNREADABLE, Augmentation.State.FAILED)

@@ -35,12 +35,12 @@ def held(act: Callable[[], object]) -> list[str]:
 def test_a_worker_holds_its_row_before_the_job() -> None:
     job = llama_job()
     pk = job.augmentations.get().pk
-    assert held(lambda: runner.work_on(augmentation_pk=pk, connect=Model())) == [ROWS, JOB]
+    assert held(lambda: runner.Augmentations(Model()).perform(pk)) == [ROWS, JOB]
 
 
 def test_who_raises_a_cap_and_resumes_holds_what_waits_before_the_job() -> None:
     job = llama_job(caps=Caps(cap_tokens=5))
-    runner.work_on(augmentation_pk=job.augmentations.get().pk, connect=Model())
+    runner.Augmentations(Model()).perform(job.augmentations.get().pk)
     assert held(lambda: jobs.resume(job, higher=Caps(cap_tokens=50_000))) == [ROWS, JOB]
     job.refresh_from_db()
     assert (job.state, job.cap_tokens) == ("running", 50_000)
@@ -121,7 +121,7 @@ def test_who_ends_a_row_of_many_locks_nobody_else_out() -> None:
 def test_a_call_is_settled_before_the_job_is_held() -> None:
     job = llama_job()
     with CaptureQueriesContext(connection) as captured:
-        runner.work_on(augmentation_pk=job.augmentations.get().pk, connect=Model())
+        runner.Augmentations(Model()).perform(job.augmentations.get().pk)
     changes = [query["sql"].split('"')[1] for query in captured if query["sql"][:6] == "UPDATE"]
     reserved, settled, *_ = (place for place, table in enumerate(changes) if table == JOB)
     assert changes[reserved + 1 : settled].count("augment_modelcall") == 2, "sent, then answered"

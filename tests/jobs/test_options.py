@@ -211,7 +211,7 @@ def test_who_ran_with_other_prompts_is_not_run_with_these() -> None:
             contestant=Contestant.objects.get(),
             sample=2,
         )
-        runner.work_on(augmentation_pk=row.pk)
+        runner.AUGMENTATIONS.perform(row.pk)
         row.refresh_from_db()
         assert (row.state, len(server.bodies)) == (Augmentation.State.FAILED, 1)
         add(server, "b", seed=1)
@@ -232,7 +232,7 @@ def job_at(server: Scripted, variant: str = "fc") -> None:
 
 def run_on(scenario: str) -> Augmentation:
     row = Augmentation.objects.get(scenario__slug=scenario)
-    runner.work_on(augmentation_pk=row.pk)
+    runner.AUGMENTATIONS.perform(row.pk)
     row.refresh_from_db()
     return row
 
@@ -257,7 +257,7 @@ def shapes(server: Scripted) -> set[tuple[str, ...]]:
         {"refused_parameters": ["reasoning_effort"], "reasoning_effort": "low"},
         {"reasoning_effort": "low"},
         {"max_output_tokens": 64},
-        {"vision": False, "json_schema": False, "temperature": False},
+        {"vision": False, "temperature": False},
     ],
     ids=lambda later: "+".join(later),
 )
@@ -278,8 +278,8 @@ def test_what_is_learnt_after_the_first_run_changes_nothing_that_is_sent(
         )
         jobs.launch(JobRequest(name="K", contestants=["two"], scenarios=["first"], is_fresh=True))
         server.bodies.clear()
-        runner.work_on(augmentation_pk=Augmentation.objects.get(contestant__slug="two").pk)
-        is_sent = not later.keys() <= {"vision", "json_schema", "temperature"}
+        runner.AUGMENTATIONS.perform(Augmentation.objects.get(contestant__slug="two").pk)
+        is_sent = not later.keys() <= {"vision", "temperature"}
         is_sent = is_sent and later != {
             "refused_parameters": ["reasoning_effort"],
             "reasoning_effort": "low",

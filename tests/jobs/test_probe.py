@@ -16,10 +16,7 @@ from tests.llm.json_server import JsonServer, serving
 
 pytestmark = pytest.mark.django_db(transaction=True)
 EVERYTHING = frozenset(
-    {
-        *("temperature", "response_format", "tools", "images", "window", "usage", "seed"),
-        *LengthName,
-    }
+    {*("temperature", "tools", "images", "window", "usage", "seed"), *LengthName}
 )
 KEY = "sk-planted-4f7a9c0d1e2b3a"
 
@@ -34,7 +31,7 @@ class Candidate(JsonServer):
     def answer(self, body: dict[str, Any]) -> tuple[int, dict[str, Any]]:
         if self.status != 200:
             return self.status, _error(f"wrong key {KEY}", None)
-        for name in ("temperature", "seed", "response_format", "tools"):
+        for name in ("temperature", "seed", "tools"):
             if name in body and name not in self.can:
                 return 400, _error(f"Unsupported: {name}", name)
         content = body["messages"][0]["content"]
@@ -62,8 +59,6 @@ class Candidate(JsonServer):
     def _said(self, body: dict[str, Any], content: Any) -> str | None:
         if not isinstance(content, str):
             return "Green, then yellow."
-        if "response_format" in body:
-            return '{"sum": 42}'
         if "tools" in body:
             return None
         if MARKER in content:
@@ -95,23 +90,22 @@ def test_a_server_that_can_do_everything() -> None:
     with candidate():
         report = asked()
     assert {made.ability: made.has_it for made in report.findings} == dict.fromkeys(Ability, True)
-    assert (report.calls, report.refused) == (7, [])
+    assert (report.calls, report.refused) == (6, [])
     assert {made.model_returned for made in report.findings} == {"m-2026"}
     known = row()
-    abilities = (known.native_tools, known.vision, known.json_schema, known.temperature)
-    assert abilities == (True, True, True, True)
+    abilities = (known.native_tools, known.vision, known.temperature)
+    assert abilities == (True, True, True)
     assert known.probed_at == report.probed_at
     assert known.probe_report is not None
-    assert len(known.probe_report["findings"]) == 7
+    assert len(known.probe_report["findings"]) == 6
     assert Event.objects.get(verb="probe").object_code == str(known.code)
-    assert CallLease.objects.filter(finished_at__isnull=False).count() == 7
+    assert CallLease.objects.filter(finished_at__isnull=False).count() == 6
 
 
 @pytest.mark.parametrize(
     ("lacks", "ability"),
     [
         ("temperature", Ability.TEMPERATURE),
-        ("response_format", Ability.JSON_SCHEMA),
         ("tools", Ability.NATIVE_TOOLS),
         ("images", Ability.VISION),
         ("window", Ability.WHOLE_PROMPT),
@@ -129,4 +123,4 @@ def test_a_limit_that_is_passed_over_is_sent_by_its_other_name() -> None:
         report = asked()
     assert report.has(Ability.ANSWER_LIMIT) is True
     assert report.refused == row().refused_parameters == ["max_completion_tokens"]
-    assert report.calls == 8
+    assert report.calls == 7

@@ -155,9 +155,7 @@ def test_no_row_is_claimed_any_more_and_its_message_goes_back() -> None:
 
 def test_where_nothing_was_sent_the_row_goes_back_unpaid() -> None:
     job = llama_job()
-    assert runner.work_on(
-        augmentation_pk=only_row(job).pk, connect=Model(waiting=workers.stopping.set)
-    )
+    assert runner.Augmentations(Model(waiting=workers.stopping.set)).perform(only_row(job).pk)
     row, calls = only(job)
     assert (row.state, row.sent_at, row.claim) == (State.QUEUED, None, None)
     assert [(call.sent_at, call.spent_tokens) for call in calls] == [(None, 0)]
@@ -170,12 +168,12 @@ def test_an_answer_before_the_stop_is_not_asked_for_again() -> None:
     """It can't be read, so the model is asked once more: by whoever takes the row next."""
     job = llama_job()
     unreadable = Model(lambda _: reply("no answer at all"), looking_on=workers.stopping.set)
-    assert runner.work_on(augmentation_pk=only_row(job).pk, connect=unreadable)
+    assert runner.Augmentations(unreadable).perform(only_row(job).pk)
     row, calls = only(job)
     assert row.state == State.QUEUED
     assert len(calls) == 1
     workers.stopping.clear()
-    assert runner.work_on(augmentation_pk=row.pk, connect=Wire(GOOD))
+    assert runner.Augmentations(Wire(GOOD)).perform(row.pk)
     row, calls = only(job)
     assert row.state == State.DONE
     assert [call.served_from_id is not None for call in calls] == [False, True, False]

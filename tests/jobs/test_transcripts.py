@@ -62,7 +62,7 @@ def test_a_request_in_it_is_what_the_server_was_sent_and_nothing_else() -> None:
     row = only_row(llama_job())
     with speaking(whole(json.dumps(HEARD).encode())) as server:
         Endpoint.objects.update(base_url=server.url)
-        runner.work_on(augmentation_pk=row.pk)
+        runner.AUGMENTATIONS.perform(row.pk)
     document = json.loads(json.dumps(transcript_of(row)))
     calls = [step for step in document["attempts"][0]["steps"] if step["kind"] == "call"]
     sent = [json.loads(heard.partition(b"\r\n\r\n")[2]) for heard in server.heard]

@@ -18,7 +18,6 @@ from augment.llm.costs import (
     worst_case,
 )
 from augment.llm.messages import (
-    AnswerSchema,
     Message,
     Reply,
     Request,
@@ -214,41 +213,33 @@ def test_who_asks_for_too_long_a_wait_is_left_for_later(asked_s: float) -> None:
 
 
 HELLO = Message(speaker=Speaker.USER, text="Hello")
-SCHEMA = AnswerSchema(name="sum", schema={"type": "object"})
 TOOL = Tool(name="double", description="Doubles.", parameters={"type": "object"})
-WITH_SCHEMA = Request(model="m", messages=(HELLO,), temperature=0.0, seed=7, answer_schema=SCHEMA)
+SENT = Request(model="m", messages=(HELLO,), temperature=0.0, seed=7)
 
 
-@pytest.mark.parametrize(
-    ("parameter", "left_out"),
-    [("temperature", "temperature"), ("seed", "seed"), ("response_format", "answer_schema")],
-)
-def test_what_was_refused_is_left_out(parameter: str, left_out: str) -> None:
-    fitted = ModelProfile().without(parameter).fitted(WITH_SCHEMA)
-    assert fitted == replace(WITH_SCHEMA, **{left_out: None})  # type: ignore[arg-type]
+@pytest.mark.parametrize("parameter", ["temperature", "seed"])
+def test_what_was_refused_is_left_out(parameter: str) -> None:
+    fitted = ModelProfile().without(parameter).fitted(SENT)
+    assert fitted == replace(SENT, **{parameter: None})  # type: ignore[arg-type]
     assert parameter not in fitted.to_document()
 
 
 def test_a_model_without_a_limit_of_the_length_is_not_asked() -> None:
     boundless = ModelProfile().without("max_completion_tokens").without("max_tokens")
     with pytest.raises(ModelFault, match="its cost has no bound") as caught:
-        boundless.fitted(WITH_SCHEMA)
+        boundless.fitted(SENT)
     assert not caught.value.retryable
 
 
 def test_a_blind_model_is_shown_nothing() -> None:
-    seen = replace(WITH_SCHEMA, messages=(replace(HELLO, images=(b"\x89PNG",)),))
+    seen = replace(SENT, messages=(replace(HELLO, images=(b"\x89PNG",)),))
     assert ModelProfile(vision=True).fitted(seen) == seen
     with pytest.raises(ModelFault, match="m at this endpoint can't see pictures"):
         ModelProfile(vision=False).fitted(seen)
 
 
-def test_tools_and_schemas_have_the_form_of_the_wire() -> None:
-    assert WITH_SCHEMA.to_document()["response_format"] == {
-        "type": "json_schema",
-        "json_schema": {"name": "sum", "schema": {"type": "object"}, "strict": True},
-    }
-    armed = replace(WITH_SCHEMA, answer_schema=None, tools=(TOOL,))
+def test_tools_have_the_form_of_the_wire() -> None:
+    armed = replace(SENT, tools=(TOOL,))
     assert armed.to_document()["tools"] == [
         {
             "type": "function",

@@ -30,7 +30,7 @@ def old_job(*, scenarios: int = 2) -> GenerationJob:
     """A job of one model, done 200 days ago."""
     job = llama_job(scenarios=scenarios)
     for row in job.augmentations.all():
-        runner.work_on(augmentation_pk=row.pk, connect=Model())
+        runner.Augmentations(Model()).perform(row.pk)
     age()
     job.refresh_from_db()
     return job
@@ -102,7 +102,7 @@ def test_the_source_of_an_answer_that_an_open_study_shows_stays() -> None:
     old_job(scenarios=1)
     again = jobs.launch(JobRequest(name="2", contestants=["llama"], scenarios=["street-1"]))
     row = again.augmentations.get()
-    runner.work_on(augmentation_pk=row.pk, connect=Model())
+    runner.Augmentations(Model()).perform(row.pk)
     age()
     assert ModelCall.objects.filter(served_from__isnull=False).count() == 1
     study = study_rows.a_study()

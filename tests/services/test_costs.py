@@ -22,7 +22,7 @@ BUSY = ModelFault("busy", retryable=True, status=503, retry_after_s=0.001)
 
 def spent(job: GenerationJob, model: Model) -> Spending:
     row = only_row(job)
-    runner.work_on(augmentation_pk=row.pk, connect=model)
+    runner.Augmentations(model).perform(row.pk)
     row.refresh_from_db()
     assert row.state == Augmentation.State.DONE
     return spent_on([row.pk])[Contestant.objects.get().pk]

@@ -123,7 +123,7 @@ def test_a_reference_that_can_not_be_is_refused_and_the_old_one_stays() -> None:
 
 def original() -> Augmentation:
     row = launch().augmentations.get()
-    runner.work_on(augmentation_pk=row.pk)
+    runner.AUGMENTATIONS.perform(row.pk)
     row.refresh_from_db()
     return row
 
@@ -136,7 +136,7 @@ def test_a_correction_goes_the_whole_way_and_leaves_the_original() -> None:
     wanted = {**start, "add": [start["add"][0], document(walker)["add"][0]]}  # type: ignore[index]
     made = by_hand.keep_correction(first, wanted, notes="the second cone is wrong", actor=ada)
     assert made.state == Augmentation.State.QUEUED
-    assert runner.work_on(augmentation_pk=made.pk, worker="here")
+    assert runner.AUGMENTATIONS.perform(made.pk, worker="here")
     made.refresh_from_db()
     made = Augmentation.objects.select_related(
         "scenario__base_scene", "contestant", "corrects", "job"

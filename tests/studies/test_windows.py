@@ -112,7 +112,7 @@ def test_a_change_outside_widens_the_window_of_all_and_an_open_study_keeps_its_o
     far = Augmentation.objects.get(contestant__slug="ann")
     person = Modification(added=(pedestrian("New1", 12.0, -40.0),))
     row = keep_correction(far, modification_to_document(person))
-    runner.work_on(augmentation_pk=row.pk)
+    runner.AUGMENTATIONS.perform(row.pk)
 
     place.refresh_from_db()
     assert camera_of(place).y_min_m <= -45.0

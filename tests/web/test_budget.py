@@ -22,7 +22,7 @@ def page_of(job: GenerationJob, role: str = "admin") -> str:
 
 
 def ran(job: GenerationJob, model: Model | None = None) -> GenerationJob:
-    runner.work_on(augmentation_pk=only_row(job).pk, connect=model or Model())
+    runner.Augmentations(model or Model()).perform(only_row(job).pk)
     job.refresh_from_db()
     return job
 

@@ -33,7 +33,7 @@ def researcher(monkeypatch: pytest.MonkeyPatch) -> Client:
 
 def run_job(job_pk: int) -> None:
     for row in Augmentation.objects.filter(job=job_pk):
-        runner.work_on(augmentation_pk=row.pk)
+        runner.AUGMENTATIONS.perform(row.pk)
 
 
 def busy(slug: str = "street") -> Scenario:
@@ -60,7 +60,7 @@ def test_a_drawn_reference_is_kept_and_shown(researcher: Client) -> None:
 
 def test_an_augmentation_is_corrected_and_both_say_so(researcher: Client) -> None:
     row = launch().augmentations.get()
-    runner.work_on(augmentation_pk=row.pk)
+    runner.AUGMENTATIONS.perform(row.pk)
     url = reverse("correct", args=[row.code])
     page = reverse("augmentation", args=[row.code])
     assert url in researcher.get(page).content.decode()

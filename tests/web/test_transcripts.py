@@ -16,7 +16,7 @@ EVIL = "<script>alert(1)</script>"
 
 
 def ran(row: Augmentation, model: Model | None = None) -> Augmentation:
-    runner.work_on(augmentation_pk=row.pk, worker="w", connect=model or Model())
+    runner.Augmentations(model or Model()).perform(row.pk, worker="w")
     row.refresh_from_db()
     return row
 

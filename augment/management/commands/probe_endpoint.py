@@ -18,7 +18,7 @@ class Command(TerminalCommand):
 
     help = (
         "Ask an endpoint about six tiny questions (some 8,000 tokens in all) and store what its "
-        "model can do: answer, take a temperature, a JSON schema and native tools, see pictures, "
+        "model can do: answer, take a temperature and native tools, see pictures, "
         "and read a long prompt to its beginning."
     )
     arguments = {

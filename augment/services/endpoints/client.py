@@ -133,7 +133,7 @@ def wire_to(endpoint: Endpoint, *, still_wanted: Callable[[], None] = watch_noth
     Raises:
         KeyNotAllowed: The variable that the endpoint names is not meant for keys.
         KeyMissing: It is not set here.
-        ModelFault: The key can't be sent, or the address is forbidden.
+        ModelFault: The key can't be sent.
     """
     return OpenAIWire(
         base_url=endpoint.base_url,

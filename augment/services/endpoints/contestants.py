@@ -42,7 +42,7 @@ OPTION_INPUTS = tuple(
     Input(
         name=name,
         kind=_OPTION_KINDS.get(rule.kind, InputKind.CHOICE if rule.choices else InputKind.TEXT),
-        label=name.replace("_", " ").capitalize(),
+        label=rule.label,
         least=rule.least,
         most=rule.most,
         choices={word: word for word in rule.choices},

@@ -74,7 +74,7 @@ class EndpointRequest(EndpointFacts):
 MODEL_FACTS = (
     *("model_class", "price_in_usd", "price_out_usd", "price_as_of", "price_source"),
     *("context_tokens", "max_output_tokens", "reasoning_effort"),
-    *("vision", "native_tools", "json_schema", "temperature"),
+    *("vision", "native_tools", "temperature"),
 )
 """What somebody can say of a model; None, or nothing, is unknown."""
 
@@ -119,27 +119,22 @@ def ensure_endpoint(request: EndpointRequest, actor: User | None = None) -> Endp
 
 
 @transaction.atomic
-def change_endpoint(
-    row: Endpoint, *, facts: EndpointFacts, may_move_key: bool = False, actor: User | None = None
-) -> Endpoint:
+def change_endpoint(row: Endpoint, *, facts: EndpointFacts, actor: User | None = None) -> Endpoint:
     """Change address, key variable or limits; they count for the next call.
 
     Raises:
         InvalidDocument: Something can't be used.
-        Conflict: Its key would go to another server, and nobody said that it may.
+        Conflict: Its key would go to another server than it was entered for.
     """
     row = Endpoint.objects.select_for_update(no_key=True).get(pk=row.pk)
     wanted = check_facts(facts)
-    move = move_of(endpoint=row, base_url=wanted["base_url"], key_variable=facts.key_variable)
-    if move is not None and not may_move_key:
+    before, after = (urlsplit(url)[:2] for url in (row.base_url, wanted["base_url"]))
+    if before != after and row.key_variable and facts.key_variable:
         raise Conflict(
-            f"The key in {facts.key_variable} of endpoint {row.label!r} went to {move[0]} and "
-            f"would go to {move[1]}. Say that it may, if that is meant."
+            f"{row.key_variable} was entered for {'://'.join(before)}, and its key must not go to "
+            f"{'://'.join(after)}. Add another endpoint, or empty the key's variable first."
         )
     _change(row, wanted, "endpoint", actor)
-    if move is not None:
-        after = {"server": move[1], "key_variable": row.key_variable}
-        log_change(row, "move key", actor, before={"server": move[0]}, after=after)
     return row
 
 
@@ -277,28 +272,7 @@ def key_of(endpoint: Endpoint) -> str | None:
     return key
 
 
-def move_of(*, endpoint: Endpoint, base_url: str, key_variable: str) -> tuple[str, str] | None:
-    """Return where an endpoint's key went so far and would go; None for the same server.
-
-    Args:
-        endpoint: As it is stored.
-        base_url: As it is to be.
-        key_variable: As it is to be.
-    """
-    before, after = _server(endpoint.base_url), _server(base_url)
-    has_key = bool(endpoint.key_variable and key_variable)
-    return (before, after) if has_key and before != after else None
-
-
 # --- Private -----------------------------------------------------------------------------------
-
-
-def _server(base_url: str) -> str:
-    """Return scheme, host and port: a key sent without encryption goes elsewhere, too."""
-    parts = urlsplit(base_url)
-    scheme = parts.scheme.lower()
-    port = parts.port or {"http": 80, "https": 443}.get(scheme)
-    return f"{scheme}://{(parts.hostname or '').rstrip('.')}:{port}"
 
 
 def _change(

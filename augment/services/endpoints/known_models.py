@@ -23,6 +23,9 @@ from augment.services.events import log_change
 AUGMENTATION = "attempt__augmentation"
 CONTESTANT = "attempt__augmentation__contestant"
 
+TEMPERATURE = "temperature"
+"""The parameter that a row has a column for; the others stand in `refused_parameters`."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Spending:
@@ -62,10 +65,15 @@ def model_at(*, endpoint: Endpoint, model: str) -> EndpointModel:
     return row
 
 
-def profile_of(*, endpoint: Endpoint, model: str) -> ModelProfile:
-    """Return what the model takes, as far as its row knows."""
+def facts_of(*, endpoint: Endpoint, model: str) -> EndpointModel:
+    """Return what is known of a model; a row that is not stored where nothing is."""
     row = EndpointModel.objects.filter(endpoint=endpoint, model=model).first()
-    return ModelProfile() if row is None else _profile(row)
+    return row or EndpointModel(endpoint=endpoint, model=model)
+
+
+def profile_of(*, endpoint: Endpoint, model: str) -> ModelProfile:
+    """Return what the model takes, as far as it is known."""
+    return _profile(facts_of(endpoint=endpoint, model=model))
 
 
 @transaction.atomic
@@ -74,22 +82,22 @@ def remember_refusal(*, endpoint: Endpoint, model: str, parameter: str) -> Model
     model_at(endpoint=endpoint, model=model)
     rows = EndpointModel.objects.select_for_update(no_key=True)
     row = rows.get(endpoint=endpoint, model=model)
-    before = _profile(row)
-    after = before.without(parameter)
-    if after != before:
-        row.temperature, row.json_schema = after.temperature, after.json_schema
-        row.refused_parameters = sorted(after.refused)
-        row.save(update_fields=["temperature", "json_schema", "refused_parameters"])
+    if parameter not in _profile(row).refused:
+        if parameter == TEMPERATURE:
+            row.temperature = False
+        else:
+            row.refused_parameters = sorted({*row.refused_parameters, parameter})
+        row.save()
         log_change(
             row, "learn", after={"endpoint": endpoint.label, "model": model, "refuses": parameter}
         )
-    return after
+    return _profile(row)
 
 
 def price_of(endpoint: Endpoint, model: str) -> Price | None:
     """Return the price of a model at an endpoint, None where it is unknown."""
-    row = EndpointModel.objects.filter(endpoint=endpoint, model=model).first()
-    if row is None or row.price_in_usd is None or row.price_out_usd is None:
+    row = facts_of(endpoint=endpoint, model=model)
+    if row.price_in_usd is None or row.price_out_usd is None:
         return None
     return Price(prompt_usd=row.price_in_usd, completion_usd=row.price_out_usd)
 
@@ -170,12 +178,11 @@ def sum_spending(which: Q, *, by: str) -> dict[int, Spending]:
 
 
 def _profile(row: EndpointModel) -> ModelProfile:
+    refused = {TEMPERATURE} if row.temperature is False else set[str]()
     return ModelProfile(
         native_tools=row.native_tools,
         vision=row.vision,
-        json_schema=row.json_schema,
-        temperature=row.temperature,
-        refused=frozenset(row.refused_parameters),
+        refused=frozenset(row.refused_parameters) | refused,
         reasoning_effort=row.reasoning_effort,
         max_output_tokens=row.max_output_tokens,
     )

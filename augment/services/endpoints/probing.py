@@ -21,7 +21,7 @@ from augment.llm.messages import LengthName, Reply, Request, shorten
 from augment.llm.questions import Ability, ProbeQuestion, questions_for
 from augment.models import EndpointModel, Probe
 from augment.services.endpoints.client import Queue, place_at, wire_to
-from augment.services.endpoints.known_models import price_of
+from augment.services.endpoints.known_models import TEMPERATURE, price_of
 from augment.services.events import log_change
 from augment.services.texts import make_document_storable
 from augment.services.work import Lease, Settlement, WorkKind
@@ -32,7 +32,7 @@ ABILITIES = tuple(ability.value for ability in Ability)
 _REFUSALS = frozenset({400, 404, 415, 422})
 """With these an endpoint answers to what it can't do; with others to how it is today."""
 
-_STORED = (Ability.TEMPERATURE, Ability.JSON_SCHEMA, Ability.NATIVE_TOOLS, Ability.VISION)
+_STORED = (Ability.TEMPERATURE, Ability.NATIVE_TOOLS, Ability.VISION)
 _LONGEST_NOTE = 200
 
 
@@ -101,7 +101,7 @@ def probe(
             on_finding(report.findings[-1])
             if report.findings[0].latency_s is None:
                 break  # nobody answers: the other questions would say the same
-    report.refused, report.calls = sorted(prober.profile.refused), prober.calls
+    report.refused, report.calls = sorted(prober.profile.refused - {TEMPERATURE}), prober.calls
     costs = [made.cost_usd for made in report.findings if made.latency_s is not None]
     if costs and None not in costs:
         report.cost_usd = f"{sum(Decimal(cost) for cost in costs if cost):f}"

@@ -7,7 +7,7 @@ is the whole set of its options: what was chosen when it was added, and the defa
 """
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 from django.db import transaction
@@ -18,23 +18,14 @@ from augment.llm.client import ModelProfile
 from augment.llm.messages import LengthName
 from augment.models import Augmentation, Contestant, Endpoint, EndpointModel, ModelCall
 from augment.prompts.fill import prompt_version
-from augment.services.endpoints.known_models import price_of, profile_of
+from augment.services.endpoints.known_models import facts_of, price_of, profile_of
 from augment.services.events import log_change
-from augment.variants.options import (
-    NAMES,
-    ContestantOptions,
-    complete_options,
-    options_from_document,
-)
+from augment.variants.options import ContestantOptions, complete_options, options_from_document
 from augment.variants.recipes import Recipe, find_recipe
 from augment.variants.respondents import ModelRole
 
-OPTIONS = NAMES
-"""Of a contestant, in the order in which they are shown."""
-
 _REFUSABLE = frozenset({"temperature", "seed", "reasoning_effort"})
-_SENT = _REFUSABLE | frozenset(LengthName)
-"""Parameters that some endpoints refuse and that contestants send."""
+"""Options that some endpoints refuse."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -47,28 +38,10 @@ class Respondent:
     def __str__(self) -> str:
         return f"{self.model} at {self.endpoint.label}"
 
-    def _known(self, name: str) -> Any:
-        """Return a fact about the model there, None where nobody entered it."""
-        rows = EndpointModel.objects.filter(endpoint=self.endpoint, model=self.model)
-        return rows.values_list(name, flat=True).first()
-
     @property
-    def context_tokens(self) -> int | None:
-        """The model's context window."""
-        tokens: int | None = self._known("context_tokens")
-        return tokens
-
-    @property
-    def sees(self) -> bool | None:
-        """Whether the model sees pictures."""
-        can_see: bool | None = self._known("vision")
-        return can_see
-
-    @property
-    def native_tools(self) -> bool | None:
-        """Whether the model calls functions natively."""
-        can_call: bool | None = self._known("native_tools")
-        return can_call
+    def facts(self) -> EndpointModel:
+        """What is known of the model there."""
+        return facts_of(endpoint=self.endpoint, model=self.model)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -276,23 +249,9 @@ def _completed(contestant: Contestant) -> ContestantOptions:
 
 def _document_of(profile: ModelProfile) -> dict[str, Any]:
     """Return what of a profile changes what contestants send; no variant sends a schema."""
-    refused = profile.refused | ({"temperature"} if profile.temperature is False else set())
-    return {
-        "native_tools": profile.native_tools,
-        "vision": profile.vision,
-        "refused": sorted(refused & _SENT),
-        "reasoning_effort": profile.reasoning_effort,
-        "max_output_tokens": profile.max_output_tokens,
-    }
+    sent = _REFUSABLE | frozenset(LengthName)
+    return asdict(profile) | {"refused": sorted(profile.refused & sent)}
 
 
 def _profile_of(document: Mapping[str, Any]) -> ModelProfile:
-    refused = frozenset(document["refused"])
-    return ModelProfile(
-        native_tools=document["native_tools"],
-        vision=document["vision"],
-        temperature=False if "temperature" in refused else None,
-        refused=refused - {"temperature"},
-        reasoning_effort=document["reasoning_effort"],
-        max_output_tokens=document["max_output_tokens"],
-    )
+    return ModelProfile(**{**document, "refused": frozenset(document["refused"])})

@@ -45,12 +45,17 @@ def find_obstacle(contestant: Contestant) -> str:
         return f"the variable {', '.join(forbidden)} may not hold a key: {KEY_RULE} is needed"
     modifier, viewer = respondents[ModelRole.MODIFIER], respondents.get(ModelRole.VIEWER)
     is_open = contestant.frozen_options is None
-    if is_open and options.protocol is ToolProtocol.NATIVE and modifier.native_tools is False:
+    if (
+        is_open
+        and options.protocol is ToolProtocol.NATIVE
+        and modifier.facts.native_tools is False
+    ):
         return f"it is to call its function natively, and {modifier} has no native calls"
     # Two calls of every augmentation would be paid for before a blind viewer fails.
-    if viewer is not None and viewer.sees is None:
+    sees = viewer is None or viewer.facts.vision
+    if sees is None:
         return f"nobody knows whether its viewer {viewer} sees pictures: probe the model"
-    if viewer is not None and not viewer.sees:
+    if not sees:
         return f"its viewer {viewer} sees text alone; visual QA needs vision"
     return other_prompts(contestant.slug, options) or ""
 

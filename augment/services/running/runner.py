@@ -156,11 +156,6 @@ class Augmentations(WorkKind[Augmentation]):
 AUGMENTATIONS = Augmentations()
 
 
-def work_on(*, augmentation_pk: int, worker: str = "", connect: Connect | None = None) -> bool:
-    """Lease a row, run it and write its outcome. Returns whether it could be leased."""
-    return Augmentations(connect).perform(augmentation_pk, worker=worker)
-
-
 def open_wire(
     endpoint: Endpoint, held: Held, treatment: Treatment | None = None
 ) -> AbstractContextManager[ChatClient]:
@@ -172,7 +167,7 @@ def open_wire(
     Raises:
         KeyNotAllowed: The variable is not meant for keys.
         KeyMissing: The variable is not set here.
-        ModelFault: The key can't be sent, or the address is forbidden.
+        ModelFault: The key can't be sent.
     """
 
     def insist_before_sending() -> None:
@@ -234,7 +229,7 @@ def _ask_model(
             role: RespondentClient(
                 client=clients[one.endpoint],
                 model=one.model,
-                context_tokens=one.context_tokens,
+                context_tokens=one.facts.context_tokens,
                 native_tools=role is ModelRole.MODIFIER
                 and options.protocol is ToolProtocol.NATIVE,
             )
