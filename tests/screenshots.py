@@ -71,9 +71,10 @@ def _shots() -> list[Shot]:
     """Every page that somebody may open, with the address of something that there is."""
     from django.contrib.auth.models import User
 
-    from arena.management.demo import JOB, OPEN_STUDY, SIMULATED_STUDY
+    from arena.management.demo import OPEN_STUDY
     from arena.models import Study, Vote
     from arena.results.pages.tabs import TABS
+    from arena.site.demo import JOB, SIMULATED_STUDY
     from augment.models import Augmentation, GenerationJob, Simulation
     from tests.web.addresses import address
     from tests.web.cast import World
@@ -94,7 +95,7 @@ def _shots() -> list[Shot]:
     shots = [
         Shot(name="login", who="", path="/login/"),
         Shot(name="home-of-an-expert", who="expert", path="/"),
-        Shot(name="home-of-an-researcher", who="researcher", path="/"),
+        Shot(name="home-of-a-researcher", who="researcher", path="/"),
         Shot(name="home-of-an-admin", who="admin", path="/"),
     ]
     for name in sorted(PAGES.keys() - ACTIONS.keys() - {"home", "drive", "results-vote"}):

@@ -40,7 +40,7 @@ class View(NamedTuple):
 
 
 MARKS = View("marks", cells=300, columns=10, samples=10, rows=50)
-PICTURES = View("pictures", cells=24, columns=4, samples=2, rows=12)
+PICTURES = View("pictures", cells=12, columns=4, samples=2, rows=3)
 VIEWS = {view.name: view for view in (MARKS, PICTURES)}
 
 
@@ -48,7 +48,7 @@ VIEWS = {view.name: view for view in (MARKS, PICTURES)}
 class Part:
     """Which part of a grid is asked for; pages count from 1."""
 
-    view: View = MARKS
+    view: View = PICTURES
     row: int = 1
     column: int = 1
     sample: int = 1

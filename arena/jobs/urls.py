@@ -33,6 +33,7 @@ urlpatterns: list[URLPattern] = [
     path("drives/<uuid:code>/", measures.drive_page, name="drive"),
     path("drives/<uuid:code>.json", measures.drive_trace, name="drive-file"),
     path("jobs/<uuid:code>/faults/", labelling.faults_page, name="faults"),
+    path("jobs/<uuid:code>/<slug:tab>/", jobs.job_page, name="job-tab"),
     path("label/<uuid:code>/", labelling.label_page, name="label"),
     path("label/<uuid:code>/close/", labelling.close, name="labelling-close"),
 ]

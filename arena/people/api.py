@@ -14,8 +14,8 @@ from arena.people.links import make_api_token
 from arena.people.queries import ROLES, role_given, role_of
 from arena.people.services import (
     accept_welcome,
-    check_password_strength,
     create_person,
+    end_of_link,
     make_first_admin,
     make_welcome_token,
 )
@@ -104,9 +104,8 @@ class FirstView(ApiView):
 
         Answers with a token of the new admin.
         """
-        check_password_strength(given["password"])
         user = make_first_admin(
-            token=_end_of(given["link"]), username=given["username"], password=given["password"]
+            code=given["link"], username=given["username"], password=given["password"]
         )
         return _token(user, "first start")
 
@@ -124,15 +123,11 @@ class WelcomeView(ApiView):
         Answers with a token of the account, in its role.
         """
         with transaction.atomic():  # the link stays valid where no token can be made
-            user = accept_welcome(token=_end_of(given["link"]), password=given["password"])
+            user = accept_welcome(token=end_of_link(given["link"]), password=given["password"])
             return _token(user, "welcome")
 
 
 # --- Private -----------------------------------------------------------------------------------
-
-
-def _end_of(link: str) -> str:
-    return link.strip().rstrip("/").rpartition("/")[2]
 
 
 def _token(user: User, name: str) -> dict[str, Any]:

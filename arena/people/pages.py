@@ -75,11 +75,15 @@ class AccountForm(forms.Form):
     )
 
 
-class FirstForm(SetPasswordForm):  # type: ignore[type-arg] # it takes none at run time
-    """The name and the password of the first admin."""
+class FirstForm(forms.Form):
+    """The first admin, with the code that the server has printed."""
 
-    username = forms.CharField(max_length=150, label="Username")
-    field_order = ("username", "new_password1", "new_password2")
+    code = forms.CharField(
+        max_length=2000,
+        help_text="It ends the link that the terminal shows, below the address of this server.",
+    )
+    username = forms.CharField(max_length=150)
+    password = forms.CharField(widget=forms.PasswordInput)
 
 
 class TokenForm(forms.Form):
@@ -107,9 +111,11 @@ class SignIn(LoginView):
     template_name = "login.html"
     redirect_authenticated_user = True
 
-    def get_context_data(self, **more: Any) -> dict[str, Any]:
-        """Add whether the first admin is still to be made."""
-        return super().get_context_data(is_empty=not has_admin(), **more)
+    def get(self, request: HttpRequest, *args: Any, **named: Any) -> HttpResponse:
+        """Show the form; where there is no account at all, lead to the page of the first one."""
+        if not User.objects.exists():
+            return redirect("first")
+        return super().get(request, *args, **named)
 
     def form_valid(self, form: AuthenticationForm) -> HttpResponse:
         """Sign in."""
@@ -147,17 +153,17 @@ def link_page(view: Callable[..., HttpResponse]) -> Callable[..., HttpResponse]:
 
 
 @link_page
-def first_page(request: HttpRequest, token: str) -> HttpResponse:
-    """The page of the link that `serve` prints where there is no admin yet."""
-    services.check_first_link(token)
-    form = FirstForm(User(), request.POST or None)
+def first_page(request: HttpRequest, token: str = "") -> HttpResponse:
+    """Where the first admin is made, by the printed code or by the link that ends with it."""
+    if token or has_admin():
+        services.check_first_link(token)
+    form = FirstForm(request.POST or None, initial={"code": token})
     if form.is_valid():
-        name, password = form.cleaned_data["username"], form.cleaned_data["new_password1"]
-        with refusals_in(form, "username"):
-            user = services.make_first_admin(token=token, username=name, password=password)
+        with refusals_in(form):
+            user = services.make_first_admin(**form.cleaned_data)
             login(request, user, backend=BACKEND)
             return redirect("home")
-    return render(request, "people/welcome.html", {"form": form, "is_first": True})
+    return render(request, "people/first.html", {"form": form, "token": token})
 
 
 @link_page

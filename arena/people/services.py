@@ -102,15 +102,21 @@ def check_first_link(token: str) -> None:
 
 
 @transaction.atomic
-def make_first_admin(*, token: str, username: str, password: str) -> User:
+def make_first_admin(*, code: str, username: str, password: str) -> User:
     """Create the first admin.
 
+    Args:
+        code: As `serve` printed it, or the link that ends with it.
+        username: For the login.
+        password: Not a weak one.
+
     Raises:
-        LinkOver: The link does not work any more.
-        InvalidDocument, Conflict: See `create_person`.
+        LinkOver: The code does not work any more.
+        InvalidDocument, Conflict: See `create_person`, or the password is too weak.
     """
     _lock_admins()  # so that of two at once the second finds an admin
-    check_first_link(token)
+    check_first_link(end_of_link(code))
+    check_password_strength(password, User(username=username))
     return create_person(username=username, password=password, role="admin")
 
 
@@ -129,6 +135,11 @@ def make_welcome_token(user: User, *, actor: User) -> str:
     end_links(user)
     log_change(user.person, "make link", actor)
     return f"{user.person.code.hex}-{default_token_generator.make_token(user)}"
+
+
+def end_of_link(link: str) -> str:
+    """Return the token of a link, or of the token alone itself."""
+    return link.strip().rstrip("/").rpartition("/")[2]
 
 
 def find_welcomed(token: str) -> User:

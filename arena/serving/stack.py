@@ -9,6 +9,7 @@ from functools import partial
 from urllib.parse import urlsplit
 
 from django.conf import settings
+from django.db import DatabaseError, close_old_connections
 
 from arena.errors import ArenaError
 from arena.serving.probes import find_redis_server, port_answers, redis_answers, require_free_port
@@ -71,7 +72,7 @@ def background(*, concurrency: int) -> list[Program]:
         ArenaError: Redis is needed and not here.
     """
     programs = [_private_redis()] if settings.REDIS_IS_PRIVATE else []
-    return [*programs, *_missing_stand_ins(), _worker(concurrency)]
+    return [*programs, *missing_stand_ins(), _worker(concurrency)]
 
 
 def web_server(web: Web) -> Program:
@@ -91,6 +92,26 @@ def web_server(web: Web) -> Program:
     )
     is_ready = partial(port_answers, web.host, web.port)
     return Program(name="web", arguments=arguments, is_ready=is_ready, grace_s=WEB_GRACE_S)
+
+
+def missing_stand_ins() -> list[Program]:
+    """Return a server for each simulated endpoint of this computer that nobody serves yet."""
+    try:
+        simulated = list(Endpoint.objects.filter(is_simulated=True))
+    except DatabaseError:  # it may answer the next time
+        return []
+    finally:
+        close_old_connections()
+    programs = []
+    for endpoint in simulated:
+        address = urlsplit(endpoint.base_url)
+        host, port = address.hostname, address.port
+        if host not in {"localhost", "127.0.0.1"} or port is None or port_answers(host, port):
+            continue
+        arguments = (*MANAGE, "fake_llm", "--port", str(port))
+        is_ready = partial(port_answers, host, port)
+        programs.append(Program(name="fake_llm", arguments=arguments, is_ready=is_ready))
+    return programs
 
 
 # --- Private -----------------------------------------------------------------------------------
@@ -132,17 +153,3 @@ def _worker(concurrency: int) -> Program:
         # A call in flight may take this long; cut off, it would be paid and asked again.
         grace_s=max(SHORTEST_GRACE_S, settings.LLM_TIMEOUT_S) + DRAWING_S,
     )
-
-
-def _missing_stand_ins() -> list[Program]:
-    """One server for each simulated endpoint of this computer that nobody serves yet."""
-    programs = []
-    for endpoint in Endpoint.objects.filter(is_simulated=True):
-        address = urlsplit(endpoint.base_url)
-        host, port = address.hostname, address.port
-        if host not in {"localhost", "127.0.0.1"} or port is None or port_answers(host, port):
-            continue
-        arguments = (*MANAGE, "fake_llm", "--port", str(port))
-        is_ready = partial(port_answers, host, port)
-        programs.append(Program(name="fake_llm", arguments=arguments, is_ready=is_ready))
-    return programs

@@ -4,6 +4,7 @@ A program that keeps crashing is restarted after growing delays while the others
 worker does not take the web server down.
 """
 
+import itertools
 import os
 import signal
 import subprocess
@@ -20,6 +21,9 @@ from arena.errors import ArenaError
 
 KEPT_LINES = 20
 POLL_S = 0.1
+TURNS = 10
+"""So often is polled before it is asked what else is missing."""
+
 READER_S = 5.0
 """How long its last lines are waited for; what it started may keep its output open."""
 
@@ -177,10 +181,20 @@ class Supervisor:
                 self.stop()
                 raise
 
-    def watch(self) -> None:
-        """Supervise until a stop is requested."""
-        while not self.is_stopping:
+    def watch(self, missing: Callable[[], Sequence[Program]] = tuple) -> None:
+        """Supervise until a stop is requested.
+
+        Args:
+            missing: Asked now and then; what it names and does not run is started as well.
+        """
+        for turn in itertools.count():
+            if self.is_stopping:
+                return
             self.check()
+            known = {child.program.arguments for child in self.children}
+            for program in () if turn % TURNS else missing():
+                if program.arguments not in known:
+                    self.children.append(Child(program, self._say))
             time.sleep(POLL_S)
 
     def check(self) -> None:

@@ -4,8 +4,9 @@ from collections.abc import Iterator
 from typing import Any
 
 from django.contrib.auth.decorators import login_not_required
+from django.db import transaction
 from django.db.models import QuerySet
-from django.http import HttpRequest, HttpResponse, JsonResponse, StreamingHttpResponse
+from django.http import Http404, HttpRequest, HttpResponse, JsonResponse, StreamingHttpResponse
 from django.shortcuts import redirect, render
 from django.utils.http import url_has_allowed_host_and_scheme
 from django.views.decorators.http import require_POST, require_safe
@@ -20,15 +21,18 @@ from arena.people.queries import Language, Theme, role_of
 from arena.people.services import keep_preference
 from arena.results.queries.access import ResultsAccess, results_access
 from arena.serving.readiness import look_at_parts, opens_metrics
-from arena.site.access import ADMIN, page_for, user_of
+from arena.site import demo
+from arena.site.access import ADMIN, act_for, page_for, user_of
+from arena.site.acts import send_later
 from arena.site.exports import audit_csv
 from arena.site.language import use_english
 from arena.site.listing import Listing, read_listing, read_page
-from arena.site.queries import actors, distinct, read_gauges, take_inventory
+from arena.site.queries import actors, count_failed, distinct, first_steps, read_gauges
 from arena.studies import queries as studies
 from arena.templatetags.results import label_of
 from augment.models import Event, GenerationJob
 from augment.services.running.progress import count_each
+from augment.tasks import enqueue_job
 
 LATEST_JOBS = 5
 ACTS_AT_ONCE = 50
@@ -81,43 +85,31 @@ def _researcher(request: HttpRequest) -> HttpResponse:
 
 
 def _admin(request: HttpRequest) -> HttpResponse:
-    inventory = take_inventory()
+    steps = first_steps()
+    lines = studies.progress_of(studies.listed_studies())
     context = {
-        "inventory": inventory,
-        "steps": list_steps(inventory),
+        "steps": steps,
+        "following": next((step for step in steps if not step.found), None),
+        "is_set_up": steps[-1].found,
+        "failed": count_failed(),
         "jobs": count_each(list(GenerationJob.objects.all()[:LATEST_JOBS])),
-        "running": studies.progress_of(studies.listed_studies().filter(state=Study.State.OPEN)),
+        "running": [line for line in lines if line.study.state == Study.State.OPEN],
+        "closed": [line for line in lines if line.study.state == Study.State.CLOSED],
     }
     return render(request, "home/admin.html", context)
 
 
-STEPS = (
-    # counted, needed, title, page, its button, what is said
-    ("scenarios", 1, "Load the catalogue", "scenarios", "Scenarios", "Scenarios here: {}."),
-    ("contestants", 2, "Have two contestants", "contestants", "Contestants", "Registered: {}."),
-    ("done", 1, "Run a job", "job-new", "New job", "Augmentations done: {}."),
-    ("studies", 1, "Open a study", "studies", "Studies", "Studies so far: {}."),
-    ("votes", 1, "Let the experts vote", "studies", "Progress", "Votes saved: {}."),
-    ("studies_closed", 1, "Close and read the results", "studies", "Results", "Closed: {}."),
-)
-"""From an empty installation to a rated table."""
-
-
-def list_steps(counts: dict[str, int]) -> list[dict[str, Any]]:
-    """Return the first steps of an admin, with what is done and what comes next."""
-    steps = [
-        {
-            "title": title,
-            "link": link,
-            "action": action,
-            "detail": text.format(counts[name]),
-            "done": counts[name] >= needed,
-        }
-        for name, needed, title, link, action, text in STEPS
-    ]
-    following = next((step for step in steps if not step["done"]), {})
-    following["is_next"] = True
-    return steps
+@act_for(ADMIN, back="home")
+def use_demo(request: HttpRequest, name: str) -> HttpResponse | None:
+    """Do one of the first steps with what the demo has."""
+    if name not in demo.ACTS:
+        raise Http404
+    with transaction.atomic():
+        made = demo.ACTS[name](user_of(request))
+        if isinstance(made, GenerationJob):
+            send_later(request, enqueue_job, made.pk)
+            return redirect("job", code=made.code)
+    return redirect("results", code=made.code) if made else None
 
 
 @require_POST

@@ -1,6 +1,7 @@
 """Reads of the whole site: the log of acts, gauges for monitoring, counts, narrowed lists."""
 
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from typing import Any
 
 from django.apps import apps
@@ -12,6 +13,7 @@ from arena.models import Matchup, Study, Vote
 from augment.models import (
     Augmentation,
     Contestant,
+    Endpoint,
     Event,
     GenerationJob,
     ModelCall,
@@ -95,25 +97,54 @@ def _by_state(name: str, text: str, numbers: Mapping[Any, int]) -> GaugeMetricFa
 # --- Counts ------------------------------------------------------------------------------------
 
 
-def take_inventory() -> dict[str, int]:
-    """Count what there is.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Step:
+    """One of the first steps: what is done there, and whether there is something of it.
 
-    Failed augmentations of cancelled jobs don't count: nobody waits for them.
+    Attributes:
+        name: What *Use the demo's* does; see `arena.site.demo`.
+        mine: The name of the page where one's own is made.
+        found: So many there are.
     """
-    augmentations = Augmentation.objects
-    failed = augmentations.filter(state=Augmentation.State.FAILED)
-    return {
-        "scenarios": Scenario.objects.count(),
-        "contestants": Contestant.objects.count(),
-        "done": augmentations.filter(state=Augmentation.State.DONE).count(),
-        "failed": failed.exclude(job__state=GenerationJob.State.CANCELLED).count(),
-        "studies": Study.objects.count(),
-        "studies_open": Study.objects.filter(state=Study.State.OPEN).count(),
-        "studies_closed": Study.objects.filter(state=Study.State.CLOSED).count(),
-        "votes": Vote.objects.filter(superseded_by=None)
-        .exclude(outcome=Vote.Outcome.SKIP)
-        .count(),
-    }
+
+    name: str
+    title: str
+    text: str
+    mine: str
+    found: int
+
+
+def first_steps() -> list[Step]:
+    """Return the steps from an empty installation to a rated table."""
+    is_there = [
+        Endpoint.objects.count(),
+        Scenario.objects.count(),
+        Contestant.objects.exclude(endpoint=None).count(),
+        Augmentation.objects.filter(state=Augmentation.State.DONE).count(),
+        User.objects.filter(groups__name="expert").count(),
+        Study.objects.filter(state=Study.State.CLOSED).count(),
+    ]
+    return [
+        Step(name=name, title=title, text=text, mine=mine, found=found)
+        for (name, mine, title, text), found in zip(_STEPS, is_there, strict=True)
+    ]
+
+
+_STEPS = (
+    ("models", "endpoint-new", "Language models", "Where they answer; the demo’s need no key."),
+    ("scenarios", "scenes", "Scenarios", "Recorded scenes, each with a sentence to carry out."),
+    ("contestants", "contestant-new", "Contestants", "Models with a way of asking them."),
+    ("job", "job-new", "A job", "Every contestant edits every scenario."),
+    ("experts", "people", "Experts", "They compare the pictures blindly, two at a time."),
+    ("study", "study-new", "A study", "Experts vote; closed, it ends at the table."),
+)
+"""Names, pages for one's own, titles and texts."""
+
+
+def count_failed() -> int:
+    """Count augmentations that failed and can be tried again; nobody waits for a cancelled job."""
+    failed = Augmentation.objects.filter(state=Augmentation.State.FAILED)
+    return failed.exclude(job__state=GenerationJob.State.CANCELLED).count()
 
 
 def usual_checks() -> int:

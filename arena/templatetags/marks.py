@@ -148,20 +148,12 @@ def pager(context: Context, page: Page[Any], name: str = "page", what: str = "")
         name: What the address calls it.
         what: What is paged, for those who can't see where the links stand.
     """
-    here, last = page.number, page.paginator.num_pages
-    near = {1, last, *range(max(1, here - 1), min(last, here + 1) + 1)}
-    links: list[dict[str, Any]] = []
-    for number in sorted(near):
-        if links and number > links[-1]["number"] + 1:
-            links.append({"number": None})
-        query = _query(context["request"], name, number)
-        links.append({"number": number, "query": query, "is_current": number == here})
+    request, here = context["request"], page.number
     return {
-        "links": links if last > 1 else [],
         "what": what,
         "page": page,
-        "previous": _query(context["request"], name, here - 1) if page.has_previous() else "",
-        "next": _query(context["request"], name, here + 1) if page.has_next() else "",
+        "previous": _query(request, name, here - 1) if page.has_previous() else "",
+        "next": _query(request, name, here + 1) if page.has_next() else "",
     }
 
 

@@ -113,7 +113,7 @@ def ask_for(client: Client, job: GenerationJob, form: str) -> None:
 
 
 def page_of(client: Client, job: GenerationJob) -> str:
-    return client.get(reverse("job", args=[job.code])).content.decode()
+    return client.get(reverse("job-tab", args=[job.code, "files"])).content.decode()
 
 
 def test_a_worker_writes_the_zip_that_the_jobs_page_offers(

@@ -22,10 +22,11 @@ from pytest_django import Settings
 
 from arena.jobs.exports.displacement import FORMATS as DISPLACEMENT
 from arena.jobs.exports.displacement import displacement_table
-from arena.management.demo import JOB, RATED, SIMULATED_EXPERTS, SIMULATED_STUDY, vote_and_rate
+from arena.management.demo import vote_and_rate
 from arena.models import Person, Study
 from arena.models.people import fresh_token
 from arena.results.exports.study_folder import MANIFEST, write_study
+from arena.site.demo import JOB, RATED, SIMULATED_EXPERTS, SIMULATED_STUDY
 from augment.models import Augmentation, GenerationJob
 from augment.scene.codec import modification_to_document
 from augment.scene.entities import Modification, ScenarioType

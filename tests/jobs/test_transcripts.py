@@ -144,8 +144,8 @@ def test_calls_are_counted_per_contestant_in_the_page_and_the_files(
     assert lines == [(3, 2, 1), (1, 1, 0)]
 
     Augmentation.objects.update(state=Augmentation.State.FAILED)
-    page = signed_in(people()["researcher"]).get(f"/jobs/{job.code}/").content.decode()
-    assert 'id="tool-calls"' in page
+    page = signed_in(people()["researcher"]).get(f"/jobs/{job.code}/files/").content.decode()
+    assert "/files/tool-calls.csv" in page
 
     call_command("export", "tool-calls", str(job.code), out="-")
     rows = list(csv.DictReader(io.StringIO(capsys.readouterr().out)))

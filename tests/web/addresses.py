@@ -15,8 +15,8 @@ from tests.web.cast import World
 
 STRANGER = str(uuid.uuid4())
 ROUTES = {pattern.name: str(pattern.pattern) for pattern in (*API, *urlpatterns)}
-FORMS = {"job-export": "tool-calls", "results-export": "votes"}
-"""What files with a name are called."""
+FORMS = {"job-export": "tool-calls", "results-export": "votes", "first-step": "experts"}
+"""What has a name is called."""
 
 
 def address(name: str, here: World) -> str:
@@ -33,7 +33,7 @@ def address(name: str, here: World) -> str:
         "rating": STRANGER,
         "matchup": shown.code,
         "side": "left",
-        "tab": "pairs",
+        "tab": "grid" if name == "job-tab" else "pairs",
         "token": shown.left_token,
     }
     if "<uuid:code>" in route:

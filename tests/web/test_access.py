@@ -22,11 +22,11 @@ def _table(names: dict[tuple[int, int, int], str]) -> dict[str, tuple[int, int, 
 PAGES = _table(
     {
         STAFF: (
-            "jobs job job-progress job-export transcripts-export analyses drives drive faults "
-            "augmentation transcript contestants contestant endpoints endpoint endpoint-model "
-            "scenes scene upload scenarios scenario intent scenario-new intent-edit "
-            "scenario-edit scenarios-bulk prompts reference-edit correct picture studies "
-            "study-plan study preregistration results results-tab"
+            "jobs job job-tab job-progress job-export transcripts-export analyses drives drive "
+            "faults augmentation transcript contestants contestant endpoints endpoint "
+            "endpoint-model scenes scene upload scenarios scenario intent scenario-new "
+            "intent-edit scenario-edit scenarios-bulk prompts reference-edit correct picture "
+            "studies study-plan study preregistration results results-tab"
         ),
         ADMIN: (
             "job-new contestant-new endpoint-new audit audit-export people person-forget "
@@ -55,7 +55,7 @@ ACTIONS = _table(
             "job-retry job-retry-cause job-pause contestant-retired endpoint-model-new "
             "endpoint-probe catalogue-load job-simulate person-change revoke author "
             "scenario-retired intent-read job-resume checks-draw study-again "
-            "study-draft-discard study-hand-over"
+            "study-draft-discard study-hand-over first-step"
         ),
         (302, 302, 403): (
             "scene-send upload-show moment-keep scenarios-write study-write set-intent "

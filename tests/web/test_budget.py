@@ -17,7 +17,7 @@ pytestmark = pytest.mark.django_db
 
 
 def page_of(job: GenerationJob, role: str = "admin") -> str:
-    answer = signed_in(people()[role]).get(reverse("job", args=[job.code]))
+    answer = signed_in(people()[role]).get(reverse("job-tab", args=[job.code, "money"]))
     return " ".join(answer.content.decode().split())
 
 

@@ -17,7 +17,7 @@ pytestmark = pytest.mark.django_db
 
 
 def page(job: GenerationJob, query: str = "") -> str:
-    shown = signed_in(people()["researcher"]).get(reverse("job", args=[job.code]) + query)
+    shown = signed_in(people()["researcher"]).get(f"/jobs/{job.code}/displacement/{query}")
     text = re.sub(r"<[^>]+>", " ", shown.content.decode())
     return re.sub(r"\s+", " ", text)
 

@@ -24,12 +24,11 @@ def test_the_button_plans_the_drives_and_queues_them(
 ) -> None:
     job = launched(scenarios=2)
     admin = signed_in(people()["admin"])
-    assert reverse("job-simulate", args=[job.code]) in (
-        admin.get(reverse("job", args=[job.code])).content.decode()
-    )
+    tab = reverse("job-tab", args=[job.code, "driving"])
+    assert reverse("job-simulate", args=[job.code]) in admin.get(tab).content.decode()
     with django_capture_on_commit_callbacks() as waiting:  # type: ignore[attr-defined]
         answer = admin.post(reverse("job-simulate", args=[job.code]))
-    assert answer.headers["Location"] == reverse("job", args=[job.code]) + "?score=nuplan#driving"
+    assert answer.headers["Location"] == f"{tab}?score=nuplan"
     assert Simulation.objects.filter(state="queued").count() == 6
     assert len(waiting) == 1
 
@@ -47,7 +46,7 @@ def test_a_page_drives_with_the_projects_own_planners_alone(planner: str) -> Non
 def test_the_jobs_page_shows_scores() -> None:
     job = launched()
     driven(job)
-    researcher, page = signed_in(people()["researcher"]), reverse("job", args=[job.code])
+    researcher, page = signed_in(people()["researcher"]), f"/jobs/{job.code}/driving/"
     shown = researcher.get(page).content.decode()
     assert "own simulator; n: drives" in shown
     assert "Mean driving score (%)" in shown

@@ -5,6 +5,8 @@ from django.contrib.auth.models import User
 from django.urls import reverse
 
 from arena.models import Person
+from arena.people.services import create_person
+from arena.studies.services.opening import close_study
 from tests import study_rows
 from tests.web.cast import people, signed_in, world
 
@@ -30,13 +32,21 @@ def test_an_expert_is_asked_to_start_then_to_continue_then_thanked() -> None:
     assert "Continue voting" not in shown
 
 
-def test_an_admin_is_led_from_an_empty_house_to_the_first_job() -> None:
-    admin = people()["admin"]
-    assert "Scenarios here: 0." in home(admin)
-    world()
-    shown = home(admin)
-    assert "From a scenario to a rated table" in shown
-    assert "Scenarios here: 8." in shown
+def test_an_admin_is_led_by_steps_that_the_demo_can_do_until_a_study_is_closed() -> None:
+    admin = signed_in(create_person(username="ada", password=None, role="admin"))
+
+    def use_demo(name: str) -> str:
+        return admin.post(reverse("first-step", args=[name]), follow=True).content.decode()
+
+    offered = "Use the demo’s"
+    assert admin.get("/").content.decode().count(offered) == 6
+    assert use_demo("contestants").count(offered) == 4, "with the stand-in that they ask"
+    assert use_demo("scenarios").count(offered) == 3
+    assert "of 400 are settled" in use_demo("job")
+    assert "No job is finished yet" in use_demo("study")
+    here = world()
+    close_study(study=here.study)
+    assert offered not in admin.get("/").content.decode()
 
 
 def test_the_theme_is_kept_with_the_person_and_leads_back() -> None:

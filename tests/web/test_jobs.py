@@ -38,7 +38,7 @@ def test_the_page_groups_failures_by_their_reason_and_retries_them() -> None:
     job = rows.launch(scenarios=3)
     for row in job.augmentations.all():
         rows.leased(row).settle(rows.failed(), now=rows.NOON)
-    admin, url = signed_in(people()["admin"]), reverse("job", args=[job.code])
+    admin, url = signed_in(people()["admin"]), reverse("job-tab", args=[job.code, "failures"])
     shown = admin.get(url).content.decode()
     assert shown.count("The wire broke") == 1
     assert "Retry 3 failed" in shown

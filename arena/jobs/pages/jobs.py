@@ -1,15 +1,16 @@
 """Pages of generation jobs, and what an admin does with one: pause, resume, cancel, try again."""
 
 import uuid
+from collections.abc import Callable
 
 from django.contrib import messages
 from django.db import transaction
-from django.http import HttpRequest, HttpResponse
+from django.http import Http404, HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, redirect, render
 from django.urls import reverse
 
 from arena.jobs.pages.measures import displacement_section, driving_section
-from arena.jobs.queries import MARKS, VIEWS, Part, grid_part
+from arena.jobs.queries import PICTURES, VIEWS, Part, grid_part
 from arena.jobs.services import retry_cause as retry_one_cause
 from arena.models import ScenarioFile
 from arena.site.access import ADMIN, STAFF, act_for, form_for, page_for, user_of
@@ -22,15 +23,14 @@ from augment.services.judging.analyses import repeatability
 from augment.services.judging.scenario_export import FORMATS
 from augment.services.running import jobs, progress
 from augment.services.running.budget import Caps, count_unpriced
+from augment.services.running.progress import JobCounts
 from augment.services.running.workers import workforce
 from augment.tasks import enqueue_job
 
 State = Augmentation.State
 JOBS_AT_ONCE = 25
-MEASURED_AT_ONCE = 1000
-"""Of a job with more augmentations the page measures nothing until somebody asks for it."""
 
-_ASK_TO_MEASURE = frozenset({"measures", "by", "checks"})
+Context = dict[str, object]
 
 
 @page_for(*STAFF)
@@ -47,53 +47,94 @@ def jobs_page(request: HttpRequest) -> HttpResponse:
         rows = rows.filter(launched_by=user_of(request))
     page = read_page(request, rows, size=JOBS_AT_ONCE)
     counted = progress.count_each(list(page.object_list))
-    context: dict[str, object] = {"jobs": counted, "page": page, "listing": listing}
+    context: Context = {"jobs": counted, "page": page, "listing": listing}
     if any(counts.is_moving for counts in counted):
         context["workforce"] = workforce()
     return render(request, "jobs/list.html", context)
 
 
 @page_for(*STAFF)
-def job_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
-    """Show progress, a part of the grid, and failures by their cause."""
+def job_page(request: HttpRequest, code: uuid.UUID, tab: str = "") -> HttpResponse:
+    """Show one part of a job; without a name the one that answers first."""
     job = get_object_or_404(GenerationJob.objects.select_related("launched_by__person"), code=code)
     counts = progress.count_rows(job)
+    tabs = _tabs_of(counts)
+    shown = tab or _first_tab(counts)
+    if shown not in TABS:
+        raise Http404
+    if shown not in tabs:
+        return redirect("job", code=code)
+    context = {
+        **{"counts": counts, "tab": shown, "tab_template": f"jobs/tabs/{shown}.html"},
+        "tabs": {name: TABS[name][0] for name in tabs},
+        **TABS[shown][1](request, counts),
+    }
+    if counts.is_moving:
+        context["workforce"] = workforce()
+    return render(request, "jobs/job.html", context)
+
+
+def _tabs_of(counts: JobCounts) -> list[str]:
+    """Return the names of the parts that have something to show."""
+    job, left_out = counts.job, set()
+    if not any(
+        counts.by_state[state] for state in (State.FAILED, State.UNREADABLE, State.REFUSED)
+    ):
+        left_out.add("failures")
+    if not (job.spent_calls or job.reserved_calls or job.is_capped):
+        left_out.add("money")
+    if counts.is_moving or not counts.settled:  # a page that reloads itself measures nothing
+        left_out |= {"displacement", "driving", "files"}
+    return [name for name in TABS if name not in left_out]
+
+
+def _first_tab(counts: JobCounts) -> str:
+    if counts.job.state == GenerationJob.State.STOPPED_AT_CAP:
+        return "money"
+    if not counts.is_over:
+        return "progress"
+    return "grid" if counts.by_state[State.DONE] or not counts.settled else "failures"
+
+
+def _show_grid(request: HttpRequest, counts: JobCounts) -> Context:
     part = Part(
-        view=VIEWS.get(request.GET.get("view", ""), MARKS),
+        view=VIEWS.get(request.GET.get("view", ""), PICTURES),
         row=page_asked(request, "row"),
         column=page_asked(request, "column"),
         sample=page_asked(request, "sample"),
         state=choice_asked(request, "state", State.values),
         search=search_asked(request),
     )
-    context: dict[str, object] = {
-        "counts": counts,
-        "unpriced": count_unpriced(job),
-        "grid": grid_part(job, part),
-        "failures": progress.failure_groups(job),
-        "shown_causes": progress.SHOWN,
-    }
-    if counts.is_moving:  # a page that reloads every two seconds measures nothing
-        context["workforce"] = workforce()
-    elif counts.total <= MEASURED_AT_ONCE or _ASK_TO_MEASURE & request.GET.keys():
-        context |= _measure(request, job)
-    else:
-        context["could_measure"] = True
-    return render(request, "jobs/job.html", context)
+    return {"grid": grid_part(counts.job, part)}
 
 
-def _measure(request: HttpRequest, job: GenerationJob) -> dict[str, object]:
-    """Return the context of all that a settled job is measured by."""
-    files = {row.format: row for row in ScenarioFile.objects.filter(job=job).order_by("pk")}
-    measured: dict[str, object] = {
+def _show_failures(_request: HttpRequest, counts: JobCounts) -> Context:
+    return {"failures": progress.failure_groups(counts.job), "shown_causes": progress.SHOWN}
+
+
+def _show_displacement(request: HttpRequest, counts: JobCounts) -> Context:
+    repeats = repeatability(counts.job) if counts.job.samples > 1 else None
+    return {"displacement": displacement_section(request, counts.job), "repeats": repeats}
+
+
+def _show_files(_request: HttpRequest, counts: JobCounts) -> Context:
+    files = {row.format: row for row in ScenarioFile.objects.filter(job=counts.job).order_by("pk")}
+    return {
         "scenario_files": [(form, files.get(form)) for form in FORMATS],
-        "displacement": displacement_section(request, job),
-        "driving": driving_section(request, job),
-        "has_tool_calls": bool(progress.tool_calls(job)),
+        "has_tool_calls": bool(progress.tool_calls(counts.job)),
     }
-    if job.samples > 1:
-        measured["repeats"] = repeatability(job)
-    return measured
+
+
+TABS: dict[str, tuple[str, Callable[[HttpRequest, JobCounts], Context]]] = {
+    "grid": ("Results", _show_grid),
+    "progress": ("Progress", lambda _request, _counts: {}),
+    "failures": ("Failures", _show_failures),
+    "money": ("Money", lambda _request, counts: {"unpriced": count_unpriced(counts.job)}),
+    "displacement": ("Displacement", _show_displacement),
+    "driving": ("Driving", lambda asked, of: {"driving": driving_section(asked, of.job)}),
+    "files": ("Files", _show_files),
+}
+"""The parts of a job's page: what they are called, and what their templates show."""
 
 
 @act_for(ADMIN, back="job")

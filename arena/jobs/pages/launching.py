@@ -27,6 +27,7 @@ from augment.services.running.matrix import add_cells, find_cells, matrix_of
 from augment.tasks import enqueue_job
 
 LONGEST_NAME = 120
+USUAL_CALLS = 5_000
 
 
 class LaunchForm(ChoiceForm, OptionsForm):
@@ -70,6 +71,16 @@ class LaunchForm(ChoiceForm, OptionsForm):
             offers.append(Offer(row=row, obstacle=obstacle, keys_missing=missing))
         return offers
 
+    def usual(self) -> dict[str, Any]:
+        """Return what is filled in at first: all that can run, on every scenario, within a cap."""
+        ready = [one.row.slug for one in self.offers if not (one.obstacle or one.keys_missing)]
+        return {
+            "name": f"Job {GenerationJob.objects.count() + 1}",
+            "contestants": ready,
+            "types": [group.type for group in self.groups],
+            "cap_calls": USUAL_CALLS,
+        }
+
     @property
     def missing_keys(self) -> set[str]:
         """For the template: variables of the models' keys that are not set here."""
@@ -101,7 +112,8 @@ class LaunchForm(ChoiceForm, OptionsForm):
 @form_for(ADMIN)
 def new_job_page(request: HttpRequest) -> HttpResponse:
     """Choose contestants and scenarios, then launch."""
-    form = _form(request, request.POST or None, initial=_like(request))
+    form = _form(request, request.POST or None)
+    form.initial = _like(request) or form.usual()
     if "estimate" in request.POST:
         return _estimated(request, form)
     if form.is_bound and form.is_valid():
@@ -113,12 +125,11 @@ def new_job_page(request: HttpRequest) -> HttpResponse:
     return _page(request, form, status=422 if form.errors else 200)
 
 
-def _form(request: HttpRequest, data: Any, *, initial: dict[str, Any] | None = None) -> LaunchForm:
+def _form(request: HttpRequest, data: Any) -> LaunchForm:
     contestants = Contestant.objects.filter(retired_at=None).select_related("endpoint")
     models = EndpointModel.objects.select_related("endpoint")
     return LaunchForm(
         data,
-        initial=initial,
         contestants=list(contestants.order_by("name")),
         groups=by_type(set_asked(request.GET.get("set"))),
         models=list(models.order_by("endpoint__label", "model")),

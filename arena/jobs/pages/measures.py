@@ -73,8 +73,8 @@ def simulate_job(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         send_later(request, lambda _pk: enqueue_simulations(waiting), job.pk)
         drives = "drive is" if len(waiting) == 1 else "drives are"
         messages.success(request, f"{len(waiting)} {drives} queued.")
-    shown = f"?score={score}#driving" if score in SCORES else "#driving"
-    return redirect(reverse("job", args=[code]) + shown)
+    shown = f"?score={score}" if score in SCORES else ""
+    return redirect(reverse("job-tab", args=[code, "driving"]) + shown)
 
 
 @page_for(*STAFF)
@@ -209,7 +209,7 @@ def ask_for_scenarios(request: HttpRequest, code: uuid.UUID, form: str) -> HttpR
         row = ask_for_file(job=job, file_format=form, actor=user_of(request))
         send_later(request, tasks.send_scenario_file, row.pk)
         messages.success(request, "A worker writes the file; it is offered here when ready.")
-    return redirect(reverse("job", args=[code]) + "#scenario-files")
+    return redirect("job-tab", code=code, tab="files")
 
 
 @page_for(*STAFF)

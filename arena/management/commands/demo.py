@@ -11,8 +11,9 @@ from django.core.management.base import CommandError
 from arena.management import demo
 from arena.management.arguments import at_least
 from arena.management.commands.serve import INTERRUPTED
-from arena.serving.stack import Web, background, hold_alone, web_server
+from arena.serving.stack import Web, background, hold_alone, missing_stand_ins, web_server
 from arena.serving.supervisor import Supervisor
+from arena.site.demo import JOB
 from augment.services.terminal import TerminalCommand
 
 STOPPED = "The demo was stopped before it was done; started again, it goes on from there."
@@ -64,7 +65,7 @@ class Command(TerminalCommand):
                 self.stdout.write(f"\n{text}\n\nTables: {', '.join(map(str, files))}")
                 self._show(web, time.monotonic() - started, serve=serve)
                 if serve and not supervisor.is_stopping:
-                    supervisor.watch()
+                    supervisor.watch(missing_stand_ins)
             finally:
                 supervisor.stop()
 
@@ -75,7 +76,7 @@ class Command(TerminalCommand):
             f"{where} {web.address}",
             *demo.login_lines(),
             f"  Vote as 'expert' in the study {demo.OPEN_STUDY!r}.",
-            f"  See the drives as 'admin': Jobs, {demo.JOB!r}, See the drives.",
+            f"  See the drives as 'admin': Jobs, {JOB!r}, See the drives.",
         ]
         self.stdout.write("\n".join(lines))
         self.stdout.flush()

@@ -8,7 +8,7 @@ from django.core.management.base import CommandError
 from arena.management.arguments import at_least
 from arena.management.demo import login_lines
 from arena.people.services import make_first_link_token
-from arena.serving.stack import Web, background, hold_alone, web_server
+from arena.serving.stack import Web, background, hold_alone, missing_stand_ins, web_server
 from arena.serving.supervisor import Supervisor
 from augment.services.terminal import TerminalCommand
 
@@ -52,7 +52,7 @@ class Command(TerminalCommand):
                 for line in login_lines():
                     self.stdout.write(line)
                 self._offer_first_link(web)
-                supervisor.watch()
+                supervisor.watch(missing_stand_ins)
             finally:
                 self.stdout.write("Stopping ...")
                 supervisor.stop()

@@ -1,0 +1,146 @@
+"""The demo's parts, each made at once: for `manage.py demo` and for an admin's first steps.
+
+Whatever is there already is used again. Simulated contestants and votes are marked everywhere.
+"""
+
+import socket
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from django.contrib.auth.models import User
+
+from arena.models import Study
+from arena.people.services import create_person
+from arena.results.services.ratings import rate_now
+from arena.studies.services.opening import close_study, open_study
+from arena.studies.services.plan import StudyPlan
+from arena.voting.services.simulation import simulate_votes
+from augment.errors import Conflict
+from augment.models import Endpoint, GenerationJob, Scenario
+from augment.services.endpoints.contestants import (
+    REFERENCE,
+    ContestantRequest,
+    add_contestant,
+    ensure_builtin,
+)
+from augment.services.endpoints.known_endpoints import EndpointRequest, ensure_endpoint
+from augment.services.running.choosing import ALL, resolve_contestants
+from augment.services.running.jobs import JobRequest, launch
+from augment.services.scenarios.catalogue import load_catalogue
+
+STAND_IN = "stand-in"
+SIMULATED = (
+    ("sim-good-otm", "otm", "fake-good", "Simulated good OTM"),
+    ("sim-careless-otm", "otm", "fake-careless", "Simulated careless OTM"),
+    ("sim-careless-fc", "fc", "fake-careless", "Simulated careless FC"),
+    ("sim-careless-tqa", "tqa", "fake-careless", "Simulated careless tQA"),
+)
+RATED = (REFERENCE, "rule-placer", "sim-good-otm", "sim-careless-otm")
+"""Who is voted on: with more, so few votes would leave no intervals."""
+
+SIMULATED_EXPERTS = tuple(f"sim-expert-{number}" for number in range(1, 6))
+JOB = "Demo: the catalogue"
+SIMULATED_STUDY = "Demo (simulated votes)"
+SEED = 7
+SIMULATED_VOTES_EACH = 40
+
+
+def load_scenarios(actor: User | None = None) -> None:
+    """Load the authored scenarios of the paper's types."""
+    load_catalogue(actor=actor)
+
+
+def add_stand_in(actor: User | None = None) -> None:
+    """Add the endpoint of the stand-in models, which `serve` starts."""
+    if not Endpoint.objects.filter(label=STAND_IN).exists():
+        request = EndpointRequest(label=STAND_IN, base_url=free_address(), is_simulated=True)
+        ensure_endpoint(request, actor)
+
+
+def add_contestants(actor: User | None = None) -> None:
+    """Add contestants that ask the stand-in models, and those that ask none."""
+    ensure_builtin()
+    add_stand_in(actor)
+    for slug, variant, model, name in SIMULATED:
+        request = ContestantRequest(
+            slug=slug, variant=variant, endpoint=STAND_IN, model=model, name=name
+        )
+        add_contestant(request, actor)
+
+
+def add_experts(actor: User | None = None) -> None:
+    """Add the experts that the machine votes for."""
+    known = set(User.objects.values_list("username", flat=True))
+    for username in SIMULATED_EXPERTS:
+        if username not in known:
+            create_person(
+                username=username, password=None, role="expert", is_simulated=True, actor=actor
+            )
+
+
+def launch_job(actor: User | None = None, scenarios: Sequence[str] = ()) -> GenerationJob:
+    """Launch the demo's job, every contestant on the scenarios, by default on all."""
+    if job := GenerationJob.objects.filter(name=JOB).first():
+        return job
+    chosen = list(scenarios) or list(Scenario.objects.values_list("slug", flat=True))
+    return launch(
+        JobRequest(name=JOB, contestants=resolve_contestants([ALL]), scenarios=chosen), actor
+    )
+
+
+def hold_study(actor: User | None = None, scenarios: Sequence[str] = ()) -> Study:
+    """Open a study, let simulated experts vote, close and rate it; by default of the last job.
+
+    Raises:
+        Conflict: No job is finished.
+    """
+    if study := Study.objects.filter(name=SIMULATED_STUDY).first():
+        return study
+    contestants: Sequence[str] = RATED
+    if not scenarios:
+        job = GenerationJob.objects.filter(state=GenerationJob.State.FINISHED).first()
+        if job is None:
+            raise Conflict("No job is finished yet; a study compares what one has made.")
+        scenarios = list(job.scenarios.values_list("slug", flat=True))
+        ran = set(job.contestants.values_list("slug", flat=True))
+        contestants = RATED if set(RATED) <= ran else sorted(ran)
+    add_experts(actor)
+    asked = study_asked(SIMULATED_STUDY, scenarios, contestants)
+    asked |= {"experts": SIMULATED_EXPERTS, "show_alike": True}
+    plan = StudyPlan.read(asked | {"votes_per_expert": SIMULATED_VOTES_EACH})
+    study = open_study(plan, actor=actor)
+    simulate_votes(study=study, seed=SEED)
+    study = close_study(study=study, actor=actor)
+    rate_now(study=study, seed=SEED)
+    return study
+
+
+def study_asked(
+    name: str, scenarios: Sequence[str], contestants: Sequence[str] = RATED
+) -> dict[str, Any]:
+    """Return what the demo's studies have in common."""
+    return {
+        "name": name,
+        "contestants": contestants,
+        "scenarios": scenarios,
+        "seed": SEED,
+        "repeats": 0.0,
+        "allow_simulated": True,
+    }
+
+
+def free_address() -> str:
+    """Return an address of this computer that nobody listens at."""
+    with socket.create_server(("127.0.0.1", 0)) as probe:
+        return f"http://127.0.0.1:{probe.getsockname()[1]}/v1"
+
+
+ACTS: dict[str, Callable[[User], GenerationJob | Study | None]] = {
+    "models": add_stand_in,
+    "scenarios": load_scenarios,
+    "contestants": add_contestants,
+    "job": launch_job,
+    "experts": add_experts,
+    "study": hold_study,
+}
+"""What *Use the demo's* does, by the name of the step."""
