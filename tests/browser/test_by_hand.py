@@ -61,10 +61,9 @@ def _become_admin(page: Page, home: Home) -> None:
     wait_until(lambda: bool(printed()), what="the link of the first admin is printed")
     page.goto(printed()[0])
     page.fill("[name=username]", "ada")
-    page.fill("[name=new_password1]", PASSWORD)
-    page.fill("[name=new_password2]", PASSWORD)
+    page.fill("[name=password]", PASSWORD)
     page.click("button.main")
-    expect(page.get_by_role("heading", name="Overview")).to_be_visible()
+    expect(page.get_by_role("heading", name="First steps")).to_be_visible()
 
 
 def _keep_a_moment(page: Page, packed: Path) -> None:
