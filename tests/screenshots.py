@@ -3,10 +3,12 @@
 Fills a new installation with the demo (authored scenes, simulated people and models), serves it,
 and opens every page of the table of access with Chromium at 1280 px. What answers no page there
 (a file, a question that is not asked there) is left out and said. With a
-folder, the demo that is there is used again.
+folder, the demo that is there is used again; with `--measure` each page is told by its name, its
+height and its controls at 1440 x 900 instead, and no picture is taken.
 """
 
 import io
+import json
 import os
 import sys
 import tempfile
@@ -24,6 +26,13 @@ from tests.stack import SMALL_DEMO, Home
 
 FOLDER = ROOT / "docs" / "images" / "pages"
 SCHEMES: tuple[Literal["light", "dark"], ...] = ("light", "dark")
+MEASURE = "--measure"
+CONTROLS = """
+() => [...document.querySelectorAll("a[href], button, input, select, textarea, summary")].filter(
+  (one) => one.checkVisibility({ visibilityProperty: true }) && one.getClientRects().length
+    && one.type !== "hidden" && !one.closest(".skip, .unseen"),
+).length
+"""
 WIDTH, LEAST, MOST = 1280, 720, 1600
 """A page is shown from its top, so many pixels high at least and at most."""
 
@@ -45,8 +54,9 @@ class Shot:
 
 def main() -> None:
     """Fill, open, write."""
+    given = [one for one in sys.argv[1:] if one != MEASURE]
     with tempfile.TemporaryDirectory(prefix="arena-shots-") as folder:
-        home = Home.at(Path(sys.argv[1] if len(sys.argv) > 1 else folder).resolve())
+        home = Home.at(Path(next(iter(given), folder)).resolve())
         home.folder.mkdir(exist_ok=True)
         if not home.database.exists():
             home.must(*SMALL_DEMO)
@@ -59,6 +69,10 @@ def main() -> None:
         shots, sessions = _shots(), _sessions()
         with home.serving() as url, chromium() as browser:
             pages = {who: _page(browser, url, sessions.get(who)) for who in ("", *sessions)}
+            if MEASURE in sys.argv:
+                measured = {one.name: _measure(pages, url, one) for one in shots}
+                print(json.dumps({name: size for name, size in measured.items() if size}))
+                return
             taken = [one for one in shots if _take(pages[one.who], url, one)]
     size = sum(path.stat().st_size for path in FOLDER.glob("*.webp"))
     print(f"{len(taken)} pages, {size / 1e6:.1f} MB")
@@ -71,6 +85,7 @@ def _shots() -> list[Shot]:
     """Every page that somebody may open, with the address of something that there is."""
     from django.contrib.auth.models import User
 
+    from arena.jobs.pages.jobs import TABS as PARTS
     from arena.management.demo import OPEN_STUDY
     from arena.models import Study, Vote
     from arena.results.pages.tabs import TABS
@@ -98,12 +113,17 @@ def _shots() -> list[Shot]:
         Shot(name="home-of-a-researcher", who="researcher", path="/"),
         Shot(name="home-of-an-admin", who="admin", path="/"),
     ]
-    for name in sorted(PAGES.keys() - ACTIONS.keys() - {"home", "drive", "results-vote"}):
+    for name in sorted(
+        PAGES.keys() - ACTIONS.keys() - {"home", "drive", "job-tab", "results-vote"}
+    ):
         who = "expert" if name in VOTES_HERE else "admin"
         here = voted if name in (*VOTES_HERE, *OPEN_HERE) else rated
         shots.append(Shot(name=name, who=who, path=address(name, here)))
     results = address("results", rated)
     shots += [Shot(name=f"results-{tab}", who="admin", path=f"{results}{tab}/") for tab in TABS]
+    shots += [
+        Shot(name=f"job-{tab}", who="admin", path=f"/jobs/{job.code}/{tab}/") for tab in PARTS
+    ]
     if drive is not None:
         shots.append(Shot(name="drive", who="admin", path=f"/drives/{drive.code}/"))
     if vote is not None:
@@ -125,16 +145,33 @@ def _sessions() -> dict[str, str]:
     return found
 
 
-def _take(page: Page, url: str, shot: Shot) -> bool:
-    """Both pictures of a page; False where it answers none."""
+def _measure(pages: dict[str, Page], url: str, shot: Shot) -> list[int]:
+    """Height and visible controls of a page on a desk; empty where it answers none."""
+    page = pages[shot.who]
+    if not _open(page, url, shot):
+        return []
+    page.set_viewport_size({"width": 1440, "height": 900})
+    page.wait_for_load_state("networkidle")
+    return [page.evaluate("document.documentElement.scrollHeight"), page.evaluate(CONTROLS)]
+
+
+def _open(page: Page, url: str, shot: Shot) -> bool:
+    """Whether it answers a page, which is open then."""
     try:
         answer = page.goto(url + shot.path, wait_until="load")
     except Error as error:  # a file is downloaded, which ends the visit
-        print(f"{shot.name}: {error.message.splitlines()[0]}", flush=True)
+        print(f"{shot.name}: {error.message.splitlines()[0]}", file=sys.stderr)
         return False
     assert answer is not None
     if not answer.ok or "text/html" not in answer.headers.get("content-type", ""):
-        print(f"{shot.name}: {answer.status}", flush=True)
+        print(f"{shot.name}: {answer.status}", file=sys.stderr)
+        return False
+    return True
+
+
+def _take(page: Page, url: str, shot: Shot) -> bool:
+    """Both pictures of a page; False where it answers none."""
+    if not _open(page, url, shot):
         return False
     page.set_viewport_size({"width": WIDTH, "height": LEAST})
     high = page.evaluate("document.documentElement.scrollHeight")

@@ -5,8 +5,7 @@ from typing import Any
 
 from django.contrib.auth.decorators import login_not_required
 from django.db import transaction
-from django.db.models import QuerySet
-from django.http import Http404, HttpRequest, HttpResponse, JsonResponse, StreamingHttpResponse
+from django.http import Http404, HttpRequest, HttpResponse, JsonResponse
 from django.shortcuts import redirect, render
 from django.utils.http import url_has_allowed_host_and_scheme
 from django.views.decorators.http import require_POST, require_safe
@@ -24,9 +23,8 @@ from arena.serving.readiness import look_at_parts, opens_metrics
 from arena.site import demo
 from arena.site.access import ADMIN, act_for, page_for, user_of
 from arena.site.acts import send_later
-from arena.site.exports import audit_csv
 from arena.site.language import use_english
-from arena.site.listing import Listing, read_listing, read_page
+from arena.site.listing import read_listing, read_page
 from arena.site.queries import actors, count_failed, distinct, first_steps, read_gauges
 from arena.studies import queries as studies
 from arena.templatetags.results import label_of
@@ -35,7 +33,7 @@ from augment.services.running.progress import count_each
 from augment.tasks import enqueue_job
 
 LATEST_JOBS = 5
-ACTS_AT_ONCE = 50
+ACTS_AT_ONCE = 20
 
 # --- Home --------------------------------------------------------------------------------------
 
@@ -139,24 +137,6 @@ def _back(request: HttpRequest) -> HttpResponse:
 @page_for(ADMIN)
 def audit_page(request: HttpRequest) -> HttpResponse:
     """A page of acts, the newest first."""
-    listing, rows = _find_acts(request)
-    page = read_page(request, rows, size=ACTS_AT_ONCE)
-    context = {"page": page, "listing": listing, "query": request.GET.urlencode()}
-    return render(request, "audit.html", context)
-
-
-@page_for(ADMIN)
-def audit_file(request: HttpRequest) -> StreamingHttpResponse:
-    """All acts that the page's filters name, as a file that is sent while it is read."""
-    _, rows = _find_acts(request)
-    return StreamingHttpResponse(
-        audit_csv(rows.iterator()),
-        content_type="text/csv; charset=utf-8",
-        headers={"Content-Disposition": 'attachment; filename="audit.csv"'},
-    )
-
-
-def _find_acts(request: HttpRequest) -> tuple[Listing, QuerySet[Event]]:
     people: list[tuple[str, object]] = [
         (str(user.person.code), user.person.pseudonym) for user in actors()
     ]
@@ -168,7 +148,9 @@ def _find_acts(request: HttpRequest) -> tuple[Listing, QuerySet[Event]]:
     rows = Event.objects.select_related("actor__person").order_by("-at", "-pk")
     if actor := listing.chosen("actor"):
         rows = rows.filter(actor__person__code=actor)
-    return listing, listing.narrow(rows, "object_code", by=["verb", "object_kind"])
+    rows = listing.narrow(rows, "object_code", by=["verb", "object_kind"])
+    page = read_page(request, rows, size=ACTS_AT_ONCE)
+    return render(request, "audit.html", {"page": page, "listing": listing})
 
 
 # --- Monitoring --------------------------------------------------------------------------------

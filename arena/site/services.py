@@ -1,22 +1,12 @@
-"""Rows of all rooms: old transcripts removed, restored rows checked, unfinished work ended.
+"""Rows that a backup or a study's folder brings: checked, and what was under way in them ended."""
 
-What language models were asked and answered is removed once it is old; the numbers stay.
-
-A call keeps who was asked in which role, tokens, money and times; its messages and its answer go,
-and the images that no other call names. Modifications, pictures and votes are not touched. What
-goes can't be used again: the same request is asked, and paid, anew, and transcripts are without
-words. Nothing of a job that is not over goes, and nothing that an unfinished study shows.
-"""
-
-from collections.abc import Iterator, Mapping
-from datetime import datetime
+from collections.abc import Mapping
 from uuid import uuid4
 
 from django.apps import apps
-from django.contrib.auth.models import User
 from django.core.exceptions import ValidationError
-from django.db import models, transaction
-from django.db.models import F, Q, QuerySet
+from django.db import models
+from django.db.models import F
 
 from arena.errors import ArenaError
 from arena.jobs.services import NOTE_LENGTH
@@ -26,70 +16,10 @@ from arena.studies.services.experts import Complaint, check_complaint
 from arena.studies.services.opening import check_seed
 from arena.studies.services.planning import rules_of
 from arena.voting.services.casting import decision_of
-from augment.errors import AugmentError, Conflict
-from augment.models import FAILED, Augmentation, GenerationJob, ModelCall, Work
+from augment.errors import AugmentError
+from augment.models import FAILED, Augmentation, GenerationJob, Work
 from augment.services import row_rules
-from augment.services.events import log_event
-from augment.services.running.jobs import OPEN
-from augment.services.running.transcript_records import delete_unnamed, images_named_by
 from augment.services.texts import check_picture_name, one_line
-
-BATCH = 200
-"""So many calls are emptied in one transaction, so that nobody waits for long."""
-
-
-def find_removable(before: datetime) -> QuerySet[ModelCall]:
-    """Return calls from before then with their words that no job or study under way needs."""
-    unfinished = Matchup.objects.exclude(study__state=Study.State.CLOSED).order_by()
-    shown = Augmentation.objects.filter(
-        Q(pk__in=unfinished.values("left")) | Q(pk__in=unfinished.values("right"))
-    ).values("pk")
-    kept = Q(attempt__augmentation__in=shown) | Q(attempt__augmentation__job__state__in=OPEN)
-    # Whoever was answered from a call counts it as the source of what it shows.
-    sources = ModelCall.objects.filter(kept, served_from__isnull=False).values("served_from")
-    old = ModelCall.objects.filter(
-        started_at__lt=before, settled_at__isnull=False, removed_at__isnull=True
-    )
-    return old.exclude(pk__in=ModelCall.objects.filter(kept).values("pk")).exclude(pk__in=sources)
-
-
-def remove_old(
-    *, before: datetime, now: datetime, actor: User | None = None
-) -> Iterator[tuple[int, int]]:
-    """Empty old calls in batches; yield how many are done, of how many.
-
-    It is logged first. Stopped halfway, it has emptied whole batches, and the next run does the
-    rest.
-
-    Raises:
-        Conflict: A job was resumed or a study opened meanwhile, so that some calls may not go.
-    """
-    keys = list(find_removable(before).order_by("pk").values_list("pk", flat=True))
-    images = images_named_by(keys)
-    counts = {"older_than": before.isoformat(), "calls": len(keys)}
-    log_event(actor=actor, verb="prune", object_kind="calls", object_code="all", after=counts)
-    for start in range(0, len(keys), BATCH):
-        _empty(keys[start : start + BATCH], before=before, now=now)
-        yield min(start + BATCH, len(keys)), len(keys)
-    delete_unnamed(images)
-
-
-@transaction.atomic
-def _empty(keys: list[int], *, before: datetime, now: datetime) -> None:
-    """Remove messages and answers of a batch, locked so that no job is resumed meanwhile."""
-    rows = list(ModelCall.objects.select_for_update().filter(pk__in=keys).order_by("pk"))
-    if find_removable(before).filter(pk__in=keys).count() != len(keys):
-        raise Conflict(
-            "A job went on or a study was opened meanwhile; the rest is kept. Run it again."
-        )
-    for row in rows:
-        row.request = {name: said for name, said in row.request.items() if name != "messages"}
-        row.answer = None if row.answer is None else ""
-        row.refusal = None if row.refusal is None else ""
-        row.extras, row.request_hash, row.removed_at = None, "", now
-    columns = ("request", "answer", "refusal", "extras", "request_hash", "removed_at")
-    ModelCall.objects.bulk_update(rows, columns)
-
 
 # --- Rules of rows that a backup or a study's folder brings -------------------------------------
 

@@ -41,7 +41,6 @@ urlpatterns: list[URLPattern] = [
     path("people/<uuid:code>/change/", people.change_person, name="person-change"),
     path("people/<uuid:code>/forget/", experts.forget_person, name="person-forget"),
     path("audit/", pages.audit_page, name="audit"),
-    path("audit.csv", pages.audit_file, name="audit-export"),
     path("studies/", studies.studies_page, name="studies"),
     path("studies/plan/", planning.planning_page, name="study-plan"),
     path("studies/checks/", setup.draw_checks, name="checks-draw"),

@@ -83,7 +83,7 @@ def _retry_the_cause(page: Page) -> None:
     _ends_in_part(page)
     expect(page.locator("a.cell img").first).to_be_visible()
     page.locator("a.cell[title=Failed]").first.click()
-    expect(page.get_by_role("heading", name="Attempt 2")).to_be_visible()
+    expect(page.get_by_text("Attempt 2.")).to_be_visible()
     page.go_back()
 
 

@@ -29,7 +29,7 @@ PAGES = _table(
             "studies study-plan study preregistration results results-tab"
         ),
         ADMIN: (
-            "job-new contestant-new endpoint-new audit audit-export people person-forget "
+            "job-new contestant-new endpoint-new audit people person-forget "
             "import-votes study-new study-draft experts enrolment"
         ),
         (404, 404, 403): "scenarios-export drive-file asked-image prompt-image study-file",

@@ -44,8 +44,7 @@ def test_an_admin_is_led_by_steps_that_the_demo_can_do_until_a_study_is_closed()
     assert use_demo("scenarios").count(offered) == 3
     assert "of 400 are settled" in use_demo("job")
     assert "No job is finished yet" in use_demo("study")
-    here = world()
-    close_study(study=here.study)
+    close_study(study=study_rows.a_study())
     assert offered not in admin.get("/").content.decode()
 
 

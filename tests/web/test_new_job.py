@@ -102,8 +102,8 @@ def test_one_scenario_is_tried_first_and_the_rest_is_remembered(
     slugs = set(job.contestants.values_list("slug", flat=True))
     assert {value for name, value in ticked if name == "contestants"} == slugs
     assert {value for name, value in ticked if name == "scenarios"} == {"one", "two"}
-    assert 'name="samples" inputmode="numeric" value="3"' in form
-    assert 'name="cap_calls" inputmode="numeric" value="500"' in form
+    assert 'name="samples" type="number" value="3"' in form
+    assert 'name="cap_calls" type="number" value="500"' in form
 
 
 def test_a_duplicate_fills_the_form_with_what_the_job_had(admin: Client, models: Endpoint) -> None:
@@ -123,7 +123,7 @@ def test_a_duplicate_fills_the_form_with_what_the_job_had(admin: Client, models:
         'value="Old (2)"',
         'name="contestants" value="reference" checked',
         'name="scenarios" value="two" checked',
-        'name="cap_tokens" inputmode="numeric" value="7"',
+        'name="cap_tokens" type="number" value="7"',
         'name="is_fresh" value="on" checked',
     ):
         assert part in form

@@ -17,13 +17,12 @@ from uuid import UUID
 
 from django.core.files.storage import default_storage
 from django.db import models
-from django.db.models import Prefetch, QuerySet
+from django.db.models import Prefetch
 
 from augment.llm.messages import IMAGE_SCHEME, shorten
 from augment.models import Attempt, Augmentation, Contestant, ModelCall, TranscriptNote
 from augment.services.endpoints.treatments import left_out
 from augment.services.running.calls import IMAGES
-from augment.variants.respondents import ModelRole
 
 FORMAT, VERSION = "scenario-arena/transcript", 3
 
@@ -219,30 +218,7 @@ def contestant_documents(contestants: Sequence[Contestant]) -> list[dict[str, An
     ]
 
 
-def images_named_by(keys: Sequence[int]) -> set[str]:
-    """Return the SHA-256 of every image that the viewers of these calls were shown."""
-    named: set[str] = set()
-    for start in range(0, len(keys), _AT_ONCE):
-        for request in _viewer_requests().filter(pk__in=keys[start : start + _AT_ONCE]):
-            named.update(images_in(request))
-    return named
-
-
-def delete_unnamed(images: set[str]) -> None:
-    """Delete those of these images that no call names any more."""
-    unnamed = set(images)
-    for request in _viewer_requests().iterator() if unnamed else ():
-        unnamed.difference_update(images_in(request))
-    for digest in sorted(unnamed):
-        default_storage.delete(f"{IMAGES}/{digest}.png")
-
-
 # --- Private -----------------------------------------------------------------------------------
-
-
-def _viewer_requests() -> QuerySet[ModelCall, dict[str, object]]:
-    rows = ModelCall.objects.filter(role=ModelRole.VIEWER, removed_at__isnull=True)
-    return rows.values_list("request", flat=True)
 
 
 def _steps(attempt: Attempt) -> Iterator[TranscriptStep]:
