@@ -41,7 +41,9 @@ class DemoFailed(ArenaError):
 def prepare(say: Callable[[str], None]) -> None:
     """Scenes, scenarios, contestants and people; nothing here needs a running worker."""
     demo.load_scenarios()
-    say(f"Catalogue: {len(scenarios_of(None))} scenarios on {BaseScene.objects.count()} scenes")
+    say(
+        f"Catalogue: {len(demo.scenarios_of(None))} scenarios on {BaseScene.objects.count()} scenes"
+    )
     Endpoint.objects.filter(label=demo.STAND_IN).update(base_url=demo.free_address())
     demo.add_contestants()
     say(f"Contestants: {', '.join(Contestant.objects.values_list('slug', flat=True))}")
@@ -50,15 +52,6 @@ def prepare(say: Callable[[str], None]) -> None:
         if username not in known:
             create_person(username=username, password=PASSWORD, role=role)
     demo.add_experts()
-
-
-def scenarios_of(per_type: int | None) -> list[str]:
-    """Slugs of the catalogue: the first so many of each type, all where None is given."""
-    kinds: dict[str, list[str]] = {}
-    authored = Scenario.objects.filter(catalogue_set="paper", paraphrase_of=None)
-    for slug, kind in authored.values_list("slug", "type"):
-        kinds.setdefault(kind, []).append(slug)
-    return [slug for slugs in kinds.values() for slug in slugs[:per_type]]
 
 
 def generate(
@@ -95,7 +88,7 @@ def generate(
 
 def start_drives() -> None:
     """Have a few scenarios driven by the workers, before the change and with the reference."""
-    rows = Scenario.objects.filter(slug__in=scenarios_of(DRIVEN_PER_TYPE))
+    rows = Scenario.objects.filter(slug__in=demo.scenarios_of(DRIVEN_PER_TYPE))
     waiting = [pk for row in rows for pk in plan_scenario(scenario=row, options=Options())]
     enqueue_simulations(waiting)
 

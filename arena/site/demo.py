@@ -24,7 +24,7 @@ from augment.services.endpoints.contestants import (
     ensure_builtin,
 )
 from augment.services.endpoints.known_endpoints import EndpointRequest, ensure_endpoint
-from augment.services.running.choosing import ALL, resolve_contestants
+from augment.services.running.choosing import ALL, resolve_contestants, resolve_scenarios
 from augment.services.running.jobs import JobRequest, launch
 from augment.services.scenarios.catalogue import load_catalogue
 
@@ -41,6 +41,9 @@ RATED = (REFERENCE, "rule-placer", "sim-good-otm", "sim-careless-otm")
 SIMULATED_EXPERTS = tuple(f"sim-expert-{number}" for number in range(1, 6))
 JOB = "Demo: the catalogue"
 SIMULATED_STUDY = "Demo (simulated votes)"
+A_FEW = 2
+"""So many scenarios of each type make a job of a minute."""
+
 SEED = 7
 SIMULATED_VOTES_EACH = 40
 
@@ -48,6 +51,15 @@ SIMULATED_VOTES_EACH = 40
 def load_scenarios(actor: User | None = None) -> None:
     """Load the authored scenarios of the paper's types."""
     load_catalogue(actor=actor)
+
+
+def scenarios_of(per_type: int | None) -> list[str]:
+    """Slugs of the catalogue: the first so many of each type, all where None is given."""
+    kinds: dict[str, list[str]] = {}
+    authored = Scenario.objects.filter(catalogue_set="paper", paraphrase_of=None)
+    for slug, kind in authored.values_list("slug", "type"):
+        kinds.setdefault(kind, []).append(slug)
+    return [slug for slugs in kinds.values() for slug in slugs[:per_type]]
 
 
 def add_stand_in(actor: User | None = None) -> None:
@@ -79,13 +91,12 @@ def add_experts(actor: User | None = None) -> None:
 
 
 def launch_job(actor: User | None = None, scenarios: Sequence[str] = ()) -> GenerationJob:
-    """Launch the demo's job, every contestant on the scenarios, by default on all."""
+    """Launch the demo's job, all contestants on the scenarios, by default a few of each type."""
     if job := GenerationJob.objects.filter(name=JOB).first():
         return job
-    chosen = list(scenarios) or list(Scenario.objects.values_list("slug", flat=True))
-    return launch(
-        JobRequest(name=JOB, contestants=resolve_contestants([ALL]), scenarios=chosen), actor
-    )
+    chosen = scenarios or scenarios_of(A_FEW) or resolve_scenarios([ALL])
+    request = JobRequest(name=JOB, contestants=resolve_contestants([ALL]), scenarios=chosen)
+    return launch(request, actor)
 
 
 def hold_study(actor: User | None = None, scenarios: Sequence[str] = ()) -> Study:

@@ -13,7 +13,7 @@ from arena.management.arguments import at_least
 from arena.management.commands.serve import INTERRUPTED
 from arena.serving.stack import Web, background, hold_alone, missing_stand_ins, web_server
 from arena.serving.supervisor import Supervisor
-from arena.site.demo import JOB
+from arena.site.demo import JOB, scenarios_of
 from augment.services.terminal import TerminalCommand
 
 STOPPED = "The demo was stopped before it was done; started again, it goes on from there."
@@ -52,7 +52,7 @@ class Command(TerminalCommand):
         server = [web_server(web)] if serve else []
         call_command("prepare", verbosity=0)
         demo.prepare(self.stdout.write)
-        scenarios = demo.scenarios_of(per_type)
+        scenarios = scenarios_of(per_type)
         supervisor = Supervisor([*background(concurrency=2), *server], self._keep)
         with supervisor.signals():
             try:
