@@ -22,7 +22,7 @@ from tests.processes import MIGRATED, copy_database, machine
 from tests.stack import SMALL_DEMO, Home
 
 GROUPS = {
-    "tests/journeys/test_demo.py": "demo_home",
+    "tests/journeys/test_demo": "demo_home",
     "tests/browser/": "browser",
     "tests/results/test_every_": "every_number",
 }

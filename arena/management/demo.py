@@ -41,9 +41,8 @@ class DemoFailed(ArenaError):
 def prepare(say: Callable[[str], None]) -> None:
     """Scenes, scenarios, contestants and people; nothing here needs a running worker."""
     demo.load_scenarios()
-    say(
-        f"Catalogue: {len(demo.scenarios_of(None))} scenarios on {BaseScene.objects.count()} scenes"
-    )
+    scenarios, scenes = len(demo.scenarios_of(None)), BaseScene.objects.count()
+    say(f"Catalogue: {scenarios} scenarios on {scenes} scenes")
     Endpoint.objects.filter(label=demo.STAND_IN).update(base_url=demo.free_address())
     demo.add_contestants()
     say(f"Contestants: {', '.join(Contestant.objects.values_list('slug', flat=True))}")
