@@ -2,6 +2,7 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -56,6 +57,19 @@ def test_programs_start_in_order_and_stop_together() -> None:
     wait_until(lambda: ("two", "up") in said.lines, what="the second one is up")
     supervisor.stop()
     assert living(children) == []
+
+
+def test_what_comes_to_be_missing_is_started_once_and_stops_with_the_others() -> None:
+    supervisor, later = Supervisor([], Said()), program("later", SLEEP)
+    watching = threading.Thread(target=supervisor.watch, args=[lambda: [later]])
+    watching.start()
+    wait_until(lambda: len(supervisor.children) == 1, what="it is started")
+    time.sleep(1.5)
+    (child,) = supervisor.children
+    supervisor.ask_to_stop()
+    watching.join()
+    supervisor.stop()
+    assert living([child.process.pid]) == []
 
 
 def test_a_program_that_ends_while_starting_shows_its_last_lines_and_stops_the_others() -> None:
