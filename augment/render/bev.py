@@ -49,6 +49,7 @@ SMALL_PX = 60.0
 _LEAST_GAIN = 1.4
 _AROUND_M = 7.0
 _LEAST_WIDTH_M = 20.0
+_CLOSER_RATIO = 1.5
 
 
 def draw(scene: Scene, modification: Modification, camera: Camera) -> bytes:
@@ -208,15 +209,14 @@ def _closer(modification: Modification, camera: Camera) -> Camera | None:
         return None
     points = np.vstack([agent.box.corners_m for agent in seen])
     low, high = points.min(axis=0) - _AROUND_M, points.max(axis=0) + _AROUND_M
-    shape = camera.width_px / camera.height_px
-    width_m = float(max(high[0] - low[0], (high[1] - low[1]) * shape, _LEAST_WIDTH_M))
+    width_m = float(max(high[0] - low[0], (high[1] - low[1]) * _CLOSER_RATIO, _LEAST_WIDTH_M))
     if (camera.x_max_m - camera.x_min_m) / width_m < _LEAST_GAIN:
         return None
     x_m, y_m = ((low + high) / 2.0).tolist()
     return Camera(
         x_min_m=x_m - width_m / 2.0,
         x_max_m=x_m + width_m / 2.0,
-        y_min_m=y_m - width_m / shape / 2.0,
-        y_max_m=y_m + width_m / shape / 2.0,
+        y_min_m=y_m - width_m / _CLOSER_RATIO / 2.0,
+        y_max_m=y_m + width_m / _CLOSER_RATIO / 2.0,
         px_per_m=camera.width_px / width_m,
     )

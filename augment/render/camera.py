@@ -25,21 +25,17 @@ from augment.scene.lane_graph import AnyLane
 
 WIDTH_PX = 1200
 MARGIN_M = 5.0
-# The widest window, 5 px/m: beyond it a car is a speck, and an arrow at the edge tells more.
-MAX_WIDTH_M = 240.0
+# The widest window, 4 px/m: beyond it a car is a speck, and an arrow at the edge tells more.
+MAX_WIDTH_M = 288.0
 # How far from the ego the window follows what contestants changed.
 FOLLOWED_M = 60.0
-# Without a reference nothing says where a change may come: a view far ahead. A wider one shows
-# more of what lies beside a street, which maps mostly leave blank.
-OPEN_WIDTH_M = 48.0
-_OPEN_AHEAD_M = 40.0
-LEAST_WIDTH_M = 42.0
+LEAST_WIDTH_M = 72.0
 WIDTH_STEP_M = 6.0
-# Of the picture, width to height: a street is long, a junction is not.
-TALL, LONG = 1.5, 2.0
-# A long window must be worth it: so much less of it is blank, and the scale hardly suffers.
-_GAIN_SHARE = 0.05
-_MOST_WIDENING = 1.2
+# Of the picture, width to height. A street is long: a higher window shows more of what lies
+# beside it, which maps mostly leave blank; and two of these, one above the other, fill a screen.
+RATIO = 4.0
+# Without a reference nothing says where a change may come: a view far ahead.
+_OPEN_AHEAD_M = 40.0
 _AHEAD_M, _BEHIND_M, _BESIDE_M = 15.0, 3.0, 3.0
 # Cells of the raster on which the ground is counted, per metre.
 _CELLS_PER_M = 2
@@ -109,9 +105,8 @@ def camera_for(
 
     The least of the windows in steps of 6 m that holds the ego, 15 m ahead of it and with 5 m
     around it all that the reference touches, and all that contestants touch within 60 m of the
-    ego; of those on a raster of 1 m the one that shows most of the ground. 3:2, or 2:1 where
-    that leaves less blank. Of places too far apart for the widest window the nearest to the ego
-    are kept.
+    ego; of those on a raster of 1 m the one that shows most of the ground. Of places too far apart
+    for the widest window the nearest to the ego are kept.
 
     Args:
         scene: The scene before the change; the old places of what is moved or removed belong
@@ -120,7 +115,6 @@ def camera_for(
         changes: What the scenario's contestants made of it.
     """
     ahead_m = _OPEN_AHEAD_M if reference is None else _AHEAD_M
-    least_m = OPEN_WIDTH_M if reference is None else LEAST_WIDTH_M
     behind_m = -math.ceil(scene.ego.length_m / 2.0 + _BEHIND_M)
     need = np.array([[behind_m, -_BESIDE_M], [ahead_m, _BESIDE_M]])
     places = [*_places(scene, reference or Modification())]
@@ -130,25 +124,18 @@ def camera_for(
         low = np.floor(np.minimum(need[0], place.min(axis=0) - MARGIN_M))
         high = np.ceil(np.maximum(need[1], place.max(axis=0) + MARGIN_M))
         more = np.array([low, high])
-        if _width_m(more, TALL, least_m) <= MAX_WIDTH_M:
+        if _width_m(more) <= MAX_WIDTH_M:
             need = more
-    origin = need[1] - 1.5 * _width_m(need, TALL, least_m)
-    sums = _ground_sums(scene, origin, need[0] - need[1] + 3.0 * _width_m(need, TALL, least_m))
-    (tall, tall_share), (long, long_share) = (
-        _best(need, ratio, least_m, origin, sums) for ratio in (TALL, LONG)
-    )
-    widest_m = min((tall.x_max_m - tall.x_min_m) * _MOST_WIDENING, MAX_WIDTH_M)
-    is_worth_it = long_share > tall_share + _GAIN_SHARE
-    return long if is_worth_it and long.x_max_m - long.x_min_m <= widest_m else tall
+    return _best(need, scene)
 
 
 # Private
 
 
-def _width_m(need: FloatArray, ratio: float, least_m: float) -> float:
-    """Return the least width in whole steps of a window of a shape that holds what is needed."""
+def _width_m(need: FloatArray) -> float:
+    """Return the least width in whole steps of a window that holds what is needed."""
     across, up = (need[1] - need[0]).tolist()
-    return float(math.ceil(max(least_m, across, up * ratio) / WIDTH_STEP_M) * WIDTH_STEP_M)
+    return float(math.ceil(max(LEAST_WIDTH_M, across, up * RATIO) / WIDTH_STEP_M) * WIDTH_STEP_M)
 
 
 def _ground_sums(scene: Scene, origin_m: FloatArray, size_m: FloatArray) -> np.ndarray:
@@ -167,16 +154,16 @@ def _ground_sums(scene: Scene, origin_m: FloatArray, size_m: FloatArray) -> np.n
     return np.pad(sums, ((1, 0), (1, 0)))
 
 
-def _best(
-    need: FloatArray, ratio: float, least_m: float, origin_m: FloatArray, sums: np.ndarray
-) -> tuple[Camera, float]:
-    """Return the least window of a shape with most ground, and the share of ground in it.
+def _best(need: FloatArray, scene: Scene) -> Camera:
+    """Return the least window with most ground.
 
     Among equals the most usual one, with the ego in the middle of its height and a quarter
     behind its left edge.
     """
-    width = _width_m(need, ratio, least_m)
-    height = width / ratio
+    width = _width_m(need)
+    height = width / RATIO
+    origin_m = need[1] - 1.5 * width
+    sums = _ground_sums(scene, origin_m, need[0] - need[1] + 3.0 * width)
     x_min = np.arange(need[1, 0] - width, need[0, 0] + 0.5)
     y_min = np.arange(math.ceil(need[1, 1] - height), math.floor(need[0, 1]) + 0.5)
     left = ((x_min - origin_m[0]) * _CELLS_PER_M).astype(int)[None, :]
@@ -189,14 +176,13 @@ def _best(
     order = np.lexsort((usual.ravel(), -np.round(share.ravel() * 200.0)))
     row, column = divmod(int(order[0]), len(x_min))
     x_m, y_m = float(x_min[column]), float(y_min[row])
-    camera = Camera(
+    return Camera(
         x_min_m=x_m,
         x_max_m=x_m + width,
         y_min_m=y_m,
         y_max_m=y_m + height,
         px_per_m=WIDTH_PX / width,
     )
-    return camera, float(share[row, column])
 
 
 def _places(scene: Scene, change: Modification) -> Iterator[FloatArray]:
