@@ -55,6 +55,9 @@ class MatchupDocument(serializers.Serializer[Any]):
     original = serializers.CharField(
         allow_null=True, help_text="The scene before any change, null where it was never drawn."
     )
+    unchanged = serializers.ListField(
+        child=serializers.CharField(), help_text="Which of a and b show the scene as it was."
+    )
     px_per_m = serializers.FloatField()
     ego_px = serializers.ListField(child=serializers.FloatField())
     width = serializers.IntegerField()

@@ -109,12 +109,14 @@ def practice_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
 def _practise(request: HttpRequest, study: Study) -> HttpResponse:
     expert, given = user_of(request), request.POST
     page = reverse("vote-practice", args=[study.code])
+    # Practice asks which picture is right; neither is as wrong as equal.
+    answer = "equal" if given.get("outcome") == "both_miss" else given.get("outcome")
     try:
         if "skip" in given:
             skip_practice(study=study, expert=expert)
             return redirect("vote", code=study.code)
         pair = answer_practice(
-            study=study, expert=expert, position=given.get("pair"), answer=given.get("outcome")
+            study=study, expert=expert, position=given.get("pair"), answer=answer
         )
     except StudyNotOpen:
         return redirect("vote", code=study.code)  # which says that the study is closed

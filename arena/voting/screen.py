@@ -6,6 +6,7 @@ from django.contrib.auth.models import User
 from django.core.exceptions import ValidationError
 from django.db.models.functions import Length
 from django.urls import reverse
+from django.utils import timezone
 from django.utils.translation import gettext as _
 from django.utils.translation import pgettext
 
@@ -26,7 +27,7 @@ LONGEST = 3
 """How many instructions: which of them takes most lines depends on words and fonts."""
 
 MODULES = tuple(
-    f"js/vote-{name}.js" for name in ("outbox", "page", "pairs", "lens", "keys", "tabs")
+    f"js/vote-{name}.js" for name in ("outbox", "pace", "page", "pairs", "lens", "keys", "tabs")
 )
 """What vote.js imports, named in the page so that all of it loads at once."""
 
@@ -47,7 +48,12 @@ def vote_context(study: Study, expert: User, *, change: str) -> dict[str, Any] |
         return None
     switches, progress = voting_switches(expert), context["progress"]
     # Nothing tells of what the study does not have.
-    keys = {name: keys for name, keys in KEYS.items() if name != "replay" or study.allow_replay}
+    has = {
+        "replay": study.allow_replay,
+        "both_miss": study.allow_both_miss,
+        "rings": not study.rules.get("hide_rings"),
+    }
+    keys = {name: keys for name, keys in KEYS.items() if has.get(name, True)}
     by_length = study.scenarios.order_by(Length("instruction").desc(), "pk")
     alts = {
         "a": _("Image A, edited scene"),
@@ -60,6 +66,8 @@ def vote_context(study: Study, expert: User, *, change: str) -> dict[str, Any] |
         "alts": alts,
         "modules": MODULES,
         "legend": switches["legend"],
+        "pressed": [name for name, is_on in switches.items() if is_on],
+        "tools": [("skip", _("Skip")), ("report", _("Report")), ("comment", _("Comment"))],
         "skip_reasons": Vote.SkipReason.choices,
         "report_reasons": Report.Reason.choices,
         "report_sides": [(name, side.label) for name, side in SIDES.items()],
@@ -73,6 +81,8 @@ def vote_context(study: Study, expert: User, *, change: str) -> dict[str, Any] |
             "last": [_as_json(vote) for vote in context["last"]],
             "change": changed,
             "allow_both_miss": study.allow_both_miss,
+            "rings": has["rings"],
+            "today": _seen_today(study, expert),
             "preferences": {**switches, "keys": keys},
             "saved": progress.voted,
             "total": progress.total,
@@ -89,6 +99,12 @@ def over_context(study: Study, expert: User) -> dict[str, Any]:
         "last": list(own_votes(study, expert).reverse()[:UNDOABLE]) if is_open else [],
         "enrolled": enrolled_voters(study).filter(expert=expert).first(),
     }
+
+
+def _seen_today(study: Study, expert: User) -> list[int | None]:
+    """How long each pair was on the screen that the expert decided today, in ms."""
+    votes = own_votes(study, expert).filter(at__date=timezone.localdate())
+    return list(votes.values_list("ms_visible", flat=True))
 
 
 def _vote_of_key(study: Study, expert: User, key: str) -> dict[str, Any] | None:
@@ -122,11 +138,10 @@ def _urls(study: Study) -> dict[str, str]:
 
 def _looks() -> dict[str, str]:
     return {
-        "original": _("Original"),
-        "zoom": _("Zoom"),
         "ruler": _("Ruler"),
         "blink": _("Blink"),
         "difference": pgettext("a way to look", "Differ"),
         "replay": _("Drives"),
+        "rings": _("Rings"),
         "legend": _("Legend"),
     }

@@ -8,6 +8,8 @@ const LEAST = 40;
 const ONLY = [[190, 80, 0], [0, 70, 200]];
 const STRIPE_PX = 8;
 const PALE = 0.3;
+// Where they differ is looked for in pictures of this width.
+const COARSE_PX = 600;
 let asked = 0;
 
 export async function show(lens, what, isOn = lens.stands !== what) {
@@ -34,7 +36,6 @@ async function differing(pair) {
   const { images, originals, shown } = pair;
   await originals?.[0].decode();
   const [a, b, before] = [...images, originals?.[0] ?? images[1]].map((image) => pixels(image, shown));
-  const apart = (one, other, at) => Math.abs(one[at] - other[at]) + Math.abs(one[at + 1] - other[at + 1]) + Math.abs(one[at + 2] - other[at + 2]) > LEAST;
   const made = new ImageData(shown.width, shown.height);
   for (let at = 0; at < a.length; at += 4) {
     const [x, y] = [(at / 4) % shown.width, Math.floor(at / 4 / shown.width)];
@@ -57,6 +58,26 @@ async function differing(pair) {
     return canvas;
   });
   return pair.difference;
+}
+
+const apart = (one, other, at) => Math.abs(one[at] - other[at]) + Math.abs(one[at + 1] - other[at + 1]) + Math.abs(one[at + 2] - other[at + 2]) > LEAST;
+
+// The part of the pictures, from 0 to 1, in which either differs from the scene before; null for none.
+export async function changeOf(pair) {
+  if (pair.change !== undefined) return pair.change;
+  const { images, originals, shown } = pair;
+  await originals?.[0].decode();
+  const size = { width: COARSE_PX, height: Math.round((COARSE_PX * shown.height) / shown.width) };
+  const [a, b, before] = [...images, originals?.[0] ?? images[1]].map((image) => pixels(image, size));
+  const found = { left: 1, right: 0, top: 1, bottom: 0 };
+  for (let at = 0; at < a.length; at += 4) {
+    if (!apart(a, before, at) && !apart(b, before, at)) continue;
+    const [x, y] = [((at / 4) % size.width) / size.width, Math.floor(at / 4 / size.width) / size.height];
+    Object.assign(found, { left: Math.min(found.left, x), right: Math.max(found.right, x) });
+    Object.assign(found, { top: Math.min(found.top, y), bottom: Math.max(found.bottom, y) });
+  }
+  pair.change = found.right ? found : null;
+  return pair.change;
 }
 
 function surface({ width, height }) {

@@ -1,17 +1,37 @@
 // Looking closely: zoom, pan, pointer, ruler and the original scene, always in both pictures.
 const STEP = 2.5;
 const MOST = 8;
+// A change takes so much of the frame, within these scales.
+const SHARE = 0.6;
+const LEAST = 1.5;
+const CLOSE = 4;
 const SVG = "http://www.w3.org/2000/svg";
 const between = (low, value, high) => Math.min(high, Math.max(low, value));
 
-// Two paths over a picture, in its pixels: the ruler and the pointer.
-function overlay({ width, height }) {
-  const svg = document.createElementNS(SVG, "svg");
-  svg.setAttribute("class", "marks");
-  svg.setAttribute("aria-hidden", "true");
-  svg.setAttribute("viewBox", `0 0 ${width} ${height}`);
-  svg.append(document.createElementNS(SVG, "path"), document.createElementNS(SVG, "path"));
-  return svg;
+const RINGS_M = [10, 20, 30];
+
+function drawn(name, attributes, ...inside) {
+  const element = document.createElementNS(SVG, name);
+  for (const [attribute, value] of Object.entries(attributes)) element.setAttribute(attribute, value);
+  element.append(...inside);
+  return element;
+}
+
+// Two paths over a picture, in its pixels: the ruler and the pointer; and rings round the ego.
+function overlay(shown, say) {
+  const viewBox = `0 0 ${shown.width} ${shown.height}`;
+  const inside = [drawn("path", {}), drawn("path", {}), drawn("g", { class: "rings" }, ...say ? rings(shown, say) : [])];
+  return drawn("svg", { class: "marks", "aria-hidden": true, viewBox }, ...inside);
+}
+
+// Each with its metres where it goes through the lower edge, or at its lowest.
+function rings({ px_per_m, ego_px: [cx, cy], height }, say) {
+  return RINGS_M.flatMap((metres) => {
+    const r = metres * px_per_m;
+    const down = between(0, height - 8 - cy, r);
+    const place = { x: cx + Math.sqrt(r * r - down * down), y: cy + down };
+    return [drawn("circle", { cx, cy, r }), drawn("text", place, say(metres))];
+  });
 }
 
 export class Lens {
@@ -33,8 +53,8 @@ export class Lens {
   stands = "";
   hasScale = false;
 
-  constructor(panels, text, changed) {
-    Object.assign(this, { panels, text, changed, scenes: panels.map((panel) => panel.firstElementChild) });
+  constructor(panels, text, changed, hasRings) {
+    Object.assign(this, { panels, text, changed, hasRings, scenes: panels.map((panel) => panel.firstElementChild) });
     panels.forEach((panel, place) => this.#listen(panel, this.scenes[place]));
   }
 
@@ -48,14 +68,15 @@ export class Lens {
 
   // Puts the pictures of a pair on the page.
   show(pair, keepsZoom) {
+    const say = this.hasRings && ((metres) => this.text("metres", metres));
     this.#pair = pair;
     this.#at = this.#from = null;
     this.isFlipped = this.isPinned = this.isRuling = false;
     this.stands = "";
     this.aids.clear();
-    this.scenes.forEach((scene, place) => scene.replaceChildren(pair.images[place], overlay(pair.shown)));
+    this.scenes.forEach((scene, place) => scene.replaceChildren(pair.images[place], overlay(pair.shown, say)));
     if (keepsZoom && this.isZoomed) this.aids.add("zoom");
-    else this.reset();
+    else this.#begin();
     this.changed(this);
   }
 
@@ -64,12 +85,23 @@ export class Lens {
     this.#place();
   }
 
-  // To 2.5 times at the pointer, or back.
-  toggleZoom() {
+  // As high as the frame, which is higher than the picture on a phone that is held upright.
+  #begin() {
+    this.reset();
+    const { shown: { width, ego_px: [x] }, change } = this.#pair;
+    if (this.#room > 1.01) this.#centre(this.#room, change ? (change.left + change.right) / 2 : x / width + 0.15, 0.5);
+  }
+
+  // To what either side changed, in parts of the picture; without one to the pointer; or back.
+  toggleZoom(change) {
+    this.aids.add("zoom");
+    if (this.isZoomed) return this.reset();
     const { width, height } = this.#pair.shown;
     const [x, y] = this.#at ?? [width / 2, height / 2];
-    if (this.isZoomed) this.reset();
-    else this.#zoom(STEP, x / width, y / height);
+    if (!change) return this.#centre(STEP, x / width, y / height);
+    const { left, right, top, bottom } = change;
+    const fits = SHARE * Math.min(1 / (right - left), this.#room / (bottom - top));
+    return this.#centre(between(LEAST, fits, CLOSE), (left + right) / 2, (top + bottom) / 2);
   }
 
   pan(dx, dy) {
@@ -136,6 +168,20 @@ export class Lens {
     return this.#from ?? this.#pair.shown.ego_px;
   }
 
+  // How high the frame is, in heights of the picture that is as wide as it.
+  get #room() {
+    const [{ clientWidth, clientHeight }] = this.panels;
+    const { width, height } = this.#pair.shown;
+    return (clientHeight / clientWidth) * (width / height);
+  }
+
+  #centre(scale, u, v) {
+    this.#scale = between(1, scale, MOST);
+    this.#x = 0.5 - u * this.#scale;
+    this.#y = 0.5 - v * this.#scale;
+    this.#place();
+  }
+
   #zoom(scale, u, v) {
     const next = between(1, scale, MOST);
     this.#x += u * (this.#scale - next);
@@ -147,7 +193,8 @@ export class Lens {
 
   #place() {
     this.#x = between(1 - this.#scale, this.#x, 0);
-    this.#y = between(1 - this.#scale, this.#y, 0);
+    const spare = Math.max(0, this.#room - 1) / 2;
+    this.#y = this.#scale < 1 + 2 * spare ? (1 - this.#scale) / 2 : between(1 + spare - this.#scale, this.#y, -spare);
     const moved = `translate(${this.#x * 100}%, ${this.#y * 100}%) scale(${this.#scale})`;
     for (const scene of this.scenes) scene.style.transform = this.isZoomed ? moved : "";
     for (const panel of this.panels) panel.classList.toggle("is-zoomed", this.isZoomed);

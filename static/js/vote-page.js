@@ -19,7 +19,10 @@ export function text(name, ...values) {
 }
 
 const counted = (name, n) => text(`${name}-${n === 1 ? "one" : "many"}`, n);
-const wordOf = ({ outcome, both_miss }) => text(both_miss ? "both_miss" : outcome);
+const wordOf = ({ outcome, both_miss, strength }) => {
+  const word = text(both_miss ? "both_miss" : outcome);
+  return strength ? text(strength, word) : word;
+};
 
 // crypto.randomUUID is missing on plain http to another machine; this is as random.
 export const freshKey = () => URL.createObjectURL(new Blob()).slice(-36);
@@ -43,8 +46,14 @@ export function replay(element) {
   }
 }
 
-export function drawPair({ instruction, position, legend }) {
+// Of windows less long than this two stand side by side.
+const LONG = 2.5;
+
+export function drawPair({ instruction, position, legend, unchanged = [], width, height }) {
   for (const mark of at("legend").children) mark.hidden = Boolean(legend) && !legend.includes(mark.dataset.mark);
+  all(".same").forEach((same, side) => { same.hidden = !unchanged.includes("ab"[side]); });
+  document.querySelector(".sides").classList.toggle("is-beside", width / height < LONG);
+  body.style.setProperty("--ratio", width / height);
   at("instruction").textContent = instruction;
   document.title = document.title.replace(/\d+/, position);
 }
@@ -53,16 +62,19 @@ export function drawReview(vote) {
   at("question").textContent = vote ? text(vote.outcome === "skip" ? "changing-skip" : "changing", vote.position, wordOf(vote)) : text("question");
   at("leave").hidden = !vote;
   const pressed = vote?.both_miss ? "both_miss" : vote?.outcome.toLowerCase();
-  for (const button of all(".answers button")) button.ariaPressed = vote ? pressed === ACTIONS[button.value] : null;
+  for (const button of all(".answers button")) {
+    const isIt = pressed === ACTIONS[button.value] && (button.dataset.strength ?? "") === (vote.strength ?? "");
+    button.ariaPressed = vote ? isIt : null;
+  }
 }
 
 export function drawComment(comment) {
-  at("comment").classList.toggle("is-written", comment.trim() !== "");
+  at("vote").classList.toggle("is-written", comment.trim() !== "");
 }
 
 export function drawLens(lens) {
-  const states = { original: lens.isFlipped, zoom: lens.isZoomed, ruler: lens.isRuling };
-  for (const name of ["blink", "difference"]) states[name] = lens.stands === name;
+  const states = { original: lens.isFlipped, zoom: lens.isZoomed, "ruler-switch": lens.isRuling };
+  for (const name of ["blink", "difference"]) states[`${name}-switch`] = lens.stands === name;
   for (const [name, isOn] of Object.entries(states)) at(name).ariaPressed = isOn;
   const said = lens.isFlipped ? text("original") : lens.reading || (lens.stands && text(lens.stands));
   for (const reading of all(".reading")) reading.textContent = said;
@@ -110,33 +122,36 @@ export function drawKeys() {
   }
 }
 
-function press(name, isOn) {
+export function press(name, isOn) {
   at(`${name}-switch`).ariaPressed = isOn;
   return isOn;
 }
 
-export const toggleLegend = () => press("legend", !at("legend").classList.toggle("is-hidden"));
+// What is asked for stands even where a low window has no room for it.
+export function toggleLegend() {
+  const { classList } = at("legend");
+  const isOn = press("legend", !at("legend").checkVisibility());
+  classList.toggle("is-hidden", !isOn);
+  classList.toggle("is-asked", isOn);
+  return isOn;
+}
 
-// --- Panels: skip, report, comment, the account's menu ------------------------------------------
+export const toggleRings = () => press("rings", !body.classList.toggle("has-no-rings"));
 
-let before = null;
+// --- Panels: tools, skip, report, comment, the account's menu -----------------------------------
 
-const POP = "details[open]";
-
-export const openPop = () => document.querySelector(POP);
+export const openPop = () => document.querySelector(":popover-open, details[open]");
 
 export function closePop() {
   const pop = openPop();
-  if (!pop) return;
-  const hadFocus = pop.contains(document.activeElement);
-  pop.open = false;
-  if (hadFocus) before?.focus();
+  if (pop?.popover) pop.hidePopover();
+  else if (pop) pop.open = false;
 }
 
 export function showPop(name) {
-  before = document.activeElement;
-  at(name).open = true;
-  at(name).querySelector("[data-first]").focus();
+  closePop();
+  at(name).showPopover();
+  at(name).querySelector("[data-first], button").focus();
 }
 
 // Digits choose, Esc and Ctrl+Enter leave; nothing votes.
@@ -149,7 +164,10 @@ export function keyInPop(event) {
   if (isDone || chosen) event.preventDefault();
 }
 
-addEventListener("pointerdown", ({ target }) => target.closest(POP) || closePop());
+// The browser itself closes the others where somebody presses beside them.
+addEventListener("pointerdown", ({ target }) => {
+  if (openPop()?.matches("details") && !target.closest("details")) closePop();
+});
 
 // --- What has to be answered before voting goes on ----------------------------------------------
 

@@ -95,7 +95,7 @@ class Replay {
     this.pairs.disconnect();
     for (const part of [this.bar, ...this.films]) part.remove();
     document.body.classList.remove("replays");
-    at("replay").ariaPressed = false;
+    at("replay-switch").ariaPressed = false;
     shown = null;
   }
 }
@@ -113,6 +113,6 @@ export async function toggleReplay(aids) {
   const drives = await answer.json();
   if (shown || matchup() !== wanted) return;
   shown = new Replay(drives);
-  at("replay").ariaPressed = true;
+  at("replay-switch").ariaPressed = true;
   aids.add("replay");
 }

@@ -3,6 +3,7 @@
 import { actionOf } from "./vote-keys.js";
 import { Lens } from "./vote-lens.js";
 import { ask, Outbox } from "./vote-outbox.js";
+import { count, drawPace, rest } from "./vote-pace.js";
 import * as page from "./vote-page.js";
 import { Pairs } from "./vote-pairs.js";
 import { hold } from "./vote-tabs.js";
@@ -16,8 +17,8 @@ const { at, given, text } = page;
 const { preferences, urls } = given;
 const form = at("vote");
 const field = form.elements.comment;
-// The votes, the latest first: {key, position, outcome, both_miss, comment, shown, pair}; the one
-// of them whose pair is on the screen again; the pair whose pictures are painted.
+// The votes, the latest first: {key, position, outcome, both_miss, strength, comment, shown, pair};
+// the one of them whose pair is on the screen again; the pair whose pictures are painted.
 let votes = given.last;
 let review = null;
 let onScreen = null;
@@ -26,7 +27,7 @@ let hiddenMs = 0;
 let isLeaving = false;
 
 const pairs = new Pairs(given.alts, fetchPairs, draw);
-const lens = new Lens([...document.querySelectorAll(".panel")], text, page.drawLens);
+const lens = new Lens([...document.querySelectorAll(".panel")], text, page.drawLens, given.rings);
 const outbox = new Outbox(given.outbox, urls, {
   wanted: () => Math.min(12, pairs.depth + outbox.entries.length),
   changed: () => page.drawSaved(outbox.entries.length, outbox.isCut),
@@ -77,7 +78,11 @@ function paint(pair) {
 function afterwards() {
   page.replay(at("ask"));
   page.drawLast(votes);
-  pairs.list[review ? 0 : 1]?.warm();
+  drawPace();
+  const coming = pairs.list[review ? 0 : 1];
+  coming?.warm();
+  // A phone that is held upright shows a part of the picture: that with the change.
+  if (coming?.originals && upright.matches) compared(({ changeOf }) => changeOf(coming));
 }
 
 // --- Deciding ------------------------------------------------------------------------------------
@@ -94,7 +99,7 @@ function decide(outcome, more = {}) {
   page.note("");
   page.closePop();
   if (review) {
-    const isSame = ["outcome", "both_miss", "comment"].every((name) => vote[name] === review[name]);
+    const isSame = ["outcome", "both_miss", "strength", "comment"].every((name) => vote[name] === review[name]);
     if (isSame && outcome !== "skip") return leave();
     body.supersedes = review.key;
     Object.assign(review, vote);
@@ -102,14 +107,15 @@ function decide(outcome, more = {}) {
   } else {
     votes = [vote, ...votes].slice(0, UNDOABLE);
     pairs.decide(shown.matchup);
+    setTimeout(count, 0, body.ms_visible);
   }
   outbox.add("votes", body, shown);
   draw();
 }
 
 function voteOf({ body, shown }, pair) {
-  const { key, outcome, comment, both_miss = false } = body;
-  return { key, outcome, comment, both_miss, position: shown.position, shown, pair };
+  const { key, outcome, comment, both_miss = false, strength = "" } = body;
+  return { key, outcome, comment, both_miss, strength, position: shown.position, shown, pair };
 }
 
 function undo(vote = votes[review ? votes.indexOf(review) + 1 : 0]) {
@@ -192,24 +198,33 @@ async function finish() {
 
 // --- Keys, clicks, tabs --------------------------------------------------------------------------
 
+// How clear it is, where the study asks for it.
+const prefer = (outcome, strength) => decide(outcome, given.ask_strength ? { strength } : {});
+const upright = matchMedia("(max-width: 50rem) and (orientation: portrait)");
+
 const actions = {
-  a: () => decide("A"),
+  a: () => prefer("A", "slightly"),
   e: () => decide("E"),
-  b: () => decide("B"),
+  b: () => prefer("B", "slightly"),
+  a_clearly: () => given.ask_strength && prefer("A", "clearly"),
+  b_clearly: () => given.ask_strength && prefer("B", "clearly"),
   both_miss: () => given.allow_both_miss && decide("E", { both_miss: true }),
   undo: () => undo(),
   skip: () => page.showPop("skip"),
   report: () => page.showPop("report"),
   comment: () => page.showPop("comment"),
+  tools: () => page.showPop("tools"),
+  rest,
   leave,
   original: () => lens.flip(true),
   pin: () => lens.flip(!lens.isFlipped, true),
-  zoom: () => lens.toggleZoom(),
+  zoom: () => (lens.isZoomed ? lens.toggleZoom() : compared(({ changeOf }) => zoom(changeOf))),
   reset: () => lens.reset(),
   ruler: () => lens.rule(true),
   replay: () => late(import("./vote-replay.js"), ({ toggleReplay }) => toggleReplay(lens.aids)),
   blink: () => compare("blink", true),
   difference: () => compare("difference"),
+  rings: () => given.rings && ask(urls.preferences, { rings: page.toggleRings() }),
   legend: () => ask(urls.preferences, { legend: page.toggleLegend() }),
   help: () => late(import("./vote-help.js"), ({ showHelp }) => showHelp()),
   again: () => pairs.fill(),
@@ -218,10 +233,17 @@ const actions = {
 // What is loaded when it is asked for first.
 const late = (module, use) => module.then(use, () => page.note(text("unreachable")));
 // What stands in the panels, true or false; without it the other way round.
-const compare = (...how) => late(import("./vote-compare.js"), ({ show }) => show(lens, ...how));
+const compared = (use) => late(import("./vote-compare.js"), use);
+const compare = (...how) => compared(({ show }) => show(lens, ...how));
+
+async function zoom(changeOf) {
+  const pair = onScreen;
+  const change = await changeOf(pair).catch(() => null);
+  if (pair === onScreen) lens.toggleZoom(change);
+}
 
 // Actions that go without a pair as well; key codes and what their release ends.
-const always = new Set(["undo", "leave", "legend", "help", "again"]);
+const always = new Set(["undo", "leave", "tools", "rings", "legend", "help", "again"]);
 const held = new Map();
 
 function arrow({ key, shiftKey }) {
@@ -236,12 +258,16 @@ function arrow({ key, shiftKey }) {
 addEventListener("keydown", (event) => {
   const { target, repeat, code } = event;
   if (document.querySelector("dialog[open]")) return;
-  if (page.openPop()) return page.keyInPop(event);
+  const pop = page.openPop();
+  // The tools show which key does what; any of them may be pressed.
+  if (pop && (pop.id !== "tools" || event.key === "Escape")) return page.keyInPop(event);
   if (arrow(event)) return event.preventDefault();
   const action = actionOf(event, preferences);
   // Enter, held on a button, would click on and on.
   if (action || (repeat && target.closest("button"))) event.preventDefault();
   if (!action || repeat || (!onScreen && !always.has(action))) return;
+  page.closePop();
+  if (pop && action === "tools") return;
   actions[action]();
   if (action === "original") held.set(code, () => lens.isPinned || lens.flip(false));
   if (action === "blink") held.set(code, () => compare("blink", false));
@@ -258,10 +284,10 @@ addEventListener("blur", () => [...held.keys()].forEach(release));
 
 form.addEventListener("submit", (event) => {
   event.preventDefault();
-  const { name, value } = event.submitter ?? {};
+  const { name, value, dataset } = event.submitter ?? {};
   if (name === "skip") decide("skip", { reason: value });
   else if (name === "report") report(value);
-  else actions[page.ACTIONS[value]]?.();
+  else actions[page.ACTIONS[value] + (dataset?.strength === "clearly" ? "_clearly" : "")]?.();
 });
 form.addEventListener("input", () => page.drawComment(field.value));
 
@@ -269,6 +295,7 @@ document.addEventListener("click", (event) => {
   const pressed = event.target.closest("[data-do], [data-vote]");
   if (!pressed) return;
   event.preventDefault();
+  if (pressed.closest("#tools")) page.closePop();
   const { do: action, vote: key } = pressed.dataset;
   if (key) undo(votes.find((vote) => vote.key === key));
   else if (action === "ruler") lens.rule(!lens.isRuling);
@@ -299,6 +326,8 @@ function elsewhere() {
 async function start() {
   form.inert = true;
   page.drawKeys();
+  page.press("legend", at("legend").checkVisibility());
+  if (!preferences.rings) document.body.classList.add("has-no-rings");
   // On small windows both pictures keep in sight beside it.
   const { classList, style } = document.body;
   new ResizeObserver(() => style.setProperty("--ask", `${at("ask").offsetHeight}px`)).observe(at("ask"));

@@ -194,7 +194,7 @@ def _frozen(
         "identical": [list(triple) for triple in planned.identical],
         "alike_shown": [list(pair) for pair in alike_shown],
         # Kept where it departs from the default, so that the settings can be used again.
-        **({"show_alike": True} if study_plan.show_alike else {}),
+        **{name: True for name in ("show_alike", "hide_rings") if getattr(study_plan, name)},
         "hypotheses": [asdict(hypothesis) for hypothesis in hypotheses],
         "samples": study_plan.samples.value,
         "jobs": [{"code": str(job.code), "name": job.name} for job in shown.jobs],

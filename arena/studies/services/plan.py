@@ -220,6 +220,10 @@ class StudyPlan:
         "Under the images, how a planner drove both scenes; only where every image of a scenario "
         "was driven. Votes say who played them.",
     )
+    hide_rings: bool = _switch(
+        "No rings round the ego",
+        "Experts otherwise see how far 10, 20 and 30 m are in both images.",
+    )
     practice: bool = _switch(
         "Practice before the first pair",
         "Five pairs, a reference beside a broken image, each followed by what was right and why; "
@@ -275,6 +279,7 @@ def plan_of(study: Study) -> StudyPlan:
         samples=SampleRule(rules.get("samples", SampleRule.ONE)),
         jobs=tuple(job["code"] for job in rules.get("jobs", ())),
         show_alike=bool(rules.get("show_alike")),
+        hide_rings=bool(rules.get("hide_rings")),
         **{name: round(100 * rules.get(share, 0), 6) for name, share in SHARES.items()},
         **{name: getattr(study, name) for name in SWITCH_COLUMNS},
     )

@@ -89,7 +89,8 @@ def upcoming(*, study: Study, expert: User, n: int) -> list[Matchup]:
     rows = Matchup.objects.filter(study=study, expert=expert, votes=None)
     needed = (
         *("code", "study_id", "expert_id", "position", "kind", "view"),
-        *("left_token", "right_token", "original_token", "original_image"),
+        *("left_token", "right_token", "original_token"),
+        *("left_image", "right_image", "original_image"),
         "scenario__instruction",
     )
     return list(rows.select_related("scenario").only(*needed).order_by("position")[:n])

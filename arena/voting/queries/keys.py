@@ -8,10 +8,12 @@ KEYS: dict[str, tuple[str, ...]] = {
     "a": ("1", "a"),
     "e": ("2", "e"),
     "b": ("3", "b"),
+    "both_miss": ("4", "n"),
     "undo": ("u",),
     "skip": ("s",),
     "report": ("r",),
     "comment": ("c",),
+    "tools": ("t",),
     "original": ("o",),
     "zoom": ("z",),
     "reset": ("0",),
@@ -19,12 +21,18 @@ KEYS: dict[str, tuple[str, ...]] = {
     "blink": ("x",),
     "difference": ("v",),
     "replay": ("d",),
+    "rings": ("g",),
     "legend": ("l",),
     "help": ("h", "?"),
 }
 """Action -> the single keys that do it, the one that is shown first."""
 
-SWITCHES: dict[str, bool] = {"single_keys": True, "legend": True, "keep_zoom": False}
+SWITCHES: dict[str, bool] = {
+    "single_keys": True,
+    "legend": True,
+    "rings": True,
+    "keep_zoom": False,
+}
 """What can be on or off, and how it is at first."""
 
 

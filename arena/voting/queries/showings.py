@@ -71,11 +71,18 @@ def as_shown(matchup: Matchup) -> dict[str, Any]:
         "a": reverse("matchup-image", args=[matchup.left_token]),
         "b": reverse("matchup-image", args=[matchup.right_token]),
         "original": reverse("matchup-image", args=[original]) if original else None,
+        "unchanged": _unchanged(matchup),
         **view_shown(matchup),
     }
     if legend := (matchup.view or {}).get(LEGEND):
         shown["legend"] = sorted({*legend["scene"], *legend["pair"]})
     return shown
+
+
+def _unchanged(matchup: Matchup) -> list[str]:
+    """Return the sides that show the scene as it was; pictures are named by what they show."""
+    shown = {"a": matchup.left_image, "b": matchup.right_image}
+    return [side for side, image in shown.items() if image and image == matchup.original_image]
 
 
 def _may_see(user: User, shown: Matchup | LabelTask | PracticePair) -> bool:
