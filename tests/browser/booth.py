@@ -18,6 +18,7 @@ from tests.web.cast import png
 
 DESK = ViewportSize(width=1280, height=720)
 PHONE = ViewportSize(width=390, height=844)
+VIEW = {"px_per_m": 20.0, "ego_px": [300.0, 150.0], "width": 1200, "height": 300}
 BOUNCE_MS = 210
 """A press sooner than this after a pair appeared is ignored, as the second of a double one."""
 
@@ -38,8 +39,8 @@ def furnish(*, scenarios: int = 6, votes: int = 9) -> Study:
 def hang(study: Study) -> Study:
     """Small pictures for all of a study, in the shape of the window that its plan names."""
     for number, augmentation in enumerate(Augmentation.objects.order_by("pk")):
-        study_rows.hang(augmentation, store(png(number % 256, width=3, height=2)))
-    study.matchups.update(original_image=store(png(255, width=3, height=2)))
+        study_rows.hang(augmentation, store(png(number % 256, width=4, height=1)))
+    study.matchups.update(original_image=store(png(255, width=4, height=1)), view=VIEW)
     return study
 
 

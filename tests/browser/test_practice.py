@@ -28,7 +28,7 @@ def wanted(booth: Booth) -> Booth:
     made = [picture(place, reference) for place in Scenario.objects.all()]
     made += draw_checks(scenarios=list(Scenario.objects.values_list("slug", flat=True)))
     for number, row in enumerate(made):
-        image = store(png(100 + number, width=3, height=2))
+        image = store(png(100 + number, width=4, height=1))
         Augmentation.objects.filter(pk=row.pk).update(image=image)
     booth.study.practice = True
     booth.study.save()

@@ -28,7 +28,7 @@ def picture(page: Page, number: int) -> str:
 
 def test_d_plays_both_drives_in_step_and_the_next_pair_ends_it(played: Booth) -> None:
     page = played.enter(reduced_motion="reduce")
-    switch = page.get_by_role("button", name="Drives D")
+    switch = page.locator("#replay-switch")
     assert not page.evaluate("performance.getEntriesByType('resource')").count("film")
     page.keyboard.press("d")
     expect(page.locator(".side canvas")).to_have_count(2)

@@ -41,7 +41,7 @@ def test_the_whole_loop_without_a_mouse(booth: Booth) -> None:
     booth.study.save()
     page = booth.enter()
     press(page, "1")
-    press(page, "Shift+Digit2")
+    press(page, "4")
     page.keyboard.press("s")
     press(page, "4")  # the fourth reason
     page.keyboard.press("r")
@@ -84,10 +84,11 @@ def test_looking_closely_by_keys_moves_both_pictures_and_is_kept_with_the_vote(
     page.keyboard.up("o")
     expect(shown).to_have_attribute("alt", "Image A, edited scene")
     page.keyboard.press("z")
+    expect(page.locator("#zoom")).to_have_attribute("aria-pressed", "true")
     page.keyboard.press("Shift+ArrowRight")
     moved = [scene.get_attribute("style") for scene in page.locator(".scene").all()]
     assert moved[0] == moved[1]
-    assert "scale(2.5)" in str(moved[0])
+    assert "scale(1.5)" in str(moved[0])
     page.keyboard.down("m")
     for key in ("ArrowRight", "ArrowRight", "ArrowRight", "ArrowUp"):
         page.keyboard.press(key)
