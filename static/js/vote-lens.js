@@ -45,6 +45,9 @@ export class Lens {
   #from = null;
   #drag = null;
   #pair = null;
+  // The frames' height to their width; to measure it for each pair would lay out the page twice.
+  #frame = 0;
+  #ratio = 0;
   aids = new Set();
   isRuling = false;
   isFlipped = false;
@@ -56,6 +59,7 @@ export class Lens {
   constructor(panels, text, changed, hasRings) {
     Object.assign(this, { panels, text, changed, hasRings, scenes: panels.map((panel) => panel.firstElementChild) });
     panels.forEach((panel, place) => this.#listen(panel, this.scenes[place]));
+    addEventListener("resize", () => { this.#frame = 0; });
   }
 
   get scale() {
@@ -68,6 +72,9 @@ export class Lens {
 
   // Puts the pictures of a pair on the page.
   show(pair, keepsZoom) {
+    const { width, height } = pair.shown;
+    if (this.#ratio !== width / height) this.#frame = 0;
+    this.#ratio = width / height;
     const say = this.hasRings && ((metres) => this.text("metres", metres));
     this.#pair = pair;
     this.#at = this.#from = null;
@@ -170,9 +177,9 @@ export class Lens {
 
   // How high the frame is, in heights of the picture that is as wide as it.
   get #room() {
-    const [{ clientWidth, clientHeight }] = this.panels;
     const { width, height } = this.#pair.shown;
-    return (clientHeight / clientWidth) * (width / height);
+    this.#frame ||= this.panels[0].clientHeight / this.panels[0].clientWidth;
+    return this.#frame * (width / height);
   }
 
   #centre(scale, u, v) {

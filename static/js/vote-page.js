@@ -48,12 +48,16 @@ export function replay(element) {
 
 // Of windows less long than this two stand side by side.
 const LONG = 2.5;
+let ratio = 0;
 
 export function drawPair({ instruction, position, legend, unchanged = [], width, height }) {
   for (const mark of at("legend").children) mark.hidden = Boolean(legend) && !legend.includes(mark.dataset.mark);
   all(".same").forEach((same, side) => { same.hidden = !unchanged.includes("ab"[side]); });
-  document.querySelector(".sides").classList.toggle("is-beside", width / height < LONG);
-  body.style.setProperty("--ratio", width / height);
+  if (ratio !== width / height) {
+    ratio = width / height;
+    document.querySelector(".sides").classList.toggle("is-beside", ratio < LONG);
+    body.style.setProperty("--ratio", ratio);
+  }
   at("instruction").textContent = instruction;
   document.title = document.title.replace(/\d+/, position);
 }

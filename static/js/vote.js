@@ -60,8 +60,8 @@ function draw() {
 function paint(pair) {
   onScreen = pair;
   paintedAt = Infinity;
-  lens.show(pair, preferences.keep_zoom);
   page.drawPair(pair.shown);
+  lens.show(pair, preferences.keep_zoom);
   form.dataset.matchup = pair.shown.matchup;
   form.elements.report_side.value = "both";
   page.drawReview(review);
