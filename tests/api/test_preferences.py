@@ -26,7 +26,8 @@ def post(user: User, body: object) -> Any:
 def test_a_switch_is_kept_and_the_others_stay(eva: User) -> None:
     assert post(eva, {"legend": False}).json()["legend"] is False
     assert post(eva, {"keep_zoom": True}).json() == voting_switches(eva)
-    assert voting_switches(eva) == {"single_keys": True, "legend": False, "keep_zoom": True}
+    usual = {"single_keys": True, "rings": True}
+    assert voting_switches(eva) == {**usual, "legend": False, "keep_zoom": True}
     assert post(eva, {"legend": "no"}).status_code == 422
 
 

@@ -19,7 +19,7 @@ pytestmark = [pytest.mark.django_db, pytest.mark.urls("tests.api.urls")]
 
 
 def test_the_next_matchups_have_tokens_and_nothing_else(study: Study) -> None:
-    study.matchups.update(original_image="bev/before.png")
+    study.matchups.update(original_image="bev/before.png", left_image="bev/before.png")
     response = signed_in("eva").get(f"/api/v1/matchups?study={study.code}")
     mine = matchups_of(study, "eva")[:4]
     assert response.json() == [
@@ -30,6 +30,7 @@ def test_the_next_matchups_have_tokens_and_nothing_else(study: Study) -> None:
             "a": f"/i/{matchup.left_token}",
             "b": f"/i/{matchup.right_token}",
             "original": f"/i/{matchup.original_token}",
+            "unchanged": ["a"],
             **VIEW_OF_OLD,
             "legend": ["ego", "grid", "motion", "other", "own", "walkway"],
         }
