@@ -53,7 +53,8 @@ def test_axe_finds_nothing_on_any_page_of_voting(booth: Booth) -> None:
 
 
 BLANK = """() => {
-  const shown = [...document.querySelectorAll(".scene > img")].map((one) => one.getBoundingClientRect());
+  const images = [...document.querySelectorAll(".scene > img")];
+  const shown = images.map((one) => one.getBoundingClientRect());
   const seen = shown.reduce((sum, { width, height }) => sum + width * height, 0);
   return 1 - seen / (innerWidth * innerHeight);
 }"""
