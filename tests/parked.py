@@ -5,10 +5,14 @@ import re
 from pathlib import Path
 from typing import Any
 
-from augment.scene.codec import intent_from_document, modification_to_document, scene_to_document
+from augment.scene.codec import (
+    intent_from_document,
+    intent_to_document,
+    modification_to_document,
+    scene_to_document,
+)
 from augment.scene.entities import Modification, Scene
-from augment.scene.intent import Intent
-from augment.services.scenarios.intent_fields import NEW_ROW, IntentFields, intent_of_fields
+from augment.scene.intent import Intent, LaneChoice, Length, Relation, Spot, VehicleRequest
 from tests.scenes import scene, vehicle
 
 TYPE = "nudge_around_parked_vehicle"
@@ -20,11 +24,11 @@ def wish(ahead_m: int) -> str:
 
 
 def asked(ahead_m: int) -> dict[str, Any]:
-    """What the wish asks for, as the fields of the form say it."""
-    fields = {"kind": "vehicles", "distance_m": str(ahead_m), "lane": "own", "speed_mps": "0"}
-    found = intent_of_fields(IntentFields(rows=(NEW_ROW | fields,)))
-    assert found is not None
-    return found
+    """What the wish asks for."""
+    length = Length(low_m=float(ahead_m), high_m=float(ahead_m))
+    spot = Spot(distance=length, relation=Relation.AHEAD, lane=LaneChoice.OWN)
+    request = VehicleRequest(spot=spot, speed_mps=0.0, count=1)
+    return intent_to_document(Intent(requests=(request,)))
 
 
 def reference(ahead_m: int) -> dict[str, Any]:

@@ -29,6 +29,7 @@ from arena.scenarios.services import was_too_large
 from augment.models import Scenario, SceneUpload, UploadMoment
 from augment.models.scenes import DENSITIES, GOALS
 from augment.services.scenarios import uploads
+from augment.services.scenarios.scene_imports import notes_of
 from augment.services.scenarios.scenes import (
     INSTRUCTION_LENGTH,
     LONGEST_TYPE,
@@ -162,7 +163,7 @@ class UploadDocument(RowDocument[SceneUpload], WarnedDocument):
     tracks = serializers.ListField(
         child=serializers.DictField(),
         read_only=True,
-        help_text="Its parts: `name` and `stops`, each with item, frame, time_s and place_m.",
+        help_text="Its parts: `name` and `stops`, each with item, frame and time_s.",
     )
 
     class Meta:
@@ -190,7 +191,7 @@ class MomentDocument(RowDocument[UploadMoment], WarnedDocument):
 
     def get_notes(self, row: UploadMoment) -> list[str]:
         """Return them as sentences."""
-        return uploads.sentences_of(row)
+        return notes_of((row.report or {}).get("notes", ()))
 
 
 class UploadsView(ApiView):

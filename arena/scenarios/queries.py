@@ -1,4 +1,4 @@
-"""Scenarios, scenes and recordings as pages show them."""
+"""Scenarios as pages show them."""
 
 import math
 import uuid
@@ -9,7 +9,7 @@ from typing import Any
 
 from django.db.models import QuerySet
 
-from augment.models import Augmentation, Contestant, Scenario, UploadMoment
+from augment.models import Augmentation, Contestant, Scenario
 from augment.services.scenarios.scenes import type_choices
 
 
@@ -112,44 +112,3 @@ def modification_lines(document: dict[str, Any] | None) -> list[dict[str, Any]]:
     ]
     removed = parts.get("remove", ())
     return lines + [{"change": "removed", "agent": name, "x_m": None} for name in removed]
-
-
-# --- Maps of uploaded recordings ---------------------------------------------------------------
-
-_AROUND_M = 35.0
-_LEAST_M = 90.0
-
-
-def place_of(maps: list[dict[str, Any]], moment: UploadMoment) -> list[dict[str, Any]]:
-    """Return the part and the stop that a moment is; empty for one that is not among them."""
-    places = ([track, stop] for track in maps for stop in track["stops"])
-    wanted = (moment.item, moment.frame)
-    return next((one for one in places if (one[1]["item"], one[1]["frame"]) == wanted), [])
-
-
-def track_map(number: int, track: dict[str, Any]) -> dict[str, Any]:
-    """Return a part of a recording: its moments, and the road under them as an SVG drawing.
-
-    `roads` and `way` are points of polylines, `box` is a viewBox (metres, y down), `dot` half the
-    width of a dot; `x` and `y` of a stop are None off the map.
-    """
-    places = [stop["place_m"] for stop in track["stops"]]
-    points = [(None, None) if place is None else (place[0], -place[1]) for place in places]
-    stops = [
-        stop | {"number": index, "x": x, "y": y}
-        for index, (stop, (x, y)) in enumerate(zip(track["stops"], points, strict=True))
-    ]
-    placed = [point for point in points if point[0] is not None] or [(0.0, 0.0)]
-    xs, ys = zip(*placed, strict=True)
-    width = max(max(xs) - min(xs) + 2 * _AROUND_M, _LEAST_M)
-    height = max(max(ys) - min(ys) + 2 * _AROUND_M, width / 3.0)
-    left, top = (max(xs) + min(xs) - width) / 2.0, (max(ys) + min(ys) - height) / 2.0
-    return {
-        "number": number,
-        "name": track["name"],
-        "stops": stops,
-        "roads": [" ".join(f"{x},{-y}" for x, y in line) for line in track["roads_m"]],
-        "way": " ".join(f"{x},{y}" for x, y in points if x is not None),
-        "box": f"{left:.1f} {top:.1f} {width:.1f} {height:.1f}",
-        "dot": round(width / 110.0, 2),
-    }

@@ -1,4 +1,4 @@
-"""Changes of scenarios and scenes that nothing depends on yet, references, and redrawing."""
+"""Changes of scenarios and scenes that nothing depends on yet, and redrawing."""
 
 from collections.abc import Iterator, Mapping
 
@@ -11,7 +11,7 @@ from augment.models import BaseScene, Scenario
 from augment.services.events import log_change
 from augment.services.scenarios import editing
 from augment.services.scenarios.pictures import redraw
-from augment.services.scenarios.scenes import change_surroundings, set_wording
+from augment.services.scenarios.scenes import change_surroundings, derive_intent, set_wording
 
 MOST_NAMED = 8
 FILE_TOO_LARGE = "arena.file_too_large"
@@ -42,37 +42,17 @@ def redraw_pictures() -> Iterator[tuple[str, int | AugmentError]]:
                 yield slug, number
 
 
-# --- References --------------------------------------------------------------------------------
-
-
-@transaction.atomic
-def set_reference(scenario: Scenario, document: object, *, actor: User | None = None) -> Scenario:
-    """Give a scenario this reference; the window of its pictures may become another one.
-
-    Raises:
-        InvalidDocument: The document breaks its format.
-        InvalidModification: It does not fit the scene.
-        Conflict: The scenario is the catalogue's, an open study or labelling shows it, or nothing
-            changes.
-    """
-    _hold_unjudged(scenario)
-    return editing.set_reference(scenario, document, actor=actor)
+# --- Changing and deleting ---------------------------------------------------------------------
 
 
 def why_not_editable(scenario: Scenario) -> str:
-    """Return why the reference of a scenario can't be changed now, empty where it can."""
+    """Return why nothing of a scenario can be changed now, empty where its drawing can."""
     try:
         editing.refuse_catalogue(scenario)
         _refuse_judged(scenario)
     except Conflict as conflict:
         return str(conflict)
     return ""
-
-
-def _hold_unjudged(scenario: Scenario) -> None:
-    """Lock it, as an opening study does: none opens between the check and the change."""
-    Scenario.objects.select_for_update(of=("self",)).get(pk=scenario.pk)
-    _refuse_judged(scenario)
 
 
 def _refuse_judged(scenario: Scenario) -> None:
@@ -91,9 +71,6 @@ def _refuse_judged(scenario: Scenario) -> None:
         )
 
 
-# --- Changing and deleting ---------------------------------------------------------------------
-
-
 @transaction.atomic
 def change_scenario(
     scenario: Scenario,
@@ -103,24 +80,37 @@ def change_scenario(
     keep_traffic: bool,
     density: str,
     goal: str,
+    reference: object = None,
+    derives: bool = False,
     actor: User | None = None,
 ) -> Scenario:
-    """Set the instruction, type and circumstances of a scenario that was not worked on yet.
+    """Set what a scenario says and draws.
+
+    Its drawing can be changed until an open study shows it, all else until something needs it.
+    The arguments are those of `add_scenario`.
 
     Raises:
-        InvalidDocument: The type or the instruction breaks its format.
+        InvalidDocument: One of these breaks its format.
         InvalidModification: The reference does not fit the changed scene.
         Conflict: The scenario is the catalogue's, or something needs it; the text names it.
     """
+    # Locked as an opening study locks it: none opens between the check and the change.
     row = Scenario.objects.select_for_update(of=("self",)).get(pk=scenario.pk)
-    if row.in_catalogue:
-        raise Conflict(f"“{row.slug}” is the catalogue’s own; change it in its file.")
-    _refuse_needed(row, "changed")
-    before = _state(row)
-    set_wording(row, instruction, type)
+    editing.refuse_catalogue(row, "text")
+    before, drawn = _state(row), row.reference
+    row.reference = reference if isinstance(reference, dict) else None
     change_surroundings(row, keep_traffic=keep_traffic, density=density, goal=goal)
+    row.reference = editing.reference_document(row, reference)
+    if row.reference != drawn:
+        _refuse_judged(row)
+    if derives:
+        type, instruction = derive_intent(row, type, instruction)
+    set_wording(row, instruction, type)
+    if _state(row) != before:
+        _refuse_needed(row, "changed")
     row.save()
-    log_change(row, "change", actor, before=before, after=_state(row))
+    after = _state(row) | {"reference": row.reference}
+    log_change(row, "change", actor, before=before | {"reference": drawn}, after=after)
     return row
 
 

@@ -14,6 +14,7 @@ import zipfile
 import zlib
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
+from itertools import islice
 from pathlib import Path, PurePosixPath
 from typing import Any
 
@@ -22,14 +23,7 @@ from pydantic import TypeAdapter
 from augment.errors import InvalidDocument
 from augment.formats import sandbox
 from augment.formats.nuplan_log import tokens_in
-from augment.formats.readers import (
-    READERS,
-    Timeline,
-    find_input,
-    reader_of,
-    recognise,
-    timeline_of,
-)
+from augment.formats.readers import READERS, find_input, reader_of, recognise
 from augment.formats.reading import Moment, Reader, Reading
 from augment.scene.codec import (
     recording_from_document,
@@ -37,7 +31,6 @@ from augment.scene.codec import (
     scene_from_document,
     scene_to_document,
 )
-from augment.scene.recording import notes_from_document, notes_to_document
 
 WHAT = "zip"
 _DEEPEST = 50
@@ -47,7 +40,7 @@ _UNREADABLE = (
     *(NotImplementedError, UnicodeDecodeError),  # zipfile's faults for odd flags and names
 )
 _MOMENT, _MOMENTS = TypeAdapter(Moment), TypeAdapter(list[Moment])
-_TIMELINE, _TOKENS = TypeAdapter(Timeline), TypeAdapter(tuple[str, ...])
+_TEXTS = TypeAdapter(tuple[str, ...])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -62,23 +55,15 @@ class UntrustedInput:
     path: Path
     format: str | None = None
 
-    def look(self) -> tuple[str, Timeline]:
-        """Return the format's name, and what the recording offers to choose from.
+    def moments(self, *, every_s: float, most: int) -> tuple[str, list[Moment]]:
+        """Return the format's name, and the first moments, so many seconds apart.
 
         Raises:
             UnknownName: No such format.
             InvalidDocument: The input breaks its format, or the limits of its process.
         """
-        name, timeline = self._ask("look")
-        return name, _TIMELINE.validate_python(timeline)
-
-    def moments(self, *, every_s: float) -> list[Moment]:
-        """Return what can be taken, so many seconds apart.
-
-        Raises:
-            UnknownName, InvalidDocument: As above.
-        """
-        return _MOMENTS.validate_python(self._ask("moments", every_s=every_s)[1])
+        name, moments = self._ask("moments", every_s=every_s, most=most)
+        return name, _MOMENTS.validate_python(moments)
 
     def read(self, *, item: str | None, frame: int | None, name: str) -> tuple[str, Reading]:
         """Return the format's name, and the scene at one moment; see `Reader.read`.
@@ -91,7 +76,7 @@ class UntrustedInput:
         return source, Reading(
             scene=scene_from_document(found["scene"]),
             recording=None if recording is None else recording_from_document(recording),
-            notes=notes_from_document(found["notes"]),
+            notes=_TEXTS.validate_python(found["notes"]),
             moment=_MOMENT.validate_python(found["moment"]),
         )
 
@@ -101,7 +86,7 @@ class UntrustedInput:
         Raises:
             UnknownName, InvalidDocument: As above.
         """
-        return _TOKENS.validate_python(self._ask("tokens", wanted=list(wanted))[1])
+        return _TEXTS.validate_python(self._ask("tokens", wanted=list(wanted))[1])
 
     def _ask(self, what: str, **more: Any) -> tuple[str, Any]:
         if self.format is not None:
@@ -136,17 +121,16 @@ def _answer(request: dict[str, Any]) -> tuple[str, Any]:
 
 def _ask_reader(reader: Reader, path: Path, what: str, more: dict[str, Any]) -> Any:
     """What a reader answers, as plain JSON."""
-    if what == "look":
-        return _TIMELINE.dump_python(timeline_of(reader, path), mode="json")
     if what == "moments":
-        return [asdict(moment) for moment in reader.moments(path, **more)]
+        moments = reader.moments(path, every_s=more["every_s"])
+        return [asdict(moment) for moment in islice(moments, more["most"])]
     if what == "tokens":
         return tokens_in(path, more["wanted"])
     found = reader.read(path, **more)
     return {
         "scene": scene_to_document(found.scene),
         "recording": None if found.recording is None else recording_to_document(found.recording),
-        "notes": notes_to_document(found.notes),
+        "notes": found.notes,
         "moment": asdict(found.moment),
     }
 

@@ -18,11 +18,10 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from augment.errors import InvalidDocument
 from augment.formats.documents import read_json
-from augment.formats.reading import Log, Reader, speeds, tracks_of
+from augment.formats.reading import Log, LogReader, speeds, tracks_of
 from augment.formats.road_map import RoadMap, Segment
 from augment.formats.values import WHAT, FloatArray, fault_at, look_up, read_finite
 from augment.scene.entities import AgentType, AreaKind
-from augment.scene.recording import Note, SceneNoteKind
 from augment.scene.schema import problems_of
 
 if TYPE_CHECKING:
@@ -84,7 +83,7 @@ _MOTION_COLUMNS = {
 }
 
 
-class ArgoverseSensor(Reader):
+class ArgoverseSensor(LogReader):
     """The reader of Argoverse 2 Sensor logs."""
 
     name = "av2"
@@ -135,11 +134,11 @@ class ArgoverseSensor(Reader):
             world=WORLD,
             title=f"Argoverse 2 Sensor data set, log {path.resolve().name}",
             licence=LICENCE,
-            notes=[Note(kind=SceneNoteKind.SPEEDS_DIFFERENCED)],
+            notes=["Speeds were taken from the recorded places."],
         )
 
 
-class ArgoverseMotion(Reader):
+class ArgoverseMotion(LogReader):
     """The reader of Argoverse 2 Motion Forecasting scenarios; `item` is the track of the ego."""
 
     name = "av2-motion"

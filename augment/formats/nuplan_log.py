@@ -1,9 +1,8 @@
 """The reader of nuPlan logs: a database of ego, boxes and lights, with the map of its city.
 
 A path is a log's .db; its map lies under a folder `maps` beside it or above it, as the data set
-is laid out: maps/<location>/<version>/map.gpkg. `item` is the token of a lidar_pc, or
-`tag:<scenario type>` for the first frame that has the tag. Tokens are BLOBs; here they are their
-hexadecimal text.
+is laid out: maps/<location>/<version>/map.gpkg. `item` is the token of a lidar_pc. Tokens are
+BLOBs; here they are their hexadecimal text.
 `ego_pose` gives the rear axle, boxes their centre; velocities of the ego are in its own frame.
 Rows of 20 Hz are taken at 10 Hz.
 """
@@ -17,16 +16,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from augment.formats.nuplan_map import city_around, open_tables
-from augment.formats.reading import Log, LoggedTrack, Moment, Reader, frames_every, tracks_of
+from augment.formats.reading import Log, LoggedTrack, LogReader, Moment, frames_every, tracks_of
 from augment.formats.values import FloatArray, fault_at, look_up, read_finite
 from augment.scene.entities import EGO_LENGTH_M, EGO_WIDTH_M, AgentType, TrafficLight
-from augment.scene.recording import Note, SceneNoteKind
 
 if TYPE_CHECKING:
     import pandas as pd
 
 LICENCE = "nuPlan, CC BY-NC-SA 4.0"
-TAG = "tag:"
 REAR_AXLE_TO_CENTER_M = 1.461
 STEP_US = 100_000
 LASTS_US = 30_000_000
@@ -45,7 +42,7 @@ TYPE_OF = {
 LIGHT_OF = {"green": TrafficLight.GREEN, "yellow": TrafficLight.YELLOW, "red": TrafficLight.RED}
 
 
-class NuPlan(Reader):
+class NuPlan(LogReader):
     """The reader of nuPlan's log databases."""
 
     name = "nuplan"
@@ -55,7 +52,7 @@ class NuPlan(Reader):
     def moments(self, path: Path, *, every_s: float) -> Iterator[Moment]:
         """Frames that far apart."""
         with open_tables(path) as base:
-            tokens = _tokens(base, None)
+            tokens = _tokens(base)
         times_s = [(time - tokens[0][1]) * 1e-6 for _, time in tokens]
         for index in frames_every(times_s, every_s):
             yield Moment(item=tokens[index][0], time_s=times_s[index])
@@ -69,7 +66,7 @@ class NuPlan(Reader):
             location, version, logfile = (str(one or "")[:200] for one in place)
             token = _token(base, item)
             times_s, ego, tracks = _motion(base, token)
-            lights, notes = _lights(base, token), list(_tag_notes(base, token))
+            lights, notes = _lights(base, token), _tag_notes(base, token)
         yield Log(
             times_s=times_s,
             ego=ego,
@@ -122,24 +119,20 @@ def _map_of(path: Path, *names: str) -> Path:
 
 
 def _token(base: sqlite3.Connection, item: str | None) -> str:
-    if item is not None and not item.startswith(TAG):
-        if not re.fullmatch(r"[0-9a-f]{16}", item.lower()):
-            problem = f"{item[:40]!r} is neither a token of 16 hex digits nor tag:TYPE"
-            raise fault_at("item", problem)
-        return item.lower()
-    return _tokens(base, None if item is None else item.removeprefix(TAG))[0][0]
+    if item is None:
+        return _tokens(base)[0][0]
+    if not re.fullmatch(r"[0-9a-f]{16}", item.lower()):
+        raise fault_at("item", f"{item[:40]!r} is no token of 16 hex digits")
+    return item.lower()
 
 
-def _tokens(base: sqlite3.Connection, tag: str | None) -> list[tuple[str, int]]:
-    """Tokens and times (µs) of all frames, or of those with a scenario tag, in their order."""
-    text = "SELECT DISTINCT hex(l.token), l.timestamp FROM lidar_pc l ORDER BY l.timestamp"
-    values: tuple[str, ...] = ()
-    if tag is not None:
-        join = "JOIN scenario_tag s ON s.lidar_pc_token = l.token WHERE s.type = ? ORDER"
-        text, values = text.replace("ORDER", join), (tag,)
-    rows = base.execute(text, values).fetchall()
+def _tokens(base: sqlite3.Connection) -> list[tuple[str, int]]:
+    """Tokens and times (µs) of all frames, in their order."""
+    rows = base.execute(
+        "SELECT DISTINCT hex(token), timestamp FROM lidar_pc ORDER BY timestamp"
+    ).fetchall()
     if not rows:
-        raise fault_at("item", f"no frame has the tag {tag!r}" if tag else "the log has no frame")
+        raise fault_at("item", "the log has no frame")
     return [(str(token).lower(), _whole(time, "lidar_pc.timestamp")) for token, time in rows]
 
 
@@ -224,10 +217,9 @@ def _lights(base: sqlite3.Connection, token: str) -> dict[int, TrafficLight]:
     }
 
 
-def _tag_notes(base: sqlite3.Connection, token: str) -> Iterator[Note]:
+def _tag_notes(base: sqlite3.Connection, token: str) -> list[str]:
     text = (
         "SELECT DISTINCT type FROM scenario_tag WHERE lidar_pc_token = ? ORDER BY type LIMIT 100"
     )
-    tags = tuple(str(tag)[:80] for (tag,) in base.execute(text, (bytes.fromhex(token),)))
-    if tags:
-        yield Note(kind=SceneNoteKind.SCENARIO_TAGS, names=tags)
+    tags = [str(tag)[:80] for (tag,) in base.execute(text, (bytes.fromhex(token),))]
+    return [f"Scenario tags of this moment: {', '.join(tags)}."] if tags else []

@@ -31,7 +31,6 @@ class OwnJson(Reader):
 
     name = "json"
     title = "scene in the own JSON (file)"
-    has_items = False
     suffix, marker = ".json", SCENE_FORMAT.encode()
 
     def moments(self, path: Path, *, every_s: float) -> Iterator[Moment]:

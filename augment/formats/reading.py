@@ -6,6 +6,7 @@ lies under them. What is wrong with a file is raised as `InvalidDocument`. Metre
 millimetres, so that documents can be read by people. T steps.
 """
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -19,7 +20,7 @@ from augment.formats.values import FURTHEST, FloatArray, fault_at, read_finite
 from augment.geometry.frames import Pose, wrap
 from augment.scene.entities import LENGTH_WIDTH_M, AgentType, Origin, Scene, TrafficAgent
 from augment.scene.lane_graph import LaneGraph
-from augment.scene.recording import Note, Recording, SceneNoteKind, Track, agent_of
+from augment.scene.recording import Recording, Track, agent_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -61,13 +62,13 @@ class Reading:
 
     Attributes:
         recording: None for a source that is no recording.
-        notes: Every loss and assumption.
+        notes: A sentence on every loss and assumption.
         moment: What was taken.
     """
 
     scene: Scene
     recording: Recording | None
-    notes: tuple[Note, ...] = ()
+    notes: tuple[str, ...] = ()
     moment: Moment = Moment()
 
 
@@ -122,7 +123,7 @@ class Log:
     is_free: bool = False
     item: str | None = None
     frame: int = 0
-    notes: Sequence[Note] = ()
+    notes: Sequence[str] = ()
 
     def moments(self, every_s: float) -> Iterator[Moment]:
         """Yield the steps that far apart in which the ego is there."""
@@ -163,19 +164,17 @@ class Log:
         notes = [*map_notes, *self.notes]
         sizeless = sum(not track.has_size for track in self.tracks)
         if sizeless:
-            kind = SceneNoteKind.SOME_BOX_SIZES
-            notes.append(Note(kind=kind, number=sizeless, of=len(self.tracks)))
+            sizes = f"{sizeless} of {len(self.tracks)} objects"
+            notes.append(f"{sizes} got the usual size of their class.")
         here = self.ego[frame, :2]
         away_m = [np.hypot(*(track.states[frame, :2] - here)) for track in self.tracks]
         far = road.far + sum(bool(distance_m > RADIUS_M) for distance_m in away_m)
         if far:
-            kind = SceneNoteKind.FAR_PARTS_LEFT_OUT
-            notes.append(Note(kind=kind, number=far, value=RADIUS_M))
+            notes.append(f"{far} things more than {RADIUS_M:g} m from the ego were left out.")
         if road.side_is_assumed:
-            side = (road.traffic_side.value,)
-            notes.append(Note(kind=SceneNoteKind.TRAFFIC_SIDE_ASSUMED, names=side))
+            notes.append(f"That people drive on the {road.traffic_side} is assumed.")
         if not self.is_free:
-            notes.append(Note(kind=SceneNoteKind.NON_COMMERCIAL, names=(self.licence,)))
+            notes.append(f"The data's licence, {self.licence}, does not allow commercial use.")
         return Reading(
             scene=_on_lanes(scene),
             recording=Recording(
@@ -197,19 +196,17 @@ class Log:
         return Pose(x_m=x_m, y_m=y_m, heading_rad=wrap(heading_rad))
 
 
-class Reader:
+class Reader(ABC):
     """One format.
 
     Attributes:
         name: How the format is called where one is asked for.
         title: What it is, for people.
-        has_items: Whether a path can hold several parts.
         suffix, marker: What its files end in, and what stands near their beginning.
     """
 
     name: str
     title: str
-    has_items = True
     suffix = ""
     marker = b""
 
@@ -220,23 +217,15 @@ class Reader:
         with path.open("rb") as file:
             return self.marker in file.read(10_000)
 
-    def logs(self, path: Path, item: str | None) -> Iterator[Log]:
-        """Yield the part of that name, or all in the source's order for None.
-
-        Raises:
-            InvalidDocument: The input breaks its format, or has no such part.
-        """
-        raise NotImplementedError
-
+    @abstractmethod
     def moments(self, path: Path, *, every_s: float) -> Iterator[Moment]:
         """Yield what can be taken, in the source's order, `every_s` seconds apart.
 
         Raises:
             InvalidDocument: The input breaks its format.
         """
-        for log in self.logs(path, None):
-            yield from log.moments(every_s)
 
+    @abstractmethod
     def read(self, path: Path, *, item: str | None, frame: int | None, name: str) -> Reading:
         """Return the scene at one moment.
 
@@ -249,6 +238,32 @@ class Reader:
         Raises:
             InvalidDocument: The input breaks its format, or has no such moment.
         """
+
+
+class LogReader(Reader):
+    """A format of recordings, opened as logs.
+
+    Attributes:
+        has_items: Whether a path can hold several parts.
+    """
+
+    has_items = True
+
+    @abstractmethod
+    def logs(self, path: Path, item: str | None) -> Iterator[Log]:
+        """Yield the part of that name, or all in the source's order for None.
+
+        Raises:
+            InvalidDocument: The input breaks its format, or has no such part.
+        """
+
+    def moments(self, path: Path, *, every_s: float) -> Iterator[Moment]:
+        """Yield the moments of every log."""
+        for log in self.logs(path, None):
+            yield from log.moments(every_s)
+
+    def read(self, path: Path, *, item: str | None, frame: int | None, name: str) -> Reading:
+        """Return the scene at one moment of one log."""
         if item is not None and not self.has_items:
             raise fault_at("item", f"there are no parts, {item!r} is not there")
         log = next(self.logs(path, item), None)

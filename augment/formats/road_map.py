@@ -13,12 +13,13 @@ import shapely
 
 from augment.formats.values import FloatArray
 from augment.scene.entities import AreaKind, TrafficLight, TrafficSide, TurnType
-from augment.scene.recording import Note, SceneNoteKind
 
 Name = int | str
 
 NARROWEST_M, WIDEST_M, USUAL_M = 2.0, 8.0, 3.5
 _MOST_NAMED = 12
+NO_CONNECTIVITY = "No lane of this source has a successor."
+NO_INTERSECTIONS = "No intersections in this source: no turn types, no lights."
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -74,7 +75,7 @@ class RoadMap:
     tells_crossings: bool = True
 
 
-def complete_map(city: RoadMap) -> tuple[RoadMap, list[Note]]:
+def complete_map(city: RoadMap) -> tuple[RoadMap, list[str]]:
     """Return a map whose segments have widths and intersections, and notes on what it lacks."""
     segments = {one.name: one for one in city.segments}
     if not city.tells_crossings:
@@ -85,31 +86,33 @@ def complete_map(city: RoadMap) -> tuple[RoadMap, list[Note]]:
     unlimited = sum(one.speed_limit_mps is None for one in filled)
     kinds = {kind for kind, _ in city.areas}
     lacking = {
-        SceneNoteKind.NO_SPEED_LIMITS: total > 0 and unlimited == total,
-        SceneNoteKind.NO_CONNECTIVITY: not any(
-            one.successors or one.predecessors for one in filled
+        NO_CONNECTIVITY: not any(one.successors or one.predecessors for one in filled),
+        NO_INTERSECTIONS: not any(one.crosses for one in filled),
+        "No traffic lights in this source.": all(
+            one.light is TrafficLight.UNKNOWN for one in filled
         ),
-        SceneNoteKind.NO_INTERSECTIONS: not any(one.crosses for one in filled),
-        SceneNoteKind.NO_LIGHTS: all(one.light is TrafficLight.UNKNOWN for one in filled),
-        SceneNoteKind.NO_WALKWAYS: AreaKind.WALKWAY not in kinds,
-        SceneNoteKind.NO_DRIVABLE_AREAS: AreaKind.DRIVABLE not in kinds,
+        "No sidewalks in this source.": AreaKind.WALKWAY not in kinds,
+        "No drivable areas in this source: only lanes can be driven on.": (
+            AreaKind.DRIVABLE not in kinds
+        ),
+        f"{unlimited} of {total} lanes have no speed limit: drives assume a usual one.": (
+            unlimited > 0
+        ),
+        f"{assumed} of {total} lanes have no boundaries on both sides: {USUAL_M:g} m wide where "
+        "no neighbour tells.": assumed > 0,
     }
-    notes = [Note(kind=kind) for kind, is_lacking in lacking.items() if is_lacking]
-    if 0 < unlimited < total:
-        notes.append(Note(kind=SceneNoteKind.SOME_SPEED_LIMITS, number=unlimited, of=total))
-    if assumed:
-        kind = SceneNoteKind.LANE_WIDTHS_ASSUMED
-        notes.append(Note(kind=kind, number=assumed, of=total, value=USUAL_M))
-    notes += left_out_notes(SceneNoteKind.MAP_PARTS_LEFT_OUT, city.left_out)
+    notes = [note for note, holds in lacking.items() if holds]
+    notes += left_out_notes("parts of the map", city.left_out)
     return replace(city, segments=filled), notes
 
 
-def left_out_notes(kind: SceneNoteKind, counts: Mapping[str, int]) -> list[Note]:
-    """Return what is left out, by name, where there is any of it."""
+def left_out_notes(what: str, counts: Mapping[str, int]) -> list[str]:
+    """Return the sentence on what is left out, by name, where there is any of it."""
     names = tuple(sorted(name for name, number in counts.items() if number))
     if not names:
         return []
-    return [Note(kind=kind, number=sum(counts.values()), names=names[:_MOST_NAMED])]
+    total = sum(counts.values())
+    return [f"{total} {what} were left out: {', '.join(names[:_MOST_NAMED])}."]
 
 
 # Edges and widths

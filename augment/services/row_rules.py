@@ -30,8 +30,8 @@ from augment.scene.codec import (
     recording_from_document,
     scene_from_document,
 )
-from augment.scene.recording import notes_from_document
 from augment.services.endpoints.known_endpoints import EndpointFacts, check_facts
+from augment.services.scenarios.scene_imports import notes_of
 from augment.services.scenarios.scenes import (
     INSTRUCTION_LENGTH,
     check_reference,
@@ -51,7 +51,7 @@ LONGEST_TRACE = 1 << 26
 def _check_scene(row: BaseScene) -> None:
     check_slug(row.slug, what="scene")
     scene_from_document(row.document)
-    notes_from_document(row.notes)
+    notes_of(row.notes)
     if row.recording is not None:
         recording_from_document(row.recording)
 

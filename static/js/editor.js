@@ -8,7 +8,9 @@ const words = form.dataset;
 const field = form.elements.modification;
 const read = (id) => JSON.parse(document.getElementById(id).textContent);
 const scene = read("scene");
-const edit = new Edit(scene, read("modification"));
+const placed = form.querySelector("#placed");
+const keep = form.elements.keep_traffic;
+const edit = new Edit(scene, parsed(field.value));
 const svg = form.querySelector("svg.stage");
 const stage = new Stage(svg, scene, words.picture);
 const numbers = form.querySelector("[data-numbers]");
@@ -19,6 +21,23 @@ let armed = false;
 let isDirty = false;
 let asked = 0;
 let timer = 0;
+
+// Null for what is no JSON.
+function parsed(text) {
+  try {
+    return JSON.parse(text || "{}");
+  } catch {
+    return null;
+  }
+}
+
+function keepsTraffic() {
+  return keep ? keep.checked : words.keep !== "";
+}
+
+function showTraffic() {
+  scene.agents = keepsTraffic() ? scene.recorded : scene.cleared;
+}
 
 // --- Showing ------------------------------------------------------------------------------------
 
@@ -43,7 +62,7 @@ function showList(rows) {
   }
   rows.forEach(([agent, was], index) => {
     const button = list.children[index].firstChild;
-    const kind = [...form.elements.type.options].find(({ value }) => value === agent.type)?.textContent ?? agent.type;
+    const kind = [...placed.options].find(({ value }) => value === agent.type)?.textContent ?? agent.type;
     button.dataset.pick = agent.id;
     button.setAttribute("aria-pressed", String(agent.id === edit.selected));
     button.textContent = `${agent.id} · ${kind} · ${words[was]}`;
@@ -99,7 +118,14 @@ async function check(snapped = "", modification = edit.document) {
   const answer = await fetch(words.check, {
     method: "POST",
     headers: { "Content-Type": "application/json", "X-CSRFToken": form.elements.csrfmiddlewaretoken.value },
-    body: JSON.stringify({ modification, snap: snapped }),
+    body: JSON.stringify({
+      modification,
+      snap: snapped,
+      scenario: words.scenario,
+      keep_traffic: keepsTraffic(),
+      derives: form.elements.derives?.checked ?? false,
+      type: form.elements.type?.value || form.elements.own_type?.value || "",
+    }),
   });
   if (mine !== asked) return;
   if (!answer.ok) throw new Error(String(answer.status));
@@ -125,6 +151,20 @@ function tell(found) {
   });
   said.replaceChildren(...items);
   form.querySelector("[data-fine]").hidden = Boolean(found.problem) || lines.some((one) => one.severity !== "fact");
+  if (found.statements) showAsked(found);
+}
+
+// What the drawing asks for, and the sentence that it makes where nobody types one.
+function showAsked({ sentence, statements }) {
+  const asks = form.querySelector("[data-asks]");
+  if (!asks) return;
+  asks.hidden = statements.length === 0;
+  asks.querySelector("[data-statements]").replaceChildren(
+    ...statements.map((text) => Object.assign(document.createElement("li"), { textContent: text })),
+  );
+  const { instruction } = form.elements;
+  instruction.dataset.usual ??= instruction.placeholder;
+  instruction.placeholder = sentence || instruction.dataset.usual;
 }
 
 function fail() {
@@ -138,7 +178,7 @@ function act(what) {
     if (what === "restore" && id) edit.restore(id);
     if (what === "copy" && id) edit.copy(id);
     if (what === "snap") return id ? check(id).catch(fail) : undefined;
-    if (what === "ahead") edit.add(form.elements.type.value, 20, 0);
+    if (what === "ahead") edit.add(placed.value, 20, 0);
     changed();
   }
   return undefined;
@@ -160,7 +200,7 @@ svg.addEventListener("pointerdown", (event) => {
   const handle = event.target.closest("[data-handle]")?.dataset.handle;
   const id = event.target.closest("[data-agent]")?.dataset.agent;
   if (armed) {
-    edit.add(form.elements.type.value, round(at.x), round(-at.y));
+    edit.add(placed.value, round(at.x), round(-at.y));
     arm(false);
     changed();
     return;
@@ -293,11 +333,16 @@ form.addEventListener("click", (event) => {
   } else if (button.matches("[data-arm]")) arm(!armed);
 });
 
+for (const name of ["keep_traffic", "derives", "type", "own_type"]) {
+  form.elements[name]?.addEventListener("change", () => {
+    showTraffic();
+    changed();
+  });
+}
+
 field.addEventListener("change", () => {
-  let typed;
-  try {
-    typed = JSON.parse(field.value);
-  } catch {
+  const typed = parsed(field.value);
+  if (typed === null) {
     tell({ problem: words.nojson, lines: [] });
     return;
   }
@@ -326,5 +371,6 @@ new ResizeObserver(() => {
 
 form.classList.add("is-live");
 field.value ||= written(); // what was refused stands there to be mended
+showTraffic();
 show();
 check().catch(fail);

@@ -48,8 +48,7 @@ def _work(home: Home, address: str, packed: Path) -> None:
         page.click("button[value=paper]")  # and the contestants that ask nobody
         expect(page.get_by_text("50 added")).to_be_visible()
         _keep_a_moment(page, packed)
-        _add_scenario(page)
-        _draw_reference(page)
+        _draw_scenario(page)
         _run_reference(page)
         _correct(page)
 
@@ -69,25 +68,12 @@ def _become_admin(page: Page, home: Home) -> None:
 def _keep_a_moment(page: Page, packed: Path) -> None:
     page.goto("/scenes/")
     page.set_input_files("[name=file]", packed)
-    page.click("form[action*=send] button.main")
-    page.locator(".trackmap").click()
-    expect(page.locator("#moment img")).to_be_visible()
     page.fill("[name=slug]", "recorded")
-    page.get_by_role("button", name="Keep as a scene").click()
-    page.locator("#moment a", has_text="recorded").click()
+    page.get_by_role("button", name="Use this moment").click()
     expect(page.get_by_role("heading", name="recorded")).to_be_visible()
 
 
-def _add_scenario(page: Page) -> None:
-    page.get_by_role("link", name="New scenario").click()
-    page.fill("[name=instruction]", "A parked car stands 15 m ahead of the ego.")
-    page.fill("[name=slug]", "parked-ahead")
-    page.get_by_role("button", name="Add the scenario").click()
-    expect(page.get_by_role("heading", name="parked-ahead")).to_be_visible()
-
-
-def _draw_reference(page: Page) -> None:
-    page.get_by_role("link", name="Draw one").click()
+def _draw_scenario(page: Page) -> None:
     stage = page.locator("svg.stage")
     expect(stage.locator("image")).to_be_attached()
     page.wait_for_load_state("networkidle")
@@ -118,8 +104,11 @@ def _draw_reference(page: Page) -> None:
     page.fill("#n-h", "0")
     page.press("#n-h", "Enter")
     expect(page.locator("[data-findings] li").first).to_be_visible()
-    page.get_by_role("button", name="Keep the reference").click()
-    expect(page.get_by_text("The reference is kept")).to_be_visible()
+    expect(page.locator("[data-statements]")).to_contain_text("in the own lane")
+    page.locator("summary", has_text="Advanced").click()
+    page.fill("[name=slug]", "parked-ahead")
+    page.get_by_role("button", name="Save the scenario").click()
+    expect(page.get_by_text("“parked-ahead” is added")).to_be_visible()
     expect(page.locator("img[src*='/pictures/reference/']")).to_be_visible()
 
 

@@ -55,7 +55,7 @@ class Desk:
         self.page.get_by_role("button", name="Onto the centreline").click()
 
     def type_in(self, text: str) -> None:
-        self.page.locator("summary", has_text="As JSON").click()
+        self.page.locator("summary", has_text="The drawing as JSON").click()
         self.page.fill("[name=modification]", text)
         self.page.locator("[name=modification]").blur()
 
@@ -68,7 +68,7 @@ class Desk:
 def desk(browser: Browser) -> Iterator[Desk]:
     scenario = add_scenario("street", scene=scene(), reference=None)
     draw_scene(scenario.base_scene_id)
-    path = reverse("reference-edit", args=[scenario.code])
+    path = reverse("scenario-edit", args=[scenario.code])
     html = signed_in(people()["researcher"]).get(path).content
     with hold(browser, path, html) as held:
         yield Desk(held=held)

@@ -5,11 +5,11 @@ import numpy as np
 import pytest
 
 from augment.errors import InvalidDocument
-from augment.formats.commonroad.scenario import CommonRoad
+from augment.formats.commonroad.scenario import ASSUMED, CommonRoad
 from augment.formats.reading import Reading
+from augment.formats.road_map import NO_INTERSECTIONS
 from augment.scene.codec import scene_to_document
 from augment.scene.entities import AgentType, AreaKind, TrafficLight, TurnType
-from augment.scene.recording import SceneNoteKind
 
 
 def bound(name: str, *pairs: tuple[float, float]) -> str:
@@ -90,17 +90,13 @@ def fault_of(path: Path, text: str, item: str | None = None) -> str:
     return str(caught.value)
 
 
-def kinds(reading: Reading) -> set[SceneNoteKind]:
-    return {note.kind for note in reading.notes}
-
-
 def test_a_planning_problem_is_an_ego_without_a_drive(tmp_path: Path) -> None:
     reading = read(tmp_path, newer())
     scene, recording = reading.scene, reading.recording
     assert recording is not None
     assert np.isnan(recording.ego[1:]).all()
     assert (scene.ego.speed_mps, scene.ego.lane_id) == (3.0, "Lane1")
-    assert {SceneNoteKind.NO_EGO_MOTION, SceneNoteKind.EGO_SIZE_ASSUMED} <= kinds(reading)
+    assert set(ASSUMED) <= set(reading.notes)
     car, parked = scene.agents
     assert (car.x_m, car.y_m, car.length_m, car.speed_mps) == (10.0, 0.0, 4.4, 5.0)
     assert (parked.x_m, parked.y_m, parked.type) == (30.0, -1.0, AgentType.VEHICLE)
@@ -113,7 +109,7 @@ def test_a_recorded_vehicle_can_be_the_ego(tmp_path: Path) -> None:
     reading = read(tmp_path, newer(more=""), "70", 1)
     assert reading.recording is not None
     assert reading.recording.ego[:, 0].tolist() == [0.0, 0.5]
-    assert SceneNoteKind.NO_EGO_MOTION not in kinds(reading)
+    assert not set(ASSUMED) & set(reading.notes)
     assert read(tmp_path, newer(more="")).moment.item == "70"
     assert "unknown '72'; known: 90, 70" in fault_of(tmp_path, newer(), "72")
 
@@ -122,7 +118,7 @@ def test_the_older_dialect_has_its_own_limits_and_roles(tmp_path: Path) -> None:
     scene = read(tmp_path, older()).scene
     assert scene.lanes[0].speed_limit_mps == 9.5
     assert [agent.type for agent in scene.agents] == [AgentType.VEHICLE]
-    assert SceneNoteKind.NO_INTERSECTIONS in kinds(read(tmp_path, older()))
+    assert NO_INTERSECTIONS in read(tmp_path, older()).notes
     assert read(tmp_path, newer()).scene.lanes[0].speed_limit_mps == 11.5
 
 

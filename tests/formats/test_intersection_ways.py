@@ -6,11 +6,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from augment.formats.road_map import RoadMap, Segment, complete_map, crossing_segments, fill_widths
+from augment.formats.road_map import (
+    NO_INTERSECTIONS,
+    RoadMap,
+    Segment,
+    complete_map,
+    crossing_segments,
+    fill_widths,
+)
 from augment.formats.roads import road_around
 from augment.geometry.frames import Pose
 from augment.scene.entities import TurnType
-from augment.scene.recording import SceneNoteKind
 
 Points = Sequence[tuple[float, float]]
 
@@ -81,4 +87,4 @@ def test_a_map_that_does_not_tell_has_connectors_with_turns() -> None:
     assert turns == sorted([TurnType.STRAIGHT] * 2 + [TurnType.LEFT] * 2 + [TurnType.RIGHT])
     assert all(one.from_lane and one.to_lane for one in road.connectors)
     assert len(road.lanes) == len(CROSSING) - 5
-    assert SceneNoteKind.NO_INTERSECTIONS not in {note.kind for note in notes}
+    assert NO_INTERSECTIONS not in notes

@@ -35,9 +35,7 @@ def test_a_recorded_scene_is_imported_and_counted(tmp_path: Path) -> None:
     assert (
         first == "Imported scene made: 3 agents, 5 lanes, 2 connectors, 2 areas besides the ego."
     )
-    assert notes[0] == (
-        "  No speed limits in this source: drives assume 15 m/s for the ego and 10 m/s for others."
-    )
+    assert "  9 of 9 lanes have no speed limit: drives assume a usual one." in notes
     assert Event.objects.filter(verb="import", after__frame=2).exists()
 
 
@@ -69,27 +67,3 @@ def test_the_same_scene_is_not_stored_twice(tmp_path: Path) -> None:
     run("av2", log, "--slug", "first")
     assert "stored already, as 'first'" in refused("av2", log, "--slug", "second")
     run("av2", log, "--slug", "second", "--frame", 1)
-
-
-def run_log(*arguments: object) -> list[str]:
-    out = StringIO()
-    call_command("import_log", *(str(one) for one in arguments), stdout=out)
-    return out.getvalue().splitlines()
-
-
-def test_a_log_becomes_a_scene_every_few_seconds(tmp_path: Path) -> None:
-    log = write_log(tmp_path / "log")
-    lines = run_log("av2", log, "--every", "0.2s", "--slug", "drive")
-    assert lines[:3] == [
-        "frame 0: drive-1, 3 agents.",
-        "frame 2: drive-2, 3 agents.",
-        "frame 4: drive-3, 4 agents.",
-    ]
-    assert lines[-1] == "Imported 3 scenes."
-    assert BaseScene.objects.get(slug="drive-2").notes[0] == {"kind": "no_speed_limits"}
-    again = run_log(log, "--every", "0.1s", "--limit", 2, "--slug", "drive")
-    assert again[:2] == [
-        "frame 0: the same scene is stored already, as drive-1.",
-        "frame 1: drive-4, 3 agents.",
-    ]
-    assert again[-1] == "Imported 1 scenes."

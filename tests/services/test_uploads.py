@@ -13,6 +13,7 @@ from augment.errors import InvalidDocument
 from augment.models import BaseScene, Event, SceneUpload, UploadMoment
 from augment.services.scenarios import uploads
 from augment.services.scenarios import uploads as upload_moments
+from augment.services.scenarios.scene_imports import notes_of
 from tests.formats.av2_logs import write_log
 
 pytestmark = pytest.mark.django_db
@@ -49,7 +50,7 @@ def test_a_zip_of_a_log_becomes_a_scene_at_the_moment_that_was_chosen(log: bytes
     row = read(sent(log))
     assert (row.state, row.format, row.reason) == ("read", "av2", "")
     assert [stop["frame"] for stop in row.tracks[0]["stops"]] == [0]  # 0.4 s of recording
-    row.tracks[0]["stops"].append({"item": "", "frame": 2, "time_s": 0.2, "place_m": None})
+    row.tracks[0]["stops"].append({"item": "", "frame": 2, "time_s": 0.2})
     row.save()
     moment = looked_at(row, 2)
     assert (moment.state, moment.reason) == ("drawn", "")
@@ -57,7 +58,7 @@ def test_a_zip_of_a_log_becomes_a_scene_at_the_moment_that_was_chosen(log: bytes
         assert picture.read(4) == b"\x89PNG"
     assert moment.report is not None
     assert (moment.report["lanes"], moment.report["recorded_s"]) == (5, 0.2)
-    assert any("limit" in str(note) for note in upload_moments.sentences_of(moment))
+    assert any("limit" in note for note in notes_of(moment.report["notes"]))
     upload_moments.ask_to_keep(moment, slug="by-the-page", actor=ada)
     upload_moments.MOMENTS.perform(moment.pk)
     moment.refresh_from_db()

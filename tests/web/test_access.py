@@ -24,9 +24,9 @@ PAGES = _table(
         STAFF: (
             "jobs job job-tab job-progress job-export transcripts-export analyses drives drive "
             "faults augmentation transcript contestants contestant endpoints endpoint "
-            "endpoint-model scenes scene upload scenarios scenario intent scenario-new "
-            "intent-edit scenario-edit scenarios-bulk prompts reference-edit correct picture "
-            "studies study-plan study preregistration results results-tab"
+            "endpoint-model scenes scene upload scenarios scenario intent scenario-edit "
+            "scenarios-bulk prompts correct picture studies study-plan study preregistration "
+            "results results-tab"
         ),
         ADMIN: (
             "job-new contestant-new endpoint-new audit people person-forget "

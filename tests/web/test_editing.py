@@ -1,7 +1,6 @@
 """The pages on which references are drawn and augmentations corrected."""
 
 import json
-import re
 
 import pytest
 from django.test import Client
@@ -23,10 +22,10 @@ CAR = json.dumps(modification_to_document(Modification(added=(vehicle("Added1", 
 @pytest.fixture
 def researcher(monkeypatch: pytest.MonkeyPatch) -> Client:
     """Signed in; what is sent to a worker is done at once."""
-    monkeypatch.setattr("arena.scenarios.pages.uploads.enqueue_scene", draw_scene)
-    monkeypatch.setattr("arena.scenarios.pages.forms.enqueue_scenario", draw_scenario)
+    monkeypatch.setattr("arena.scenarios.pages.editor.enqueue_scene", draw_scene)
+    monkeypatch.setattr("arena.scenarios.pages.editor.enqueue_scenario", draw_scenario)
     monkeypatch.setattr("arena.scenarios.pages.scenarios.enqueue_scenario", draw_scenario)
-    monkeypatch.setattr("arena.scenarios.pages.forms.enqueue_job", run_job)
+    monkeypatch.setattr("arena.scenarios.pages.editor.enqueue_job", run_job)
     monkeypatch.setattr("arena.site.acts.transaction.on_commit", lambda done: done())
     return signed_in(people()["researcher"])
 
@@ -41,21 +40,23 @@ def busy(slug: str = "street") -> Scenario:
     return add_scenario(slug, scene=scene(agents=traffic), reference=None, keep_traffic=True)
 
 
-def given(shown: str, name: str) -> object:
-    found = re.search(rf'<script id="{name}" type="application/json">(.*?)</script>', shown)
-    assert found is not None
-    return json.loads(found.group(1))
-
-
 def test_a_drawn_reference_is_kept_and_shown(researcher: Client) -> None:
     here = busy()
-    url = reverse("reference-edit", args=[here.code])
-    shown = researcher.post(url, {"modification": CAR}, follow=True).content.decode()
-    assert "The reference is kept" in shown
+    url = reverse("scenario-edit", args=[here.code])
+    wanted = {"type": here.type, "instruction": here.instruction, "keep_traffic": "on"}
+    given = wanted | {"modification": CAR, "derives": "on", "density": "none"}
+    shown = researcher.post(url, given, follow=True).content.decode()
+    assert "is changed" in shown
     assert reverse("picture", args=["reference", here.code]) in shown
     here.refresh_from_db()
     assert here.reference is not None
     assert here.reference["add"][0]["lane_id"] == "Lane1"
+    assert here.intent_origin == "derived"
+    asked = {"modification": json.loads(CAR), "derives": True, "keep_traffic": True}
+    check = reverse("edit-check", args=[here.base_scene.code])
+    found = researcher.post(check, asked, content_type="application/json").json()
+    assert "20.0 m ahead of the ego" in found["sentence"]
+    assert "vehicle: in the own lane" in found["statements"]
 
 
 def test_an_augmentation_is_corrected_and_both_say_so(researcher: Client) -> None:
@@ -64,7 +65,7 @@ def test_an_augmentation_is_corrected_and_both_say_so(researcher: Client) -> Non
     url = reverse("correct", args=[row.code])
     page = reverse("augmentation", args=[row.code])
     assert url in researcher.get(page).content.decode()
-    assert given(researcher.get(url).content.decode(), "modification") is not None
+    assert "&quot;add&quot;" in researcher.get(url).content.decode()
     refused = researcher.post(url, {"modification": CAR, "contestant": "Not A Slug"})
     assert refused.status_code == 422
     shown = researcher.post(

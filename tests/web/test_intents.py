@@ -44,7 +44,7 @@ def test_the_page_shows_what_the_instruction_asks_for(staff: Client) -> None:
     assert "cones: 20 m ahead of the ego" in shown
     assert "entered" in shown
     none = page(staff, add_scenario("bare", intent=None, intent_origin=""))
-    assert "nobody has written down what the instruction asks for" in none
+    assert "Nobody has written down what the sentence asks for" in none
 
 
 def test_what_a_model_read_is_shown_and_counts_once_accepted(staff: Client) -> None:

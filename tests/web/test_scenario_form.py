@@ -1,6 +1,8 @@
 """New scenarios by a page: one beside its scene, or many from a file."""
 
+import html
 import json
+import re
 
 import pytest
 from django.core.files.uploadedfile import SimpleUploadedFile
@@ -29,8 +31,8 @@ street-scene,jaywalking_pedestrian,Let somebody cross.,two,"{CHANGE.replace(chr(
 @pytest.fixture
 def reader(monkeypatch: pytest.MonkeyPatch) -> Client:
     """Signed in; what is sent to a worker is done at once."""
-    monkeypatch.setattr("arena.scenarios.pages.uploads.enqueue_scene", draw_scene)
-    monkeypatch.setattr("arena.scenarios.pages.forms.enqueue_scenario", draw_scenario)
+    monkeypatch.setattr("arena.scenarios.pages.editor.enqueue_scene", draw_scene)
+    monkeypatch.setattr("arena.scenarios.pages.editor.enqueue_scenario", draw_scenario)
     monkeypatch.setattr("arena.site.acts.transaction.on_commit", lambda done: done())
     return signed_in(people()["researcher"])
 
@@ -42,36 +44,36 @@ def scene() -> BaseScene:
 
 def send(client: Client, scene: BaseScene, **fields: str) -> tuple[str, Scenario | None]:
     given = {"type": "cut_in", "instruction": "Let a car cut in.", **fields}
-    answer = client.post(reverse("scenario-new", args=[scene.code]), given, follow=True)
+    answer = client.post(reverse("scene", args=[scene.code]), given, follow=True)
     made = Scenario.objects.exclude(slug="street").first()
     return answer.content.decode(), made
 
 
-def test_a_scenario_of_a_type_of_one_s_own_with_an_intent_by_fields(
-    reader: Client, scene: BaseScene
+def test_a_drawing_alone_becomes_a_scenario_with_sentence_and_intent(
+    researcher: Client, scene: BaseScene
 ) -> None:
+    shown = researcher.get(reverse("scene", args=[scene.code])).content.decode()
+    assert 'name="keep_traffic" checked' in re.sub(r"\s+", " ", shown)
     shown, made = send(
         reader,
         scene,
         type="",
         own_type="parked_bus",
         slug="my-bus",
+        instruction="",
+        modification=CHANGE,
+        derives="on",
         keep_traffic="on",
-        i_kind="vehicles",
-        i_count="2",
-        i_distance_m="20.5",
-        i_relation="ahead",
-        i_lane="own",
-        i_body="bus",
-        i_speed_mps="0",
     )
     assert made is not None
     assert (made.slug, made.type, made.type_label) == ("my-bus", "parked_bus", "Parked bus")
-    assert (made.keep_traffic, made.intent_origin) == (True, "entered")
+    assert (made.keep_traffic, made.intent_origin) == (True, "derived")
+    assert made.instruction.startswith("Change the scene: a traffic cone 9.0 m ahead of the ego")
     assert made.intent is not None
     [request] = made.intent["requests"]
-    assert (request["kind"], request["body"], request["count"]) == ("vehicles", "bus", 2)
-    assert request["spot"]["distance"] == {"low_m": 20.5}
+    assert (request["kind"], request["spot"]["distance"]) == ("cones", {"low_m": 9.0})
+    copied = researcher.get(reverse("scene", args=[scene.code]) + f"?copy={made.code}")
+    assert html.escape(made.instruction) in copied.content.decode()
     assert "my-bus" in shown
     assert reverse("picture", args=["original", made.code]) in shown
 
@@ -81,17 +83,10 @@ def test_a_scenario_of_a_type_of_one_s_own_with_an_intent_by_fields(
     [
         ({"type": "", "own_type": "Cut In"}, "must be one of"),
         ({"type": "jaywalking_pedestrian", "slug": "street"}, "called &#x27;street&#x27; already"),
-        (
-            {"type": "jaywalking_pedestrian", "i_kind": "vehicles", "i_count": "1"}
-            | {"i_distance_m": "20", "i_relation": "ahead"},
-            "leaves open whether they stand or how fast they drive",
-        ),
-        ({"type": "avoid_crashed_cars", "i_whole": "[" * 100_000}, "must be a JSON object"),
-        ({"type": "jaywalking_pedestrian", "i_kind": "walk", "i_count": "x"}, "is no number"),
-        ({"type": "jaywalking_pedestrian", "i_kind": "walk", "i_count": "inf"}, "is no number"),
-        ({"type": "jaywalking_pedestrian", "i_kind": "walk", "i_count": "nan"}, "is no number"),
-        ({"type": "jaywalking_pedestrian", "i_kind": "tram"}, "tram"),
-        ({"type": "jaywalking_pedestrian", "instruction": " "}, "required"),
+        ({"modification": "[" * 100_000}, "is no JSON"),
+        ({"modification": '{"add": 3}', "type": "cut_in"}, "add"),
+        ({"modification": CHANGE.replace("9.0", "1e9"), "type": "cut_in"}, "x_m"),
+        ({"type": "jaywalking_pedestrian", "instruction": " "}, "Type a sentence"),
     ],
 )
 def test_what_can_not_be_is_told_and_nothing_is_lost(

@@ -32,7 +32,8 @@ def working(monkeypatch: pytest.MonkeyPatch, django_capture_on_commit_callbacks:
     monkeypatch.setattr(
         "arena.scenarios.pages.uploads.enqueue_moment", upload_moments.MOMENTS.perform
     )
-    monkeypatch.setattr("arena.scenarios.pages.uploads.enqueue_scene", pictures.draw_scene)
+    for page in ("uploads", "editor"):
+        monkeypatch.setattr(f"arena.scenarios.pages.{page}.enqueue_scene", pictures.draw_scene)
     monkeypatch.setattr("arena.site.acts.transaction.on_commit", lambda done: done())
 
 
@@ -48,25 +49,32 @@ def is_picture(client: Client, address: str) -> bool:
 
 
 def test_from_a_file_to_a_scene(researcher: Client) -> None:
-    assert "Choose the moment" in send(researcher)
-    row = SceneUpload.objects.get()
-    shown = researcher.post(
-        reverse("upload-show", args=[row.code]), {"track": "0", "stop": "0"}, follow=True
-    ).content.decode()
+    shown = send(researcher)
     moment = UploadMoment.objects.get()
     picture = reverse("picture", args=["moment", moment.code])
     assert picture in shown
     assert is_picture(researcher, picture)
-    shown = researcher.post(
-        reverse("moment-keep", args=[moment.code]), {"slug": "main-street"}, follow=True
-    ).content.decode()
+    again = reverse("upload-show", args=[moment.upload.code])
+    assert picture in researcher.post(again, {"stop": "0"}, follow=True).content.decode()
+    assert "no such moment" in researcher.post(again, {"stop": "1"}, follow=True).content.decode()
+    kept = reverse("moment-keep", args=[moment.code])
+    answer = researcher.post(kept, {"slug": "main-street"}, follow=True)
     scene_row = BaseScene.objects.get()
     page = reverse("scene", args=[scene_row.code])
-    assert (scene_row.slug, page in shown) == ("main-street", True)
-    researcher.get(page)
-    for view in ("kept", "cleared", "backdrop"):
+    assert (scene_row.slug, answer.redirect_chain[-1][0]) == ("main-street", page)
+    for view in ("kept", "backdrop"):
         assert is_picture(researcher, reverse("picture", args=[view, scene_row.code]))
     assert "picture" in researcher.get(page).content.decode()
+
+
+def test_several_files_become_uploads_of_their_own(researcher: Client) -> None:
+    files = [SimpleUploadedFile("one.json", STREET), SimpleUploadedFile("two.txt", b"hello")]
+    shown = researcher.post(reverse("scene-send"), {"file": files}, follow=True).content.decode()
+    assert sorted(SceneUpload.objects.values_list("name", "state")) == [
+        ("one.json", "read"),
+        ("two.txt", "failed"),
+    ]
+    assert "one.json" in shown
 
 
 def test_what_can_not_be_read_says_why(researcher: Client) -> None:
@@ -79,6 +87,6 @@ def test_what_can_not_be_read_says_why(researcher: Client) -> None:
 def test_a_file_that_is_too_large_is_not_kept(researcher: Client, settings: LazySettings) -> None:
     settings.UPLOAD_MB = 1
     shown = send(researcher, b" " * 1_000_001)
-    assert "a file of at most 1 MB" in shown
+    assert "files of at most 1 MB" in shown
     assert not SceneUpload.objects.exists()
-    assert "Choose the moment" in send(researcher, STREET + b" " * (1_000_000 - len(STREET)))
+    assert "Use this moment" in send(researcher, STREET + b" " * (1_000_000 - len(STREET)))

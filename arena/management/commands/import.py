@@ -13,7 +13,7 @@ class Command(TerminalCommand):
     """Check a folder whole, then take it in."""
 
     failure = "Nothing was imported."
-    help = "Take in a whole study; other imports: import_scene, import_log, import_votes."
+    help = "Take in a whole study; other imports: import_scene, import_votes."
 
     def add_arguments(self, parser: CommandParser) -> None:
         """Declare the options."""

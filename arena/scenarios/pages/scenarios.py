@@ -18,6 +18,7 @@ from augment.models import BaseScene, EndpointModel, Scenario
 from augment.services.endpoints.contestants import ensure_builtin
 from augment.services.events import retire, take_back
 from augment.services.running.intent_readings import plan_reading
+from augment.services.scenarios import bulk
 from augment.services.scenarios.catalogue import load_catalogue
 from augment.services.scenarios.editing import (
     accept_reading,
@@ -97,10 +98,25 @@ def scenario_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         "reading_statements": statements_of(None if reading is None else reading.document),
         "last_reading": last_reading(scenario),
         "readers": readers.order_by("endpoint__label", "model"),
-        "notes": notes_of(scenario.base_scene),
+        "notes": notes_of(scenario.base_scene.notes),
         "augmentations": queries.augmentations_of(scenario),
     }
     return render(request, "scenarios/scenario.html", context)
+
+
+@form_for(*STAFF)
+def bulk_page(request: HttpRequest) -> HttpResponse:
+    """Add many scenarios from a CSV or YAML file, all or none."""
+    report, most = None, bulk.MOST_ROWS_AT_ONCE
+    if request.method == "POST":
+        table = request.FILES.get("file")
+        with refusals_told(request):
+            if table is None or services.was_too_large(request.META):
+                raise Conflict("Choose a CSV or YAML file; it may be too large.")
+            name, actor = table.name or "", user_of(request)
+            report = bulk.add_rows(name, table.read(), most=most, actor=actor)
+    context = {"report": report, "most": most}
+    return render(request, "scenarios/bulk.html", context)
 
 
 # --- Intents -----------------------------------------------------------------------------------

@@ -15,11 +15,10 @@ import numpy as np
 
 from augment.formats.commonroad.network import network_of, points_of, real, whole
 from augment.formats.documents import read_xml
-from augment.formats.reading import LONGEST_GAP_S, Log, LoggedTrack, Reader
+from augment.formats.reading import LONGEST_GAP_S, Log, LoggedTrack, LogReader
 from augment.formats.road_map import left_out_notes
 from augment.formats.values import WHAT, fault_at, look_up
 from augment.scene.entities import EGO_LENGTH_M, EGO_WIDTH_M, AgentType
-from augment.scene.recording import Note, SceneNoteKind
 
 VERSIONS = ("2018b", "2020a")
 MOST_STEPS = 100_000
@@ -45,6 +44,10 @@ SCENERY = frozenset(
     }
 )
 """What stands beside the road and is no road user."""
+ASSUMED = (
+    f"The ego is assumed to be {EGO_LENGTH_M:g} m long.",
+    "The ego's motion was not recorded: drives are measured by an IDM drive.",
+)
 State = tuple[float, float, float, float]
 """x, y, heading, speed."""
 
@@ -78,7 +81,7 @@ class Obstacle:
         )
 
 
-class CommonRoad(Reader):
+class CommonRoad(LogReader):
     """The reader of CommonRoad XML."""
 
     name = "commonroad"
@@ -96,15 +99,10 @@ class CommonRoad(Reader):
         if item is not None:
             chosen = [look_up(egos, item, "item")]
         if step_s > LONGEST_GAP_S:
-            notes.append(Note(kind=SceneNoteKind.LONG_TIME_STEP, value=step_s))
+            notes.append(f"Steps lie {step_s:g} s apart; a drive looks between them.")
         steps = 1 + max((max(one.states) for one in (*obstacles, *chosen)), default=0)
         benchmark = root.get("benchmarkID", path.stem)[:80]
         for ego in chosen:
-            is_problem = ego in problems
-            assumed = [
-                Note(kind=SceneNoteKind.EGO_SIZE_ASSUMED, value=EGO_LENGTH_M),
-                Note(kind=SceneNoteKind.NO_EGO_MOTION),
-            ]
             yield Log(
                 times_s=np.arange(steps, dtype=np.float64) * step_s,
                 ego=ego.track(steps).states,
@@ -117,7 +115,7 @@ class CommonRoad(Reader):
                 is_free=True,
                 item=str(ego.id),
                 frame=min(ego.states),
-                notes=[*notes, *(assumed if is_problem else [])],
+                notes=[*notes, *(ASSUMED if ego in problems else [])],
             )
 
 
@@ -148,7 +146,7 @@ def _problem(element: Element) -> Obstacle:
     )
 
 
-def _obstacles(root: Element) -> tuple[list[Obstacle], list[Note]]:
+def _obstacles(root: Element) -> tuple[list[Obstacle], list[str]]:
     """What stands and drives, and what is left out of it."""
     obstacles, left_out = [], Counter[str]()
     for element in root:
@@ -170,7 +168,7 @@ def _obstacles(root: Element) -> tuple[list[Obstacle], list[Note]]:
                 stands=element.tag == "staticObstacle" or role == "static",
             )
         )
-    return obstacles, left_out_notes(SceneNoteKind.OBJECTS_LEFT_OUT, left_out)
+    return obstacles, left_out_notes("objects", left_out)
 
 
 def _state(element: Element | None, place: str) -> tuple[int, State]:

@@ -1,11 +1,8 @@
 """The reader of ScenarioNet's scenario descriptions, from nuScenes, Waymo or nuPlan.
 
-A path is a file, or a data set's folder, where `item` is the name of a file or its number from 0.
-`frame` is a step; without one the step that the description calls its current one, else 0. A
-folder holds a file for each scenario and may hold two indices:
-
-    dataset_summary.pkl  file name -> what the scenario is
-    dataset_mapping.pkl  file name -> the folder that it lies in, from here
+A path is a file, or a data set's folder, where `item` is the name of a scenario's file in it or
+below it; its index files are not needed. `frame` is a step; without one the step that the
+description calls its current one, else 0.
 """
 
 from collections import Counter
@@ -16,7 +13,7 @@ from typing import Any
 import numpy as np
 import shapely
 
-from augment.formats.reading import Log, LoggedTrack, Reader
+from augment.formats.reading import Log, LoggedTrack, LogReader
 from augment.formats.road_map import NARROWEST_M, WIDEST_M, RoadMap, Segment, left_out_notes
 from augment.formats.scenarionet.unpickling import read_pickle
 from augment.formats.values import (
@@ -28,10 +25,7 @@ from augment.formats.values import (
     read_times,
 )
 from augment.scene.entities import LENGTH_WIDTH_M, AgentType, AreaKind, TrafficLight, TrafficSide
-from augment.scene.recording import Note, SceneNoteKind
 
-SUMMARY, MAPPING = "dataset_summary.pkl", "dataset_mapping.pkl"
-ENDING = ".pkl"
 _SCENARIOS = "sd_*.pkl"
 TYPE_OF = {
     "VEHICLE": AgentType.VEHICLE,
@@ -80,17 +74,17 @@ _COLUMNS = {"position": 2, "heading": 1, "velocity": 2, "valid": 1}
 """How many numbers a step needs."""
 
 
-class ScenarioNet(Reader):
+class ScenarioNet(LogReader):
     """The reader of scenario pickles."""
 
     name = "scenarionet"
     title = "ScenarioNet scenario description (pickle file), or a data set of them (folder)"
-    suffix, marker = ENDING, b"\x80"
+    suffix, marker = ".pkl", b"\x80"
 
     def recognises(self, path: Path) -> bool:
         """A pickle by its name and first bytes, not opened as one; a folder by its files."""
         if path.is_dir():
-            return (path / SUMMARY).is_file() or any(path.glob(_SCENARIOS))
+            return any(path.glob(_SCENARIOS)) or any(path.glob(f"*/{_SCENARIOS}"))
         return super().recognises(path)
 
     def logs(self, path: Path, item: str | None) -> Iterator[Log]:
@@ -100,42 +94,9 @@ class ScenarioNet(Reader):
                 raise fault_at("item", f"a file holds one scenario, {item!r} is not there")
             yield _log(path, None)
             return
-        for name in _names_in(path) if item is None else [item]:
-            file = _file_in(path, name)
-            yield _log(file, file.name)
-
-
-# Folders
-
-
-def _table(file: Path) -> dict[str, Any]:
-    table = read_pickle(file) if file.is_file() else {}
-    if not isinstance(table, dict) or not all(isinstance(key, str) for key in table):
-        raise fault_at(file.name, "is no dictionary of file names")
-    return table
-
-
-def _names_in(folder: Path) -> list[str]:
-    """The file names of all scenarios, in the summary's order, else in the alphabet's."""
-    names = [name for name in _table(folder / SUMMARY) if name.endswith(ENDING)]
-    names = names or sorted(file.name for file in folder.glob(_SCENARIOS))
-    if not names:
-        raise fault_at(str(folder), "holds no scenario")
-    return names
-
-
-def _file_in(folder: Path, item: str) -> Path:
-    """The file of that name or number; not outside of the data set."""
-    name = item
-    if not item.endswith(ENDING):
-        name = look_up({str(n): one for n, one in enumerate(_names_in(folder))}, item, "item")
-    place = _table(folder / MAPPING).get(name, "")
-    if not isinstance(place, str) or "\0" in place + name or Path(name).name != name:
-        raise fault_at(MAPPING, f"{name[:60]!r} has no folder")
-    file = (folder / place / name).resolve()
-    if not file.is_relative_to(folder.resolve().parent) or not file.is_file():
-        raise fault_at("item", f"{name[:60]!r} is not in the data set")
-    return file
+        files = {file.name: file for file in sorted(path.rglob(_SCENARIOS))}
+        chosen = files.values() if item is None else [look_up(files, item, "item")]
+        yield from (_log(file, file.name) for file in chosen)
 
 
 # Tracks
@@ -163,9 +124,9 @@ def _log(path: Path, item: str | None) -> Log:
             tracks[str(key)] = _track(str(key), track, len(times_s), place)
     ego = look_up(tracks, str(metadata.get("sdc_id")), "metadata.sdc_id")
     del tracks[ego.name]
-    notes = left_out_notes(SceneNoteKind.OBJECTS_LEFT_OUT, left_out)
+    notes = left_out_notes("objects", left_out)
     if ego.width_m > ego.length_m:
-        notes.append(Note(kind=SceneNoteKind.EGO_SIZE_SWAPPED))
+        notes.append("The ego's length and width were swapped and put right.")
     current, city = metadata.get("current_time_index"), str(metadata.get("map") or "")[:60]
     data_set = str(metadata.get("dataset") or description.get("version") or "unknown")[:40]
     licences = [text for name, text in DATA_LICENCES.items() if name in data_set.lower()]

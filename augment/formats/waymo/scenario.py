@@ -18,7 +18,7 @@ from google.protobuf.descriptor_pb2 import FileDescriptorSet
 from google.protobuf.message import DecodeError
 from google.protobuf.message_factory import GetMessages
 
-from augment.formats.reading import Log, LoggedTrack, Reader
+from augment.formats.reading import Log, LoggedTrack, LogReader
 from augment.formats.road_map import WIDEST_M, RoadMap, Segment, edge_of, left_out_notes, width_of
 from augment.formats.values import (
     FloatArray,
@@ -29,7 +29,6 @@ from augment.formats.values import (
     read_times,
 )
 from augment.scene.entities import AgentType, AreaKind, TrafficLight
-from augment.scene.recording import SceneNoteKind
 
 LICENCE = "Waymo Open Dataset licence, non-commercial use"
 UNSET = 0
@@ -52,7 +51,7 @@ _HEAD, _FOOT = struct.Struct("<QI"), struct.Struct("<I")
 _STATE = ("center_x", "center_y", "heading", "velocity_x", "velocity_y", "length", "width")
 
 
-class WaymoMotion(Reader):
+class WaymoMotion(LogReader):
     """The reader of scenario TFRecords."""
 
     name = "waymo"
@@ -94,9 +93,7 @@ class WaymoMotion(Reader):
                 licence=LICENCE,
                 item=str(number),
                 frame=scenario.current_time_index,
-                notes=left_out_notes(
-                    SceneNoteKind.OBJECTS_LEFT_OUT, {"TYPE_UNSET": kinds.count(UNSET)}
-                ),
+                notes=left_out_notes("objects", {"TYPE_UNSET": kinds.count(UNSET)}),
             )
 
 

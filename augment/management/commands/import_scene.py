@@ -45,5 +45,5 @@ class Command(TerminalCommand):
             for name in ("agents", "lanes", "connectors", "areas")
         )
         self.stdout.write(f"Imported scene {row.slug}: {counts} besides the ego.")
-        for note in notes_of(row):
+        for note in notes_of(row.notes):
             self.stdout.write(f"  {note}")

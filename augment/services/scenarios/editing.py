@@ -5,7 +5,8 @@ its agents, whatever the page said.
 """
 
 import math
-from dataclasses import replace
+from copy import copy
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from typing import Any
 
@@ -14,7 +15,7 @@ from django.db import transaction
 
 from augment.errors import Conflict, UnknownName
 from augment.geometry.frames import difference, wrap
-from augment.models import IntentReading, Scenario
+from augment.models import BaseScene, IntentReading, Scenario
 from augment.render.camera import AROUND_THE_EGO
 from augment.scene import codec
 from augment.scene.entities import LENGTH_WIDTH_M, AgentType, Modification, Scene, TrafficAgent
@@ -31,23 +32,38 @@ _SNAP_WITHIN_M = 15.0
 # Changes by hand
 
 
-def editor_document(scenario: Scenario) -> dict[str, Any]:
+def draft_of(scene: BaseScene, scenario: Scenario | None, *, keep_traffic: bool) -> Scenario:
+    """Return a scenario that is being made or changed, with the traffic that was chosen for it."""
+    draft = Scenario(base_scene=scene) if scenario is None else copy(scenario)
+    draft.keep_traffic = keep_traffic
+    if keep_traffic:
+        draft.spawned = None
+    return draft
+
+
+def editor_document(draft: Scenario) -> dict[str, Any]:
     """Return the picture's window, who is there before the change, and what can be placed.
 
     Raises:
         InvalidDocument: The stored scene can't be read.
     """
-    scene = editable_scene(scenario)
     camera = AROUND_THE_EGO
     names = ("x_min_m", "y_max_m", "px_per_m", "width_px", "height_px")
     return {
         "camera": {name: getattr(camera, name) for name in names},
-        "agents": codec.modification_to_document(Modification(moved=scene.agents))["move"],
+        "recorded": _agents_of(draft_of(draft.base_scene, draft, keep_traffic=True)),
+        "cleared": _agents_of(draft_of(draft.base_scene, draft, keep_traffic=False)),
         "sizes": {
             one.value: dict(zip(("length_m", "width_m"), LENGTH_WIDTH_M[one], strict=True))
             for one in PLACED
         },
     }
+
+
+def _agents_of(draft: Scenario) -> list[dict[str, Any]]:
+    agents = editable_scene(draft).agents
+    listed: list[dict[str, Any]] = codec.MODIFICATION.dump(Modification(moved=agents))["move"]
+    return listed
 
 
 def read_edit(scenario: Scenario, document: object) -> Modification:
@@ -57,7 +73,7 @@ def read_edit(scenario: Scenario, document: object) -> Modification:
         InvalidDocument: It breaks its format.
         InvalidModification: It does not fit the scene.
     """
-    scene, graph = _read_scene(scenario.pk, scenes.scene_key(scenario))
+    scene, graph = _scene_and_lanes(scenario)
     given = codec.modification_from_document(document)
     placed = replace(
         given,
@@ -68,14 +84,27 @@ def read_edit(scenario: Scenario, document: object) -> Modification:
     return placed
 
 
+def reference_document(scenario: Scenario, document: object) -> dict[str, Any] | None:
+    """Return a drawing as a reference; None where nothing is drawn, but for an unmet wish.
+
+    Raises:
+        InvalidDocument, InvalidModification: As above.
+    """
+    if document is None:
+        return None
+    modification, intent = read_edit(scenario, document), scenes.intent_of(scenario)
+    if modification.is_empty and not (intent and intent.unmet):
+        return None
+    return codec.modification_to_document(modification)
+
+
 def snap(scenario: Scenario, modification: Modification, agent_id: str) -> Modification:
     """Return the modification with one agent on the nearest centreline, along it or against it.
 
     A pedestrian who walks somewhere faces that way from there, along or across the lane.
     Nothing happens to an agent that is not changed, or further than 15 m from every lane.
     """
-    _, graph = _read_scene(scenario.pk, scenes.scene_key(scenario))
-
+    _, graph = _scene_and_lanes(scenario)
     added, moved = (
         tuple(_snapped(one, graph) if one.id == agent_id else one for one in agents)
         for agents in (modification.added, modification.moved)
@@ -89,13 +118,24 @@ def editable_scene(scenario: Scenario) -> Scene:
     Raises:
         InvalidDocument: The stored scene can't be read.
     """
-    return _read_scene(scenario.pk, scenes.scene_key(scenario))[0]
+    return _scene_and_lanes(scenario)[0]
+
+
+@dataclass(frozen=True, slots=True)
+class _Keyed:
+    """A scenario by the key that alone tells when a scene that was read before still holds."""
+
+    key: str
+    scenario: Scenario = field(compare=False)
+
+
+def _scene_and_lanes(scenario: Scenario) -> tuple[Scene, LaneGraph]:
+    return _read_scene(_Keyed(scenes.scene_key(scenario), scenario))
 
 
 @lru_cache(maxsize=8)
-def _read_scene(scenario_pk: int, key: str) -> tuple[Scene, LaneGraph]:
-    """The key alone tells when a scene that was read before still holds."""
-    scene = scenes.scene_of(Scenario.objects.select_related("base_scene").get(pk=scenario_pk))
+def _read_scene(keyed: _Keyed) -> tuple[Scene, LaneGraph]:
+    scene = scenes.scene_of(keyed.scenario)
     return scene, LaneGraph(scene)
 
 
@@ -120,31 +160,6 @@ def _snapped(agent: TrafficAgent, graph: LaneGraph) -> TrafficAgent:
         heading_rad = math.atan2(away[1], away[0]) if any(away) else agent.heading_rad
     moved = replace(agent, x_m=pose.x_m, y_m=pose.y_m, heading_rad=heading_rad)
     return _on_its_lane(moved, graph)
-
-
-# References
-
-
-@transaction.atomic
-def set_reference(scenario: Scenario, document: object, *, actor: User | None = None) -> Scenario:
-    """Give a scenario the reference of a document, in the place of the one that it had.
-
-    Raises:
-        InvalidDocument: The document breaks its format.
-        InvalidModification: It does not fit the scene.
-        Conflict: The scenario is the catalogue's, or nothing changes though the wish can be met.
-    """
-    row = _locked(scenario.slug, "reference")
-    modification = read_edit(row, document)
-    intent = scenes.intent_of(row)
-    if modification.is_empty and not (intent and intent.unmet):
-        raise Conflict(
-            "Nothing is added, moved or removed. An empty reference is for wishes that can't "
-            "be met, whose intent says so."
-        )
-    return _set(
-        row, "set reference", actor, reference=codec.modification_to_document(modification)
-    )
 
 
 # Intents

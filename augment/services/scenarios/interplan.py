@@ -15,11 +15,11 @@ from typing import Any
 from django.contrib.auth.models import User
 from pydantic import BaseModel
 
+from augment.checks.derived import describe_change
 from augment.errors import AugmentError, InvalidDocument
 from augment.formats.apart import UntrustedInput
 from augment.formats.documents import MAX_CHARACTERS, read_yaml_file
 from augment.formats.interplan import file as interplan_file
-from augment.formats.interplan.intent import describe_reference
 from augment.formats.nuplan_log import NuPlan
 from augment.models import BaseScene, Scenario
 from augment.scene.codec import intent_to_document, modification_to_document
@@ -175,7 +175,7 @@ def _keep_entry(
     goal_m = interplan_file.goal_place(kept, goal or "", scene)
     options = SceneOptions(density=density, goal=goal, goal_m=goal_m)
     driven = replace(scene, agents=traffic, options=options)
-    instruction, intent = describe_reference(entry.type, reference, driven)
+    instruction, intent = describe_change(entry.type, reference, driven)
     add_scenario(
         scene=row.slug,
         type=entry.type.value,

@@ -187,7 +187,6 @@ class SceneView(StrEnum):
     """What a picture of a scene shows."""
 
     KEPT = "kept"  # with the recorded traffic
-    CLEARED = "cleared"  # the ego alone
     BACKDROP = "backdrop"  # the ego alone, from far: others are placed on it
 
 
@@ -224,8 +223,9 @@ def draw_scene(scene_pk: int) -> None:
         return
     scene = codec.scene_from_document(row.document)
     for view in missing:
-        shown = scene if view is SceneView.KEPT else without_traffic(scene)
-        camera = AROUND_THE_EGO if view is SceneView.BACKDROP else camera_for(scene, None)
+        is_kept = view is SceneView.KEPT
+        shown = scene if is_kept else without_traffic(scene)
+        camera = camera_for(scene, None) if is_kept else AROUND_THE_EGO
         store_as(scene_picture(row, view), draw(shown, Modification(), camera))
 
 

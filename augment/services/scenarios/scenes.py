@@ -5,12 +5,14 @@ import json
 import re
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import count
 from typing import Any
 
 from django.contrib.auth.models import User
 from django.db import IntegrityError, transaction
 
 from augment.baselines.rule_placer import list_open
+from augment.checks.derived import describe_change, type_of_change
 from augment.errors import Conflict, InvalidDocument, UnknownName
 from augment.formats.interplan.file import goal_place
 from augment.models import BaseScene, Scenario
@@ -119,6 +121,7 @@ def add_scenario(
     goal: str = "",
     traffic: Sequence[entities.TrafficAgent] | None = None,
     interplan: dict[str, Any] | None = None,
+    derives: bool = False,
     actor: User | None = None,
 ) -> Scenario:
     """Keep an instruction for a scene, with its intent and reference if there are any.
@@ -136,6 +139,7 @@ def add_scenario(
         goal: Where the ego's way turns; empty where nobody says.
         traffic: Who is spawned, where that is known already; None to spawn it.
         interplan: The parts of interPlan's file that it comes from, with a generated instruction.
+        derives: Whether the reference says what is asked for, see `derive_intent`.
         actor: Who did it.
 
     Raises:
@@ -154,9 +158,11 @@ def add_scenario(
     scenario = Scenario(
         slug=slug or _free_slug(base_scene, type), base_scene=base_scene, interplan=interplan
     )
-    set_wording(scenario, instruction, type)
-    scenario.instruction_is_generated = interplan is not None
     _set_surroundings(scenario, keep_traffic, density, goal, traffic, reference)
+    if derives:
+        type, instruction = derive_intent(scenario, type, instruction)
+    set_wording(scenario, instruction, type)
+    scenario.instruction_is_generated |= interplan is not None
     if intent is not None:
         # The catalogue leaves some open on purpose: the rule placer refuses them, models do not.
         is_entered = intent_origin is IntentOrigin.ENTERED
@@ -183,6 +189,29 @@ def _insert(scenario: Scenario, actor: User | None) -> None:
         "intent": scenario.intent_origin or None,
     }
     log_change(scenario, "add", actor, after=after)
+
+
+def derive_intent(scenario: Scenario, type: str, instruction: str) -> tuple[str, str]:
+    """Set what a scenario asks for, without saving, by what its reference changes.
+
+    Args:
+        scenario: With its reference, without one nothing happens.
+        type: Of the scenario, empty for the one that the drawing looks like.
+        instruction: In the user's words, empty where the drawing is to say it all.
+
+    Returns:
+        Type and instruction, both filled in.
+    """
+    reference, scene = reference_of(scenario), scene_of(scenario)
+    if reference is None or reference.is_empty:
+        return type, instruction
+    type = type or type_of_change(reference, scene).value
+    sentence, intent = describe_change(type_of(type), reference, scene)
+    scenario.intent = None if intent is None else codec.intent_to_document(intent)
+    scenario.intent_origin = "" if intent is None else IntentOrigin.DERIVED
+    if not instruction.strip():
+        scenario.instruction, scenario.instruction_is_generated = sentence, True
+    return type, instruction.strip() or sentence
 
 
 def set_wording(scenario: Scenario, instruction: str, type: str) -> None:
@@ -352,7 +381,4 @@ def _free_slug(base_scene: BaseScene, name: str) -> str:
     stem = (name if kind is None else kind.name).lower().replace("_", "-")
     stem = f"{base_scene.slug[: SLUG_LENGTH - len(stem) - 8].strip('-')}-{stem}"
     taken = set(Scenario.objects.filter(slug__startswith=stem).values_list("slug", flat=True))
-    number = 1
-    while f"{stem}-{number}" in taken:
-        number += 1
-    return f"{stem}-{number}"
+    return next(name for n in count(1) if (name := f"{stem}-{n}") not in taken)

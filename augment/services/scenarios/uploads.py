@@ -6,7 +6,7 @@ import hashlib
 import re
 import shutil
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
@@ -20,16 +20,15 @@ from django.db import transaction
 
 from augment.errors import AugmentError, Conflict, InvalidDocument
 from augment.formats.apart import UntrustedInput
-from augment.formats.readers import READERS, RecordingPart, reader_of
-from augment.formats.reading import Reading
+from augment.formats.readers import READERS, reader_of
+from augment.formats.reading import Moment, Reading
 from augment.models import SceneUpload, UploadMoment
 from augment.render.bev import draw
 from augment.render.camera import camera_for
 from augment.scene.entities import Modification
-from augment.scene.recording import notes_from_document, notes_to_document
 from augment.services.events import log_change
 from augment.services.scenarios.pictures import store_as
-from augment.services.scenarios.scene_imports import keep_reading, sentence_of
+from augment.services.scenarios.scene_imports import keep_reading
 from augment.services.scenarios.scenes import check_slug
 from augment.services.work import Lease, Settlement, WorkKind
 
@@ -38,6 +37,9 @@ MomentState = UploadMoment.State
 FOLDER, PREVIEWS = "uploads", "previews"
 FORMATS = {reader.name: reader.title for reader in READERS.values()}
 """By name, what can be read."""
+EVERY_S = 0.5
+MOST_STOPS = 2_000
+"""Moments that are offered; later ones of a longer recording are not."""
 
 
 def most_megabytes() -> int:
@@ -128,31 +130,40 @@ class Uploads(WorkKind[SceneUpload]):
     model = SceneUpload
 
     def run(self, row: SceneUpload, held: Lease[SceneUpload]) -> Settlement:
-        """Look into the file."""
+        """List what the file offers, and draw the moment that its format means."""
         with open_upload(row) as source:
-            name, found = source.look()
-        if not any(track.stops for track in found.tracks):
-            raise InvalidDocument("recording", [("", "holds no moment with an ego")])
-        tracks = [_document(track) for track in found.tracks]
-        columns = {"format": name, "tracks": tracks, "is_cut": found.is_cut}
+            name, moments = source.moments(every_s=EVERY_S, most=MOST_STOPS + 1)
+            if not moments:
+                raise InvalidDocument("recording", [("", "holds no moment with an ego")])
+            _, reading = source.read(item=None, frame=None, name="preview")
+        meant, offered = reading.moment, moments[:MOST_STOPS]
+        if all((one.item, one.frame) != (meant.item, meant.frame) for one in offered):
+            offered.insert(0, meant)
+        shown, _ = UploadMoment.objects.update_or_create(
+            upload=row,
+            item=meant.item or "",
+            frame=meant.frame,
+            defaults={"state": MomentState.DRAWN, "asked_by": row.uploaded_by},
+        )
+        UploadMoment.objects.filter(pk=shown.pk).update(**_preview(shown, reading))
+        is_cut = len(moments) > MOST_STOPS
+        columns = {"format": name, "tracks": _parts(offered), "is_cut": is_cut}
         return Settlement(state=State.READ, columns=columns)
 
 
 UPLOADS = Uploads()
 
 
-def _document(track: RecordingPart) -> dict[str, Any]:
-    stops = [
-        {
-            "item": stop.moment.item or "",
-            "frame": stop.moment.frame,
-            "time_s": None if stop.moment.time_s is None else round(stop.moment.time_s, 2),
-            "place_m": stop.place_m and [round(value, 2) for value in stop.place_m],
-        }
-        for stop in track.stops
-    ]
-    seen = {"name": track.name, "is_seen": track.is_seen, "roads_m": track.roads_m}
-    return seen | {"stops": stops}
+def _parts(moments: Sequence[Moment]) -> list[dict[str, Any]]:
+    """Return the moments by their items; those of one recording are one part without a name."""
+    items = {moment.item for moment in moments}
+    is_one = len(items) == len(moments) and all(one.time_s is not None for one in moments)
+    parts: dict[str, list[dict[str, Any]]] = {}
+    for one in moments:
+        time_s = None if one.time_s is None else round(one.time_s, 2)
+        stop = {"item": one.item or "", "frame": one.frame, "time_s": time_s}
+        parts.setdefault("" if is_one else one.item or "", []).append(stop)
+    return [{"name": name, "stops": stops} for name, stops in parts.items()]
 
 
 # Moments
@@ -206,11 +217,7 @@ class Moments(WorkKind[UploadMoment]):
                     item=row.item or None, frame=row.frame, name="preview" if is_new else row.slug
                 )
             if is_new:
-                picture = f"{PREVIEWS}/{row.code}.png"
-                scene = reading.scene
-                store_as(picture, draw(scene, Modification(), camera_for(scene, None)))
-                columns = {"picture": picture, "report": _report(reading)}
-                return Settlement(state=MomentState.DRAWN, columns=columns)
+                return Settlement(state=MomentState.DRAWN, columns=_preview(row, reading))
             path = Path(row.upload.name)
             kept, _ = keep_reading(reading, source=source, path=path, actor=row.asked_by)
         except AugmentError as error:
@@ -223,19 +230,17 @@ class Moments(WorkKind[UploadMoment]):
 MOMENTS = Moments()
 
 
-def sentences_of(row: UploadMoment) -> list[str]:
-    """Return what the source left open at this moment."""
-    return [sentence_of(note) for note in notes_from_document((row.report or {}).get("notes", []))]
-
-
-def _report(reading: Reading) -> dict[str, Any]:
+def _preview(row: UploadMoment, reading: Reading) -> dict[str, Any]:
+    """Draw a moment, and return its columns."""
     scene, recording = reading.scene, reading.recording
-    counts = {name: len(getattr(scene, name)) for name in _COUNTED}
-    return counts | {
+    picture = f"{PREVIEWS}/{row.code}.png"
+    store_as(picture, draw(scene, Modification(), camera_for(scene, None)))
+    report = {name: len(getattr(scene, name)) for name in _COUNTED} | {
         "recorded_s": 0.0 if recording is None else round(float(recording.times_s[-1]), 1),
         "provenance": scene.provenance,
-        "notes": notes_to_document(reading.notes),
+        "notes": reading.notes,
     }
+    return {"picture": picture, "report": report}
 
 
 _COUNTED = ("agents", "lanes", "connectors", "areas")

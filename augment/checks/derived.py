@@ -1,21 +1,21 @@
-"""A human reference of interPlan as an intent and as a sentence: its file has places, no words.
+"""A change that somebody drew as an intent and as a sentence, so that no words need be found.
 
-Both count as instructions do, along the lanes of the ego's way and across them. Only what
-interPlan's keys can hold comes up: vehicles and buses that stand, cones, people.
+Both count as instructions do, along the lanes of the ego's way and across them.
 """
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from statistics import median
 
 import numpy as np
 
-from augment.checks.ground import Ground
-from augment.checks.lanes_across import Band, LanesAcross
+from augment.checks.ground import Ground, is_stopped
+from augment.checks.lanes_across import Band, LanesAcross, find_picked
 from augment.checks.registry import check_against_intent
 from augment.geometry.frames import difference
 from augment.scene import intent as wish
+from augment.scene.ego_route import EgoRoute
 from augment.scene.entities import (
     AgentType,
     Modification,
@@ -25,9 +25,11 @@ from augment.scene.entities import (
     TrafficAgent,
     TurnType,
 )
+from augment.scene.schema import MOST_OBJECTS
 
 _STRAIGHT_DEG = 5.0
 _BESIDE_M = 0.1
+_ASIDE_M = 0.5
 _ON_ROAD_M = 1.0
 _ROW_M, _TAPER_M = 1.0, 1.0
 _LEADS = {
@@ -37,6 +39,14 @@ _LEADS = {
     ScenarioType.NUDGE: "Have the ego nudge around what stands at the side of its lane",
     ScenarioType.OVERTAKE: "Have the ego overtake what stands in its lane",
 }
+_BODIES = {
+    AgentType.VEHICLE: wish.Body.VEHICLE,
+    AgentType.BUS: wish.Body.BUS,
+    AgentType.BICYCLE: wish.Body.BICYCLE,
+    AgentType.BARRIER: wish.Body.BARRIER,
+    AgentType.CONSTRUCTION_SIGN: wish.Body.CONSTRUCTION_SIGN,
+}
+_FRONTLESS = (AgentType.BARRIER, AgentType.CONSTRUCTION_SIGN)
 _LANES = {
     wish.LaneChoice.OWN: "in the ego's lane",
     wish.LaneChoice.LEFT: "in the next lane to the left",
@@ -45,34 +55,64 @@ _LANES = {
 }
 
 
-def describe_reference(
-    kind: ScenarioType, reference: Modification, scene: Scene
+def describe_change(
+    kind: ScenarioType | None, change: Modification, scene: Scene
 ) -> tuple[str, wish.Intent | None]:
-    """Return the sentence that asks for a reference, and the same as an intent.
+    """Return the sentence that asks for a change, and the same as an intent.
 
     Args:
-        kind: The type of the special scenario.
-        reference: What people placed.
+        kind: The type of the scenario, None for one of one's own.
+        change: What people placed, moved and removed; not empty.
         scene: Before the change, with the scenario's goal.
 
     Returns:
-        The intent is None where the ego is on no lane, or where nothing can be said as a request;
-        else without offsets and lanes where the reference meets it better so.
+        The intent is None where the ego is on no lane, or where nothing or too much can be said
+        as requests; else without offsets and lanes where the change meets it better so.
     """
     ground = Ground.of(scene)
     lanes = LanesAcross.of(ground, scene.options.goal or TurnType.STRAIGHT)
-    sentence = _sentence(kind, reference, lanes, scene)
+    touched = {*change.removed, *(agent.id for agent in change.moved)}
+    picks = {
+        agent.id: None if lanes is None else _pick_of(agent, lanes)
+        for agent in scene.agents
+        if agent.id in touched
+    }
+    sentence = _sentence(kind, change, lanes, scene, picks)
     if lanes is None:
         return sentence, None
-    full = wish.Intent(requests=tuple(_requests(reference, lanes)), route=lanes.route.turn)
-    if not full.requests:
+    requests = tuple(_requests(change, lanes))
+    moves = tuple(_moves(change, lanes, picks))
+    removals = tuple(pick for name in change.removed if (pick := picks[name]))
+    counts = [len(part) for part in (requests, moves, removals)]
+    if not any(counts) or max(counts) > wish.MOST_REQUESTS:
         return sentence, None
-    looser = replace(full, requests=tuple(map(_looser, full.requests)))
+    full = wish.Intent(requests=requests, moves=moves, removals=removals, route=lanes.route.turn)
+    looser = replace(
+        full,
+        requests=tuple(map(_looser, requests)),
+        moves=tuple(replace(one, spot=_looser_spot(one.spot)) for one in moves),
+    )
     faults = [
-        sum(one.is_fault for one in check_against_intent(ground, reference, intent))
+        sum(one.is_fault for one in check_against_intent(ground, change, intent))
         for intent in (full, looser)
     ]
     return sentence, full if faults[0] <= faults[1] else looser
+
+
+def type_of_change(change: Modification, scene: Scene) -> ScenarioType:
+    """Return the one of the five types that a change looks most like."""
+    kinds = {agent.type for agent in change.added}
+    if kinds & {AgentType.TRAFFIC_CONE, *_FRONTLESS}:
+        return ScenarioType.CONSTRUCTION_ZONE
+    if AgentType.PEDESTRIAN in kinds:
+        return ScenarioType.JAYWALKER
+    if len(change.added) > 1:
+        return ScenarioType.ACCIDENT_SITE
+    route = EgoRoute.of(scene)
+    is_aside = any(
+        route and abs(route.locate_agent(agent).left_m) > _ASIDE_M for agent in change.changed
+    )
+    return ScenarioType.NUDGE if is_aside else ScenarioType.OVERTAKE
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -112,15 +152,46 @@ def _place_of(agent: TrafficAgent, lanes: LanesAcross) -> _Place:
 # The intent
 
 
-def _requests(reference: Modification, lanes: LanesAcross) -> Iterator[wish.Request]:
-    added = sorted(reference.added, key=lambda one: lanes.route.locate_agent(one).ahead_m)
+def _requests(change: Modification, lanes: LanesAcross) -> Iterator[wish.Request]:
+    added = sorted(change.added, key=lambda one: lanes.route.locate_agent(one).ahead_m)
     cones = [agent for agent in added if agent.type is AgentType.TRAFFIC_CONE]
     people = [agent for agent in added if agent.type is AgentType.PEDESTRIAN]
-    vehicles = [agent for agent in added if agent.type in (AgentType.VEHICLE, AgentType.BUS)]
     if cones:
         yield _cones(cones, any(agent.walk_to_m is None for agent in people), lanes)
-    yield from (_vehicle(agent, lanes) for agent in vehicles)
+    yield from (_vehicle(agent, lanes) for agent in added if agent.type in _BODIES)
     yield from (_walk(agent, lanes) for agent in people if agent.walk_to_m is not None)
+
+
+def _moves(
+    change: Modification, lanes: LanesAcross, picks: Mapping[str, wish.Pick | None]
+) -> Iterator[wish.Move]:
+    for agent in change.moved:
+        who = picks[agent.id]
+        if who is not None:
+            there = _vehicle(agent, lanes)
+            yield wish.Move(
+                who=who,
+                spot=there.spot,
+                facing=there.facing,
+                turn_deg=there.turn_deg,
+                speed_mps=agent.speed_mps,
+            )
+
+
+def _pick_of(agent: TrafficAgent, lanes: LanesAcross) -> wish.Pick | None:
+    """How a sentence calls a road user of the scene; None for one that it can't tell."""
+    kind = {
+        AgentType.VEHICLE: wish.Sight.PARKED if is_stopped(agent) else wish.Sight.MOVING,
+        AgentType.BUS: wish.Sight.BUS,
+        AgentType.BICYCLE: wish.Sight.BICYCLE,
+        AgentType.PEDESTRIAN: wish.Sight.PEDESTRIAN,
+    }.get(agent.type)
+    for relation in wish.Relation if kind else ():
+        assert kind is not None
+        alike = find_picked(lanes, wish.Pick(kind=kind, relation=relation, every=True))
+        if agent in alike[:MOST_OBJECTS]:
+            return wish.Pick(kind=kind, relation=relation, ordinal=alike.index(agent) + 1)
+    return None
 
 
 def _spot(place: _Place) -> wish.Spot:
@@ -141,7 +212,7 @@ def _boundary(left_m: float) -> wish.LateralTarget:
 
 def _vehicle(agent: TrafficAgent, lanes: LanesAcross) -> wish.VehicleRequest:
     place = _place_of(agent, lanes)
-    facing, turn_deg = _turned(agent, place)
+    facing, turn_deg = (None, 0.0) if agent.type in _FRONTLESS else _turned(agent, place)
     lateral = None
     if abs(place.left_m) >= _BESIDE_M:
         outside = place.lane is None
@@ -152,10 +223,10 @@ def _vehicle(agent: TrafficAgent, lanes: LanesAcross) -> wish.VehicleRequest:
         )
     return wish.VehicleRequest(
         spot=replace(_spot(place), lateral=lateral),
-        body=wish.Body.BUS if agent.type is AgentType.BUS else wish.Body.VEHICLE,
+        body=_BODIES.get(agent.type, wish.Body.VEHICLE),
         facing=facing,
         turn_deg=turn_deg,
-        speed_mps=0.0,
+        speed_mps=agent.speed_mps,
         count=1,
     )
 
@@ -216,7 +287,7 @@ def _cones(
 
 def _looser(request: wish.Request) -> wish.Request:
     """Without what says how things stand across the road and to each other."""
-    spot = replace(request.spot, lateral=None, lane=None)
+    spot = _looser_spot(request.spot)
     match request:
         case wish.WalkRequest():
             return replace(request, drift_m=None, on_road=False)
@@ -226,14 +297,22 @@ def _looser(request: wish.Request) -> wish.Request:
             return replace(request, spot=spot)
 
 
+def _looser_spot(spot: wish.Spot) -> wish.Spot:
+    return replace(spot, lateral=None, lane=None)
+
+
 # The sentence
 
 
 def _sentence(
-    kind: ScenarioType, reference: Modification, lanes: LanesAcross | None, scene: Scene
+    kind: ScenarioType | None,
+    change: Modification,
+    lanes: LanesAcross | None,
+    scene: Scene,
+    picks: Mapping[str, wish.Pick | None],
 ) -> str:
     """The sentences from which a reader could put the same objects to the same places."""
-    added = sorted(reference.added, key=lambda one: (one.x_m, one.y_m))
+    added = sorted(change.added, key=lambda one: (one.x_m, one.y_m))
     cones = [agent for agent in added if agent.type is AgentType.TRAFFIC_CONE]
     spots = ", ".join(_where((one.x_m, one.y_m), lanes) for one in cones)
     parts = [f"{len(cones)} traffic cones: {spots}"] if len(cones) > 1 else []
@@ -241,29 +320,46 @@ def _sentence(
         parts = [f"a traffic cone {spots}"]
     others = [agent for agent in added if agent.type is not AgentType.TRAFFIC_CONE]
     parts += [_thing(other, kind, lanes) for other in others]
+    for agent in change.moved:
+        there = _where((agent.x_m, agent.y_m), lanes)
+        parts.append(f"move {_who(agent.id, picks)} to {there}")
+    parts += [f"remove {_who(name, picks)}" for name in change.removed]
     goal = scene.options.goal
     way = "" if goal is None else f" The ego is to turn {goal}."
     if goal is TurnType.STRAIGHT:
         way = " The ego is to go straight on."
-    return f"{_LEADS[kind]}: {'; '.join(parts)}.{way}"
+    lead = "Change the scene" if kind is None else _LEADS[kind]
+    return f"{lead}: {'; '.join(parts)}.{way}"
 
 
-def _thing(agent: TrafficAgent, kind: ScenarioType, lanes: LanesAcross | None) -> str:
+def _who(name: str, picks: Mapping[str, wish.Pick | None]) -> str:
+    pick = picks[name]
+    if pick is None:
+        return name
+    place = f"{pick.relation.words} the ego"
+    if pick.ordinal == 1:
+        return f"the nearest {pick.kind} {place}"
+    return f"{pick.kind} number {pick.ordinal} {place}"
+
+
+def _thing(agent: TrafficAgent, kind: ScenarioType | None, lanes: LanesAcross | None) -> str:
     here = _where((agent.x_m, agent.y_m), lanes)
     if agent.type is AgentType.PEDESTRIAN:
         if agent.walk_to_m is not None:
             return f"a pedestrian who walks from {here} to {_where(agent.walk_to_m, lanes)}"
         who = "worker" if kind is ScenarioType.CONSTRUCTION_ZONE else "pedestrian"
         return f"a {who} who stands {here}"
-    what = "bus" if agent.type is AgentType.BUS else "vehicle"
-    how = "crashed" if kind is ScenarioType.ACCIDENT_SITE else "parked"
+    what, drives = agent.type.lower().replace("_", " "), not is_stopped(agent)
+    if agent.type in (AgentType.VEHICLE, AgentType.BUS) and not drives:
+        what = f"{'crashed' if kind is ScenarioType.ACCIDENT_SITE else 'parked'} {what}"
+    pace = f", driving at {agent.speed_mps:.1f} m/s" if drives else ""
     base_rad = 0.0 if lanes is None else _place_of(agent, lanes).tangent_rad
     base = "the ego's direction" if lanes is None else "the lane's direction"
     degrees = math.degrees(difference(agent.heading_rad, base_rad))
     turn = f"turned {abs(degrees):.0f} degrees to the {_side(degrees)} of {base}"
     if abs(degrees) < _STRAIGHT_DEG:
         turn = f"in {base}"
-    return f"a {how} {what} {here}, {turn}"
+    return f"a {what} {here}, {turn}{pace}"
 
 
 def _where(point: Point, lanes: LanesAcross | None) -> str:

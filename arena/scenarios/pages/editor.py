@@ -1,0 +1,226 @@
+"""Drawing: a new scenario on its scene, a scenario that is changed, a correction by hand."""
+
+import json
+import uuid
+from typing import Any
+
+from django import forms
+from django.contrib import messages
+from django.http import HttpRequest, HttpResponse, JsonResponse
+from django.shortcuts import get_object_or_404, redirect, render
+
+from arena.scenarios import services
+from arena.site.access import STAFF, act_for, form_for, user_of
+from arena.site.acts import looks_again, refusals_in, refusals_told, send_later
+from arena.site.forms import offer, read_code, read_json
+from augment.errors import Conflict, InvalidDocument
+from augment.models import Augmentation, BaseScene, Contestant, Scenario
+from augment.models.scenes import DENSITIES, GOALS
+from augment.services.judging.findings import check_edit
+from augment.services.running import by_hand
+from augment.services.scenarios import editing, scenes
+from augment.services.scenarios.pictures import SceneView, is_drawn, scene_picture
+from augment.services.scenarios.scene_imports import notes_of
+from augment.tasks import enqueue_job, enqueue_scenario, enqueue_scene
+
+LONGEST_CHANGE = 1_000_000
+"""Bytes of a modification."""
+NOTHING = "type a sentence, or draw the change"
+PARTS = ("agents", "lanes", "connectors", "areas")
+
+
+class ScenarioForm(forms.Form):
+    """A sentence and a drawing for a scene, and their circumstances."""
+
+    slug = forms.CharField(required=False, max_length=scenes.SLUG_LENGTH)
+    type = forms.ChoiceField(required=False)
+    own_type = forms.CharField(required=False, max_length=scenes.LONGEST_TYPE)
+    instruction = forms.CharField(required=False, max_length=scenes.INSTRUCTION_LENGTH, strip=True)
+    modification = forms.CharField(required=False, max_length=LONGEST_CHANGE)
+    derives = forms.BooleanField(required=False)
+    keep_traffic = forms.BooleanField(required=False)
+    density = forms.ChoiceField(
+        required=False, choices=[(one.value, one.value) for one in DENSITIES]
+    )
+    goal = forms.ChoiceField(
+        required=False,
+        choices=[("", "as recorded, or straightest"), *((one.value, one.value) for one in GOALS)],
+    )
+
+    def __init__(self, *args: Any, **kwargs: Any) -> None:
+        super().__init__(*args, **kwargs)
+        offer(self, "type", [("", "As the drawing looks"), *scenes.type_choices()])
+
+    def wanted(self) -> dict[str, Any]:
+        """Return what the valid form says of a scenario.
+
+        Raises:
+            Conflict: Nothing is said, or the drawing is no JSON.
+        """
+        given = self.cleaned_data
+        names = ("instruction", "derives", "keep_traffic", "density", "goal")
+        document = _document(given["modification"]) if given["modification"] else None
+        if document is None and not given["instruction"]:
+            raise InvalidDocument("scenario", [("instruction", NOTHING)])
+        return {name: given[name] for name in names} | {
+            "type": given["type"] or given["own_type"],
+            "reference": document,
+        }
+
+
+def _stored(scenario: Scenario) -> dict[str, Any]:
+    """Return a scenario as the form has it."""
+    names = ("type", "instruction", "keep_traffic", "goal")
+    return {name: getattr(scenario, name) for name in names} | {
+        "density": scenario.traffic_density,
+        "modification": _text(scenario.reference),
+        "derives": scenario.intent is None or scenario.intent_origin == "derived",
+    }
+
+
+@form_for(*STAFF)
+def scene_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
+    """Show a scene with what is drawn on it, and add that as a scenario; or copy another."""
+    scene = get_object_or_404(BaseScene, code=code)
+    original = _copied(request, scene)
+    usual = {"keep_traffic": True, "derives": True} if original is None else _stored(original)
+    form = ScenarioForm(request.POST or usual)
+    if request.method == "POST" and form.is_valid():
+        with refusals_in(form):
+            wanted = form.wanted()
+            if original is not None and not wanted["derives"]:
+                wanted |= {"intent": original.intent, "intent_origin": original.intent_origin}
+            reference = editing.reference_document(
+                editing.draft_of(scene, None, keep_traffic=wanted["keep_traffic"]),
+                wanted["reference"],
+            )
+            made = scenes.add_scenario(
+                scene=scene.slug,
+                **wanted | {"reference": reference},
+                slug=form.cleaned_data["slug"] or None,
+                actor=user_of(request),
+            )
+            send_later(request, enqueue_scenario, made.pk)
+            messages.success(request, f"“{made.slug}” is added.")
+            return redirect("scenario", code=made.code)
+    context = {
+        "form": form,
+        "scenarios": scene.scenarios.only("base_scene", "code", "slug", "instruction"),
+        "notes": notes_of(scene.notes),
+        "found": {name: len(scene.document.get(name, ())) for name in PARTS}
+        | {
+            "provenance": scene.provenance,
+            "recorded_s": scene.recording["times_s"][-1] if scene.recording else 0.0,
+        },
+    }
+    draft = editing.draft_of(scene, None, keep_traffic=True)
+    return _editor(request, draft, form["modification"].value(), context)
+
+
+def _copied(request: HttpRequest, scene: BaseScene) -> Scenario | None:
+    return scene.scenarios.filter(code=read_code(request.GET.get("copy", ""))).first()
+
+
+@form_for(*STAFF)
+def edit_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
+    """Change the drawing and the sentence of a scenario, as far as nothing needs them yet."""
+    scenario = _scenario(code)
+    form = ScenarioForm(request.POST or _stored(scenario))
+    if request.method == "POST" and form.is_valid():
+        with refusals_in(form):
+            services.change_scenario(scenario, **form.wanted(), actor=user_of(request))
+            send_later(request, enqueue_scenario, scenario.pk)
+            messages.success(request, f"“{scenario.slug}” is changed.")
+            return redirect("scenario", code=code)
+    context = {"form": form, "refusal": services.why_not_editable(scenario)}
+    return _editor(request, scenario, form["modification"].value(), context)
+
+
+@form_for(*STAFF)
+def correct_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
+    """Correct an augmentation; the result is an augmentation of its own."""
+    rows = Augmentation.objects.select_related("contestant", "job", "scenario__base_scene")
+    original = get_object_or_404(rows.defer("scenario__base_scene__recording"), code=code)
+    slug = request.POST.get("contestant", "").strip() or by_hand.BY_HAND
+    notes = request.POST.get("notes", "")
+    text = request.POST.get("modification", _text(by_hand.starting_document(original)))
+    if request.method == "POST":
+        with refusals_told(request):
+            made = by_hand.keep_correction(
+                original, _document(text), slug=slug, notes=notes, actor=user_of(request)
+            )
+            send_later(request, enqueue_job, made.job_id)
+            messages.success(request, "The correction is kept; a worker draws it.")
+            return redirect("augmentation", code=made.code)
+    people = Contestant.objects.filter(kind=Contestant.Kind.HUMAN, retired_at=None)
+    correction = {"original": original, "people": people, "slug": slug, "notes": notes}
+    return _editor(request, original.scenario, text, correction)
+
+
+@act_for(*STAFF, back="scene")
+def check_change(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
+    """Answer with what the checks find in a drawing, and what it asks for; nothing is kept."""
+    scene = get_object_or_404(BaseScene.objects.defer("recording"), code=code)
+    try:
+        sent = _document(request.body)
+        if not isinstance(sent, dict):
+            raise Conflict("A JSON object is needed.")
+    except Conflict as error:
+        return JsonResponse({"problem": str(error)}, status=422)
+    scenario = scene.scenarios.filter(code=read_code(str(sent.get("scenario") or ""))).first()
+    draft = editing.draft_of(scene, scenario, keep_traffic=sent.get("keep_traffic") is True)
+    if sent.get("derives") is True:
+        draft.intent = None
+    checked = check_edit(draft, sent.get("modification"), snapped=str(sent.get("snap") or ""))
+    lines = [
+        {
+            "severity": line.severity,
+            "label": "measured" if line.severity == "fact" else line.severity,
+            "sentence": line.sentence(),
+        }
+        for line in checked.findings
+    ]
+    draft.reference, sentence = checked.modification, ""
+    if sent.get("derives") is True:
+        _, sentence = scenes.derive_intent(draft, str(sent.get("type") or ""), "")
+    told = {"sentence": sentence, "statements": editing.statements_of(draft.intent)}
+    parts = ("modification", "problem", "is_against_intent")
+    return JsonResponse({"lines": lines} | told | {name: getattr(checked, name) for name in parts})
+
+
+def _scenario(code: uuid.UUID) -> Scenario:
+    rows = Scenario.objects.select_related("base_scene").defer("base_scene__recording")
+    return get_object_or_404(rows, code=code)
+
+
+def _editor(
+    request: HttpRequest, draft: Scenario, text: str | None, more: dict[str, Any]
+) -> HttpResponse:
+    drawn = is_drawn(scene_picture(draft.base_scene, SceneView.BACKDROP))
+    look = looks_again(request, waits=not drawn and request.method != "POST")
+    if look == 1:
+        send_later(request, enqueue_scene, draft.base_scene.pk)
+    context = {
+        "scenario": draft,
+        "scene": draft.base_scene,
+        "editor": editing.editor_document(draft),
+        "text": text or "",
+        "types": [(one.value, one.value.replace("_", " ").lower()) for one in editing.PLACED],
+        "is_drawn": drawn,
+        "look": look,
+        **more,
+    }
+    # What was sent has been refused.
+    status = 422 if request.method == "POST" else 200
+    return render(request, "scenarios/edit.html", context, status=status)
+
+
+def _text(document: object) -> str:
+    return "" if document is None else json.dumps(document, indent=2)
+
+
+def _document(text: str | bytes) -> object:
+    """Return what was sent; Conflict where it is too long, or no JSON."""
+    if len(text) > LONGEST_CHANGE:
+        raise Conflict("The change is too long.")
+    return read_json(text, otherwise="The change is no JSON.")
