@@ -50,9 +50,9 @@ def send(client: Client, scene: BaseScene, **fields: str) -> tuple[str, Scenario
 
 
 def test_a_drawing_alone_becomes_a_scenario_with_sentence_and_intent(
-    researcher: Client, scene: BaseScene
+    reader: Client, scene: BaseScene
 ) -> None:
-    shown = researcher.get(reverse("scene", args=[scene.code])).content.decode()
+    shown = reader.get(reverse("scene", args=[scene.code])).content.decode()
     assert 'name="keep_traffic" checked' in re.sub(r"\s+", " ", shown)
     shown, made = send(
         reader,
@@ -72,7 +72,7 @@ def test_a_drawing_alone_becomes_a_scenario_with_sentence_and_intent(
     assert made.intent is not None
     [request] = made.intent["requests"]
     assert (request["kind"], request["spot"]["distance"]) == ("cones", {"low_m": 9.0})
-    copied = researcher.get(reverse("scene", args=[scene.code]) + f"?copy={made.code}")
+    copied = reader.get(reverse("scene", args=[scene.code]) + f"?copy={made.code}")
     assert html.escape(made.instruction) in copied.content.decode()
     assert "my-bus" in shown
     assert reverse("picture", args=["original", made.code]) in shown
