@@ -27,7 +27,6 @@ urlpatterns: list[URLPattern] = [
     _at("uploads/<uuid:code>", scenarios.UploadView, "api-upload"),
     _at("uploads/<uuid:code>/moments", scenarios.MomentsView, "api-moments"),
     _at("moments/<uuid:code>", scenarios.MomentView, "api-moment"),
-    _at("moments/<uuid:code>/keep", scenarios.KeepMomentView, "api-moment-keep"),
     _at("scenarios", scenarios.ScenariosView, "api-scenarios"),
     _at("endpoints", contestants.EndpointsView, "api-endpoints"),
     _at("endpoints/<uuid:code>/models", contestants.ModelsView, "api-endpoint-models"),

@@ -149,12 +149,9 @@ class MomentBody(StrictSerializer):
 
     item = TextField(max_length=200, required=False, default="", allow_blank=True)
     frame = WholeNumberField(min_value=0, max_value=HIGHEST_FRAME)
-
-
-class KeepBody(StrictSerializer):
-    """What the scene is to be called."""
-
-    slug = TextField(max_length=80)
+    slug = TextField(
+        max_length=80, required=False, default="", help_text="Keep it as a scene of this name."
+    )
 
 
 class UploadDocument(RowDocument[SceneUpload], WarnedDocument):
@@ -239,9 +236,9 @@ class MomentsView(ApiView):
 
     @operation(MomentDocument, takes=MomentBody, status=202, name="showMoment")
     def post(self, code: uuid.UUID, given: Given) -> tuple[UploadMoment, list[str]]:
-        """Have a moment of a recording drawn.
+        """Have a moment of a recording drawn, or kept as a scene.
 
-        The same one twice is one; poll it until it is drawn.
+        The same one twice is one; poll it until it is drawn or kept.
         """
         upload = get_object_or_404(SceneUpload, code=code)
         ask = partial(uploads.ask_for_moment, upload, **given, actor=self.user)
@@ -259,28 +256,5 @@ class MomentView(ApiView):
 
         With a report of what is in it.
         """
-        return _find_moment(code)
-
-
-class KeepMomentView(ApiView):
-    """A moment that becomes a scene."""
-
-    writers = STAFF
-
-    @operation(MomentDocument, takes=KeepBody, status=202, name="keepMoment")
-    def post(self, code: uuid.UUID, given: Given) -> tuple[UploadMoment, list[str]]:
-        """Have a drawn moment kept as a scene.
-
-        Poll it until its state is kept; `scene` then names the scene.
-        """
-
-        def ask() -> UploadMoment:
-            uploads.ask_to_keep(_find_moment(code), slug=given["slug"], actor=self.user)
-            return _find_moment(code)
-
-        return keep_and_send(ask, enqueue_moment)
-
-
-def _find_moment(code: uuid.UUID) -> UploadMoment:
-    rows = UploadMoment.objects.select_related("upload", "scene").defer("upload__tracks")
-    return get_object_or_404(rows, code=code)
+        rows = UploadMoment.objects.select_related("upload", "scene").defer("upload__tracks")
+        return get_object_or_404(rows, code=code)

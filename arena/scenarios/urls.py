@@ -12,7 +12,6 @@ urlpatterns: list[URLPattern] = [
     path("uploads/<uuid:code>/", uploads.upload_page, name="upload"),
     path("uploads/<uuid:code>/show/", uploads.show_moment, name="upload-show"),
     path("uploads/<uuid:code>/remove/", uploads.remove, name="upload-remove"),
-    path("moments/<uuid:code>/keep/", uploads.keep_moment, name="moment-keep"),
     path("scenarios/", scenarios.scenarios_page, name="scenarios"),
     path("scenarios/load/", scenarios.load_scenarios, name="catalogue-load"),
     path("scenarios/bulk/", scenarios.bulk_page, name="scenarios-bulk"),

@@ -83,12 +83,12 @@ def test_a_recording_becomes_a_scene(reader: Client, sent: list[tuple[str, int]]
     asked = {name: stop[name] for name in ("item", "frame")}
     moment = send(reader, path + "/moments", **asked).json()
     assert send(reader, path + "/moments", **asked).json()["code"] == moment["code"]
-    upload_moments.MOMENTS.perform(sent.pop()[1])
     here = f"moments/{moment['code']}"
     drawn = reader.get(API + here).json()
     assert (drawn["state"], drawn["report"]["agents"], drawn["scene"]) == ("drawn", 1, None)
-    error_of(send(reader, here + "/keep", slug="No Slug"), 400, "refused")
-    assert send(reader, here + "/keep", slug="main-street").status_code == 202
+    error_of(send(reader, path + "/moments", **asked, slug="No Slug"), 400, "refused")
+    kept = send(reader, path + "/moments", **asked, slug="main-street")
+    assert (kept.status_code, kept.json()["code"]) == (202, moment["code"])
     upload_moments.MOMENTS.perform(sent.pop()[1])
     assert reader.get(API + here).json()["scene"] == "main-street"
     assert BaseScene.objects.get().slug == "main-street"

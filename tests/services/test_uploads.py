@@ -59,7 +59,7 @@ def test_a_zip_of_a_log_becomes_a_scene_at_the_moment_that_was_chosen(log: bytes
     assert moment.report is not None
     assert (moment.report["lanes"], moment.report["recorded_s"]) == (5, 0.2)
     assert any("limit" in note for note in notes_of(moment.report["notes"]))
-    upload_moments.ask_to_keep(moment, slug="by-the-page", actor=ada)
+    upload_moments.ask_for_moment(row, item="", frame=2, slug="by-the-page", actor=ada)
     upload_moments.MOMENTS.perform(moment.pk)
     moment.refresh_from_db()
     kept = BaseScene.objects.get(slug="by-the-page")
@@ -102,17 +102,17 @@ def test_the_same_scene_is_kept_once_and_a_taken_name_says_so(log: bytes) -> Non
     BaseScene.objects.create(slug="taken", document={}, source="json", provenance="here")
     row = read(sent(log))
     moment = looked_at(row, 0)
-    upload_moments.ask_to_keep(moment, slug="taken")
+    upload_moments.ask_for_moment(row, item="", frame=0, slug="taken")
     upload_moments.MOMENTS.perform(moment.pk)
     moment.refresh_from_db()
     assert moment.state == "drawn"
     assert "called 'taken' already" in moment.reason
     with pytest.raises(InvalidDocument, match="slug"):
-        upload_moments.ask_to_keep(moment, slug="Not A Slug")
+        upload_moments.ask_for_moment(row, item="", frame=0, slug="Not A Slug")
     for slug in ("first", "second"):
         moment.state = "drawn"
         moment.save()
-        upload_moments.ask_to_keep(moment, slug=slug)
+        upload_moments.ask_for_moment(row, item="", frame=0, slug=slug)
         upload_moments.MOMENTS.perform(moment.pk)
         moment.refresh_from_db()
         assert moment.scene is not None

@@ -58,8 +58,7 @@ ACTIONS = _table(
             "study-draft-discard study-hand-over first-step"
         ),
         (302, 302, 403): (
-            "scene-send upload-show moment-keep scenarios-write study-write set-intent "
-            "results-open"
+            "scene-send upload-show scenarios-write study-write set-intent results-open"
         ),
         ADMIN: (
             "invite person-link scenario-delete scene-delete job-cancel study-close study-cancel"

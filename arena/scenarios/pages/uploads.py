@@ -1,6 +1,7 @@
 """Scenes, and how they come from recordings: a worker reads a file, a person chooses a moment."""
 
 import uuid
+from typing import Any
 
 from django.contrib import messages
 from django.db.models import Count
@@ -79,10 +80,9 @@ def upload_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     if moment is not None and moment.scene is not None and "keep" in request.GET:
         return redirect("scene", code=moment.scene.code)
     waits = row.state in row.UNDER_WAY or (moment is not None and moment.state in moment.UNDER_WAY)
-    stops = [stop for track in row.tracks for stop in track["stops"]]
     context = {
         "upload": row,
-        "stops": list(enumerate(stops)),
+        "stops": list(enumerate(_stops(row))),
         "moment": moment,
         "notes": notes_of(((moment and moment.report) or {}).get("notes", ())),
         "slug": free_slug(row.name.partition(".")[0]),
@@ -94,30 +94,23 @@ def upload_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
 
 @act_for(*STAFF, back="upload")
 def show_moment(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
-    """Have one moment drawn by a worker."""
+    """Have one moment drawn by a worker, or kept as a scene, which its page goes on to."""
     row = get_object_or_404(SceneUpload, code=code)
-    stops = [stop for track in row.tracks for stop in track["stops"]]
+    slug = request.POST.get("slug", "").strip()
     try:
-        chosen = stops[int(request.POST.get("stop", ""))]
+        chosen = _stops(row)[int(request.POST.get("stop", ""))]
     except (ValueError, IndexError):
         raise Conflict("This recording has no such moment.") from None
     moment = uploads.ask_for_moment(
-        row, item=chosen["item"], frame=chosen["frame"], actor=user_of(request)
+        row, item=chosen["item"], frame=chosen["frame"], slug=slug, actor=user_of(request)
     )
     send_later(request, enqueue_moment, moment.pk)
-    return redirect(f"{reverse('upload', args=[code])}?moment={moment.code}")
+    goes_on = "&keep=1" if slug else ""
+    return redirect(f"{reverse('upload', args=[code])}?moment={moment.code}{goes_on}")
 
 
-@act_for(*STAFF, back="scenes")
-def keep_moment(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
-    """Have a moment kept as a scene, which its page goes on to."""
-    moment = get_object_or_404(UploadMoment.objects.select_related("upload"), code=code)
-    with refusals_told(request):
-        slug = request.POST.get("slug", "").strip()
-        uploads.ask_to_keep(moment, slug=slug, actor=user_of(request))
-        send_later(request, enqueue_moment, moment.pk)
-    page = reverse("upload", args=[moment.upload.code])
-    return redirect(f"{page}?moment={moment.code}&keep=1")
+def _stops(row: SceneUpload) -> list[dict[str, Any]]:
+    return [stop for track in row.tracks for stop in track["stops"]]
 
 
 @act_for(*STAFF, back="scenes")

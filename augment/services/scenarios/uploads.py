@@ -170,36 +170,39 @@ def _parts(moments: Sequence[Moment]) -> list[dict[str, Any]]:
 
 
 def ask_for_moment(
-    upload: SceneUpload, *, item: str, frame: int, actor: User | None = None
+    upload: SceneUpload, *, item: str, frame: int, slug: str = "", actor: User | None = None
 ) -> UploadMoment:
-    """Return the row of a moment that the upload offers; one that failed waits again.
+    """Have a moment that the upload offers drawn, or kept as a scene.
+
+    Args:
+        upload: Of which.
+        item: Which part of it.
+        frame: Which moment of that; one that failed is drawn again.
+        slug: The name of the scene, with what was recorded from there on; empty to draw alone.
+        actor: Who asks.
 
     Raises:
-        Conflict: The upload offers no such moment.
+        InvalidDocument: The slug can't be.
+        Conflict: The upload offers no such moment, or it is kept already or being worked on.
     """
     offered = {(stop["item"], stop["frame"]) for track in upload.tracks for stop in track["stops"]}
     if (item, frame) not in offered:
         raise Conflict(f"“{upload.name}” offers no such moment.")
+    if slug:
+        check_slug(slug, what="scene")
     row, _ = UploadMoment.objects.get_or_create(
         upload=upload, item=item, frame=frame, defaults={"asked_by": actor}
     )
-    row.wait_again(state=MomentState.QUEUED)
-    return row
-
-
-@transaction.atomic
-def ask_to_keep(row: UploadMoment, *, slug: str, actor: User | None = None) -> None:
-    """Have a drawn moment kept as a scene, with what was recorded from there on.
-
-    Raises:
-        InvalidDocument: The slug can't be.
-        Conflict: The moment is not drawn, or kept already.
-    """
-    check_slug(slug, what="scene")
-    drawn = UploadMoment.objects.filter(pk=row.pk, state=MomentState.DRAWN)
+    if not slug:
+        row.wait_again(state=MomentState.QUEUED)
+        return row
+    free = UploadMoment.objects.filter(pk=row.pk, claim=None)
+    free = free.exclude(state__in=(MomentState.KEEPING, MomentState.KEPT))
     asked = {"state": MomentState.KEEPING, "slug": slug, "reason": "", "sent_at": None}
-    if not drawn.update(**asked, asked_by=actor):
+    if not free.update(**asked, asked_by=actor):
         raise Conflict("This moment can't be kept now: look at its state.")
+    row.refresh_from_db()
+    return row
 
 
 class Moments(WorkKind[UploadMoment]):
