@@ -72,6 +72,16 @@ def test_a_zip_of_a_log_becomes_a_scene_at_the_moment_that_was_chosen(log: bytes
     assert (event.actor, event.after["frame"]) == (ada, 2)
 
 
+def test_of_a_long_recording_the_first_moments_are_offered(
+    log: bytes, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(uploads, "EVERY_S", 0.1)
+    monkeypatch.setattr(uploads, "MOST_STOPS", 3)
+    row = read(sent(log))
+    assert [stop["frame"] for stop in row.tracks[0]["stops"]] == [0, 1, 2]
+    assert (row.is_cut, row.moments.get().state) == (True, "drawn")
+
+
 def test_a_second_message_finds_nothing_to_do(log: bytes) -> None:
     row = read(sent(log))
     moment = looked_at(row, 0)

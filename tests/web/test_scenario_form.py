@@ -100,7 +100,7 @@ def test_what_can_not_be_is_told_and_nothing_is_lost(
 
 def upload(client: Client, text: str) -> str:
     given = {"file": SimpleUploadedFile("many.csv", text.encode())}
-    return client.post(reverse("scenarios-bulk"), given).content.decode()
+    return client.post(reverse("scenarios-bulk"), given, follow=True).content.decode()
 
 
 @pytest.mark.usefixtures("scene")

@@ -13,7 +13,7 @@ from arena.site.access import ADMIN, STAFF, act_for, form_for, page_for, user_of
 from arena.site.acts import Confirmation, ask, is_sure, looks_again, refusals_told, send_later
 from arena.site.forms import read_code, read_json
 from arena.site.listing import read_listing, read_page
-from augment.errors import Conflict
+from augment.errors import Conflict, InvalidDocument
 from augment.models import BaseScene, EndpointModel, Scenario
 from augment.services.endpoints.contestants import ensure_builtin
 from augment.services.events import retire, take_back
@@ -107,16 +107,20 @@ def scenario_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
 @form_for(*STAFF)
 def bulk_page(request: HttpRequest) -> HttpResponse:
     """Add many scenarios from a CSV or YAML file, all or none."""
-    report, most = None, bulk.MOST_ROWS_AT_ONCE
+    problems, most = list[tuple[str, str]](), bulk.MOST_ROWS_AT_ONCE
     if request.method == "POST":
         table = request.FILES.get("file")
-        with refusals_told(request):
+        try:
             if table is None or services.was_too_large(request.META):
-                raise Conflict("Choose a CSV or YAML file; it may be too large.")
-            name, actor = table.name or "", user_of(request)
-            report = bulk.add_rows(name, table.read(), most=most, actor=actor)
-    context = {"report": report, "most": most}
-    return render(request, "scenarios/bulk.html", context)
+                raise InvalidDocument("file", [("", "choose CSV or YAML; it may be too large")])
+            slugs = bulk.add_rows(
+                table.name or "", table.read(), most=most, actor=user_of(request)
+            )
+            messages.success(request, f"{len(slugs)} scenarios are added.")
+            return redirect("scenarios")
+        except InvalidDocument as error:
+            problems = [(path, str(text)) for path, text in error.problems]
+    return render(request, "scenarios/bulk.html", {"problems": problems, "most": most})
 
 
 # --- Intents -----------------------------------------------------------------------------------

@@ -9,7 +9,7 @@ from augment.errors import InvalidDocument
 from augment.formats.documents import read_json
 from augment.models.scenes import GOALS
 from augment.scene.entities import ScenarioType, TrafficDensity
-from augment.services.scenarios.bulk import DOCUMENTS, NEEDED, OPTIONAL, WHAT, add_rows
+from augment.services.scenarios.bulk import DOCUMENTS, NEEDED, OPTIONAL, add_rows
 from augment.services.scenarios.scenes import add_scenario
 from augment.services.terminal import TerminalCommand
 
@@ -79,14 +79,7 @@ class Command(TerminalCommand):
             content = file.read_bytes()
         except OSError as fault:
             raise CommandError(f"{file} can't be read: {fault.strerror}.") from None
-        report = add_rows(file.name, content)
-        problems = [
-            (f"row {row.number}.{path}" if path else f"row {row.number}", text)
-            for row in report.rows
-            for path, text in row.problems
-        ]
-        if problems:
-            raise InvalidDocument(WHAT, problems)
-        for row in report.rows:
-            self.stdout.write(f"Added scenario {row.slug}.")
-        self.stdout.write(f"{len(report.rows)} scenarios.")
+        slugs = add_rows(file.name, content)
+        for slug in slugs:
+            self.stdout.write(f"Added scenario {slug}.")
+        self.stdout.write(f"{len(slugs)} scenarios.")

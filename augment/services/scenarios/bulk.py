@@ -1,12 +1,11 @@
 """Many scenarios from one file, all of them or none.
 
-In: a CSV or YAML file. Out: stored scenarios; or every error with the row it is in.
+In: a CSV or YAML file. Out: stored scenarios; or every fault with the row it is in.
 """
 
 import csv
 import io
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any
 
 from django.contrib.auth.models import User
@@ -27,37 +26,10 @@ MOST_ROWS_AT_ONCE = 300
 _NO, _YES = ("", "no", "false", "0"), ("yes", "true", "1")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class RowReport:
-    """What became of one row.
-
-    Attributes:
-        number: From 1.
-        slug: Of its scenario, empty where there is none.
-        problems: The columns that are wrong, and why; an empty name is the whole row.
-    """
-
-    number: int
-    slug: str = ""
-    problems: tuple[tuple[str, str], ...] = ()
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class BulkReport:
-    """What became of a file: all of its rows were added, or none."""
-
-    rows: tuple[RowReport, ...]
-
-    @property
-    def is_kept(self) -> bool:
-        """Whether they were added."""
-        return not any(row.problems for row in self.rows)
-
-
 def add_rows(
     name: str, content: bytes, *, most: int = MOST_ROWS, actor: User | None = None
-) -> BulkReport:
-    """Add the scenarios of a file, all or none, and say of each what became of it.
+) -> list[str]:
+    """Add the scenarios of a file, all or none, and return their slugs.
 
     Args:
         name: Of the file; its ending is .csv, .yaml or .yml.
@@ -66,14 +38,22 @@ def add_rows(
         actor: Who adds them.
 
     Raises:
-        InvalidDocument: It can't be read.
+        InvalidDocument: It can't be read, or rows can't be added; every fault names its row.
     """
-    rows = _read_rows(name, content, most)
+    slugs, problems = list[str](), list[tuple[str, str]]()
     with transaction.atomic():
-        reports = [_add(number, row, actor) for number, row in enumerate(rows, start=1)]
-        report = BulkReport(rows=tuple(reports))
-        transaction.set_rollback(not report.is_kept)
-    return report
+        for number, row in enumerate(_read_rows(name, content, most), start=1):
+            place = f"row {number}"
+            try:
+                with transaction.atomic():
+                    slugs.append(add_scenario(**_request_of(row), actor=actor).slug)
+            except InvalidDocument as error:
+                problems += [(f"{place}.{path}", str(text)) for path, text in error.problems]
+            except AugmentError as error:
+                problems.append((place, str(error)))
+        if problems:
+            raise InvalidDocument(WHAT, problems)
+    return slugs
 
 
 def _read_rows(name: str, content: bytes, most: int) -> list[dict[str, Any]]:
@@ -93,19 +73,6 @@ def _read_rows(name: str, content: bytes, most: int) -> list[dict[str, Any]]:
     if not 1 <= len(rows) <= most:
         raise InvalidDocument(WHAT, [("", f"{len(rows)} rows; 1 to {most} are read")])
     return rows
-
-
-def _add(number: int, row: Mapping[str, Any], actor: User | None) -> RowReport:
-    """Add one row in a transaction of its own within that of the file."""
-    try:
-        with transaction.atomic():
-            made = add_scenario(**_request_of(row), actor=actor)
-    except InvalidDocument as error:
-        problems = tuple((path, str(text)) for path, text in error.problems)
-        return RowReport(number=number, problems=problems)
-    except AugmentError as error:
-        return RowReport(number=number, problems=(("", str(error)),))
-    return RowReport(number=number, slug=made.slug)
 
 
 def _request_of(row: Mapping[str, Any]) -> dict[str, Any]:

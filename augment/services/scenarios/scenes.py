@@ -164,13 +164,18 @@ def add_scenario(
     set_wording(scenario, instruction, type)
     scenario.instruction_is_generated |= interplan is not None
     if intent is not None:
-        # The catalogue leaves some open on purpose: the rule placer refuses them, models do not.
-        is_entered = intent_origin is IntentOrigin.ENTERED
-        read = codec.intent_to_document(codec.intent_from_document(intent))
-        scenario.intent = placeable_intent(intent) if is_entered else read
-        scenario.intent_origin = intent_origin
+        _set_intent(scenario, intent, intent_origin)
     _insert(scenario, actor)
     return scenario
+
+
+def _set_intent(scenario: Scenario, intent: object, origin: IntentOrigin) -> None:
+    # The catalogue leaves some open on purpose: the rule placer refuses them, models do not.
+    if origin is IntentOrigin.ENTERED:
+        scenario.intent = placeable_intent(intent)
+    else:
+        scenario.intent = codec.intent_to_document(codec.intent_from_document(intent))
+    scenario.intent_origin = origin
 
 
 def _insert(scenario: Scenario, actor: User | None) -> None:
