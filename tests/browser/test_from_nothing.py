@@ -132,30 +132,20 @@ def _set_password(page: Page) -> None:
 def _send_scene(page: Page, files: Path) -> None:
     page.goto("/scenes/")
     page.set_input_files("[name=file]", files / "street.json")
-    page.click("form[action*=send] button.main")
-    page.get_by_role("button", name="Show").click()
-    page.fill("[name=slug]", "street")
-    page.get_by_role("button", name="Keep as a scene").click()
-    page.locator("#moment a", has_text="street").click()
+    page.get_by_role("button", name="Use this moment").click()
     expect(page.get_by_role("heading", name="street")).to_be_visible()
 
 
 def _write_scenarios(page: Page, files: Path) -> None:
-    """One by the form, its reference typed; the others by a list."""
-    page.get_by_role("link", name="New scenario").click()
+    """One drawn on its scene, as JSON; the others by a list."""
     page.fill("[name=instruction]", wish(15))
     page.select_option("[name=type]", TYPE)
+    page.get_by_text("Advanced", exact=True).click()
     page.fill("[name=slug]", "parked-15")
-    for name, value in {"kind": "vehicles", "lane": "own"}.items():
-        page.select_option(f"[name=i_{name}]", value)
-    for name, value in {"distance_m": "15", "speed_mps": "0"}.items():
-        page.fill(f"[name=i_{name}]", value)
-    page.get_by_role("button", name="Add the scenario").click()
-    page.get_by_role("link", name="Draw one").click()
-    page.get_by_text("As JSON", exact=True).click()
+    page.get_by_text("The drawing as JSON", exact=True).click()
     page.fill("[name=modification]", json.dumps(reference(15)))
-    page.get_by_role("button", name="Keep the reference").click()
-    expect(page.get_by_text("The reference is kept")).to_be_visible()
+    page.get_by_role("button", name="Save the scenario").click()
+    expect(page.get_by_text("“parked-15” is added")).to_be_visible()
     page.goto("/scenarios/bulk/")
     page.set_input_files("[name=file]", files / "many.csv")
     page.get_by_role("button", name="Add them").click()

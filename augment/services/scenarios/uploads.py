@@ -27,7 +27,7 @@ from augment.render.bev import draw
 from augment.render.camera import camera_for
 from augment.scene.entities import Modification
 from augment.services.events import log_change
-from augment.services.scenarios.pictures import store_as
+from augment.services.scenarios.pictures import draw_scene, store_as
 from augment.services.scenarios.scene_imports import keep_reading
 from augment.services.scenarios.scenes import check_slug
 from augment.services.work import Lease, Settlement, WorkKind
@@ -223,6 +223,7 @@ class Moments(WorkKind[UploadMoment]):
                 return Settlement(state=MomentState.DRAWN, columns=_preview(row, reading))
             path = Path(row.upload.name)
             kept, _ = keep_reading(reading, source=source, path=path, actor=row.asked_by)
+            draw_scene(kept.pk)  # whoever keeps it looks at it next
         except AugmentError as error:
             if is_new:
                 raise
