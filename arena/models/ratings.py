@@ -14,7 +14,7 @@ from arena.models.people import fresh_token
 from arena.models.studies import Study
 from arena.rating.lines import Line
 from arena.rating.snapshot_document import Results, read_results, results_document
-from augment.models import AppendOnly, Contestant, Work
+from augment.models import AppendOnly, Contestant, Work, account_column
 
 if TYPE_CHECKING:
     _JSONField = models.JSONField[Results, Results]
@@ -87,13 +87,7 @@ class Snapshot(Work):
     )
     includes_simulated = models.BooleanField(default=False)
     is_early = models.BooleanField(default=False, help_text="the study was still open")
-    made_by = models.ForeignKey(
-        settings.AUTH_USER_MODEL,
-        null=True,
-        blank=True,
-        on_delete=models.PROTECT,
-        related_name="snapshots",
-    )
+    made_by = account_column(related_name="snapshots")
     made_at = models.DateTimeField(auto_now_add=True)
 
     class Meta:

@@ -11,7 +11,7 @@ from django.db.models import F, Q
 
 from arena.models.people import Coded, fresh_token
 from arena.models.studies import Study
-from augment.models import Augmentation, Contestant, Scenario
+from augment.models import Augmentation, Contestant, Scenario, account_column
 
 
 class Invitation(Coded):
@@ -34,13 +34,8 @@ class Invitation(Coded):
         settings.AUTH_USER_MODEL, on_delete=models.CASCADE, related_name="invitations"
     )
     token_sha256 = models.CharField(max_length=64, unique=True, editable=False)
-    invited_by = models.ForeignKey(
-        settings.AUTH_USER_MODEL,
-        null=True,
-        blank=True,
-        on_delete=models.SET_NULL,
-        related_name="+",
-        help_text="none for a link that was made by the command",
+    invited_by = account_column(
+        on_delete=models.SET_NULL, help_text="none for a link that was made by the command"
     )
     made_at = models.DateTimeField(auto_now_add=True)
     expires_at = models.DateTimeField()
@@ -158,14 +153,7 @@ class Authorship(Coded):
     contestant = models.ForeignKey(
         Contestant, on_delete=models.CASCADE, related_name="authorships"
     )
-    marked_by = models.ForeignKey(
-        settings.AUTH_USER_MODEL,
-        null=True,
-        blank=True,
-        on_delete=models.SET_NULL,
-        related_name="+",
-        help_text="none where the command did",
-    )
+    marked_by = account_column(on_delete=models.SET_NULL, help_text="none where the command did")
     marked_at = models.DateTimeField(auto_now_add=True)
 
     class Meta:
@@ -247,13 +235,7 @@ class StudyDraft(Coded):
     revision = models.PositiveIntegerField(
         default=1, help_text="counts what was saved, so that nobody overwrites what they never saw"
     )
-    changed_by = models.ForeignKey(
-        settings.AUTH_USER_MODEL,
-        null=True,
-        blank=True,
-        on_delete=models.SET_NULL,
-        related_name="study_drafts",
-    )
+    changed_by = account_column(related_name="study_drafts", on_delete=models.SET_NULL)
     made_at = models.DateTimeField(auto_now_add=True)
     changed_at = models.DateTimeField(auto_now=True)
 

@@ -21,6 +21,7 @@ from augment.models.work import (
     Event,
     Work,
     Worker,
+    account_column,
     after_migrations,
     before_migrations,
 )
@@ -48,6 +49,7 @@ __all__ = [
     "UploadMoment",
     "Work",
     "Worker",
+    "account_column",
     "after_migrations",
     "before_migrations",
 ]
