@@ -6,7 +6,6 @@ from uuid import UUID
 
 from django.contrib.auth.models import User
 from django.db import transaction
-from django.db.models import Q
 from django.utils import timezone
 
 from arena.errors import AlreadyLabelled, LabellingClosed, NothingToPlan, NotYours
@@ -14,12 +13,10 @@ from arena.models import FaultLabel, LabellingRound, LabelTask, ScenarioFile
 from arena.people.queries import experts as expert_accounts
 from arena.results.services.written_files import ask_for
 from augment.errors import Conflict, UnknownName
-from augment.models import Augmentation, GenerationJob, Scenario
+from augment.models import Augmentation, GenerationJob
 from augment.services.events import log_event
 from augment.services.judging.findings import FaultClass, guess_faults
 from augment.services.judging.scenario_export import FORMATS
-from augment.services.running import jobs
-from augment.services.running.progress import rows_of_cause
 from augment.services.texts import make_storable, one_line
 
 NOTE_LENGTH = 2000
@@ -170,35 +167,3 @@ def ask_for_file(
         raise UnknownName("format", file_format, list(FORMATS))
     row = ScenarioFile(job=job, format=file_format, asked_by=actor)
     return ask_for(row, job, format=file_format)
-
-
-_BATCH = 500
-_SHOWN = Q(shown_left__isnull=False) | Q(shown_right__isnull=False) | Q(label_tasks__isnull=False)
-
-
-@transaction.atomic
-def retry_cause(job: GenerationJob, *, key: str, actor: User | None = None) -> GenerationJob:
-    """Let the rows that ended for one cause wait again.
-
-    What experts compare or label stays as it is: an unreadable answer is shown as the unchanged
-    scene, and a second one would put another picture in the place of the one that was judged.
-
-    Raises:
-        UnknownName: No row has that cause (any more).
-        Conflict: A study or a labelling shows some of them, the job was cancelled, or the
-            contestants have refused.
-    """
-    _, _, pks = rows_of_cause(job, key)
-    # Held, as an opening study does, so that none shows them between the look and the change.
-    places = Scenario.objects.filter(pk__in=job.scenarios.values("pk"))
-    list(places.select_for_update(no_key=True).order_by("pk").values_list("pk"))
-    shown = sum(
-        Augmentation.objects.filter(_SHOWN, pk__in=pks[start : start + _BATCH]).distinct().count()
-        for start in range(0, len(pks), _BATCH)
-    )
-    if shown:
-        raise Conflict(
-            f"Experts are shown {shown} of these {len(pks)} in a study or a labelling: what "
-            "is judged stays as it is. Launch a new job instead."
-        )
-    return jobs.retry_cause(job, key=key, actor=actor)

@@ -9,7 +9,6 @@ urlpatterns: list[URLPattern] = [
     path("jobs/new/", launching.new_job_page, name="job-new"),
     path("jobs/<uuid:code>/", jobs.job_page, name="job"),
     path("jobs/<uuid:code>/retry/", jobs.retry_job, name="job-retry"),
-    path("jobs/<uuid:code>/retry/<slug:key>/", jobs.retry_cause, name="job-retry-cause"),
     path("jobs/<uuid:code>/pause/", jobs.pause_job, name="job-pause"),
     path("jobs/<uuid:code>/cancel/", jobs.cancel_job, name="job-cancel"),
     path("jobs/<uuid:code>/resume/", jobs.resume_job, name="job-resume"),

@@ -142,9 +142,6 @@ class Augmentation(Work):
     earlier_images = models.JSONField(
         default=list, blank=True, help_text="names of its pictures in windows of before"
     )
-    asked_anew_at = models.DateTimeField(
-        null=True, blank=True, help_text="answers from before are not used again for it"
-    )
 
     class Meta:
         ordering = ("scenario__slug", "contestant__slug", "sample")

@@ -26,7 +26,7 @@ def run_round(page: Page, gate: threading.Event) -> None:
     _launch_all(page)
     _pause(page, gate)
     _resume(page)
-    _retry_the_cause(page)
+    _retry(page)
     _duplicate(page)
 
 
@@ -76,10 +76,11 @@ def _resume(page: Page) -> None:
     expect(page.get_by_text(f"{ROWS} of {ROWS} settled").first).to_be_visible()
 
 
-def _retry_the_cause(page: Page) -> None:
+def _retry(page: Page) -> None:
     page.get_by_role("link", name="Failures").click()
-    page.get_by_role("button", name=f"Retry these {SCENARIOS}").click()
-    expect(page.get_by_text("What ended for this cause is queued again.")).to_be_visible()
+    expect(page.locator("#causes summary b").first).to_have_text(str(SCENARIOS))
+    page.get_by_role("button", name=f"Retry {SCENARIOS} failed").click()
+    expect(page.get_by_text("What failed is queued again.")).to_be_visible()
     _ends_in_part(page)
     expect(page.locator("a.cell img").first).to_be_visible()
     page.locator("a.cell[title=Failed]").first.click()

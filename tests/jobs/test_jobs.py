@@ -2,19 +2,14 @@ from datetime import timedelta
 
 import pytest
 from django.contrib.auth.models import User
-from django.db import connection
-from django.test.utils import CaptureQueriesContext
 
-from arena.jobs.services import retry_cause as retry_unless_shown
 from augment.errors import Conflict
-from augment.models import Augmentation, Contestant, Event, GenerationJob, ModelCall
+from augment.models import Augmentation, Contestant, Event, GenerationJob
 from augment.services.running import jobs
 from augment.services.running.jobs import JobRequest
-from augment.services.running.progress import cause_of, count_rows, failure_groups
+from augment.services.running.progress import cause_of, count_rows
 from augment.services.running.runner import AUGMENTATIONS
-from tests.jobs.models import Model, llama_job, ran, reply
 from tests.jobs.rows import NOON, add_kind, add_scenario, done, failed, launch, leased
-from tests.variants.playing import GOOD
 
 pytestmark = pytest.mark.django_db
 State = Augmentation.State
@@ -149,38 +144,3 @@ def test_reasons_have_one_cause_where_only_numbers_and_ids_differ(
     reason: str, other: str, are_alike: bool
 ) -> None:
     assert (cause_of(reason) == cause_of(other)) is are_alike
-
-
-def broken(job: GenerationJob, *reasons: str) -> None:
-    for row, reason in zip(job.augmentations.order_by("pk"), reasons, strict=True):
-        leased(row).settle(failed(reason))
-    jobs.finish_if_over()
-
-
-def test_an_unreadable_answer_is_asked_for_anew_and_not_served_again() -> None:
-    said = ["Sorry?", "Sorry, what?", GOOD]
-    model = Model(lambda request: reply(said.pop(0)))
-    job = llama_job()
-    row = ran(job, model)
-    assert row.state == State.UNREADABLE
-    (group,) = failure_groups(job)
-    jobs.retry_cause(job, key=group.key)
-    row.refresh_from_db()
-    assert (row.image, row.state) == ("", State.QUEUED)
-    ran(row, model)
-    assert (row.state, len(model.requests)) == (State.DONE, 3)
-    assert not ModelCall.objects.exclude(served_from=None).exists()
-    assert list(row.attempts.values_list("outcome", flat=True)) == ["unreadable", "done"]
-
-
-def test_the_scenarios_are_held_before_somebody_looks_who_is_shown_a_row() -> None:
-    """Else a study could open with it between the look and the second try."""
-    job = launch(scenarios=2)
-    broken(job, "HTTP 429: slow down", "HTTP 429: slow down")
-    (group,) = failure_groups(job)
-    with CaptureQueriesContext(connection) as seen:
-        retry_unless_shown(job, key=group.key)
-    asked = [one["sql"] for one in seen]
-    look = next(n for n, sql in enumerate(asked) if "arena_matchup" in sql)
-    held = next(n for n, sql in enumerate(asked) if 'FROM "augment_scenario"' in sql)
-    assert held < look

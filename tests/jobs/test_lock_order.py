@@ -12,7 +12,7 @@ from augment.errors import Conflict
 from augment.models import GenerationJob
 from augment.services.running import jobs, runner
 from augment.services.running.budget import Caps
-from augment.services.running.progress import count_rows, failure_groups
+from augment.services.running.progress import count_rows
 from augment.services.running.runner import AUGMENTATIONS
 from augment.services.work import change_all
 from tests.jobs.models import Model, llama_job
@@ -55,9 +55,6 @@ def all_failed() -> GenerationJob:
 def test_who_retries_holds_the_rows_before_the_job() -> None:
     job = all_failed()
     assert held(lambda: jobs.retry_failed(job)) == [ROWS, JOB]
-    job.augmentations.update(state="failed", reason="the wire broke")
-    (cause,) = failure_groups(job)
-    assert held(lambda: jobs.retry_cause(job, key=cause.key)) == [ROWS, JOB]
 
 
 @pytest.mark.django_db(transaction=True)

@@ -52,7 +52,7 @@ ACTIONS = _table(
         # before anybody looks early
         (403, 403, 403): "study-rate rating-again results-share results-unshare",
         (302, 403, 403): (
-            "job-retry job-retry-cause job-pause contestant-retired endpoint-model-new "
+            "job-retry job-pause contestant-retired endpoint-model-new "
             "endpoint-probe catalogue-load job-simulate person-change revoke author "
             "scenario-retired intent-read job-resume checks-draw study-again "
             "study-draft-discard study-hand-over first-step"

@@ -7,10 +7,9 @@ from django.test import Client
 from django.urls import reverse
 
 from augment.models import Augmentation, GenerationJob, Worker
-from augment.services.running.progress import failure_groups
 from augment.services.running.workers import Presence
 from tests.jobs import rows
-from tests.web.cast import people, signed_in, world
+from tests.web.cast import people, signed_in
 
 pytestmark = pytest.mark.django_db
 
@@ -44,20 +43,6 @@ def test_the_page_groups_failures_by_their_reason_and_retries_them() -> None:
     assert "Retry 3 failed" in shown
     admin.post(reverse("job-retry", args=[job.code]))
     assert job.augmentations.filter(state=Augmentation.State.QUEUED).count() == 3
-
-
-def test_what_a_study_shows_is_not_asked_again() -> None:
-    here = world()
-    shown = here.study.matchups.order_by("pk")[0].left
-    job = shown.job
-    job.augmentations.filter(pk=shown.pk).update(state=State.UNREADABLE, reason="no block")
-    key = failure_groups(job)[0].key
-    answer = signed_in(people()["admin"]).post(
-        reverse("job-retry-cause", args=[job.code, key]), {"sure": "1"}, follow=True
-    )
-    assert "Experts are shown 1 of these 1" in answer.content.decode()
-    shown.refresh_from_db()
-    assert shown.state == State.UNREADABLE
 
 
 def test_a_job_is_paused_says_what_still_runs_and_is_resumed() -> None:

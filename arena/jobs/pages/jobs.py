@@ -11,7 +11,6 @@ from django.urls import reverse
 
 from arena.jobs.pages.measures import displacement_section, driving_section
 from arena.jobs.queries import PICTURES, VIEWS, Part, grid_part
-from arena.jobs.services import retry_cause as retry_one_cause
 from arena.models import ScenarioFile
 from arena.site.access import ADMIN, STAFF, act_for, form_for, page_for, user_of
 from arena.site.acts import Confirmation, ask, is_sure, refusals_told, send_later
@@ -145,16 +144,6 @@ def retry_job(request: HttpRequest, code: uuid.UUID) -> None:
         jobs.retry_failed(job=job, actor=user_of(request))
         send_later(request, enqueue_job, job.pk)
         messages.success(request, "What failed is queued again.")
-
-
-@act_for(ADMIN, back="job")
-def retry_cause(request: HttpRequest, code: uuid.UUID, key: str) -> None:
-    """Queue again what ended for one cause; of an unreadable answer the last attempt counts."""
-    job = get_object_or_404(GenerationJob, code=code)
-    with transaction.atomic():
-        retry_one_cause(job, key=key, actor=user_of(request))
-        send_later(request, enqueue_job, job.pk)
-        messages.success(request, "What ended for this cause is queued again.")
 
 
 @act_for(ADMIN, back="job")

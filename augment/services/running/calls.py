@@ -319,14 +319,9 @@ class RowTranscript(CallTranscript):
         insist_wanted(self._held, lock=True)
 
     def answers_to(self, request_hash: str) -> QuerySet[ModelCall]:
-        """Return them; of a fresh row its own attempts' alone, each once, to be replayed.
-
-        A row that is asked anew is fresh, and no answer from before counts.
-        """
-        calls, since = super().answers_to(request_hash), self._row.asked_anew_at
-        if since is not None:
-            calls = calls.filter(started_at__gte=since)
-        if self._row.job.is_fresh or since is not None:
+        """Return them; of a fresh job the row's own attempts' alone, each once, to be replayed."""
+        calls = super().answers_to(request_hash)
+        if self._row.job.is_fresh:
             own = calls.filter(attempt__augmentation=self._row)
             calls = own.exclude(attempt=self._attempt).exclude(copies__attempt=self._attempt)
         return calls

@@ -11,13 +11,13 @@ from django.utils import timezone
 
 from augment.errors import Conflict, UnknownName
 from augment.models import Augmentation, Contestant, GenerationJob, Scenario
-from augment.services.clock import DATABASE_TIME, Moment, database_now
+from augment.services.clock import DATABASE_TIME, Moment
 from augment.services.endpoints.treatments import loosen_unanswered
 from augment.services.events import log_change
 from augment.services.inputs import InputKind, check_bounds, input_field
 from augment.services.running.budget import NO_CAPS, Caps, check_caps, limit_of, raise_caps
 from augment.services.running.choosing import refuse_impossible
-from augment.services.running.progress import count_rows, rows_of_cause
+from augment.services.running.progress import count_rows
 from augment.services.texts import one_line
 from augment.services.work import change_all
 from augment.variants.options import MOST_SAMPLES
@@ -27,9 +27,6 @@ JobState = GenerationJob.State
 
 OPEN = (JobState.RUNNING, *GenerationJob.HELD)
 """States of jobs that are not over."""
-
-RETRIED = (State.FAILED, State.UNREADABLE)
-"""What may be tried again. A contestant that declined has answered and is not asked again."""
 
 _MAY_END = (JobState.RUNNING, JobState.PAUSED)
 """A paused job whose last row was in flight has nothing left to resume."""
@@ -167,35 +164,6 @@ def resume(
     _move(job, GenerationJob.HELD, JobState.RUNNING, "resumed")
     after = {"state": JobState.RUNNING.value, "cap": limit_of(job), "queued": queued}
     _log(job, "resume", actor, before=before, after=after)
-    return job
-
-
-@transaction.atomic
-def retry_cause(job: GenerationJob, *, key: str, actor: User | None = None) -> GenerationJob:
-    """Let the rows that ended for one cause wait again; the caller sends the messages.
-
-    What failed goes on from the answers that it had. What was unreadable is asked anew, because
-    the same answer would be read the same way; the attempt that counted so far stays on record.
-
-    Args:
-        job: Whose rows they are.
-        key: Of the cause, as `failure_groups` gives it.
-        actor: Who wants it.
-
-    Raises:
-        UnknownName: No row has that cause (any more).
-        Conflict: The job was cancelled, or the contestants have refused.
-    """
-    state, cause, pks = rows_of_cause(job, key)
-    if state not in RETRIED:
-        raise Conflict(
-            "Who refused has answered: it is not asked again. Launch a new job instead."
-        )
-    anew: dict[str, object] = {}
-    if state == State.UNREADABLE:
-        anew = {"image": "", "notes": "", "asked_anew_at": database_now()}
-    rows = Augmentation.objects.filter(pk__in=pks, state=state)
-    _let_wait(job, rows, actor, {"state": state.value, "cause": cause}, **anew)
     return job
 
 

@@ -4,7 +4,6 @@ Reasons of failure name what was at hand: a request's id, a count, a place in an
 differ in nothing else have one cause; its key is the same from one look to the next.
 """
 
-import hashlib
 import re
 from collections import Counter, defaultdict
 from collections.abc import Sequence
@@ -13,7 +12,6 @@ from dataclasses import dataclass
 from django.db.models import Count, Max, QuerySet
 from django.db.models.functions import Substr
 
-from augment.errors import UnknownName
 from augment.models import Attempt, Augmentation, GenerationJob, TranscriptNote
 from augment.variants.respondents import NoteKind
 
@@ -95,12 +93,10 @@ class FailureGroup:
     """Augmentations without a modification that ended for the same cause.
 
     Attributes:
-        key: What names it in an address.
         reason: The beginning of the reason that most of them have.
         augmentations: Some of them, with scenario and contestant.
     """
 
-    key: str
     state: State
     reason: str
     number: int
@@ -172,7 +168,6 @@ def failure_groups(job: GenerationJob) -> list[FailureGroup]:
     cells = {cell.pk: cell for cell in cells_of(job).filter(pk__in=named)} if named else {}
     return [
         FailureGroup(
-            key=_key_of(state, cause),
             state=state,
             reason=Counter(reason for _, reason in causes[state, cause]).most_common(1)[0][0],
             number=len(causes[state, cause]),
@@ -180,20 +175,6 @@ def failure_groups(job: GenerationJob) -> list[FailureGroup]:
         )
         for state, cause in order
     ]
-
-
-def rows_of_cause(job: GenerationJob, key: str) -> tuple[State, str, list[int]]:
-    """Return the state, the cause and the rows of a group.
-
-    Raises:
-        UnknownName: No row of the job has that cause (any more).
-    """
-    keys = {}
-    for (state, cause), rows in _rows_by_cause(job).items():
-        keys[_key_of(state, cause)] = (state, cause, [pk for pk, _ in rows])
-    if key not in keys:
-        raise UnknownName("cause in this job", key, list(keys))
-    return keys[key]
 
 
 def tool_calls(job: GenerationJob) -> list[ToolCallLine]:
@@ -227,10 +208,6 @@ def tool_calls(job: GenerationJob) -> list[ToolCallLine]:
 
 
 # --- Private -----------------------------------------------------------------------------------
-
-
-def _key_of(state: State, cause: str) -> str:
-    return hashlib.sha256(f"{state.value}\n{cause}".encode()).hexdigest()[:16]
 
 
 def _rows_by_cause(job: GenerationJob) -> dict[tuple[State, str], list[tuple[int, str]]]:
