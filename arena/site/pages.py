@@ -33,7 +33,7 @@ from augment.services.running.progress import count_each
 from augment.tasks import enqueue_job
 
 LATEST_JOBS = 5
-ACTS_AT_ONCE = 20
+ACTS_AT_ONCE = 15
 
 # --- Home --------------------------------------------------------------------------------------
 
