@@ -1,0 +1,42 @@
+"""No page of the demo is long or crowded; lists, which page, may be long."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.processes import ROOT
+from tests.stack import Home
+
+pytestmark = [pytest.mark.browser, pytest.mark.redis, pytest.mark.slow, pytest.mark.timeout(900)]
+
+LONGEST_PX, MOST_CONTROLS = 2_500, 40
+LISTS = {"results-votes", "scenarios"}
+"""Lists, which page: each of their rows is something to open."""
+
+STILL_BEYOND = {
+    *("scenario", "study-draft", "study-new"),  # long
+    *("results-tab", "results-pairs", "results-types", "study-draft", "study-new"),  # crowded
+}
+"""Pages that are to be made shorter or calmer."""
+
+
+def test_a_page_is_short_and_has_few_controls(demo_home: Home, tmp_path: Path) -> None:
+    home = demo_home.copy(tmp_path / "pages")
+    told = subprocess.run(
+        [sys.executable, "-m", "tests.screenshots", str(home.folder), "--measure"],
+        cwd=ROOT,
+        capture_output=True,
+        check=True,
+        text=True,
+    ).stdout
+    sizes: dict[str, tuple[int, int]] = json.loads(told.splitlines()[-1])
+    assert len(sizes) > 60
+    wrong = {
+        name: f"{high} px, {controls} controls"
+        for name, (high, controls) in sizes.items()
+        if name not in LISTS | STILL_BEYOND and (high > LONGEST_PX or controls > MOST_CONTROLS)
+    }
+    assert wrong == {}
