@@ -48,7 +48,6 @@ def worlds() -> Iterator[tuple[str, World]]:
         yield "a fifth spammers", replace(blank, experts=experts, spammers=0.2)
     for experts in (5, 9):
         yield "handed over", replace(blank, experts=experts, handed_over=True)
-        yield "adaptive", replace(blank, experts=experts, adaptive=True)
 
 
 def _differing(world: World, effects: tuple[float, float]) -> World:
@@ -116,11 +115,10 @@ def lines(studies: int) -> Iterator[str]:
     for (plan, scenario_sd, expert_sd), members in groups.items():
         found, false = [], []
         for world in members:
-            number = studies // 3 if world.adaptive else studies
-            found.append(study(world, studies=number))
+            found.append(study(world, studies=studies))
             if min(world.experts, world.scenarios) >= FEWEST_TO_JUDGE:
                 equal = replace(world, ratings=np.full(len(world.ratings), 1000.0))
-                false.append(study(equal, studies=number, judge=True).false)
+                false.append(study(equal, studies=studies, judge=True).false)
         cells = (
             plan,
             f"{scenario_sd:.0f} / {expert_sd:.0f}",

@@ -6,8 +6,8 @@ standard deviation in Elo points. Every expert has a threshold of their own for 
 would be rated.
 
 Plans: the product's (default); `uneven` experts, who judge a lognormal number of random units;
-`adaptive`, the product's choice of pairs, ten at a time; `handed_over`, the product's plan of
-which a fifth of the experts judge a random part and others the rest.
+`handed_over`, the product's plan of which a fifth of the experts judge a random part and others
+the rest.
 """
 
 from __future__ import annotations
@@ -19,9 +19,7 @@ from pathlib import Path
 
 import numpy as np
 
-from arena.pairing.later import draw_units, ratings_so_far
 from arena.pairing.plan import Entry, PlanRules, plan
-from arena.pairing.rules import Grid, grid_of
 from arena.rating.comparisons import LOSS, TIE, WIN, Comparisons, FloatArray, IntArray, PairCounts
 from arena.rating.models import ELO_PER_LOGIT, Meetings, fit, to_elo
 
@@ -29,8 +27,6 @@ PAPER = Path(__file__).parents[1] / "tests" / "rating" / "paper_table.json"
 SCENARIOS = 50
 THRESHOLDS = np.exp(np.linspace(0.5, 1.5, 5))
 """Of experts, drawn evenly: two equals are called so in 24 to 63 % of votes, 45 % on average."""
-BATCH, UNIFORM_SHARE = 10, 0.2
-"""Of adaptive plans: votes of an expert between two fits, and the share of uniform draws."""
 PLANS = 4
 """Different plans for a size; contestants take turns in them."""
 
@@ -58,7 +54,6 @@ class World:
     controversial: tuple[int, ...] = ()
     spammers: float = 0.0
     uneven: float = 0.0
-    adaptive: bool = False
     handed_over: bool = False
 
     @property
@@ -114,11 +109,8 @@ class World:
     def votes(self, rng: np.random.Generator) -> Comparisons:
         """A study: experts and scenarios are new ones each time."""
         panel = _Panel(self, rng)
-        if self.adaptive:
-            expert, scenario, first, second, score = self._adaptive_votes(panel, rng)
-        else:
-            expert, scenario, first, second = self._planned(rng)
-            score = panel.scores(expert, scenario, first, second, rng)
+        expert, scenario, first, second = self._planned(rng)
+        score = panel.scores(expert, scenario, first, second, rng)
         return Comparisons(
             names=tuple(f"c{index}" for index in range(len(self.ratings))),
             first=first,
@@ -150,32 +142,6 @@ class World:
         return np.stack(
             [expert, unit % self.scenarios, *np.stack([low, high])[:, unit // self.scenarios]]
         )
-
-    def _adaptive_votes(self, panel: _Panel, rng: np.random.Generator) -> tuple[np.ndarray, ...]:
-        contestants = len(self.ratings)
-        grid = _grid(contestants, self.scenarios)
-        pairs = np.stack(np.triu_indices(contestants, 1))
-        judges = np.zeros(grid.showable.shape, dtype=np.int64)
-        known: list[set[tuple[int, int]]] = [set() for _ in range(self.experts)]
-        scores = np.zeros((contestants, contestants))
-        rows, answers = [], []
-        for turn in range(self.experts * self.votes_per_expert // BATCH):
-            expert = turn % self.experts
-            ratings, covariance = ratings_so_far(scores)
-            drawn = draw_units(
-                grid, known[expert], judges, ratings, covariance, UNIFORM_SHARE, BATCH, rng
-            )
-            units = np.array([(wanted.pair, wanted.scenario) for wanted in drawn]).T
-            known[expert].update((wanted.pair, wanted.scenario) for wanted in drawn)
-            first, second = pairs[:, units[0]]
-            experts = np.full(len(drawn), expert)
-            answer = panel.scores(experts, units[1], first, second, rng)
-            np.add.at(judges, (units[0], units[1]), 1)
-            np.add.at(scores, (first, second), answer)
-            np.add.at(scores, (second, first), 1.0 - answer)
-            rows.append(np.stack([experts, units[1], first, second]))
-            answers.append(answer)
-        return (*np.concatenate(rows, axis=1), np.concatenate(answers))
 
 
 class _Panel:
@@ -247,11 +213,6 @@ def _entries(contestants: int, scenarios: int) -> tuple[Entry, ...]:
         for scenario in range(scenarios)
         for one in range(contestants)
     )
-
-
-@cache
-def _grid(contestants: int, scenarios: int) -> Grid:
-    return grid_of(_entries(contestants, scenarios))
 
 
 @cache

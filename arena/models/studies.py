@@ -27,6 +27,9 @@ class Study(Coded):
     allow_both_miss = models.BooleanField(
         default=False, help_text="experts may add to Equal that both miss the instruction"
     )
+    ask_strength = models.BooleanField(
+        default=False, help_text="experts say whether a preference is slight or clear"
+    )
     allow_text = models.BooleanField(
         default=False, help_text="experts may read what was changed, beside looking at it"
     )
@@ -40,9 +43,6 @@ class Study(Coded):
     )
     practice = models.BooleanField(
         default=False, help_text="experts practise on up to five pairs before their first one"
-    )
-    votes_to_plan = models.JSONField(
-        default=dict, help_text="votes that the adaptive part still has to plan, by username"
     )
     rules = models.JSONField(
         default=dict, help_text="the planner's rules, as they were at opening"

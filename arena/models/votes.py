@@ -49,6 +49,10 @@ class Vote(AppendOnly):
         RIGHT = "right", "B is better"
         SKIP = "skip", "Skipped"
 
+    class Strength(models.TextChoices):
+        SLIGHTLY = "slightly", "slightly"
+        CLEARLY = "clearly", "clearly"
+
     class SkipReason(models.TextChoices):
         CANNOT_JUDGE = "cannot_judge", _("I cannot judge this")
         PICTURE_MISSING = "picture_missing", _("Image does not show")
@@ -66,6 +70,12 @@ class Vote(AppendOnly):
     outcome = models.CharField(max_length=10, choices=Outcome.choices)
     both_miss = models.BooleanField(
         default=False, help_text="equal, and both miss the instruction; counts as a tie"
+    )
+    strength = models.CharField(
+        max_length=10,
+        blank=True,
+        choices=Strength.choices,
+        help_text="how clear the preference is, empty where it was not said",
     )
     reason = models.CharField(
         max_length=20, blank=True, choices=SkipReason.choices, help_text="why it was skipped"
@@ -103,6 +113,11 @@ class Vote(AppendOnly):
             models.CheckConstraint(
                 name="vote_both_miss_only_when_equal",
                 condition=Q(both_miss=False) | Q(outcome="equal"),
+            ),
+            models.CheckConstraint(
+                name="vote_strength_is_of_a_preference",
+                condition=Q(strength="")
+                | Q(strength__in=["slightly", "clearly"], outcome__in=["left", "right"]),
             ),
             models.CheckConstraint(
                 name="vote_reason_goes_with_skip",

@@ -1,20 +1,19 @@
 """Plans that are made while votes come in: who judges which unit, and in which order.
 
-For an expert whose remaining pairs are handed over, for somebody who joins, and for the adaptive
-part. All are pure functions of what is planned so far and of a generator.
+For an expert whose remaining pairs are handed over, and for somebody who joins. Both are pure
+functions of what is planned so far and of a generator.
 
-Notation: P pairs, S scenarios, C contestants. Ratings are in logits.
+Notation: P pairs, S scenarios.
 """
 
-import math
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from arena.errors import NothingToPlan
-from arena.pairing.order import CHECK, MAIN, REPEAT, BoolArray, FloatArray, IntArray, Slot
+from arena.pairing.order import CHECK, MAIN, REPEAT, IntArray, Slot
 from arena.pairing.plan import lay_out
 from arena.pairing.rules import Grid, PlannedMatchup, PlanRules
 
@@ -124,16 +123,14 @@ def _find_elsewhere(
 # --- Units one after the other -------------------------------------------------------------------
 
 
-Chances = Callable[[IntArray, IntArray], FloatArray]
-"""(n,) how likely each of these pairs (n,) is drawn next, by the judges of each unit (P, S)."""
-
-
 def choose_for_newcomer(
     grid: Grid, judges: IntArray, count: int, rng: np.random.Generator
 ) -> list[Wanted]:
     """Choose units for somebody who joins, so that pairs and scenarios stay as equal as they can.
 
-    Of the pairs that come least in this choice one of those that are planned least so far.
+    One after the other: of the pairs that come least in this choice one of those that are planned
+    least so far; then of its scenarios those with the fewest judges of the pair, of these one
+    that comes least in this choice, then one that is planned least over all pairs.
 
     Args:
         grid: What can be shown.
@@ -141,48 +138,22 @@ def choose_for_newcomer(
         count: How many; fewer where there are not so many units.
         rng: The lots.
     """
-    before = judges.sum(axis=1)
-
-    def chances(pairs: IntArray, counts: IntArray) -> FloatArray:
-        planned = counts.sum(axis=1)
-        best = _least((planned - before)[pairs], planned[pairs])
-        return np.where(np.isin(np.arange(len(pairs)), best), 1.0 / len(best), 0.0)
-
-    return _draw(grid.showable, judges, count, chances, lambda pair: None, rng)
-
-
-def _draw(
-    free: BoolArray,
-    judges: IntArray,
-    count: int,
-    chances: Chances,
-    after_each: Callable[[int], None],
-    rng: np.random.Generator,
-) -> list[Wanted]:
-    """Draw units (P, S) one after the other: a pair by its chance, then one of its scenarios.
-
-    That is one of those with the fewest judges of the pair, of these one that comes least in this
-    draw, then one that is planned least over all pairs.
-    """
-    free, counts = free.copy(), judges.copy()
+    free, counts = grid.showable.copy(), judges.copy()
+    before = counts.sum(axis=1)
     used = np.zeros(free.shape[1], dtype=np.int64)
-    drawn: list[Wanted] = []
-    while len(drawn) < count and free.any():
-        pairs = np.flatnonzero(free.any(axis=1))
-        chance = chances(pairs, counts)
-        place = int(rng.choice(len(pairs), p=chance / chance.sum()))
-        pair = int(pairs[place])
+    chosen: list[Wanted] = []
+    while len(chosen) < count and free.any():
+        pairs, planned = np.flatnonzero(free.any(axis=1)), counts.sum(axis=1)
+        pairs = pairs[_least((planned - before)[pairs], planned[pairs])]
+        pair = int(rng.choice(pairs))
         open_ = np.flatnonzero(free[pair])
         fewest = open_[_least(counts[pair, open_], used[open_], counts[:, open_].sum(axis=0))]
         scenario = int(rng.choice(fewest))
-        drawn.append(
-            Wanted(pair=pair, scenario=scenario, chance=float(chance[place]) / len(fewest))
-        )
+        chosen.append(Wanted(pair=pair, scenario=scenario, chance=1.0 / len(pairs) / len(fewest)))
         free[pair, scenario] = False
         counts[pair, scenario] += 1
         used[scenario] += 1
-        after_each(pair)
-    return drawn
+    return chosen
 
 
 def _least(*keys: IntArray) -> IntArray:
@@ -191,104 +162,6 @@ def _least(*keys: IntArray) -> IntArray:
     for key in keys:
         left = left[key[left] == key[left].min()]
     return left
-
-
-# --- The adaptive part ---------------------------------------------------------------------------
-
-
-PRIOR_SD = 200.0 * math.log(10.0) / 400.0
-NEWTON_STEPS = 50
-
-
-def contestants_of(grid: Grid) -> list[str]:
-    """Return the order of rows and columns of ratings and covariance."""
-    return sorted({name for pair in grid.pairs for name in pair})
-
-
-def ratings_so_far(scores: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return ratings (C,) and their covariance (C, C) by the votes so far and a prior.
-
-    `scores` (C, C) are what the row scored against the column: a win 1, a tie one half.
-    """
-    votes = scores + scores.T
-    prior = np.eye(len(scores)) / PRIOR_SD**2
-    ratings = np.zeros(len(scores))
-    for _ in range(NEWTON_STEPS):
-        expected = 1.0 / (1.0 + np.exp(ratings[None, :] - ratings[:, None]))
-        slope = (scores - votes * expected).sum(axis=1) - ratings / PRIOR_SD**2
-        weight = votes * expected * (1.0 - expected)
-        information = np.diag(weight.sum(axis=1)) - weight + prior
-        step = np.linalg.solve(information, slope)
-        ratings += step
-        if np.abs(step).max() < 1e-10:
-            break
-    return ratings, np.asarray(np.linalg.inv(information), dtype=np.float64)
-
-
-def gains(
-    pairs: Sequence[tuple[int, int]], ratings: FloatArray, covariance: FloatArray
-) -> FloatArray:
-    """Return by how much a vote on each pair (P,) shrinks the trace of the covariance."""
-    first, second = np.array(pairs).T
-    weight, along, spread = _vote_on(first, second, ratings, covariance)
-    return np.asarray(weight * (along**2).sum(axis=0) / (1.0 + weight * spread))
-
-
-def draw_units(
-    grid: Grid,
-    known: set[Unit],
-    judges: IntArray,
-    ratings: FloatArray,
-    covariance: FloatArray,
-    uniform_share: float,
-    count: int,
-    rng: np.random.Generator,
-) -> list[Wanted]:
-    """Draw units for one expert, one after the other, each as if the one before were voted.
-
-    A pair is drawn by how much one more vote on it shrinks the summed variance of the ratings
-    (A-optimality: Chaloner and Verdinelli 1995), mixed with a uniform draw, so that every pair
-    stays possible and its probability is known.
-
-    Args:
-        grid: What can be shown.
-        known: Units that the expert has.
-        judges: (P, S) how many experts have each unit.
-        ratings: (C,) in the order of `contestants_of`.
-        covariance: (C, C) of the ratings.
-        uniform_share: The probability that the pair is drawn uniformly.
-        count: How many; fewer where the expert knows all others.
-        rng: The lots.
-    """
-    names = {name: index for index, name in enumerate(contestants_of(grid))}
-    pairs = [(names[first], names[second]) for first, second in grid.pairs]
-    free = grid.showable.copy()
-    for unit in known:
-        free[unit] = False
-    covariance = covariance.copy()
-
-    def chances(open_: IntArray, _: IntArray) -> FloatArray:
-        gain = gains([pairs[pair] for pair in open_], ratings, covariance)
-        is_best = gain >= gain.max() * (1.0 - 1e-9)
-        best = np.where(is_best, (1.0 - uniform_share) / is_best.sum(), 0.0)
-        return np.asarray(best + uniform_share / len(open_))
-
-    def after_a_vote(pair: int) -> None:
-        first, second = (np.array([end]) for end in pairs[pair])
-        weight, along, spread = _vote_on(first, second, ratings, covariance)
-        covariance[:] -= weight * (along @ along.T) / (1.0 + weight * spread)
-
-    return _draw(free, judges, count, chances, after_a_vote, rng)
-
-
-def _vote_on(
-    first: IntArray, second: IntArray, ratings: FloatArray, covariance: FloatArray
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return of votes on pairs (n,) the information, and where in the covariance they tell."""
-    chance = 1.0 / (1.0 + np.exp(ratings[second] - ratings[first]))
-    along = covariance[:, first] - covariance[:, second]
-    places = np.arange(len(first))
-    return chance * (1.0 - chance), along, along[first, places] - along[second, places]
 
 
 # --- What follows on an expert's order so far ----------------------------------------------------
@@ -301,7 +174,7 @@ def follow_on(
     so_far: Sequence[PlannedMatchup],
     units: Sequence[Wanted],
     rng: np.random.Generator,
-) -> tuple[list[PlannedMatchup], int]:
+) -> list[PlannedMatchup]:
     """Put one expert's next units in an order, with sides, and with repeats and checks on top.
 
     Args:
@@ -311,9 +184,6 @@ def follow_on(
         so_far: The expert's showings, by position.
         units: What comes now; none of it is known to the expert.
         rng: Shuffles.
-
-    Returns:
-        The showings, and the scenario gap that holds from the last known showing on.
     """
     items = [
         Slot(kind=MAIN, scenario=unit.scenario, pair=unit.pair, chance=unit.chance)
@@ -321,7 +191,7 @@ def follow_on(
     ]
     items += _draw_repeats(rules, grid, so_far, units, rng)
     items += _draw_checks(rules, grid, so_far, len(units), rng)
-    order, gap = _find_order(items, [showing.scenario for showing in so_far], grid, rules, rng)
+    order = _find_order(items, [showing.scenario for showing in so_far], grid, rules, rng)
     start = so_far[-1].position + 1 if so_far else 1
     position_of = {index: position for position, index in enumerate(order, start=start)}
     slots = [
@@ -329,7 +199,7 @@ def follow_on(
         for item in (items[index] for index in order)
     ]
     flips = _turn_mains(grid, so_far, slots, rng)
-    return lay_out(rules, grid, expert, slots, flips, so_far, rng), gap
+    return lay_out(rules, grid, expert, slots, flips, so_far, rng)
 
 
 def _draw_repeats(
@@ -383,7 +253,7 @@ def _find_order(
     grid: Grid,
     rules: PlanRules,
     rng: np.random.Generator,
-) -> tuple[list[int], int]:
+) -> list[int]:
     """Order the items with the largest gap that can be kept, also to what was shown before."""
     bases = [int(base) for base in grid.bases]
     last = [bases[grid.column_of_scenario[name]] for name in before[-rules.scenario_gap :]]
@@ -391,7 +261,7 @@ def _find_order(
         for _ in range(5):
             order = _try_order(items, last[len(last) - min(gap, len(last)) :], gap, rng, bases)
             if order is not None:
-                return order, gap
+                return order
     raise AssertionError("without a gap any order will do")
 
 

@@ -58,7 +58,7 @@ def plan(rules: PlanRules) -> MatchupPlan:
     grid = rules.grid
     check_rules(rules, grid)
     rng = np.random.default_rng(rules.seed)
-    experts, votes = len(rules.experts), rules.votes_at_once
+    experts, votes = len(rules.experts), rules.votes_per_expert
     chosen = choose_units(grid.showable, experts, votes, rng)
     bring_together(chosen, grid.showable, rules.overlap_share, rng)
     probability = draw_probability(grid.showable, votes)
@@ -82,8 +82,8 @@ def plan(rules: PlanRules) -> MatchupPlan:
 
 def _extras(rules: PlanRules, grid: Grid, mine: BoolArray, rng: np.random.Generator) -> Extras:
     """One expert's repeats and checks, by lot."""
-    repeats = round(rules.repeat_share * rules.votes_at_once)
-    checks = min(round(rules.check_share * rules.votes_at_once), len(rules.checks))
+    repeats = round(rules.repeat_share * rules.votes_per_expert)
+    checks = min(round(rules.check_share * rules.votes_per_expert), len(rules.checks))
     if not repeats and not checks:
         return Extras()
     units = np.argwhere(mine)

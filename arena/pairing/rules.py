@@ -66,13 +66,9 @@ class PlanRules:
         scenario_gap: Matchups wanted between two showings of a scenario to one expert.
         repeat_share: Hidden repeats as a share of the quota.
         repeat_distance: Matchups wanted between a pair and its repeat.
-        overlap_share: Of the units that are planned at once, those that two experts or more
-            judge at least.
+        overlap_share: Of the judged units, those that two experts or more judge at least.
         check_share: Attention checks as a share of the quota, as far as there are `checks`.
         checks: What can be checked with.
-        adaptive_share: The last share of the quota, which is planned in batches by the votes.
-        uniform_share: The share of the adaptive draws that is uniform over the pairs.
-        batch_size: Votes of one expert that are planned at once in the adaptive part.
         alike: (scenario, contestant, contestant) that nobody can tell apart, whose pictures
             differ all the same; settled as a tie like identical ones.
     """
@@ -87,25 +83,12 @@ class PlanRules:
     overlap_share: float = 0.0
     check_share: float = 0.0
     checks: tuple[Check, ...] = ()
-    adaptive_share: float = 0.0
-    uniform_share: float = 0.2
-    batch_size: int = 20
     alike: tuple[tuple[str, str, str], ...] = ()
 
     @property
     def grid(self) -> Grid:
         """What can be shown of the entries."""
         return grid_of(self.entries, self.alike)
-
-    @property
-    def votes_later(self) -> int:
-        """Votes of each expert that the adaptive part plans."""
-        return round(self.adaptive_share * self.votes_per_expert)
-
-    @property
-    def votes_at_once(self) -> int:
-        """Votes of each expert that are planned before the first vote."""
-        return self.votes_per_expert - self.votes_later
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -237,7 +220,6 @@ MOST_OVERLAP = 0.8
 
 MOST_CHECKS = 0.5
 MOST_REPEATS = 0.5
-MOST_ADAPTIVE = 0.9
 ATTENTION_CHECKS = "attention checks"
 
 
@@ -250,7 +232,6 @@ def check_rules(rules: PlanRules, grid: Grid) -> None:
     check_share("repeats", rules.repeat_share, MOST_REPEATS)
     check_share("what two experts judge", rules.overlap_share, MOST_OVERLAP)
     check_share(ATTENTION_CHECKS, rules.check_share, MOST_CHECKS)
-    check_share("the adaptive part", rules.adaptive_share, MOST_ADAPTIVE)
     contestants = len({entry.contestant for entry in rules.entries})
     checked = [check.scenario for check in rules.checks]
     votes, units, same = rules.votes_per_expert, int(grid.showable.sum()), len(grid.identical)
@@ -260,8 +241,6 @@ def check_rules(rules: PlanRules, grid: Grid) -> None:
         "There is nobody to vote: name at least one expert.": not rules.experts,
         "An expert is named twice.": len(set(rules.experts)) < len(rules.experts),
         f"A comparison needs two contestants with pictures, not {contestants}.": not grid.pairs,
-        "At least 20 % of the adaptive draws are uniform, else no vote could be weighted; not "
-        f"{rules.uniform_share:.0%}.": not 0.2 <= rules.uniform_share <= 1,
         "For pairs that two experts judge there must be two.": rules.overlap_share > 0
         and len(rules.experts) < 2,
         "Each check is on a scenario of its own out of those of the study.": len(set(checked))

@@ -48,6 +48,7 @@ def check_row(row: models.Model) -> None:
                 key=row.key,
                 outcome=row.outcome,
                 both_miss=row.both_miss,
+                strength=row.strength,
                 reason=row.reason,
                 comment=row.comment,
                 aids=row.aids.split(),

@@ -68,7 +68,7 @@ def listed_studies(expert: User | None = None) -> QuerySet[Study]:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StudyProgress(VotingProgress):
-    """How many matchups of a study have a vote; those to be planned later count too."""
+    """How many matchups of a study have a vote."""
 
     study: Study
 
@@ -88,13 +88,7 @@ def progress_of(studies: Iterable[Study], expert: User | None = None) -> list[St
     return [
         StudyProgress(
             study=study,
-            # The adaptive part still plans some.
-            total=totals.get(study.pk, 0)
-            + sum(
-                votes
-                for username, votes in study.votes_to_plan.items()
-                if expert is None or username == expert.username
-            ),
+            total=totals.get(study.pk, 0),
             voted=voted.get(study.pk, 0),
             skipped=skipped.get(study.pk, 0),
         )

@@ -25,7 +25,7 @@ from arena.errors import StudyNotOpen
 from arena.models import AIDS, OUTCOME_LETTERS, Report, Study, Vote
 from arena.people.services import keep_voting
 from arena.studies.services.experts import SIDES, Complaint, report
-from arena.studies.services.planning import next_pairs
+from arena.voting.queries.ballots import upcoming
 from arena.voting.queries.keys import SWITCHES, voting_switches
 from arena.voting.queries.showings import as_shown, picture_shown
 from arena.voting.services.casting import LONGEST_COMMENT, decision_of, receive_vote
@@ -76,6 +76,9 @@ class VoteBody(StrictSerializer):
     matchup = CodeField()
     outcome = serializers.ChoiceField(choices=list(OUTCOMES))
     both_miss = FlagField(required=False, default=False)
+    strength = serializers.ChoiceField(
+        choices=Vote.Strength.choices, required=False, allow_blank=True, default=""
+    )
     reason = serializers.ChoiceField(
         choices=Vote.SkipReason.choices, required=False, allow_blank=True, default=""
     )
@@ -146,7 +149,7 @@ class MatchupsView(ApiView):
         study = get_object_or_404(self.user.studies, code=given["study"])
         if study.state != Study.State.OPEN:
             raise StudyNotOpen(f"The study {study.name!r} takes no votes: it is {study.state}.")
-        matchups = next_pairs(study=study, expert=self.user, n=given["n"])
+        matchups = upcoming(study=study, expert=self.user, n=given["n"])
         return Response([as_shown(matchup) for matchup in matchups])
 
 
@@ -166,7 +169,7 @@ class VotesView(ApiView):
         decision = decision_of(matchup_code=given.pop("matchup"), outcome=outcome, **given)
         received = receive_vote(expert=self.user, decision=decision)
         progress = received.progress
-        coming = next_pairs(study=received.study, expert=self.user, n=n)
+        coming = upcoming(study=received.study, expert=self.user, n=n)
         return Response(
             {
                 "saved": progress.voted,

@@ -13,8 +13,7 @@ from django.utils.translation import pgettext
 from arena.models import OUTCOME_LETTERS, Report, Study, Vote
 from arena.studies.queries import enrolled_voters
 from arena.studies.services.experts import SIDES
-from arena.studies.services.planning import next_pairs
-from arena.voting.queries.ballots import own_votes, voting_progress
+from arena.voting.queries.ballots import own_votes, upcoming, voting_progress
 from arena.voting.queries.keys import KEYS, voting_switches
 from arena.voting.queries.showings import as_shown
 
@@ -41,7 +40,7 @@ def vote_context(study: Study, expert: User, *, change: str) -> dict[str, Any] |
         change: The key of one of the expert's votes to show its pair again; anything else shows
             the next pair.
     """
-    pairs = [as_shown(matchup) for matchup in next_pairs(study=study, expert=expert, n=AHEAD)]
+    pairs = [as_shown(matchup) for matchup in upcoming(study=study, expert=expert, n=AHEAD)]
     context = over_context(study, expert)
     changed = _vote_of_key(study, expert, change)
     if not pairs and changed is None:
@@ -83,6 +82,7 @@ def vote_context(study: Study, expert: User, *, change: str) -> dict[str, Any] |
             "allow_both_miss": study.allow_both_miss,
             "rings": has["rings"],
             "today": _seen_today(study, expert),
+            "ask_strength": study.ask_strength,
             "preferences": {**switches, "keys": keys},
             "saved": progress.voted,
             "total": progress.total,
@@ -121,6 +121,7 @@ def _as_json(vote: Vote) -> dict[str, Any]:
         "position": vote.matchup.position,
         "outcome": OUTCOME_LETTERS[vote.outcome],
         "both_miss": vote.both_miss,
+        "strength": vote.strength,
         "comment": vote.comment,
         "shown": as_shown(vote.matchup),
     }

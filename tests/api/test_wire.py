@@ -111,8 +111,8 @@ def test_no_answer_betrays_a_contestant() -> None:
 
 
 def test_a_vote_says_all_that_an_expert_can_say(study: Study) -> None:
-    Study.objects.update(allow_both_miss=True)
-    first, second, *_ = matchups_of(study, "eva")
+    Study.objects.update(allow_both_miss=True, ask_strength=True)
+    first, second, third, *_ = matchups_of(study, "eva")
     client = signed_in("eva")
     said = {"both_miss": True, "comment": " Both off the road. ", "aids": ["ruler", "zoom"]}
     assert post(client, body_for(first, "E", n=1, **said)).json()["next"][0]["matchup"] == str(
@@ -120,7 +120,9 @@ def test_a_vote_says_all_that_an_expert_can_say(study: Study) -> None:
     )
     skipped = post(client, body_for(second, "skip", reason="picture_missing")).json()
     assert (skipped["saved"], skipped["skipped"]) == (1, 1), "a skip is no vote"
-    tie, skip = Vote.objects.order_by("pk")
+    post(client, body_for(third, "B", strength="slightly"))
+    tie, skip, preference = Vote.objects.order_by("pk")
+    assert (preference.outcome, preference.strength) == ("right", "slightly")
     assert (tie.both_miss, tie.comment, tie.aids) == (True, "Both off the road.", "zoom ruler")
     assert (skip.outcome, skip.reason, skip.winner_id) == ("skip", "picture_missing", None)
 

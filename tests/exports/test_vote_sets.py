@@ -123,7 +123,9 @@ def test_rows_have_the_columns_of_other_packages_and_no_formulas() -> None:
 def test_a_vote_is_exported_with_all_that_was_kept_of_it() -> None:
     study = a_study(votes_per_expert=4)
     first, second, *_ = matchups_of(study, "eva")
-    kept = vote(first, "left", comment="=both\nturn", aids=("zoom", "ruler"))
+    Study.objects.update(ask_strength=True)
+    said = {"comment": "=both\nturn", "aids": ("zoom", "ruler"), "strength": "slightly"}
+    kept = vote(first, "left", **said)
     vote(second, "skip", reason="unclear", comment="never in the file")
     snapshot = rate(study=close_study(study=study), rounds=10)
     (line,) = csv.DictReader(io.StringIO(VOTE_FORMATS["csv"].write(vote_table(snapshot)).decode()))
@@ -132,6 +134,7 @@ def test_a_vote_is_exported_with_all_that_was_kept_of_it() -> None:
     )
     assert (line["position"], line["aids"]) == (str(first.position), "zoom ruler")
     assert line["comment"] == "'=both turn", "no formula, one line"
+    assert line["strength"] == "slightly"
     assert (line["augmentation_a"], line["augmentation_b"]) == (
         str(first.left.code),
         str(first.right.code),

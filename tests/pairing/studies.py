@@ -91,7 +91,7 @@ def check_extras(asked: PlanRules, made: MatchupPlan) -> None:
         repeats = [matchup for matchup in mine if matchup.kind == REPEAT]
         checks = [matchup for matchup in mine if matchup.kind == CHECK]
         assert [matchup.position for matchup in mine] == list(range(1, len(mine) + 1))
-        assert len(mains) == asked.votes_at_once
+        assert len(mains) == asked.votes_per_expert
         assert len({(pair(matchup), matchup.scenario) for matchup in mains}) == len(mains)
         assert len(repeats) == round(asked.repeat_share * len(mains))
         assert len({matchup.repeats for matchup in repeats}) == len(repeats)

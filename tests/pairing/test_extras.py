@@ -65,8 +65,6 @@ def small(**rules: object) -> PlanRules:
     [
         ({"repeat_share": 0.6}, "share of repeats goes from 0 to 50%, not 60.0%"),
         ({"check_share": -0.1}, "share of attention checks"),
-        ({"adaptive_share": 0.95}, "share of the adaptive part"),
-        ({"uniform_share": 0.1}, "At least 20 %"),
     ],
 )
 def test_rules_that_can_not_be_met_are_refused_with_numbers(

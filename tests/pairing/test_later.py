@@ -1,22 +1,10 @@
-import math
 from collections import Counter, defaultdict
 
 import numpy as np
 import pytest
 
 from arena.errors import NothingToPlan
-from arena.pairing.later import (
-    PRIOR_SD,
-    Wanted,
-    contestants_of,
-    deal,
-    draw_units,
-    follow_on,
-    gains,
-    judges,
-    ratings_so_far,
-    units_of,
-)
+from arena.pairing.later import Wanted, deal, follow_on, units_of
 from arena.pairing.order import CHECK, MAIN, REPEAT
 from arena.pairing.plan import PlannedMatchup, plan
 from arena.pairing.rules import PlanRules, grid_of
@@ -34,8 +22,7 @@ def handed_over(
     known[giver] = made[giver][:done]
     dealt = deal(grid, known, to, left, rng)
     for name in to:
-        more, gap = follow_on(rules, grid, name, known[name], dealt[name], rng)
-        assert gap == rules.scenario_gap
+        more = follow_on(rules, grid, name, known[name], dealt[name], rng)
         known[name] = [*known[name], *more]
     return known
 
@@ -100,84 +87,3 @@ def test_a_pair_that_everybody_has_judged_everywhere_is_refused_by_name() -> Non
     more = [Wanted(pair=0, scenario=0, chance=1.0)]
     with pytest.raises(NothingToPlan, match=f"{first} against {second} on every scenario"):
         deal(grid, {"eva": all_of_it}, ["eva"], more, np.random.default_rng(1))
-
-
-# --- The adaptive part -------------------------------------------------------------------------
-
-
-def test_ratings_so_far_agree_with_a_case_worked_by_hand() -> None:
-    scores = np.array([[0.0, 30.0], [10.0, 0.0]])
-    ratings, covariance = ratings_so_far(scores)
-    # The slope is zero: 30 - 40 p - r / sd^2 = 0 with p the chance of the first.
-    chance = 1 / (1 + math.exp(-(ratings[0] - ratings[1])))
-    assert 30 - 40 * chance == pytest.approx(ratings[0] / PRIOR_SD**2)
-    assert ratings.sum() == pytest.approx(0.0)
-    weight = 40 * chance * (1 - chance)
-    spread = covariance[0, 0] + covariance[1, 1] - 2 * covariance[0, 1]
-    assert spread == pytest.approx(1 / (weight + 0.5 / PRIOR_SD**2))
-
-
-def test_without_votes_every_pair_gains_the_same_and_less_where_much_is_known() -> None:
-    ratings, covariance = ratings_so_far(np.zeros((3, 3)))
-    pairs = [(0, 1), (0, 2), (1, 2)]
-    assert gains(pairs, ratings, covariance) == pytest.approx(
-        [gains(pairs, ratings, covariance)[0]] * 3
-    )
-    scores = np.array([[0.0, 50.0, 0.0], [50.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
-    first, second, third = gains(pairs, *ratings_so_far(scores))
-    assert first < second == pytest.approx(third)
-
-
-def test_the_gain_is_what_the_trace_loses_by_one_more_vote() -> None:
-    rng = np.random.default_rng(2)
-    scores = np.triu(rng.integers(1, 9, (4, 4)), 1).astype(float)
-    scores += scores.T
-    ratings, covariance = ratings_so_far(scores)
-    along = np.array([1.0, 0.0, -1.0, 0.0])
-    chance = 1 / (1 + math.exp(ratings[2] - ratings[0]))
-    after = np.linalg.inv(
-        np.linalg.inv(covariance) + chance * (1 - chance) * np.outer(along, along)
-    )
-    lost = np.trace(covariance) - np.trace(after)
-    assert gains([(0, 2)], ratings, covariance)[0] == pytest.approx(lost)
-
-
-def test_draws_go_to_what_is_known_least_and_leave_every_pair_a_chance() -> None:
-    rules = paper_rules(1, votes=20, experts=1)
-    grid = grid_of(rules.entries)
-    names = contestants_of(grid)
-    scores = np.full((9, 9), 40.0) - np.diag(np.full(9, 40.0))
-    scores[0, :] = scores[:, 0] = 0.0
-    ratings, covariance = ratings_so_far(scores)
-    none = np.zeros(grid.showable.shape, dtype=np.int64)
-    drawn = draw_units(grid, set(), none, ratings, covariance, 0.2, 400, np.random.default_rng(3))
-    assert len({(unit.pair, unit.scenario) for unit in drawn}) == 400
-    assert min(unit.chance for unit in drawn) >= 0.2 / 36 / 50
-    early = [names[0] in grid.pairs[unit.pair] for unit in drawn[:60]]
-    assert sum(early) > 30, "8 of 36 pairs by lot: 13"
-    assert len({unit.pair for unit in drawn}) > 30
-
-
-def test_the_scenario_with_the_fewest_judges_comes_first() -> None:
-    rules = paper_rules(1, votes=20, experts=1)
-    grid = grid_of(rules.entries)
-    counts = np.ones(grid.showable.shape, dtype=np.int64)
-    counts[:, [4, 9]] = 0
-    ratings, covariance = ratings_so_far(np.zeros((9, 9)))
-    known = {(pair_, 4) for pair_ in range(36)}
-    drawn = draw_units(grid, known, counts, ratings, covariance, 0.2, 6, np.random.default_rng(3))
-    assert {unit.scenario for unit in drawn} == {9}
-
-
-def test_the_same_seed_draws_the_same_and_judges_are_counted_by_expert() -> None:
-    rules = paper_rules(1, votes=50, experts=3)
-    grid, made = grid_of(rules.entries), by_expert(plan(rules))
-    counts = judges(grid, made)
-    assert counts.sum() == 150
-    ratings, covariance = ratings_so_far(np.zeros((9, 9)))
-    one, again, other = (
-        draw_units(grid, set(), counts, ratings, covariance, 0.2, 30, np.random.default_rng(seed))
-        for seed in (1, 1, 2)
-    )
-    assert one == again
-    assert one != other

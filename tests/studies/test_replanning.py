@@ -1,19 +1,15 @@
-"""Handing pairs over, and the adaptive part, as rows."""
+"""Handing pairs over, as rows."""
 
 import uuid
 from collections import Counter
 
 import pytest
-from django.contrib.auth.models import User
 
 from arena.errors import NotYours
-from arena.models import Study, Vote
+from arena.models import Study
 from arena.pairing.order import MAIN
-from arena.studies.queries import progress_of
 from arena.studies.services.experts import Complaint, report
-from arena.studies.services.planning import next_pairs, plan_batch
 from arena.studies.services.taking_part import hand_over
-from arena.voting.queries.ballots import tallies, voting_progress
 from augment.errors import Conflict, UnknownName
 from augment.models import Event
 from tests.opening import open_study
@@ -27,9 +23,6 @@ def pairs_of(study: Study) -> Counter[frozenset[int]]:
         "left__contestant_id", "right__contestant_id"
     )
     return Counter(frozenset(row) for row in rows)
-
-
-# --- Handing over ------------------------------------------------------------------------------
 
 
 def test_what_one_has_not_judged_goes_to_the_others_with_fresh_tokens() -> None:
@@ -103,49 +96,3 @@ def test_a_hand_over_that_makes_no_sense_is_refused(
     with pytest.raises(error, match=sentence):
         hand_over(study=study, username=giver, to=to)
     assert study.matchups.count() == 18
-
-
-# --- The adaptive part -------------------------------------------------------------------------
-
-
-def adaptive(simulated: bool = False) -> Study:
-    """Each expert judges 20, ten of them planned by the votes."""
-    return open_study(
-        name="Round 1",
-        votes_per_expert=20,
-        seed=1,
-        adaptive=50,
-        repeats=10,
-        allow_simulated=simulated,
-        **cast_of(scenarios=10, simulated_experts=simulated),
-    )
-
-
-def test_the_last_share_is_planned_when_it_is_needed_and_counts_from_the_start() -> None:
-    study = adaptive()
-    eva = User.objects.get(username="eva")
-    assert study.matchups.filter(expert=eva, kind="main").count() == 10
-    assert study.votes_to_plan == {"eva": 10, "finn": 10}
-    assert voting_progress(study=study, expert=eva).total == 21
-    assert [line.total for line in progress_of(eva.studies.all(), eva)] == [21]
-    assert (progress_of([study])[0].total, tallies(study)[0].total) == (42, 21)
-
-    for matchup in matchups_of(study, "eva"):
-        vote(matchup)
-    first = next_pairs(study=study, expert=eva, n=4)[0]
-
-    study.refresh_from_db()
-    assert (first.position, first.batch) == (12, 1)
-    assert study.votes_to_plan == {"eva": 0, "finn": 10}
-    assert study.matchups.filter(expert=eva, kind="main").count() == 20
-    assert all(0 < row.draw_probability < 1 for row in matchups_of(study, "eva"))
-    units = [
-        (m.scenario_id, frozenset((m.left_id, m.right_id)))
-        for m in study.matchups.filter(expert=eva, kind="main")
-    ]
-    assert len(set(units)) == 20
-    event = Event.objects.get(verb="plan batch")
-    assert event.after is not None
-    assert (event.after["batch"], event.after["votes"]) == (1, 10)
-    assert event.after["last_vote"] == Vote.objects.latest("pk").pk
-    assert plan_batch(study=study, expert=eva) == 0

@@ -54,7 +54,11 @@ def test_a_change_is_appended_and_supersedes_the_current_vote() -> None:
 
 @pytest.mark.parametrize(
     ("outcome", "more", "named"),
-    [("equal", {"both_miss": True}, "both_miss"), ("right", {"aids": ["replay"]}, "aids")],
+    [
+        ("equal", {"both_miss": True}, "both_miss"),
+        ("right", {"aids": ["replay"]}, "aids"),
+        ("right", {"strength": "clearly"}, "strength"),
+    ],
 )
 def test_a_changed_vote_is_held_against_the_studys_rules_as_a_first_one_is(
     outcome: str, more: dict[str, Any], named: str
@@ -135,6 +139,8 @@ def test_a_closed_study_takes_no_votes_but_knows_the_ones_it_has() -> None:
         ({"outcome": "left", "reason": "unclear"}, "reason"),
         ({"outcome": "right", "both_miss": True}, "both_miss"),
         ({"outcome": "equal", "both_miss": True}, "both_miss"),
+        ({"outcome": "equal", "strength": "slightly"}, "strength"),
+        ({"outcome": "left", "strength": "a bit"}, "strength"),
         ({"outcome": "left", "comment": "x" * 1001}, "comment"),
         ({"outcome": "left", "aids": ["zoom", "glasses"]}, "aids"),
         ({"outcome": "left", "aids": ["replay"]}, "aids"),

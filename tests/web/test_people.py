@@ -151,7 +151,6 @@ def test_who_is_forgotten_leaves_votes_and_no_name() -> None:
     study, admin = a_study(), people()["admin"]
     eva = study.experts.get(username="eva")
     vote(matchups_of(study, "eva")[0], "left")
-    Study.objects.update(votes_to_plan={"eva": 3, "finn": 4})
     AccessAttempt.objects.create(username="eva", failures_since_start=1)
     pseudonym = eva.person.pseudonym
     url = reverse("person-forget", args=[eva.person.code])
@@ -167,7 +166,6 @@ def test_who_is_forgotten_leaves_votes_and_no_name() -> None:
     assert Vote.objects.filter(expert=eva).count() == 1
     assert "eva" not in client.get(reverse("people")).content.decode()
     assert Study.objects.get().rules["experts"] == [eva.username, "finn"]
-    assert Study.objects.get().votes_to_plan == {eva.username: 3, "finn": 4}
     assert not AccessAttempt.objects.exists()
     change(admin, eva, act="resume")
     assert not eva.is_active, "for good"

@@ -59,7 +59,7 @@ class Command(TerminalCommand):
         kinds = Counter(study.matchups.values_list("kind", flat=True))
         self.stdout.write(
             f"{kinds['main']} votes, {kinds['repeat']} hidden repeats, {kinds['check']} attention "
-            f"checks; {sum(study.votes_to_plan.values())} votes are planned later."
+            "checks."
         )
         if rules["scenario_gap_kept"] < rules["scenario_gap"]:
             self.stdout.write(

@@ -101,22 +101,17 @@ class Closure:
         return sorted(named)
 
     def renamed_rules(self) -> dict[str, Any]:
-        """The rules with the names that accounts get."""
-        names = self._names_in_plans()
-        experts = [names[name] for name in self.study.rules.get("experts", [])]
-        return {**self.study.rules, **({"experts": experts} if experts else {})}
+        """The rules with the names that accounts get.
 
-    def renamed_votes_to_plan(self) -> dict[str, int]:
-        """How many votes are planned later, by the names that accounts get."""
-        names = self._names_in_plans()
-        return {names[name]: votes for name, votes in self.study.votes_to_plan.items()}
-
-    def _names_in_plans(self) -> dict[str, str]:
-        """Whom the plan names; who does not travel, or is nobody any more, gets a number."""
-        named = {*self.study.rules.get("experts", []), *self.study.votes_to_plan}
-        former = sorted(named - self.names.keys())
-        numbered = {name: f"former-{place:04}" for place, name in enumerate(former, start=1)}
-        return self.names | numbered
+        Who does not travel, or is nobody any more, gets a number.
+        """
+        experts = self.study.rules.get("experts", [])
+        former = sorted(set(experts) - self.names.keys())
+        names = self.names | {
+            name: f"former-{place:04}" for place, name in enumerate(former, start=1)
+        }
+        renamed = {"experts": [names[name] for name in experts]} if experts else {}
+        return {**self.study.rules, **renamed}
 
     def _of(self, name: str, model: type[models.Model]) -> Rows:
         """What the study names or its jobs work on.
@@ -230,7 +225,6 @@ def travelling_rows(closure: Closure, rows: Rows) -> Iterator[list[Any]]:
             row["username"] = closure.accounts[row["id"]]
         elif model is Study:
             row["rules"] = closure.renamed_rules()
-            row["votes_to_plan"] = closure.renamed_votes_to_plan()
         yield list(row.values())
 
 

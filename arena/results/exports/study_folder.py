@@ -62,6 +62,7 @@ _SHOWN: dict[str, Value] = {
 _JUDGED: dict[str, Value] = {
     "outcome": "outcome",
     "both_miss": "both_miss",
+    "strength": "strength",
     "skip_reason": "reason",
     "aids": "aids",
     "ms_visible": "ms_visible",

@@ -69,6 +69,6 @@ def _list_row(vote: ListedVote) -> tuple[object, ...]:
         *(vote.ms_visible, vote.is_simulated),
         vote.at and vote.at.isoformat(timespec="milliseconds"),
         *(vote.position, vote.aids, vote.comment),
-        *(vote.left.augmentation, vote.right.augmentation),
+        *(vote.left.augmentation, vote.right.augmentation, vote.strength),
         *(vote.mark, vote.reason, vote.code),
     )

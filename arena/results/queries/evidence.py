@@ -91,6 +91,7 @@ class ListedVote:
     right: ShownSide
     outcome: str
     both_miss: bool = False
+    strength: str = ""
     reason: str = ""
     ms_visible: int | None = None
     aids: str = ""
@@ -275,6 +276,7 @@ def _list_vote(vote: Vote, mark: str, snapshot: Snapshot, evidence: Evidence) ->
         right=right,
         outcome=vote.outcome,
         both_miss=vote.both_miss,
+        strength=vote.strength,
         reason=vote.reason,
         ms_visible=vote.ms_visible,
         aids=vote.aids,

@@ -72,6 +72,7 @@ class Judged(NamedTuple):
         position: Of the matchup in the expert's own order, from 1.
         aids: What the expert looked with, joined by blanks.
         left_code, right_code: The augmentations that were shown.
+        strength: slightly or clearly better.
     """
 
     judge: str
@@ -94,6 +95,7 @@ class Judged(NamedTuple):
     comment: str = ""
     left_code: str = ""
     right_code: str = ""
+    strength: str = ""
 
     @property
     def winner(self) -> str | None:
@@ -255,7 +257,7 @@ def current_votes(study: Study, filters: Filters, last: int | None) -> list[Judg
         *("shown_left__contestant__slug", "shown_right__contestant__slug"),
         *("outcome", "both_miss", "is_simulated", F("mark"), "ms_visible"),
         *("matchup", "matchup__repeat_of", "at", "matchup__position", "aids", "comment"),
-        *("shown_left__code", "shown_right__code"),
+        *("shown_left__code", "shown_right__code", "strength"),
     )
     current = rows.exclude(Q(mark=LeftOut.SUPERSEDED.value)).order_by("pk")
     return [

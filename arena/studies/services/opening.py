@@ -206,7 +206,6 @@ def _insert(
     name: str, frozen: dict[str, Any], study_plan: StudyPlan, rules: PlanRules, has_simulated: bool
 ) -> Study:
     switches = {column: getattr(study_plan, column) for column in SWITCH_COLUMNS}
-    later = rules.votes_later
     try:
         with transaction.atomic():
             return Study.objects.create(
@@ -214,7 +213,6 @@ def _insert(
                 votes_per_expert=rules.votes_per_expert,
                 seed=rules.seed,
                 rules=frozen,
-                votes_to_plan=dict.fromkeys(rules.experts, later) if later else {},
                 opened_at=timezone.now(),
                 **switches | {"allow_simulated": has_simulated},
             )
@@ -293,11 +291,7 @@ def _plan_document(study: Study) -> dict[str, Any]:
     )
     lines = sorted((numbers[name], *rest) for name, *rest in rows)
     text = "".join(f"{json.dumps(line)}\n" for line in lines)
-    return {
-        "matchups": len(lines),
-        "planned_later": sum(study.votes_to_plan.values()),
-        "sha256": hashlib.sha256(text.encode()).hexdigest(),
-    }
+    return {"matchups": len(lines), "sha256": hashlib.sha256(text.encode()).hexdigest()}
 
 
 # --- The end -----------------------------------------------------------------------------------

@@ -8,7 +8,7 @@ from typing import Any, Self
 
 from arena.errors import NothingToPlan
 from arena.models import Snapshot, Study
-from arena.pairing.rules import MOST_ADAPTIVE, MOST_CHECKS, MOST_OVERLAP, MOST_REPEATS
+from arena.pairing.rules import MOST_CHECKS, MOST_OVERLAP, MOST_REPEATS
 from arena.voting.services.shown_pictures import SampleRule
 from augment.services.inputs import InputKind, input_field, inputs_of
 
@@ -180,12 +180,6 @@ class StudyPlan:
         "far they agree.",
         most=MOST_OVERLAP,
     )
-    adaptive: float = _percent(
-        "Planned by the votes",
-        "The last share of the votes goes to the pairs that tell most; 0 plans all before the "
-        "first vote.",
-        most=MOST_ADAPTIVE,
-    )
     hypotheses: tuple[str, ...] = input_field(
         InputKind.LINES,
         "Hypotheses",
@@ -209,6 +203,10 @@ class StudyPlan:
     allow_both_miss: bool = _switch(
         "Ask whether both miss",
         "Experts may add to Equal that both miss the instruction; it counts as a tie.",
+    )
+    ask_strength: bool = _switch(
+        "Ask how clear a preference is",
+        "Experts say slightly or clearly. The order is rated without it; a cross-check is shown.",
     )
     show_alike: bool = _switch(
         "Also show pairs that nobody can tell apart",
@@ -247,12 +245,7 @@ class StudyPlan:
 
 
 PLAN_INPUTS = inputs_of(StudyPlan)
-SHARES = {
-    "repeats": "repeat_share",
-    "checks": "check_share",
-    "overlap": "overlap_share",
-    "adaptive": "adaptive_share",
-}
+SHARES = {"repeats": "repeat_share", "checks": "check_share", "overlap": "overlap_share"}
 """What the frozen rules call a percentage; they keep it as a share."""
 SWITCH_COLUMNS = tuple(
     one.name

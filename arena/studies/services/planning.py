@@ -9,20 +9,10 @@ from typing import Self
 
 import numpy as np
 from django.contrib.auth.models import User
-from django.db import transaction
-from django.db.models import Count, Max
+from django.db.models import Max
 
-from arena.models import Matchup, Study, Vote
-from arena.pairing.later import (
-    Wanted,
-    contestants_of,
-    draw_units,
-    follow_on,
-    judges,
-    ratings_so_far,
-    units_of,
-)
-from arena.pairing.order import FloatArray
+from arena.models import Matchup, Study
+from arena.pairing.later import Wanted, follow_on
 from arena.pairing.plan import Check, Entry, PlannedMatchup, PlanRules
 from arena.pairing.rules import Grid, place_of, scenario_of
 from arena.studies.services.pictures import (
@@ -33,19 +23,14 @@ from arena.studies.services.pictures import (
     with_picture,
     without_lost_checks,
 )
-from arena.voting.queries.ballots import upcoming
 from arena.voting.queries.showings import LEGEND
 from arena.voting.services.shown_pictures import find_frames, frames_shown, sides_of
 from augment.models import Augmentation, Scenario
-from augment.services.events import log_change
 from augment.services.scenarios.pictures import legends_of_changes
-
-MOST_AHEAD = 12
-"""The most matchups that a browser may ask for; with as many waiting no new batch is needed."""
 
 _PLAIN = (
     *("votes_per_expert", "seed", "scenario_gap", "repeat_share", "repeat_distance"),
-    *("overlap_share", "check_share", "adaptive_share", "uniform_share", "batch_size"),
+    *("overlap_share", "check_share"),
 )
 """Rules that are kept as they are; studies opened before a rule existed go without it."""
 
@@ -221,90 +206,10 @@ class Planning:
 
     def follow(
         self, username: str, known: Sequence[PlannedMatchup], units: Sequence[Wanted]
-    ) -> tuple[list[PlannedMatchup], int]:
-        """Return an expert's next showings, and the scenario gap that they keep."""
+    ) -> list[PlannedMatchup]:
+        """Return an expert's next showings."""
         return follow_on(self.rules, self.grid, username, known, units, self.rng)
 
     def store(self, planned: Sequence[PlannedMatchup], experts: Iterable[User]) -> None:
         """Store what was planned."""
         store(self.study, planned, self.cells, experts, batch=self.number)
-
-
-def votes_left(study: Study, expert: User) -> int:
-    """Return how many votes of the expert the adaptive part still has to plan."""
-    return int(study.votes_to_plan.get(expert.username, 0))
-
-
-def next_pairs(*, study: Study, expert: User, n: int) -> list[Matchup]:
-    """Return the expert's next matchups, planned first where it is needed."""
-    if study.state != Study.State.OPEN:
-        return []
-    coming = upcoming(study=study, expert=expert, n=n)
-    if len(coming) < n and plan_batch(study=study, expert=expert):
-        coming = upcoming(study=study, expert=expert, n=n)
-    return coming
-
-
-def plan_batch(*, study: Study, expert: User) -> int:
-    """Plan an expert's next batch of the adaptive part, from the votes that there are now.
-
-    The log names the newest vote that it was planned by.
-
-    Returns:
-        How many matchups were planned; 0 where nothing is left to plan.
-    """
-    if not votes_left(study, expert):
-        return 0
-    with transaction.atomic():
-        study = Study.objects.select_for_update().get(pk=study.pk)
-        left = votes_left(study, expert)
-        waiting = study.matchups.filter(expert=expert, votes=None).count()
-        if not left or study.state != Study.State.OPEN or waiting >= MOST_AHEAD:
-            return 0
-        planning, known = Planning.begin(study), planned_so_far(study)
-        rules, grid, mine = planning.rules, planning.grid, known[expert.username]
-        scores, last_vote = _scores(study, contestants_of(grid))
-        ratings, covariance = ratings_so_far(scores)
-        units = draw_units(
-            grid,
-            {(unit.pair, unit.scenario) for unit in units_of(grid, mine)},
-            judges(grid, known),
-            ratings,
-            covariance,
-            rules.uniform_share,
-            min(left, rules.batch_size),
-            planning.rng,
-        )
-        planned, gap = planning.follow(expert.username, mine, units)
-        planning.store(planned, [expert])
-        # Where the expert knows every unit, the rest of the quota can't be filled.
-        rest = left - len(units) if units else 0
-        study.votes_to_plan = {**study.votes_to_plan, expert.username: rest}
-        study.save(update_fields=["votes_to_plan"])
-        after = {
-            "batch": planning.number,
-            "expert": str(expert.person.code),
-            "matchups": len(planned),
-            "votes": round(float(scores.sum())),
-            "last_vote": last_vote,
-            "scenario_gap": gap,
-        }
-        log_change(study, "plan batch", None, after=after)
-        return len(planned)
-
-
-def _scores(study: Study, names: list[str]) -> tuple[FloatArray, int]:
-    """Return what each contestant scored against each other, and the newest vote's row."""
-    places = {name: index for index, name in enumerate(names)}
-    scores = np.zeros((len(names), len(names)))
-    votes = Vote.objects.filter(matchup__study=study)
-    current = votes.filter(matchup__kind=Matchup.Kind.MAIN, superseded_by=None)
-    columns = ("shown_left__contestant__slug", "shown_right__contestant__slug", "outcome")
-    counted = current.order_by().values(*columns).annotate(n=Count("pk"))
-    won = {Vote.Outcome.LEFT: 1.0, Vote.Outcome.EQUAL: 0.5, Vote.Outcome.RIGHT: 0.0}
-    for left, right, outcome, n in counted.values_list(*columns, "n"):
-        if outcome != Vote.Outcome.SKIP:
-            share = won[Vote.Outcome(outcome)]
-            scores[places[left], places[right]] += n * share
-            scores[places[right], places[left]] += n * (1.0 - share)
-    return scores, votes.aggregate(last=Max("pk"))["last"] or 0

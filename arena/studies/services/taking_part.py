@@ -20,7 +20,7 @@ from arena.people.services import SIGNED_IN, check_may_change, create_person, en
 from arena.studies.queries import expert_named, find_silent, find_unfinished
 from arena.studies.services.drafts import rename_in_drafts
 from arena.studies.services.opening import find_named
-from arena.studies.services.planning import Planning, planned_so_far, votes_left
+from arena.studies.services.planning import Planning, planned_so_far
 from augment.errors import Conflict
 from augment.services.events import log_change
 from augment.services.texts import one_line
@@ -63,20 +63,14 @@ def hand_over(
     positions = {row.position for row in rows}
     open_pairs = [one for one in known[username] if one.position in positions]
     units = units_of(planning.grid, open_pairs)
-    each, rest = divmod(votes_left(study, giver), len(names))
-    later = {name: each + (index < rest) for index, name in enumerate(names)}
-    if not units and not any(later.values()):
+    if not units:
         raise NothingToPlan(f"{username} has nothing left to hand over.")
     dealt = deal(planning.grid, known, names, units, planning.rng)
-    planned = [one for name in names for one in planning.follow(name, known[name], dealt[name])[0]]
+    planned = [one for name in names for one in planning.follow(name, known[name], dealt[name])]
     Matchup.objects.filter(pk__in=[row.pk for row in rows]).delete()
     planning.store(planned, takers)
     study.experts.add(*takers)
-    if study.votes_to_plan:
-        waiting = {**study.votes_to_plan, username: 0}
-        study.votes_to_plan = waiting | {n: waiting.get(n, 0) + later[n] for n in names}
-        study.save(update_fields=["votes_to_plan"])
-    taken = {name: len(dealt[name]) + later[name] for name in names}
+    taken = {name: len(dealt[name]) for name in names}
     withdrawn = [
         [row.position, row.kind, row.scenario.slug]
         + [side.contestant.slug for side in (row.left, row.right)]
@@ -205,7 +199,7 @@ def _take_on(study: Study, enrolment: Enrolment, external_id: str) -> EnrolledVo
     units = choose_for_newcomer(planning.grid, counts, enrolment.votes_each, planning.rng)
     if not units:
         raise NothingToPlan(gettext("The study has no pair that could be shown."))
-    planned, _ = planning.follow(person.username, [], units)
+    planned = planning.follow(person.username, [], units)
     planning.store(planned, [person])
     study.experts.add(person)
     voter = EnrolledVoter.objects.create(
@@ -297,11 +291,8 @@ def forget_identity(*, user: User, actor: User) -> None:
 
 def _rename_in_plans(known_as: str, name: str) -> None:
     """Replace a name in the rules of studies."""
-    named = {known_as: name}
     for study in Study.objects.select_for_update().order_by("pk"):
         experts = study.rules.get("experts", [])
         if known_as in experts:
-            study.rules["experts"] = [named.get(expert, expert) for expert in experts]
-        if known_as in experts or known_as in study.votes_to_plan:
-            study.votes_to_plan = {named.get(n, n): v for n, v in study.votes_to_plan.items()}
-            study.save(update_fields=["rules", "votes_to_plan"])
+            study.rules["experts"] = [name if one == known_as else one for one in experts]
+            study.save(update_fields=["rules"])

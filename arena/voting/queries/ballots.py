@@ -85,7 +85,12 @@ def own_votes(study: Study, expert: User) -> QuerySet[Vote]:
 
 
 def upcoming(*, study: Study, expert: User, n: int) -> list[Matchup]:
-    """Return the next matchups of this expert, at most n, with what a browser needs of them."""
+    """Return the next matchups of this expert, at most n, with what a browser needs of them.
+
+    There is none of a study that takes no votes.
+    """
+    if study.state != Study.State.OPEN:
+        return []
     rows = Matchup.objects.filter(study=study, expert=expert, votes=None)
     needed = (
         *("code", "study_id", "expert_id", "position", "kind", "view"),
@@ -118,9 +123,7 @@ def voting_state(
     }
     row: Any = Study.objects.raw(_STATE, values)[0]  # with the counts as attributes
     progress = VotingProgress(
-        total=row.total + row.votes_to_plan.get(expert.username, 0),
-        voted=row.decided - row.skipped,
-        skipped=row.skipped,
+        total=row.total, voted=row.decided - row.skipped, skipped=row.skipped
     )
     return row, progress, row.just_now
 
@@ -128,7 +131,7 @@ def voting_state(
 # Thousands of votes ask this, and building the query anew cost as much as asking it.
 _STATE = """
 SELECT study.id, study.code, study.name, study.state, study.allow_both_miss,
-       study.allow_replay, study.allow_measures, study.votes_to_plan,
+       study.ask_strength, study.allow_replay,
        (SELECT COUNT(*) FROM arena_matchup matchup
         WHERE matchup.study_id = study.id AND matchup.expert_id = %(expert)s) AS total,
        (SELECT COUNT(*) FROM arena_vote vote
@@ -161,7 +164,7 @@ def tallies(study: Study) -> list[ExpertTally]:
         lines.append(
             ExpertTally(
                 expert=expert,
-                total=total_of.get(expert.pk, 0) + study.votes_to_plan.get(expert.username, 0),
+                total=total_of.get(expert.pk, 0),
                 voted=left_wins + ties + right_wins,
                 skipped=skipped,
                 left_wins=left_wins,

@@ -25,6 +25,7 @@ from augment.services.texts import make_storable
 
 LONGEST_COMMENT = 1000
 PACE_WINDOW = timedelta(seconds=5)
+PREFERENCES = (Vote.Outcome.LEFT, Vote.Outcome.RIGHT)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -35,6 +36,7 @@ class Decision:
     matchup: UUID
     outcome: Vote.Outcome
     both_miss: bool
+    strength: str
     reason: str
     comment: str
     aids: str
@@ -62,6 +64,7 @@ def decision_of(
     key: UUID | str,
     outcome: str,
     both_miss: bool = False,
+    strength: str = "",
     reason: str = "",
     comment: str = "",
     aids: Iterable[str] = (),
@@ -75,6 +78,7 @@ def decision_of(
         key: Made by the browser, one per decision.
         outcome: "left", "equal", "right" or "skip"; the side is kept apart from who won.
         both_miss: With "equal": both miss the instruction. Counts as a tie.
+        strength: With "left" or "right": "slightly" or "clearly", empty where it was not said.
         reason: With "skip": why, one of Vote.SkipReason.
         comment: Whatever the expert wants to add.
         aids: What was used to look, out of AIDS.
@@ -89,6 +93,9 @@ def decision_of(
     wrong = {}
     if both_miss and chosen != Vote.Outcome.EQUAL:
         wrong["both_miss"] = "Both can only miss the instruction where they are equal."
+    if strength and (strength not in Vote.Strength or chosen not in PREFERENCES):
+        allowed = " or ".join(Vote.Strength.values)
+        wrong["strength"] = f"Only a preference has a strength: {allowed}."
     if chosen == Vote.Outcome.SKIP and reason not in Vote.SkipReason.values:
         wrong["reason"] = f"A skip needs one of: {', '.join(Vote.SkipReason.values)}."
     if chosen != Vote.Outcome.SKIP and reason:
@@ -104,6 +111,7 @@ def decision_of(
         matchup=UUID(str(matchup_code)),
         outcome=chosen,
         both_miss=both_miss,
+        strength=strength,
         reason=reason,
         comment=make_storable(comment.strip()),
         aids=" ".join(aid for aid in AIDS if aid in used),
@@ -190,6 +198,7 @@ def _insert(matchup: Matchup, expert: User, decision: Decision, old: Vote | None
         outcome=decision.outcome,
         winner_id=winners.get(decision.outcome),
         both_miss=decision.both_miss,
+        strength=decision.strength,
         reason=decision.reason,
         comment=decision.comment,
         aids=decision.aids,
@@ -217,8 +226,9 @@ def _check_replay(vote: Vote, matchup: Matchup, decision: Decision) -> None:
     if vote.matchup_id != matchup.pk:
         raise Conflict("This key belongs to another vote; make a new key for every decision.")
     old = None if vote.supersedes is None else vote.supersedes.key
-    stored = (vote.outcome, vote.both_miss, vote.reason, old)
-    if stored != (decision.outcome, decision.both_miss, decision.reason, decision.supersedes):
+    stored = (vote.outcome, vote.both_miss, vote.strength, vote.reason, old)
+    given = (decision.outcome, decision.both_miss, decision.strength, decision.reason)
+    if stored != (*given, decision.supersedes):
         raise AlreadyDecided(vote.outcome)
 
 
@@ -232,5 +242,7 @@ def _check_allowed(decision: Decision, study: Study) -> None:
     _check_open(study)
     if decision.both_miss and not study.allow_both_miss:
         raise InvalidVote({"both_miss": "This study does not ask whether both miss."})
+    if decision.strength and not study.ask_strength:
+        raise InvalidVote({"strength": "This study does not ask how clear a preference is."})
     if "replay" in decision.aids.split() and not study.allow_replay:
         raise InvalidVote({"aids": "This study has no drives to play."})

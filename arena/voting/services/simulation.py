@@ -6,15 +6,13 @@ key, as people do.
 """
 
 import math
-from collections.abc import Iterator
 from typing import Any
 from uuid import uuid5
 
 import numpy as np
 from django.db import transaction
 
-from arena.models import Matchup, Study, Vote
-from arena.studies.services.planning import plan_batch
+from arena.models import Study, Vote
 from arena.voting.services.casting import cast_vote, decision_of
 from augment.errors import Conflict
 from augment.models import Augmentation
@@ -48,7 +46,9 @@ def simulate_votes(*, study: Study, seed: int) -> int:
         raise Conflict(f"The study {study.name!r} does not allow simulated votes.")
     rng = np.random.default_rng(seed)
     cast = 0
-    for matchup in _waiting(study):
+    waiting = study.matchups.filter(votes=None, expert__person__is_simulated=True)
+    shown = waiting.select_related("expert__person", "scenario", "left", "right")
+    for matchup in shown.order_by("expert__username", "position"):
         reference = matchup.scenario.reference
         advantage = _error_m(reference, matchup.right) - _error_m(reference, matchup.left)
         decision = decision_of(
@@ -67,20 +67,6 @@ def simulate_votes(*, study: Study, seed: int) -> int:
             after={"votes": cast, "seed": seed},
         )
     return cast
-
-
-def _waiting(study: Study) -> Iterator[Matchup]:
-    """Everything that simulated experts have not judged; what is planned later comes last."""
-    while True:
-        yield from (
-            study.matchups.filter(votes=None, expert__person__is_simulated=True)
-            .select_related("expert__person", "scenario", "left", "right")
-            .order_by("expert__username", "position")
-        )
-        experts = study.experts.filter(person__is_simulated=True).order_by("username")
-        study.refresh_from_db(fields=["votes_to_plan"])
-        if not sum(plan_batch(study=study, expert=expert) for expert in experts):
-            return
 
 
 def _judge(advantage_m: float, rng: np.random.Generator) -> str:
