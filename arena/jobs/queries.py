@@ -12,7 +12,6 @@ from django.db.models import Count, Q
 
 from arena.errors import NotYours
 from arena.models import LabellingRound, LabelTask, Study
-from arena.voting.queries.remembering import Remembered, plan_of
 from augment.models import (
     Augmentation,
     Contestant,
@@ -106,12 +105,9 @@ def before_of(row: Simulation) -> Simulation | None:
 
 
 def shown_augmentations(study: Study) -> frozenset[int]:
-    """The primary keys of all augmentations in the study's matchups; two queries at most."""
+    """The primary keys of all augmentations in the study's matchups; one query."""
     rows = study.matchups.order_by().values_list("left", "right").distinct()
-    return _SHOWN.get(plan_of(study), lambda: frozenset(pk for pair in rows for pk in pair))
-
-
-_SHOWN: Remembered[frozenset[int]] = Remembered(8)
+    return frozenset(pk for pair in rows for pk in pair)
 
 
 def spent_on(augmentations: Collection[int]) -> dict[int, Spending]:

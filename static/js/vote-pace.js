@@ -1,7 +1,7 @@
 // One's own pace, for nobody else, and a word about a pause after long work.
 import { at, given, say, text } from "./vote-page.js";
 
-const PAUSE_VOTES = 50;
+const PAUSE_VOTES = 40;
 const PAUSE_MS = 25 * 60_000;
 // Who was away for so long has had one.
 const AWAY_MS = 3 * 60_000;

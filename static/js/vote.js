@@ -130,6 +130,7 @@ function undo(vote = votes[review ? votes.indexOf(review) + 1 : 0]) {
 
 function leave() {
   lens.flip(false);
+  if (!at("pause").hidden) rest();
   if (!review) return;
   review = onScreen = null;
   page.drawReview(null);

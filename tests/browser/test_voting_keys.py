@@ -95,11 +95,17 @@ def test_looking_closely_by_keys_moves_both_pictures_and_is_kept_with_the_vote(
     for reading in page.locator(".reading").all():
         expect(reading).to_have_text("3.0 m ahead, 1.0 m left (3.2 m)")
     page.keyboard.up("m")
+    page.keyboard.press("g")
+    expect(page.locator(".rings").first).to_be_hidden()
+    page.keyboard.press("t")
+    expect(page.locator("#pace")).to_have_text("")
     page.keyboard.press("0")
     assert page.locator(".scene").first.get_attribute("style") == ""
     press(page, "1")
     all_sent(page, 1)
     assert Vote.objects.get().aids == "zoom ruler flip"
+    page.keyboard.press("t")
+    expect(page.locator("#pace")).to_contain_text("1 done today")
 
 
 def test_single_keys_can_be_switched_off_for_good(booth: Booth) -> None:
