@@ -21,7 +21,7 @@ from arena.exports.formats import (
 )
 from arena.results.exports.drawing import MARK, house_style, name_lines, write_figure
 from arena.results.exports.tables import shown_name
-from augment.models import GenerationJob
+from augment.models import Contestant, GenerationJob
 from augment.services.judging.displacement import (
     PLACED_EXACTLY,
     By,
@@ -64,7 +64,7 @@ class DisplacementTable:
     @property
     def simulated(self) -> bool:
         """Whether a contestant in it is simulated."""
-        return any(group.is_simulated for group in self.groups)
+        return any(group.contestant.is_simulated for group in self.groups)
 
     @property
     def types_text(self) -> str:
@@ -102,11 +102,16 @@ def displacement_table(job: GenerationJob, *, by: By) -> DisplacementTable:
     )
 
 
+def name_of(contestant: Contestant) -> str:
+    """Return a contestant's name, with "(simulated)" where that is so."""
+    return shown_name(contestant.name, contestant.is_simulated)
+
+
 GROUPS: Columns = {
     "group": ("heading", TEXT),
-    "contestant": (lambda group: shown_name(group.contestant, group.is_simulated), TEXT),
-    **{name: (name, TEXT) for name in ("slug", "model", "variant")},
-    "simulated": ("is_simulated", YES_NO),
+    "contestant": (lambda group: name_of(group.contestant), TEXT),
+    **{name: (f"contestant.{name}", TEXT) for name in ("slug", "model", "variant")},
+    "simulated": ("contestant.is_simulated", YES_NO),
     **{name: (f"summary.{name}", WHOLE) for name in ("augmentations", "n", "missing", "surplus")},
     **{
         name: (f"summary.box.{name}", NUMBER)
@@ -149,8 +154,8 @@ OBJECTS: Columns = {
     **WHOSE,
     "augmentation": ("row.code", TEXT),
     "state": ("row.state", TEXT),
-    "object": ("standing", TEXT),
-    "class": ("object_class", TEXT),
+    "object": ("object", TEXT),
+    "class": ("class", TEXT),
     "reference": ("reference.id", TEXT),
     "reference_x_m": ("reference.x_m", NUMBER),
     "reference_y_m": ("reference.y_m", NUMBER),
@@ -193,7 +198,7 @@ def box_plot(table: DisplacementTable, *, file_format: str) -> bytes:
             meanprops={"marker": "D", "markersize": 3.5, "markerfacecolor": "white"},
             flierprops={"marker": "o", "markersize": 3.2, "markeredgecolor": MARK},
         )
-        simulated = [group.is_simulated for group in table.groups]
+        simulated = [group.contestant.is_simulated for group in table.groups]
         name_lines(axes, [_name(table, group) for group in table.groups], simulated)
         _scale(axes, list(boxes.values()))
         marks = ", with simulated contestants" if table.simulated else ""
@@ -220,7 +225,7 @@ def _stats(group: Group) -> dict[str, Any]:
 
 def _name(table: DisplacementTable, group: Group) -> str:
     """Return what a box is called: its group, and how many objects it stands for."""
-    name = shown_name(group.contestant, group.is_simulated)
+    name = name_of(group.contestant)
     heading = "" if table.by is By.CONTESTANT else f"{group.heading}: "
     summary = group.summary
     counts = {"n": summary.n, "missing": summary.missing, "surplus": summary.surplus}

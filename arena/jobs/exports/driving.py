@@ -73,7 +73,7 @@ def _percent_of(kind: str, line: DrivingLine) -> float | None:
 
 COLUMNS: Columns = {
     "scenarios": (lambda line: shown_name(line.name, line.is_simulated), TEXT),
-    **{name: (name, TEXT) for name in ("slug", "model", "variant")},
+    **{name: (f"contestant.{name}", TEXT) for name in ("slug", "model", "variant")},
     "simulated": ("is_simulated", YES_NO),
     "score_percent": (lambda line: _percent(line.mean), NUMBER),
     "before_percent": (lambda line: _percent(line.before), NUMBER),

@@ -3,6 +3,7 @@
 from collections import defaultdict
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from django.db.models import Count, Q
@@ -17,10 +18,10 @@ from arena.exports.formats import (
     sheet_of,
     table_formats,
 )
+from arena.jobs.exports.displacement import name_of
 from arena.models import FaultLabel
 from arena.rating.lines import UNKNOWN, escape, latex_table
 from arena.rating.reliability import DifferenceMetric, cohens_kappa, krippendorff_alpha
-from arena.results.exports.tables import shown_name
 from augment.models import Augmentation, Contestant, GenerationJob
 from augment.services.judging.findings import FaultClass
 
@@ -32,85 +33,33 @@ _LABEL = (
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class FaultLine:
-    """One contestant's faults.
-
-    Attributes:
-        position, heading, logic: Augmentations with that fault, one with two counts in both; None
-            where nothing was labelled.
-        labelled: Augmentations with a label.
-        labels: Labels on them, over all experts.
-        without_modification: Unreadable and refused answers: nobody labels them, each is a miss.
-    """
-
-    name: str
-    slug: str
-    is_simulated: bool
-    position: int | None
-    heading: int | None
-    logic: int | None
-    labelled: int
-    labels: int
-    without_modification: int
-
-    @property
-    def all(self) -> int | None:
-        """The sum over the classes, as the paper has it, and one for each answer that is none."""
-        seen = sum(count or 0 for count in (self.position, self.heading, self.logic))
-        return seen + self.without_modification if self.counted else None
-
-    @property
-    def counted(self) -> int:
-        """Augmentations that are judged: labelled, or without anything to label."""
-        return self.labelled + self.without_modification
-
-    @property
-    def shown_counts(self) -> tuple[str, ...]:
-        """All, position, heading and logic; two hyphens where nothing was labelled."""
-        counts = (self.all, self.position, self.heading, self.logic)
-        return tuple(UNKNOWN if count is None else str(count) for count in counts)
-
-    @property
-    def shown_name(self) -> str:
-        """The name, with "(simulated)" where that is so."""
-        return shown_name(self.name, self.is_simulated)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class LabelAgreement:
-    """How well the labels of one class of faults agree; None is undefined.
-
-    Attributes:
-        kappa: Cohen's, of the checks' first guess and the experts.
-        n: Labels with a guess beside them.
-        alpha: Krippendorff's, nominal, of the experts among themselves.
-        pictures: Augmentations that at least two experts have labelled.
-    """
-
-    fault: str
-    kappa: float | None
-    n: int
-    alpha: float | None
-    pictures: int
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class FaultTable:
-    """All contestants of a job, by name."""
+    """The faults of a job.
+
+    Attributes:
+        lines: A dict a contestant, by name. `position`, `heading` and `logic` are augmentations
+            with that fault, one with two counts in both; `all` is their sum, as the paper has it,
+            and one for each unreadable or refused answer (`missed`), which nobody labels. They
+            are None where nothing was labelled. `labels` are those on the augmentations
+            `labelled`, over all experts; `counted` are judged: labelled or missed.
+        agreement: A dict a class of faults. `kappa` is Cohen's, of the checks' first guess and the
+            experts over `n` labels; `alpha` is Krippendorff's, nominal, of the experts among
+            themselves over the `pictures` that two or more have labelled. None is undefined.
+    """
 
     job: str
-    lines: tuple[FaultLine, ...]
-    agreement: tuple[LabelAgreement, ...]
+    lines: list[dict[str, Any]]
+    agreement: list[dict[str, Any]]
 
     @property
     def labels(self) -> int:
         """Over all contestants."""
-        return sum(line.labels for line in self.lines)
+        return sum(line["labels"] for line in self.lines)
 
     @property
     def counted(self) -> int:
         """Augmentations that are judged, over all contestants."""
-        return sum(line.counted for line in self.lines)
+        return sum(line["counted"] for line in self.lines)
 
 
 def fault_table(job: GenerationJob) -> FaultTable:
@@ -129,35 +78,23 @@ def fault_table(job: GenerationJob) -> FaultTable:
     mine = Q(augmentations__job=job)
     missed = Count("augmentations", filter=mine & Q(augmentations__state__in=_MISSES))
     contestants = Contestant.objects.filter(mine).annotate(missed=missed)
-    lines = []
-    for who in contestants.only("name", "slug", "kind").order_by("name", "slug"):
-        labelled = by_contestant[who.pk]
-        counts = {
-            fault.value: sum(_is_seen(fault, own) for own in labelled) if labelled else None
-            for fault in FaultClass
-        }
-        line = FaultLine(
-            name=who.name,
-            slug=who.slug,
-            is_simulated=who.is_simulated,
-            labelled=len(labelled),
-            labels=sum(map(len, labelled)),
-            without_modification=who.missed,
-            **counts,
-        )
-        lines.append(line)
-    agreement = tuple(_agreement(fault, labels, by_augmentation.values()) for fault in FaultClass)
-    return FaultTable(job=job.name, lines=tuple(lines), agreement=agreement)
+    lines = [
+        _line(who, who.missed, by_contestant[who.pk])
+        for who in contestants.only("name", "slug", "kind").order_by("name", "slug")
+    ]
+    agreement = [_agreement(fault, labels, by_augmentation.values()) for fault in FaultClass]
+    return FaultTable(job=job.name, lines=lines, agreement=agreement)
 
 
+COUNTS = ("all", "position", "heading", "logic")
 COLUMNS: Columns = {
     "contestant": ("shown_name", TEXT),
     "slug": ("slug", TEXT),
     "simulated": ("is_simulated", YES_NO),
-    **{name: (name, WHOLE) for name in ("all", "position", "heading", "logic")},
+    **{name: (name, WHOLE) for name in COUNTS},
     "augmentations_labelled": ("labelled", WHOLE),
     "labels": ("labels", WHOLE),
-    "without_modification": ("without_modification", WHOLE),
+    "without_modification": ("missed", WHOLE),
 }
 
 
@@ -173,19 +110,19 @@ def fault_latex(table: FaultTable) -> bytes:
     """
     comments = [f"{table.job}: {table.labels} labels"]
     comments += [
-        f"{line.fault}: Cohen's kappa of the checks' first guess and the experts "
-        f"{_printed(line.kappa)} (n={line.n}), Krippendorff's alpha of the experts among "
-        f"themselves {_printed(line.alpha)} (pictures={line.pictures})"
+        f"{line['fault']}: Cohen's kappa of the checks' first guess and the experts "
+        f"{_printed(line['kappa'])} (n={line['n']}), Krippendorff's alpha of the experts among "
+        f"themselves {_printed(line['alpha'])} (pictures={line['pictures']})"
         for line in table.agreement
     ]
     rows = (
         (
-            escape(line.shown_name),
-            *line.shown_counts,
-            *(str(line.without_modification), str(line.counted)),
+            escape(line["shown_name"]),
+            *(UNKNOWN if line[name] is None else str(line[name]) for name in COUNTS),
+            *(str(line["missed"]), str(line["counted"])),
         )
         for line in table.lines
-        if line.counted
+        if line["counted"]
     )
     heads = ("Model", "All", "Position", "Heading", "Logic", "No answer", "n")
     caption = "Error Count per Category."
@@ -198,6 +135,25 @@ def fault_latex(table: FaultTable) -> bytes:
 FORMATS = table_formats(fault_sheet) | formats(latex=fault_latex)
 
 
+def _line(
+    who: Contestant, missed: int, labelled: Sequence[Sequence[FaultLabel]]
+) -> dict[str, Any]:
+    seen = {fault.value: sum(_is_seen(fault, own) for own in labelled) for fault in FaultClass}
+    counted = len(labelled) + missed
+    return {
+        "name": who.name,
+        "shown_name": name_of(who),
+        "slug": who.slug,
+        "is_simulated": who.is_simulated,
+        "all": sum(seen.values()) + missed if counted else None,
+        **(seen if labelled else dict.fromkeys(seen)),
+        "labelled": len(labelled),
+        "labels": sum(map(len, labelled)),
+        "missed": missed,
+        "counted": counted,
+    }
+
+
 def _is_seen(fault: FaultClass, labels: Sequence[FaultLabel]) -> bool:
     seen: int = sum(getattr(label, fault.value) for label in labels)
     return 2 * seen > len(labels)
@@ -205,7 +161,7 @@ def _is_seen(fault: FaultClass, labels: Sequence[FaultLabel]) -> bool:
 
 def _agreement(
     fault: FaultClass, labels: Sequence[FaultLabel], of_rows: Iterable[list[FaultLabel]]
-) -> LabelAgreement:
+) -> dict[str, Any]:
     guessed = [label for label in labels if label.guessed_position is not None]
     several = [own for own in of_rows if len(own) > 1]
     alpha = None
@@ -213,16 +169,16 @@ def _agreement(
         seen = np.array([sum(getattr(label, fault.value) for label in own) for own in several])
         said = np.column_stack([[len(own) for own in several] - seen, np.zeros_like(seen), seen])
         alpha = krippendorff_alpha(said.astype(np.int64), DifferenceMetric.NOMINAL)
-    return LabelAgreement(
-        fault=fault.value,
-        kappa=cohens_kappa(
+    return {
+        "fault": fault.value,
+        "kappa": cohens_kappa(
             [getattr(label, f"guessed_{fault.value}") for label in guessed],
             [getattr(label, fault.value) for label in guessed],
         ),
-        n=len(guessed),
-        alpha=alpha,
-        pictures=len(several),
-    )
+        "n": len(guessed),
+        "alpha": alpha,
+        "pictures": len(several),
+    }
 
 
 def _printed(value: float | None) -> str:

@@ -1,20 +1,21 @@
 """How far stored augmentations are from their references: one by one, in groups, by object."""
 
 from collections import defaultdict
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 from itertools import combinations
+from typing import Any
 
 from django.db.models import QuerySet
 
 from augment.errors import InvalidDocument
-from augment.metrics.displacement import CLASS_OF, ObjectClass, Summary, are_alike, displacement
+from augment.metrics.displacement import CLASS_OF, Summary, are_alike, displacement
 from augment.metrics.displacement import Displacement as Displacement
 from augment.metrics.displacement import summarise as summarise
-from augment.models import Augmentation, GenerationJob
+from augment.models import Augmentation, Contestant, GenerationJob
 from augment.scene.codec import modification_from_document
-from augment.scene.entities import Modification, ScenarioType, TrafficAgent
+from augment.scene.entities import Modification, ScenarioType
 from augment.services.scenarios.scenes import type_rank
 from augment.variants.recipes import SPELLING, spell_variant
 
@@ -67,42 +68,11 @@ class Group:
 
     Attributes:
         heading: What they have in common: a type, a variant, or the contestant's name.
-        contestant: The contestant's name; slug, model and variant as its row has them.
     """
 
     heading: str
-    contestant: str
-    slug: str
-    model: str
-    variant: str
-    is_simulated: bool
+    contestant: Contestant
     summary: Summary
-
-
-class MatchState(StrEnum):
-    """What became of an object."""
-
-    MATCHED = "matched"
-    MISSING = "missing"
-    SURPLUS = "surplus"
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class DisplacedObject:
-    """One object of one augmentation, in the ego frame.
-
-    Attributes:
-        reference: As the reference places it, None for what is surplus.
-        generated: As the contestant places it, None for what is missing.
-        distance_m: Between the centres of both, None without the other.
-    """
-
-    row: Augmentation
-    standing: MatchState
-    object_class: ObjectClass
-    reference: TrafficAgent | None
-    generated: TrafficAgent | None
-    distance_m: float | None
 
 
 def of_job(job: GenerationJob) -> list[Measured]:
@@ -135,7 +105,14 @@ def groups(measured: Iterable[Measured], *, by: By) -> list[Group]:
             rank, heading = _group_of(one.row, by)
             contestant = one.row.contestant
             cells[rank, heading.lower(), contestant.name.lower(), contestant.slug].append(one)
-    return [_sum_up(cell, by) for _, cell in sorted(cells.items())]
+    return [
+        Group(
+            heading=_group_of(cell[0].row, by)[1],
+            contestant=cell[0].row.contestant,
+            summary=summarise([one.displacement for one in cell if one.displacement is not None]),
+        )
+        for _, cell in sorted(cells.items())
+    ]
 
 
 def _group_of(row: Augmentation, by: By) -> tuple[int, str]:
@@ -149,24 +126,13 @@ def _group_of(row: Augmentation, by: By) -> tuple[int, str]:
     return rank, spell_variant(row.contestant.variant) or NO_VARIANT
 
 
-def _sum_up(cell: Sequence[Measured], by: By) -> Group:
-    row = cell[0].row
-    return Group(
-        heading=_group_of(row, by)[1],
-        contestant=row.contestant.name,
-        slug=row.contestant.slug,
-        model=row.contestant.model,
-        variant=row.contestant.variant,
-        is_simulated=row.contestant.is_simulated,
-        summary=summarise([one.displacement for one in cell if one.displacement is not None]),
-    )
-
-
-def objects_of(job: GenerationJob) -> Iterator[DisplacedObject]:
+def objects_of(job: GenerationJob) -> Iterator[dict[str, Any]]:
     """Yield every object of every measured augmentation, by scenario and contestant.
 
-    In each the matched ones come first, in the order in which they were matched. What has no
-    displacement (see `Unmeasured`) has no objects.
+    Each is a dict: the `row` that it is of; `object`, whether it is matched, missing or surplus;
+    its `class`; where the `reference` and the `generated` one place it, None where only the other
+    has it; and their `distance_m`. The matched ones come first, in the order in which they were
+    matched. What has no displacement (see `Unmeasured`) has no objects.
     """
     for one in of_job(job):
         if one.displacement is None:
@@ -177,21 +143,19 @@ def objects_of(job: GenerationJob) -> Iterator[DisplacedObject]:
         )
         found = one.displacement
         for standing, reference_id, generated_id, distance_m in (
-            *((MatchState.MATCHED, m.reference, m.generated, m.distance_m) for m in found.matches),
-            *((MatchState.MISSING, name, "", None) for name in found.missing),
-            *((MatchState.SURPLUS, "", name, None) for name in found.surplus),
+            *(("matched", m.reference, m.generated, m.distance_m) for m in found.matches),
+            *(("missing", name, "", None) for name in found.missing),
+            *(("surplus", "", name, None) for name in found.surplus),
         ):
             reference, generated = wanted.get(reference_id), placed.get(generated_id)
-            agent = reference or generated
-            assert agent is not None
-            yield DisplacedObject(
-                row=one.row,
-                standing=standing,
-                object_class=CLASS_OF[agent.type],
-                reference=reference,
-                generated=generated,
-                distance_m=distance_m,
-            )
+            yield {
+                "row": one.row,
+                "object": standing,
+                "class": CLASS_OF[(wanted | placed)[reference_id or generated_id].type],
+                "reference": reference,
+                "generated": generated,
+                "distance_m": distance_m,
+            }
 
 
 def alike_pairs(cells: Mapping[tuple[str, str], Augmentation]) -> tuple[tuple[str, str, str], ...]:

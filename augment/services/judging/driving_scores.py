@@ -8,7 +8,7 @@ from typing import Any
 
 from django.db.models import Q
 
-from augment.models import GenerationJob, Scenario, Simulation
+from augment.models import Contestant, GenerationJob, Scenario, Simulation
 from augment.scene.entities import ScenarioType, in_type_order
 from augment.services.judging.simulations import SCORES, Options
 
@@ -17,7 +17,7 @@ CLOSE_M = 0.3
 """A least clearance below this is marked wherever a score is shown; the score does not ask."""
 
 _COLUMNS = (
-    *("code", "state", "reason", "subject", "nuplan_score", "interplan_score", "document"),
+    *("state", "reason", "subject", "nuplan_score", "interplan_score", "document"),
     *("scenario__type", "augmentation__contestant__name", "augmentation__contestant__slug"),
     *("augmentation__contestant__model", "augmentation__contestant__variant"),
     "augmentation__contestant__kind",
@@ -29,7 +29,7 @@ class DrivingLine:
     """The mean score of one contestant, or of the scenes without any.
 
     Attributes:
-        slug: Of the contestant; empty for the scenes before the change and the references.
+        contestant: None for the scenes before the change and the references.
         drives: How many count: those whose scene was also driven before the change.
         failed: How many could not be driven.
         mean: 0 to 1, None without drives.
@@ -43,10 +43,7 @@ class DrivingLine:
 
     subject: str
     name: str
-    slug: str = ""
-    model: str = ""
-    variant: str = ""
-    is_simulated: bool = False
+    contestant: Contestant | None
     drives: int
     failed: int
     mean: float | None
@@ -56,6 +53,11 @@ class DrivingLine:
     close: int
     collided: int
     braked: int
+
+    @property
+    def is_simulated(self) -> bool:
+        """Whether its contestant is simulated."""
+        return self.contestant is not None and self.contestant.is_simulated
 
     @property
     def lowered(self) -> float | None:
@@ -76,7 +78,6 @@ class DrivingScores:
         under_way: How many drives wait or run.
         failures: Why drives failed, with how often.
         outlasting: How many drives went on after the end of their recording.
-        codes: By the key of an augmentation the code of its drive.
     """
 
     title: str
@@ -87,7 +88,6 @@ class DrivingScores:
     under_way: int
     failures: tuple[tuple[str, int], ...]
     outlasting: int
-    codes: dict[int, str]
 
     @property
     def done(self) -> int:
@@ -186,7 +186,6 @@ def _scores(title: str, which: Q, options: Options, score: str) -> DrivingScores
         under_way=sum(row.state in Simulation.UNDER_WAY for row in rows),
         failures=tuple(sorted(failures.items(), key=lambda item: (-item[1], item[0]))),
         outlasting=sum(bool(_document(row).get("outlasts_recording")) for row in rows),
-        codes={row.augmentation_id: str(row.code) for row in rows if row.augmentation_id},
     )
 
 
@@ -202,10 +201,7 @@ def _line(
     return DrivingLine(
         subject=first.subject,
         name=who.name if who else first.get_subject_display(),
-        slug=who.slug if who else "",
-        model=who.model if who else "",
-        variant=who.variant if who else "",
-        is_simulated=who is not None and who.is_simulated,
+        contestant=who,
         drives=len(paired),
         failed=sum(row.state == State.FAILED for row in cell),
         mean=_mean(list(values.values())),
