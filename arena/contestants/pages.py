@@ -30,7 +30,7 @@ from augment.services.endpoints.known_endpoints import (
 )
 from augment.services.endpoints.probing import plan_probe
 from augment.services.endpoints.treatments import respondents_of
-from augment.services.events import retire, take_back
+from augment.services.events import retire
 from augment.services.inputs import inputs_of, read_request, read_values
 from augment.services.running.workers import workforce
 from augment.tasks import enqueue_probe
@@ -153,8 +153,7 @@ def new_contestant_page(request: HttpRequest) -> HttpResponse:
 def set_retired(request: HttpRequest, code: uuid.UUID) -> None:
     """Retire a contestant, or take that back."""
     row = get_object_or_404(Contestant, code=code)
-    change = take_back if request.POST.get("retired") == "no" else retire
-    change(row, actor=user_of(request))
+    retire(row, actor=user_of(request), is_retired=request.POST.get("retired") != "no")
 
 
 # --- Endpoints and models ----------------------------------------------------------------------

@@ -1,8 +1,7 @@
 """Who answers which part of an instruction, and how far off it may be.
 
 There is one set of tolerances for every scenario and contestant; docs/method.md says where each
-number comes from. The references of the catalogue are held by a narrower one: their authors
-measured them.
+number comes from.
 """
 
 import math
@@ -71,19 +70,6 @@ USUAL = Tolerances(
     drift_m=5.0,
 )
 """Of what contestants hand in."""
-
-AUTHORED = Tolerances(
-    distance_m=0.5,
-    distance_share=0.0,
-    across_m=0.1,
-    middle_m=0.1,
-    edge_m=0.25,
-    heading_deg=3.0,
-    spacing_m=0.15,
-    spacing_share=0.0,
-    drift_m=0.5,
-)
-"""Of the catalogue's references."""
 
 CRASH_M = 6.0
 """From one crashed vehicle to the next at most: the widest of interPlan's."""

@@ -81,8 +81,3 @@ def retire(row: Retirable, *, actor: User | None = None, is_retired: bool = True
         log_change(row, verb, actor, after={"slug": row.slug})
     row.refresh_from_db()
     return row
-
-
-def take_back(row: Retirable, *, actor: User | None = None) -> Retirable:
-    """Let it be chosen again."""
-    return retire(row, actor=actor, is_retired=False)

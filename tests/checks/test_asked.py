@@ -6,7 +6,6 @@ from dataclasses import replace
 import pytest
 
 from augment.checks import Finding, FindingKind, Ground, Severity
-from augment.checks.parties import AUTHORED
 from augment.checks.registry import check_against_intent
 from augment.scene.entities import AgentType, Modification, TrafficAgent, TrafficSide
 from augment.scene.intent import (
@@ -25,6 +24,7 @@ from augment.scene.intent import (
     Spot,
     VehicleRequest,
 )
+from tests.fixtures.shelf import AUTHORED
 from tests.intents import (
     CENTRED,
     LEFT_EDGE,

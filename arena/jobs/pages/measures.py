@@ -31,7 +31,6 @@ from arena.models import ScenarioFile
 from arena.site.access import ADMIN, STAFF, allow_only, page_for, user_of
 from arena.site.acts import refusals_told, send_later
 from arena.site.listing import choice_asked, read_page
-from augment.errors import UnknownName
 from augment.models import GenerationJob, Simulation
 from augment.services.judging import simulations
 from augment.services.judging.analyses import ANALYSES, SEED, answers_of
@@ -65,16 +64,12 @@ def simulate_job(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         offsets=request.POST.get("offsets", "paper") if planner == PDM_CLOSED else "paper",
         is_reactive=request.POST.get("reactive") == "on",
     )
-    score = request.POST.get("score", NUPLAN)
     with refusals_told(request), transaction.atomic():
-        if score not in SCORES:
-            raise UnknownName("score", score, list(SCORES))
         waiting = simulations.plan_job(job=job, options=options)
         send_later(request, lambda _pk: enqueue_simulations(waiting), job.pk)
         drives = "drive is" if len(waiting) == 1 else "drives are"
         messages.success(request, f"{len(waiting)} {drives} queued.")
-    shown = f"?score={score}" if score in SCORES else ""
-    return redirect(reverse("job-tab", args=[code, "driving"]) + shown)
+    return redirect("job-tab", code=code, tab="driving")
 
 
 @page_for(*STAFF)

@@ -16,7 +16,7 @@ from arena.site.listing import read_listing, read_page
 from augment.errors import Conflict, InvalidDocument
 from augment.models import BaseScene, EndpointModel, Scenario
 from augment.services.endpoints.contestants import ensure_builtin
-from augment.services.events import retire, take_back
+from augment.services.events import retire
 from augment.services.running.intent_readings import plan_reading
 from augment.services.scenarios import bulk
 from augment.services.scenarios.catalogue import load_catalogue
@@ -193,5 +193,5 @@ def delete(request: HttpRequest, code: uuid.UUID, kind: str) -> HttpResponse:
 @act_for(ADMIN, back="scenario")
 def set_retired(request: HttpRequest, code: uuid.UUID) -> None:
     """Retire a scenario, or take that back."""
-    change = take_back if request.POST.get("retired") == "no" else retire
-    change(get_object_or_404(Scenario, code=code), actor=user_of(request))
+    row = get_object_or_404(Scenario, code=code)
+    retire(row, actor=user_of(request), is_retired=request.POST.get("retired") != "no")

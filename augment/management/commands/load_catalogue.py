@@ -1,9 +1,12 @@
 """Bring the catalogue's scenes and scenarios into the database."""
 
+from pathlib import Path
 from typing import Any
 
-from augment.management.arguments import FOLDER, sets_argument, sets_of
-from augment.services.scenarios.catalogue import CatalogueStep, load_catalogue
+from django.conf import settings
+
+from augment.scene.entities import CatalogueSet
+from augment.services.scenarios.catalogue import CatalogueStep, folder_of, load_catalogue
 from augment.services.terminal import TerminalCommand
 
 
@@ -16,8 +19,15 @@ class Command(TerminalCommand):
     )
 
     arguments = {
-        **FOLDER,
-        **sets_argument("paper"),
+        "--folder": {
+            "type": Path,
+            "default": settings.BASE_DIR / "fixtures",
+            "help": "holds scenes/*.json and scenarios/*.json; default: the project's own",
+        },
+        "--set": {
+            **{"dest": "sets", "choices": (*CatalogueSet, "all"), "default": "paper"},
+            "help": "which part of it; default: paper",
+        },
         "--paraphrases": {
             "action": "store_true",
             "help": "also every paraphrase, as a scenario beside the one that it says anew",
@@ -26,9 +36,12 @@ class Command(TerminalCommand):
 
     def handle(self, *args: Any, **options: Any) -> None:
         """Load it and say what that changed."""
+        folder, sets = options["folder"], [options["sets"]]
+        if sets == ["all"]:  # those that the folder has
+            sets = [one for one in CatalogueSet if folder_of(folder, one).is_dir()]
         report = load_catalogue(
-            folder=options["folder"],
-            sets=sets_of(options),
+            folder=folder,
+            sets=[CatalogueSet(one) for one in sets],
             with_paraphrases=options["paraphrases"],
         )
         for kind, counts in (("scenes", report.scenes), ("scenarios", report.scenarios)):
