@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
 from functools import partial
-from typing import Any, Generic, NamedTuple, Protocol, TypeVar
+from typing import Any, Generic, NamedTuple, TypeVar
 from uuid import UUID
 
 from django.http import Http404, HttpResponse
@@ -19,7 +19,6 @@ from augment.errors import UnknownName
 
 Table = TypeVar("Table")
 Named = TypeVar("Named")
-Drawn = TypeVar("Drawn", contravariant=True)
 
 TEXT, WHOLE, NUMBER, YES_NO = "string", "int64", "double", "bool"
 """What a column of a Parquet file can hold; every cell may be empty."""
@@ -87,14 +86,8 @@ def format_named(known: Mapping[str, Named], name: str) -> Named:
     return known[name]
 
 
-class _Drawing(Protocol[Drawn]):
-    """Draws a chart as a file of that format: svg, pdf or png."""
-
-    def __call__(self, table: Drawn, /, *, file_format: str) -> bytes: ...
-
-
-def drawings(chart: _Drawing[Table]) -> dict[str, Format[Table]]:
-    """Return the formats of a chart."""
+def drawings(chart: Callable[..., bytes]) -> dict[str, Format[Any]]:
+    """Return the formats of a chart, which takes a table and `file_format`: svg, pdf or png."""
     return formats(**{name: partial(chart, file_format=name) for name in ("svg", "pdf", "png")})
 
 

@@ -10,6 +10,7 @@ from functools import partial
 import shapely
 
 from augment.checks import Ground
+from augment.checks.ground import rings
 from augment.checks.lanes_across import LanesAcross
 from augment.errors import CannotPlace
 from augment.geometry.frames import Pose, difference
@@ -69,13 +70,7 @@ class PlacingGround:
         self.side_sign = lanes.side_sign
         self.kerb = Side(scene.traffic_side.value)
         self._drivable, self._walkways = (
-            shapely.union_all(
-                [
-                    shapely.make_valid(shapely.Polygon(area.boundary_m))
-                    for area in scene.areas
-                    if area.kind is kind
-                ]
-            )
+            shapely.union_all(rings([area for area in scene.areas if area.kind is kind]))
             for kind in (entities.AreaKind.DRIVABLE, entities.AreaKind.WALKWAY)
         )
 
@@ -88,13 +83,9 @@ class PlacingGround:
         place = self.route.lane_position(distance_m)
         if place is not None:
             return place
-        low, high = 0.0, abs(distance_m)
-        while high - low > 0.1:
-            middle = (low + high) / 2.0
-            position = self.route.lane_position(math.copysign(middle, distance_m))
-            low, high = (low, middle) if position is None else (middle, high)
+        end_m = self.route.ends_m[-1] if distance_m > 0.0 else self.route.ego_s_m
         where = "ahead of" if distance_m > 0.0 else "behind"
-        raise CannotPlace(f"The lanes end {low:.0f} m {where} the ego.")
+        raise CannotPlace(f"The lanes end {end_m:.0f} m {where} the ego.")
 
     def beside(self, distance_m: float, lane: LaneChoice | None) -> LanePosition:
         """Return the place on a lane next to one on the ego's own; there the centre of that lane.

@@ -40,12 +40,7 @@ class Options:
 
     def of(self, rows: QuerySet[Simulation]) -> QuerySet[Simulation]:
         """Those driven so."""
-        return rows.filter(**self.columns)
-
-    @property
-    def columns(self) -> dict[str, Any]:
-        """As a row has them."""
-        return asdict(self)
+        return rows.filter(**asdict(self))
 
 
 def allowed_planners() -> tuple[str, ...]:
@@ -152,19 +147,12 @@ def document_of(drove: Drive, scores: dict[ScoreKind, Score]) -> dict[str, Any]:
     score = scores[ScoreKind.NUPLAN]
     return {
         "duration_s": round(drove.duration_s, 1),
-        "at_map_end": drove.at_map_end,
         "recorded_s": None if drove.recorded_s is None else round(drove.recorded_s, 1),
         "outlasts_recording": drove.outlasts_recording,
         "emergency_brake_steps": sum(plan.braking for plan in drove.plans),
         "expert": {"kind": score.expert.kind.value, "progress_m": score.expert.progress_m},
         "collisions": [
-            {
-                "time_s": round(collision.moment * 0.1, 1),
-                "object": collision.object_id,
-                "contact": collision.contact.name.lower(),
-                "at_fault": collision.at_fault,
-            }
-            for collision in score.collisions
+            {"object": one.object_id, "at_fault": one.at_fault} for one in score.collisions
         ],
         "criticality": criticality(drove, score.collisions),
         "metrics": {
@@ -203,7 +191,7 @@ def _plan(
 ) -> list[int]:
     """Return the key of one drive if it waits now; what failed waits again."""
     row, _ = Simulation.objects.get_or_create(
-        scenario=scenario, subject=subject, augmentation=augmentation, **options.columns
+        scenario=scenario, subject=subject, augmentation=augmentation, **asdict(options)
     )
     if row.state == State.FAILED:
         row.wait_again()
