@@ -90,7 +90,8 @@ def check_edit(scenario: Scenario, document: object, *, snapped: str = "") -> Ch
         if snapped:
             modification = snap(scenario, modification, snapped)
         intent = intent_of(scenario)
-        findings = check_against_intent(_ground_of(scenario), modification, intent)
+        ground = _ground(editable_scene(scenario))
+        findings = check_against_intent(ground, modification, intent)
     except (InvalidDocument, InvalidModification) as error:
         return Checked(problem=str(error))
     return Checked(
@@ -115,11 +116,6 @@ def guess_faults(row: Augmentation) -> frozenset[FaultClass] | None:
 
 
 # --- Private -----------------------------------------------------------------------------------
-
-
-def _ground_of(scenario: Scenario) -> Ground:
-    """Return the ground of a scenario's scene before any change."""
-    return _ground(editable_scene(scenario))
 
 
 @lru_cache(maxsize=4)
