@@ -10,7 +10,7 @@ from django.utils.text import slugify
 
 from arena.errors import StudyStillOpen
 from arena.exports.formats import Export, format_named
-from arena.jobs.exports.files import scenario_zip, zip_name
+from arena.jobs.exports.files import made_of
 from arena.jobs.exports.tables import JOB_FILES
 from arena.models import Snapshot, Study
 from arena.results.exports.sheets import SHEET_FORMATS, contact_sheet, find_cells, sample_sheet
@@ -188,8 +188,8 @@ def _write_scenarios(options: Chosen, say: Say) -> ExportedFile:
         f"{len(written.losses)} things could not be said as {exported.format}; "
         f"{len(written.refused)} refused."
     )
-    slug = slugify(exported.origin.name) or exported.origin.code
-    return ExportedFile(scenario_zip(exported), "zip", False, name=zip_name(exported, slug))
+    made = made_of(exported, slugify(exported.origin.name) or exported.origin.code)
+    return ExportedFile(made.content.read(), "zip", False, name=made.name)
 
 
 # --- All of them ---------------------------------------------------------------------------------

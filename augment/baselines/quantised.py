@@ -63,13 +63,6 @@ class Code:
         """The middle of its bin, 0 where it stands."""
         return 0.0 if self.speed_bin is None else (self.speed_bin + 0.5) * SPEED_BIN_MPS
 
-    def words(self, bin_m: float) -> str:
-        """Return the code for people, with the edges of its bin."""
-        end, side = "front" if self.is_ahead else "back", "left" if self.is_left else "right"
-        low_m, facing = self.distance_bin * bin_m, self.direction.name.replace("_", " ").lower()
-        does = "stands" if self.speed_bin is None else f"drives at about {self.speed_mps:g} m/s"
-        return f"{end} {side}, {low_m:g} to {low_m + bin_m:g} m away, direction {facing}, {does}"
-
 
 def code_of(agent: TrafficAgent, *, bin_m: float) -> Code:
     """Return what is left of a vehicle, distances told in bins of that width."""
@@ -127,9 +120,7 @@ def place(
     added: list[TrafficAgent] = []
     notes = []
     for agent in right.changed:
-        code = code_of(agent, bin_m=bin_m)
-        drawn = places.draw(code, bin_m, [*standing, *added], rng)
-        notes.append(f"{agent.id}: {code.words(bin_m)}.")
+        drawn = places.draw(code_of(agent, bin_m=bin_m), bin_m, [*standing, *added], rng)
         if drawn is None:
             notes.append(f"{agent.id} is left out: no place was free.")
         else:

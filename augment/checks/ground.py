@@ -104,12 +104,6 @@ class Surface:
         return sorted((min(span), max(span)) for span in spans)
 
 
-def gaps_m(boxes_m: FloatArray) -> FloatArray:
-    """Return the gap (N, N) between every two boxes with corners (N, 4, 2); 0 where they meet."""
-    boxes = np.asarray(shapely.polygons(boxes_m), dtype=object)
-    return np.asarray(shapely.distance(boxes[:, None], boxes[None, :]), dtype=np.float64)
-
-
 def strips(lanes: Sequence[AnyLane]) -> NDArray[np.object_]:
     """Return one polygon a lane."""
     made = np.full(len(lanes), None, dtype=object)
@@ -257,7 +251,9 @@ class ChangedScene:
         cars = [agent for agent in self.changed if agent.type in VEHICLES and is_stopped(agent)]
         if len(cars) < 2:
             return frozenset()
-        gaps = gaps_m(np.array([self.boxes[car.id].corners_m for car in cars]))
+        corners_m = np.array([self.boxes[car.id].corners_m for car in cars])
+        boxes = np.asarray(shapely.polygons(corners_m), dtype=object)
+        gaps = np.asarray(shapely.distance(boxes[:, None], boxes[None, :]), dtype=np.float64)
         np.fill_diagonal(gaps, np.inf)
         near = gaps.min(axis=1) <= CRASH_GAP_M
         return frozenset(car.id for car, is_near in zip(cars, near, strict=True) if is_near)

@@ -34,12 +34,6 @@ def scenario_zip(exported: Exported) -> bytes:
     return zip_bytes(files)
 
 
-def zip_name(exported: Exported, slug: str) -> str:
-    """What the zip is called; data that must not be used commercially is marked in the name."""
-    marked = any(source.is_non_commercial for source in exported.sources)
-    return f"{slug}-{exported.format}{'-non-commercial' if marked else ''}.zip"
-
-
 # --- Private -----------------------------------------------------------------------------------
 
 
@@ -81,12 +75,13 @@ SCENARIO_FILES = ScenarioFiles()
 
 
 def made_of(exported: Exported, slug: str) -> MadeFile:
-    """Scenarios as the file that is offered."""
+    """Return scenarios as a zip; its name marks data that must not be used commercially."""
+    marked = any(source.is_non_commercial for source in exported.sources)
     return MadeFile(
-        name=zip_name(exported, slug),
+        name=f"{slug}-{exported.format}{'-non-commercial' * marked}.zip",
         content=ContentFile(scenario_zip(exported)),
         warnings=exported.warnings,
-        marked=any(source.is_non_commercial for source in exported.sources),
+        marked=marked,
     )
 
 

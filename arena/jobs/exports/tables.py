@@ -87,12 +87,10 @@ TOOL_CALLS: Columns = {
 _WHO: Columns = {"contestant": ("contestant", TEXT), "simulated": ("simulated", YES_NO)}
 ANALYSIS_COLUMNS: dict[str, Columns] = {
     "pairs": {
-        "first": ("first", TEXT),
-        "second": ("second", TEXT),
+        **{name: (name, TEXT) for name in ("first", "second")},
         "scenarios": ("scenarios", WHOLE),
         "median_difference_m": ("median_m", NUMBER),
-        "low_m": ("low_m", NUMBER),
-        "high_m": ("high_m", NUMBER),
+        **{name: (name, NUMBER) for name in ("low_m", "high_m")},
         "p_wilcoxon": ("p", NUMBER),
         "p_holm": ("p_holm", NUMBER),
     },

@@ -97,7 +97,6 @@ def drive_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         "drive": row,
         "before": before,
         "metrics": [metric | {"before": old.get(metric["name"])} for metric in metrics],
-        "labels": driving.SCORE_LABELS,
     }
     return render(request, "drives/drive.html", context)
 
