@@ -142,7 +142,7 @@ def _write_scenarios(page: Page, files: Path) -> None:
     page.select_option("[name=type]", TYPE)
     page.get_by_text("Advanced", exact=True).click()
     page.fill("[name=slug]", "parked-15")
-    page.get_by_text("The drawing as JSON", exact=True).click()
+    page.locator("summary", has_text="The drawing as JSON").click()
     page.fill("[name=modification]", json.dumps(reference(15)))
     page.get_by_role("button", name="Save the scenario").click()
     expect(page.get_by_text("“parked-15” is added")).to_be_visible()
