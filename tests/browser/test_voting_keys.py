@@ -37,10 +37,10 @@ def test_no_modified_key_votes_and_none_while_typing(booth: Booth) -> None:
 
 
 def test_the_whole_loop_without_a_mouse(booth: Booth) -> None:
-    booth.study.allow_both_miss = True
+    booth.study.allow_both_miss = booth.study.ask_strength = True
     booth.study.save()
     page = booth.enter()
-    press(page, "1")
+    press(page, "Shift+Digit1")
     press(page, "4")
     page.keyboard.press("s")
     press(page, "4")  # the fourth reason
@@ -50,10 +50,8 @@ def test_the_whole_loop_without_a_mouse(booth: Booth) -> None:
     page.keyboard.press("u")
     page.keyboard.press("Backspace")
     page.keyboard.press("Control+z")
-    expect(page.locator("#question")).to_contain_text("Pair 1: A.")
-    expect(page.get_by_role("button", name="A is better")).to_have_attribute(
-        "aria-pressed", "true"
-    )
+    expect(page.locator("#question")).to_contain_text("Pair 1: A, clearly.")
+    expect(page.get_by_role("button", name="A clearly")).to_have_attribute("aria-pressed", "true")
     ready(page)
     press(page, "3")  # replaces it and returns to the pair that was open
     page.keyboard.press("u")
@@ -67,6 +65,7 @@ def test_the_whole_loop_without_a_mouse(booth: Booth) -> None:
     votes = booth.votes()
     assert [vote.outcome for vote in votes] == ["right", "equal", "skip", "equal"]
     assert [vote.both_miss for vote in votes] == [False, True, False, False]
+    assert [vote.strength for vote in votes] == ["slightly", "", "", ""]
     assert votes[2].reason == "recognised"
     assert Vote.objects.count() == 5
     report = Report.objects.get()
