@@ -40,7 +40,7 @@ QUALITIES = (50, 35, 20)
 LIGHT = 40_000
 """Bytes: the first quality that stays below, else the last one."""
 VOTES_HERE = ("vote", "vote-practice", "vote-skipped")
-OPEN_HERE = ("study", "experts", "enrolment", "preregistration", "invite")
+OPEN_HERE = ("study", "enrolment", "preregistration", "invite")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

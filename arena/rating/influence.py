@@ -1,4 +1,4 @@
-"""How much a table hangs on single experts, and how much experts and scenarios differ.
+"""How much a table hangs on single experts.
 
 Notation: C contestants, P pairs that met, E experts. Strengths are natural logarithms of odds.
 """
@@ -8,8 +8,6 @@ import numpy as np
 from arena.rating.chains import are_determined
 from arena.rating.comparisons import Comparisons, FloatArray, IntArray, PairCounts, count_pairs
 from arena.rating.models import Meetings, fit
-from arena.rating.rules import Unit
-from arena.rating.sandwich import pulls_of_model, spread_of
 
 
 def bradley_terry(votes: Comparisons) -> FloatArray | None:
@@ -65,26 +63,3 @@ def _fits(
     strengths = np.full((len(games), len(start)), np.nan)
     strengths[fine] = fit(met, games[fine].T, scores[fine].T, start=start).T
     return strengths
-
-
-def estimate_effects(votes: Comparisons) -> dict[str, float] | None:
-    """Return by how many Elo points experts, and scenarios, differ about a contestant.
-
-    Standard deviations on the scale of the rated table, 0 where none is seen; None where the votes
-    do not determine ratings.
-    """
-    strengths = bradley_terry(votes)
-    if strengths is None:
-        return None
-    counts = count_pairs(votes)
-    pulls = pulls_of_model(votes, Meetings(len(votes.names), counts), counts.games, strengths)
-    variances = [
-        float(spread_of(pulls, unit).covariance.diagonal().mean())
-        for unit in (Unit.VOTE, Unit.EXPERT, Unit.SCENARIO)
-    ]
-    share = 1.0 - 1.0 / len(votes.names)
-    effects = {}
-    for kind, variance in zip(Unit.TWO_WAY.kinds, variances[1:], strict=True):
-        clusters = len(np.unique(getattr(votes, kind)))
-        effects[kind] = float(np.sqrt(max(variance - variances[0], 0.0) * clusters / share))
-    return effects

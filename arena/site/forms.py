@@ -41,6 +41,8 @@ class ChoiceForm(forms.Form):
     A whole type can be chosen without a script: `types` stands for all of its scenarios.
     """
 
+    NO_SCENARIO = "Choose at least one scenario."
+
     name = forms.CharField(max_length=120, strip=True)
     contestants = forms.MultipleChoiceField(
         error_messages={"required": "Choose at least one contestant."}
@@ -76,7 +78,7 @@ class ChoiceForm(forms.Form):
             if group.type in types or row.slug in chosen
         ]
         if not cleaned["scenarios"]:
-            self.add_error("scenarios", "Choose at least one scenario.")
+            self.add_error("scenarios", self.NO_SCENARIO)
         return cleaned
 
     @property

@@ -12,7 +12,7 @@ from arena.results.pages.comparison import comparison_page
 from arena.results.pages.shared import shared_file, shared_page
 from arena.scenarios.urls import urlpatterns as SCENARIOS
 from arena.site import pages
-from arena.studies.pages import experts, planning, setup, studies
+from arena.studies.pages import experts, setup, studies
 from arena.voting import pages as voting
 
 urlpatterns: list[URLPattern] = [
@@ -42,11 +42,11 @@ urlpatterns: list[URLPattern] = [
     path("people/<uuid:code>/forget/", experts.forget_person, name="person-forget"),
     path("audit/", pages.audit_page, name="audit"),
     path("studies/", studies.studies_page, name="studies"),
-    path("studies/plan/", planning.planning_page, name="study-plan"),
     path("studies/checks/", setup.draw_checks, name="checks-draw"),
     path("studies/import/", setup.upload_votes_page, name="import-votes"),
     path("studies/new/", setup.new_study_page, name="study-new"),
     path("studies/drafts/<uuid:code>/", setup.draft_page, name="study-draft"),
+    path("studies/drafts/<uuid:code>/preview/", setup.preview_page, name="study-draft-preview"),
     path("studies/drafts/<uuid:code>/discard/", setup.discard, name="study-draft-discard"),
     path("studies/<uuid:code>/", studies.study_page, name="study"),
     path("studies/<uuid:code>/again/", setup.use_again, name="study-again"),
@@ -56,7 +56,6 @@ urlpatterns: list[URLPattern] = [
         studies.preregistration_file,
         name="preregistration",
     ),
-    path("studies/<uuid:code>/experts/", experts.experts_page, name="experts"),
     path("studies/<uuid:code>/enrolment/", experts.enrolment_page, name="enrolment"),
     path("studies/<uuid:code>/enrolment/voters.csv", experts.voters_file, name="enrolment-voters"),
     path("studies/<uuid:code>/experts/invite/", experts.invite_experts, name="invite"),

@@ -6,16 +6,25 @@ from typing import Any
 from django import forms
 from django.contrib.auth.models import User
 
+from arena.models import Study
 from arena.site.forms import ChoiceForm, form_field, offer
+from arena.studies.queries import finished_scenarios, scenario_sources
 from arena.studies.services.drafts import SWITCHES
-from arena.studies.services.outlook import ESTIMATE_INPUTS, StudyEstimate
+from arena.studies.services.outlook import StudyEstimate, estimate_of
 from arena.studies.services.plan import PLAN_INPUTS, StudyPlan
 from augment.models import GenerationJob
 from augment.services.inputs import InputKind
 
 
 class StudyForm(ChoiceForm):
-    """A new study; its rules are fixed from the moment it opens."""
+    """A new study; its rules are fixed from the moment it opens.
+
+    Scenarios are those of one of the sources on which all contestants are finished, or single
+    ones, which replace it.
+    """
+
+    NO_SCENARIO = "No scenario has a picture of every chosen contestant. Generate them first."
+    source_job = ""
 
     def __init__(
         self, *args: Any, experts: list[User], jobs: Sequence[GenerationJob] = (), **kwargs: Any
@@ -26,16 +35,43 @@ class StudyForm(ChoiceForm):
         }
         self.accounts = experts
         self.all_jobs = jobs
+        self.sources = scenario_sources(jobs)
+        rows = [row for group in self.groups for row in group.scenarios]
+        offer(self, "scenarios", [*self.sources.items(), *((row.slug, row.slug) for row in rows)])
         offer(self, "jobs", [(str(job.code), job.name) for job in jobs])
         offer(self, "experts", [(user.get_username(), user.get_username()) for user in experts])
         self.fields["experts"].error_messages["required"] = "Choose at least one expert."
 
     def rules(self) -> list[forms.BoundField]:
-        """Return what is entered beside names, switches last; for the template."""
-        names = [
-            one.name for one in PLAN_INPUTS if one.kind not in (InputKind.TEXT, InputKind.NAMES)
-        ]
+        """Return what is entered under *Advanced*, switches last; for the template."""
+        kinds = (InputKind.TEXT, InputKind.NAMES)
+        names = [one.name for one in PLAN_INPUTS if one.kind not in kinds]
+        names.remove("votes_per_expert")
         return [self[name] for name in sorted(names, key=lambda name: name in SWITCHES)]
+
+    @property
+    def has_rule_errors(self) -> bool:
+        """Return whether something under *Advanced* is wrong, for the template."""
+        return any(field.errors for field in self.rules())
+
+    def clean_scenarios(self) -> list[str]:
+        """Return the single ones, or else those of the source."""
+        chosen: list[str] = self.cleaned_data["scenarios"]
+        singles = [name for name in chosen if name not in self.sources]
+        if singles or not chosen:
+            return singles
+        self.source_job = chosen[0].partition("job:")[2]
+        return finished_scenarios(self.cleaned_data.get("contestants", ()), chosen[0])
+
+    @property
+    def singles(self) -> int:
+        """Return how many single scenarios are ticked, for the template."""
+        return len(set(self["scenarios"].value() or ()) - set(self.sources))
+
+    def estimate(self) -> StudyEstimate | None:
+        """Return what is entered so far as an estimate; None while something is missing."""
+        self.is_valid()
+        return estimate_of(self.cleaned_data)
 
     def study_plan(self) -> StudyPlan:
         """Return what is to be opened, once the form is valid; an empty number is 0."""
@@ -46,6 +82,8 @@ class StudyForm(ChoiceForm):
         }
         if len(entered["experts"]) < 2:
             entered["overlap"] = 0.0  # a single expert shares nothing with anybody
+        if self.source_job and not entered["jobs"]:
+            entered["jobs"] = [self.source_job]
         return StudyPlan.read(entered)
 
 
@@ -61,19 +99,14 @@ class HandOverForm(forms.Form):
         offer(self, "takers", [(username, username) for username in takers])
 
 
-class PlanningForm(forms.Form):
-    """A study in mind, and what it is to tell; shares in percent."""
+class AuthorForm(forms.Form):
+    """Which expert of a study made which of its contestants."""
 
-    def __init__(self, *args: Any, **kwargs: Any) -> None:
+    expert = forms.ChoiceField(widget=forms.Select(attrs={"class": "input"}))
+    contestant = forms.ChoiceField(widget=forms.Select(attrs={"class": "input"}))
+
+    def __init__(self, *args: Any, study: Study, **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)
-        self.fields |= {field.name: form_field(field) for field in ESTIMATE_INPUTS}
-
-    def clean(self) -> dict[str, Any]:
-        """Refuse more ties than contestants so far apart can have."""
-        cleaned = super().clean() or {}
-        if not self.errors:
-            possible = StudyEstimate(**cleaned).most_ties
-            if cleaned["ties"] >= possible:
-                problem = "Contestants so far apart can tie in less than {:.0f} % of votes."
-                self.add_error("ties", problem.format(possible))
-        return cleaned
+        choose = [("", "Choose …")]
+        offer(self, "expert", choose + [(row.username,) * 2 for row in study.experts.all()])
+        offer(self, "contestant", choose + [(r.slug, r.name) for r in study.contestants.all()])

@@ -1,6 +1,6 @@
 """Reads of studies: which there are, how far their experts are, who takes part, drafts."""
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from contextlib import suppress
 from dataclasses import dataclass
 from datetime import datetime, timedelta
@@ -26,7 +26,7 @@ from arena.people.links import lets_in
 from arena.people.queries import experts, may_be_let_in, natural_order
 from arena.voting.queries.ballots import ExpertTally, VotingProgress, tallies
 from augment.errors import UnknownName
-from augment.models import Contestant, GenerationJob, Scenario
+from augment.models import Augmentation, Contestant, GenerationJob, Scenario
 
 # --- Studies -----------------------------------------------------------------------------------
 
@@ -118,6 +118,50 @@ def authors_of(study: Study) -> frozenset[tuple[str, str]]:
     return frozenset((str(code), slug) for code, slug in rows)
 
 
+# --- What a new study can be of ----------------------------------------------------------------
+
+FINISHED = "finished"
+"""The source of a study's scenarios that most take: whatever is there."""
+
+
+def offered_contestants() -> QuerySet[Contestant]:
+    """Return whom a study can be of."""
+    return Contestant.objects.exclude(kind=Contestant.Kind.CHECK).filter(retired_at=None)
+
+
+def latest_contestants() -> list[str]:
+    """Return the offered contestants of the latest job that has pictures of any."""
+    made = _pictured().filter(contestant__in=offered_contestants())
+    latest = made.order_by("-job__created_at").values("job")[:1]
+    return sorted(set(made.filter(job=latest).values_list("contestant__slug", flat=True)))
+
+
+def scenario_sources(jobs: Iterable[GenerationJob]) -> dict[str, str]:
+    """Return where the scenarios of a study can come from, by what forms and drafts call it."""
+    sets = {f"set:{name}": f"Finished, {name} set" for name in Scenario.SETS}
+    of_jobs = {f"job:{job.code}": f"Finished in {job.name}" for job in jobs}
+    return {FINISHED: "All that are finished", **sets, "set:": "Finished, our own", **of_jobs}
+
+
+def finished_scenarios(contestants: Collection[str], source: str) -> list[str]:
+    """Return the scenarios of a source of which each of the contestants has a picture."""
+    rows = _pictured().filter(contestant__slug__in=contestants)
+    kind, _, name = source.partition(":")
+    if kind == "job":
+        rows = rows.filter(job__code=name)
+    elif kind == "set":
+        rows = rows.filter(scenario__catalogue_set=name)
+    counted = rows.order_by().values_list("scenario__slug")
+    finished = counted.annotate(n=Count("contestant", distinct=True)).filter(
+        n=len(set(contestants))
+    )
+    return [slug for slug, _ in finished]
+
+
+def _pictured() -> QuerySet[Augmentation]:
+    return Augmentation.objects.filter(state__in=Augmentation.SHOWABLE).exclude(image="")
+
+
 # --- Drafts ------------------------------------------------------------------------------------
 
 
@@ -129,12 +173,13 @@ def find_drafts(search: str = "") -> QuerySet[StudyDraft]:
 
 def missing_of(draft: StudyDraft) -> list[str]:
     """Return the names that the draft chooses and nobody could choose now."""
-    contestants = Contestant.objects.exclude(kind=Contestant.Kind.CHECK).filter(retired_at=None)
+    jobs = GenerationJob.objects.only("code", "name")
+    scenarios = Scenario.objects.values_list("slug", flat=True)
     choices = {
-        "contestants": set(contestants.values_list("slug", flat=True)),
+        "contestants": set(offered_contestants().values_list("slug", flat=True)),
         "experts": {user.username for user in experts()},
-        "scenarios": set(Scenario.objects.values_list("slug", flat=True)),
-        "jobs": {str(code) for code in GenerationJob.objects.values_list("code", flat=True)},
+        "scenarios": {*scenarios, *scenario_sources(jobs)},
+        "jobs": {str(job.code) for job in jobs},
     }
     return [
         name
@@ -163,6 +208,11 @@ class ExpertLine:
     link: Invitation.State | None
     has_live_link: bool
     may_be_invited: bool
+
+    @property
+    def waits_for_link(self) -> bool:
+        """Return whether the expert can't have begun: no vote yet, and no link to come in by."""
+        return self.may_be_invited and not self.has_live_link and not self.tally.voted
 
 
 def expert_lines(study: Study) -> list[ExpertLine]:

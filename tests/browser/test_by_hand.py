@@ -15,14 +15,13 @@ import pytest
 from PIL import Image
 from playwright.sync_api import Locator, Page, expect
 
-from tests.browser.booth import DESK
-from tests.browser.chromium import PATIENCE_MS, chromium
+from tests.browser.chromium import chromium
+from tests.browser.hand import Hand
 from tests.formats.av2_logs import write_log
 from tests.processes import wait_until
 from tests.stack import Home
 
 pytestmark = [pytest.mark.browser, pytest.mark.redis, pytest.mark.slow, pytest.mark.timeout(600)]
-PASSWORD = "nine lives of a cat"
 RED = (218, 30, 40)
 
 
@@ -41,9 +40,9 @@ def test_a_recording_becomes_a_reference_and_a_result_is_corrected(tmp_path: Pat
 
 def _work(home: Home, address: str, packed: Path) -> None:
     with chromium() as browser:
-        page = browser.new_context(viewport=DESK, base_url=address).new_page()
-        page.set_default_timeout(PATIENCE_MS)
-        _become_admin(page, home)
+        ada = Hand.at(browser, address)
+        ada.become_admin(home)
+        page = ada.page
         page.goto("/scenarios/")
         page.click("button[value=paper]")  # and the contestants that ask nobody
         expect(page.get_by_text("50 added")).to_be_visible()
@@ -51,18 +50,6 @@ def _work(home: Home, address: str, packed: Path) -> None:
         _draw_scenario(page)
         _run_reference(page)
         _correct(page)
-
-
-def _become_admin(page: Page, home: Home) -> None:
-    def printed() -> list[str]:
-        return re.findall(r"/first/\S+", (home.folder / "serve.log").read_text())
-
-    wait_until(lambda: bool(printed()), what="the link of the first admin is printed")
-    page.goto(printed()[0])
-    page.fill("[name=username]", "ada")
-    page.fill("[name=password]", PASSWORD)
-    page.click("button.main")
-    expect(page.get_by_role("heading", name="First steps")).to_be_visible()
 
 
 def _keep_a_moment(page: Page, packed: Path) -> None:

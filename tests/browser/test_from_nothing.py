@@ -7,7 +7,6 @@ that a job can go.
 
 import csv
 import json
-import re
 import threading
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -15,22 +14,20 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import Browser, Page, expect
+from playwright.sync_api import Page, expect
 
 from augment.fake_llm.server import FakeServer, running
 from augment.llm.questions import Ability
 from augment.scene.entities import Scene
 from augment.scene.intent import Intent
-from tests.browser.booth import DESK, ready
-from tests.browser.chromium import PATIENCE_MS, chromium
-from tests.browser.job_round import CONTESTANTS, SCENARIOS, run_round
+from tests.browser.chromium import chromium
+from tests.browser.hand import Hand
+from tests.browser.job_round import SCENARIOS, run_round
 from tests.parked import TYPE, asked, known, reference, wish, write_street
-from tests.processes import wait_until
 from tests.stack import Home
 
 pytestmark = [pytest.mark.browser, pytest.mark.redis, pytest.mark.slow, pytest.mark.timeout(600)]
 
-PASSWORD = "nine lives of a cat"
 VOTES = 6
 
 
@@ -92,41 +89,22 @@ def test_an_empty_house_ends_at_a_table(
 
 def _work(home: Home, address: str, model: str, gate: threading.Event, files: Path) -> str:
     with chromium() as browser:
-        admin = _page(browser, address)
-        _become_admin(admin, home)
+        ada = Hand.at(browser, address)
+        ada.become_admin(home)
+        admin = ada.page
         _send_scene(admin, files)
         _write_scenarios(admin, files)
         _enter_models(admin, model)
         _enter_contestant(admin)
         run_round(admin, gate)
-        link = _invite(admin)
-        study = _open_study(admin)
-        _vote(_page(browser, address), link)
-        return _rate(admin, study)
-
-
-def _page(browser: Browser, address: str) -> Page:
-    page = browser.new_context(viewport=DESK, base_url=address).new_page()
-    page.set_default_timeout(PATIENCE_MS)
-    return page
-
-
-def _become_admin(page: Page, home: Home) -> None:
-    def printed() -> list[str]:
-        return re.findall(r"/first/\S+", (home.folder / "serve.log").read_text())
-
-    wait_until(lambda: bool(printed()), what="the link of the first admin is printed")
-    page.goto(printed()[0])
-    page.fill("[name=username]", "ada")
-    page.fill("[name=password]", PASSWORD)
-    page.click("button.main")
-    expect(page.get_by_role("heading", name="First steps")).to_be_visible()
-
-
-def _set_password(page: Page) -> None:
-    page.fill("[name=new_password1]", PASSWORD)
-    page.fill("[name=new_password2]", PASSWORD)
-    page.click("button.main")
+        link = ada.add_expert("grace")
+        _open_study(ada)
+        grace = Hand.at(browser, address)
+        grace.page.goto(link)
+        grace.set_password()
+        grace.vote(VOTES)
+        admin.reload()
+        return ada.close_and_export()
 
 
 def _send_scene(page: Page, files: Path) -> None:
@@ -184,50 +162,13 @@ def _enter_contestant(page: Page) -> None:
     expect(page.locator("p.mono", has_text="careless-otm")).to_be_visible()
 
 
-def _choose(page: Page) -> None:
-    for slug in CONTESTANTS:
-        page.check(f"[name=contestants][value={slug}]")
-    page.locator(f"[name=types][value={TYPE}]").check()
-
-
-def _invite(page: Page) -> str:
-    page.goto("/people/")
-    page.fill("[name=username]", "grace")
-    page.click("section button.main")
-    return page.locator("#link").input_value()
-
-
-def _open_study(page: Page) -> str:
-    page.goto("/studies/new/")
-    page.fill("[name=name]", "First study")
-    page.check("[name=experts][value=grace]")
-    _choose(page)
-    page.fill("[name=votes_per_expert]", str(VOTES))
+def _open_study(ada: Hand) -> None:
+    ada.page.goto("/studies/new/")
+    ada.fill("name", "First study")
+    ada.fill("votes_per_expert", str(VOTES))
+    ada.press("Advanced")
     for name in ("repeats", "checks"):
-        page.fill(f"[name={name}]", "0")
-    page.check("[name=allow_simulated]")
-    page.click("button.main.big")
-    page.click("button[name=sure]")
-    expect(page.get_by_role("heading", name="First study")).to_be_visible()
-    return re.sub(r"(/studies/[^/]+/).*", r"\1", page.url)
-
-
-def _vote(page: Page, link: str) -> None:
-    page.goto(link)
-    _set_password(page)
-    page.click("a[href*='/vote/']")
-    for number in range(VOTES):
-        expect(page.locator("#place")).to_have_text(str(number + 1))
-        ready(page)
-        page.keyboard.press(str(number % 3 + 1))
-    page.get_by_role("heading", name="You are done.").wait_for()
-
-
-def _rate(page: Page, study: str) -> str:
-    page.goto(f"{study}close/")
-    page.click("button[name=sure]")
-    page.goto(f"{study}results/")
-    expect(page.get_by_role("table").first).to_be_visible()
-    answer = page.request.get(f"{study}rating/leaderboard.latex")
-    assert answer.ok
-    return answer.text()
+        ada.fill(name, "0")
+    ada.page.check("[name=allow_simulated]")
+    ada.press("Open the study")
+    expect(ada.page.get_by_role("heading", name="First study")).to_be_visible()

@@ -17,8 +17,8 @@ LISTS = {"results-votes", "scenarios"}
 """Lists, which page: each of their rows is something to open."""
 
 STILL_BEYOND = {
-    *("scenario", "study-draft", "study-new"),  # long
-    *("results-tab", "results-pairs", "results-types", "study-draft", "study-new"),  # crowded
+    "scenario",  # long
+    *("results-tab", "results-pairs", "results-types"),  # crowded
 }
 """Pages that are to be made shorter or calmer."""
 

@@ -25,12 +25,12 @@ PAGES = _table(
             "jobs job job-tab job-progress job-export transcripts-export analyses drives drive "
             "faults augmentation transcript contestants contestant endpoints endpoint "
             "endpoint-model scenes scene upload scenarios scenario intent scenario-edit "
-            "scenarios-bulk prompts correct picture studies study-plan study preregistration "
+            "scenarios-bulk prompts correct picture studies study preregistration "
             "results results-tab"
         ),
         ADMIN: (
             "job-new contestant-new endpoint-new audit people person-forget "
-            "import-votes study-new study-draft experts enrolment"
+            "import-votes study-new study-draft enrolment"
         ),
         (404, 404, 403): "scenarios-export drive-file asked-image prompt-image study-file",
         (403, 403, 403): (
@@ -40,6 +40,7 @@ PAGES = _table(
         (403, 403, 404): "label vote vote-practice vote-skipped",
         (200, 200, 200): "home password api-tokens",
         (200, 401, 401): "metrics",
+        (302, 403, 403): "study-draft-preview",
         (404, 403, 403): "enrolment-voters",
         (200, 403, 404): "matchup-image",
         (404, 403, 404): "replay",

@@ -34,7 +34,7 @@ def admin() -> Client:
     return signed_in(people()["admin"])
 
 
-def page(client: Client, study: Study, name: str = "experts", tab: str = "") -> str:
+def page(client: Client, study: Study, name: str = "study", tab: str = "") -> str:
     answer = client.get(reverse(name, args=[study.code, tab] if tab else [study.code]))
     assert answer.status_code == 200
     return " ".join(answer.content.decode().split())

@@ -61,7 +61,7 @@ def test_a_newcomer_votes_at_once_and_is_told_the_code_at_the_end(enrolment: Enr
 def test_a_voter_opens_nothing_but_the_own_study(enrolment: Enrolment) -> None:
     client = Client()
     join(client, enrolment)
-    for name in ("enrolment", "study", "experts"):
+    for name in ("enrolment", "study"):
         assert client.get(reverse(name, args=[enrolment.study.code])).status_code == 403
     other = Study.objects.create(name="Round 2", votes_per_expert=1, seed=1, state="open")
     assert client.get(reverse("vote", args=[other.code])).status_code == 404

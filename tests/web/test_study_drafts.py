@@ -104,16 +104,16 @@ def test_a_draft_is_listed_and_no_expert_sees_it(admin: Client) -> None:
 
 
 def test_a_draft_is_previewed_and_opened_and_is_gone_then(admin: Client) -> None:
-    cast = study_rows.cast_of()
-    draft = keep_draft(entered={"name": "Round 1", **cast, "votes_per_expert": 9, "seed": 4})
-    sent = {"name": "Round 1", **cast, "votes_per_expert": "9", "seed": "4", "revision": "1"}
+    sent = {"name": "Round 1", **study_rows.cast_of(), "votes_per_expert": "9", "seed": "4"}
+    shown = admin.post(NEW, {**sent, "preview": "1"}, follow=True)
+    assert "what you answer is not stored" in text_of(shown)
+    assert shown.content.decode().count('src="/pictures/augmentation/') == 2
+    assert admin.post(shown.request["PATH_INFO"], {"outcome": "A"}).json()["next"] == []
+    assert not Study.objects.exists(), "a preview plans nothing"
+    draft = StudyDraft.objects.get()
     refused = admin.post(page_of(draft), {**sent, "contestants": [], "sure": "1"})
     assert refused.status_code == 422
-    asked = admin.post(page_of(draft), sent)
-    assert "Open the study “Round 1”?" in text_of(asked)
-    assert "Experts: 2. Votes: 18." in text_of(asked)
-    assert not Study.objects.exists(), "a preview plans nothing"
-    answer = admin.post(page_of(draft), {**hidden_of(asked), "sure": "1"})
+    answer = admin.post(page_of(draft), {**sent, "revision": "1", "sure": "1"})
     study = Study.objects.get()
     assert answer.headers["Location"] == reverse("study", args=[study.code])
     assert (study.state, study.matchups.count()) == ("open", 18)

@@ -1,6 +1,5 @@
 """manage.py open_study: plan a study and open it."""
 
-from collections import Counter
 from typing import Any
 
 from django.core.management.base import CommandParser
@@ -56,17 +55,3 @@ class Command(TerminalCommand):
         names = ", ".join(repr(job["name"]) for job in rules["jobs"])
         samples = SAMPLES[rules["samples"]]
         self.stdout.write(f"It shows augmentations of {names}, of several samples {samples}.")
-        kinds = Counter(study.matchups.values_list("kind", flat=True))
-        self.stdout.write(
-            f"{kinds['main']} votes, {kinds['repeat']} hidden repeats, {kinds['check']} attention "
-            "checks."
-        )
-        if rules["scenario_gap_kept"] < rules["scenario_gap"]:
-            self.stdout.write(
-                f"A scenario comes again after {rules['scenario_gap_kept']} others instead of "
-                f"{rules['scenario_gap']}: there are too few scenarios for more."
-            )
-        if rules["identical"]:
-            self.stdout.write(
-                f"{len(rules['identical'])} pairs that nobody can tell apart are never shown."
-            )

@@ -1,16 +1,17 @@
 """Experts of a study: progress, authors, links to invite and to enrol; forgetting somebody."""
 
 import uuid
-from typing import Any, cast
+from typing import Any
 
 from django import forms
 from django.contrib import messages
 from django.contrib.auth import login
 from django.contrib.auth.decorators import login_not_required
 from django.contrib.auth.models import User
-from django.http import Http404, HttpRequest, HttpResponse, QueryDict
+from django.http import Http404, HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, redirect, render
 from django.urls import reverse
+from django.utils.cache import add_never_cache_headers
 from django.utils.translation import gettext as _
 from django.utils.translation import gettext_lazy
 from django.views.decorators.cache import never_cache
@@ -21,10 +22,11 @@ from arena.exports.cells import csv_text
 from arena.models import Enrolment, Invitation, Study
 from arena.people import links
 from arena.people.pages import find_account, link_page, with_own_language
-from arena.site.access import ADMIN, BACKEND, GONE, allow_only, form_for, user_of
+from arena.site.access import ADMIN, BACKEND, GONE, act_for, allow_only, form_for, user_of
 from arena.site.acts import Confirmation, ask, is_sure, refusals_in, refusals_told, tell_errors
 from arena.site.listing import read_page
-from arena.studies.queries import authorships_of, enrolled_voters, expert_lines, state_of
+from arena.studies.forms import AuthorForm
+from arena.studies.queries import enrolled_voters, expert_lines, state_of
 from arena.studies.services.taking_part import (
     LONGEST_CONSENT,
     LONGEST_ID,
@@ -32,7 +34,6 @@ from arena.studies.services.taking_part import (
     forget_identity,
     set_enrolment,
 )
-from augment.models import Contestant
 
 SESSION_S = 30 * 24 * 3600
 
@@ -48,21 +49,6 @@ CONSENT = (
     "I take part of my own free will and may stop at any time. My answers, the time that they "
     "took and the id that I enter are kept to evaluate this study; the id is published nowhere."
 )
-
-
-class AuthorForm(forms.Form):
-    """Which expert of the study made which of its contestants."""
-
-    expert = forms.ModelChoiceField(User.objects, to_field_name="username", empty_label="Choose …")
-    contestant = forms.ModelChoiceField(
-        Contestant.objects, to_field_name="slug", empty_label="Choose …"
-    )
-
-    def __init__(self, data: QueryDict | None = None, *, study: Study) -> None:
-        super().__init__(data)
-        for name, rows in (("expert", study.experts), ("contestant", study.contestants)):
-            cast("forms.ModelChoiceField[Any]", self.fields[name]).queryset = rows.all()
-            self.fields[name].widget.attrs["class"] = "input"
 
 
 class EnrolmentForm(forms.Form):
@@ -101,33 +87,16 @@ class NewcomerForm(forms.Form):
 # --- The experts of a study --------------------------------------------------------------------
 
 
-@allow_only(ADMIN)
-@never_cache
-@require_safe
-def experts_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
-    """Every expert of a study: progress, pace, quota, last seen, link, and who is an author."""
-    study = get_object_or_404(Study, code=code)
-    lines = expert_lines(study)
-    context = {
-        "study": study,
-        "lines": lines,
-        "without_link": sum(line.may_be_invited and not line.has_live_link for line in lines),
-        "authorships": authorships_of(study),
-        "author_form": AuthorForm(study=study),
-    }
-    return render(request, "studies/experts.html", context)
-
-
-@allow_only(ADMIN)
-@require_POST
-def mark(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
+@act_for(ADMIN, back="study")
+def mark(request: HttpRequest, code: uuid.UUID) -> None:
     """Mark an expert as author of a contestant, or take it back, be the study open or closed."""
     study = get_object_or_404(Study, code=code)
     form = AuthorForm(request.POST, study=study)
     if not form.is_valid():
         tell_errors(request, form)
-        return redirect("experts", code=code)
-    expert, contestant = form.cleaned_data["expert"], form.cleaned_data["contestant"].slug
+        return
+    contestant = form.cleaned_data["contestant"]
+    expert = study.experts.select_related("person").get(username=form.cleaned_data["expert"])
     is_author = "back" not in request.POST
     links.mark_author(
         study=study,
@@ -140,7 +109,6 @@ def mark(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     messages.success(
         request, f"{expert.person.pseudonym} {state} marked as author of {contestant}."
     )
-    return redirect("experts", code=code)
 
 
 @form_for(ADMIN)
@@ -170,30 +138,27 @@ def forget_person(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
 # --- Invitations -------------------------------------------------------------------------------
 
 
-@allow_only(ADMIN)
-@never_cache
-@require_POST
-def invite_experts(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
+@act_for(ADMIN, back="study")
+def invite_experts(request: HttpRequest, code: uuid.UUID) -> HttpResponse | None:
     """Make links, for one expert or for all without one, and show them this once."""
     study = get_object_or_404(Study, code=code)
     wanted = request.POST.get("expert")
     chosen = [
         line.tally.expert
         for line in expert_lines(study)
-        if str(line.tally.expert.person.code) == wanted
-        or (not wanted and line.may_be_invited and not line.has_live_link)
+        if str(line.tally.expert.person.code) == wanted or (not wanted and line.waits_for_link)
     ]
     if not chosen:
         messages.info(request, "Nobody was left to invite; no link was made.")
-        return redirect("experts", code=study.code)
+        return None
     made = []
-    with refusals_told(request):
-        for expert in chosen:
-            fresh = links.invite(study=study, expert=expert, actor=user_of(request))
-            address = request.build_absolute_uri(reverse("invitation", args=[fresh.token]))
-            made.append({"invitation": fresh.invitation, "address": address})
-        return render(request, "studies/links.html", {"study": study, "links": made})
-    return redirect("experts", code=study.code)
+    for expert in chosen:
+        fresh = links.invite(study=study, expert=expert, actor=user_of(request))
+        address = request.build_absolute_uri(reverse("invitation", args=[fresh.token]))
+        made.append({"invitation": fresh.invitation, "address": address})
+    answer = render(request, "studies/links.html", {"study": study, "links": made})
+    add_never_cache_headers(answer)
+    return answer
 
 
 @allow_only(ADMIN)
@@ -203,7 +168,7 @@ def revoke_invitation(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     invitation = get_object_or_404(Invitation.objects.select_related("study"), code=code)
     links.revoke(invitation=invitation, actor=user_of(request))
     messages.success(request, "The link was taken back.")
-    return redirect("experts", code=invitation.study.code)
+    return redirect("study", code=invitation.study.code)
 
 
 @link_page

@@ -10,33 +10,36 @@ from django import forms
 from django.contrib import messages
 from django.contrib.auth.models import User
 from django.core.files.uploadedfile import UploadedFile
-from django.http import HttpRequest, HttpResponse, QueryDict
+from django.db import transaction
+from django.http import HttpRequest, HttpResponse, JsonResponse, QueryDict
 from django.shortcuts import get_object_or_404, redirect, render
 from django.urls import reverse
-from django.views.decorators.http import require_POST
 
 from arena import tasks
+from arena.errors import NothingToPlan
 from arena.models import Study, StudyDraft
 from arena.people.queries import by_pseudonym, experts
 from arena.results.services.vote_files import ImportedVotes, import_votes
 from arena.scenarios import queries
 from arena.scenarios.services import was_too_large
-from arena.site.access import ADMIN, act_for, allow_only, form_for, user_of
-from arena.site.acts import Confirmation, ask, is_sure, refusals_in, refusals_told, wants_to_change
+from arena.site.access import ADMIN, act_for, form_for, user_of
+from arena.site.acts import is_sure, refusals_in, refusals_told, tell_errors
 from arena.site.queries import usual_checks
 from arena.studies.forms import StudyForm
-from arena.studies.queries import missing_of
+from arena.studies.queries import FINISHED, latest_contestants, missing_of, offered_contestants
 from arena.studies.services import drafts
 from arena.studies.services.experts import has_practice
-from arena.studies.services.outlook import StudyEstimate
-from arena.studies.services.plan import StudyPlan
-from augment.models import Contestant, GenerationJob
+from arena.studies.services.opening import open_study
+from arena.studies.services.outlook import compare_votes
+from arena.studies.services.plan import PRESETS
+from arena.voting.screen import vote_context
+from augment.models import GenerationJob
 
-KEEP = "keep"
-"""What the button sends that saves a draft."""
+USUAL = "paper"
+"""The preset of a new form."""
 
-SUGGESTED = {"votes_per_expert": 40, "overlap": 10}
-"""What a new form holds beside the defaults of a plan."""
+KEEP, PREVIEW = "keep", "preview"
+"""What the buttons send that save a draft; the second one then shows its first pairs."""
 
 MOST_MB = 20
 """Some 200,000 votes, read while the page waits; more goes by `manage.py import_votes`."""
@@ -49,7 +52,7 @@ _ODD = re.compile(r"[^A-Za-z0-9._ -]+")
 
 @form_for(ADMIN)
 def new_study_page(request: HttpRequest) -> HttpResponse:
-    """Who competes on what, and who judges; opening plans every matchup."""
+    """Who competes on what, who judges, and what the votes will tell; opening plans every pair."""
     return _set_up(request, None)
 
 
@@ -60,14 +63,12 @@ def draft_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     return _set_up(request, get_object_or_404(rows, code=code))
 
 
-@allow_only(ADMIN)
-@require_POST
-def discard(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
+@act_for(ADMIN, back="studies")
+def discard(request: HttpRequest, code: uuid.UUID) -> None:
     """Remove a draft."""
     draft = get_object_or_404(StudyDraft, code=code)
     drafts.discard_draft(draft=draft, actor=user_of(request))
     messages.success(request, "The draft is discarded.")
-    return redirect("studies")
 
 
 @act_for(ADMIN, back="study")
@@ -91,49 +92,59 @@ def draw_checks(request: HttpRequest) -> None:
 
 
 def _set_up(request: HttpRequest, draft: StudyDraft | None) -> HttpResponse:
-    if KEEP in request.POST:
-        return _keep(request, draft)
-    form = _form(data=request.POST or None, initial=_initial(draft))
-    if form.is_valid() and not wants_to_change(request):
+    posted = request.POST
+    entered = _entered(posted) if posted else _initial(draft)
+    if (preset := posted.get("preset")) in PRESETS:
+        entered |= _quantities(preset)
+    form = _form(data=entered)
+    if KEEP in posted or PREVIEW in posted:
+        return _keep(request, draft, form)
+    if is_sure(request) and form.is_valid():
         with refusals_in(form):
-            study_plan = form.study_plan()
-            if not is_sure(request):
-                return ask(request, _opening(study_plan, draft))
             study = drafts.open_draft(
-                study_plan, draft=draft, revision=_revision(request), actor=user_of(request)
+                form.study_plan(), draft=draft, revision=_revision(request), actor=user_of(request)
             )
             messages.success(request, f"“{study.name}” is open; its experts can vote now.")
             return redirect("study", code=study.code)
-    revision = request.POST.get("revision", "") or (draft.revision if draft else "")
-    return _show(request, draft, form, revision, 422 if form.errors else 200)
+    revision = posted.get("revision", "") or (draft.revision if draft else "")
+    return _show(request, draft, form, revision, 422 if is_sure(request) else 200)
 
 
-def _keep(request: HttpRequest, draft: StudyDraft | None) -> HttpResponse:
+def _keep(request: HttpRequest, draft: StudyDraft | None, form: StudyForm) -> HttpResponse:
     """Save what stands in the form, whether it makes a study or not."""
-    entered = _entered(request.POST)
     with refusals_told(request):
         kept = drafts.keep_draft(
-            entered=entered, draft=draft, revision=_revision(request), actor=user_of(request)
+            entered=form.data, draft=draft, revision=_revision(request), actor=user_of(request)
         )
+        if PREVIEW in request.POST:
+            return redirect("study-draft-preview", code=kept.code)
         messages.success(request, "Saved as a draft: no expert sees it, nothing is planned yet.")
         return redirect("study-draft", code=kept.code)
     # Shown with the revision of whoever was faster, so that saving again replaces theirs.
     draft = draft and StudyDraft.objects.filter(pk=draft.pk).first()
-    return _show(request, draft, _form(initial=entered), draft.revision if draft else "", 409)
+    return _show(request, draft, form, draft.revision if draft else "", 409)
 
 
 def _show(
     request: HttpRequest, draft: StudyDraft | None, form: StudyForm, revision: object, status: int
 ) -> HttpResponse:
-    missing = missing_of(draft) if draft else []
-    context = {"form": form, "draft": draft, "revision": revision, "missing": missing}
+    estimate = form.estimate()
+    context = {
+        "form": form if is_sure(request) else _form(initial=form.data),
+        "draft": draft,
+        "revision": revision,
+        "missing": missing_of(draft) if draft else [],
+        "presets": PRESETS,
+        "chosen": request.POST.get("preset", "" if request.POST or draft else USUAL),
+        "estimate": estimate,
+        "compared": compare_votes(estimate) if estimate else [],
+    }
     return render(request, "studies/new.html", context, status=status)
 
 
 def _form(**given: Any) -> StudyForm:
-    offered = Contestant.objects.exclude(kind=Contestant.Kind.CHECK).filter(retired_at=None)
     return StudyForm(
-        contestants=list(offered.select_related("endpoint").order_by("name")),
+        contestants=list(offered_contestants().select_related("endpoint").order_by("name")),
         groups=queries.by_type(),
         experts=by_pseudonym(experts()),
         jobs=list(GenerationJob.objects.all()),
@@ -141,14 +152,12 @@ def _form(**given: Any) -> StudyForm:
     )
 
 
-def _entered(posted: QueryDict) -> dict[str, object]:
+def _entered(posted: QueryDict) -> dict[str, Any]:
     """Return the form as it came in; whole types are the scenarios that they have now."""
-    entered: dict[str, object] = posted.dict() | {
-        name: posted.getlist(name) for name in drafts.NAMES
-    }
+    entered = posted.dict() | {name: posted.getlist(name) for name in drafts.NAMES}
     groups = [group for group in queries.by_type() if group.type in posted.getlist("types")]
     whole = [row.slug for group in groups for row in group.scenarios]
-    return entered | {"scenarios": [*posted.getlist("scenarios"), *whole]}
+    return entered | {"scenarios": [*posted.getlist("scenarios"), *whole], "types": []}
 
 
 def _revision(request: HttpRequest) -> int:
@@ -160,29 +169,56 @@ def _initial(draft: StudyDraft | None) -> dict[str, Any]:
     """Return what the draft has, or what suits most studies."""
     if draft is not None:
         return dict(draft.entered)
-    return SUGGESTED | {"checks": usual_checks(), "practice": has_practice()}
+    people = experts().filter(person__is_simulated=False)
+    return _quantities(USUAL) | {
+        "practice": has_practice(),
+        "contestants": latest_contestants(),
+        "scenarios": [FINISHED],
+        "experts": [user.username for user in people],
+    }
 
 
-def _opening(plan: StudyPlan, draft: StudyDraft | None) -> Confirmation:
-    pairs = plan.votes_per_expert * (1 + (plan.repeats + plan.checks) / 100)
-    seconds = StudyEstimate().seconds
-    page = ("New study", reverse("study-new"))
-    if draft is not None:
-        page = ("Draft", reverse("study-draft", args=[draft.code]))
-    return Confirmation(
-        title=f"Open the study “{plan.name}”?",
-        facts=(
-            f"Experts: {len(plan.experts)}. Votes: {len(plan.experts) * plan.votes_per_expert}. "
-            f"Contestants: {len(plan.contestants)}. Scenarios: {len(plan.scenarios)}.",
-            f"For each expert about {pairs:.0f} pairs, repeats and checks among them, which take "
-            f"{pairs * seconds / 60:.0f} minutes at {seconds:g} s a pair.",
-            "Experts can vote at once. The rules can’t be changed afterwards.",
-        ),
-        button="Open the study",
-        back=page[1],
-        is_final=False,
-        crumbs=(("Studies", reverse("studies")), page),
-    )
+def _quantities(preset: str) -> dict[str, Any]:
+    """Return what a preset sets; no checks where none were drawn."""
+    return PRESETS[preset].quantities | ({} if usual_checks() else {"checks": 0.0})
+
+
+@form_for(ADMIN)
+def preview_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
+    """The first pairs as experts would see them; what the script sends is taken and forgotten."""
+    draft = get_object_or_404(StudyDraft, code=code)
+    if request.method == "POST":
+        return JsonResponse({"saved": 0, "total": 0, "skipped": 0, "next": []})
+    if "study" in request.GET:  # the script asks for more pairs
+        return JsonResponse([], safe=False)
+    form = _form(data=draft.entered)
+    if form.is_valid():
+        with refusals_in(form), transaction.atomic():
+            study = open_study(form.study_plan(), actor=user_of(request))
+            context = _first_pairs(study, draft) | {"draft": draft}
+            shown = render(request, "studies/preview.html", context)
+            transaction.set_rollback(True)
+            return shown
+    tell_errors(request, form)
+    return redirect("study-draft", code=code)
+
+
+def _first_pairs(study: Study, draft: StudyDraft) -> dict[str, Any]:
+    """Return what the voting page shows to one of the experts, with addresses that stay."""
+    here = reverse("study-draft-preview", args=[draft.code])
+    expert = study.experts.order_by("username")[0]
+    context = vote_context(study, expert, change="")
+    if context is None:
+        raise NothingToPlan("No pair is shown to anybody: nobody can tell these pictures apart.")
+    for shown in context["given"]["pairs"]:
+        matchup = study.matchups.select_related("left", "right").get(code=shown["matchup"])
+        shown["a"] = reverse("picture", args=["augmentation", matchup.left.code])
+        shown["b"] = reverse("picture", args=["augmentation", matchup.right.code])
+        shown["original"] = reverse("picture", args=["original", matchup.scenario.code])
+    urls = dict.fromkeys(context["given"]["urls"], here)
+    urls |= {"matchups": f"{here}?study", "page": reverse("study-draft", args=[draft.code])}
+    context["given"] |= {"outbox": "arena preview", "urls": urls}
+    return context
 
 
 # --- Votes from a file -------------------------------------------------------------------------

@@ -40,11 +40,10 @@ from arena.site.acts import (
 )
 from arena.site.listing import read_listing, read_page
 from arena.studies import queries
-from arena.studies.forms import HandOverForm
+from arena.studies.forms import AuthorForm, HandOverForm
 from arena.studies.services.opening import cancel_study, close_study, preregistration_sha256
 from arena.studies.services.plan import PLAN_INPUTS, plan_of
 from arena.studies.services.taking_part import hand_over
-from arena.voting.queries.ballots import tallies
 from augment.services.inputs import InputKind
 
 STUDIES_AT_ONCE = 25
@@ -72,16 +71,20 @@ def studies_page(request: HttpRequest) -> HttpResponse:
 
 @page_for(*STAFF)
 def study_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
-    """The rules, and how far each expert is."""
+    """How far each expert is, their links, and the rules."""
     study = _find_study(code)
     if is_imported(study):
         return redirect("results", code=code)
     study_plan, (line,) = plan_of(study), queries.progress_of([study])
+    lines = queries.expert_lines(study)
     long = (InputKind.TEXT, InputKind.NAMES, InputKind.LINES)
     context = {
         "line": line,
         "export": export_place(study, user_of(request)),
-        "tallies": tallies(study),
+        "lines": lines,
+        "done": sum(not one.tally.left for one in lines),
+        "without_link": sum(one.waits_for_link for one in lines),
+        "shows_links": any(one.may_be_invited or one.invitation for one in lines),
         "contestants": study.contestants.all(),
         "rules": [
             (field.label, field.shown(getattr(study_plan, field.name)))
@@ -92,6 +95,8 @@ def study_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         "reports": queries.reports_of(study),
         "accounts": by_pseudonym(experts()),
         "frozen": preregistration_sha256(study),
+        "authorships": queries.authorships_of(study),
+        "author_form": AuthorForm(study=study),
     }
     return render(request, "studies/study.html", context)
 
@@ -122,7 +127,7 @@ def hand_over_pairs(request: HttpRequest, code: uuid.UUID) -> HttpResponse | Non
     """Let others judge what an expert has not judged; asks first."""
     study = get_object_or_404(Study, code=code)
     if wants_to_change(request):
-        return redirect("study", code=code)
+        return None
     form = HandOverForm(
         request.POST,
         givers=list(study.experts.values_list("username", flat=True)),
@@ -130,7 +135,7 @@ def hand_over_pairs(request: HttpRequest, code: uuid.UUID) -> HttpResponse | Non
     )
     if not form.is_valid():
         tell_errors(request, form)
-        return redirect("study", code=code)
+        return None
     giver, takers = form.cleaned_data["giver"], form.cleaned_data["takers"]
     if not is_sure(request):
         question = _question(

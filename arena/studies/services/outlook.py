@@ -1,8 +1,7 @@
-"""How many votes a study needs, and what it will tell, before its first vote.
+"""What a study will tell, before its first vote: its expected intervals.
 
-In: a `StudyEstimate`, filled in by hand or from a study that there is. Out: a `Goal` for each
-wish. All of it is closed form: the sandwich of single votes of a balanced plan, plus what experts
-and scenarios add, which only more experts and more scenarios reduce, and Student's t with
+All of it is closed form: the sandwich of single votes of a balanced plan, plus what experts and
+scenarios add, which only more experts and more scenarios reduce, and Student's t with
 Satterthwaite's degrees of freedom. docs/rating.md describes it; everything is on the scale of the
 rated table, ties half a win.
 
@@ -10,64 +9,51 @@ Notation: C contestants, P pairs. Widths and gaps are Elo points.
 """
 
 import math
-from bisect import bisect_left
-from collections.abc import Callable
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from django.contrib.auth.models import User
-from django.db.models import Count, Max, Min
 from scipy.special import ndtr, ndtri
 
-from arena.models import Snapshot, Study
 from arena.rating.comparisons import LEVEL, FloatArray, t_quantile
-from arena.rating.influence import estimate_effects
 from arena.rating.models import ELO_PER_LOGIT
 from arena.rating.ranking import CAUTION
 from arena.rating.sandwich import MOST_PRIOR
-from arena.results.queries.access import ResultsAccess, latest_snapshot, results_access
-from arena.results.services.analysis import vote_arrays
-from arena.results.services.ratings import votes_of
-from augment.errors import InvalidDocument
-from augment.services.inputs import InputKind, input_field, inputs_of
+from arena.studies.services.plan import QUANTITIES
 
-POINTS = "Elo points"
-MOST_SEARCHED = 500
-"""No more experts, or scenarios, are thought of."""
-
-
-def _whole(label: str, least: int, most: int, default: int | None) -> Any:
-    return input_field(InputKind.WHOLE, label, default=default, least=least, most=most)
-
-
-def _number(label: str, unit: str, least: float, most: float, default: float) -> Any:
-    return input_field(InputKind.NUMBER, label, unit=unit, default=default, least=least, most=most)
+COMPARED = (0.5, 1.0, 2.0, 4.0)
+"""Times the votes per expert: what fewer or more votes would tell."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StudyEstimate:
-    """A study in mind, and what it is to tell; the defaults are guesses (docs/method.md).
+    """A study in mind; the defaults below the first block are guesses (docs/rating.md).
 
-    Shares are in percent. The contestants lie evenly between the worst and the best.
+    Attributes:
+        repeats, checks, overlap: In percent, as in StudyPlan.
+        spread: Points from the worst to the best; the others lie evenly between them.
+        ties: Percent of the votes that say equal.
+        expert_sd, scenario_sd: By how many points experts and scenarios differ about a contestant.
+        power: Percent, the chance with which two are to be told apart.
+        seconds: For one vote.
     """
 
-    contestants: int = _whole("Contestants", 2, 500, 9)
-    experts: int = _whole("Experts", 2, 500, 9)
-    scenarios: int = _whole("Scenarios", 2, 10_000, 50)
-    spread: float = _number("From the worst to the best", POINTS, 0, 3000, 150)
-    ties: float = _number("Votes that say Equal", "%", 0, 99, 45)
-    expert_sd: float = _number("Experts differ about a contestant by", POINTS, 0, 1000, 30)
-    scenario_sd: float = _number("Scenarios differ in a contestant by", POINTS, 0, 1000, 70)
-    half_width: float = _number("Expected widest interval ±", POINTS, 1, 1000, 25)
-    gap: float = _number("Tell two apart that differ by", POINTS, 1, 2000, 40)
-    power: float = _number("with a chance of", "%", 50, 99.9, 80)
-    seconds: float = _number("Seconds for one vote", "", 0.1, 3600, 12)
-    repeats: float = _number("Hidden repeats", "%", 0, 50, 5)
-    checks: float = _number("Attention checks", "%", 0, 50, 2)
-    overlap: float = _number("Pairs that two experts judge", "%", 0, 80, 10)
-    votes_per_expert: int | None = _whole("Votes per expert in mind", 1, 10_000, None)
+    contestants: int
+    experts: int
+    scenarios: int
+    votes_per_expert: int
+    repeats: float = 5.0
+    checks: float = 2.0
+    overlap: float = 10.0
+
+    spread: float = 150.0
+    ties: float = 45.0
+    expert_sd: float = 30.0
+    scenario_sd: float = 70.0
+    power: float = 80.0
+    seconds: float = 12.0
 
     @property
     def pairs(self) -> int:
@@ -80,128 +66,79 @@ class StudyEstimate:
         return self.pairs * self.scenarios
 
     @property
+    def votes(self) -> int:
+        """Votes in all, without repeats and checks."""
+        return self.votes_per_expert * self.experts
+
+    @property
+    def minutes(self) -> float:
+        """What each expert needs, repeats and checks included."""
+        on_top = 1.0 + (self.repeats + self.checks) / 100
+        return self.votes_per_expert * on_top * self.seconds / 60.0
+
+    @property
     def gaps(self) -> FloatArray:
         """(P,) points between the pairs, in the order of np.triu_indices."""
         low, high = np.triu_indices(self.contestants, 1)
         return np.asarray((high - low) * self.spread / (self.contestants - 1))
 
-    @property
-    def most_ties(self) -> float:
-        """The percentage of ties that contestants so far apart can't reach."""
-        return float((200.0 / (1.0 + np.exp(self.gaps / ELO_PER_LOGIT))).mean())
-
-
-ESTIMATE_INPUTS = inputs_of(StudyEstimate)
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Prospect:
-    """What a number of votes gives.
+    """What the votes of a study tell.
 
     Attributes:
-        votes_per_expert, votes: Without repeats and checks.
-        minutes: Of each expert, with them.
         half_width, widest: Expected of a typical interval, and of the widest.
         gap: At which two are told apart with the wanted power.
     """
 
-    votes_per_expert: int
-    votes: int
-    minutes: float
     half_width: float
     widest: float
     gap: float
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Goal:
-    """A wish and what it takes, or why no number of votes reaches it."""
+def estimate_of(given: Mapping[str, Any]) -> StudyEstimate | None:
+    """Return what is in mind, from the values of a StudyPlan; None while one is missing."""
+    counted = {name: len(given.get(name, ())) for name in ("contestants", "experts", "scenarios")}
+    numbers = {name: given.get(name) or 0 for name in QUANTITIES}
+    if not all(counted.values()) or not numbers["votes_per_expert"]:
+        return None
+    return StudyEstimate(**counted, **numbers)
 
-    text: str
-    prospect: Prospect | None
-    obstacle: str = ""
 
+def compare_votes(estimate: StudyEstimate) -> list[tuple[StudyEstimate, Prospect]]:
+    """Return what some numbers of votes per expert tell, from few to many.
 
-def foretell(estimate: StudyEstimate) -> list[Goal]:
-    """Return what it takes to be told what is asked for, and what the votes in mind give.
-
-    Raises:
-        InvalidDocument: So many ties do not go together with so large a spread.
+    Nothing where there is only one contestant, expert or scenario: no interval can be foretold.
     """
-    if estimate.ties >= estimate.most_ties:
-        allowed = f"is below {estimate.most_ties:.0f} for contestants so far apart"
-        raise InvalidDocument("estimate", [("ties", allowed)])
-    goals = [
-        _pursue(
-            estimate,
-            f"Expected widest interval ±{estimate.half_width:g}",
-            lambda found: found.widest <= estimate.half_width,
-        ),
-        _pursue(
-            estimate,
-            f"Two that differ by {estimate.gap:g} told apart",
-            lambda found: found.gap <= estimate.gap,
-        ),
-    ]
-    if (votes := estimate.votes_per_expert) is not None:
-        goals.append(Goal(text="Votes in mind", prospect=prospect(estimate, votes)))
-    return goals
+    if min(estimate.contestants, estimate.experts, estimate.scenarios) < 2:
+        return []
+    most, wanted = estimate.most_votes, estimate.votes_per_expert
+    numbers = {min(max(round(wanted * times), 1), most) for times in COMPARED} | {wanted}
+    estimates = [replace(estimate, votes_per_expert=number) for number in sorted(numbers)]
+    return [(one, prospect(one)) for one in estimates]
 
 
-def prospect(estimate: StudyEstimate, votes_per_expert: int) -> Prospect:
-    """Return what so many votes of each expert give."""
-    votes = votes_per_expert * estimate.experts
-    covariance, degrees, chance = _expected_spread(estimate, float(votes))
+def prospect(estimate: StudyEstimate) -> Prospect:
+    """Return what the votes of a study with two or more of everything tell."""
+    covariance, degrees, chance = _expected_spread(estimate)
     variance = covariance.diagonal()
     factor = float(t_quantile(degrees))
     # By chance some intervals of a table are wider than expected.
     by_chance = 1.0 + 0.5 * _largest_of(estimate.contestants) * math.sqrt(chance)
-    on_top = 1.0 + (estimate.repeats + estimate.checks) / 100
     return Prospect(
-        votes_per_expert=votes_per_expert,
-        votes=votes,
-        minutes=votes_per_expert * on_top * estimate.seconds / 60.0,
         half_width=factor * math.sqrt(float(variance.mean())),
         widest=factor * math.sqrt(float(variance.max())) * by_chance,
         gap=_gap_found(estimate, covariance, degrees),
     )
 
 
-def _pursue(estimate: StudyEstimate, text: str, reached: Callable[[Prospect], bool]) -> Goal:
-    votes = _fewest(lambda number: reached(prospect(estimate, number)), 1, estimate.most_votes)
-    if votes is not None:
-        return Goal(text=text, prospect=prospect(estimate, votes))
-    needs = []
-    for name in ("experts", "scenarios"):
-
-        def is_enough(number: int, name: str = name) -> bool:
-            larger = replace(estimate, **{name: number})
-            return reached(prospect(larger, larger.most_votes))
-
-        number = _fewest(is_enough, getattr(estimate, name), MOST_SEARCHED)
-        needs += [] if number is None else [f"{number} {name} would do"]
-    most = prospect(estimate, estimate.most_votes)
-    obstacle = (
-        "No number of votes reaches it: with every pair judged by everybody the widest interval "
-        f"is ±{most.widest:.0f} and {most.gap:.0f} points are told apart. "
-        f"{' or '.join(needs) or 'It takes more experts and more scenarios'}."
-    )
-    return Goal(text=text, prospect=None, obstacle=obstacle)
-
-
-def _fewest(is_enough: Callable[[int], bool], least: int, most: int) -> int | None:
-    """Return the first number that is enough, where every larger one is, too."""
-    numbers = range(least, most + 1)
-    place = bisect_left(numbers, True, key=is_enough)
-    return numbers[place] if place < len(numbers) else None
-
-
-def _expected_spread(estimate: StudyEstimate, votes: float) -> tuple[FloatArray, float, float]:
+def _expected_spread(estimate: StudyEstimate) -> tuple[FloatArray, float, float]:
     """Return (C, C) squared points, Student's degrees of freedom, and the chance in variances.
 
     The last is the relative variance of what is found for one contestant's variance.
     """
-    size = estimate.contestants
+    size, votes = estimate.contestants, float(estimate.votes)
     single = _covariance_of_a_vote(size, estimate.spread, estimate.ties) / votes
     distinct = votes / (1.0 + estimate.overlap / 100)
     clusters = np.array([estimate.experts, estimate.scenarios], dtype=np.float64)
@@ -271,53 +208,3 @@ def _gap_found(estimate: StudyEstimate, covariance: FloatArray, degrees: float) 
         if abs(gap - before) < 0.01:
             break
     return gap
-
-
-# --- What past votes say -------------------------------------------------------------------------
-
-
-def known_of(study: Study, reader: User | None = None) -> dict[str, Any]:
-    """Return what a study says of the next one like it, by the fields of StudyEstimate.
-
-    Nothing of its results where the reader may not see them.
-
-    Args:
-        study: Any.
-        reader: Who asks on a page; None for a command, which reads closed studies alone.
-
-    Raises:
-        Conflict: The votes of its rating are not what they were.
-    """
-    shares = {"repeats": "repeat_share", "checks": "check_share"}
-    values: dict[str, Any] = {
-        "contestants": study.contestants.count(),
-        "experts": study.experts.count(),
-        "scenarios": study.scenarios.count(),
-        **{name: round(100 * study.rules.get(share, 0), 2) for name, share in shares.items()},
-    }
-    values = {name: value for name, value in values.items() if value}
-    may_read = study.state == Study.State.CLOSED
-    if reader is not None:
-        may_read = results_access(user=reader, study=study) is ResultsAccess.FULL
-    snapshot = latest_snapshot(study) if may_read else None
-    return values if snapshot is None else values | _of_results(snapshot)
-
-
-def _of_results(snapshot: Snapshot) -> dict[str, Any]:
-    votes = votes_of(snapshot)
-    comparisons = vote_arrays(votes.entrants, votes.counted).comparisons
-    rated = snapshot.standings.exclude(rating=None).aggregate(
-        best=Max("rating"), worst=Min("rating"), n=Count("pk")
-    )
-    effects = estimate_effects(comparisons)
-    if effects is None or rated["n"] < 2:
-        return {}
-    return {
-        "contestants": len(votes.entrants),
-        "experts": len(set(comparisons.expert.tolist())),
-        "scenarios": len(set(comparisons.scenario.tolist())),
-        "spread": round(rated["best"] - rated["worst"]),
-        "ties": round(100 * float((comparisons.score == 0.5).mean()), 1),
-        "expert_sd": round(effects["expert"]),
-        "scenario_sd": round(effects["scenario"]),
-    }

@@ -245,6 +245,8 @@ class StudyPlan:
 
 
 PLAN_INPUTS = inputs_of(StudyPlan)
+QUANTITIES = ("votes_per_expert", "repeats", "checks", "overlap")
+"""What decides how many pairs each expert sees, and what a preset sets."""
 SHARES = {"repeats": "repeat_share", "checks": "check_share", "overlap": "overlap_share"}
 """What the frozen rules call a percentage; they keep it as a share."""
 SWITCH_COLUMNS = tuple(
@@ -253,6 +255,55 @@ SWITCH_COLUMNS = tuple(
     if one.kind is InputKind.SWITCH and one.name in {column.name for column in Study._meta.fields}
 )
 """Switches that a study keeps in a column of its own."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Preset:
+    """Values of a StudyPlan that go together; everything else keeps its default.
+
+    Attributes:
+        help: What it is for.
+    """
+
+    label: str
+    help: str
+    votes_per_expert: int
+    repeats: float
+    checks: float
+    overlap: float
+
+    @property
+    def quantities(self) -> dict[str, float]:
+        """The values, by the fields of StudyPlan."""
+        return {name: getattr(self, name) for name in QUANTITIES}
+
+
+PRESETS = {
+    "pilot": Preset(
+        label="Pilot",
+        help="A first look: few votes, many of them on pairs that two experts judge.",
+        votes_per_expert=20,
+        repeats=0.0,
+        checks=0.0,
+        overlap=30.0,
+    ),
+    "paper": Preset(
+        label="Paper",
+        help="A table to publish: agreement and steadiness of the experts can be reported.",
+        votes_per_expert=40,
+        repeats=5.0,
+        checks=2.0,
+        overlap=10.0,
+    ),
+    "crowd": Preset(
+        label="Crowd",
+        help="Many voters whom you don’t know: more checks and repeats for each of them.",
+        votes_per_expert=30,
+        repeats=10.0,
+        checks=10.0,
+        overlap=0.0,
+    ),
+}
 
 
 def plan_of(study: Study) -> StudyPlan:

@@ -1,0 +1,117 @@
+"""From an empty installation to a table in LaTeX: how many clicks and fields that takes an admin.
+
+What experts do is not counted.
+"""
+
+import zipfile
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import Browser, expect
+
+from tests.browser.chromium import chromium
+from tests.browser.hand import Hand
+from tests.formats.av2_logs import write_log
+from tests.stack import Home
+
+pytestmark = [pytest.mark.browser, pytest.mark.redis, pytest.mark.slow, pytest.mark.timeout(600)]
+
+OVER_MS = 300_000
+
+
+@pytest.fixture
+def home(tmp_path: Path) -> Home:
+    made = Home.at(tmp_path / "h")
+    made.folder.mkdir()
+    return made
+
+
+def _as_ada(home: Home, work: Callable[[Hand, Browser], str]) -> Hand:
+    """The admin after all of the work, which ends at a table."""
+
+    def all_of_it(address: str) -> tuple[Hand, str]:
+        with chromium() as browser:
+            ada = Hand.at(browser, address)
+            ada.become_admin(home)
+            return ada, work(ada, browser)
+
+    with home.serving() as address, ThreadPoolExecutor(1) as pool:
+        # Playwright wants a thread without an event loop.
+        ada, table = pool.submit(all_of_it, address).result()
+    assert r"\toprule" in table
+    assert "Reference" in table
+    return ada
+
+
+def test_two_contestants_on_the_catalogue(home: Home) -> None:
+    def work(ada: Hand, browser: Browser) -> str:
+        ada.press("Scenarios")
+        ada.press("Load the paper set")
+        ada.sees("50 added")
+        _run_job(ada)
+        return _study(ada, browser, votes=5)
+
+    ada = _as_ada(home, work)
+    assert ada.clicks <= 25
+    assert ada.fields <= 12
+
+
+def test_two_contestants_on_a_recording(home: Home, tmp_path: Path) -> None:
+    packed, folder = tmp_path / "log.zip", write_log(tmp_path / "log")
+    with zipfile.ZipFile(packed, "w") as made:
+        for file in sorted(folder.rglob("*")):
+            made.write(file, file.relative_to(tmp_path))
+
+    def work(ada: Hand, browser: Browser) -> str:
+        ada.press("Scenarios")
+        ada.press("Load the paper set")
+        _draw_on_a_recording(ada, packed)
+        _run_job(ada)
+        return _study(ada, browser, votes=1)
+
+    assert _as_ada(home, work).clicks <= 40
+
+
+def _draw_on_a_recording(ada: Hand, packed: Path) -> None:
+    """A car, placed 15 m ahead of the ego by a click."""
+    ada.press("Scenarios")
+    ada.press("Scenes")
+    ada.send(packed)
+    ada.fill("slug", "recorded")
+    ada.press("Use this moment")
+    expect(ada.page.get_by_role("heading", name="recorded")).to_be_visible()
+    ada.page.wait_for_load_state("networkidle")
+    ada.press("Place by a click")
+    ada.click_scene(15, 0.5)
+    ada.press("Save the scenario")
+    expect(ada.page.locator("img[src*='/pictures/reference/']")).to_be_visible()
+
+
+def _run_job(ada: Hand) -> None:
+    ada.press("Jobs")
+    ada.press("New job")
+    if (own := ada.page.get_by_role("link", name="Own")).count():
+        ada.click(own)
+    ada.fill("name", "Round 1")
+    ada.tick_only("contestants", "reference", "quantised-5m")
+    ada.click("[data-launch]")
+    ada.sees("Finished", within_ms=OVER_MS)
+
+
+def _study(ada: Hand, browser: Browser, *, votes: int) -> str:
+    link = ada.add_expert("grace")
+    ada.press("Studies")
+    ada.press("New study")
+    ada.fill("name", "First study")
+    ada.fill("votes_per_expert", str(votes))
+    ada.sees(f"{votes} from each of 1 expert")
+    ada.press("Open the study")
+    expect(ada.page.get_by_role("heading", name="First study")).to_be_visible()
+    grace = Hand.at(browser, ada.page.url)
+    grace.page.goto(link)
+    grace.set_password()
+    grace.vote(votes)
+    ada.page.reload()
+    return ada.close_and_export()
