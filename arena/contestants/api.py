@@ -24,8 +24,8 @@ from arena.api.views import (
 from arena.contestants.queries import probe_lines
 from augment.models import Contestant, Endpoint, EndpointModel, Probe
 from augment.services.endpoints.contestants import VARIANTS, ContestantRequest, add_contestant
-from augment.services.endpoints.known_endpoints import EndpointRequest, add_endpoint, add_model
-from augment.services.endpoints.probing import plan_probe
+from augment.services.endpoints.known_endpoints import EndpointRequest, add_endpoint
+from augment.services.endpoints.probing import add_model, plan_probe
 from augment.tasks import enqueue_probe
 
 KINDS = [kind.value for kind in Contestant.Kind if kind is not Contestant.Kind.CHECK]
@@ -156,12 +156,13 @@ class ModelsView(ApiView):
 
     @operation(EndpointModelDocument, takes=NewModelBody, status=201, name="addModel")
     def post(self, code: uuid.UUID, given: Given) -> EndpointModel:
-        """Add a model to an endpoint.
+        """Add a model to an endpoint and have it probed.
 
-        Comes with its listed price; all else is unknown before a probe.
+        Comes with its listed price; all else is unknown before the probe's end.
         """
         row = get_object_or_404(Endpoint, code=code)
-        return add_model(row, model=given["model"], actor=self.user)
+        plan = partial(add_model, row, model=given["model"], actor=self.user)
+        return keep_and_send(plan, enqueue_probe)[0].model
 
 
 class ProbeView(ApiView):

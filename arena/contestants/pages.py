@@ -11,7 +11,7 @@ from django.forms import model_to_dict
 from django.http import HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, redirect, render
 
-from arena.contestants.queries import asking_of, probe_lines
+from arena.contestants.queries import asking_of, probe_lines, state_of
 from arena.people.queries import role_of
 from arena.site.access import ADMIN, STAFF, act_for, form_for, page_for, user_of
 from arena.site.acts import refusals_in, send_later
@@ -20,18 +20,18 @@ from arena.site.listing import read_listing, read_page
 from augment.errors import AugmentError
 from augment.models import Contestant, Endpoint, EndpointModel, GenerationJob, Probe
 from augment.services.endpoints import known_endpoints
-from augment.services.endpoints.contestants import OPTION_INPUTS, ContestantRequest, add_contestant
-from augment.services.endpoints.known_endpoints import (
-    MODEL_FACTS,
-    EndpointFacts,
-    EndpointRequest,
-    is_key_here,
-    list_key_variables,
+from augment.services.endpoints.contestants import (
+    OPTION_INPUTS,
+    ContestantRequest,
+    add_contestant,
+    free_slug,
 )
-from augment.services.endpoints.probing import plan_probe
+from augment.services.endpoints.known_endpoints import MODEL_FACTS, EndpointFacts, EndpointRequest
+from augment.services.endpoints.probing import add_model, plan_probe
 from augment.services.endpoints.treatments import respondents_of
 from augment.services.events import retire
 from augment.services.inputs import inputs_of, read_request, read_values
+from augment.services.running.matrix import SEPARATOR
 from augment.services.running.workers import workforce
 from augment.tasks import enqueue_probe
 
@@ -57,18 +57,33 @@ class OptionsForm(RequestForm):
 class ContestantForm(OptionsForm):
     """A model, a variant, and how it asks."""
 
-    inputs = inputs_of(ContestantRequest) + OPTION_INPUTS
-    endpoint = forms.ChoiceField(label="Endpoint")
+    inputs = (
+        *(one for one in inputs_of(ContestantRequest) if one.name in ("variant", "name")),
+        *OPTION_INPUTS,
+    )
+    model = forms.ChoiceField(label="Model")
+    slug = forms.CharField(
+        required=False,
+        max_length=80,
+        label="Short name in files",
+        help_text="Lower-case letters, digits, hyphens. Empty: made of model and variant.",
+    )
 
     def __init__(self, *args: Any, **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)
-        known = Endpoint.objects.values_list("label", flat=True)
-        offer(self, "endpoint", [(label, label) for label in known])
+        known = EndpointModel.objects.order_by("endpoint__label", "model")
+        pairs = known.values_list("endpoint__label", "model")
+        choices = [(f"{at}{SEPARATOR}{model}", f"{model} at {at}") for at, model in pairs]
+        offer(self, "model", choices)
 
-    @property
-    def own_fields(self) -> list[forms.BoundField]:
-        """For the template: all but the options."""
-        return [self[one.name] for one in inputs_of(ContestantRequest)]
+    def to_request(self) -> ContestantRequest:
+        """Return what is asked for; the short name is made where none is given."""
+        given = self.cleaned_data
+        options = read_values(OPTION_INPUTS, given)
+        endpoint, model = given["model"].split(SEPARATOR, 1)
+        slug = given["slug"] or free_slug(model, given["variant"], options)
+        whole = given | {"endpoint": endpoint, "model": model, "slug": slug}
+        return read_request(ContestantRequest, whole, options=options)
 
 
 class EndpointForm(RequestForm):
@@ -139,11 +154,8 @@ def new_contestant_page(request: HttpRequest) -> HttpResponse:
     """Add a contestant that asks a model."""
     form = ContestantForm(request.POST or None, initial=request.GET.dict())
     if form.is_valid():
-        given = form.cleaned_data
-        options = read_values(OPTION_INPUTS, given)
         with refusals_in(form):
-            wanted = read_request(ContestantRequest, given, options=options)
-            row = add_contestant(wanted, user_of(request))
+            row = add_contestant(form.to_request(), user_of(request))
             messages.success(request, f"“{row.name}” is added.")
             return redirect("contestant", code=row.code)
     return render(request, "contestants/new.html", {"form": form})
@@ -161,14 +173,9 @@ def set_retired(request: HttpRequest, code: uuid.UUID) -> None:
 
 @page_for(*STAFF)
 def endpoints_page(request: HttpRequest) -> HttpResponse:
-    """List every endpoint with its limits, and whether its key is here."""
+    """List every endpoint, and whether its key is found in the workers."""
     rows = Endpoint.objects.annotate(known=Count("models")).order_by("label")
-    lines = [{"row": row, "has_key": _has_key(row)} for row in rows]
-    return render(request, "endpoints/list.html", {"lines": lines})
-
-
-def _has_key(row: Endpoint) -> bool:
-    return not row.key_variable or is_key_here(row.key_variable)
+    return render(request, "endpoints/list.html", {"rows": rows, "workforce": workforce()})
 
 
 @form_for(ADMIN)
@@ -181,7 +188,7 @@ def new_endpoint_page(request: HttpRequest) -> HttpResponse:
             row = known_endpoints.add_endpoint(wanted, user_of(request))
             messages.success(request, f"“{row.label}” is added. Name its models now.")
             return redirect("endpoint", code=row.code)
-    context = {"form": form, "variables": list_key_variables()}
+    context = {"form": form, "variables": sorted(workforce().keys)}
     return render(request, "endpoints/new.html", context, status=422 if form.errors else 200)
 
 
@@ -196,13 +203,17 @@ def endpoint_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
             known_endpoints.change_endpoint(row, facts=facts, actor=user_of(request))
             messages.success(request, "Kept. It counts for the next call.")
             return redirect("endpoint", code=row.code)
+    models = [(model, state_of(model, model.probes.first())) for model in row.models.all()]
+    staff = workforce()
     context = {
         "row": row,
         "form": form,
-        "models": row.models.all(),
+        "models": models,
+        "is_live": any(state == "asked" for _, state in models),
+        "is_priced": any(model.price_in_usd is not None for model, _ in models),
         "contestants": row.contestants.filter(retired_at=None).order_by("name"),
-        "has_key": _has_key(row),
-        "variables": list_key_variables(),
+        "workforce": staff,
+        "variables": sorted(staff.keys),
     }
     return render(request, "endpoints/endpoint.html", context, status=422 if form.errors else 200)
 
@@ -215,12 +226,12 @@ def _sent_by_admin(request: HttpRequest) -> Any:
 
 
 @act_for(ADMIN, back="endpoint")
-def add_model(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
-    """Note a model of an endpoint; its listed price comes with it."""
+def new_model(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
+    """Note a model of an endpoint with its listed price, and have a worker probe it."""
     endpoint = get_object_or_404(Endpoint, code=code)
-    model = request.POST.get("model", "")
-    row = known_endpoints.add_model(endpoint, model=model, actor=user_of(request))
-    return redirect("endpoint-model", code=row.code)
+    probe = add_model(endpoint, model=request.POST.get("model", ""), actor=user_of(request))
+    send_later(request, enqueue_probe, probe.pk)
+    return redirect("endpoint-model", code=probe.model.code)
 
 
 @form_for(*STAFF)
@@ -240,6 +251,7 @@ def model_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         "form": form,
         "probe": probe,
         "is_live": is_live,
+        "state": state_of(row, probe),
         "lines": probe_lines(row, probe),
         "workforce": workforce() if is_live else None,
     }

@@ -35,6 +35,15 @@ def probe_lines(model: EndpointModel, probe: Probe | None) -> list[dict[str, Any
     return lines
 
 
+def state_of(model: EndpointModel, probe: Probe | None) -> str:
+    """Return in a word what the last probe of a model came to: for pages."""
+    if probe is not None and probe.state in (*Probe.UNDER_WAY, Probe.State.FAILED):
+        return "failed" if probe.state == Probe.State.FAILED else "asked"
+    findings = (model.probe_report or {}).get("findings", ())
+    answers = {found["ability"]: found["has_it"] for found in findings}.get("answers")
+    return {True: "works", False: "silent", None: "unknown"}[answers]
+
+
 def asking_of(
     contestant: Contestant, made_with: dict[str, Any] | None = None
 ) -> dict[str, Any] | None:

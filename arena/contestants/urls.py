@@ -12,7 +12,7 @@ urlpatterns: list[URLPattern] = [
     path("endpoints/", pages.endpoints_page, name="endpoints"),
     path("endpoints/new/", pages.new_endpoint_page, name="endpoint-new"),
     path("endpoints/<uuid:code>/", pages.endpoint_page, name="endpoint"),
-    path("endpoints/<uuid:code>/models/", pages.add_model, name="endpoint-model-new"),
+    path("endpoints/<uuid:code>/models/", pages.new_model, name="endpoint-model-new"),
     path("models/<uuid:code>/", pages.model_page, name="endpoint-model"),
     path("models/<uuid:code>/probe/", pages.probe_model, name="endpoint-probe"),
 ]

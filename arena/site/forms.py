@@ -19,15 +19,10 @@ LONGEST_LINES = 60_000
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Offer:
-    """A contestant to choose, or why it can't be.
-
-    Attributes:
-        keys_missing: Environment variables that its workers need and this process lacks.
-    """
+    """A contestant to choose, or why it can't be."""
 
     row: Contestant
     obstacle: str = ""
-    keys_missing: tuple[str, ...] = ()
 
 
 def offer(form: forms.BaseForm, field: str, choices: Iterable[tuple[str, Any]]) -> None:

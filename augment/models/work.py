@@ -230,6 +230,9 @@ class Worker(models.Model):
         null=True, blank=True, help_text="it last brought lost work back, or saw that none is lost"
     )
     fault = models.TextField(blank=True, help_text="why it could not since then")
+    keys = models.JSONField(
+        default=list, help_text="names of the variables for keys that are set there"
+    )
 
     class Meta:
         ordering = ("-seen_at",)

@@ -135,6 +135,7 @@ def _enter_models(page: Page, model: str) -> None:
     page.goto("/endpoints/new/")
     page.fill("[name=label]", "stand-in")
     page.fill("[name=base_url]", model)
+    page.get_by_text("Advanced").click()
     page.fill("[name=max_concurrency]", "2")
     page.check("[name=is_simulated]")
     page.click("button.main.big")
@@ -143,23 +144,23 @@ def _enter_models(page: Page, model: str) -> None:
     page.click("ol.crumbs a:has-text('stand-in')")
     page.fill("#new-model", "fake-careless")
     page.click("form.add-model button")
+    expect(page.locator("tr[data-ability] .badge.is-good")).to_have_count(len(Ability))
+    page.get_by_text("by hand").click()
     price = {"price_in_usd": "1", "price_out_usd": "4", "price_as_of": "2026-01-31"}
     for name, value in (price | {"price_source": "made up"}).items():
         page.fill(f"[name={name}]", value)
     page.get_by_role("button", name="Keep").click()
-    page.click("#probe")
-    expect(page.locator("tr[data-ability] .badge.is-good")).to_have_count(len(Ability))
-    expect(page.get_by_text("Last report:")).to_be_visible()
 
 
 def _enter_contestant(page: Page) -> None:
     page.click("a:has-text('New contestant')")
-    expect(page.locator("[name=model]")).to_have_value("fake-careless")
-    page.fill("[name=slug]", "careless-otm")
+    expect(page.locator("[name=model]")).to_have_value("stand-in|fake-careless")
     page.select_option("[name=variant]", "otm")
+    page.get_by_text("Advanced").click()
+    page.fill("[name=slug]", "careless-otm")
     page.fill("[name=temperature]", "0.7")
     page.click("button.main.big")
-    expect(page.locator("p.mono", has_text="careless-otm")).to_be_visible()
+    expect(page.get_by_text("fake-careless at stand-in")).to_be_visible()
 
 
 def _open_study(ada: Hand) -> None:

@@ -11,6 +11,8 @@ from augment.fake_llm.server import FakeServer, running
 from augment.llm.questions import Ability
 from augment.models import Endpoint, EndpointModel, Event, Probe
 from augment.services.endpoints import known_endpoints, probing
+from augment.services.endpoints.known_models import model_at
+from augment.services.running.workers import Presence
 from augment.services.work import Lease
 from tests.web.cast import people, signed_in
 
@@ -34,7 +36,7 @@ def admin() -> Client:
 def model() -> EndpointModel:
     request = known_endpoints.EndpointRequest(label="here", base_url="http://127.0.0.1:9/v1")
     site = known_endpoints.add_endpoint(request)
-    return known_endpoints.add_model(site, model="m")
+    return model_at(endpoint=site, model="m")
 
 
 def post(admin: Client, name: str, given: dict[str, str], **where: object) -> str:
@@ -56,9 +58,12 @@ def test_an_endpoint_is_added_with_its_limits_and_shows_no_key(
     assert "“here” is added." in shown
     pages = [shown, admin.get(reverse("endpoints")).content.decode()]
     assert all("HERE_API_KEY" in page and "sk-very-secret" not in page for page in pages)
-    assert "not set where pages are served" not in pages[1]
+    assert "No worker runs" in pages[1]
+    Presence("here 1").beat()
+    assert "Key found" in admin.get(reverse("endpoints")).content.decode()
     monkeypatch.delenv("HERE_API_KEY")
-    assert "not set where pages are served" in admin.get(reverse("endpoints")).content.decode()
+    Presence("here 2").beat()
+    assert "Key not found" in admin.get(reverse("endpoints")).content.decode(), "not in each"
     told = Event.objects.get(verb="add", object_kind="endpoint").after or {}
     assert told["max_concurrency"] == 3
 
@@ -111,7 +116,6 @@ def test_a_model_keeps_what_somebody_knows_and_no_half_of_a_price(
     assert (model.price_in_usd, model.price_out_usd) == (Decimal("0.5"), Decimal("1.5"))
     listed = admin.get(reverse("endpoint", args=[model.endpoint.code])).content.decode()
     assert "$0.50" in listed
-    assert "Open weight" in listed
     refused = post(admin, "endpoint-model", whole | {"price_in_usd": "-1"}, code=model.code)
     assert "a price is 0 or more" in refused
 
@@ -133,12 +137,13 @@ def test_a_probe_is_asked_for_on_the_page_and_its_lines_appear_one_by_one(
     django_capture_on_commit_callbacks: Callable[..., object],
 ) -> None:
     Endpoint.objects.update(base_url=stand_in.url, is_simulated=True)
-    EndpointModel.objects.update(model="fake-no-vision")
-    address = reverse("endpoint-model", args=[model.code])
+    model.delete()
     with django_capture_on_commit_callbacks() as waiting:  # type: ignore[attr-defined]
-        admin.post(reverse("endpoint-probe", args=[model.code]))
+        asked = {"model": "fake-no-vision"}
+        added = admin.post(reverse("endpoint-model-new", args=[model.endpoint.code]), asked)
     assert len(waiting) == 1, "its message is sent once the row is stored"
-    probe = Probe.objects.get()
+    probe, address = Probe.objects.get(), added["Location"]
+    model = probe.model
     shown = admin.get(address).content.decode()
     assert (shown.count("data-ability"), shown.count("waiting")) == (len(Ability), len(Ability))
     assert "js/live.js" in shown

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from decimal import Decimal
+from functools import cached_property
 from typing import Any
 
 from django import forms
@@ -18,12 +19,12 @@ from arena.site.acts import refusals_in, send_later
 from arena.site.forms import ChoiceForm, Offer, offer
 from augment.models import Contestant, EndpointModel, GenerationJob
 from augment.services.endpoints.contestants import OPTION_INPUTS
-from augment.services.endpoints.known_endpoints import is_key_here
 from augment.services.inputs import inputs_of, read_request, read_values
-from augment.services.running.choosing import find_obstacle, keys_missing
+from augment.services.running.choosing import find_obstacle
 from augment.services.running.estimates import JobEstimate, estimate
 from augment.services.running.jobs import JobRequest, JobScope, launch
 from augment.services.running.matrix import add_cells, find_cells, matrix_of
+from augment.services.running.workers import workforce
 from augment.tasks import enqueue_job
 
 LONGEST_NAME = 120
@@ -64,16 +65,16 @@ class LaunchForm(ChoiceForm, OptionsForm):
     @property
     def offers(self) -> list[Offer]:
         """For the template: contestants, with the reason where no job can run them."""
-        offers = []
-        for row in self.offered:
-            obstacle = find_obstacle(row)
-            missing = () if obstacle else tuple(keys_missing(row))
-            offers.append(Offer(row=row, obstacle=obstacle, keys_missing=missing))
-        return offers
+        return [Offer(row=row, obstacle=find_obstacle(row)) for row in self.offered]
 
     def usual(self) -> dict[str, Any]:
         """Return what is filled in at first: all that can run, on every scenario, within a cap."""
-        ready = [one.row.slug for one in self.offers if not (one.obstacle or one.keys_missing)]
+        ready = [
+            one.row.slug
+            for one in self.offers
+            if not one.obstacle
+            and getattr(one.row.endpoint, "key_variable", "") not in self.missing_keys
+        ]
         return {
             "name": f"Job {GenerationJob.objects.count() + 1}",
             "contestants": ready,
@@ -81,11 +82,11 @@ class LaunchForm(ChoiceForm, OptionsForm):
             "cap_calls": USUAL_CALLS,
         }
 
-    @property
+    @cached_property
     def missing_keys(self) -> set[str]:
-        """For the template: variables of the models' keys that are not set here."""
+        """For the template: variables of the models' keys that the workers do not have."""
         names = {known.endpoint.key_variable for known in self.models} - {""}
-        return {name for name in names if not is_key_here(name)}
+        return names - workforce().keys
 
     @property
     def chosen_cells(self) -> list[str]:

@@ -1,5 +1,6 @@
 """Contestants: who is there without being added, who is added, and what they would send."""
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -15,7 +16,7 @@ from augment.services.endpoints.known_models import model_at
 from augment.services.endpoints.treatments import Respondent, check_roles
 from augment.services.events import log_change
 from augment.services.inputs import Input, InputKind, input_field
-from augment.services.scenarios.scenes import check_slug
+from augment.services.scenarios.scenes import SLUG_LENGTH, check_slug
 from augment.services.texts import one_line
 from augment.variants.options import RULES, ContestantOptions, check_options, options_from_document
 from augment.variants.recipes import RECIPES, Recipe, find_recipe, spell_variant
@@ -67,7 +68,9 @@ class ContestantRequest:
         InputKind.TEXT, "Name", "Empty: made of model and variant.", default="", most=LONGEST_NAME
     )
     variant: str = input_field(
-        InputKind.CHOICE, "Variant", choices={name: name for name in RECIPES}
+        InputKind.CHOICE,
+        "Variant",
+        choices={name: f"{spell_variant(name)}: {one.title}" for name, one in RECIPES.items()},
     )
     endpoint: str = input_field(InputKind.TEXT, "Label of an endpoint", most=80)
     model: str = input_field(InputKind.TEXT, "Model id on the endpoint", most=120)
@@ -132,6 +135,16 @@ def add_contestant(request: ContestantRequest, actor: User | None = None) -> Con
             "choose another slug."
         )
     return row
+
+
+def free_slug(model: str, variant: str, options: Mapping[str, Any]) -> str:
+    """Return a slug that says how a contestant asks and that nobody has."""
+    words = "-".join((model, variant, options_from_document(options).slug()))
+    stem = re.sub(r"[^a-z0-9]+", "-", words.lower())
+    stem = stem.strip("-")[: SLUG_LENGTH - 4].strip("-") or "contestant"
+    taken = set(Contestant.objects.filter(slug__startswith=stem).values_list("slug", flat=True))
+    numbered = (f"{stem}-{number}" for number in range(2, len(taken) + 3))
+    return next(one for one in (stem, *numbered) if one not in taken)
 
 
 def _reviewers(roles: Roles, own: Respondent, actor: User | None) -> dict[ModelRole, Respondent]:

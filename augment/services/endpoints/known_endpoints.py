@@ -23,11 +23,9 @@ from django.forms import model_to_dict
 from augment.errors import Conflict, InvalidDocument, KeyMissing, KeyNotAllowed, UnknownName
 from augment.llm.addresses import check_base_url
 from augment.models import Endpoint, EndpointModel
-from augment.services.endpoints.known_models import model_at
 from augment.services.events import log_change
 from augment.services.inputs import InputKind, check_bounds, input_field
 from augment.services.scenarios.scenes import check_slug
-from augment.services.texts import one_line
 
 OPENAI, OPENAI_URL, OPENAI_KEY = "openai", "https://api.openai.com/v1", "OPENAI_API_KEY"
 
@@ -152,28 +150,12 @@ def find_endpoint(label: str, actor: User | None = None) -> Endpoint:
         raise UnknownName(
             "endpoint", label, list(Endpoint.objects.values_list("label", flat=True))
         )
-    if not is_key_here(OPENAI_KEY):
+    if OPENAI_KEY not in list_keys():
         raise Conflict(
             f"Endpoint {OPENAI!r} was not added yet: set {OPENAI_KEY} here, or name its address."
         )
     request = EndpointRequest(label=OPENAI, base_url=OPENAI_URL, key_variable=OPENAI_KEY)
     return add_endpoint(request, actor)
-
-
-@transaction.atomic
-def add_model(endpoint: Endpoint, *, model: str, actor: User | None = None) -> EndpointModel:
-    """Add a model of an endpoint with its listed price, and nothing else known yet.
-
-    Raises:
-        InvalidDocument: The model id can't be used.
-        Conflict: The endpoint has it already.
-    """
-    model = one_line("model", model, what="endpoint")
-    if endpoint.models.filter(model=model).exists():
-        raise Conflict(f"{endpoint.label} has the model {model} already.")
-    row = model_at(endpoint=endpoint, model=model)
-    log_change(row, "add", actor, after=_facts(row, ("model", *MODEL_FACTS)))
-    return row
 
 
 @transaction.atomic
@@ -243,15 +225,9 @@ def check_key_variable(variable: str) -> None:
         raise InvalidDocument("endpoint", [("key_variable", problem)])
 
 
-def is_key_here(variable: str) -> bool:
-    """Return whether this process has the key; workers elsewhere may have it all the same."""
-    return bool(os.environ.get(variable, "").strip())
-
-
-def list_key_variables() -> list[str]:
-    """Return names, and only names, of variables for keys that are set or listed here."""
-    here = {name for name in os.environ if _FOR_KEYS.fullmatch(name)}
-    return sorted(here | set(settings.KEY_VARIABLES))
+def list_keys() -> list[str]:
+    """Return the names, and only the names, of the variables for keys that are set here."""
+    return sorted(name for name in os.environ if may_hold_key(name) and os.environ[name].strip())
 
 
 def key_of(endpoint: Endpoint) -> str | None:

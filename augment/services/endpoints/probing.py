@@ -19,11 +19,11 @@ from augment.llm.client import ChatClient, ModelProfile
 from augment.llm.costs import cut_of, usd_of
 from augment.llm.messages import LengthName, Reply, Request, shorten
 from augment.llm.questions import Ability, ProbeQuestion, questions_for
-from augment.models import EndpointModel, Probe
+from augment.models import Endpoint, EndpointModel, Probe
 from augment.services.endpoints.client import Queue, place_at, wire_to
-from augment.services.endpoints.known_models import TEMPERATURE, price_of
+from augment.services.endpoints.known_models import TEMPERATURE, model_at, price_of
 from augment.services.events import log_change
-from augment.services.texts import make_document_storable
+from augment.services.texts import make_document_storable, one_line
 from augment.services.work import Lease, Settlement, WorkKind
 
 ABILITIES = tuple(ability.value for ability in Ability)
@@ -107,6 +107,22 @@ def probe(
         report.cost_usd = f"{sum(Decimal(cost) for cost in costs if cost):f}"
     _store(row, report, actor)
     return report
+
+
+@transaction.atomic
+def add_model(endpoint: Endpoint, *, model: str, actor: User | None = None) -> Probe:
+    """Add a model of an endpoint with its listed price; the caller sends its probe's message.
+
+    Raises:
+        InvalidDocument: The model id can't be used.
+        Conflict: The endpoint has it already.
+    """
+    model = one_line("model", model, what="endpoint")
+    if endpoint.models.filter(model=model).exists():
+        raise Conflict(f"{endpoint.label} has the model {model} already.")
+    row = model_at(endpoint=endpoint, model=model)
+    log_change(row, "add", actor, after={"model": model, "endpoint": endpoint.label})
+    return plan_probe(row, actor=actor)
 
 
 def plan_probe(model: EndpointModel, *, actor: User | None = None) -> Probe:

@@ -11,7 +11,7 @@ from augment.baselines.registry import PLACERS
 from augment.errors import AugmentError, Conflict, UnknownName
 from augment.models import Contestant, GenerationJob, Scenario
 from augment.scene.entities import CatalogueSet
-from augment.services.endpoints.known_endpoints import KEY_RULE, is_key_here, may_hold_key
+from augment.services.endpoints.known_endpoints import KEY_RULE, may_hold_key
 from augment.services.endpoints.treatments import options_of, other_prompts, respondents_of
 from augment.variants.options import ToolProtocol
 from augment.variants.respondents import ModelRole
@@ -58,15 +58,6 @@ def find_obstacle(contestant: Contestant) -> str:
     if not sees:
         return f"its viewer {viewer} sees text alone; visual QA needs vision"
     return other_prompts(contestant.slug, options) or ""
-
-
-def keys_missing(contestant: Contestant) -> list[str]:
-    """Return the variables with keys that a contestant needs and this process does not have.
-
-    Workers elsewhere may have them: this is a warning, no obstacle.
-    """
-    names = {one.endpoint.key_variable for one in respondents_of(contestant).values()} - {""}
-    return sorted(name for name in names if may_hold_key(name) and not is_key_here(name))
 
 
 def refuse_impossible(who: Sequence[Contestant], where: Sequence[Scenario]) -> None:

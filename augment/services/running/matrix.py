@@ -4,7 +4,6 @@ A cell with a set of options is one contestant: the one that there is, else one 
 job is launched. Options that a variant has no use for are left out for it.
 """
 
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -12,9 +11,13 @@ from django.contrib.auth.models import User
 from django.db import transaction
 
 from augment.models import Contestant, Endpoint, EndpointModel
-from augment.services.endpoints.contestants import LONGEST_NAME, ContestantRequest, add_contestant
+from augment.services.endpoints.contestants import (
+    LONGEST_NAME,
+    ContestantRequest,
+    add_contestant,
+    free_slug,
+)
 from augment.services.endpoints.known_endpoints import may_hold_key
-from augment.services.scenarios.scenes import SLUG_LENGTH
 from augment.variants.options import ContestantOptions, names_for, options_from_document
 from augment.variants.recipes import RECIPES, Recipe, find_recipe, spell_variant
 from augment.variants.respondents import ModelRole
@@ -117,14 +120,9 @@ def _contestant(key: str, options: ContestantOptions) -> Contestant:
         if not row.roles and row.options == document:
             return row
     chosen = options_from_document(document)
-    stem = re.sub(r"[^a-z0-9]+", "-", "-".join((model, variant, chosen.slug())).lower())
-    stem = stem.strip("-")[: SLUG_LENGTH - 4].strip("-") or "contestant"
-    taken = set(Contestant.objects.filter(slug__startswith=stem).values_list("slug", flat=True))
-    numbered = (f"{stem}-{number}" for number in range(2, len(taken) + 3))
-    slug = next(one for one in (stem, *numbered) if one not in taken)
     endpoint = Endpoint.objects.get(label=label)
     return Contestant(
-        slug=slug,
+        slug=free_slug(model, variant, document),
         name=f"{model} {spell_variant(variant)} {chosen.describe()}".strip()[:LONGEST_NAME],
         kind=Contestant.Kind.SIMULATED if endpoint.is_simulated else Contestant.Kind.LLM,
         variant=variant,

@@ -12,6 +12,7 @@ from django.conf import settings
 from augment.errors import WorkerStopping
 from augment.models import Worker
 from augment.services.clock import DATABASE_TIME
+from augment.services.endpoints.known_endpoints import list_keys
 from augment.services.texts import make_storable
 
 logger = logging.getLogger(__name__)
@@ -37,12 +38,14 @@ class Workforce:
             there has been none.
         not_recovered_since: Where workers live and none recovers lost work: since when.
         fault: Why they can't, as far as they said so.
+        keys: Names of the variables for keys that all living ones have.
     """
 
     living: int
     silent_since: datetime | None = None
     not_recovered_since: datetime | None = None
     fault: str = ""
+    keys: frozenset[str] = frozenset()
 
     @property
     def works(self) -> bool:
@@ -87,7 +90,8 @@ class Presence:
                 if last is not None:
                     old.exclude(pk=last.pk).delete()
                 times = {"started_at": DATABASE_TIME, "seen_at": DATABASE_TIME}
-                self._pk = Worker.objects.create(name=self._name, **times).pk
+                row = Worker.objects.create(name=self._name, keys=list_keys(), **times)
+                self._pk = row.pk
 
     def recovered(self) -> None:
         """Record that it has recovered what was lost."""
@@ -130,13 +134,15 @@ def workforce() -> Workforce:
     living = [row for row in heard if not row.ended_at and now - row.seen_at <= silent_for]
     if not living:
         return Workforce(living=0, silent_since=heard[0].seen_at)
+    keys = frozenset.intersection(*(frozenset(row.keys) for row in living))
     late = now - timedelta(seconds=LATE_ROUNDS * settings.RECOVER_EVERY_S)
     # A new worker is still at its first round.
     worked_at = {row.pk: row.recovered_at or row.started_at for row in living}
     if any(not row.fault and worked_at[row.pk] >= late for row in living):
-        return Workforce(living=len(living))
+        return Workforce(living=len(living), keys=keys)
     last = max(living, key=lambda row: worked_at[row.pk])
-    return Workforce(living=len(living), not_recovered_since=worked_at[last.pk], fault=last.fault)
+    since, fault = worked_at[last.pk], last.fault
+    return Workforce(living=len(living), not_recovered_since=since, fault=fault, keys=keys)
 
 
 stopping = Event()
