@@ -8,6 +8,7 @@ from django.db.models import Q
 
 from augment.models.scenes import SLUG_HELP
 from augment.models.work import Work, account_column
+from augment.variants.recipes import spell_variant
 
 
 class Endpoint(models.Model):
@@ -224,6 +225,12 @@ class Contestant(models.Model):
 
     def __str__(self) -> str:
         return self.name
+
+    @property
+    def way(self) -> str:
+        """Variant, model and endpoint in words; empty where it asks no model."""
+        variant = spell_variant(self.variant)
+        return f"{variant} with {self.model} at {self.endpoint}" if self.endpoint else ""
 
     @property
     def is_simulated(self) -> bool:

@@ -42,10 +42,7 @@ class EndpointFacts:
 
     base_url: str = input_field(InputKind.TEXT, "Address, up to /v1", most=200)
     key_variable: str = input_field(
-        InputKind.TEXT,
-        "Environment variable of the workers that holds its key",
-        default="",
-        most=80,
+        InputKind.TEXT, "Environment variable that holds its key", default="", most=80
     )
     max_concurrency: int = input_field(
         InputKind.WHOLE, "Calls at once, over all workers", default=4, least=1, most=1000
@@ -63,7 +60,7 @@ class EndpointFacts:
 class EndpointRequest(EndpointFacts):
     """A new endpoint; label and kind stay for ever."""
 
-    label: str = input_field(InputKind.TEXT, "Label", SLUG_RULE, most=80)
+    label: str = input_field(InputKind.TEXT, "Name", SLUG_RULE, most=80)
     is_simulated: bool = input_field(
         InputKind.SWITCH, "A stand-in: what it answers counts as simulated", default=False
     )
