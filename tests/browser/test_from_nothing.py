@@ -160,7 +160,7 @@ def _enter_contestant(page: Page) -> None:
     page.fill("[name=slug]", "careless-otm")
     page.fill("[name=temperature]", "0.7")
     page.click("button.main.big")
-    expect(page.get_by_text("fake-careless at stand-in")).to_be_visible()
+    expect(page.get_by_text("OTM with fake-careless")).to_be_visible()
 
 
 def _open_study(ada: Hand) -> None:
