@@ -138,10 +138,10 @@ def test_a_model_of_a_new_endpoint_is_probed(admin: Client, sent: list[tuple[str
     model = send(admin, f"endpoints/{made['code']}/models", model="m").json()
     assert (model["endpoint"], model["price_in_usd"]) == ("here", None)
     there = f"models/{model['code']}/probe"
-    error_of(admin.get(API + there), 404, "not_found")
+    assert sent == [("enqueue_probe", Probe.objects.get().pk)]
+    error_of(send(admin, there), 409, "conflict")
+    Probe.objects.update(state=Probe.State.DONE)
     answer = send(admin, there)
     assert (answer.status_code, len(answer.json()["lines"])) == (202, len(ABILITIES))
     assert {line["progress"] for line in answer.json()["lines"]} == {"waiting"}
-    assert sent == [("enqueue_probe", Probe.objects.get().pk)]
-    error_of(send(admin, there), 409, "conflict")
     assert admin.get(API + there).json()["state"] == "queued"
