@@ -4,7 +4,7 @@ from django.db import migrations, models
 
 
 class Migration(migrations.Migration):
-    dependencies = [("augment", "0023_work")]
+    dependencies = [("augment", "0024_no_second_chances")]
 
     operations = [
         migrations.AddField(
