@@ -134,17 +134,10 @@ def _write_table(name: str, asked: Chosen, **more: Any) -> ExportedFile:
     return _write(JOB_FILES[name], asked["format"], lambda: find_job(asked["job"]), **more)
 
 
-def _write_plain(options: Chosen, say: Say) -> ExportedFile:
-    """Write a table that takes no options."""
-    return _write_table(options["what"], options)
-
-
 def _write_displacement(options: Chosen, say: Say) -> ExportedFile:
     """Write how far from the references: in groups, or one row an object."""
-    by = options["by"]
-    return _write_table(
-        "displacement-objects" if by == BY_OBJECT else f"displacement-by-{by}", options
-    )
+    part = "objects" if options["by"] == BY_OBJECT else f"by-{options['by']}"
+    return _write_table(f"displacement-{part}", options)
 
 
 def _write_driving(options: Chosen, say: Say) -> ExportedFile:
@@ -156,10 +149,6 @@ def _write_driving(options: Chosen, say: Say) -> ExportedFile:
     if how not in options_driven(job):
         raise Conflict(f"Job {job.name!r} was not driven so; manage.py simulate does it.")
     return _write_table(f"driving-{options['score']}", options, options=how)
-
-
-def _write_analyses(options: Chosen, say: Say) -> ExportedFile:
-    return _write_table(f"analyses-{options['part']}", options)
 
 
 def _write_samples(options: Chosen, say: Say) -> ExportedFile:
@@ -266,7 +255,7 @@ KINDS: dict[str, ExportKind] = {
         name: ExportKind(
             "job",
             table.help,
-            _write_plain,
+            lambda options, say: _write_table(options["what"], options),
             _format(table.formats, default=next(iter(table.formats))),
         )
         for name, table in JOB_FILES.items()
@@ -275,7 +264,7 @@ KINDS: dict[str, ExportKind] = {
     "analyses": ExportKind(
         "job",
         "pairs of contestants, wordings, refusals",
-        _write_analyses,
+        lambda options, say: _write_table(f"analyses-{options['part']}", options),
         _option("--part", "which", choices=list(ANALYSES), required=True)
         | _format(JOB_FILES["analyses-pairs"].formats),
     ),

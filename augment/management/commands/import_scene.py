@@ -1,9 +1,9 @@
 """Bring a recorded or written scene into the database."""
 
+from pathlib import Path
 from typing import Any
 
 from augment.formats.readers import READERS
-from augment.management.arguments import SOURCE
 from augment.services.scenarios.scene_imports import import_scene, notes_of
 from augment.services.terminal import TerminalCommand
 
@@ -16,7 +16,11 @@ class Command(TerminalCommand):
     )
 
     arguments = {
-        **SOURCE,
+        "source": {
+            **{"nargs": "?", "metavar": "FORMAT"},
+            "help": f"what PATH holds: {' or '.join(READERS)}; recognised when not given",
+        },
+        "path": {"type": Path, "help": "the file or folder"},
         "--frame": {
             "type": int,
             "help": "the step that becomes t0, from 0 (default: what the format means, else 0)",
