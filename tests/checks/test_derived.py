@@ -21,7 +21,7 @@ BICYCLE = replace(vehicle("Added1", 9.0, 0.0), type=AgentType.BICYCLE, speed_mps
 
 def test_references_of_the_catalogue_answer_what_is_derived_from_them() -> None:
     unanswered = set()
-    for slug in (*SLUGS, *HARD_SLUGS):
+    for slug in (*SLUGS[::3], *HARD_SLUGS[::3], *HARD_TO_TELL):
         given, here = entry(slug), shown_scene(slug)
         if given.reference.is_empty:
             continue
