@@ -20,13 +20,12 @@ class Command(TerminalCommand):
 
     arguments = {
         "--folder": {
-            "type": Path,
-            "default": settings.BASE_DIR / "fixtures",
+            **{"type": Path, "default": settings.BASE_DIR / "fixtures"},
             "help": "holds scenes/*.json and scenarios/*.json; default: the project's own",
         },
         "--set": {
-            **{"dest": "sets", "choices": (*CatalogueSet, "all"), "default": "paper"},
-            "help": "which part of it; default: paper",
+            **{"choices": [*CatalogueSet, "all"], "default": "paper"},
+            "help": "which part of it; all: those that the folder has; default: paper",
         },
         "--paraphrases": {
             "action": "store_true",
@@ -36,14 +35,11 @@ class Command(TerminalCommand):
 
     def handle(self, *args: Any, **options: Any) -> None:
         """Load it and say what that changed."""
-        folder, sets = options["folder"], [options["sets"]]
-        if sets == ["all"]:  # those that the folder has
+        folder, sets = options["folder"], [options["set"]]
+        if sets == ["all"]:
             sets = [one for one in CatalogueSet if folder_of(folder, one).is_dir()]
-        report = load_catalogue(
-            folder=folder,
-            sets=[CatalogueSet(one) for one in sets],
-            with_paraphrases=options["paraphrases"],
-        )
+        paraphrased = options["paraphrases"]
+        report = load_catalogue(folder=folder, sets=sets, with_paraphrases=paraphrased)
         for kind, counts in (("scenes", report.scenes), ("scenarios", report.scenarios)):
             steps = ", ".join(f"{counts[step]} {step}" for step in list(CatalogueStep)[:3])
             self.stdout.write(f"{kind}: {steps}")
