@@ -136,7 +136,8 @@ def test_what_is_drawn_says_what_is_asked_for() -> None:
     assert (made.instruction_is_generated, made.intent_origin) == (True, "derived")
     assert made.intent is not None
     assert made.intent["requests"][0]["spot"]["distance"] == {"low_m": 20.0}
-    assert set_reference(made, document(), derives=True).reference is None
+    bare = set_reference(made, document(), derives=True)
+    assert (bare.reference, bare.intent) == (None, None)
 
 
 def original() -> Augmentation:

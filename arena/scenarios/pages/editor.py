@@ -69,9 +69,10 @@ class ScenarioForm(forms.Form):
 
 
 def _stored(scenario: Scenario) -> dict[str, Any]:
-    """Return a scenario as the form has it."""
-    names = ("type", "instruction", "keep_traffic", "goal")
+    """Return a scenario as the form has it; a sentence of the drawing is made anew."""
+    names = ("type", "keep_traffic", "goal")
     return {name: getattr(scenario, name) for name in names} | {
+        "instruction": "" if scenario.instruction_is_generated else scenario.instruction,
         "density": scenario.traffic_density,
         "modification": _text(scenario.reference),
         "derives": scenario.intent is None or scenario.intent_origin == "derived",

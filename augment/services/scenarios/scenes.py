@@ -200,7 +200,7 @@ def derive_intent(scenario: Scenario, type: str, instruction: str) -> tuple[str,
     """Set what a scenario asks for, without saving, by what its reference changes.
 
     Args:
-        scenario: With its reference, without one nothing happens.
+        scenario: With its reference; without one nothing derived is left.
         type: Of the scenario, empty for the one that the drawing looks like.
         instruction: In the user's words, empty where the drawing is to say it all.
 
@@ -209,6 +209,8 @@ def derive_intent(scenario: Scenario, type: str, instruction: str) -> tuple[str,
     """
     reference, scene = reference_of(scenario), scene_of(scenario)
     if reference is None or reference.is_empty:
+        if scenario.intent_origin == IntentOrigin.DERIVED:
+            scenario.intent, scenario.intent_origin = None, ""
         return type, instruction
     type = type or type_of_change(reference, scene).value
     sentence, intent = describe_change(type_of(type), reference, scene)
