@@ -62,6 +62,7 @@ def test_a_drawn_reference_is_kept_and_shown(researcher: Client) -> None:
 def test_an_augmentation_is_corrected_and_both_say_so(researcher: Client) -> None:
     row = launch().augmentations.get()
     runner.AUGMENTATIONS.perform(row.pk)
+    draw_scene(row.scenario.base_scene_id)
     url = reverse("correct", args=[row.code])
     page = reverse("augmentation", args=[row.code])
     assert url in researcher.get(page).content.decode()

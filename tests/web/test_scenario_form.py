@@ -51,6 +51,7 @@ def send(client: Client, scene: BaseScene, **fields: str) -> tuple[str, Scenario
 def test_a_drawing_alone_becomes_a_scenario_with_sentence_and_intent(
     reader: Client, scene: BaseScene
 ) -> None:
+    draw_scene(scene.pk)
     shown = reader.get(reverse("scene", args=[scene.code])).content.decode()
     assert 'name="keep_traffic" checked' in re.sub(r"\s+", " ", shown)
     shown, made = send(
