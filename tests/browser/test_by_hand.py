@@ -139,9 +139,12 @@ def _drag(page: Page, what: Locator, *, dx: float = 0.0, dy: float = 0.0) -> Non
 def _run_reference(page: Page) -> None:
     page.goto("/jobs/new/")
     page.fill("[name=name]", "Round 1")
-    page.check("[name=contestants][value=reference]")
-    # It is folded away with the others of its type.
-    page.locator("[name=scenarios][value=parked-ahead]").evaluate("(box) => box.click()")
+    # Scenarios are folded away with the others of their type.
+    for name, value in {"contestants": "reference", "scenarios": "parked-ahead"}.items():
+        page.locator(f"[name={name}]").evaluate_all(
+            "(boxes, one) => boxes.forEach((b) => b.checked === (b.value === one) || b.click())",
+            value,
+        )
     page.click("[data-launch]")
     expect(page.get_by_text("Finished").first).to_be_visible(timeout=240_000)
 
