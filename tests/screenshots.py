@@ -87,7 +87,7 @@ def _shots() -> list[Shot]:
 
     from arena.jobs.pages.jobs import TABS as PARTS
     from arena.management.demo import OPEN_STUDY
-    from arena.models import Study, Vote
+    from arena.models import Study
     from arena.results.pages.tabs import TABS
     from arena.site.demo import JOB, SIMULATED_STUDY
     from augment.models import Augmentation, GenerationJob, Simulation
@@ -106,16 +106,13 @@ def _shots() -> list[Shot]:
     rated = World(study=closed, job=job, augmentation=row, expert=judge.expert)
     voted = World(study=is_open, job=job, augmentation=row, expert=voter)
     drive = Simulation.objects.filter(state=Simulation.State.DONE).first()
-    vote = Vote.objects.filter(matchup__study=closed).first()
     shots = [
         Shot(name="login", who="", path="/login/"),
         Shot(name="home-of-an-expert", who="expert", path="/"),
         Shot(name="home-of-a-researcher", who="researcher", path="/"),
         Shot(name="home-of-an-admin", who="admin", path="/"),
     ]
-    for name in sorted(
-        PAGES.keys() - ACTIONS.keys() - {"home", "drive", "job-tab", "results-vote"}
-    ):
+    for name in sorted(PAGES.keys() - ACTIONS.keys() - {"home", "drive", "job-tab"}):
         who = "expert" if name in VOTES_HERE else "admin"
         here = voted if name in (*VOTES_HERE, *OPEN_HERE) else rated
         shots.append(Shot(name=name, who=who, path=address(name, here)))
@@ -126,8 +123,6 @@ def _shots() -> list[Shot]:
     ]
     if drive is not None:
         shots.append(Shot(name="drive", who="admin", path=f"/drives/{drive.code}/"))
-    if vote is not None:
-        shots.append(Shot(name="results-vote", who="admin", path=f"{results}votes/{vote.key}/"))
     return shots
 
 

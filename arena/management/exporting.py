@@ -123,8 +123,7 @@ def _write_contact_sheet(options: Chosen, say: Say) -> ExportedFile:
     snapshot = _snapshot(options | {"format": "pdf"})
     if is_imported(snapshot.study):
         raise Conflict("Votes from a file have no pictures, so there is no contact sheet.")
-    scenarios = list(snapshot.study.scenarios.defer("reference").order_by("type", "slug"))
-    return ExportedFile(contact_sheet(snapshot, scenarios), "pdf", False)
+    return ExportedFile(contact_sheet(snapshot), "pdf", False)
 
 
 # --- Of a job ------------------------------------------------------------------------------------

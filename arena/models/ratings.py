@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 from django.conf import settings
 from django.db import models
 from django.db.models import F, Q
-from django.utils import timezone
 
 from arena.models.people import fresh_token
 from arena.models.studies import Study
@@ -181,34 +180,19 @@ class EarlyLook(AppendOnly):
 
 
 class VoteFile(models.Model):
-    """Votes from elsewhere. Their study is closed and has neither matchups nor pictures.
+    """Votes from elsewhere. Their study is closed and has neither matchups nor pictures."""
 
-    While they are being written there is no study, so that nobody sees half of them.
-    """
-
-    study = models.OneToOneField(
-        Study, null=True, blank=True, on_delete=models.CASCADE, related_name="vote_file"
-    )
+    study = models.OneToOneField(Study, on_delete=models.CASCADE, related_name="vote_file")
     name = models.CharField(max_length=200, help_text="of the file")
     sha256 = models.CharField(max_length=64)
     made_at = models.DateTimeField(auto_now_add=True)
-    written_at = models.DateTimeField(
-        default=timezone.now, help_text="when the latest batch of its votes was written"
-    )
 
     class Meta:
         ordering = ("-made_at", "-pk")
 
 
 class ImportedVote(AppendOnly):
-    """One line of a file: `first` against `second` as the file has them.
-
-    Append-only from the moment on at which a study has them.
-    """
-
-    removable = """EXISTS (
-        SELECT 1 FROM arena_votefile file WHERE file.id = OLD.file_id AND file.study_id IS NULL
-    )"""
+    """One line of a file: `first` against `second` as the file has them."""
 
     class Outcome(models.TextChoices):
         FIRST = "model_a", "first"

@@ -6,10 +6,8 @@ from dataclasses import fields
 from functools import partial
 from typing import Any
 
-from django.http import Http404
 from django.http.response import HttpResponseBase
 from django.shortcuts import get_object_or_404
-from django.utils.text import slugify
 from drf_spectacular.utils import extend_schema_field
 from rest_framework import serializers
 from rest_framework.request import Request
@@ -27,18 +25,16 @@ from arena.api.views import (
     operation,
 )
 from arena.errors import NoSnapshot
-from arena.exports.formats import download
 from arena.models import Snapshot, Study
 from arena.models.ratings import STORED
 from arena.rating.leaderboard import Line
 from arena.results.exports.tables import leaderboard_table
-from arena.results.exports.writers import RATING_FILES
+from arena.results.exports.writers import RATING_FILES, download_rating
 from arena.results.queries.access import must_read_results
 from arena.results.services.rating_request import RatingRequest
 from arena.results.services.ratings import is_big, plan_snapshot
 from arena.results.services.ratings import rate_now as rate
 from arena.studies.api import get_study
-from augment.errors import UnknownName
 from augment.services.inputs import read_request
 
 _FIELDS: dict[Any, Callable[[], serializers.Field[Any, Any, Any, Any]]] = {
@@ -183,11 +179,4 @@ class SnapshotExportView(FileView):
         snapshot = get_snapshot(self, code)
         if snapshot.state != Snapshot.State.READY:
             raise NoSnapshot("This rating is not ready.")
-        if name not in RATING_FILES or form not in RATING_FILES[name].formats:
-            raise Http404
-        try:
-            made = RATING_FILES[name].make(snapshot)
-        except UnknownName as error:
-            raise Http404 from error
-        stem = f"{slugify(snapshot.study.name) or 'study'}-{'rating' if name == 'all' else name}"
-        return download(RATING_FILES[name].formats, form, stem, made)
+        return download_rating(snapshot, name, form)

@@ -77,11 +77,6 @@ urlpatterns: list[URLPattern] = [
         name="results-votes-file",
     ),
     path(
-        "studies/<uuid:code>/results/votes/<uuid:vote>/",
-        results_votes.single_vote_page,
-        name="results-vote",
-    ),
-    path(
         "studies/<uuid:code>/results/shown/<uuid:matchup>/<slug:side>.png",
         results_votes.shown_picture,
         name="shown-picture",

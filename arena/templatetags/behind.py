@@ -30,16 +30,14 @@ def behind(
 ) -> SafeString | str:
     """A number, or what stands for it, as a link to so many votes; plain where there are none.
 
-    Who may not see single votes gets no link.
-
     Args:
-        context: With the study, the rating and whether staff asks.
+        context: With the study, the rating and whether whoever asks may see single votes.
         number: Of votes.
         text: What is written instead.
         search: Of `VoteSearch`.
     """
     shown = number if text is None else text
-    if not number or not context.get("is_staff"):
+    if not number or not context.get("has_evidence"):
         return str(shown)
     return format_html(
         '<a class="behind" href="{}" data-votes="{}">{}</a>',

@@ -9,6 +9,7 @@ from arena.models import Vote
 from arena.models.votes import AID_LABELS
 from arena.rating.comparisons import Estimate
 from arena.rating.lines import whole_percent, with_minus
+from arena.results.exports.tables import method_text
 from augment.services.judging.driving_scores import clearance_text
 from augment.services.scenarios.scenes import type_label
 
@@ -49,17 +50,6 @@ _LABELS: dict[str, dict[str, str]] = {
         "mark author": "marked an author",
         "take back author": "took the mark of an author back",
     },
-    "method_label": {
-        "bt": "Bradley-Terry on the Elo scale, a tie half a win for both",
-        "davidson": "Davidson’s Bradley-Terry with ties, on the Elo scale",
-        "elo": "online Elo, the median over resamples; its interval does not shrink with votes",
-    },
-    "unit_label": {
-        "vote": "single votes",
-        "scenario": "scenarios",
-        "expert": "experts",
-        "two-way": "experts and scenarios",
-    },
     "skip_reason": {value: str(label) for value, label in Vote.SkipReason.choices},
     "metric_label": {
         "no_ego_at_fault_collisions": "No collision at fault",
@@ -85,6 +75,7 @@ def label_of(kind: str, word: str) -> str:
 for _kind in _LABELS:
     register.filter(_kind, partial(label_of, _kind))
 register.filter("clearance", clearance_text)
+register.filter(method_text)
 register.filter("minus", with_minus)
 register.filter(type_label)
 

@@ -79,9 +79,6 @@ class AppendOnly(models.Model):
     The database refuses it as well, whoever asks: see `augment.models.work`.
     """
 
-    removable: ClassVar[str] = ""
-    """Which rows may be deleted all the same: an SQL condition on OLD, none by default."""
-
     class Meta:
         abstract = True
 
@@ -153,25 +150,18 @@ def _stored(
 
 def _for_sqlite(model: type[AppendOnly]) -> list[str]:
     table = model._meta.db_table
-    stays = f"WHEN NOT ({model.removable})" if model.removable else ""
     return [
-        f"CREATE TRIGGER IF NOT EXISTS {table}_refuses_{what} BEFORE {what} ON {table} {when} "
+        f"CREATE TRIGGER IF NOT EXISTS {table}_refuses_{what} BEFORE {what} ON {table} "
         f"BEGIN SELECT RAISE(ABORT, '{_said(table)}'); END"
-        for what, when in (("update", ""), ("delete", stays))
+        for what in ("update", "delete")
     ]
 
 
 def _for_postgresql(model: type[AppendOnly]) -> list[str]:
     table = model._meta.db_table
-    goes = model.removable or "FALSE"
     function = f"""
         CREATE OR REPLACE FUNCTION {table}_refuses() RETURNS trigger LANGUAGE plpgsql AS $$
         BEGIN
-            IF TG_OP = 'DELETE' THEN
-                IF {goes} THEN
-                    RETURN OLD;
-                END IF;
-            END IF;
             RAISE EXCEPTION '{_said(table)}' USING ERRCODE = 'integrity_constraint_violation';
         END $$
     """

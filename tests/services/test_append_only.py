@@ -8,7 +8,6 @@ from django.core.management import call_command
 from django.db import IntegrityError, connection, transaction
 from django.db.models import Model
 
-from arena.models import ImportedVote, VoteFile
 from augment.models import AppendOnly, before_migrations
 from augment.services.events import log_event
 from tests.study_rows import a_study, matchups_of, vote
@@ -73,22 +72,6 @@ def test_a_stored_row_can_be_neither_changed_nor_deleted(made: Callable[[], Mode
     with pytest.raises(TypeError, match="can't be deleted"):
         row.delete()
     assert stored.values().get() == before
-
-
-@pytest.mark.django_db
-def test_imported_votes_can_be_deleted_until_a_study_has_them() -> None:
-    file = VoteFile.objects.create(name="votes.csv", sha256="0" * 64)
-    votes = ImportedVote.objects.filter(file=file)
-    for line in (2, 3):
-        ImportedVote.objects.create(file=file, line=line, first="x", second="y", outcome="tie")
-    votes.filter(line=2).delete()
-    with pytest.raises(IntegrityError, match="append-only"), transaction.atomic():
-        votes.update(outcome="model_a")
-    file.study = a_study()
-    file.save()
-    with pytest.raises(IntegrityError, match="append-only"), transaction.atomic():
-        votes.delete()
-    assert [vote.line for vote in votes] == [3]
 
 
 @pytest.mark.django_db(transaction=True)

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from django.contrib.auth.models import User
 from django.urls import reverse
 
-from arena.models import Vote
 from arena.results.pages.tabs import TABS
 from arena.results.queries.votes import Filters
 from arena.results.services.ratings import rate_now as rate
@@ -45,9 +44,6 @@ def pages_of_a_rated_study() -> list[ShownPage]:
     named |= {
         name: reverse(name, args=code) for name in ("study", "preregistration", "results-votes")
     }
-    vote = Vote.objects.exclude(comment="").first()
-    assert vote is not None
-    named["results-vote"] = reverse("results-vote", args=[*code, vote.key])
     return _shown(people()["admin"], named)
 
 

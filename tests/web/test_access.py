@@ -34,8 +34,7 @@ PAGES = _table(
         ),
         (404, 404, 403): "scenarios-export drive-file asked-image prompt-image study-file",
         (403, 403, 403): (
-            "results-votes results-votes-file results-vote shown-picture results-export "
-            "results-compare"
+            "results-votes results-votes-file shown-picture results-export results-compare"
         ),
         (403, 403, 404): "label vote vote-practice vote-skipped",
         (200, 200, 200): "home password api-tokens",

@@ -1,4 +1,4 @@
-"""The orders of the grid of evidence, what stands beside its pictures, and the contact sheet."""
+"""The order of the grid of evidence, what stands beside its pictures, and the contact sheet."""
 
 import re
 from pathlib import Path
@@ -8,9 +8,9 @@ from django.core.management import call_command
 from django.test import Client
 from django.urls import reverse
 
-from arena.models import Snapshot, Vote
-from arena.results.queries.evidence import neighbours, vote_page
-from arena.results.queries.scores import VoteScore, read_evidence
+from arena.models import Snapshot
+from arena.results.queries.evidence import vote_page
+from arena.results.queries.scores import VoteScore, scores_of_pairs
 from arena.results.queries.search import VoteSearch
 from arena.results.services.ratings import rate_now as rate
 from arena.studies.services.opening import close_study
@@ -85,7 +85,7 @@ def test_disagreement_is_the_mean_distance_of_two_judgements(
 
 
 def test_the_votes_on_the_most_disputed_pair_come_first(rated: Snapshot, reader: Client) -> None:
-    judged_twice = [score for score in read_evidence(rated).pairs.values() if score.votes > 1]
+    judged_twice = [score for score in scores_of_pairs(rated).values() if score.votes > 1]
     agreement = rated.results.trust.agreement
     assert agreement is not None
     assert len(judged_twice) == agreement.units == 18
@@ -98,17 +98,6 @@ def test_the_votes_on_the_most_disputed_pair_come_first(rated: Snapshot, reader:
     assert len(pictures_in(first)) == 2
     for address in pictures_in(first):
         assert b"".join(reader.get(address))[:4] == b"\x89PNG"
-
-
-def test_votes_by_scenario_are_walked_through_in_that_order(rated: Snapshot) -> None:
-    search = VoteSearch(order="scenario")
-    listed = [vote for number in (1, 2) for vote in vote_page(rated, search, number)]
-    places = [vote.scenario for vote in listed]
-    assert places == sorted(places)
-    middle = Vote.objects.get(key=str(listed[5].code))
-    beside = neighbours(rated, search, middle)
-    assert (beside.before, beside.place, beside.after) == (listed[4].code, 6, listed[6].code)
-    assert neighbours(rated, VoteSearch(mark="skip"), middle).place is None
 
 
 def test_the_command_writes_the_whole_sheet(rated: Snapshot, tmp_path: Path) -> None:

@@ -10,7 +10,7 @@ import pytest
 from django.test import Client
 from django.urls import reverse
 
-from arena.models import Matchup, Snapshot, Study, Vote
+from arena.models import Matchup, Study, Vote
 from arena.results.pages.tabs import TABS
 from arena.results.queries.votes import Filters
 from arena.results.services.ratings import rate_now as rate
@@ -78,7 +78,7 @@ def test_every_number_leads_to_as_many_votes(
         promised |= links_of(shown.content.decode())
     assert len(promised) > 50
     parts = set(re.findall(r"part=(\w+)", " ".join(promised)))
-    assert {"alike", "repeats"} <= parts
+    assert "repeats" in parts
     wrong = {}
     for address, number in promised.items():
         answer = reader.get(address)
@@ -106,34 +106,21 @@ def test_the_file_has_the_votes_of_the_list(study: Study, reader: Client) -> Non
 def test_a_vote_shows_the_pair_as_it_was_shown(study: Study, reader: Client) -> None:
     rate(study=study, rounds=10)
     vote = Vote.objects.filter(comment__contains="kerb").order_by("pk")[0]
-    shades = {"left": 10, "right": 200, "original": 90}
+    shades = {"left": 10, "right": 200}
     for side, row in (("left", vote.shown_left), ("right", vote.shown_right)):
         hang(row, store(png(shades[side])))
-    Matchup.objects.filter(pk=vote.matchup_id).update(original_image=store(png(90)))
     vote.shown_left.refresh_from_db()
     type(vote.shown_left).objects.filter(pk=vote.shown_left_id).update(image="drawn-anew.png")
-    page = " ".join(
-        reader.get(reverse("results-vote", args=[study.code, vote.key])).content.decode().split()
-    )
+    page = listed(reader, study, expert=str(vote.expert.person.code))
     matchup = Matchup.objects.get(pk=vote.matchup_id)
     for side, shade in shades.items():
         address = reverse("shown-picture", args=[study.code, matchup.code, side])
         assert address in page
         assert b"".join(reader.get(address)) == png(shade)
-    left, right = page.index("<b>A</b> is by"), page.index("<b>B</b> is by")
-    assert left < page.index(vote.shown_left.contestant.name, left) < right
-    assert page.index(vote.shown_right.contestant.name, right)
     for said in (vote.matchup.scenario.instruction, "The car stands on the kerb.", "0.4 s"):
         assert said in page, said
     address = reverse("shown-picture", args=[study.code, matchup.code, "upside-down"])
     assert reader.get(address).status_code == 404
-
-
-def test_a_vote_given_after_the_rating_is_none_of_it(study: Study, reader: Client) -> None:
-    snapshot = rate(study=study, rounds=10)
-    newest = Vote.objects.latest("pk")
-    Snapshot.objects.filter(pk=snapshot.pk).update(last_vote=newest.pk - 1)
-    assert reader.get(reverse("results-vote", args=[study.code, newest.key])).status_code == 404
 
 
 def test_an_open_study_keeps_its_votes_until_an_early_look(reader: Client) -> None:
@@ -143,11 +130,10 @@ def test_an_open_study_keeps_its_votes_until_an_early_look(reader: Client) -> No
     addresses = [
         reverse("results-votes", args=[study.code]),
         reverse("results-votes-file", args=[study.code]),
-        reverse("results-vote", args=[study.code, vote.key]),
         reverse("shown-picture", args=[study.code, vote.matchup.code, "left"]),
     ]
     hang(vote.shown_left, store(png(7)))
-    assert [reader.get(address).status_code for address in addresses] == [403] * 4
+    assert [reader.get(address).status_code for address in addresses] == [403] * 3
     eva = signed_in(vote.expert)
     reader.post(reverse("results-open", args=[study.code]))
     for address in addresses:

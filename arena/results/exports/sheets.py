@@ -142,13 +142,14 @@ _ACROSS, _LINES = 5, 4
 _SHRUNK_PX = 600
 
 
-def contact_sheet(snapshot: Snapshot, scenarios: Sequence[Scenario]) -> bytes:
-    """Draw every contestant's picture on these scenarios with the votes on it, as A4 pages."""
+def contact_sheet(snapshot: Snapshot) -> bytes:
+    """Draw every contestant's picture of every scenario with the votes on it, as A4 pages."""
     from matplotlib.backends.backend_pdf import PdfPages
 
     content = io.BytesIO()
     with house_style(), PdfPages(content, metadata=NO_METADATA["pdf"]) as pages:
-        for figure in _pages(snapshot, scenarios):
+        scenarios = snapshot.study.scenarios.defer("reference").order_by("type", "slug")
+        for figure in _pages(snapshot, list(scenarios)):
             pages.savefig(figure)
     return content.getvalue()
 

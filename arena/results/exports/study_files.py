@@ -34,8 +34,7 @@ class StudyFiles(FileWork[StudyFile]):
             rows, many = shown_augmentations(study), study.shows_all_samples
             return made_of(export_rows(rows, origin, "interplan", many=many), slug)
         if row.kind == Kind.CONTACT_SHEET:
-            places = study.scenarios.defer("reference").order_by("type", "slug")
-            content = contact_sheet(snapshot_to_export(study), list(places))
+            content = contact_sheet(snapshot_to_export(study))
             return MadeFile(name=f"{slug}-contact-sheet.pdf", content=ContentFile(content))
         write_study(study, folder / "study", say=lambda line: None)
         packed = folder / "study.zip"

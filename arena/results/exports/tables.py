@@ -32,6 +32,25 @@ def shown_name(name: str, is_simulated: bool) -> str:
     return f"{name}{SIMULATED}" if is_simulated else name
 
 
+def is_closed_form(rating: Snapshot) -> bool:
+    """Whether its intervals come from a formula and not from resampled rounds."""
+    return bool(rating.intervals == Intervals.CLOSED_FORM.value)
+
+
+def method_text(rating: Snapshot) -> str:
+    """How its numbers came about, in one line."""
+    # Earlier ratings could be adjusted for what was shown.
+    adjusted = f", adjusted for {', '.join(rating.covariates)}" if rating.covariates else ""
+    unit = UNIT_TEXTS[rating.resampling_unit]
+    intervals = (
+        f"in closed form, clustered by {unit}"
+        if is_closed_form(rating)
+        else f"by {rating.rounds} resamples of {unit}"
+    )
+    method = METHOD_TEXTS[rating.method]
+    return f"{method}{adjusted}, 95 % intervals {intervals}, seed {rating.seed}"
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Row(Line):
     """One contestant's line, and who that is; `name` is what people know.
@@ -94,22 +113,12 @@ class LeaderboardTable:
     @property
     def method_text(self) -> str:
         """How the numbers came about, in one line."""
-        rating = self.snapshot
-        # Earlier ratings could be adjusted for what was shown.
-        adjusted = f", adjusted for {', '.join(rating.covariates)}" if rating.covariates else ""
-        unit = UNIT_TEXTS[rating.resampling_unit]
-        intervals = (
-            f"in closed form, clustered by {unit}"
-            if self.is_closed_form
-            else f"by {rating.rounds} resamples of {unit}"
-        )
-        method = METHOD_TEXTS[rating.method]
-        return f"{method}{adjusted}, 95 % intervals {intervals}, seed {rating.seed}"
+        return method_text(self.snapshot)
 
     @property
     def is_closed_form(self) -> bool:
         """Whether intervals come from a formula and not from resampled rounds."""
-        return self.snapshot.intervals == Intervals.CLOSED_FORM.value
+        return is_closed_form(self.snapshot)
 
     @property
     def warnings(self) -> list[str]:

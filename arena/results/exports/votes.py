@@ -7,7 +7,7 @@ from arena.exports.formats import TEXT, WHOLE, YES_NO, Sheet, formats, sheet_csv
 from arena.models import Snapshot, Study
 from arena.results.queries.evidence import ListedVote, each_vote
 from arena.results.queries.search import VoteSearch
-from arena.results.queries.votes import RATED, Filters, current_votes, last_vote_of
+from arena.results.queries.votes import RATED, Filters, Judged, current_votes, last_vote_of
 from arena.results.services.ratings import votes_of, votes_version_of
 from arena.results.services.vote_files import (
     BOTH_BAD,
@@ -60,15 +60,17 @@ def vote_list_csv(snapshot: Snapshot, search: VoteSearch) -> Iterator[bytes]:
     return csv_parts(LIST_COLUMNS, map(_list_row, each_vote(snapshot, search)))
 
 
-def _list_row(vote: ListedVote) -> tuple[object, ...]:
+def _list_row(line: ListedVote) -> tuple[object, ...]:
+    vote = line.given
+    if isinstance(vote, Judged):  # whoever the tie counts for has not judged it
+        return (*next(vote_rows([vote], {vote.judge: ""})), line.mark, None, None)
+    left, right, matchup = vote.shown_left, vote.shown_right, vote.matchup
     return (
-        *(vote.left.slug, vote.right.slug),
+        *(left.contestant.slug, right.contestant.slug),
         BOTH_BAD if vote.both_miss else WINNERS.get(vote.outcome),
-        *(vote.judge, vote.scenario, vote.type, vote.kind),
+        *(line.judge, matchup.scenario.slug, matchup.scenario.type, matchup.kind),
         vote.outcome if vote.outcome in ("left", "right") else None,
-        *(vote.ms_visible, vote.is_simulated),
-        vote.at and vote.at.isoformat(timespec="milliseconds"),
-        *(vote.position, vote.aids, vote.comment),
-        *(vote.left.augmentation, vote.right.augmentation, vote.strength),
-        *(vote.mark, vote.reason, vote.code),
+        *(vote.ms_visible, vote.is_simulated, vote.at.isoformat(timespec="milliseconds")),
+        *(matchup.position, vote.aids, vote.comment, left.code, right.code, vote.strength),
+        *(line.mark, vote.reason, vote.key),
     )

@@ -7,6 +7,9 @@ from functools import partial
 from operator import attrgetter
 from typing import Any
 
+from django.http import Http404, HttpResponse
+from django.utils.text import slugify
+
 from arena.exports.cells import csv_text
 from arena.exports.files import zip_bytes
 from arena.exports.formats import (
@@ -15,6 +18,7 @@ from arena.exports.formats import (
     Sheet,
     Value,
     csv_of,
+    download,
     drawings,
     formats,
     json_bytes,
@@ -22,7 +26,7 @@ from arena.exports.formats import (
     sheet_parquet,
 )
 from arena.models import Snapshot
-from arena.rating.lines import caption_text, escape, latex_table
+from arena.rating.lines import aligned, caption_text, escape, latex_table
 from arena.rating.snapshot_document import Results, results_document
 from arena.results.exports.charts import Chart, charts, interval_chart
 from arena.results.exports.tables import (
@@ -101,14 +105,7 @@ def plain_text(table: LeaderboardTable) -> str:
         [column.printed for column in PRINTED],
         *([column.text(row) for column in PRINTED] for row in table.rows),
     ]
-    widths = [max(map(len, column)) for column in zip(*grid, strict=True)]
-    lines = [
-        "  ".join(
-            cell.rjust(width) if place else cell.ljust(width)
-            for place, (cell, width) in enumerate(zip(line, widths, strict=True))
-        )
-        for line in grid
-    ]
+    lines = aligned(grid)
     left_out = ", ".join(f"{number} {reason}" for reason, number in table.left_out.items())
     votes = table.snapshot.votes_counted
     lines += ["", *(f"{line}." for line in table.missing)]
@@ -222,6 +219,23 @@ RATING_FILES = {
 }
 """What a rating is offered as. PostgreSQL keeps the keys of stored documents in an order of its
 own, so documents are sorted."""
+
+
+def download_rating(snapshot: Snapshot, name: str, form: str) -> HttpResponse:
+    """Answer with a file of RATING_FILES.
+
+    Raises:
+        Http404: There is no such file, or not of this rating.
+        Conflict: The votes are not what they were when they were rated.
+    """
+    if name not in RATING_FILES or form not in RATING_FILES[name].formats:
+        raise Http404
+    try:
+        made = RATING_FILES[name].make(snapshot)
+    except UnknownName as error:
+        raise Http404 from error
+    stem = f"{slugify(snapshot.study.name) or 'study'}-{'rating' if name == 'all' else name}"
+    return download(RATING_FILES[name].formats, form, stem, made)
 
 
 # --- Private -----------------------------------------------------------------------------------

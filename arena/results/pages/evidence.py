@@ -1,4 +1,4 @@
-"""The evidence of a rating: votes with their pictures, as a grid, a file, or one at a time."""
+"""The evidence of a rating: votes with their pictures, as a grid and as a file."""
 
 import uuid
 from collections.abc import Mapping
@@ -15,7 +15,7 @@ from arena.people.queries import natural_order
 from arena.results.exports.tables import shown_name
 from arena.results.exports.votes import vote_list_csv
 from arena.results.pages.ratings import get_readable_study, get_snapshot
-from arena.results.queries.evidence import neighbours, vote_in, vote_page
+from arena.results.queries.evidence import vote_page
 from arena.results.queries.search import MARKS, ORDERS, OUTCOMES, PARTS, VoteSearch
 from arena.results.queries.votes import AUTOMATIC, COUNTED, is_imported
 from arena.site.access import STAFF, page_for
@@ -53,9 +53,6 @@ class VoteSearchForm(forms.Form):
         fields: dict[str, Any] = self.fields
         fields["contestant"].choices = fields["opponent"].choices = [_ALL, *shown]
         fields["expert"].choices = [_ALL, *_experts(snapshot)]
-        if is_imported(snapshot.study):
-            for name in ("type", "part", "order"):
-                del fields[name]
 
     def search(self) -> VoteSearch:
         """What is looked for; everything that counts where the form is not valid."""
@@ -87,33 +84,16 @@ def votes_file(request: HttpRequest, code: uuid.UUID) -> HttpResponseBase:
 
 
 @page_for(*STAFF)
-def single_vote_page(request: HttpRequest, code: uuid.UUID, vote: uuid.UUID) -> HttpResponse:
-    """One vote: the pair as it was shown, what was decided how, and who drew what."""
-    snapshot, form, context = _asked(request, code)
-    single = vote_in(snapshot, vote)
-    if single is None:
-        raise Http404
-    matchup = single.vote.matchup
-    context |= {
-        "found": single,
-        "vote": single.vote,
-        "matchup": matchup,
-        "beside": neighbours(snapshot, form.search(), single.vote),
-    }
-    return render(request, "results/vote.html", context)
-
-
-@page_for(*STAFF)
 def shown_picture(
     request: HttpRequest, code: uuid.UUID, matchup: uuid.UUID, side: str
 ) -> HttpResponseBase:
-    """A picture as an expert of the study was shown it: left, right, or before the change."""
+    """A picture as an expert of the study was shown it, left or right."""
     study = get_readable_study(request, code)
     rows = Matchup.objects.select_related("left", "right").only(
-        "left_image", "right_image", "original_image", "left__image", "right__image"
+        "left_image", "right_image", "left__image", "right__image"
     )
     shown = get_object_or_404(rows, study=study, code=matchup)
-    if side not in ("left", "right", "original"):
+    if side not in ("left", "right"):
         raise Http404
     return sized_picture_response(request, picture_of_side(shown, side))
 
@@ -124,8 +104,10 @@ def shown_picture(
 def _asked(
     request: HttpRequest, code: uuid.UUID
 ) -> tuple[Snapshot, VoteSearchForm, dict[str, Any]]:
-    """The rating, what is looked for, and what the templates of both pages need of them."""
+    """The rating, what is looked for, and what the page needs of them; no votes from a file."""
     study: Study = get_readable_study(request, code)
+    if is_imported(study):
+        raise Http404
     snapshot = get_snapshot(request, study)
     form = VoteSearchForm(request.GET.dict(), snapshot=snapshot)
     query = {"rating": str(snapshot.code), **form.search().as_query()}
@@ -135,8 +117,7 @@ def _asked(
         "form": form,
         "search": form.search() if form.is_valid() else None,
         "query": urlencode(query),
-        "imported": is_imported(study),
-        "is_staff": True,
+        "has_evidence": True,
     }
     return snapshot, form, context
 

@@ -15,7 +15,7 @@ from arena.exports.formats import download
 from arena.models import Snapshot, Study
 from arena.people.queries import role_of
 from arena.results.exports.votes import VOTE_FORMATS, unrated_votes
-from arena.results.exports.writers import CHART_FORMATS, RATING_FILES
+from arena.results.exports.writers import CHART_FORMATS, download_rating
 from arena.results.pages.rating_form import RatingForm, rate_or_send
 from arena.results.pages.tabs import FOR_EXPERTS, TABS, describe
 from arena.results.queries.access import (
@@ -32,7 +32,6 @@ from arena.results.services.sharing import share_rating, stop_sharing
 from arena.site.access import ADMIN, EXPERT, RESEARCHER, STAFF, act_for, page_for, user_of
 from arena.site.acts import refusals_told, tell_errors
 from arena.studies.pages.studies import export_place
-from augment.errors import UnknownName
 from augment.services.inputs import read_request
 
 SHOWN = 12
@@ -68,6 +67,7 @@ def results_page(request: HttpRequest, code: uuid.UUID, tab: str = "table") -> H
         "tab_template": f"results/{tab}.html",
         "tabs": TABS if is_staff else FOR_EXPERTS,
         "is_staff": is_staff,
+        "has_evidence": is_staff and not is_imported(study),
         "query": f"?rating={snapshot.code}" if snapshot and request.GET.get("rating") else "",
     }
     if is_staff:
@@ -135,18 +135,12 @@ def rating_file(request: HttpRequest, code: uuid.UUID, name: str, form: str) -> 
     is_staff = role_of(request.user) in STAFF
     if form not in CHART_FORMATS and not is_staff:
         raise PermissionDenied
-    stem = f"{slugify(study.name) or 'study'}-{'rating' if name == 'all' else name}"
     if study.state == Study.State.CANCELLED and name == "votes":
+        stem = f"{slugify(study.name) or 'study'}-votes"
         return download(VOTE_FORMATS, form, stem, unrated_votes(study))
     snapshot = get_snapshot(request, get_readable_study(request, code))
-    if name not in RATING_FILES or form not in RATING_FILES[name].formats:
-        raise Http404
     with refusals_told(request):
-        try:
-            made = RATING_FILES[name].make(snapshot)
-        except UnknownName as error:
-            raise Http404 from error
-        return download(RATING_FILES[name].formats, form, stem, made)
+        return download_rating(snapshot, name, form)
     return redirect("results", code=code)
 
 

@@ -79,13 +79,6 @@ def snapshots_of(study: Study) -> QuerySet[Snapshot]:
     return study.snapshots.order_by("-made_at", "-pk")
 
 
-def snapshot_coded(study: Study, code: UUID | None) -> Snapshot | None:
-    """The rating with that code if it is ready, the newest one without a code."""
-    if code is None:
-        return latest_snapshot(study)
-    return snapshots_of(study).filter(state=Snapshot.State.READY, code=code).first()
-
-
 def snapshot_to_export(study: Study, code: UUID | None = None) -> Snapshot:
     """The rating with that code, the newest without one.
 
@@ -94,7 +87,8 @@ def snapshot_to_export(study: Study, code: UUID | None = None) -> Snapshot:
     """
     if study.state == Study.State.CANCELLED:
         raise NoSnapshot(f"The study {study.name!r} was cancelled: it has votes, but no results.")
-    snapshot = snapshot_coded(study, code)
+    ready = snapshots_of(study).filter(state=Snapshot.State.READY)
+    snapshot = (ready if code is None else ready.filter(code=code)).first()
     if snapshot is None:
         what = "no rating yet" if code is None else f"no rating {code}"
         raise NoSnapshot(f"The study {study.name!r} has {what}. Rate it first.")

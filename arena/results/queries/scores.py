@@ -10,7 +10,6 @@ from django.db.models import Count, F, Max, QuerySet, Value
 from arena.models import Matchup, Snapshot, Vote
 from arena.results.queries.search import VoteSearch, find_votes
 from arena.results.queries.votes import counted_votes
-from augment.models import Contestant
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -27,11 +26,6 @@ class VoteScore:
         return self.wins + self.ties + self.losses
 
     @property
-    def lost_share(self) -> float:
-        """The mean score that went to the others, a tie half; 0 without votes."""
-        return (self.losses + self.ties / 2) / self.votes if self.votes else 0.0
-
-    @property
     def disagreement(self) -> float:
         """The mean distance of two judgements: a win against a loss is 1, against a tie a half."""
         n = self.votes
@@ -39,14 +33,6 @@ class VoteScore:
             return 0.0
         far = self.wins * self.losses + (self.wins + self.losses) * self.ties / 2
         return far / (n * (n - 1) / 2)
-
-
-class Picture(NamedTuple):
-    """A contestant's picture of a scenario; `sample` is 0 unless each is judged on its own."""
-
-    scenario: int
-    sample: int
-    contestant: int
 
 
 class Pair(NamedTuple):
@@ -63,14 +49,6 @@ class Pair(NamedTuple):
         return cls(scenario, sample, min(one, other), max(one, other))
 
 
-@dataclass(frozen=True, slots=True)
-class Evidence:
-    """The scores of a rating's pictures, and of its pairs as seen from the lower contestant."""
-
-    pictures: dict[Picture, VoteScore]
-    pairs: dict[Pair, VoteScore]
-
-
 class PictureShown(NamedTuple):
     """A contestant's picture as a showing had it, by its name in the storage."""
 
@@ -78,17 +56,13 @@ class PictureShown(NamedTuple):
     score: VoteScore
 
 
-def read_evidence(snapshot: Snapshot) -> Evidence:
-    """Count the votes of a rating by picture and by pair; one query."""
-    pictures: defaultdict[Picture, VoteScore] = defaultdict(VoteScore)
+def scores_of_pairs(snapshot: Snapshot) -> dict[Pair, VoteScore]:
+    """The votes of a rating by pair, as seen from the lower contestant; one query."""
     pairs: defaultdict[Pair, VoteScore] = defaultdict(VoteScore)
     for count in _count_votes(counted_votes(snapshot), snapshot):
         pair = Pair.of(count.scenario, count.sample, count.left, count.right)
         pairs[pair] = count.add_to(pairs[pair], pair.low)
-        for contestant in (count.left, count.right):
-            picture = Picture(count.scenario, count.sample, contestant)
-            pictures[picture] = count.add_to(pictures[picture], contestant)
-    return Evidence(dict(pictures), dict(pairs))
+    return dict(pairs)
 
 
 def pictures_by_scenario(
@@ -118,29 +92,17 @@ def pictures_by_scenario(
 
 
 def sort_votes(snapshot: Snapshot, search: VoteSearch) -> list[tuple[int, str]]:
-    """Return keys and marks of the votes looked for, in the order that the search asks for."""
+    """Return keys and marks of the votes looked for, as given or the most disputed ones first."""
     rows = find_votes(snapshot, search)
     if not search.order:
         return list(rows.order_by("pk").values_list("pk", F("mark")))
-    wanted = Contestant.objects.filter(slug=search.contestant).values_list("pk", flat=True).first()
-    evidence = read_evidence(snapshot)
+    scores = scores_of_pairs(snapshot)
 
     def place(row: tuple[Any, ...]) -> tuple[Any, ...]:
-        pk, _, slug, scenario, sample, *contestants = row
-        pair = Pair.of(scenario, sample, *contestants)
-        if search.order == "scenario":
-            return slug, pair, pk
-        if search.order == "disputed":
-            score = evidence.pairs.get(pair, VoteScore())
-            return -score.disagreement, -score.votes, slug, pair, pk
-        pictures = [
-            Picture(scenario, sample, contestant)
-            for contestant in contestants
-            if wanted in (None, contestant)
-        ]
-        scores = [(evidence.pictures.get(picture, VoteScore()), picture) for picture in pictures]
-        worst = min((-score.lost_share, -score.votes, picture) for score, picture in scores)
-        return (*worst, pk)
+        pk, _, slug, *shown = row
+        pair = Pair.of(*shown)
+        score = scores.get(pair, VoteScore())
+        return -score.disagreement, -score.votes, slug, pair, pk
 
     columns = rows.values_list(
         *("pk", F("mark"), "matchup__scenario__slug", "matchup__scenario", _sample_of(snapshot)),

@@ -6,24 +6,19 @@ from typing import Any, Self
 
 from django.db.models import Exists, OuterRef, Q, QuerySet
 
-from arena.models import ImportedVote, Snapshot, Vote
+from arena.models import Snapshot, Vote
 from arena.pairing.order import CHECK, REPEAT
 from arena.rating.reliability import FAST_MS
 from arena.results.queries.votes import (
     AUTOMATIC,
     AUTOMATIC_TIE,
     COUNTED,
-    IMPORTED_OUTCOMES,
     RATED,
-    Filters,
     Judged,
     LeftOut,
-    marked_lines,
     marked_votes,
-    own_votes,
     users_of,
 )
-from augment.models import Contestant
 
 EVERY, LEFT_OUT = "all", "left_out"
 """Marks of several: everything, and all that does not count."""
@@ -42,18 +37,10 @@ OUTCOMES = {
 PARTS = {
     "commented": "With a comment",
     "fast": "Under 1 s",
-    "own": "By authors on their own contestants",
     "repeats": "Hidden repeats of counted votes",
-    "alike": "Hidden repeats answered alike",
     "checks": "Attention checks answered",
-    "passed": "Attention checks passed",
-    "checks_skipped": "Attention checks skipped",
 }
-ORDERS = {
-    "disputed": "Most disputed",
-    "lost": "Most often beaten",
-    "scenario": "Scenarios by name",
-}
+ORDERS = {"disputed": "Most disputed"}
 MARKS = {
     COUNTED: "Counted",
     EVERY: "All",
@@ -115,24 +102,8 @@ def find_votes(snapshot: Snapshot, search: VoteSearch) -> QuerySet[Vote]:
     rows = rows.filter(**{path: word for path, word in words.items() if word})
     if search.outcome == "both_miss":
         rows = rows.filter(both_miss=True)
-    left, right = "shown_left__contestant__slug", "shown_right__contestant__slug"
-    rows = rows.filter(_shows(search, left, right, _VOTE_OUTCOMES))
+    rows = rows.filter(_shows(search))
     return _PARTS[search.part](rows, snapshot) if search.part else rows
-
-
-def find_lines(snapshot: Snapshot, search: VoteSearch) -> QuerySet[ImportedVote]:
-    """The lines of a study's file that are looked for, in their order, each with its `mark`.
-
-    A file has no types, times, comments and skips, so nothing is found by these.
-    """
-    filters = Filters.of_document(snapshot.filters)
-    lines = marked_lines(snapshot.study, filters, snapshot.last_vote)
-    rows: QuerySet[ImportedVote] = _by_mark(lines, search.mark)
-    if search.type or search.part:
-        return rows.none()
-    words = {"judge": search.expert, "item": search.scenario}
-    rows = rows.filter(**{name: word for name, word in words.items() if word})
-    return rows.filter(_shows(search, "first", "second", _LINE_OUTCOMES)).order_by("line")
 
 
 def is_found(tie: Judged, search: VoteSearch) -> bool:
@@ -154,7 +125,7 @@ def is_found(tie: Judged, search: VoteSearch) -> bool:
 
 _DEFAULTS: dict[str, str] = {field.name: str(field.default) for field in fields(VoteSearch)}
 
-_VOTE_OUTCOMES: dict[str, list[str]] = {
+_OUTCOMES: dict[str, list[str]] = {
     "left": ["left"],
     "right": ["right"],
     "equal": ["equal"],
@@ -162,10 +133,6 @@ _VOTE_OUTCOMES: dict[str, list[str]] = {
     "decided": ["left", "right"],
     "skip": ["skip"],
 }
-_LINE_OUTCOMES = {
-    name: [stored for stored, meant in IMPORTED_OUTCOMES.items() if meant in wanted]
-    for name, wanted in _VOTE_OUTCOMES.items()
-} | {"both_miss": [ImportedVote.Outcome.BOTH_BAD.value]}
 
 
 def _by_mark(rows: QuerySet[Any], mark: str) -> QuerySet[Any]:
@@ -174,15 +141,9 @@ def _by_mark(rows: QuerySet[Any], mark: str) -> QuerySet[Any]:
     return rows if mark == EVERY else rows.filter(Q(mark=mark))
 
 
-def _shows(search: VoteSearch, left: str, right: str, outcomes: Mapping[str, list[str]]) -> Q:
-    """Who was shown, on either side, and how it came out as seen from the contestant.
-
-    Args:
-        search: What is looked for.
-        left: The column with who was shown on the left.
-        right: The same of the right.
-        outcomes: The values of the column `outcome` by what is looked for.
-    """
+def _shows(search: VoteSearch) -> Q:
+    """Who was shown, on either side, and how it came out as seen from the contestant."""
+    left, right = "shown_left__contestant__slug", "shown_right__contestant__slug"
     wanted = {"won": ("left", "right"), "lost": ("right", "left")}
     on_left, on_right = wanted.get(search.outcome, (search.outcome, search.outcome))
     shown = Q(pk=None)
@@ -192,8 +153,8 @@ def _shows(search: VoteSearch, left: str, right: str, outcomes: Mapping[str, lis
             side &= Q(**{own: search.contestant})
         if search.opponent:
             side &= Q(**{other: search.opponent})
-        if outcome in outcomes:
-            side &= Q(outcome__in=outcomes[outcome])
+        if outcome in _OUTCOMES:
+            side &= Q(outcome__in=_OUTCOMES[outcome])
         shown |= side
     return shown
 
@@ -209,23 +170,9 @@ def _repeats(rows: QuerySet[Vote], snapshot: Snapshot) -> QuerySet[Vote]:
     return current.filter(Exists(_first_votes(snapshot)))
 
 
-def _alike(rows: QuerySet[Vote], snapshot: Snapshot) -> QuerySet[Vote]:
-    first = _first_votes(snapshot)
-    tied, won = first.filter(winner=None), first.filter(winner=OuterRef("winner"))
-    return _repeats(rows, snapshot).filter(
-        (Q(winner=None) & Exists(tied)) | (Q(winner__isnull=False) & Exists(won))
-    )
-
-
 _PARTS: dict[str, Callable[[QuerySet[Vote], Snapshot], QuerySet[Vote]]] = {
     "commented": lambda rows, _: rows.exclude(comment=""),
     "fast": lambda rows, _: rows.filter(ms_visible__lt=FAST_MS),
-    "own": lambda rows, rating: rows.filter(own_votes(Filters.of_document(rating.filters))),
     "repeats": _repeats,
-    "alike": _alike,
     "checks": lambda rows, _: rows.filter(matchup__kind=CHECK, outcome__in=RATED),
-    "passed": lambda rows, _: rows.filter(
-        matchup__kind=CHECK, winner__contestant__kind=Contestant.Kind.REFERENCE
-    ),
-    "checks_skipped": lambda rows, _: rows.filter(matchup__kind=CHECK, outcome="skip"),
 }

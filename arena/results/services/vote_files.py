@@ -6,8 +6,6 @@ A vote set is known by the hash of its CSV file, so whoever has the file can che
 import hashlib
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from datetime import timedelta
-from itertools import islice
 from pathlib import Path
 
 from django.contrib.auth.models import User
@@ -116,10 +114,7 @@ def digest_of(content: bytes) -> str:
 
 LONGEST_CELL = 200
 AT_ONCE = 500
-"""So many rows are written at once; no vote gets in meanwhile, 0.4 s at most on a busy machine."""
-
-DEAD_AFTER = timedelta(minutes=10)
-"""An import that has written nothing for so long is over: its process was ended."""
+"""So many rows go to the database at once."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -146,41 +141,38 @@ def import_votes(
     Raises:
         VotesUnreadable: A column is missing, a winner is unknown, a cell is empty or too long, or
             the file can't be read; the text has the line and what is allowed.
-        Conflict: There is a study of that name, or another import took this one for dead.
+        Conflict: There is a study of that name.
         InvalidDocument: The name is empty, too long or not one line.
     """
     name = one_line("name", name, what="study")
-    if Study.objects.filter(name=name).exists():
-        raise _taken(name)
     table, digest = _read(path)
     contestants = {*table.columns["model_a"], *table.columns["model_b"]}
     made_up = not {"yes", "true"}.isdisjoint(table.columns.get(SIMULATED, ()))
-    remove_dead()
-    file = VoteFile.objects.create(name=path.name[:200], sha256=digest)
-    try:
-        votes = 0
-        waiting = _rows(table, file)
-        while batch := list(islice(waiting, AT_ONCE)):
-            with in_turn(), transaction.atomic():
-                _hold(file)
-                votes += len(ImportedVote.objects.bulk_create(batch))
-        study = _publish(file, name, votes, is_simulated or made_up, actor)
-    except BaseException:  # also Ctrl-C; after a kill the next import does it
-        _remove(file)
-        raise
+    now = timezone.now()
+    with in_turn(), transaction.atomic():
+        try:
+            with transaction.atomic():
+                study = Study.objects.create(
+                    name=name,
+                    state=Study.State.CLOSED,
+                    votes_per_expert=0,
+                    seed=0,
+                    allow_simulated=is_simulated or made_up,
+                    opened_at=now,
+                    closed_at=now,
+                )
+        except IntegrityError as error:
+            raise Conflict(f"There is a study named {name!r} already.") from error
+        file = VoteFile.objects.create(study=study, name=path.name[:200], sha256=digest)
+        votes = len(ImportedVote.objects.bulk_create(_rows(table, file), batch_size=AT_ONCE))
+        log_event(
+            actor=actor,
+            verb="import votes",
+            object_kind="study",
+            object_code=study.code,
+            after={"file": file.name, "sha256": file.sha256, "votes": votes},
+        )
     return ImportedVotes(study=study, votes=votes, contestants=len(contestants))
-
-
-def remove_dead() -> int:
-    """Remove what imports left behind that were ended before they were done.
-
-    Returns:
-        How many there were.
-    """
-    dead = list(VoteFile.objects.filter(study=None, written_at__lt=timezone.now() - DEAD_AFTER))
-    for file in dead:
-        _remove(file)
-    return len(dead)
 
 
 # --- Private -----------------------------------------------------------------------------------
@@ -220,64 +212,3 @@ def _rows(table: VotesTable, file: VoteFile) -> Iterator[ImportedVote]:
             judge=judge,
             item=item,
         )
-
-
-def _hold(file: VoteFile) -> None:
-    """Say that the import goes on, and keep its file until the transaction ends.
-
-    Raises:
-        Conflict: Somebody has removed it.
-    """
-    if not VoteFile.objects.filter(pk=file.pk).update(written_at=timezone.now()):
-        raise Conflict(
-            f"The import of {file.name} stood still for more than "
-            f"{DEAD_AFTER // timedelta(minutes=1)} minutes and was taken for dead; nothing is "
-            "kept of it. Import the file again."
-        )
-
-
-def _publish(
-    file: VoteFile, name: str, votes: int, is_simulated: bool, actor: User | None
-) -> Study:
-    """Make the study that has the votes of the file; from here on they can be seen."""
-    now = timezone.now()
-    with in_turn(), transaction.atomic():
-        _hold(file)
-        try:
-            with transaction.atomic():
-                study = Study.objects.create(
-                    name=name,
-                    state=Study.State.CLOSED,
-                    votes_per_expert=0,
-                    seed=0,
-                    allow_simulated=is_simulated,
-                    opened_at=now,
-                    closed_at=now,
-                )
-        except IntegrityError:  # somebody else was faster
-            raise _taken(name) from None
-        file.study = study
-        file.save(update_fields=["study"])
-        log_event(
-            actor=actor,
-            verb="import votes",
-            object_kind="study",
-            object_code=study.code,
-            after={"file": file.name, "sha256": file.sha256, "votes": votes},
-        )
-    return study
-
-
-def _remove(file: VoteFile) -> None:
-    """Delete the rows of an import that did not come to its end, and the import itself."""
-    rows = ImportedVote.objects.filter(file=file.pk, file__study=None).order_by("pk")
-    while first := list(rows.values_list("pk", flat=True)[:AT_ONCE]):
-        with in_turn():
-            batch = ImportedVote.objects.filter(file=file.pk, pk__range=(first[0], first[-1]))
-            batch._raw_delete(using=batch.db)
-    with in_turn():
-        VoteFile.objects.filter(pk=file.pk, study=None).delete()
-
-
-def _taken(name: str) -> Conflict:
-    return Conflict(f"There is a study named {name!r} already.")
