@@ -42,7 +42,11 @@ COLUMNS = {
     "rank_worst": "rank_worst",
 }
 """Those of CSV and JSON, by the fields of a line; a new one comes at the end."""
-HEADS = (*PAPERS_HEADS, "95% ranks")
+HEADS = {
+    **{"Model": "name", "Rank": "rank_text", "Elo": "elo_text"},
+    **{"95% CI": "interval_text", "Votes": "votes", "95% ranks": "ranks_text"},
+}
+"""Of the printed table, by the fields of a line; the paper's come first."""
 _CLUSTERED = {
     Unit.VOTE: "single votes",
     Unit.EXPERT: "clustered by judge",
@@ -200,16 +204,9 @@ class RatedCsv:
 
     @property
     def cells(self) -> list[tuple[str, ...]]:
-        """Model, rank, rating, interval, votes and rank set of each line."""
+        """What the lines have under HEADS."""
         return [
-            (
-                line.name,
-                line.rank_text,
-                line.elo_text,
-                line.interval_text,
-                str(line.votes),
-                line.ranks_text,
-            )
+            tuple(str(getattr(line, field)) for field in HEADS.values())
             for line in self.board.standings
         ]
 
@@ -223,7 +220,7 @@ class RatedCsv:
 
 
 def _write_table(rated: RatedCsv) -> str:
-    rows = [HEADS, *rated.cells]
+    rows = [tuple(HEADS), *rated.cells]
     rows = [(escape_controls(" ".join(row[0].split())), *row[1:]) for row in rows]
     lines = aligned(rows)
     lines += ["", *(" ".join(f"{line}.".split()) for line in rated.missing)]
@@ -301,7 +298,7 @@ def _rounded(value: Any) -> Any:
 def _write_latex(rated: RatedCsv) -> str:
     board = rated.board
     in_paper = board.intervals is Intervals.RESAMPLES  # whose table has no rank sets
-    heads = PAPERS_HEADS if in_paper else HEADS
+    heads = PAPERS_HEADS if in_paper else tuple(HEADS)
     return latex_table(
         ((escape(name), *rest)[: len(heads)] for name, *rest in rated.cells),
         comments=(f"{rated.method}; {board.votes} votes", *rated.notes),

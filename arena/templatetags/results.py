@@ -5,11 +5,11 @@ from functools import partial
 
 from django import template
 
-from arena.models import Vote
 from arena.models.votes import AID_LABELS
 from arena.rating.comparisons import Estimate
 from arena.rating.lines import whole_percent, with_minus
 from arena.results.exports.tables import method_text
+from arena.results.queries.votes import REASONS
 from augment.services.judging.driving_scores import clearance_text
 from augment.services.scenarios.scenes import type_label
 
@@ -25,15 +25,7 @@ _LABELS: dict[str, dict[str, str]] = {
         "pdf": "PDF",
         "png": "PNG",
     },
-    "left_out": {
-        "superseded": "changed later",
-        "check": "attention checks",
-        "repeat": "hidden repeats",
-        "skip": "skipped",
-        "simulated": "simulated",
-        "filtered": "not asked for",
-        "own": "by authors on their own contestants",
-    },
+    "left_out": REASONS,
     "verb_label": {
         "open": "opened",
         "close": "closed",
@@ -50,7 +42,6 @@ _LABELS: dict[str, dict[str, str]] = {
         "mark author": "marked an author",
         "take back author": "took the mark of an author back",
     },
-    "skip_reason": {value: str(label) for value, label in Vote.SkipReason.choices},
     "metric_label": {
         "no_ego_at_fault_collisions": "No collision at fault",
         "drivable_area_compliance": "Stays on the road",

@@ -16,7 +16,6 @@ from arena.results.exports.charts import scatters_of
 from arena.results.exports.tables import (
     EARLY_LOOK,
     LeaderboardTable,
-    Row,
     for_experts,
     leaderboard_table,
 )
@@ -95,7 +94,10 @@ def fill_pairs(snapshot: Snapshot, table: LeaderboardTable) -> Context:
 
 def fill_types(snapshot: Snapshot, table: LeaderboardTable) -> Context:
     """One chart of all scenario types, and a table each."""
-    whole, names = _by_slug(table), ("rank", "rating", "lower", "upper", "votes")
+    whole, names = (
+        {row.slug: row for row in table.rows},
+        ("rank", "rating", "lower", "upper", "votes"),
+    )
     parts: list[Context] = []
     for part in snapshot.results.types:
         rows = [
@@ -163,12 +165,7 @@ def _counts(rater: PanelRater) -> Context:
 
 def fill_displacement(snapshot: Snapshot, table: LeaderboardTable) -> Context:
     """Elo against the distance from the references."""
-    metres = {line.slug: line for line in snapshot.results.displacement}
-    lines = [
-        {"number": n, "row": row, "far": metres[row.slug]}
-        for n, row in enumerate(table.rows, start=1)
-        if row.slug in metres
-    ]
+    lines = _numbered(table, {line.slug: line for line in snapshot.results.displacement})
     return {"lines": lines, "has_chart": "displacement" in scatters_of(snapshot, table)}
 
 
@@ -186,22 +183,19 @@ def fill_driving(snapshot: Snapshot, table: LeaderboardTable) -> Context:
 
 def fill_cost(snapshot: Snapshot, table: LeaderboardTable) -> Context:
     """Elo against money and tokens, by class of model."""
-    spent = {line.slug: line for line in snapshot.results.cost}
     metres = {line.slug: line.median_m for line in snapshot.results.displacement}
     labels = {value: str(label) for value, label in EndpointModel.ModelClass.choices}
     titles = {"elo-usd": "Elo against money", "elo-tokens": "Elo against tokens"}
     drawn = scatters_of(snapshot, table)
+    lines = _numbered(table, {line.slug: line for line in snapshot.results.cost})
     return {
         "lines": [
-            {
-                "number": n,
-                "row": row,
-                "spent": spent[row.slug],
-                "class_label": labels.get(spent[row.slug].model_class, ""),
-                "median_m": metres.get(row.slug),
+            line
+            | {
+                "class_label": labels.get(line["found"].model_class, ""),
+                "median_m": metres.get(line["row"].slug),
             }
-            for n, row in enumerate(table.rows, start=1)
-            if row.slug in spent
+            for line in lines
         ],
         "charts": [(name, title) for name, title in titles.items() if name in drawn],
     }
@@ -235,5 +229,10 @@ FOR_EXPERTS = ("table", "pairs", "types")
 # --- Private -----------------------------------------------------------------------------------
 
 
-def _by_slug(table: LeaderboardTable) -> Mapping[str, Row]:
-    return {row.slug: row for row in table.rows}
+def _numbered(table: LeaderboardTable, found: Mapping[str, Any]) -> list[Context]:
+    """What was found of each contestant, by its place in the table."""
+    return [
+        {"number": number, "row": row, "found": found[row.slug]}
+        for number, row in enumerate(table.rows, start=1)
+        if row.slug in found
+    ]

@@ -22,7 +22,7 @@ from arena.results.queries.votes import (
 )
 from augment.models import Augmentation
 
-PER_PAGE = 25
+PER_PAGE = 20
 CHUNK = 2000
 """So many votes are read at once for a file."""
 

@@ -14,6 +14,7 @@ from arena.results.queries.votes import (
     AUTOMATIC_TIE,
     COUNTED,
     RATED,
+    REASONS,
     Judged,
     LeftOut,
     marked_votes,
@@ -45,13 +46,7 @@ MARKS = {
     COUNTED: "Counted",
     EVERY: "All",
     LEFT_OUT: "Left out",
-    "superseded": "Left out: changed later",
-    "check": "Left out: attention checks",
-    "repeat": "Left out: hidden repeats",
-    "skip": "Left out: skipped",
-    "simulated": "Left out: simulated",
-    "filtered": "Left out: not asked for",
-    "own": "Left out: by authors on their own contestants",
+    **{mark: f"Left out: {reason}" for mark, reason in REASONS.items()},
     AUTOMATIC_TIE: "Not shown: nobody can tell the pictures apart",
 }
 

@@ -58,6 +58,18 @@ class LeftOut(StrEnum):
     OWN = "own"
 
 
+REASONS: dict[str, str] = {
+    LeftOut.SUPERSEDED: "changed later",
+    LeftOut.CHECK: "attention checks",
+    LeftOut.REPEAT: "hidden repeats",
+    LeftOut.SKIP: "skipped",
+    LeftOut.SIMULATED: "simulated",
+    LeftOut.FILTERED: "not asked for",
+    LeftOut.OWN: "by authors on their own contestants",
+}
+"""The same in words."""
+
+
 class Judged(NamedTuple):
     """One current vote.
 

@@ -5,24 +5,13 @@ from dataclasses import dataclass
 
 from arena.pairing.order import MAIN, REPEAT
 from arena.rating.leaderboard import Intervals, Method
-from arena.rating.rules import Unit
+from arena.rating.rules import METHOD_TEXTS, UNIT_TEXTS
 from arena.results.queries.votes import Filters
 from arena.results.services.ratings import DEFAULT_ROUNDS, MOST_ROUNDS, Choices
 from arena.studies.services.plan import HIGHEST_SEED
 from augment.services.inputs import InputKind, input_field
 from augment.services.scenarios.scenes import types_named
 
-METHODS = {
-    Method.BRADLEY_TERRY.value: "Bradley-Terry",
-    Method.DAVIDSON.value: "Davidson (ties)",
-    Method.ELO.value: "Online Elo",
-}
-UNITS = {
-    Unit.TWO_WAY.value: "experts and scenarios",
-    Unit.SCENARIO.value: "scenarios",
-    Unit.EXPERT.value: "experts",
-    Unit.VOTE.value: "votes, as in the paper",
-}
 INTERVALS = {
     Intervals.CLOSED_FORM.value: "in closed form",
     Intervals.RESAMPLES.value: "by resamples",
@@ -34,13 +23,13 @@ class RatingRequest:
     """A new rating of a study's votes as they are now."""
 
     method: str = input_field(
-        InputKind.CHOICE, "Method", choices=METHODS, default=Method.BRADLEY_TERRY.value
+        InputKind.CHOICE, "Method", choices=METHOD_TEXTS, default=Method.BRADLEY_TERRY.value
     )
     resample: str | None = input_field(
         InputKind.CHOICE,
         "What hangs together",
         "As the votes allow unless given.",
-        choices=UNITS,
+        choices=UNIT_TEXTS,
         default=None,
     )
     intervals: str | None = input_field(

@@ -12,7 +12,7 @@ def remove_halves(apps: Apps, editor: BaseDatabaseSchemaEditor) -> None:
 
 
 class Migration(migrations.Migration):
-    dependencies = [("arena", "0031_shared_ratings")]
+    dependencies = [("arena", "0032_strength_of_preferences")]
 
     operations = [
         migrations.RunPython(remove_halves, migrations.RunPython.noop),
