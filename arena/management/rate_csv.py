@@ -16,7 +16,7 @@ import numpy as np
 from arena.exports.cells import csv_text
 from arena.rating.leaderboard import ROUNDS, Intervals, Leaderboard, Method, rate
 from arena.rating.lines import HEADS as PAPERS_HEADS
-from arena.rating.lines import aligned, caption_text, escape, latex_table, notes_by_reason
+from arena.rating.lines import align_cells, caption_text, escape, latex_table, notes_by_reason
 from arena.rating.ranking import Separation
 from arena.rating.rules import METHOD_TEXTS, Unit, default_intervals, unit_for
 from arena.rating.votes_file import OPTIONAL, as_comparisons, read_table
@@ -222,7 +222,7 @@ class RatedCsv:
 def _write_table(rated: RatedCsv) -> str:
     rows = [tuple(HEADS), *rated.cells]
     rows = [(escape_controls(" ".join(row[0].split())), *row[1:]) for row in rows]
-    lines = aligned(rows)
+    lines = align_cells(rows)
     lines += ["", *(" ".join(f"{line}.".split()) for line in rated.missing)]
     board = rated.board
     if board.tie_share is not None:

@@ -150,7 +150,7 @@ def latex_table(
     return "\n".join(lines) + "\n"
 
 
-def aligned(rows: Sequence[Sequence[str]]) -> list[str]:
+def align_cells(rows: Sequence[Sequence[str]]) -> list[str]:
     """Lines of a terminal: the first cell to the left, the others to the right."""
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     return [

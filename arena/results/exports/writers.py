@@ -26,7 +26,7 @@ from arena.exports.formats import (
     sheet_parquet,
 )
 from arena.models import Snapshot
-from arena.rating.lines import aligned, caption_text, escape, latex_table
+from arena.rating.lines import align_cells, caption_text, escape, latex_table
 from arena.rating.snapshot_document import Results, results_document
 from arena.results.exports.charts import Chart, charts, interval_chart
 from arena.results.exports.tables import (
@@ -105,7 +105,7 @@ def plain_text(table: LeaderboardTable) -> str:
         [column.printed for column in PRINTED],
         *([column.text(row) for column in PRINTED] for row in table.rows),
     ]
-    lines = aligned(grid)
+    lines = align_cells(grid)
     left_out = ", ".join(f"{number} {reason}" for reason, number in table.left_out.items())
     votes = table.snapshot.votes_counted
     lines += ["", *(f"{line}." for line in table.missing)]
