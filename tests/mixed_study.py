@@ -75,5 +75,4 @@ def _check(study: Study, username: str, left: Augmentation, right: Augmentation)
         right=right,
         view=last.view,
         kind=Matchup.Kind.CHECK,
-        draw_probability=1.0,
     )

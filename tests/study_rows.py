@@ -134,7 +134,6 @@ def shown_again(matchup: Matchup) -> Matchup:
         view=matchup.view,
         kind=Matchup.Kind.REPEAT,
         repeat_of=matchup,
-        draw_probability=1.0,
     )
 
 

@@ -11,9 +11,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from arena.exports.cells import csv_text
+from arena.rating.comparisons import LEVEL
 from arena.rating.leaderboard import ROUNDS, Intervals, Leaderboard, Method, rate
 from arena.rating.lines import HEADS as PAPERS_HEADS
 from arena.rating.lines import align_cells, caption_text, escape, latex_table, notes_by_reason
@@ -270,19 +269,14 @@ def _write_json(rated: RatedCsv) -> str:
 
 def _pairs(board: Leaderboard, found: Separation) -> list[dict[str, Any]]:
     """Pairs with p-values adjusted for all of them."""
-    low, high = np.triu_indices(len(board.lines), 1)
-    judged = ~np.isnan(found.p_value[low, high])
+    pairs = found.judged([line.name for line in board.lines])
     return [
         {
-            "a": board.lines[i].name,
-            "b": board.lines[j].name,
-            "difference": float(found.difference[i, j]),
-            "lower": float(found.difference[i, j] - found.half[i, j]),
-            "upper": float(found.difference[i, j] + found.half[i, j]),
-            "p_adjusted": float(found.p_value[i, j]),
-            "told_apart": bool(found.above[i, j] or found.above[j, i]),
+            **{name: getattr(pair, name) for name in ("a", "b", "difference", "lower", "upper")},
+            "p_adjusted": pair.p,
+            "told_apart": pair.p <= 1.0 - LEVEL,
         }
-        for i, j in zip(low[judged].tolist(), high[judged].tolist(), strict=True)
+        for pair in pairs
     ]
 
 

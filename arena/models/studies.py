@@ -124,10 +124,6 @@ class Matchup(Coded):
     batch = models.PositiveIntegerField(
         default=0, help_text="0 was planned at the opening; later plannings count up"
     )
-    draw_probability = models.FloatField(
-        help_text="of this pair and scenario, when it was planned"
-    )
-    served_at = models.DateTimeField(null=True, blank=True)
 
     class Meta:
         ordering = ("study", "expert", "position")
@@ -140,10 +136,6 @@ class Matchup(Coded):
             ),
             models.CheckConstraint(
                 name="matchup_shows_two_augmentations", condition=~Q(left=F("right"))
-            ),
-            models.CheckConstraint(
-                name="draw_probability_is_one",
-                condition=Q(draw_probability__gt=0, draw_probability__lte=1),
             ),
             models.CheckConstraint(
                 name="matchup_repeats_only_as_repeat",

@@ -8,7 +8,8 @@ Notation: P pairs, S scenarios.
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,33 +18,19 @@ from arena.pairing.order import CHECK, MAIN, REPEAT, IntArray, Slot
 from arena.pairing.plan import lay_out
 from arena.pairing.rules import Grid, PlannedMatchup, PlanRules
 
-Unit = tuple[int, int]
-"""A row and a column of the grid: a pair on a scenario."""
 
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Wanted:
-    """A unit that somebody is to judge, and how likely it was drawn."""
+class GridUnit(NamedTuple):
+    """A row and a column of the grid: a pair on a scenario."""
 
     pair: int
     scenario: int
-    chance: float
-
-    @property
-    def unit(self) -> Unit:
-        """Pair and scenario."""
-        return self.pair, self.scenario
 
 
-def units_of(grid: Grid, showings: Sequence[PlannedMatchup]) -> list[Wanted]:
+def units_of(grid: Grid, showings: Sequence[PlannedMatchup]) -> list[GridUnit]:
     """Return the units of the main showings."""
     rows, columns = grid.row_of_pair, grid.column_of_scenario
     return [
-        Wanted(
-            pair=rows[frozenset((showing.left, showing.right))],
-            scenario=columns[showing.scenario],
-            chance=showing.draw_probability,
-        )
+        GridUnit(rows[frozenset((showing.left, showing.right))], columns[showing.scenario])
         for showing in showings
         if showing.kind == MAIN
     ]
@@ -53,8 +40,8 @@ def judges(grid: Grid, so_far: Mapping[str, Sequence[PlannedMatchup]]) -> IntArr
     """Return how many experts are to judge each unit (P, S)."""
     counts = np.zeros(grid.showable.shape, dtype=np.int64)
     for showings in so_far.values():
-        for wanted in units_of(grid, showings):
-            counts[wanted.unit] += 1
+        for unit in units_of(grid, showings):
+            counts[unit] += 1
     return counts
 
 
@@ -62,9 +49,9 @@ def deal(
     grid: Grid,
     so_far: Mapping[str, Sequence[PlannedMatchup]],
     to: Sequence[str],
-    units: Sequence[Wanted],
+    units: Sequence[GridUnit],
     rng: np.random.Generator,
-) -> dict[str, list[Wanted]]:
+) -> dict[str, list[GridUnit]]:
     """Share units out equally among experts, none twice to one of them.
 
     Where everybody has judged a unit, its pair is judged on another scenario, one with few
@@ -80,29 +67,29 @@ def deal(
     Raises:
         NothingToPlan: A pair has no scenario left for any of them.
     """
-    known = {name: {wanted.unit for wanted in units_of(grid, so_far[name])} for name in to}
+    known = {name: set(units_of(grid, so_far[name])) for name in to}
     counts = judges(grid, so_far)
-    dealt: dict[str, list[Wanted]] = {name: [] for name in to}
+    dealt: dict[str, list[GridUnit]] = {name: [] for name in to}
     for index in rng.permutation(len(units)):
         wanted = units[index]
         order = sorted(to, key=lambda name: (len(dealt[name]), rng.random()))
-        fits = [name for name in order if wanted.unit not in known[name]]
+        fits = [name for name in order if wanted not in known[name]]
         taker, scenario = (
             (fits[0], wanted.scenario)
             if fits
             else _find_elsewhere(grid, counts, known, order, wanted, rng)
         )
-        dealt[taker].append(Wanted(pair=wanted.pair, scenario=scenario, chance=wanted.chance))
-        known[taker].add((wanted.pair, scenario))
+        dealt[taker].append(GridUnit(wanted.pair, scenario))
+        known[taker].add(dealt[taker][-1])
     return dealt
 
 
 def _find_elsewhere(
     grid: Grid,
     counts: IntArray,
-    known: Mapping[str, set[Unit]],
+    known: Mapping[str, set[GridUnit]],
     order: Sequence[str],
-    wanted: Wanted,
+    wanted: GridUnit,
     rng: np.random.Generator,
 ) -> tuple[str, int]:
     """Return who judges the pair on which other scenario."""
@@ -125,7 +112,7 @@ def _find_elsewhere(
 
 def choose_for_newcomer(
     grid: Grid, judges: IntArray, count: int, rng: np.random.Generator
-) -> list[Wanted]:
+) -> list[GridUnit]:
     """Choose units for somebody who joins, so that pairs and scenarios stay as equal as they can.
 
     One after the other: of the pairs that come least in this choice one of those that are planned
@@ -141,7 +128,7 @@ def choose_for_newcomer(
     free, counts = grid.showable.copy(), judges.copy()
     before = counts.sum(axis=1)
     used = np.zeros(free.shape[1], dtype=np.int64)
-    chosen: list[Wanted] = []
+    chosen: list[GridUnit] = []
     while len(chosen) < count and free.any():
         pairs, planned = np.flatnonzero(free.any(axis=1)), counts.sum(axis=1)
         pairs = pairs[_least((planned - before)[pairs], planned[pairs])]
@@ -149,7 +136,7 @@ def choose_for_newcomer(
         open_ = np.flatnonzero(free[pair])
         fewest = open_[_least(counts[pair, open_], used[open_], counts[:, open_].sum(axis=0))]
         scenario = int(rng.choice(fewest))
-        chosen.append(Wanted(pair=pair, scenario=scenario, chance=1.0 / len(pairs) / len(fewest)))
+        chosen.append(GridUnit(pair, scenario))
         free[pair, scenario] = False
         counts[pair, scenario] += 1
         used[scenario] += 1
@@ -172,7 +159,7 @@ def follow_on(
     grid: Grid,
     expert: str,
     so_far: Sequence[PlannedMatchup],
-    units: Sequence[Wanted],
+    units: Sequence[GridUnit],
     rng: np.random.Generator,
 ) -> list[PlannedMatchup]:
     """Put one expert's next units in an order, with sides, and with repeats and checks on top.
@@ -185,10 +172,7 @@ def follow_on(
         units: What comes now; none of it is known to the expert.
         rng: Shuffles.
     """
-    items = [
-        Slot(kind=MAIN, scenario=unit.scenario, pair=unit.pair, chance=unit.chance)
-        for unit in units
-    ]
+    items = [Slot(kind=MAIN, scenario=unit.scenario, pair=unit.pair) for unit in units]
     items += _draw_repeats(rules, grid, so_far, units, rng)
     items += _draw_checks(rules, grid, so_far, len(units), rng)
     order = _find_order(items, [showing.scenario for showing in so_far], grid, rules, rng)
@@ -206,7 +190,7 @@ def _draw_repeats(
     rules: PlanRules,
     grid: Grid,
     so_far: Sequence[PlannedMatchup],
-    units: Sequence[Wanted],
+    units: Sequence[GridUnit],
     rng: np.random.Generator,
 ) -> list[Slot]:
     """Draw hidden repeats: of what was shown long enough ago, else of what comes now."""
@@ -226,9 +210,7 @@ def _draw_repeats(
             Slot(kind=REPEAT, scenario=wanted.scenario, pair=wanted.pair, of=index)
             for index, wanted in enumerate(units)
         ]
-    chance = count / len(offered)
-    drawn = rng.permutation(len(offered))[:count]
-    return [replace(offered[index], chance=chance) for index in drawn]
+    return [offered[index] for index in rng.permutation(len(offered))[:count]]
 
 
 def _draw_checks(
@@ -244,7 +226,7 @@ def _draw_checks(
     count = min(max(round(rules.check_share * mains) - len(shown), 0), len(unused))
     columns = grid.column_of_scenario
     drawn = [columns[unused[index]] for index in rng.permutation(len(unused))[:count]]
-    return [Slot(kind=CHECK, scenario=n, pair=-1, chance=1.0 / len(unused)) for n in drawn]
+    return [Slot(kind=CHECK, scenario=n, pair=-1) for n in drawn]
 
 
 def _find_order(

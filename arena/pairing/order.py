@@ -26,7 +26,6 @@ class Slot:
         pair: The row of the pair, -1 for a check.
         of: For a repeat, the index of the slot that it shows again.
         again: The same as a position in the expert's order, once it is known.
-        chance: How likely it was drawn.
     """
 
     kind: str
@@ -34,7 +33,6 @@ class Slot:
     scenario: int
     of: int | None = None
     again: int | None = None
-    chance: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -146,7 +144,7 @@ def _filled(
     for pair, scenario in more.repeated:
         first, again = _two_places(places[scenario], distance, rng)
         slots[first] = Slot(kind=MAIN, pair=pair, scenario=scenario)
-        slots[again] = Slot(kind=REPEAT, pair=pair, scenario=scenario, of=first)
+        slots[again] = Slot(kind=REPEAT, pair=pair, scenario=scenario, of=first, again=first + 1)
         places[scenario] = [index for index in places[scenario] if index not in (first, again)]
     for scenario in more.checks:
         index = places[scenario].pop(int(rng.integers(len(places[scenario]))))

@@ -18,21 +18,10 @@ Notation: E experts, P pairs, S scenarios.
 """
 
 from collections.abc import Iterable, Sequence
-from dataclasses import replace
 
 import numpy as np
 
-from arena.pairing.order import (
-    CHECK,
-    MAIN,
-    REPEAT,
-    BoolArray,
-    Extras,
-    FloatArray,
-    Slot,
-    deal_sides,
-    put_in_order,
-)
+from arena.pairing.order import CHECK, MAIN, BoolArray, Extras, Slot, deal_sides, put_in_order
 from arena.pairing.rules import (
     Check,
     Entry,
@@ -42,7 +31,7 @@ from arena.pairing.rules import (
     PlanRules,
     check_rules,
 )
-from arena.pairing.units import bring_together, choose_units, draw_probability
+from arena.pairing.units import bring_together, choose_units
 
 __all__ = ["Check", "Entry", "MatchupPlan", "PlanRules", "PlannedMatchup", "plan"]
 
@@ -61,7 +50,6 @@ def plan(rules: PlanRules) -> MatchupPlan:
     experts, votes = len(rules.experts), rules.votes_per_expert
     chosen = choose_units(grid.showable, experts, votes, rng)
     bring_together(chosen, grid.showable, rules.overlap_share, rng)
-    probability = draw_probability(grid.showable, votes)
     extras = [_extras(rules, grid, mine, rng) for mine in chosen]
     orders, gap = put_in_order(
         chosen, extras, rules.scenario_gap, rules.repeat_distance, rng, grid.bases
@@ -73,9 +61,7 @@ def plan(rules: PlanRules) -> MatchupPlan:
     matchups = [
         matchup
         for expert, order, flips in zip(rules.experts, orders, flipped, strict=True)
-        for matchup in lay_out(
-            rules, grid, expert, _with_chances(rules, probability, order), flips, (), rng
-        )
+        for matchup in lay_out(rules, grid, expert, order, flips, (), rng)
     ]
     return MatchupPlan(matchups=tuple(matchups), scenario_gap=gap, identical=grid.identical)
 
@@ -93,23 +79,6 @@ def _extras(rules: PlanRules, grid: Grid, mine: BoolArray, rng: np.random.Genera
         repeated=tuple((int(units[row][0]), int(units[row][1])) for row in drawn),
         checks=tuple(grid.scenarios.index(rules.checks[number].scenario) for number in shown),
     )
-
-
-def _with_chances(rules: PlanRules, probability: FloatArray, order: Sequence[Slot]) -> list[Slot]:
-    """An expert's order with how likely each showing was drawn, and what repeats show again."""
-    repeats = sum(slot.kind == REPEAT for slot in order)
-    chances = {
-        CHECK: 1.0 / max(len(rules.checks), 1),
-        REPEAT: repeats / max(len(order) - repeats, 1),
-    }
-    return [
-        replace(
-            slot,
-            again=None if slot.of is None else slot.of + 1,
-            chance=chances.get(slot.kind, float(probability[slot.pair, slot.scenario])),
-        )
-        for slot in order
-    ]
 
 
 def lay_out(
@@ -158,7 +127,6 @@ def lay_out(
                 scenario=grid.scenarios[slot.scenario],
                 left=left,
                 right=right,
-                draw_probability=slot.chance,
                 kind=slot.kind,
                 repeats=slot.again,
             )

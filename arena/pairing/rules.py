@@ -105,7 +105,6 @@ class PlannedMatchup:
     scenario: str
     left: str
     right: str
-    draw_probability: float
     kind: str = MAIN
     repeats: int | None = None
 

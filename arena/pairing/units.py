@@ -65,17 +65,6 @@ def _fill(
         wanted[picked] -= 1
 
 
-def draw_probability(showable: BoolArray, votes: int) -> FloatArray:
-    """How likely each unit (P, S) is a given showing: its pair's share times its scenario's.
-
-    Exact where every unit can be shown; else the product of both shares, made to sum to 1.
-    """
-    by_scenario = _level(showable.sum(axis=0), votes)
-    by_pair = _level(showable.sum(axis=1), votes)
-    shares = np.where(showable, by_pair[:, None] * by_scenario[None, :], 0.0)
-    return np.asarray(shares / shares.sum())
-
-
 def quotas(capacity: IntArray, experts: int, votes: int, rng: np.random.Generator) -> IntArray:
     """Shares (E, n) of the votes of each expert: equal to +-1 by row and by column total.
 
@@ -136,18 +125,6 @@ def _chain(level: IntArray, can_give: BoolArray) -> list[int] | None:
                     came_from[int(taker)] = row
                     queue.append(int(taker))
     return None
-
-
-def _level(capacity: IntArray, total: int) -> FloatArray:
-    """Share a total equally among vessels that hold no more than their capacity each."""
-    level = np.zeros(len(capacity))
-    left = float(total)
-    while left > 1e-9:
-        open_ = capacity - level > 1e-9
-        poured = np.where(open_, np.minimum(capacity - level, left / open_.sum()), 0.0)
-        level += poured
-        left -= poured.sum()
-    return level
 
 
 _MOST_AT_ONCE = 250

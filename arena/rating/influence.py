@@ -6,17 +6,37 @@ Notation: C contestants, P pairs that met, E experts. Strengths are natural loga
 import numpy as np
 
 from arena.rating.chains import are_determined
-from arena.rating.comparisons import Comparisons, FloatArray, IntArray, PairCounts, count_pairs
+from arena.rating.comparisons import (
+    BoolArray,
+    Comparisons,
+    FloatArray,
+    IntArray,
+    PairCounts,
+    count_pairs,
+)
 from arena.rating.models import Meetings, fit
 
+SLIGHT = 0.75
+"""What a contestant who is slightly preferred scores, where that is weighed."""
 
-def bradley_terry(votes: Comparisons) -> FloatArray | None:
-    """(C,) strengths of two contestants or more; None where the votes do not determine them."""
+
+def bradley_terry(votes: Comparisons, is_slight: BoolArray | None = None) -> FloatArray | None:
+    """(C,) strengths of two contestants or more; None where the votes do not determine them.
+
+    Args:
+        votes: What was voted.
+        is_slight: (R,) preferences that count as three quarters of a win; by default none.
+    """
     if len(votes.names) < 2:
         return None
     counts = count_pairs(votes)
+    scores: FloatArray = counts.scores
+    if is_slight is not None:
+        score = 1.0 - 0.5 * counts.outcome_of
+        graded = np.where(is_slight, 0.5 + (2.0 * SLIGHT - 1.0) * (score - 0.5), score)
+        scores = np.bincount(counts.pair_of, weights=votes.count * graded).astype(np.float64)
     start = np.zeros(len(votes.names))
-    strengths = _fits(counts, counts.games[None], counts.scores[None], start)[0]
+    strengths = _fits(counts, counts.games[None], scores[None], start)[0]
     return None if np.isnan(strengths).any() else strengths
 
 

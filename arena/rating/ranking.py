@@ -10,7 +10,8 @@ step-down of Westfall and Young 1993, Romano and Wolf 2005).
 Notation: C contestants, P pairs in the order of np.triu_indices, B rounds, N draws.
 """
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 from typing import Any, Self
 
 import numpy as np
@@ -121,6 +122,26 @@ def above_in_rounds(rating: FloatArray, samples: FloatArray) -> BoolArray:
 # --- All pairs at once, by intervals in closed form ----------------------------------------------
 
 
+_SINCE_5 = {"since": 5}
+"""Of fields that stored documents of earlier versions do not have."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PairP:
+    """How likely a difference as large as that of `a` and `b` is among equals, in any pair.
+
+    Attributes:
+        difference: Points by which `a` is above `b`; `lower` and `upper` are of its own interval.
+    """
+
+    a: str
+    b: str
+    p: float
+    difference: float | None = field(default=None, metadata=_SINCE_5)
+    lower: float | None = field(default=None, metadata=_SINCE_5)
+    upper: float | None = field(default=None, metadata=_SINCE_5)
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Separation:
     """Which pairs differ, all pairs judged at once: the error is 5 % for the whole table.
@@ -136,6 +157,20 @@ class Separation:
     p_value: FloatArray
     difference: FloatArray
     half: FloatArray
+
+    def judged(self, names: Sequence[str]) -> tuple[PairP, ...]:
+        """Return every pair that was judged, by the names of the C contestants."""
+        low, high = np.triu_indices(len(names), 1)
+        known = ~np.isnan(self.p_value[low, high])
+        low, high = low[known], high[known]
+        p, gap, half = (square[low, high] for square in (self.p_value, self.difference, self.half))
+        columns = (low, high, p, gap, gap - half, gap + half)
+        return tuple(
+            PairP(a=names[i], b=names[j], p=one, difference=points, lower=lower, upper=upper)
+            for i, j, one, points, lower, upper in zip(
+                *(column.tolist() for column in columns), strict=True
+            )
+        )
 
     def among(self, members: IntArray, contestants: int) -> Self:
         """The same with rows for all: these members' stay, the others differ from nobody."""

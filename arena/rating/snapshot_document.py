@@ -13,6 +13,7 @@ from typing import Annotated, Any
 
 from pydantic import PlainValidator, TypeAdapter, ValidationError
 
+from arena.rating.ranking import PairP
 from arena.rating.reliability import Agreement, Rater, Repeats
 from arena.rating.side import SideBias
 from augment.errors import InvalidDocument
@@ -50,22 +51,6 @@ of types; a rating of version 0 kept its standings alone."""
 
 _SINCE_2, _SINCE_3, _SINCE_5 = {"since": 2}, {"since": 3}, {"since": 5}
 """Of fields that documents of earlier versions do not have, unless they say something."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class PairP:
-    """How likely a difference as large as that of `a` and `b` is among equals, in any pair.
-
-    Attributes:
-        difference: Points by which `a` is above `b`; `lower` and `upper` are of its own interval.
-    """
-
-    a: str
-    b: str
-    p: float
-    difference: float | None = field(default=None, metadata=_SINCE_5)
-    lower: float | None = field(default=None, metadata=_SINCE_5)
-    upper: float | None = field(default=None, metadata=_SINCE_5)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -118,11 +103,29 @@ class PanelRater(Rater):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class StrengthCheck:
+    """What it changes to count a slight preference as three quarters of a win.
+
+    Attributes:
+        slight, clear: How many votes say so.
+        change: Elo points by which a Bradley-Terry rating moves at most; None where the votes do
+            not determine ratings.
+        order: Slugs, best first, where the order is another one.
+    """
+
+    slight: int
+    clear: int
+    change: float | None = None
+    order: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Trust:
     """Statistics about the votes themselves.
 
     Attributes:
         tie_share: From 0 to 1.
+        strength: None where no vote has one.
     """
 
     tie_share: float | None = None
@@ -130,6 +133,7 @@ class Trust:
     side: SideBias | None = None
     repeats: Repeats | None = None
     raters: tuple[PanelRater, ...] = ()
+    strength: StrengthCheck | None = field(default=None, metadata=_SINCE_5)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -110,4 +110,3 @@ def check_extras(asked: PlanRules, made: MatchupPlan) -> None:
         times = Counter(pair(matchup) for matchup in mains)
         assert all(abs(2 * first_left[key] - times[key]) <= 1 for key in times)
         assert smallest_gap(mine) >= made.scenario_gap
-    assert all(0 < matchup.draw_probability <= 1 for matchup in made.matchups)

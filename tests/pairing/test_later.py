@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from arena.errors import NothingToPlan
-from arena.pairing.later import Wanted, deal, follow_on, units_of
+from arena.pairing.later import GridUnit, deal, follow_on, units_of
 from arena.pairing.order import CHECK, MAIN, REPEAT
 from arena.pairing.plan import PlannedMatchup, plan
 from arena.pairing.rules import PlanRules, grid_of
@@ -74,16 +74,9 @@ def test_a_pair_that_everybody_has_judged_everywhere_is_refused_by_name() -> Non
     grid = grid_of(rules.entries)
     first, second = grid.pairs[0]
     all_of_it = [
-        PlannedMatchup(
-            expert="eva",
-            position=n + 1,
-            scenario=scenario,
-            left=first,
-            right=second,
-            draw_probability=1.0,
-        )
+        PlannedMatchup(expert="eva", position=n + 1, scenario=scenario, left=first, right=second)
         for n, scenario in enumerate(grid.scenarios)
     ]
-    more = [Wanted(pair=0, scenario=0, chance=1.0)]
+    more = [GridUnit(pair=0, scenario=0)]
     with pytest.raises(NothingToPlan, match=f"{first} against {second} on every scenario"):
         deal(grid, {"eva": all_of_it}, ["eva"], more, np.random.default_rng(1))

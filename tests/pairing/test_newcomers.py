@@ -40,7 +40,6 @@ def test_what_is_planned_least_comes_first() -> None:
     (first,) = choose_units(grid(), judges, 1, np.random.default_rng(1))
     assert first.pair == 2
     assert first.scenario != 4
-    assert first.chance == 1 / 4
 
 
 def test_all_units_are_given_where_more_are_asked_for() -> None:

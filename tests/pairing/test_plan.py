@@ -65,7 +65,6 @@ def check_rules_hold(asked: PlanRules, made: MatchupPlan) -> None:
     for matchup in made.matchups:
         left = pictures[matchup.scenario, matchup.left]
         assert left != pictures[matchup.scenario, matchup.right]
-        assert 0 < matchup.draw_probability <= 1
 
 
 sizes = st.tuples(
@@ -90,7 +89,6 @@ def test_a_full_plan_is_balanced_to_one(size: tuple[int, int, int, int, int]) ->
         mine = [m for m in made.matchups if m.expert == expert]
         assert spread(Counter(pair(m) for m in mine), pairs) <= 1
         assert spread(Counter(m.scenario for m in mine), scenarios) <= 1
-    assert made.matchups[0].draw_probability == pytest.approx(1 / (pairs * scenarios))
 
 
 cells = st.frozensets(st.tuples(st.integers(0, 4), st.integers(0, 7)), max_size=14)

@@ -66,6 +66,16 @@ def test_leaving_an_expert_out_is_a_fit_of_the_others() -> None:
     assert without[4] == pytest.approx(fit(others), abs=1e-9)
 
 
+def test_a_slight_preference_can_weigh_three_quarters_of_a_win() -> None:
+    # 0.75 + 0.75 + 1 + 0 are 2.5 of 4 votes: 400 log10(2.5 / 1.5).
+    strengths = bradley_terry(
+        named(versus("a", "b", 3, 0, 1)), np.array([True, True, False, False])
+    )
+    assert strengths is not None
+    gap = (strengths[0] - strengths[1]) * ELO_PER_LOGIT
+    assert gap == pytest.approx(88.739, abs=1e-3)
+
+
 def test_an_expert_without_whom_nothing_is_determined_is_said_to_be_so() -> None:
     def vote(expert: str, first: str, second: str) -> list[Comparison]:
         return [

@@ -36,11 +36,9 @@ def test_the_stored_rules_give_the_stored_plan_again() -> None:
         "scenario__slug",
         "left__contestant__slug",
         "right__contestant__slug",
-        "draw_probability",
     )
     assert list(stored) == [
-        (m.expert, m.position, m.scenario, m.left, m.right, m.draw_probability)
-        for m in planned.matchups
+        (m.expert, m.position, m.scenario, m.left, m.right) for m in planned.matchups
     ]
     assert study.rules["scenario_gap_kept"] == 5
 

@@ -10,7 +10,7 @@ from django.urls import reverse
 
 from arena.errors import NothingToPlan
 from arena.models import Study
-from arena.rating.snapshot_document import PairP
+from arena.rating.ranking import PairP
 from arena.results.exports.tables import leaderboard_table
 from arena.results.exports.writers import FORMATS, bundle_files, plain_text
 from arena.results.services.ratings import rate_now as rate

@@ -47,6 +47,23 @@ def test_every_tab_reads_the_snapshot_with_few_queries(
             page(reader, study, tab)
 
 
+def test_slight_preferences_are_held_against_the_order(reader: Client) -> None:
+    study = study_rows.a_study(votes_per_expert=9)
+    Study.objects.update(ask_strength=True, allow_both_miss=True)
+    for number, matchup in enumerate(study.matchups.order_by("pk")):
+        said = {"strength": "slightly"} if number % 3 else {"strength": "clearly"}
+        outcome = "left" if number % 2 else "right"
+        if number:
+            study_rows.vote(matchup, outcome, **said)
+        else:
+            study_rows.vote(matchup, "equal", both_miss=True)
+    rate(study=close_study(study=study), rounds=50)
+    shown = page(reader, study)
+    assert "12 preferences are slight, 5 clear; each counts as one win." in shown
+    assert "moves no rating by more than" in shown
+    assert "In 1 vote</a> (6 %) both miss" in shown
+
+
 def test_raters_are_pseudonyms_with_repeats_and_checks(reader: Client) -> None:
     study = study_rows.a_study(votes_per_expert=9)
     first, second, third, *rest = study_rows.matchups_of(study, "eva")

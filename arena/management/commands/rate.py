@@ -15,7 +15,7 @@ from augment.services.terminal import TerminalCommand
 
 
 class Command(TerminalCommand):
-    """The door to arena.results.services.ratings.rate."""
+    """The door to arena.results.services.ratings.rate_now."""
 
     help = "Rate the contestants of a study by its votes and keep the result."
 

@@ -54,10 +54,16 @@ def fill_table(snapshot: Snapshot, table: LeaderboardTable) -> Context:
     """The table with its intervals, and the lines that say how far it can be trusted."""
     trust = snapshot.results.trust
     moves = [line.moves for line in trust.raters if line.moves is not None]
+    names = {row.slug: row.name for row in table.rows}
+    order = trust.strength.order if trust.strength else ()
+    both_miss = sum(pair.both_miss for pair in snapshot.results.pairs)
     return plot(table.rows) | {
         "largest_move": max(moves, default=None),
         "ties": round((trust.tie_share or 0.0) * snapshot.votes_counted),
         "all_tied": trust.tie_share == 1.0,
+        "both_miss": both_miss,
+        "both_miss_share": both_miss / max(snapshot.votes_counted, 1),
+        "weighed_order": [names[slug] for slug in order],
     }
 
 

@@ -5,13 +5,14 @@ from dataclasses import fields, replace
 
 import numpy as np
 
+from arena.models import Vote
 from arena.rating.comparisons import Comparisons, IntArray, restrict_to, select_votes, tally
 from arena.rating.influence import bradley_terry, rank_changes, without_each_expert
 from arena.rating.leaderboard import Leaderboard
-from arena.rating.ranking import Separation
+from arena.rating.models import to_elo
 from arena.rating.reliability import Repeats, agreement, raters, repeat_consistency
 from arena.rating.side import side_bias
-from arena.rating.snapshot_document import BoardRemarks, PairP, PanelRater, Trust
+from arena.rating.snapshot_document import BoardRemarks, PanelRater, StrengthCheck, Trust
 from arena.results.queries.votes import AUTOMATIC, VoteSet
 from arena.results.services.analysis import SCORES, VoteArrays
 
@@ -39,6 +40,7 @@ def trust(arrays: VoteArrays, votes: VoteSet, *, seed: int) -> Trust:
         side=side_bias(by_people) if len(by_people) else None,
         repeats=repeats if repeats.number else None,
         raters=_panel(arrays, inner, given, votes, repeats),
+        strength=_check_strength(inner, votes),
     )
 
 
@@ -57,25 +59,30 @@ def board_remarks(board: Leaderboard, *more_warnings: str) -> BoardRemarks:
         above=None
         if apart is None
         else tuple((names[i], names[j]) for i, j in np.argwhere(apart.above).tolist()),
-        p_values=None if apart is None else _p_values(names, apart),
+        p_values=None if apart is None else apart.judged(names),
     )
 
 
 # --- Private -----------------------------------------------------------------------------------
 
 
-def _p_values(names: list[str], apart: Separation) -> tuple[PairP, ...]:
-    low, high = np.triu_indices(len(names), 1)
-    p_value, gap, half = (
-        matrix[low, high] for matrix in (apart.p_value, apart.difference, apart.half)
+def _check_strength(inner: Comparisons, votes: VoteSet) -> StrengthCheck | None:
+    said = [vote.strength for vote in votes.counted]
+    if not any(said):
+        return None
+    check = StrengthCheck(
+        slight=said.count(Vote.Strength.SLIGHTLY.value),
+        clear=said.count(Vote.Strength.CLEARLY.value),
     )
-    known = ~np.isnan(p_value)
-    columns = (low, high, p_value, gap, gap - half, gap + half)
-    return tuple(
-        PairP(a=names[i], b=names[j], p=p, difference=difference, lower=lower, upper=upper)
-        for i, j, p, difference, lower, upper in zip(
-            *(column[known].tolist() for column in columns), strict=True
-        )
+    is_slight = np.array(said) == Vote.Strength.SLIGHTLY.value
+    plain, weighed = bradley_terry(inner), bradley_terry(inner, is_slight)
+    if plain is None or weighed is None:
+        return check
+    before, after = (np.argsort(-one, kind="stable").tolist() for one in (plain, weighed))
+    return replace(
+        check,
+        change=float(np.abs(to_elo(weighed) - to_elo(plain)).max()),
+        order=() if before == after else tuple(inner.names[one] for one in after),
     )
 
 

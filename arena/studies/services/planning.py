@@ -12,7 +12,7 @@ from django.contrib.auth.models import User
 from django.db.models import Max
 
 from arena.models import Matchup, Study
-from arena.pairing.later import Wanted, follow_on
+from arena.pairing.later import GridUnit, follow_on
 from arena.pairing.plan import Check, Entry, PlannedMatchup, PlanRules
 from arena.pairing.rules import Grid, place_of, scenario_of
 from arena.studies.services.pictures import (
@@ -84,11 +84,11 @@ def planned_so_far(study: Study) -> dict[str, list[PlannedMatchup]]:
     """Return every showing that is planned, by expert and position."""
     rows = study.matchups.order_by("expert__username", "position").values_list(
         *("expert__username", "position", "scenario__slug", "left__contestant__slug"),
-        *("right__contestant__slug", "draw_probability", "kind", "repeat_of__position"),
+        *("right__contestant__slug", "kind", "repeat_of__position"),
         "right__sample",
     )
     planned: dict[str, list[PlannedMatchup]] = defaultdict(list)
-    for expert, position, slug, left, right, chance, kind, repeats, sample in rows:
+    for expert, position, slug, left, right, kind, repeats, sample in rows:
         scenario = slug
         if study.shows_all_samples:
             scenario = place_of(slug, 1 if kind == Matchup.Kind.CHECK else sample)
@@ -99,7 +99,6 @@ def planned_so_far(study: Study) -> dict[str, list[PlannedMatchup]]:
                 scenario=scenario,
                 left=left,
                 right=right,
-                draw_probability=chance,
                 kind=kind,
                 repeats=repeats,
             )
@@ -148,7 +147,6 @@ def store(
             view={**frame.view, LEGEND: {"scene": frame.legend, "pair": pair}},
             kind=one.kind,
             batch=batch,
-            draw_probability=one.draw_probability,
         )
         for one in planned
         for frame, (left, right) in [(frames[one.scenario], sides_of(one, cells))]
@@ -205,7 +203,7 @@ class Planning:
         return cls(study=study, number=number, cells=cells, rules=rules, grid=rules.grid, rng=rng)
 
     def follow(
-        self, username: str, known: Sequence[PlannedMatchup], units: Sequence[Wanted]
+        self, username: str, known: Sequence[PlannedMatchup], units: Sequence[GridUnit]
     ) -> list[PlannedMatchup]:
         """Return an expert's next showings."""
         return follow_on(self.rules, self.grid, username, known, units, self.rng)
