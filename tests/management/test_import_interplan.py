@@ -1,3 +1,4 @@
+import zipfile
 from io import StringIO
 from pathlib import Path
 
@@ -97,10 +98,12 @@ def test_an_unchanged_reference_goes_out_as_it_came_in(tmp_path: Path) -> None:
         )
         for scenario in Scenario.objects.all()
     )
-    file, said = tmp_path / "out.yaml", StringIO()
-    arguments = ("modifications", "Round 1", "--format", "interplan", "--out", file)
+    file, said = tmp_path / "out.zip", StringIO()
+    arguments = ("scenarios", "Round 1", "--format", "interplan", "--out", file)
     call_command("export", *map(str, arguments), stdout=StringIO(), stderr=said)
-    assert yaml.safe_load(file.read_text()) == wanted
+    with zipfile.ZipFile(file) as archive:
+        (name,) = (name for name in archive.namelist() if name.endswith(".yaml"))
+        assert yaml.safe_load(archive.read(name)) == wanted
     assert "Lost" not in said.getvalue()
 
 
