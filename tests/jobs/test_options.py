@@ -32,7 +32,7 @@ def every(name: str, value: object) -> Callable[[Bodies], bool]:
 
 
 def png_width(bodies: Bodies) -> int:
-    (url,) = [
+    url, *_ = [
         part["image_url"]["url"]
         for part in bodies[2]["messages"][-1]["content"]
         if part["type"] == "image_url"

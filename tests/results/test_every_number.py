@@ -30,7 +30,8 @@ def test_ratings_intervals_and_ranks(shown: Shown) -> None:
 
 
 def test_counts_of_every_line_and_what_the_page_prints(shown: Shown) -> None:
-    printed = [row for row in shown.rows("table") if len(row) >= 6]
+    standings = [row for row in shown.rows("table") if len(row) == 5]
+    details = [row for row in shown.rows("table") if len(row) == 7]
     for slug, line in shown.lines.items():
         own = [vote.score_of(slug) for vote in shown.main if slug in vote.names]
         assert (line.wins, line.ties, line.losses) == (
@@ -38,15 +39,17 @@ def test_counts_of_every_line_and_what_the_page_prints(shown: Shown) -> None:
             own.count(0.5),
             own.count(0.0),
         )
-        cells = next(row for row in printed if row[1].startswith(line.name))
+        standing = next(row for row in standings if row[1] == line.name)
+        (detail,) = (row for row in details if row[0] == line.name)
         assert line.lower is not None
         assert line.upper is not None
         assert line.rating is not None
         half = (line.upper - line.lower) / 2
-        assert cells[0].split()[0] == str(line.rank)
-        for said in (f"{line.rating:.0f}", f"±{half:.0f}", str(len(own))):
-            assert said in cells, (line.name, said)
-        assert any(cell.startswith(str(round(100 * np.mean(own)))) for cell in cells[4:])
+        rating, votes = f"{line.rating:.0f}", str(len(own))
+        assert standing == [str(line.rank), line.name, rating, "", votes]
+        assert detail[1] == f"±{half:.0f}"
+        score = f"{round(100 * np.mean(own))} %"
+        assert detail[3:] == [score, *(str(own.count(points)) for points in (1.0, 0.5, 0.0))]
 
 
 def test_ties_and_what_is_left_out(shown: Shown) -> None:

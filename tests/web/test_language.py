@@ -20,6 +20,7 @@ def login_page(client: Client, **headers: str) -> str:
 
 
 def test_the_browser_decides_before_anybody_has_chosen() -> None:
+    people()
     assert '<html lang="de"' in login_page(Client(), **GERMAN)
     assert "Anmelden" in login_page(Client(), **GERMAN)
     for other in ("en", "fr"):

@@ -68,7 +68,7 @@ LISTS = {
     # page: what a row is told by, how many a page has
     "jobs": ("Job ", 25),
     "studies": ('">Study ', 25),
-    "contestants": ('<td class="mono">', 50),
+    "contestants": ('/">Who ', 50),
     "scenarios": ("<b>street-", 60),
 }
 

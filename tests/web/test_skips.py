@@ -38,7 +38,7 @@ def test_a_skip_is_counted_apart_everywhere_and_a_vote_instead_of_it_counts() ->
     assert (state.voted, state.skipped, state.left) == (1, 2, 0)
     shown = signed_in(people()["researcher"]).get(reverse("study", args=[study.code]))
     text = " ".join(re.sub(r"<[^>]+>", " ", shown.content.decode()).split())
-    assert "1 of 6 votes · 3 skipped" in text
+    assert "1 of 6 votes, 1 of 2 experts done; 3 pairs skipped" in text
     study_rows.vote(first, "left", supersedes=skipped.key)
     assert counted() == ((2, 2, 2), (2, 1, 0), (2, 1, 0))
 
