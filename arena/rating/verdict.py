@@ -39,8 +39,8 @@ def verdict(lines: Sequence[Line], votes: int, apart: Pairs | None) -> str:
     if len(parts) < 2:
         return f"{_compare(names, judged, pairs, counted)}."
     groups = [[place for place in judged if lines[place].part == part] for part in parts]
-    said = "; ".join(_compare(names, group, pairs, "") for group in groups)
-    return f"{votes} votes leave {len(parts)} groups that can’t be compared: {said}."
+    comparisons = "; ".join(_compare(names, group, pairs, "") for group in groups)
+    return f"{votes} votes leave {len(parts)} groups that can’t be compared: {comparisons}."
 
 
 def by_intervals(lines: Sequence[Line]) -> Pairs:
@@ -51,12 +51,12 @@ def by_intervals(lines: Sequence[Line]) -> Pairs:
     """
     ranks = [line.rank for line in lines if line.rank is not None]
 
-    def is_above(one: Line, other: Line) -> bool:
-        if one.part == other.part != -1:
-            return None not in (one.lower, other.upper) and (one.lower or 0) > (other.upper or 0)
-        if -1 not in (one.part, other.part) or one.rank is None or other.rank is None:
+    def is_above(line: Line, other: Line) -> bool:
+        if line.part == other.part != -1:
+            return None not in (line.lower, other.upper) and (line.lower or 0) > (other.upper or 0)
+        if -1 not in (line.part, other.part) or line.rank is None or other.rank is None:
             return False
-        return one.rank < other.rank == 1 + sum(rank < other.rank for rank in ranks)
+        return line.rank < other.rank == 1 + sum(rank < other.rank for rank in ranks)
 
     places = range(len(lines))
     return [(a, b) for a in places for b in places if is_above(lines[a], lines[b])]
@@ -73,12 +73,12 @@ def _compare(names: Sequence[str], places: Sequence[int], apart: Pairs, counted:
         order = ", then ".join(names[place] for place in places)
         return f"The order is {order}: all are told apart{counted}"
     if len(best) > 1:
-        said = [f"{_named(names, best, len(places))} can’t be told apart{counted}"]
+        clauses = [f"{_named(names, best, len(places))} can’t be told apart{counted}"]
     else:
         below = [place for place in places if (best[0], place) in apart]
         all_others = f"{_ALL[len(below)]} others" if len(below) < len(_ALL) else "all others"
         worse = all_others if 1 < len(below) == len(places) - 1 else _named(names, below)
-        said = [f"{names[best[0]]} is better than {worse}{counted}"]
+        clauses = [f"{names[best[0]]} is better than {worse}{counted}"]
     before = list(best)
     for tier in rest:
         by_betters: dict[tuple[int, ...], list[int]] = {}
@@ -89,21 +89,21 @@ def _compare(names: Sequence[str], places: Sequence[int], apart: Pairs, counted:
             verb = "is" if len(members) == 1 else "are"
             if list(betters) != best or len(best) > 1:
                 whom = _better_ones(names, betters, before)
-                said.append(f"{_named(names, members)} {verb} worse than {whom}")
+                clauses.append(f"{_named(names, members)} {verb} worse than {whom}")
             elif len(members) > 1:
-                said.append(f"{_named(names, members)} can’t be told apart")
+                clauses.append(f"{_named(names, members)} can’t be told apart")
         before += tier
-    more = ["the table has the rest"] if len(said) > MOST_CLAUSES else []
-    return "; ".join(said[:MOST_CLAUSES] + more)
+    more = ["the table has the rest"] if len(clauses) > MOST_CLAUSES else []
+    return "; ".join(clauses[:MOST_CLAUSES] + more)
 
 
 def _tiers(places: Sequence[int], apart: Pairs) -> list[list[int]]:
     """Those whom nobody is above, then those whom nobody of the rest is above, and so on."""
     left, tiers = list(places), []
     while left:
-        tier = [one for one in left if not any((other, one) in apart for other in left)]
+        tier = [place for place in left if not any((other, place) in apart for other in left)]
         tiers.append(tier)
-        left = [one for one in left if one not in tier]
+        left = [place for place in left if place not in tier]
     return tiers
 
 

@@ -16,12 +16,6 @@ LONGEST_PX, MOST_CONTROLS = 2_500, 40
 LISTS = {"results-votes", "scenarios"}
 """Lists, which page: each of their rows is something to open."""
 
-STILL_BEYOND = {
-    "scenario",  # long
-    *("results-tab", "results-pairs", "results-types"),  # crowded
-}
-"""Pages that are to be made shorter or calmer."""
-
 
 def test_a_page_is_short_and_has_few_controls(demo_home: Home, tmp_path: Path) -> None:
     home = demo_home.copy(tmp_path / "pages")
@@ -37,6 +31,6 @@ def test_a_page_is_short_and_has_few_controls(demo_home: Home, tmp_path: Path) -
     wrong = {
         name: f"{high} px, {controls} controls"
         for name, (high, controls) in sizes.items()
-        if name not in LISTS | STILL_BEYOND and (high > LONGEST_PX or controls > MOST_CONTROLS)
+        if name not in LISTS and (high > LONGEST_PX or controls > MOST_CONTROLS)
     }
     assert wrong == {}
