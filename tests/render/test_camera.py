@@ -93,7 +93,7 @@ def test_over_recorded_scenes_at_most_25_percent_are_blank(realdata: Path) -> No
 def test_the_window_holds_what_contestants_changed_within_60_m_and_no_more() -> None:
     street, reference = scenes.scene(), Modification(added=(scenes.vehicle("New1", 20.0, 0.0),))
     behind = Modification(added=(scenes.vehicle("New1", -50.0, 20.0),))
-    lost = Modification(added=(scenes.vehicle("New1", 0.0, 80.0),))
+    lost = Modification(added=(scenes.vehicle("New1", -80.0, 0.0),))
     camera = camera_for(street, reference, (behind, lost))
     assert camera == camera_for(street, reference, (behind,))
     assert camera.x_min_m <= -57.0
