@@ -11,600 +11,246 @@ import arena.models
 
 
 class Migration(migrations.Migration):
+
     initial = True
 
     dependencies = [
-        ("augment", "0001_initial"),
+        ('augment', '0001_initial'),
         migrations.swappable_dependency(settings.AUTH_USER_MODEL),
     ]
 
     operations = [
         migrations.CreateModel(
-            name="LabellingRound",
+            name='LabellingRound',
             fields=[
-                (
-                    "id",
-                    models.BigAutoField(
-                        auto_created=True, primary_key=True, serialize=False, verbose_name="ID"
-                    ),
-                ),
-                ("code", models.UUIDField(default=uuid.uuid4, editable=False, unique=True)),
-                (
-                    "name",
-                    models.CharField(help_text="experts see it", max_length=120, unique=True),
-                ),
-                ("seed", models.BigIntegerField()),
-                ("opened_at", models.DateTimeField(auto_now_add=True)),
-                (
-                    "experts",
-                    models.ManyToManyField(related_name="labellings", to=settings.AUTH_USER_MODEL),
-                ),
-                (
-                    "job",
-                    models.ForeignKey(
-                        on_delete=django.db.models.deletion.PROTECT,
-                        related_name="labellings",
-                        to="augment.generationjob",
-                    ),
-                ),
+                ('id', models.BigAutoField(auto_created=True, primary_key=True, serialize=False, verbose_name='ID')),
+                ('code', models.UUIDField(default=uuid.uuid4, editable=False, unique=True)),
+                ('name', models.CharField(help_text='experts see it', max_length=120, unique=True)),
+                ('seed', models.BigIntegerField()),
+                ('opened_at', models.DateTimeField(auto_now_add=True)),
+                ('experts', models.ManyToManyField(related_name='labellings', to=settings.AUTH_USER_MODEL)),
+                ('job', models.ForeignKey(on_delete=django.db.models.deletion.PROTECT, related_name='labellings', to='augment.generationjob')),
             ],
-            options={"ordering": ("-opened_at", "-pk")},
+            options={
+                'ordering': ('-opened_at', '-pk'),
+            },
         ),
         migrations.CreateModel(
-            name="LabelTask",
+            name='LabelTask',
             fields=[
-                (
-                    "id",
-                    models.BigAutoField(
-                        auto_created=True, primary_key=True, serialize=False, verbose_name="ID"
-                    ),
-                ),
-                ("code", models.UUIDField(default=uuid.uuid4, editable=False, unique=True)),
-                (
-                    "position",
-                    models.PositiveIntegerField(
-                        help_text="place in the expert's own order, from 1"
-                    ),
-                ),
-                (
-                    "token",
-                    models.CharField(default=arena.models.fresh_token, max_length=40, unique=True),
-                ),
-                (
-                    "original_token",
-                    models.CharField(default=arena.models.fresh_token, max_length=40, unique=True),
-                ),
-                (
-                    "augmentation",
-                    models.ForeignKey(
-                        on_delete=django.db.models.deletion.PROTECT,
-                        related_name="label_tasks",
-                        to="augment.augmentation",
-                    ),
-                ),
-                (
-                    "expert",
-                    models.ForeignKey(
-                        on_delete=django.db.models.deletion.PROTECT,
-                        related_name="label_tasks",
-                        to=settings.AUTH_USER_MODEL,
-                    ),
-                ),
-                (
-                    "labelling",
-                    models.ForeignKey(
-                        on_delete=django.db.models.deletion.CASCADE,
-                        related_name="tasks",
-                        to="arena.labellinground",
-                    ),
-                ),
+                ('id', models.BigAutoField(auto_created=True, primary_key=True, serialize=False, verbose_name='ID')),
+                ('code', models.UUIDField(default=uuid.uuid4, editable=False, unique=True)),
+                ('position', models.PositiveIntegerField(help_text="place in the expert's own order, from 1")),
+                ('token', models.CharField(default=arena.models.fresh_token, max_length=40, unique=True)),
+                ('original_token', models.CharField(default=arena.models.fresh_token, max_length=40, unique=True)),
+                ('augmentation', models.ForeignKey(on_delete=django.db.models.deletion.PROTECT, related_name='label_tasks', to='augment.augmentation')),
+                ('expert', models.ForeignKey(on_delete=django.db.models.deletion.PROTECT, related_name='label_tasks', to=settings.AUTH_USER_MODEL)),
+                ('labelling', models.ForeignKey(on_delete=django.db.models.deletion.CASCADE, related_name='tasks', to='arena.labellinground')),
             ],
-            options={"ordering": ("labelling", "expert", "position")},
+            options={
+                'ordering': ('labelling', 'expert', 'position'),
+            },
         ),
         migrations.CreateModel(
-            name="FaultLabel",
+            name='FaultLabel',
             fields=[
-                (
-                    "id",
-                    models.BigAutoField(
-                        auto_created=True, primary_key=True, serialize=False, verbose_name="ID"
-                    ),
-                ),
-                ("position", models.BooleanField()),
-                ("heading", models.BooleanField()),
-                ("logic", models.BooleanField()),
-                ("note", models.TextField(blank=True, max_length=2000)),
-                ("guessed_position", models.BooleanField(null=True)),
-                ("guessed_heading", models.BooleanField(null=True)),
-                ("guessed_logic", models.BooleanField(null=True)),
-                ("at", models.DateTimeField(auto_now_add=True)),
-                (
-                    "augmentation",
-                    models.ForeignKey(
-                        on_delete=django.db.models.deletion.PROTECT,
-                        related_name="fault_labels",
-                        to="augment.augmentation",
-                    ),
-                ),
-                (
-                    "expert",
-                    models.ForeignKey(
-                        on_delete=django.db.models.deletion.PROTECT,
-                        related_name="fault_labels",
-                        to=settings.AUTH_USER_MODEL,
-                    ),
-                ),
-                (
-                    "task",
-                    models.OneToOneField(
-                        on_delete=django.db.models.deletion.PROTECT,
-                        related_name="label",
-                        to="arena.labeltask",
-                    ),
-                ),
+                ('id', models.BigAutoField(auto_created=True, primary_key=True, serialize=False, verbose_name='ID')),
+                ('position', models.BooleanField()),
+                ('heading', models.BooleanField()),
+                ('logic', models.BooleanField()),
+                ('note', models.TextField(blank=True, max_length=2000)),
+                ('guessed_position', models.BooleanField(null=True)),
+                ('guessed_heading', models.BooleanField(null=True)),
+                ('guessed_logic', models.BooleanField(null=True)),
+                ('at', models.DateTimeField(auto_now_add=True)),
+                ('augmentation', models.ForeignKey(on_delete=django.db.models.deletion.PROTECT, related_name='fault_labels', to='augment.augmentation')),
+                ('expert', models.ForeignKey(on_delete=django.db.models.deletion.PROTECT, related_name='fault_labels', to=settings.AUTH_USER_MODEL)),
+                ('task', models.OneToOneField(on_delete=django.db.models.deletion.PROTECT, related_name='label', to='arena.labeltask')),
             ],
-            options={"ordering": ("at", "pk")},
+            options={
+                'ordering': ('at', 'pk'),
+            },
         ),
         migrations.CreateModel(
-            name="Person",
+            name='Person',
             fields=[
-                (
-                    "id",
-                    models.BigAutoField(
-                        auto_created=True, primary_key=True, serialize=False, verbose_name="ID"
-                    ),
-                ),
-                ("code", models.UUIDField(default=uuid.uuid4, editable=False, unique=True)),
-                ("pseudonym", models.CharField(max_length=60, unique=True)),
-                ("preferences", models.JSONField(blank=True, default=dict)),
-                (
-                    "is_simulated",
-                    models.BooleanField(
-                        default=False, help_text="votes of this account are made by the machine"
-                    ),
-                ),
-                (
-                    "user",
-                    models.OneToOneField(
-                        on_delete=django.db.models.deletion.CASCADE,
-                        related_name="person",
-                        to=settings.AUTH_USER_MODEL,
-                    ),
-                ),
+                ('id', models.BigAutoField(auto_created=True, primary_key=True, serialize=False, verbose_name='ID')),
+                ('code', models.UUIDField(default=uuid.uuid4, editable=False, unique=True)),
+                ('pseudonym', models.CharField(max_length=60, unique=True)),
+                ('preferences', models.JSONField(blank=True, default=dict)),
+                ('is_simulated', models.BooleanField(default=False, help_text='votes of this account are made by the machine')),
+                ('user', models.OneToOneField(on_delete=django.db.models.deletion.CASCADE, related_name='person', to=settings.AUTH_USER_MODEL)),
             ],
-            options={"verbose_name_plural": "people", "ordering": ("pseudonym",)},
+            options={
+                'verbose_name_plural': 'people',
+                'ordering': ('pseudonym',),
+            },
         ),
         migrations.CreateModel(
-            name="Snapshot",
+            name='Snapshot',
             fields=[
-                (
-                    "id",
-                    models.BigAutoField(
-                        auto_created=True, primary_key=True, serialize=False, verbose_name="ID"
-                    ),
-                ),
-                ("code", models.UUIDField(default=uuid.uuid4, editable=False, unique=True)),
-                ("method", models.CharField(help_text="bt or elo", max_length=20)),
-                ("rounds", models.PositiveIntegerField()),
-                ("resampling_unit", models.CharField(max_length=20)),
-                ("seed", models.BigIntegerField()),
-                ("votes_sha256", models.CharField(max_length=64)),
-                ("votes_counted", models.PositiveIntegerField()),
-                (
-                    "votes_left_out",
-                    models.JSONField(default=dict, help_text="how many votes, by reason"),
-                ),
-                ("versions", models.JSONField(default=dict)),
-                (
-                    "status",
-                    models.TextField(
-                        blank=True, help_text="why there is no rating, if there is none"
-                    ),
-                ),
-                (
-                    "degenerate_rounds",
-                    models.PositiveIntegerField(
-                        default=0,
-                        help_text="bootstrap rounds that determined no rating; intervals leave them out",
-                    ),
-                ),
-                ("includes_simulated", models.BooleanField(default=False)),
-                (
-                    "is_early",
-                    models.BooleanField(default=False, help_text="the study was still open"),
-                ),
-                ("made_at", models.DateTimeField(auto_now_add=True)),
-                (
-                    "made_by",
-                    models.ForeignKey(
-                        blank=True,
-                        null=True,
-                        on_delete=django.db.models.deletion.PROTECT,
-                        related_name="snapshots",
-                        to=settings.AUTH_USER_MODEL,
-                    ),
-                ),
+                ('id', models.BigAutoField(auto_created=True, primary_key=True, serialize=False, verbose_name='ID')),
+                ('code', models.UUIDField(default=uuid.uuid4, editable=False, unique=True)),
+                ('method', models.CharField(help_text='bt or elo', max_length=20)),
+                ('rounds', models.PositiveIntegerField()),
+                ('resampling_unit', models.CharField(max_length=20)),
+                ('seed', models.BigIntegerField()),
+                ('votes_sha256', models.CharField(max_length=64)),
+                ('votes_counted', models.PositiveIntegerField()),
+                ('votes_left_out', models.JSONField(default=dict, help_text='how many votes, by reason')),
+                ('versions', models.JSONField(default=dict)),
+                ('status', models.TextField(blank=True, help_text='why there is no rating, if there is none')),
+                ('degenerate_rounds', models.PositiveIntegerField(default=0, help_text='bootstrap rounds that determined no rating; intervals leave them out')),
+                ('includes_simulated', models.BooleanField(default=False)),
+                ('is_early', models.BooleanField(default=False, help_text='the study was still open')),
+                ('made_at', models.DateTimeField(auto_now_add=True)),
+                ('made_by', models.ForeignKey(blank=True, null=True, on_delete=django.db.models.deletion.PROTECT, related_name='snapshots', to=settings.AUTH_USER_MODEL)),
             ],
-            options={"ordering": ("-made_at", "-pk")},
+            options={
+                'ordering': ('-made_at', '-pk'),
+            },
         ),
         migrations.CreateModel(
-            name="Standing",
+            name='Standing',
             fields=[
-                (
-                    "id",
-                    models.BigAutoField(
-                        auto_created=True, primary_key=True, serialize=False, verbose_name="ID"
-                    ),
-                ),
-                ("rank", models.PositiveIntegerField(null=True)),
-                ("rating", models.FloatField(null=True)),
-                ("lower", models.FloatField(null=True)),
-                ("upper", models.FloatField(null=True)),
-                ("votes", models.PositiveIntegerField()),
-                ("wins", models.PositiveIntegerField()),
-                ("ties", models.PositiveIntegerField()),
-                ("losses", models.PositiveIntegerField()),
-                ("note", models.TextField(blank=True)),
-                (
-                    "contestant",
-                    models.ForeignKey(
-                        on_delete=django.db.models.deletion.PROTECT,
-                        related_name="standings",
-                        to="augment.contestant",
-                    ),
-                ),
-                (
-                    "snapshot",
-                    models.ForeignKey(
-                        on_delete=django.db.models.deletion.CASCADE,
-                        related_name="standings",
-                        to="arena.snapshot",
-                    ),
-                ),
+                ('id', models.BigAutoField(auto_created=True, primary_key=True, serialize=False, verbose_name='ID')),
+                ('rank', models.PositiveIntegerField(null=True)),
+                ('rating', models.FloatField(null=True)),
+                ('lower', models.FloatField(null=True)),
+                ('upper', models.FloatField(null=True)),
+                ('votes', models.PositiveIntegerField()),
+                ('wins', models.PositiveIntegerField()),
+                ('ties', models.PositiveIntegerField()),
+                ('losses', models.PositiveIntegerField()),
+                ('note', models.TextField(blank=True)),
+                ('contestant', models.ForeignKey(on_delete=django.db.models.deletion.PROTECT, related_name='standings', to='augment.contestant')),
+                ('snapshot', models.ForeignKey(on_delete=django.db.models.deletion.CASCADE, related_name='standings', to='arena.snapshot')),
             ],
-            options={"ordering": ("rank", "-rating", "contestant__slug")},
+            options={
+                'ordering': ('rank', '-rating', 'contestant__slug'),
+            },
         ),
         migrations.CreateModel(
-            name="Study",
+            name='Study',
             fields=[
-                (
-                    "id",
-                    models.BigAutoField(
-                        auto_created=True, primary_key=True, serialize=False, verbose_name="ID"
-                    ),
-                ),
-                ("code", models.UUIDField(default=uuid.uuid4, editable=False, unique=True)),
-                ("name", models.CharField(max_length=120, unique=True)),
-                (
-                    "state",
-                    models.CharField(
-                        choices=[("draft", "Draft"), ("open", "Open"), ("closed", "Closed")],
-                        default="draft",
-                        max_length=10,
-                    ),
-                ),
-                ("votes_per_expert", models.PositiveIntegerField()),
-                ("seed", models.BigIntegerField()),
-                (
-                    "rules",
-                    models.JSONField(
-                        default=dict, help_text="the planner's rules, as they were at opening"
-                    ),
-                ),
-                (
-                    "allow_simulated",
-                    models.BooleanField(
-                        default=False,
-                        help_text="simulated contestants and votes count; everything then says so",
-                    ),
-                ),
-                ("opened_at", models.DateTimeField(blank=True, null=True)),
-                ("closed_at", models.DateTimeField(blank=True, null=True)),
-                (
-                    "contestants",
-                    models.ManyToManyField(related_name="studies", to="augment.contestant"),
-                ),
-                (
-                    "experts",
-                    models.ManyToManyField(related_name="studies", to=settings.AUTH_USER_MODEL),
-                ),
-                (
-                    "scenarios",
-                    models.ManyToManyField(related_name="studies", to="augment.scenario"),
-                ),
+                ('id', models.BigAutoField(auto_created=True, primary_key=True, serialize=False, verbose_name='ID')),
+                ('code', models.UUIDField(default=uuid.uuid4, editable=False, unique=True)),
+                ('name', models.CharField(max_length=120, unique=True)),
+                ('state', models.CharField(choices=[('draft', 'Draft'), ('open', 'Open'), ('closed', 'Closed')], default='draft', max_length=10)),
+                ('votes_per_expert', models.PositiveIntegerField()),
+                ('seed', models.BigIntegerField()),
+                ('rules', models.JSONField(default=dict, help_text="the planner's rules, as they were at opening")),
+                ('allow_simulated', models.BooleanField(default=False, help_text='simulated contestants and votes count; everything then says so')),
+                ('opened_at', models.DateTimeField(blank=True, null=True)),
+                ('closed_at', models.DateTimeField(blank=True, null=True)),
+                ('contestants', models.ManyToManyField(related_name='studies', to='augment.contestant')),
+                ('experts', models.ManyToManyField(related_name='studies', to=settings.AUTH_USER_MODEL)),
+                ('scenarios', models.ManyToManyField(related_name='studies', to='augment.scenario')),
             ],
-            options={"verbose_name_plural": "studies", "ordering": ("-opened_at", "-pk")},
+            options={
+                'verbose_name_plural': 'studies',
+                'ordering': ('-opened_at', '-pk'),
+            },
         ),
         migrations.AddField(
-            model_name="snapshot",
-            name="study",
-            field=models.ForeignKey(
-                on_delete=django.db.models.deletion.CASCADE,
-                related_name="snapshots",
-                to="arena.study",
-            ),
+            model_name='snapshot',
+            name='study',
+            field=models.ForeignKey(on_delete=django.db.models.deletion.CASCADE, related_name='snapshots', to='arena.study'),
         ),
         migrations.CreateModel(
-            name="Matchup",
+            name='Matchup',
             fields=[
-                (
-                    "id",
-                    models.BigAutoField(
-                        auto_created=True, primary_key=True, serialize=False, verbose_name="ID"
-                    ),
-                ),
-                ("code", models.UUIDField(default=uuid.uuid4, editable=False, unique=True)),
-                (
-                    "position",
-                    models.PositiveIntegerField(
-                        help_text="place in the expert's own order, from 1"
-                    ),
-                ),
-                (
-                    "left_token",
-                    models.CharField(default=arena.models.fresh_token, max_length=40, unique=True),
-                ),
-                (
-                    "right_token",
-                    models.CharField(default=arena.models.fresh_token, max_length=40, unique=True),
-                ),
-                (
-                    "draw_probability",
-                    models.FloatField(help_text="of this pair and scenario, when it was planned"),
-                ),
-                ("served_at", models.DateTimeField(blank=True, null=True)),
-                (
-                    "expert",
-                    models.ForeignKey(
-                        on_delete=django.db.models.deletion.PROTECT,
-                        related_name="matchups",
-                        to=settings.AUTH_USER_MODEL,
-                    ),
-                ),
-                (
-                    "left",
-                    models.ForeignKey(
-                        on_delete=django.db.models.deletion.PROTECT,
-                        related_name="shown_left",
-                        to="augment.augmentation",
-                    ),
-                ),
-                (
-                    "right",
-                    models.ForeignKey(
-                        on_delete=django.db.models.deletion.PROTECT,
-                        related_name="shown_right",
-                        to="augment.augmentation",
-                    ),
-                ),
-                (
-                    "scenario",
-                    models.ForeignKey(
-                        on_delete=django.db.models.deletion.PROTECT,
-                        related_name="matchups",
-                        to="augment.scenario",
-                    ),
-                ),
-                (
-                    "study",
-                    models.ForeignKey(
-                        on_delete=django.db.models.deletion.CASCADE,
-                        related_name="matchups",
-                        to="arena.study",
-                    ),
-                ),
+                ('id', models.BigAutoField(auto_created=True, primary_key=True, serialize=False, verbose_name='ID')),
+                ('code', models.UUIDField(default=uuid.uuid4, editable=False, unique=True)),
+                ('position', models.PositiveIntegerField(help_text="place in the expert's own order, from 1")),
+                ('left_token', models.CharField(default=arena.models.fresh_token, max_length=40, unique=True)),
+                ('right_token', models.CharField(default=arena.models.fresh_token, max_length=40, unique=True)),
+                ('draw_probability', models.FloatField(help_text='of this pair and scenario, when it was planned')),
+                ('served_at', models.DateTimeField(blank=True, null=True)),
+                ('expert', models.ForeignKey(on_delete=django.db.models.deletion.PROTECT, related_name='matchups', to=settings.AUTH_USER_MODEL)),
+                ('left', models.ForeignKey(on_delete=django.db.models.deletion.PROTECT, related_name='shown_left', to='augment.augmentation')),
+                ('right', models.ForeignKey(on_delete=django.db.models.deletion.PROTECT, related_name='shown_right', to='augment.augmentation')),
+                ('scenario', models.ForeignKey(on_delete=django.db.models.deletion.PROTECT, related_name='matchups', to='augment.scenario')),
+                ('study', models.ForeignKey(on_delete=django.db.models.deletion.CASCADE, related_name='matchups', to='arena.study')),
             ],
-            options={"ordering": ("study", "expert", "position")},
+            options={
+                'ordering': ('study', 'expert', 'position'),
+            },
         ),
         migrations.CreateModel(
-            name="Vote",
+            name='Vote',
             fields=[
-                (
-                    "id",
-                    models.BigAutoField(
-                        auto_created=True, primary_key=True, serialize=False, verbose_name="ID"
-                    ),
-                ),
-                (
-                    "key",
-                    models.UUIDField(
-                        help_text="made by the browser; the same key is one vote", unique=True
-                    ),
-                ),
-                (
-                    "outcome",
-                    models.CharField(
-                        choices=[
-                            ("left", "A is better"),
-                            ("equal", "Equal"),
-                            ("right", "B is better"),
-                        ],
-                        max_length=10,
-                    ),
-                ),
-                ("is_simulated", models.BooleanField(default=False)),
-                (
-                    "ms_visible",
-                    models.PositiveIntegerField(
-                        blank=True,
-                        help_text="how long the pair was on screen, null if not measured",
-                        null=True,
-                    ),
-                ),
-                ("at", models.DateTimeField(auto_now_add=True)),
-                (
-                    "expert",
-                    models.ForeignKey(
-                        on_delete=django.db.models.deletion.PROTECT,
-                        related_name="votes",
-                        to=settings.AUTH_USER_MODEL,
-                    ),
-                ),
-                (
-                    "matchup",
-                    models.ForeignKey(
-                        on_delete=django.db.models.deletion.PROTECT,
-                        related_name="votes",
-                        to="arena.matchup",
-                    ),
-                ),
-                (
-                    "shown_left",
-                    models.ForeignKey(
-                        on_delete=django.db.models.deletion.PROTECT,
-                        related_name="+",
-                        to="augment.augmentation",
-                    ),
-                ),
-                (
-                    "shown_right",
-                    models.ForeignKey(
-                        on_delete=django.db.models.deletion.PROTECT,
-                        related_name="+",
-                        to="augment.augmentation",
-                    ),
-                ),
-                (
-                    "supersedes",
-                    models.OneToOneField(
-                        blank=True,
-                        null=True,
-                        on_delete=django.db.models.deletion.PROTECT,
-                        related_name="superseded_by",
-                        to="arena.vote",
-                    ),
-                ),
-                (
-                    "winner",
-                    models.ForeignKey(
-                        blank=True,
-                        null=True,
-                        on_delete=django.db.models.deletion.PROTECT,
-                        related_name="wins",
-                        to="augment.augmentation",
-                    ),
-                ),
+                ('id', models.BigAutoField(auto_created=True, primary_key=True, serialize=False, verbose_name='ID')),
+                ('key', models.UUIDField(help_text='made by the browser; the same key is one vote', unique=True)),
+                ('outcome', models.CharField(choices=[('left', 'A is better'), ('equal', 'Equal'), ('right', 'B is better')], max_length=10)),
+                ('is_simulated', models.BooleanField(default=False)),
+                ('ms_visible', models.PositiveIntegerField(blank=True, help_text='how long the pair was on screen, null if not measured', null=True)),
+                ('at', models.DateTimeField(auto_now_add=True)),
+                ('expert', models.ForeignKey(on_delete=django.db.models.deletion.PROTECT, related_name='votes', to=settings.AUTH_USER_MODEL)),
+                ('matchup', models.ForeignKey(on_delete=django.db.models.deletion.PROTECT, related_name='votes', to='arena.matchup')),
+                ('shown_left', models.ForeignKey(on_delete=django.db.models.deletion.PROTECT, related_name='+', to='augment.augmentation')),
+                ('shown_right', models.ForeignKey(on_delete=django.db.models.deletion.PROTECT, related_name='+', to='augment.augmentation')),
+                ('supersedes', models.OneToOneField(blank=True, null=True, on_delete=django.db.models.deletion.PROTECT, related_name='superseded_by', to='arena.vote')),
+                ('winner', models.ForeignKey(blank=True, null=True, on_delete=django.db.models.deletion.PROTECT, related_name='wins', to='augment.augmentation')),
             ],
-            options={"ordering": ("at", "pk")},
+            options={
+                'ordering': ('at', 'pk'),
+            },
         ),
         migrations.AddConstraint(
-            model_name="labeltask",
-            constraint=models.UniqueConstraint(
-                fields=("labelling", "expert", "position"), name="one_label_task_per_position"
-            ),
+            model_name='labeltask',
+            constraint=models.UniqueConstraint(fields=('labelling', 'expert', 'position'), name='one_label_task_per_position'),
         ),
         migrations.AddConstraint(
-            model_name="labeltask",
-            constraint=models.UniqueConstraint(
-                fields=("augmentation", "expert"), name="one_label_task_per_augmentation"
-            ),
+            model_name='labeltask',
+            constraint=models.UniqueConstraint(fields=('augmentation', 'expert'), name='one_label_task_per_augmentation'),
         ),
         migrations.AddConstraint(
-            model_name="labeltask",
-            constraint=models.CheckConstraint(
-                condition=models.Q(("position__gte", 1)), name="label_task_counts_from_one"
-            ),
+            model_name='labeltask',
+            constraint=models.CheckConstraint(condition=models.Q(('position__gte', 1)), name='label_task_counts_from_one'),
         ),
         migrations.AddConstraint(
-            model_name="faultlabel",
-            constraint=models.UniqueConstraint(
-                fields=("augmentation", "expert"), name="one_fault_label_per_expert"
-            ),
+            model_name='faultlabel',
+            constraint=models.UniqueConstraint(fields=('augmentation', 'expert'), name='one_fault_label_per_expert'),
         ),
         migrations.AddConstraint(
-            model_name="faultlabel",
-            constraint=models.CheckConstraint(
-                condition=models.Q(
-                    models.Q(
-                        ("guessed_heading__isnull", True),
-                        ("guessed_logic__isnull", True),
-                        ("guessed_position__isnull", True),
-                    ),
-                    models.Q(
-                        ("guessed_heading__isnull", False),
-                        ("guessed_logic__isnull", False),
-                        ("guessed_position__isnull", False),
-                    ),
-                    _connector="OR",
-                ),
-                name="fault_guess_is_whole_or_absent",
-            ),
+            model_name='faultlabel',
+            constraint=models.CheckConstraint(condition=models.Q(models.Q(('guessed_heading__isnull', True), ('guessed_logic__isnull', True), ('guessed_position__isnull', True)), models.Q(('guessed_heading__isnull', False), ('guessed_logic__isnull', False), ('guessed_position__isnull', False)), _connector='OR'), name='fault_guess_is_whole_or_absent'),
         ),
         migrations.AddConstraint(
-            model_name="standing",
-            constraint=models.UniqueConstraint(
-                fields=("snapshot", "contestant"), name="one_standing_per_contestant"
-            ),
+            model_name='standing',
+            constraint=models.UniqueConstraint(fields=('snapshot', 'contestant'), name='one_standing_per_contestant'),
         ),
         migrations.AddConstraint(
-            model_name="standing",
-            constraint=models.CheckConstraint(
-                condition=models.Q(
-                    (
-                        "votes",
-                        django.db.models.expressions.CombinedExpression(
-                            django.db.models.expressions.CombinedExpression(
-                                models.F("wins"), "+", models.F("ties")
-                            ),
-                            "+",
-                            models.F("losses"),
-                        ),
-                    )
-                ),
-                name="standing_counts_add_up",
-            ),
+            model_name='standing',
+            constraint=models.CheckConstraint(condition=models.Q(('votes', django.db.models.expressions.CombinedExpression(django.db.models.expressions.CombinedExpression(models.F('wins'), '+', models.F('ties')), '+', models.F('losses')))), name='standing_counts_add_up'),
         ),
         migrations.AddConstraint(
-            model_name="study",
-            constraint=models.CheckConstraint(
-                condition=models.Q(("state__in", ["draft", "open", "closed"])),
-                name="study_state_is_known",
-            ),
+            model_name='study',
+            constraint=models.CheckConstraint(condition=models.Q(('state__in', ['draft', 'open', 'closed'])), name='study_state_is_known'),
         ),
         migrations.AddConstraint(
-            model_name="matchup",
-            constraint=models.UniqueConstraint(
-                fields=("study", "expert", "position"), name="one_matchup_per_position"
-            ),
+            model_name='matchup',
+            constraint=models.UniqueConstraint(fields=('study', 'expert', 'position'), name='one_matchup_per_position'),
         ),
         migrations.AddConstraint(
-            model_name="matchup",
-            constraint=models.UniqueConstraint(
-                fields=("study", "expert", "left", "right"), name="one_matchup_per_pair"
-            ),
+            model_name='matchup',
+            constraint=models.UniqueConstraint(fields=('study', 'expert', 'left', 'right'), name='one_matchup_per_pair'),
         ),
         migrations.AddConstraint(
-            model_name="matchup",
-            constraint=models.CheckConstraint(
-                condition=models.Q(("left", models.F("right")), _negated=True),
-                name="matchup_shows_two_augmentations",
-            ),
+            model_name='matchup',
+            constraint=models.CheckConstraint(condition=models.Q(('left', models.F('right')), _negated=True), name='matchup_shows_two_augmentations'),
         ),
         migrations.AddConstraint(
-            model_name="matchup",
-            constraint=models.CheckConstraint(
-                condition=models.Q(("draw_probability__gt", 0), ("draw_probability__lte", 1)),
-                name="draw_probability_is_one",
-            ),
+            model_name='matchup',
+            constraint=models.CheckConstraint(condition=models.Q(('draw_probability__gt', 0), ('draw_probability__lte', 1)), name='draw_probability_is_one'),
         ),
         migrations.AddConstraint(
-            model_name="vote",
-            constraint=models.UniqueConstraint(
-                condition=models.Q(("supersedes", None)),
-                fields=("matchup",),
-                name="one_first_vote_per_matchup",
-            ),
+            model_name='vote',
+            constraint=models.UniqueConstraint(condition=models.Q(('supersedes', None)), fields=('matchup',), name='one_first_vote_per_matchup'),
         ),
         migrations.AddConstraint(
-            model_name="vote",
-            constraint=models.CheckConstraint(
-                condition=models.Q(
-                    models.Q(("outcome", "left"), ("winner", models.F("shown_left"))),
-                    models.Q(("outcome", "right"), ("winner", models.F("shown_right"))),
-                    models.Q(("outcome", "equal"), ("winner", None)),
-                    _connector="OR",
-                ),
-                name="vote_winner_was_shown",
-            ),
+            model_name='vote',
+            constraint=models.CheckConstraint(condition=models.Q(models.Q(('outcome', 'left'), ('winner', models.F('shown_left'))), models.Q(('outcome', 'right'), ('winner', models.F('shown_right'))), models.Q(('outcome', 'equal'), ('winner', None)), _connector='OR'), name='vote_winner_was_shown'),
         ),
     ]

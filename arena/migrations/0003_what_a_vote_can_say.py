@@ -9,284 +9,142 @@ import arena.models.people
 
 def fill_matchups(apps, schema_editor):
     """A token for the unchanged picture of every matchup that was planned before it had one."""
-    Matchup = apps.get_model("arena", "Matchup")
-    rows = list(Matchup.objects.select_related("scenario").defer("scenario__reference"))
+    Matchup = apps.get_model('arena', 'Matchup')
+    rows = list(Matchup.objects.select_related('scenario').defer('scenario__reference'))
     for row in rows:
         row.original_token = arena.models.people.fresh_token()
         row.original_image = row.scenario.original_image
-    Matchup.objects.bulk_update(rows, ["original_token", "original_image"], batch_size=500)
+    Matchup.objects.bulk_update(rows, ['original_token', 'original_image'], batch_size=500)
 
 
 class Migration(migrations.Migration):
+
     dependencies = [
-        ("arena", "0002_invitations"),
-        ("augment", "0001_initial"),
+        ('arena', '0002_invitations'),
+        ('augment', '0001_initial'),
         migrations.swappable_dependency(settings.AUTH_USER_MODEL),
     ]
 
     operations = [
         migrations.CreateModel(
-            name="Report",
+            name='Report',
             fields=[
-                (
-                    "id",
-                    models.BigAutoField(
-                        auto_created=True, primary_key=True, serialize=False, verbose_name="ID"
-                    ),
-                ),
-                (
-                    "key",
-                    models.UUIDField(
-                        help_text="made by the browser; one key is one report", unique=True
-                    ),
-                ),
-                (
-                    "reason",
-                    models.CharField(
-                        choices=[
-                            ("picture_wrong", "Something is wrong with an image"),
-                            ("instruction_wrong", "Something is wrong with the instruction"),
-                            ("other", "Other"),
-                        ],
-                        max_length=20,
-                    ),
-                ),
-                ("comment", models.TextField(blank=True, max_length=1000)),
-                ("at", models.DateTimeField(auto_now_add=True)),
+                ('id', models.BigAutoField(auto_created=True, primary_key=True, serialize=False, verbose_name='ID')),
+                ('key', models.UUIDField(help_text='made by the browser; one key is one report', unique=True)),
+                ('reason', models.CharField(choices=[('picture_wrong', 'Something is wrong with an image'), ('instruction_wrong', 'Something is wrong with the instruction'), ('other', 'Other')], max_length=20)),
+                ('comment', models.TextField(blank=True, max_length=1000)),
+                ('at', models.DateTimeField(auto_now_add=True)),
             ],
-            options={"ordering": ("at", "pk")},
+            options={
+                'ordering': ('at', 'pk'),
+            },
         ),
-        migrations.RemoveConstraint(model_name="vote", name="vote_winner_was_shown"),
-        migrations.AddField(
-            model_name="matchup",
-            name="batch",
-            field=models.PositiveIntegerField(
-                default=0, help_text="0 was planned at the opening; later plannings count up"
-            ),
+        migrations.RemoveConstraint(
+            model_name='vote',
+            name='vote_winner_was_shown',
         ),
         migrations.AddField(
-            model_name="matchup",
-            name="kind",
-            field=models.CharField(
-                choices=[
-                    ("main", "Main"),
-                    ("repeat", "Hidden repeat"),
-                    ("check", "Attention check"),
-                ],
-                default="main",
-                max_length=10,
-            ),
+            model_name='matchup',
+            name='batch',
+            field=models.PositiveIntegerField(default=0, help_text='0 was planned at the opening; later plannings count up'),
         ),
         migrations.AddField(
-            model_name="matchup",
-            name="original_image",
-            field=models.CharField(
-                blank=True, help_text="name of the picture before any change", max_length=120
-            ),
+            model_name='matchup',
+            name='kind',
+            field=models.CharField(choices=[('main', 'Main'), ('repeat', 'Hidden repeat'), ('check', 'Attention check')], default='main', max_length=10),
         ),
         migrations.AddField(
-            model_name="matchup",
-            name="original_token",
-            field=models.CharField(
-                default=arena.models.people.fresh_token, max_length=40, null=True
-            ),
+            model_name='matchup',
+            name='original_image',
+            field=models.CharField(blank=True, help_text='name of the picture before any change', max_length=120),
+        ),
+        migrations.AddField(
+            model_name='matchup',
+            name='original_token',
+            field=models.CharField(default=arena.models.people.fresh_token, max_length=40, null=True),
         ),
         migrations.RunPython(fill_matchups, migrations.RunPython.noop),
         migrations.AlterField(
-            model_name="matchup",
-            name="original_token",
-            field=models.CharField(
-                default=arena.models.people.fresh_token, max_length=40, unique=True
-            ),
+            model_name='matchup',
+            name='original_token',
+            field=models.CharField(default=arena.models.people.fresh_token, max_length=40, unique=True),
         ),
         migrations.AddField(
-            model_name="matchup",
-            name="repeat_of",
-            field=models.OneToOneField(
-                blank=True,
-                help_text="the main matchup that this one shows again, sides swapped",
-                null=True,
-                on_delete=django.db.models.deletion.CASCADE,
-                related_name="repeated_by",
-                to="arena.matchup",
-            ),
+            model_name='matchup',
+            name='repeat_of',
+            field=models.OneToOneField(blank=True, help_text='the main matchup that this one shows again, sides swapped', null=True, on_delete=django.db.models.deletion.CASCADE, related_name='repeated_by', to='arena.matchup'),
         ),
         migrations.AddField(
-            model_name="matchup",
-            name="view",
-            field=models.JSONField(
-                help_text="where metres lie in its pictures: px_per_m, ego_px, width, height",
-                null=True,
-            ),
+            model_name='matchup',
+            name='view',
+            field=models.JSONField(help_text='where metres lie in its pictures: px_per_m, ego_px, width, height', null=True),
         ),
         migrations.AddField(
-            model_name="study",
-            name="allow_both_miss",
-            field=models.BooleanField(
-                default=False, help_text="experts may add to Equal that both miss the instruction"
-            ),
+            model_name='study',
+            name='allow_both_miss',
+            field=models.BooleanField(default=False, help_text='experts may add to Equal that both miss the instruction'),
         ),
         migrations.AddField(
-            model_name="vote",
-            name="aids",
-            field=models.CharField(
-                blank=True,
-                help_text="aids used, in a fixed order, joined by blanks",
-                max_length=40,
-            ),
+            model_name='vote',
+            name='aids',
+            field=models.CharField(blank=True, help_text='aids used, in a fixed order, joined by blanks', max_length=40),
         ),
         migrations.AddField(
-            model_name="vote",
-            name="both_miss",
-            field=models.BooleanField(
-                default=False, help_text="equal, and both miss the instruction; counts as a tie"
-            ),
+            model_name='vote',
+            name='both_miss',
+            field=models.BooleanField(default=False, help_text='equal, and both miss the instruction; counts as a tie'),
         ),
         migrations.AddField(
-            model_name="vote", name="comment", field=models.TextField(blank=True, max_length=1000)
+            model_name='vote',
+            name='comment',
+            field=models.TextField(blank=True, max_length=1000),
         ),
         migrations.AddField(
-            model_name="vote",
-            name="reason",
-            field=models.CharField(
-                blank=True,
-                choices=[
-                    ("cannot_judge", "I cannot judge this"),
-                    ("picture_missing", "Image does not show"),
-                    ("unclear", "Instruction unclear"),
-                    ("recognised", "I recognise this scene’s author"),
-                    ("other", "Other"),
-                ],
-                help_text="why it was skipped",
-                max_length=20,
-            ),
+            model_name='vote',
+            name='reason',
+            field=models.CharField(blank=True, choices=[('cannot_judge', 'I cannot judge this'), ('picture_missing', 'Image does not show'), ('unclear', 'Instruction unclear'), ('recognised', 'I recognise this scene’s author'), ('other', 'Other')], help_text='why it was skipped', max_length=20),
         ),
         migrations.AlterField(
-            model_name="vote",
-            name="outcome",
-            field=models.CharField(
-                choices=[
-                    ("left", "A is better"),
-                    ("equal", "Equal"),
-                    ("right", "B is better"),
-                    ("skip", "Skipped"),
-                ],
-                max_length=10,
-            ),
+            model_name='vote',
+            name='outcome',
+            field=models.CharField(choices=[('left', 'A is better'), ('equal', 'Equal'), ('right', 'B is better'), ('skip', 'Skipped')], max_length=10),
         ),
         migrations.AddIndex(
-            model_name="vote",
-            index=models.Index(fields=["expert", "at"], name="votes_of_expert_by_time"),
+            model_name='vote',
+            index=models.Index(fields=['expert', 'at'], name='votes_of_expert_by_time'),
         ),
         migrations.AddConstraint(
-            model_name="matchup",
-            constraint=models.CheckConstraint(
-                condition=models.Q(
-                    models.Q(("kind", "repeat"), ("repeat_of__isnull", False)),
-                    models.Q(("kind__in", ["main", "check"]), ("repeat_of", None)),
-                    _connector="OR",
-                ),
-                name="matchup_repeats_only_as_repeat",
-            ),
+            model_name='matchup',
+            constraint=models.CheckConstraint(condition=models.Q(models.Q(('kind', 'repeat'), ('repeat_of__isnull', False)), models.Q(('kind__in', ['main', 'check']), ('repeat_of', None)), _connector='OR'), name='matchup_repeats_only_as_repeat'),
         ),
         migrations.AddConstraint(
-            model_name="vote",
-            constraint=models.CheckConstraint(
-                condition=models.Q(
-                    models.Q(
-                        ("outcome", "left"),
-                        ("winner", models.F("shown_left")),
-                        ("winner__isnull", False),
-                    ),
-                    models.Q(
-                        ("outcome", "right"),
-                        ("winner", models.F("shown_right")),
-                        ("winner__isnull", False),
-                    ),
-                    models.Q(("outcome__in", ["equal", "skip"]), ("winner", None)),
-                    _connector="OR",
-                ),
-                name="vote_winner_was_shown",
-            ),
+            model_name='vote',
+            constraint=models.CheckConstraint(condition=models.Q(models.Q(('outcome', 'left'), ('winner', models.F('shown_left')), ('winner__isnull', False)), models.Q(('outcome', 'right'), ('winner', models.F('shown_right')), ('winner__isnull', False)), models.Q(('outcome__in', ['equal', 'skip']), ('winner', None)), _connector='OR'), name='vote_winner_was_shown'),
         ),
         migrations.AddConstraint(
-            model_name="vote",
-            constraint=models.CheckConstraint(
-                condition=models.Q(("both_miss", False), ("outcome", "equal"), _connector="OR"),
-                name="vote_both_miss_only_when_equal",
-            ),
+            model_name='vote',
+            constraint=models.CheckConstraint(condition=models.Q(('both_miss', False), ('outcome', 'equal'), _connector='OR'), name='vote_both_miss_only_when_equal'),
         ),
         migrations.AddConstraint(
-            model_name="vote",
-            constraint=models.CheckConstraint(
-                condition=models.Q(
-                    models.Q(models.Q(("outcome", "skip"), _negated=True), ("reason", "")),
-                    models.Q(
-                        ("outcome", "skip"),
-                        (
-                            "reason__in",
-                            ["cannot_judge", "picture_missing", "unclear", "recognised", "other"],
-                        ),
-                    ),
-                    _connector="OR",
-                ),
-                name="vote_reason_goes_with_skip",
-            ),
+            model_name='vote',
+            constraint=models.CheckConstraint(condition=models.Q(models.Q(models.Q(('outcome', 'skip'), _negated=True), ('reason', '')), models.Q(('outcome', 'skip'), ('reason__in', ['cannot_judge', 'picture_missing', 'unclear', 'recognised', 'other'])), _connector='OR'), name='vote_reason_goes_with_skip'),
         ),
         migrations.AddConstraint(
-            model_name="vote",
-            constraint=models.CheckConstraint(
-                condition=models.Q(
-                    (
-                        "aids__in",
-                        [
-                            "",
-                            "zoom",
-                            "original",
-                            "ruler",
-                            "flip",
-                            "zoom original",
-                            "zoom ruler",
-                            "zoom flip",
-                            "original ruler",
-                            "original flip",
-                            "ruler flip",
-                            "zoom original ruler",
-                            "zoom original flip",
-                            "zoom ruler flip",
-                            "original ruler flip",
-                            "zoom original ruler flip",
-                        ],
-                    )
-                ),
-                name="vote_aids_are_known",
-            ),
+            model_name='vote',
+            constraint=models.CheckConstraint(condition=models.Q(('aids__in', ['', 'zoom', 'original', 'ruler', 'flip', 'zoom original', 'zoom ruler', 'zoom flip', 'original ruler', 'original flip', 'ruler flip', 'zoom original ruler', 'zoom original flip', 'zoom ruler flip', 'original ruler flip', 'zoom original ruler flip'])), name='vote_aids_are_known'),
         ),
         migrations.AddField(
-            model_name="report",
-            name="expert",
-            field=models.ForeignKey(
-                on_delete=django.db.models.deletion.PROTECT,
-                related_name="reports",
-                to=settings.AUTH_USER_MODEL,
-            ),
+            model_name='report',
+            name='expert',
+            field=models.ForeignKey(on_delete=django.db.models.deletion.PROTECT, related_name='reports', to=settings.AUTH_USER_MODEL),
         ),
         migrations.AddField(
-            model_name="report",
-            name="matchup",
-            field=models.ForeignKey(
-                on_delete=django.db.models.deletion.PROTECT,
-                related_name="reports",
-                to="arena.matchup",
-            ),
+            model_name='report',
+            name='matchup',
+            field=models.ForeignKey(on_delete=django.db.models.deletion.PROTECT, related_name='reports', to='arena.matchup'),
         ),
         migrations.AddConstraint(
-            model_name="report",
-            constraint=models.CheckConstraint(
-                condition=models.Q(
-                    ("reason__in", ["picture_wrong", "instruction_wrong", "other"])
-                ),
-                name="report_reason_is_known",
-            ),
+            model_name='report',
+            constraint=models.CheckConstraint(condition=models.Q(('reason__in', ['picture_wrong', 'instruction_wrong', 'other'])), name='report_reason_is_known'),
         ),
     ]

@@ -7,261 +7,192 @@ from django.db import migrations, models
 
 def fill_standings(apps, schema_editor):
     """Names of the lines of every snapshot that was made before they were kept."""
-    Standing = apps.get_model("arena", "Standing")
-    rows = list(Standing.objects.select_related("contestant"))
+    Standing = apps.get_model('arena', 'Standing')
+    rows = list(Standing.objects.select_related('contestant'))
     for row in rows:
         row.slug = row.contestant.slug
         row.name = row.contestant.name
         row.variant = row.contestant.variant
         row.kind = row.contestant.kind
-        row.is_simulated = row.contestant.kind == "simulated"
-    fields = ["slug", "name", "variant", "kind", "is_simulated"]
+        row.is_simulated = row.contestant.kind == 'simulated'
+    fields = ['slug', 'name', 'variant', 'kind', 'is_simulated']
     Standing.objects.bulk_update(rows, fields, batch_size=500)
 
 
 class Migration(migrations.Migration):
+
     dependencies = [
-        ("arena", "0003_what_a_vote_can_say"),
-        ("augment", "0001_initial"),
+        ('arena', '0003_what_a_vote_can_say'),
+        ('augment', '0001_initial'),
         migrations.swappable_dependency(settings.AUTH_USER_MODEL),
     ]
 
     operations = [
         migrations.CreateModel(
-            name="EarlyLook",
+            name='EarlyLook',
             fields=[
-                (
-                    "id",
-                    models.BigAutoField(
-                        auto_created=True, primary_key=True, serialize=False, verbose_name="ID"
-                    ),
-                ),
-                ("at", models.DateTimeField(auto_now_add=True)),
+                ('id', models.BigAutoField(auto_created=True, primary_key=True, serialize=False, verbose_name='ID')),
+                ('at', models.DateTimeField(auto_now_add=True)),
             ],
-            options={"ordering": ("at", "pk")},
+            options={
+                'ordering': ('at', 'pk'),
+            },
         ),
         migrations.CreateModel(
-            name="ImportedVote",
+            name='ImportedVote',
             fields=[
-                (
-                    "id",
-                    models.BigAutoField(
-                        auto_created=True, primary_key=True, serialize=False, verbose_name="ID"
-                    ),
-                ),
-                ("line", models.PositiveIntegerField(help_text="of the file, its head is line 1")),
-                ("first", models.CharField(max_length=200)),
-                ("second", models.CharField(max_length=200)),
-                (
-                    "outcome",
-                    models.CharField(
-                        choices=[
-                            ("model_a", "first"),
-                            ("model_b", "second"),
-                            ("tie", "tie"),
-                            ("tie (bothbad)", "both bad"),
-                        ],
-                        max_length=20,
-                    ),
-                ),
-                ("judge", models.CharField(blank=True, max_length=200)),
-                ("item", models.CharField(blank=True, max_length=200)),
+                ('id', models.BigAutoField(auto_created=True, primary_key=True, serialize=False, verbose_name='ID')),
+                ('line', models.PositiveIntegerField(help_text='of the file, its head is line 1')),
+                ('first', models.CharField(max_length=200)),
+                ('second', models.CharField(max_length=200)),
+                ('outcome', models.CharField(choices=[('model_a', 'first'), ('model_b', 'second'), ('tie', 'tie'), ('tie (bothbad)', 'both bad')], max_length=20)),
+                ('judge', models.CharField(blank=True, max_length=200)),
+                ('item', models.CharField(blank=True, max_length=200)),
             ],
-            options={"ordering": ("line",)},
+            options={
+                'ordering': ('line',),
+            },
         ),
         migrations.CreateModel(
-            name="VoteFile",
+            name='VoteFile',
             fields=[
-                (
-                    "id",
-                    models.BigAutoField(
-                        auto_created=True, primary_key=True, serialize=False, verbose_name="ID"
-                    ),
-                ),
-                ("name", models.CharField(help_text="of the file", max_length=200)),
-                ("sha256", models.CharField(max_length=64)),
-                ("made_at", models.DateTimeField(auto_now_add=True)),
+                ('id', models.BigAutoField(auto_created=True, primary_key=True, serialize=False, verbose_name='ID')),
+                ('name', models.CharField(help_text='of the file', max_length=200)),
+                ('sha256', models.CharField(max_length=64)),
+                ('made_at', models.DateTimeField(auto_now_add=True)),
             ],
-            options={"ordering": ("-made_at", "-pk")},
+            options={
+                'ordering': ('-made_at', '-pk'),
+            },
         ),
         migrations.AlterModelOptions(
-            name="standing", options={"ordering": ("rank", "-rating", "slug")}
+            name='standing',
+            options={'ordering': ('rank', '-rating', 'slug')},
         ),
-        migrations.RemoveConstraint(model_name="standing", name="one_standing_per_contestant"),
-        migrations.AddField(
-            model_name="snapshot",
-            name="filters",
-            field=models.JSONField(
-                default=dict,
-                help_text="which votes were asked for: types, experts, kinds, automatic_ties",
-            ),
+        migrations.RemoveConstraint(
+            model_name='standing',
+            name='one_standing_per_contestant',
         ),
         migrations.AddField(
-            model_name="snapshot",
-            name="last_vote",
-            field=models.BigIntegerField(
-                blank=True,
-                help_text="no vote after this row counts; null without votes",
-                null=True,
-            ),
+            model_name='snapshot',
+            name='filters',
+            field=models.JSONField(default=dict, help_text='which votes were asked for: types, experts, kinds, automatic_ties'),
         ),
         migrations.AddField(
-            model_name="snapshot",
-            name="progress",
-            field=models.PositiveSmallIntegerField(default=100, help_text="percent"),
+            model_name='snapshot',
+            name='last_vote',
+            field=models.BigIntegerField(blank=True, help_text='no vote after this row counts; null without votes', null=True),
         ),
         migrations.AddField(
-            model_name="snapshot",
-            name="results",
-            field=models.JSONField(
-                default=dict,
-                help_text="all statistics beside the standings, as the pages show them",
-            ),
+            model_name='snapshot',
+            name='progress',
+            field=models.PositiveSmallIntegerField(default=100, help_text='percent'),
         ),
         migrations.AddField(
-            model_name="snapshot",
-            name="state",
-            field=models.CharField(
-                choices=[
-                    ("queued", "Waiting"),
-                    ("running", "Running"),
-                    ("ready", "Ready"),
-                    ("failed", "Failed"),
-                ],
-                default="ready",
-                max_length=10,
-            ),
+            model_name='snapshot',
+            name='results',
+            field=models.JSONField(default=dict, help_text='all statistics beside the standings, as the pages show them'),
         ),
         migrations.AddField(
-            model_name="standing", name="is_simulated", field=models.BooleanField(default=False)
+            model_name='snapshot',
+            name='state',
+            field=models.CharField(choices=[('queued', 'Waiting'), ('running', 'Running'), ('ready', 'Ready'), ('failed', 'Failed')], default='ready', max_length=10),
         ),
         migrations.AddField(
-            model_name="standing",
-            name="kind",
-            field=models.CharField(
-                default="", help_text="as the contestant's, or imported", max_length=20
-            ),
+            model_name='standing',
+            name='is_simulated',
+            field=models.BooleanField(default=False),
+        ),
+        migrations.AddField(
+            model_name='standing',
+            name='kind',
+            field=models.CharField(default='', help_text="as the contestant's, or imported", max_length=20),
             preserve_default=False,
         ),
         migrations.AddField(
-            model_name="standing",
-            name="name",
-            field=models.CharField(default="", max_length=200),
+            model_name='standing',
+            name='name',
+            field=models.CharField(default='', max_length=200),
             preserve_default=False,
         ),
         migrations.AddField(
-            model_name="standing", name="rank_best", field=models.PositiveIntegerField(null=True)
+            model_name='standing',
+            name='rank_best',
+            field=models.PositiveIntegerField(null=True),
         ),
         migrations.AddField(
-            model_name="standing", name="rank_worst", field=models.PositiveIntegerField(null=True)
+            model_name='standing',
+            name='rank_worst',
+            field=models.PositiveIntegerField(null=True),
         ),
         migrations.AddField(
-            model_name="standing",
-            name="slug",
-            field=models.CharField(default="", max_length=200),
+            model_name='standing',
+            name='slug',
+            field=models.CharField(default='', max_length=200),
             preserve_default=False,
         ),
         migrations.AddField(
-            model_name="standing",
-            name="variant",
+            model_name='standing',
+            name='variant',
             field=models.CharField(blank=True, max_length=20),
         ),
         migrations.AlterField(
-            model_name="snapshot",
-            name="method",
-            field=models.CharField(help_text="bt, elo or davidson", max_length=20),
+            model_name='snapshot',
+            name='method',
+            field=models.CharField(help_text='bt, elo or davidson', max_length=20),
         ),
         migrations.AlterField(
-            model_name="standing",
-            name="contestant",
-            field=models.ForeignKey(
-                blank=True,
-                null=True,
-                on_delete=django.db.models.deletion.PROTECT,
-                related_name="standings",
-                to="augment.contestant",
-            ),
+            model_name='standing',
+            name='contestant',
+            field=models.ForeignKey(blank=True, null=True, on_delete=django.db.models.deletion.PROTECT, related_name='standings', to='augment.contestant'),
         ),
         migrations.RunPython(fill_standings, migrations.RunPython.noop),
         migrations.AddConstraint(
-            model_name="snapshot",
-            constraint=models.CheckConstraint(
-                condition=models.Q(("state__in", ["queued", "running", "ready", "failed"])),
-                name="snapshot_state_is_known",
-            ),
+            model_name='snapshot',
+            constraint=models.CheckConstraint(condition=models.Q(('state__in', ['queued', 'running', 'ready', 'failed'])), name='snapshot_state_is_known'),
         ),
         migrations.AddConstraint(
-            model_name="snapshot",
-            constraint=models.CheckConstraint(
-                condition=models.Q(("progress__lte", 100)), name="snapshot_progress_is_percent"
-            ),
+            model_name='snapshot',
+            constraint=models.CheckConstraint(condition=models.Q(('progress__lte', 100)), name='snapshot_progress_is_percent'),
         ),
         migrations.AddConstraint(
-            model_name="standing",
-            constraint=models.UniqueConstraint(
-                fields=("snapshot", "slug"), name="one_standing_per_slug"
-            ),
+            model_name='standing',
+            constraint=models.UniqueConstraint(fields=('snapshot', 'slug'), name='one_standing_per_slug'),
         ),
         migrations.AddField(
-            model_name="earlylook",
-            name="study",
-            field=models.ForeignKey(
-                on_delete=django.db.models.deletion.CASCADE,
-                related_name="early_looks",
-                to="arena.study",
-            ),
+            model_name='earlylook',
+            name='study',
+            field=models.ForeignKey(on_delete=django.db.models.deletion.CASCADE, related_name='early_looks', to='arena.study'),
         ),
         migrations.AddField(
-            model_name="earlylook",
-            name="user",
-            field=models.ForeignKey(
-                on_delete=django.db.models.deletion.PROTECT,
-                related_name="early_looks",
-                to=settings.AUTH_USER_MODEL,
-            ),
+            model_name='earlylook',
+            name='user',
+            field=models.ForeignKey(on_delete=django.db.models.deletion.PROTECT, related_name='early_looks', to=settings.AUTH_USER_MODEL),
         ),
         migrations.AddField(
-            model_name="votefile",
-            name="study",
-            field=models.OneToOneField(
-                on_delete=django.db.models.deletion.CASCADE,
-                related_name="vote_file",
-                to="arena.study",
-            ),
+            model_name='votefile',
+            name='study',
+            field=models.OneToOneField(on_delete=django.db.models.deletion.CASCADE, related_name='vote_file', to='arena.study'),
         ),
         migrations.AddField(
-            model_name="importedvote",
-            name="file",
-            field=models.ForeignKey(
-                on_delete=django.db.models.deletion.CASCADE,
-                related_name="votes",
-                to="arena.votefile",
-            ),
+            model_name='importedvote',
+            name='file',
+            field=models.ForeignKey(on_delete=django.db.models.deletion.CASCADE, related_name='votes', to='arena.votefile'),
         ),
         migrations.AddConstraint(
-            model_name="earlylook",
-            constraint=models.UniqueConstraint(
-                fields=("study", "user"), name="one_early_look_each"
-            ),
+            model_name='earlylook',
+            constraint=models.UniqueConstraint(fields=('study', 'user'), name='one_early_look_each'),
         ),
         migrations.AddConstraint(
-            model_name="importedvote",
-            constraint=models.UniqueConstraint(fields=("file", "line"), name="one_vote_per_line"),
+            model_name='importedvote',
+            constraint=models.UniqueConstraint(fields=('file', 'line'), name='one_vote_per_line'),
         ),
         migrations.AddConstraint(
-            model_name="importedvote",
-            constraint=models.CheckConstraint(
-                condition=models.Q(("first", models.F("second")), _negated=True),
-                name="imported_vote_compares_two",
-            ),
+            model_name='importedvote',
+            constraint=models.CheckConstraint(condition=models.Q(('first', models.F('second')), _negated=True), name='imported_vote_compares_two'),
         ),
         migrations.AddConstraint(
-            model_name="importedvote",
-            constraint=models.CheckConstraint(
-                condition=models.Q(
-                    ("outcome__in", ["model_a", "model_b", "tie", "tie (bothbad)"])
-                ),
-                name="imported_outcome_is_known",
-            ),
+            model_name='importedvote',
+            constraint=models.CheckConstraint(condition=models.Q(('outcome__in', ['model_a', 'model_b', 'tie', 'tie (bothbad)'])), name='imported_outcome_is_known'),
         ),
     ]

@@ -4,15 +4,15 @@ from django.db import migrations, models
 
 
 class Migration(migrations.Migration):
-    dependencies = [("arena", "0004_what_a_snapshot_keeps")]
+
+    dependencies = [
+        ('arena', '0004_what_a_snapshot_keeps'),
+    ]
 
     operations = [
         migrations.AddField(
-            model_name="study",
-            name="votes_to_plan",
-            field=models.JSONField(
-                default=dict,
-                help_text="votes that the adaptive part still has to plan, by username",
-            ),
-        )
+            model_name='study',
+            name='votes_to_plan',
+            field=models.JSONField(default=dict, help_text='votes that the adaptive part still has to plan, by username'),
+        ),
     ]

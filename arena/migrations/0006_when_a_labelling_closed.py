@@ -4,12 +4,15 @@ from django.db import migrations, models
 
 
 class Migration(migrations.Migration):
-    dependencies = [("arena", "0005_votes_planned_later")]
+
+    dependencies = [
+        ('arena', '0005_votes_planned_later'),
+    ]
 
     operations = [
         migrations.AddField(
-            model_name="labellinground",
-            name="closed_at",
-            field=models.DateTimeField(blank=True, help_text="takes no labels since", null=True),
-        )
+            model_name='labellinground',
+            name='closed_at',
+            field=models.DateTimeField(blank=True, help_text='takes no labels since', null=True),
+        ),
     ]

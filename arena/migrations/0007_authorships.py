@@ -8,67 +8,28 @@ from django.db import migrations, models
 
 
 class Migration(migrations.Migration):
+
     dependencies = [
-        ("arena", "0006_when_a_labelling_closed"),
-        ("augment", "0004_when_a_call_was_sent"),
+        ('arena', '0006_when_a_labelling_closed'),
+        ('augment', '0004_when_a_call_was_sent'),
         migrations.swappable_dependency(settings.AUTH_USER_MODEL),
     ]
 
     operations = [
         migrations.CreateModel(
-            name="Authorship",
+            name='Authorship',
             fields=[
-                (
-                    "id",
-                    models.BigAutoField(
-                        auto_created=True, primary_key=True, serialize=False, verbose_name="ID"
-                    ),
-                ),
-                ("code", models.UUIDField(default=uuid.uuid4, editable=False, unique=True)),
-                ("marked_at", models.DateTimeField(auto_now_add=True)),
-                (
-                    "contestant",
-                    models.ForeignKey(
-                        on_delete=django.db.models.deletion.CASCADE,
-                        related_name="authorships",
-                        to="augment.contestant",
-                    ),
-                ),
-                (
-                    "expert",
-                    models.ForeignKey(
-                        on_delete=django.db.models.deletion.CASCADE,
-                        related_name="authorships",
-                        to=settings.AUTH_USER_MODEL,
-                    ),
-                ),
-                (
-                    "marked_by",
-                    models.ForeignKey(
-                        blank=True,
-                        help_text="none where the command did",
-                        null=True,
-                        on_delete=django.db.models.deletion.SET_NULL,
-                        related_name="+",
-                        to=settings.AUTH_USER_MODEL,
-                    ),
-                ),
-                (
-                    "study",
-                    models.ForeignKey(
-                        on_delete=django.db.models.deletion.CASCADE,
-                        related_name="authorships",
-                        to="arena.study",
-                    ),
-                ),
+                ('id', models.BigAutoField(auto_created=True, primary_key=True, serialize=False, verbose_name='ID')),
+                ('code', models.UUIDField(default=uuid.uuid4, editable=False, unique=True)),
+                ('marked_at', models.DateTimeField(auto_now_add=True)),
+                ('contestant', models.ForeignKey(on_delete=django.db.models.deletion.CASCADE, related_name='authorships', to='augment.contestant')),
+                ('expert', models.ForeignKey(on_delete=django.db.models.deletion.CASCADE, related_name='authorships', to=settings.AUTH_USER_MODEL)),
+                ('marked_by', models.ForeignKey(blank=True, help_text='none where the command did', null=True, on_delete=django.db.models.deletion.SET_NULL, related_name='+', to=settings.AUTH_USER_MODEL)),
+                ('study', models.ForeignKey(on_delete=django.db.models.deletion.CASCADE, related_name='authorships', to='arena.study')),
             ],
             options={
-                "ordering": ("marked_at", "pk"),
-                "constraints": [
-                    models.UniqueConstraint(
-                        fields=("study", "expert", "contestant"), name="one_authorship_each"
-                    )
-                ],
+                'ordering': ('marked_at', 'pk'),
+                'constraints': [models.UniqueConstraint(fields=('study', 'expert', 'contestant'), name='one_authorship_each')],
             },
-        )
+        ),
     ]

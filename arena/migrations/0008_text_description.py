@@ -5,72 +5,30 @@ from django.db import migrations, models
 
 
 class Migration(migrations.Migration):
+
     dependencies = [
-        ("arena", "0007_authorships"),
-        ("augment", "0004_when_a_call_was_sent"),
+        ('arena', '0007_authorships'),
+        ('augment', '0004_when_a_call_was_sent'),
         migrations.swappable_dependency(settings.AUTH_USER_MODEL),
     ]
 
     operations = [
-        migrations.RemoveConstraint(model_name="vote", name="vote_aids_are_known"),
-        migrations.AddField(
-            model_name="matchup",
-            name="descriptions",
-            field=models.JSONField(
-                help_text="what its pictures show, left and right, as augment.render.legend gives it; null where the study has no text description",
-                null=True,
-            ),
+        migrations.RemoveConstraint(
+            model_name='vote',
+            name='vote_aids_are_known',
         ),
         migrations.AddField(
-            model_name="study",
-            name="allow_text",
-            field=models.BooleanField(
-                default=False, help_text="experts may read what was changed, beside looking at it"
-            ),
+            model_name='matchup',
+            name='descriptions',
+            field=models.JSONField(help_text='what its pictures show, left and right, as augment.render.legend gives it; null where the study has no text description', null=True),
+        ),
+        migrations.AddField(
+            model_name='study',
+            name='allow_text',
+            field=models.BooleanField(default=False, help_text='experts may read what was changed, beside looking at it'),
         ),
         migrations.AddConstraint(
-            model_name="vote",
-            constraint=models.CheckConstraint(
-                condition=models.Q(
-                    (
-                        "aids__in",
-                        [
-                            "",
-                            "zoom",
-                            "original",
-                            "ruler",
-                            "flip",
-                            "text",
-                            "zoom original",
-                            "zoom ruler",
-                            "zoom flip",
-                            "zoom text",
-                            "original ruler",
-                            "original flip",
-                            "original text",
-                            "ruler flip",
-                            "ruler text",
-                            "flip text",
-                            "zoom original ruler",
-                            "zoom original flip",
-                            "zoom original text",
-                            "zoom ruler flip",
-                            "zoom ruler text",
-                            "zoom flip text",
-                            "original ruler flip",
-                            "original ruler text",
-                            "original flip text",
-                            "ruler flip text",
-                            "zoom original ruler flip",
-                            "zoom original ruler text",
-                            "zoom original flip text",
-                            "zoom ruler flip text",
-                            "original ruler flip text",
-                            "zoom original ruler flip text",
-                        ],
-                    )
-                ),
-                name="vote_aids_are_known",
-            ),
+            model_name='vote',
+            constraint=models.CheckConstraint(condition=models.Q(('aids__in', ['', 'zoom', 'original', 'ruler', 'flip', 'text', 'zoom original', 'zoom ruler', 'zoom flip', 'zoom text', 'original ruler', 'original flip', 'original text', 'ruler flip', 'ruler text', 'flip text', 'zoom original ruler', 'zoom original flip', 'zoom original text', 'zoom ruler flip', 'zoom ruler text', 'zoom flip text', 'original ruler flip', 'original ruler text', 'original flip text', 'ruler flip text', 'zoom original ruler flip', 'zoom original ruler text', 'zoom original flip text', 'zoom ruler flip text', 'original ruler flip text', 'zoom original ruler flip text'])), name='vote_aids_are_known'),
         ),
     ]

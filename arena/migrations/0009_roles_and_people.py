@@ -19,6 +19,7 @@ def complete(apps, schema_editor):
 
 
 class Migration(migrations.Migration):
+
     dependencies = [
         ("arena", "0008_text_description"),
         ("auth", "0012_alter_user_first_name_max_length"),

@@ -6,26 +6,20 @@ from django.db import migrations, models
 
 
 class Migration(migrations.Migration):
-    dependencies = [("arena", "0009_roles_and_people")]
+
+    dependencies = [
+        ('arena', '0009_roles_and_people'),
+    ]
 
     operations = [
         migrations.AddField(
-            model_name="votefile",
-            name="written_at",
-            field=models.DateTimeField(
-                default=django.utils.timezone.now,
-                help_text="when the latest batch of its votes was written",
-            ),
+            model_name='votefile',
+            name='written_at',
+            field=models.DateTimeField(default=django.utils.timezone.now, help_text='when the latest batch of its votes was written'),
         ),
         migrations.AlterField(
-            model_name="votefile",
-            name="study",
-            field=models.OneToOneField(
-                blank=True,
-                null=True,
-                on_delete=django.db.models.deletion.CASCADE,
-                related_name="vote_file",
-                to="arena.study",
-            ),
+            model_name='votefile',
+            name='study',
+            field=models.OneToOneField(blank=True, null=True, on_delete=django.db.models.deletion.CASCADE, related_name='vote_file', to='arena.study'),
         ),
     ]

@@ -4,7 +4,9 @@ from django.db import migrations, models
 
 
 class Migration(migrations.Migration):
-    dependencies = [("arena", "0012_pictures_as_shown")]
+    dependencies = [
+        ("arena", "0012_pictures_as_shown"),
+    ]
 
     operations = [
         migrations.AddField(
@@ -13,5 +15,5 @@ class Migration(migrations.Migration):
             field=models.CharField(
                 default="resamples", help_text="closed form or resamples", max_length=20
             ),
-        )
+        ),
     ]

@@ -8,111 +8,37 @@ from django.db import migrations, models
 
 
 class Migration(migrations.Migration):
+
     dependencies = [
-        ("arena", "0013_intervals_of_ratings"),
-        ("augment", "0012_sets_of_the_catalogue"),
+        ('arena', '0013_intervals_of_ratings'),
+        ('augment', '0012_sets_of_the_catalogue'),
         migrations.swappable_dependency(settings.AUTH_USER_MODEL),
     ]
 
     operations = [
         migrations.CreateModel(
-            name="ScenarioFile",
+            name='ScenarioFile',
             fields=[
-                (
-                    "id",
-                    models.BigAutoField(
-                        auto_created=True, primary_key=True, serialize=False, verbose_name="ID"
-                    ),
-                ),
-                ("code", models.UUIDField(default=uuid.uuid4, editable=False, unique=True)),
-                (
-                    "format",
-                    models.CharField(help_text="commonroad, scenarionet, ...", max_length=40),
-                ),
-                (
-                    "state",
-                    models.CharField(
-                        choices=[
-                            ("queued", "Waiting"),
-                            ("running", "Running"),
-                            ("ready", "Ready"),
-                            ("failed", "Failed"),
-                        ],
-                        default="queued",
-                        max_length=10,
-                    ),
-                ),
-                (
-                    "fault",
-                    models.CharField(
-                        blank=True, help_text="why it could not be written", max_length=500
-                    ),
-                ),
-                (
-                    "name",
-                    models.CharField(
-                        blank=True, help_text="what it is called for people", max_length=200
-                    ),
-                ),
-                (
-                    "stored",
-                    models.CharField(
-                        blank=True, help_text="its name in the storage", max_length=120
-                    ),
-                ),
-                ("size_bytes", models.PositiveBigIntegerField(default=0)),
-                (
-                    "digest",
-                    models.CharField(blank=True, help_text="SHA-256 of the zip", max_length=64),
-                ),
-                (
-                    "warnings",
-                    models.JSONField(
-                        blank=True, default=list, help_text="what comes with passing it on"
-                    ),
-                ),
-                ("is_non_commercial", models.BooleanField(default=False)),
-                ("created_at", models.DateTimeField(auto_now_add=True)),
-                ("finished_at", models.DateTimeField(blank=True, null=True)),
-                (
-                    "asked_by",
-                    models.ForeignKey(
-                        blank=True,
-                        null=True,
-                        on_delete=django.db.models.deletion.SET_NULL,
-                        to=settings.AUTH_USER_MODEL,
-                    ),
-                ),
-                (
-                    "job",
-                    models.ForeignKey(
-                        on_delete=django.db.models.deletion.CASCADE,
-                        related_name="files",
-                        to="augment.generationjob",
-                    ),
-                ),
+                ('id', models.BigAutoField(auto_created=True, primary_key=True, serialize=False, verbose_name='ID')),
+                ('code', models.UUIDField(default=uuid.uuid4, editable=False, unique=True)),
+                ('format', models.CharField(help_text='commonroad, scenarionet, ...', max_length=40)),
+                ('state', models.CharField(choices=[('queued', 'Waiting'), ('running', 'Running'), ('ready', 'Ready'), ('failed', 'Failed')], default='queued', max_length=10)),
+                ('fault', models.CharField(blank=True, help_text='why it could not be written', max_length=500)),
+                ('name', models.CharField(blank=True, help_text='what it is called for people', max_length=200)),
+                ('stored', models.CharField(blank=True, help_text='its name in the storage', max_length=120)),
+                ('size_bytes', models.PositiveBigIntegerField(default=0)),
+                ('digest', models.CharField(blank=True, help_text='SHA-256 of the zip', max_length=64)),
+                ('warnings', models.JSONField(blank=True, default=list, help_text='what comes with passing it on')),
+                ('is_non_commercial', models.BooleanField(default=False)),
+                ('created_at', models.DateTimeField(auto_now_add=True)),
+                ('finished_at', models.DateTimeField(blank=True, null=True)),
+                ('asked_by', models.ForeignKey(blank=True, null=True, on_delete=django.db.models.deletion.SET_NULL, to=settings.AUTH_USER_MODEL)),
+                ('job', models.ForeignKey(on_delete=django.db.models.deletion.CASCADE, related_name='files', to='augment.generationjob')),
             ],
             options={
-                "ordering": ("job", "format", "-pk"),
-                "indexes": [
-                    models.Index(models.F("job"), models.F("format"), name="scenario_file_of_job")
-                ],
-                "constraints": [
-                    models.CheckConstraint(
-                        condition=models.Q(
-                            ("state__in", ["queued", "running", "ready", "failed"])
-                        ),
-                        name="scenario_file_state_is_known",
-                    ),
-                    models.CheckConstraint(
-                        condition=models.Q(
-                            models.Q(("state", "ready"), _negated=True),
-                            models.Q(("stored", ""), _negated=True),
-                            _connector="OR",
-                        ),
-                        name="ready_scenario_file_is_stored",
-                    ),
-                ],
+                'ordering': ('job', 'format', '-pk'),
+                'indexes': [models.Index(models.F('job'), models.F('format'), name='scenario_file_of_job')],
+                'constraints': [models.CheckConstraint(condition=models.Q(('state__in', ['queued', 'running', 'ready', 'failed'])), name='scenario_file_state_is_known'), models.CheckConstraint(condition=models.Q(models.Q(('state', 'ready'), _negated=True), models.Q(('stored', ''), _negated=True), _connector='OR'), name='ready_scenario_file_is_stored')],
             },
-        )
+        ),
     ]

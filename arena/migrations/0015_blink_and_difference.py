@@ -12,7 +12,10 @@ class Migration(migrations.Migration):
     ]
 
     operations = [
-        migrations.RemoveConstraint(model_name="vote", name="vote_aids_are_known"),
+        migrations.RemoveConstraint(
+            model_name="vote",
+            name="vote_aids_are_known",
+        ),
         migrations.AlterField(
             model_name="vote",
             name="aids",

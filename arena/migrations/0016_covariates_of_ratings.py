@@ -4,14 +4,15 @@ from django.db import migrations, models
 
 
 class Migration(migrations.Migration):
-    dependencies = [("arena", "0015_blink_and_difference")]
+
+    dependencies = [
+        ('arena', '0015_blink_and_difference'),
+    ]
 
     operations = [
         migrations.AddField(
-            model_name="snapshot",
-            name="covariates",
-            field=models.JSONField(
-                default=list, help_text="what is adjusted for: side, objects, vehicles"
-            ),
-        )
+            model_name='snapshot',
+            name='covariates',
+            field=models.JSONField(default=list, help_text='what is adjusted for: side, objects, vehicles'),
+        ),
     ]

@@ -4,23 +4,20 @@ from django.db import migrations, models
 
 
 class Migration(migrations.Migration):
-    dependencies = [("arena", "0016_covariates_of_ratings")]
+
+    dependencies = [
+        ('arena', '0016_covariates_of_ratings'),
+    ]
 
     operations = [
         migrations.AddField(
-            model_name="study",
-            name="looks",
-            field=models.JSONField(
-                default=list,
-                help_text="what the stopping rule saw, one entry a look; no contestant's",
-            ),
+            model_name='study',
+            name='looks',
+            field=models.JSONField(default=list, help_text="what the stopping rule saw, one entry a look; no contestant's"),
         ),
         migrations.AddField(
-            model_name="study",
-            name="preregistration",
-            field=models.TextField(
-                blank=True,
-                help_text="the file that was frozen at the opening, as it is downloaded",
-            ),
+            model_name='study',
+            name='preregistration',
+            field=models.TextField(blank=True, help_text='the file that was frozen at the opening, as it is downloaded'),
         ),
     ]

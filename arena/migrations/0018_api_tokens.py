@@ -8,59 +8,32 @@ from django.db import migrations, models
 
 
 class Migration(migrations.Migration):
+
     dependencies = [
-        ("arena", "0017_plans_of_studies"),
+        ('arena', '0017_plans_of_studies'),
         migrations.swappable_dependency(settings.AUTH_USER_MODEL),
     ]
 
     operations = [
         migrations.CreateModel(
-            name="ApiToken",
+            name='ApiToken',
             fields=[
-                (
-                    "id",
-                    models.BigAutoField(
-                        auto_created=True, primary_key=True, serialize=False, verbose_name="ID"
-                    ),
-                ),
-                ("code", models.UUIDField(default=uuid.uuid4, editable=False, unique=True)),
-                ("name", models.CharField(help_text="what it is for", max_length=80)),
-                (
-                    "role",
-                    models.CharField(
-                        choices=[("admin", "admin"), ("analyst", "analyst"), ("expert", "expert")],
-                        max_length=10,
-                    ),
-                ),
-                ("token_sha256", models.CharField(editable=False, max_length=64, unique=True)),
-                ("made_at", models.DateTimeField(auto_now_add=True)),
-                ("expires_at", models.DateTimeField()),
-                ("last_used_at", models.DateTimeField(blank=True, null=True)),
-                ("revoked_at", models.DateTimeField(blank=True, null=True)),
-                (
-                    "window_began_at",
-                    models.DateTimeField(
-                        blank=True, help_text="since when `window_requests` are counted", null=True
-                    ),
-                ),
-                ("window_requests", models.PositiveIntegerField(default=0)),
-                (
-                    "owner",
-                    models.ForeignKey(
-                        on_delete=django.db.models.deletion.CASCADE,
-                        related_name="api_tokens",
-                        to=settings.AUTH_USER_MODEL,
-                    ),
-                ),
+                ('id', models.BigAutoField(auto_created=True, primary_key=True, serialize=False, verbose_name='ID')),
+                ('code', models.UUIDField(default=uuid.uuid4, editable=False, unique=True)),
+                ('name', models.CharField(help_text='what it is for', max_length=80)),
+                ('role', models.CharField(choices=[('admin', 'admin'), ('analyst', 'analyst'), ('expert', 'expert')], max_length=10)),
+                ('token_sha256', models.CharField(editable=False, max_length=64, unique=True)),
+                ('made_at', models.DateTimeField(auto_now_add=True)),
+                ('expires_at', models.DateTimeField()),
+                ('last_used_at', models.DateTimeField(blank=True, null=True)),
+                ('revoked_at', models.DateTimeField(blank=True, null=True)),
+                ('window_began_at', models.DateTimeField(blank=True, help_text='since when `window_requests` are counted', null=True)),
+                ('window_requests', models.PositiveIntegerField(default=0)),
+                ('owner', models.ForeignKey(on_delete=django.db.models.deletion.CASCADE, related_name='api_tokens', to=settings.AUTH_USER_MODEL)),
             ],
             options={
-                "ordering": ("-made_at", "-pk"),
-                "constraints": [
-                    models.CheckConstraint(
-                        condition=models.Q(("role__in", ["admin", "analyst", "expert"])),
-                        name="api_token_role_is_known",
-                    )
-                ],
+                'ordering': ('-made_at', '-pk'),
+                'constraints': [models.CheckConstraint(condition=models.Q(('role__in', ['admin', 'analyst', 'expert'])), name='api_token_role_is_known')],
             },
-        )
+        ),
     ]

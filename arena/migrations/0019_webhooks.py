@@ -10,130 +10,52 @@ import arena.models.people
 
 
 class Migration(migrations.Migration):
+
     dependencies = [
-        ("arena", "0018_api_tokens"),
+        ('arena', '0018_api_tokens'),
         migrations.swappable_dependency(settings.AUTH_USER_MODEL),
     ]
 
     operations = [
         migrations.CreateModel(
-            name="Webhook",
+            name='Webhook',
             fields=[
-                (
-                    "id",
-                    models.BigAutoField(
-                        auto_created=True, primary_key=True, serialize=False, verbose_name="ID"
-                    ),
-                ),
-                ("code", models.UUIDField(default=uuid.uuid4, editable=False, unique=True)),
-                ("name", models.CharField(max_length=80)),
-                ("url", models.CharField(max_length=500)),
-                ("events", models.JSONField(default=list, help_text="what it is told of")),
-                (
-                    "salt",
-                    models.CharField(
-                        default=arena.models.people.fresh_token, editable=False, max_length=40
-                    ),
-                ),
-                ("is_active", models.BooleanField(default=True)),
-                ("made_at", models.DateTimeField(auto_now_add=True)),
-                (
-                    "looked_at",
-                    models.DateTimeField(
-                        help_text="until when was looked for what it has to be told", null=True
-                    ),
-                ),
-                (
-                    "made_by",
-                    models.ForeignKey(
-                        null=True,
-                        on_delete=django.db.models.deletion.SET_NULL,
-                        related_name="webhooks",
-                        to=settings.AUTH_USER_MODEL,
-                    ),
-                ),
-            ],
-            options={"ordering": ("name", "pk")},
-        ),
-        migrations.CreateModel(
-            name="WebhookDelivery",
-            fields=[
-                (
-                    "id",
-                    models.BigAutoField(
-                        auto_created=True, primary_key=True, serialize=False, verbose_name="ID"
-                    ),
-                ),
-                ("code", models.UUIDField(default=uuid.uuid4, editable=False, unique=True)),
-                (
-                    "event",
-                    models.CharField(
-                        choices=[
-                            ("job.finished", "Job finished"),
-                            ("job.budget_hit", "Budget hit"),
-                            ("study.closed", "Study closed"),
-                            ("snapshot.frozen", "Snapshot frozen"),
-                            ("test", "Test"),
-                        ],
-                        max_length=40,
-                    ),
-                ),
-                (
-                    "occurrence",
-                    models.CharField(
-                        help_text="what happened, once for all: a code and when", max_length=120
-                    ),
-                ),
-                (
-                    "body",
-                    models.TextField(
-                        help_text="as it is sent, so that every try has the same bytes"
-                    ),
-                ),
-                (
-                    "state",
-                    models.CharField(
-                        choices=[
-                            ("waiting", "Waiting"),
-                            ("delivered", "Delivered"),
-                            ("failed", "Given up"),
-                        ],
-                        default="waiting",
-                        max_length=10,
-                    ),
-                ),
-                ("attempts", models.PositiveSmallIntegerField(default=0)),
-                (
-                    "due_at",
-                    models.DateTimeField(
-                        help_text="when it is tried next, by whichever worker is first"
-                    ),
-                ),
-                ("last_status", models.PositiveSmallIntegerField(blank=True, null=True)),
-                ("last_answer", models.CharField(blank=True, max_length=300)),
-                ("made_at", models.DateTimeField(auto_now_add=True)),
-                ("ended_at", models.DateTimeField(blank=True, null=True)),
-                (
-                    "webhook",
-                    models.ForeignKey(
-                        on_delete=django.db.models.deletion.CASCADE,
-                        related_name="deliveries",
-                        to="arena.webhook",
-                    ),
-                ),
+                ('id', models.BigAutoField(auto_created=True, primary_key=True, serialize=False, verbose_name='ID')),
+                ('code', models.UUIDField(default=uuid.uuid4, editable=False, unique=True)),
+                ('name', models.CharField(max_length=80)),
+                ('url', models.CharField(max_length=500)),
+                ('events', models.JSONField(default=list, help_text='what it is told of')),
+                ('salt', models.CharField(default=arena.models.people.fresh_token, editable=False, max_length=40)),
+                ('is_active', models.BooleanField(default=True)),
+                ('made_at', models.DateTimeField(auto_now_add=True)),
+                ('looked_at', models.DateTimeField(help_text='until when was looked for what it has to be told', null=True)),
+                ('made_by', models.ForeignKey(null=True, on_delete=django.db.models.deletion.SET_NULL, related_name='webhooks', to=settings.AUTH_USER_MODEL)),
             ],
             options={
-                "ordering": ("-made_at", "-pk"),
-                "indexes": [models.Index(fields=["state", "due_at"], name="delivery_due")],
-                "constraints": [
-                    models.UniqueConstraint(
-                        fields=("webhook", "event", "occurrence"), name="one_delivery_of_each"
-                    ),
-                    models.CheckConstraint(
-                        condition=models.Q(("state__in", ["waiting", "delivered", "failed"])),
-                        name="delivery_state_is_known",
-                    ),
-                ],
+                'ordering': ('name', 'pk'),
+            },
+        ),
+        migrations.CreateModel(
+            name='WebhookDelivery',
+            fields=[
+                ('id', models.BigAutoField(auto_created=True, primary_key=True, serialize=False, verbose_name='ID')),
+                ('code', models.UUIDField(default=uuid.uuid4, editable=False, unique=True)),
+                ('event', models.CharField(choices=[('job.finished', 'Job finished'), ('job.budget_hit', 'Budget hit'), ('study.closed', 'Study closed'), ('snapshot.frozen', 'Snapshot frozen'), ('test', 'Test')], max_length=40)),
+                ('occurrence', models.CharField(help_text='what happened, once for all: a code and when', max_length=120)),
+                ('body', models.TextField(help_text='as it is sent, so that every try has the same bytes')),
+                ('state', models.CharField(choices=[('waiting', 'Waiting'), ('delivered', 'Delivered'), ('failed', 'Given up')], default='waiting', max_length=10)),
+                ('attempts', models.PositiveSmallIntegerField(default=0)),
+                ('due_at', models.DateTimeField(help_text='when it is tried next, by whichever worker is first')),
+                ('last_status', models.PositiveSmallIntegerField(blank=True, null=True)),
+                ('last_answer', models.CharField(blank=True, max_length=300)),
+                ('made_at', models.DateTimeField(auto_now_add=True)),
+                ('ended_at', models.DateTimeField(blank=True, null=True)),
+                ('webhook', models.ForeignKey(on_delete=django.db.models.deletion.CASCADE, related_name='deliveries', to='arena.webhook')),
+            ],
+            options={
+                'ordering': ('-made_at', '-pk'),
+                'indexes': [models.Index(fields=['state', 'due_at'], name='delivery_due')],
+                'constraints': [models.UniqueConstraint(fields=('webhook', 'event', 'occurrence'), name='one_delivery_of_each'), models.CheckConstraint(condition=models.Q(('state__in', ['waiting', 'delivered', 'failed'])), name='delivery_state_is_known')],
             },
         ),
     ]

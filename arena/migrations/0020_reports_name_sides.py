@@ -5,57 +5,34 @@ from django.db import migrations, models
 
 
 class Migration(migrations.Migration):
+
     dependencies = [
-        ("arena", "0019_webhooks"),
+        ('arena', '0019_webhooks'),
         migrations.swappable_dependency(settings.AUTH_USER_MODEL),
     ]
 
     operations = [
         migrations.AddField(
-            model_name="report",
-            name="mark_x",
-            field=models.FloatField(
-                blank=True, help_text="from the left, as a share of the picture's width", null=True
-            ),
+            model_name='report',
+            name='mark_x',
+            field=models.FloatField(blank=True, help_text="from the left, as a share of the picture's width", null=True),
         ),
         migrations.AddField(
-            model_name="report",
-            name="mark_y",
-            field=models.FloatField(
-                blank=True, help_text="from the top, as a share of the picture's height", null=True
-            ),
+            model_name='report',
+            name='mark_y',
+            field=models.FloatField(blank=True, help_text="from the top, as a share of the picture's height", null=True),
         ),
         migrations.AddField(
-            model_name="report",
-            name="side",
-            field=models.CharField(
-                blank=True,
-                choices=[("left", "A"), ("right", "B"), ("both", "both")],
-                help_text="which picture it is about; reports from before this was asked name none",
-                max_length=10,
-            ),
+            model_name='report',
+            name='side',
+            field=models.CharField(blank=True, choices=[('left', 'A'), ('right', 'B'), ('both', 'both')], help_text='which picture it is about; reports from before this was asked name none', max_length=10),
         ),
         migrations.AddConstraint(
-            model_name="report",
-            constraint=models.CheckConstraint(
-                condition=models.Q(("side__in", ["", "left", "right", "both"])),
-                name="report_side_is_known",
-            ),
+            model_name='report',
+            constraint=models.CheckConstraint(condition=models.Q(('side__in', ['', 'left', 'right', 'both'])), name='report_side_is_known'),
         ),
         migrations.AddConstraint(
-            model_name="report",
-            constraint=models.CheckConstraint(
-                condition=models.Q(
-                    models.Q(("mark_x", None), ("mark_y", None)),
-                    models.Q(
-                        ("mark_x__gte", 0),
-                        ("mark_x__lte", 1),
-                        ("mark_y__gte", 0),
-                        ("mark_y__lte", 1),
-                    ),
-                    _connector="OR",
-                ),
-                name="report_mark_lies_in_the_picture",
-            ),
+            model_name='report',
+            constraint=models.CheckConstraint(condition=models.Q(models.Q(('mark_x', None), ('mark_y', None)), models.Q(('mark_x__gte', 0), ('mark_x__lte', 1), ('mark_y__gte', 0), ('mark_y__lte', 1)), _connector='OR'), name='report_mark_lies_in_the_picture'),
         ),
     ]

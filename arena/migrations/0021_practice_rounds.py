@@ -8,119 +8,37 @@ import arena.models.people
 
 
 class Migration(migrations.Migration):
+
     dependencies = [
-        ("arena", "0020_reports_name_sides"),
-        ("augment", "0017_corrections_by_hand"),
+        ('arena', '0020_reports_name_sides'),
+        ('augment', '0017_corrections_by_hand'),
         migrations.swappable_dependency(settings.AUTH_USER_MODEL),
     ]
 
     operations = [
         migrations.AddField(
-            model_name="study",
-            name="practice",
-            field=models.BooleanField(
-                default=False,
-                help_text="experts practise on up to five pairs before their first one",
-            ),
+            model_name='study',
+            name='practice',
+            field=models.BooleanField(default=False, help_text='experts practise on up to five pairs before their first one'),
         ),
         migrations.CreateModel(
-            name="PracticePair",
+            name='PracticePair',
             fields=[
-                (
-                    "id",
-                    models.BigAutoField(
-                        auto_created=True, primary_key=True, serialize=False, verbose_name="ID"
-                    ),
-                ),
-                (
-                    "position",
-                    models.PositiveIntegerField(help_text="place in the expert's round, from 1"),
-                ),
-                ("good_is_left", models.BooleanField()),
-                (
-                    "left_token",
-                    models.CharField(
-                        default=arena.models.people.fresh_token, max_length=40, unique=True
-                    ),
-                ),
-                (
-                    "right_token",
-                    models.CharField(
-                        default=arena.models.people.fresh_token, max_length=40, unique=True
-                    ),
-                ),
-                (
-                    "answer",
-                    models.CharField(
-                        blank=True,
-                        choices=[
-                            ("left", "A is better"),
-                            ("equal", "Equal"),
-                            ("right", "B is better"),
-                            ("skipped", "Skipped"),
-                        ],
-                        max_length=10,
-                    ),
-                ),
-                (
-                    "broken",
-                    models.ForeignKey(
-                        on_delete=django.db.models.deletion.CASCADE,
-                        related_name="+",
-                        to="augment.augmentation",
-                    ),
-                ),
-                (
-                    "expert",
-                    models.ForeignKey(
-                        on_delete=django.db.models.deletion.CASCADE,
-                        related_name="practice_pairs",
-                        to=settings.AUTH_USER_MODEL,
-                    ),
-                ),
-                (
-                    "good",
-                    models.ForeignKey(
-                        on_delete=django.db.models.deletion.CASCADE,
-                        related_name="+",
-                        to="augment.augmentation",
-                    ),
-                ),
-                (
-                    "scenario",
-                    models.ForeignKey(
-                        on_delete=django.db.models.deletion.CASCADE,
-                        related_name="+",
-                        to="augment.scenario",
-                    ),
-                ),
-                (
-                    "study",
-                    models.ForeignKey(
-                        on_delete=django.db.models.deletion.CASCADE,
-                        related_name="practice_pairs",
-                        to="arena.study",
-                    ),
-                ),
+                ('id', models.BigAutoField(auto_created=True, primary_key=True, serialize=False, verbose_name='ID')),
+                ('position', models.PositiveIntegerField(help_text="place in the expert's round, from 1")),
+                ('good_is_left', models.BooleanField()),
+                ('left_token', models.CharField(default=arena.models.people.fresh_token, max_length=40, unique=True)),
+                ('right_token', models.CharField(default=arena.models.people.fresh_token, max_length=40, unique=True)),
+                ('answer', models.CharField(blank=True, choices=[('left', 'A is better'), ('equal', 'Equal'), ('right', 'B is better'), ('skipped', 'Skipped')], max_length=10)),
+                ('broken', models.ForeignKey(on_delete=django.db.models.deletion.CASCADE, related_name='+', to='augment.augmentation')),
+                ('expert', models.ForeignKey(on_delete=django.db.models.deletion.CASCADE, related_name='practice_pairs', to=settings.AUTH_USER_MODEL)),
+                ('good', models.ForeignKey(on_delete=django.db.models.deletion.CASCADE, related_name='+', to='augment.augmentation')),
+                ('scenario', models.ForeignKey(on_delete=django.db.models.deletion.CASCADE, related_name='+', to='augment.scenario')),
+                ('study', models.ForeignKey(on_delete=django.db.models.deletion.CASCADE, related_name='practice_pairs', to='arena.study')),
             ],
             options={
-                "ordering": ("study", "expert", "position"),
-                "constraints": [
-                    models.UniqueConstraint(
-                        fields=("study", "expert", "position"),
-                        name="one_practice_pair_per_position",
-                    ),
-                    models.CheckConstraint(
-                        condition=models.Q(("good", models.F("broken")), _negated=True),
-                        name="practice_shows_two_augmentations",
-                    ),
-                    models.CheckConstraint(
-                        condition=models.Q(
-                            ("answer__in", ["", "left", "equal", "right", "skipped"])
-                        ),
-                        name="practice_answer_is_known",
-                    ),
-                ],
+                'ordering': ('study', 'expert', 'position'),
+                'constraints': [models.UniqueConstraint(fields=('study', 'expert', 'position'), name='one_practice_pair_per_position'), models.CheckConstraint(condition=models.Q(('good', models.F('broken')), _negated=True), name='practice_shows_two_augmentations'), models.CheckConstraint(condition=models.Q(('answer__in', ['', 'left', 'equal', 'right', 'skipped'])), name='practice_answer_is_known')],
             },
         ),
     ]

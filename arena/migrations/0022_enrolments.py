@@ -67,7 +67,9 @@ class Migration(migrations.Migration):
                     ),
                 ),
             ],
-            options={"ordering": ("-made_at", "-pk")},
+            options={
+                "ordering": ("-made_at", "-pk"),
+            },
         ),
         migrations.CreateModel(
             name="EnrolledVoter",
@@ -122,7 +124,9 @@ class Migration(migrations.Migration):
                     ),
                 ),
             ],
-            options={"ordering": ("enrolled_at", "pk")},
+            options={
+                "ordering": ("enrolled_at", "pk"),
+            },
         ),
         migrations.AddConstraint(
             model_name="enrolment",

@@ -8,197 +8,101 @@ from django.db import migrations, models
 
 
 class Migration(migrations.Migration):
+
     dependencies = [
-        ("arena", "0023_measures"),
-        ("augment", "0017_corrections_by_hand"),
+        ('arena', '0023_measures'),
+        ('augment', '0017_corrections_by_hand'),
         migrations.swappable_dependency(settings.AUTH_USER_MODEL),
     ]
 
     operations = [
         migrations.CreateModel(
-            name="StudyDraft",
+            name='StudyDraft',
             fields=[
-                (
-                    "id",
-                    models.BigAutoField(
-                        auto_created=True, primary_key=True, serialize=False, verbose_name="ID"
-                    ),
-                ),
-                ("code", models.UUIDField(default=uuid.uuid4, editable=False, unique=True)),
-                (
-                    "entered",
-                    models.JSONField(
-                        default=dict,
-                        help_text="by field: a text, yes or no, or names; see services.study_drafts",
-                    ),
-                ),
-                (
-                    "revision",
-                    models.PositiveIntegerField(
-                        default=1,
-                        help_text="counts what was saved, so that nobody overwrites what they never saw",
-                    ),
-                ),
-                ("made_at", models.DateTimeField(auto_now_add=True)),
-                ("changed_at", models.DateTimeField(auto_now=True)),
+                ('id', models.BigAutoField(auto_created=True, primary_key=True, serialize=False, verbose_name='ID')),
+                ('code', models.UUIDField(default=uuid.uuid4, editable=False, unique=True)),
+                ('entered', models.JSONField(default=dict, help_text='by field: a text, yes or no, or names; see services.study_drafts')),
+                ('revision', models.PositiveIntegerField(default=1, help_text='counts what was saved, so that nobody overwrites what they never saw')),
+                ('made_at', models.DateTimeField(auto_now_add=True)),
+                ('changed_at', models.DateTimeField(auto_now=True)),
             ],
-            options={"ordering": ("-changed_at", "-pk")},
+            options={
+                'ordering': ('-changed_at', '-pk'),
+            },
         ),
         migrations.CreateModel(
-            name="StudyFile",
+            name='StudyFile',
             fields=[
-                (
-                    "id",
-                    models.BigAutoField(
-                        auto_created=True, primary_key=True, serialize=False, verbose_name="ID"
-                    ),
-                ),
-                ("code", models.UUIDField(default=uuid.uuid4, editable=False, unique=True)),
-                (
-                    "state",
-                    models.CharField(
-                        choices=[
-                            ("queued", "Waiting"),
-                            ("running", "Running"),
-                            ("ready", "Ready"),
-                            ("failed", "Failed"),
-                        ],
-                        default="queued",
-                        max_length=10,
-                    ),
-                ),
-                (
-                    "fault",
-                    models.CharField(
-                        blank=True, help_text="why it could not be written", max_length=500
-                    ),
-                ),
-                (
-                    "name",
-                    models.CharField(
-                        blank=True, help_text="what it is called for people", max_length=200
-                    ),
-                ),
-                (
-                    "stored",
-                    models.CharField(
-                        blank=True, help_text="its name in the storage", max_length=120
-                    ),
-                ),
-                ("size_bytes", models.PositiveBigIntegerField(default=0)),
-                (
-                    "digest",
-                    models.CharField(
-                        blank=True, help_text="SHA-256 of the content", max_length=64
-                    ),
-                ),
-                (
-                    "warnings",
-                    models.JSONField(
-                        blank=True, default=list, help_text="what comes with passing it on"
-                    ),
-                ),
-                ("is_non_commercial", models.BooleanField(default=False)),
-                ("created_at", models.DateTimeField(auto_now_add=True)),
-                ("finished_at", models.DateTimeField(blank=True, null=True)),
-                (
-                    "kind",
-                    models.CharField(
-                        choices=[
-                            ("study", "The whole study"),
-                            ("contact-sheet", "Contact sheet"),
-                            ("interplan", "Scenarios for interPlan"),
-                        ],
-                        max_length=20,
-                    ),
-                ),
+                ('id', models.BigAutoField(auto_created=True, primary_key=True, serialize=False, verbose_name='ID')),
+                ('code', models.UUIDField(default=uuid.uuid4, editable=False, unique=True)),
+                ('state', models.CharField(choices=[('queued', 'Waiting'), ('running', 'Running'), ('ready', 'Ready'), ('failed', 'Failed')], default='queued', max_length=10)),
+                ('fault', models.CharField(blank=True, help_text='why it could not be written', max_length=500)),
+                ('name', models.CharField(blank=True, help_text='what it is called for people', max_length=200)),
+                ('stored', models.CharField(blank=True, help_text='its name in the storage', max_length=120)),
+                ('size_bytes', models.PositiveBigIntegerField(default=0)),
+                ('digest', models.CharField(blank=True, help_text='SHA-256 of the content', max_length=64)),
+                ('warnings', models.JSONField(blank=True, default=list, help_text='what comes with passing it on')),
+                ('is_non_commercial', models.BooleanField(default=False)),
+                ('created_at', models.DateTimeField(auto_now_add=True)),
+                ('finished_at', models.DateTimeField(blank=True, null=True)),
+                ('kind', models.CharField(choices=[('study', 'The whole study'), ('contact-sheet', 'Contact sheet'), ('interplan', 'Scenarios for interPlan')], max_length=20)),
             ],
-            options={"ordering": ("study", "kind", "-pk")},
+            options={
+                'ordering': ('study', 'kind', '-pk'),
+            },
         ),
-        migrations.RemoveConstraint(model_name="study", name="study_state_is_known"),
-        migrations.AlterField(
-            model_name="scenariofile",
-            name="digest",
-            field=models.CharField(blank=True, help_text="SHA-256 of the content", max_length=64),
-        ),
-        migrations.AlterField(
-            model_name="study",
-            name="closed_at",
-            field=models.DateTimeField(
-                blank=True, help_text="when it took its last votes: closed or cancelled", null=True
-            ),
+        migrations.RemoveConstraint(
+            model_name='study',
+            name='study_state_is_known',
         ),
         migrations.AlterField(
-            model_name="study",
-            name="state",
-            field=models.CharField(
-                choices=[("open", "Open"), ("closed", "Closed"), ("cancelled", "Cancelled")],
-                default="open",
-                max_length=10,
-            ),
+            model_name='scenariofile',
+            name='digest',
+            field=models.CharField(blank=True, help_text='SHA-256 of the content', max_length=64),
+        ),
+        migrations.AlterField(
+            model_name='study',
+            name='closed_at',
+            field=models.DateTimeField(blank=True, help_text='when it took its last votes: closed or cancelled', null=True),
+        ),
+        migrations.AlterField(
+            model_name='study',
+            name='state',
+            field=models.CharField(choices=[('open', 'Open'), ('closed', 'Closed'), ('cancelled', 'Cancelled')], default='open', max_length=10),
         ),
         migrations.AddConstraint(
-            model_name="study",
-            constraint=models.CheckConstraint(
-                condition=models.Q(("state__in", ["open", "closed", "cancelled"])),
-                name="study_state_is_known",
-            ),
+            model_name='study',
+            constraint=models.CheckConstraint(condition=models.Q(('state__in', ['open', 'closed', 'cancelled'])), name='study_state_is_known'),
         ),
         migrations.AddField(
-            model_name="studydraft",
-            name="changed_by",
-            field=models.ForeignKey(
-                blank=True,
-                null=True,
-                on_delete=django.db.models.deletion.SET_NULL,
-                related_name="study_drafts",
-                to=settings.AUTH_USER_MODEL,
-            ),
+            model_name='studydraft',
+            name='changed_by',
+            field=models.ForeignKey(blank=True, null=True, on_delete=django.db.models.deletion.SET_NULL, related_name='study_drafts', to=settings.AUTH_USER_MODEL),
         ),
         migrations.AddField(
-            model_name="studyfile",
-            name="asked_by",
-            field=models.ForeignKey(
-                blank=True,
-                null=True,
-                on_delete=django.db.models.deletion.SET_NULL,
-                to=settings.AUTH_USER_MODEL,
-            ),
+            model_name='studyfile',
+            name='asked_by',
+            field=models.ForeignKey(blank=True, null=True, on_delete=django.db.models.deletion.SET_NULL, to=settings.AUTH_USER_MODEL),
         ),
         migrations.AddField(
-            model_name="studyfile",
-            name="study",
-            field=models.ForeignKey(
-                on_delete=django.db.models.deletion.CASCADE, related_name="files", to="arena.study"
-            ),
+            model_name='studyfile',
+            name='study',
+            field=models.ForeignKey(on_delete=django.db.models.deletion.CASCADE, related_name='files', to='arena.study'),
         ),
         migrations.AddIndex(
-            model_name="studyfile",
-            index=models.Index(models.F("study"), models.F("kind"), name="study_file_of_study"),
+            model_name='studyfile',
+            index=models.Index(models.F('study'), models.F('kind'), name='study_file_of_study'),
         ),
         migrations.AddConstraint(
-            model_name="studyfile",
-            constraint=models.CheckConstraint(
-                condition=models.Q(("state__in", ["queued", "running", "ready", "failed"])),
-                name="study_file_state_is_known",
-            ),
+            model_name='studyfile',
+            constraint=models.CheckConstraint(condition=models.Q(('state__in', ['queued', 'running', 'ready', 'failed'])), name='study_file_state_is_known'),
         ),
         migrations.AddConstraint(
-            model_name="studyfile",
-            constraint=models.CheckConstraint(
-                condition=models.Q(
-                    models.Q(("state", "ready"), _negated=True),
-                    models.Q(("stored", ""), _negated=True),
-                    _connector="OR",
-                ),
-                name="ready_study_file_is_stored",
-            ),
+            model_name='studyfile',
+            constraint=models.CheckConstraint(condition=models.Q(models.Q(('state', 'ready'), _negated=True), models.Q(('stored', ''), _negated=True), _connector='OR'), name='ready_study_file_is_stored'),
         ),
         migrations.AddConstraint(
-            model_name="studyfile",
-            constraint=models.CheckConstraint(
-                condition=models.Q(("kind__in", ["study", "contact-sheet", "interplan"])),
-                name="study_file_kind_is_known",
-            ),
+            model_name='studyfile',
+            constraint=models.CheckConstraint(condition=models.Q(('kind__in', ['study', 'contact-sheet', 'interplan'])), name='study_file_kind_is_known'),
         ),
     ]

@@ -4,9 +4,16 @@ from django.db import migrations
 
 
 class Migration(migrations.Migration):
-    dependencies = [("arena", "0024_drafts_cancelled_and_files")]
+
+    dependencies = [
+        ('arena', '0024_drafts_cancelled_and_files'),
+    ]
 
     operations = [
-        migrations.DeleteModel(name="WebhookDelivery"),
-        migrations.DeleteModel(name="Webhook"),
+        migrations.DeleteModel(
+            name='WebhookDelivery',
+        ),
+        migrations.DeleteModel(
+            name='Webhook',
+        ),
     ]

@@ -4,6 +4,14 @@ from django.db import migrations
 
 
 class Migration(migrations.Migration):
-    dependencies = [("arena", "0025_drop_webhooks")]
 
-    operations = [migrations.RemoveField(model_name="study", name="looks")]
+    dependencies = [
+        ('arena', '0025_drop_webhooks'),
+    ]
+
+    operations = [
+        migrations.RemoveField(
+            model_name='study',
+            name='looks',
+        ),
+    ]

@@ -4,15 +4,15 @@ from django.db import migrations, models
 
 
 class Migration(migrations.Migration):
-    dependencies = [("arena", "0026_drop_looks")]
+
+    dependencies = [
+        ('arena', '0026_drop_looks'),
+    ]
 
     operations = [
         migrations.AlterField(
-            model_name="snapshot",
-            name="filters",
-            field=models.JSONField(
-                default=dict,
-                help_text="which votes were asked for: types, experts, kinds and so on",
-            ),
-        )
+            model_name='snapshot',
+            name='filters',
+            field=models.JSONField(default=dict, help_text='which votes were asked for: types, experts, kinds and so on'),
+        ),
     ]

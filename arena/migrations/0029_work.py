@@ -4,96 +4,93 @@ from django.db import migrations, models
 
 
 class Migration(migrations.Migration):
-    dependencies = [("arena", "0028_spell_intervals")]
+
+    dependencies = [
+        ('arena', '0028_spell_intervals'),
+    ]
 
     operations = [
-        migrations.RenameField(model_name="scenariofile", old_name="fault", new_name="reason"),
-        migrations.RenameField(model_name="snapshot", old_name="status", new_name="reason"),
-        migrations.RenameField(model_name="studyfile", old_name="fault", new_name="reason"),
+        migrations.RenameField(model_name='scenariofile', old_name='fault', new_name='reason'),
+        migrations.RenameField(model_name='snapshot', old_name='status', new_name='reason'),
+        migrations.RenameField(model_name='studyfile', old_name='fault', new_name='reason'),
         migrations.AddField(
-            model_name="scenariofile",
-            name="claim",
-            field=models.UUIDField(blank=True, help_text="who works on it right now", null=True),
+            model_name='scenariofile',
+            name='claim',
+            field=models.UUIDField(blank=True, help_text='who works on it right now', null=True),
         ),
         migrations.AddField(
-            model_name="scenariofile",
-            name="heartbeat_at",
+            model_name='scenariofile',
+            name='heartbeat_at',
             field=models.DateTimeField(blank=True, null=True),
         ),
         migrations.AddField(
-            model_name="scenariofile",
-            name="lost",
-            field=models.PositiveSmallIntegerField(
-                default=0, help_text="so many workers in a row ended over it without a word"
-            ),
+            model_name='scenariofile',
+            name='lost',
+            field=models.PositiveSmallIntegerField(default=0, help_text='so many workers in a row ended over it without a word'),
         ),
         migrations.AlterField(
-            model_name="scenariofile",
-            name="reason",
-            field=models.TextField(blank=True, help_text="why there is no result"),
+            model_name='scenariofile',
+            name='reason',
+            field=models.TextField(blank=True, help_text='why there is no result'),
         ),
         migrations.AddField(
-            model_name="scenariofile",
-            name="sent_at",
-            field=models.DateTimeField(blank=True, help_text="last put on the queue", null=True),
+            model_name='scenariofile',
+            name='sent_at',
+            field=models.DateTimeField(blank=True, help_text='last put on the queue', null=True),
         ),
         migrations.AddField(
-            model_name="snapshot",
-            name="claim",
-            field=models.UUIDField(blank=True, help_text="who works on it right now", null=True),
+            model_name='snapshot',
+            name='claim',
+            field=models.UUIDField(blank=True, help_text='who works on it right now', null=True),
         ),
         migrations.AddField(
-            model_name="snapshot",
-            name="finished_at",
+            model_name='snapshot',
+            name='finished_at',
             field=models.DateTimeField(blank=True, null=True),
         ),
         migrations.AddField(
-            model_name="snapshot",
-            name="heartbeat_at",
+            model_name='snapshot',
+            name='heartbeat_at',
             field=models.DateTimeField(blank=True, null=True),
         ),
         migrations.AddField(
-            model_name="snapshot",
-            name="lost",
-            field=models.PositiveSmallIntegerField(
-                default=0, help_text="so many workers in a row ended over it without a word"
-            ),
+            model_name='snapshot',
+            name='lost',
+            field=models.PositiveSmallIntegerField(default=0, help_text='so many workers in a row ended over it without a word'),
         ),
         migrations.AlterField(
-            model_name="snapshot",
-            name="reason",
-            field=models.TextField(blank=True, help_text="why there is no result"),
+            model_name='snapshot',
+            name='reason',
+            field=models.TextField(blank=True, help_text='why there is no result'),
         ),
         migrations.AddField(
-            model_name="snapshot",
-            name="sent_at",
-            field=models.DateTimeField(blank=True, help_text="last put on the queue", null=True),
+            model_name='snapshot',
+            name='sent_at',
+            field=models.DateTimeField(blank=True, help_text='last put on the queue', null=True),
         ),
         migrations.AddField(
-            model_name="studyfile",
-            name="claim",
-            field=models.UUIDField(blank=True, help_text="who works on it right now", null=True),
+            model_name='studyfile',
+            name='claim',
+            field=models.UUIDField(blank=True, help_text='who works on it right now', null=True),
         ),
         migrations.AddField(
-            model_name="studyfile",
-            name="heartbeat_at",
+            model_name='studyfile',
+            name='heartbeat_at',
             field=models.DateTimeField(blank=True, null=True),
         ),
         migrations.AddField(
-            model_name="studyfile",
-            name="lost",
-            field=models.PositiveSmallIntegerField(
-                default=0, help_text="so many workers in a row ended over it without a word"
-            ),
+            model_name='studyfile',
+            name='lost',
+            field=models.PositiveSmallIntegerField(default=0, help_text='so many workers in a row ended over it without a word'),
         ),
         migrations.AlterField(
-            model_name="studyfile",
-            name="reason",
-            field=models.TextField(blank=True, help_text="why there is no result"),
+            model_name='studyfile',
+            name='reason',
+            field=models.TextField(blank=True, help_text='why there is no result'),
         ),
         migrations.AddField(
-            model_name="studyfile",
-            name="sent_at",
-            field=models.DateTimeField(blank=True, help_text="last put on the queue", null=True),
+            model_name='studyfile',
+            name='sent_at',
+            field=models.DateTimeField(blank=True, help_text='last put on the queue', null=True),
         ),
     ]
