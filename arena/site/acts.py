@@ -5,6 +5,7 @@ from contextlib import AbstractContextManager
 from dataclasses import dataclass
 
 from django.contrib import messages
+from django.core.exceptions import NON_FIELD_ERRORS
 from django.db import transaction
 from django.forms import BaseForm
 from django.http import HttpRequest, HttpResponse
@@ -57,9 +58,10 @@ def refusals_in(form: BaseForm, field: str | None = None) -> AbstractContextMana
 
 
 def tell_errors(request: HttpRequest, form: BaseForm) -> None:
-    """Show the errors of a form that is on another page as messages."""
-    for problems in form.errors.values():
-        messages.error(request, " ".join(map(str, problems)))
+    """Show the errors of a form that is on another page as messages, each with its field."""
+    for name, problems in form.errors.items():
+        label = "" if name == NON_FIELD_ERRORS else f"{form[name].label}: "
+        messages.error(request, label + " ".join(map(str, problems)))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

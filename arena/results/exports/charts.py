@@ -153,19 +153,21 @@ def heat_chart(rows: Sequence[Row], pairs: Sequence[PairRecord], *, file_format:
         votes[a, b] = votes[b, a] = pair.votes
     shares = np.divide(scores, votes, out=np.full_like(scores, np.nan), where=votes > 0)
     with house_style():
+        names = [f"{row.model}  {n}" for n, row in enumerate(rows, start=1)]
         side_in = 0.62 * max(len(rows), 2)
-        figure = Figure(figsize=(side_in + 2.6, side_in + 0.8), layout="constrained")
+        names_in = 0.4 + 0.08 * max(map(len, names), default=0)
+        figure = Figure(figsize=(side_in + names_in, side_in + 0.9), layout="constrained")
         axes = figure.add_subplot()
         colours = LinearSegmentedColormap.from_list("score", _HEAT)
         axes.imshow(shares, cmap=colours, vmin=0.5 - STRONG, vmax=0.5 + STRONG)
+        axes.set_anchor("E")  # what is left of the width is for the names
         for a, b in zip(*map(list, np.nonzero(votes)), strict=True):
             text = f"{whole_percent(shares[a, b])}\n{votes[a, b]:.0f}"
             axes.text(b, a, text, ha="center", va="center")
-        names = [f"{row.model}  {n}" for n, row in enumerate(rows, start=1)]
         name_lines(axes, names, [row.simulated for row in rows])
         axes.grid(visible=False)
         axes.set_xticks(range(len(rows)), [str(n + 1) for n in range(len(rows))])
-        axes.set_xlabel("Score of the row in percent, a tie half a win; votes beneath")
+        axes.set_xlabel("Score of the row in percent,\na tie half a win; votes beneath")
         return write_figure(figure, file_format)
 
 
