@@ -65,6 +65,12 @@ def test_a_job_is_paused_says_what_still_runs_and_is_resumed() -> None:
     )
 
 
+def test_a_job_that_is_cancelled_before_anything_ran_shows_its_grid() -> None:
+    job, admin = rows.launch(), signed_in(people()["admin"])
+    admin.post(reverse("job-cancel", args=[job.code]), {"sure": "1"})
+    assert 'id="grid"' in admin.get(reverse("job", args=[job.code])).content.decode()
+
+
 def test_progress_is_counted_and_not_sent_again_while_nothing_changes() -> None:
     job = rows.launch(scenarios=2)
     admin, url = signed_in(people()["admin"]), reverse("job-progress", args=[job.code])

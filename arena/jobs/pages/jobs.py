@@ -58,7 +58,7 @@ def job_page(request: HttpRequest, code: uuid.UUID, tab: str = "") -> HttpRespon
     job = get_object_or_404(GenerationJob.objects.select_related("launched_by__person"), code=code)
     counts = progress.count_rows(job)
     tabs = _tabs_of(counts)
-    shown = tab or _first_tab(counts)
+    shown = tab or _first_tab(counts, tabs)
     if shown not in TABS:
         raise Http404
     if shown not in tabs:
@@ -76,9 +76,7 @@ def job_page(request: HttpRequest, code: uuid.UUID, tab: str = "") -> HttpRespon
 def _tabs_of(counts: JobCounts) -> list[str]:
     """Return the names of the parts that have something to show."""
     job, left_out = counts.job, set()
-    if not any(
-        counts.by_state[state] for state in (State.FAILED, State.UNREADABLE, State.REFUSED)
-    ):
+    if not any(counts.by_state[state] for state in progress.GROUPED):
         left_out.add("failures")
     if not (job.spent_calls or job.reserved_calls or job.is_capped):
         left_out.add("money")
@@ -87,12 +85,12 @@ def _tabs_of(counts: JobCounts) -> list[str]:
     return [name for name in TABS if name not in left_out]
 
 
-def _first_tab(counts: JobCounts) -> str:
+def _first_tab(counts: JobCounts, tabs: list[str]) -> str:
     if counts.job.state == GenerationJob.State.STOPPED_AT_CAP:
         return "money"
     if not counts.is_over:
         return "progress"
-    return "grid" if counts.by_state[State.DONE] or not counts.settled else "failures"
+    return "failures" if "failures" in tabs and not counts.by_state[State.DONE] else "grid"
 
 
 def _show_grid(request: HttpRequest, counts: JobCounts) -> Context:
