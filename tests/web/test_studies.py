@@ -48,6 +48,7 @@ def test_progress_is_shown_by_expert_and_says_nothing_of_who_leads() -> None:
     assert "4 of 18 votes" in shown
     assert "Elo" not in shown[shown.index("<main") :]
     assert "Close the study" not in shown
+    assert "finn" not in shown, "researchers know experts by their pseudonyms"
 
 
 def test_closing_rates_the_votes_once_and_shows_the_table() -> None:
