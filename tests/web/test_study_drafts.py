@@ -110,6 +110,9 @@ def test_a_draft_is_previewed_and_opened_and_is_gone_then(admin: Client) -> None
     assert shown.content.decode().count('src="/pictures/augmentation/') == 2
     assert admin.post(shown.request["PATH_INFO"], {"outcome": "A"}).json()["next"] == []
     assert not Study.objects.exists(), "a preview plans nothing"
+    nameless = admin.post(NEW, {**sent, "name": "", "preview": "1"}, follow=True)
+    assert "Name: This field is required." in text_of(nameless)
+    StudyDraft.objects.latest("pk").delete()
     draft = StudyDraft.objects.get()
     refused = admin.post(page_of(draft), {**sent, "contestants": [], "sure": "1"})
     assert refused.status_code == 422
