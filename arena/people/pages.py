@@ -19,7 +19,7 @@ from django.utils import timezone
 from django.utils.translation import gettext as _
 from django.utils.translation import gettext_lazy, ngettext
 from django.views.decorators.cache import never_cache
-from django.views.decorators.http import require_http_methods, require_POST
+from django.views.decorators.http import require_http_methods
 
 from arena.errors import LinkOver
 from arena.models import ApiToken
@@ -40,17 +40,18 @@ from arena.site.access import (
     ADMIN,
     BACKEND,
     EXPERT,
+    FORM_METHODS,
     GONE,
     RESEARCHER,
     STAFF,
-    allow_only,
+    act_for,
+    form_for,
     keep_secret,
     user_of,
 )
-from arena.site.acts import refusals_in, refusals_told
+from arena.site.acts import refusals_in
 from arena.site.forms import offer
 
-PAGES = ["GET", "HEAD", "POST"]
 ROLE_NAMES = {
     "admin": gettext_lazy("Admin"),
     "researcher": gettext_lazy("Researcher"),
@@ -141,7 +142,7 @@ def link_page(view: Callable[..., HttpResponse]) -> Callable[..., HttpResponse]:
 
     @login_not_required
     @never_cache
-    @require_http_methods(PAGES)
+    @require_http_methods(FORM_METHODS)
     @wraps(view)
     def answer(request: HttpRequest, **named: Any) -> HttpResponse:
         try:
@@ -180,7 +181,7 @@ def welcome_page(request: HttpRequest, token: str) -> HttpResponse:
 
 
 @never_cache
-@require_http_methods(PAGES)
+@require_http_methods(FORM_METHODS)
 def password_page(request: HttpRequest) -> HttpResponse:
     """One's own password; other devices are signed out by a new one."""
     user = user_of(request)
@@ -198,9 +199,8 @@ def password_page(request: HttpRequest) -> HttpResponse:
 # --- People ------------------------------------------------------------------------------------
 
 
-@allow_only(ADMIN)
+@form_for(ADMIN)
 @never_cache
-@require_http_methods(PAGES)
 def people_page(request: HttpRequest) -> HttpResponse:
     """Every account, and a form for a new one, which ends at its link."""
     form = AccountForm(request.POST or None)
@@ -230,29 +230,23 @@ def _list_accounts() -> list[dict[str, Any]]:
     ]
 
 
-@allow_only(ADMIN)
+@act_for(ADMIN, back="people")
 @never_cache
-@require_POST
 def make_link(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """A link to set a password, for who is new or has forgotten it."""
-    with refusals_told(request):
-        return _link_page(request, find_account(code))
-    return redirect("people")
+    return _link_page(request, find_account(code))
 
 
-@allow_only(ADMIN)
-@require_POST
-def change_person(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
+@act_for(ADMIN, back="people")
+def change_person(request: HttpRequest, code: uuid.UUID) -> None:
     """Pause, resume, or give another role: what the pressed button says."""
     user, actor = find_account(code), user_of(request)
     act = request.POST.get("act", "")
-    with refusals_told(request):
-        if act in ("pause", "resume"):
-            services.set_active(user=user, is_active=act == "resume", actor=actor)
-        else:
-            services.set_role(user=user, role=request.POST.get("role", ""), actor=actor)
-        messages.success(request, f"{user.person.pseudonym} is changed.")
-    return redirect("people")
+    if act in ("pause", "resume"):
+        services.set_active(user=user, is_active=act == "resume", actor=actor)
+    else:
+        services.set_role(user=user, role=request.POST.get("role", ""), actor=actor)
+    messages.success(request, f"{user.person.pseudonym} is changed.")
 
 
 def find_account(code: uuid.UUID) -> User:
@@ -269,9 +263,8 @@ def _link_page(request: HttpRequest, user: User) -> HttpResponse:
 # --- One's own tokens --------------------------------------------------------------------------
 
 
-@allow_only(ADMIN, RESEARCHER, EXPERT)
+@form_for(ADMIN, RESEARCHER, EXPERT)
 @never_cache
-@require_http_methods(PAGES)
 def tokens_page(request: HttpRequest) -> HttpResponse:
     """One's own tokens, and a form for a new one, which is shown this once."""
     user, now = user_of(request), timezone.now()
@@ -296,12 +289,10 @@ def tokens_page(request: HttpRequest) -> HttpResponse:
     return render(request, "api/tokens.html", context, status=422 if form.errors else 200)
 
 
-@allow_only(ADMIN, RESEARCHER, EXPERT)
-@require_POST
-def revoke_token(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
+@act_for(ADMIN, RESEARCHER, EXPERT, back="api-tokens")
+def revoke_token(request: HttpRequest, code: uuid.UUID) -> None:
     """Revoke one of one's own tokens."""
     user = user_of(request)
     token = get_object_or_404(ApiToken, owner=user, code=code)
     revoke_api_token(token=token, actor=user)
     messages.success(request, _("“%(name)s” opens nothing any more.") % {"name": token.name})
-    return redirect("api-tokens")

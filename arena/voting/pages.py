@@ -11,11 +11,10 @@ from django.shortcuts import get_object_or_404, redirect, render
 from django.urls import reverse
 from django.utils.translation import gettext as _
 from django.views.decorators.cache import never_cache
-from django.views.decorators.http import require_http_methods, require_safe
 
 from arena.errors import InvalidVote, NotYours, StudyNotOpen
 from arena.models import Study, Vote
-from arena.site.access import ADMIN, EXPERT, allow_only, user_of
+from arena.site.access import ADMIN, EXPERT, form_for, page_for, user_of
 from arena.site.pictures import picture_response
 from arena.studies.services.experts import answer_practice, is_due, practice_pairs, skip_practice
 from arena.voting.queries.ballots import own_votes
@@ -38,9 +37,8 @@ def strangers_find_nothing(view: View) -> View:
     return answer
 
 
-@allow_only(EXPERT)
+@page_for(EXPERT)
 @never_cache
-@require_safe
 def vote_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """The next pair, or with `change` one that was decided; votes go to the API."""
     expert, study = user_of(request), _study_of(request, code)
@@ -54,9 +52,8 @@ def vote_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     return render(request, "vote/vote.html", context)
 
 
-@allow_only(EXPERT)
+@page_for(EXPERT)
 @never_cache
-@require_safe
 def skipped_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """The pairs that the expert skipped: each can be looked at again and voted on."""
     expert, study = user_of(request), _study_of(request, code)
@@ -64,17 +61,15 @@ def skipped_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     return render(request, "vote/skipped.html", over_context(study, expert) | {"skips": skips})
 
 
-@allow_only(EXPERT, ADMIN)
+@page_for(EXPERT, ADMIN)
 @strangers_find_nothing
-@require_safe
 def matchup_image(request: HttpRequest, token: str) -> HttpResponseBase:
     """One side of a matchup, by a token that says nothing."""
     return picture_response(picture_shown(user=user_of(request), token=token))
 
 
-@allow_only(EXPERT, ADMIN)
+@page_for(EXPERT, ADMIN)
 @strangers_find_nothing
-@require_safe
 def replay(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """How a planner drove both scenes of a pair, for the script that plays it."""
     drives = drives_of_pair(user=user_of(request), code=code)
@@ -83,9 +78,8 @@ def replay(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     return JsonResponse(drives, headers={"Cache-Control": "private, no-store"})
 
 
-@allow_only(EXPERT)
+@form_for(EXPERT)
 @never_cache
-@require_http_methods(["GET", "HEAD", "POST"])
 def practice_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """The next pair to practise on, or with `pair` what was right of one that was answered."""
     expert, study = user_of(request), _study_of(request, code)

@@ -11,7 +11,6 @@ from django.http import Http404, HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, redirect, render
 from django.urls import reverse
 from django.views.decorators.cache import never_cache
-from django.views.decorators.http import require_http_methods
 
 from arena.errors import AlreadyLabelled, LabellingClosed, NotYours
 from arena.jobs import queries
@@ -20,7 +19,7 @@ from arena.jobs.pages.jobs import crumbs_of
 from arena.jobs.services import close_labelling, open_labelling, save_label
 from arena.models import FaultLabel, LabellingRound
 from arena.people.queries import by_pseudonym, experts, role_of
-from arena.site.access import ADMIN, EXPERT, STAFF, allow_only, form_for, user_of
+from arena.site.access import ADMIN, EXPERT, STAFF, form_for, user_of
 from arena.site.acts import Confirmation, ask, is_sure, refusals_in, refusals_told
 from arena.site.forms import offer
 from arena.voting.queries.showings import original_beside
@@ -55,9 +54,8 @@ class LabellingForm(forms.Form):
         offer(self, "experts", [(user.username, user.username) for user in self.accounts])
 
 
-@allow_only(EXPERT)
+@form_for(EXPERT)
 @never_cache
-@require_http_methods(["GET", "HEAD", "POST"])
 def label_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Show the next picture; a label is saved and followed by a redirect."""
     expert = user_of(request)

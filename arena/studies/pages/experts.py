@@ -11,18 +11,17 @@ from django.contrib.auth.models import User
 from django.http import Http404, HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, redirect, render
 from django.urls import reverse
-from django.utils.cache import add_never_cache_headers
 from django.utils.translation import gettext as _
 from django.utils.translation import gettext_lazy
 from django.views.decorators.cache import never_cache
-from django.views.decorators.http import require_http_methods, require_POST, require_safe
+from django.views.decorators.http import require_http_methods
 
 from arena.errors import EnrolmentOver, LinkOver
 from arena.exports.cells import csv_text
 from arena.models import Enrolment, Invitation, Study
 from arena.people import links
 from arena.people.pages import find_account, link_page, with_own_language
-from arena.site.access import ADMIN, BACKEND, GONE, act_for, allow_only, form_for, user_of
+from arena.site.access import ADMIN, BACKEND, GONE, act_for, form_for, page_for, user_of
 from arena.site.acts import Confirmation, ask, is_sure, refusals_in, refusals_told, tell_errors
 from arena.site.listing import read_page
 from arena.studies.forms import AuthorForm
@@ -138,6 +137,7 @@ def forget_person(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
 # --- Invitations -------------------------------------------------------------------------------
 
 
+@never_cache
 @act_for(ADMIN, back="study")
 def invite_experts(request: HttpRequest, code: uuid.UUID) -> HttpResponse | None:
     """Make links, for one expert or for all without one, and show them this once."""
@@ -156,13 +156,10 @@ def invite_experts(request: HttpRequest, code: uuid.UUID) -> HttpResponse | None
         fresh = links.invite(study=study, expert=expert, actor=user_of(request))
         address = request.build_absolute_uri(reverse("invitation", args=[fresh.token]))
         made.append({"invitation": fresh.invitation, "address": address})
-    answer = render(request, "studies/links.html", {"study": study, "links": made})
-    add_never_cache_headers(answer)
-    return answer
+    return render(request, "studies/links.html", {"study": study, "links": made})
 
 
-@allow_only(ADMIN)
-@require_POST
+@act_for(ADMIN, back="study")
 def revoke_invitation(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Revoke one link; whoever came in by it is signed out."""
     invitation = get_object_or_404(Invitation.objects.select_related("study"), code=code)
@@ -228,9 +225,8 @@ def enrol_page(request: HttpRequest, token: str) -> HttpResponse:
     return render(request, "enrol.html", context, status=422 if form.errors else 200)
 
 
-@allow_only(ADMIN)
+@form_for(ADMIN)
 @never_cache
-@require_http_methods(["GET", "HEAD", "POST"])
 def enrolment_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """The link with its rules, and who came by it."""
     study = get_object_or_404(Study, code=code)
@@ -253,9 +249,8 @@ def enrolment_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     return render(request, "studies/enrolment.html", context, status=status)
 
 
-@allow_only(ADMIN)
+@page_for(ADMIN)
 @never_cache
-@require_safe
 def voters_file(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
     """Who is to be thanked or paid: ids, progress and completion codes, as CSV."""
     study = get_object_or_404(Study, code=code, enrolment__isnull=False)
