@@ -1,7 +1,7 @@
 """Forms of studies, from the fields of their plans."""
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, Self
 
 from django import forms
 from django.contrib.auth.models import User
@@ -67,6 +67,16 @@ class StudyForm(ChoiceForm):
     def singles(self) -> int:
         """Return how many single scenarios are ticked, for the template."""
         return len(set(self["scenarios"].value() or ()) - set(self.sources))
+
+    def as_entered(self) -> Self:
+        """Return the same form with what was entered, and without faults."""
+        return type(self)(
+            initial=self.data,
+            contestants=self.offered,
+            groups=self.groups,
+            experts=self.accounts,
+            jobs=self.all_jobs,
+        )
 
     def estimate(self) -> StudyEstimate | None:
         """Return what is entered so far as an estimate; None while something is missing."""

@@ -96,7 +96,7 @@ def _set_up(request: HttpRequest, draft: StudyDraft | None) -> HttpResponse:
     entered = _entered(posted) if posted else _initial(draft)
     if (preset := posted.get("preset")) in PRESETS:
         entered |= _quantities(preset)
-    form = _form(data=entered)
+    form = _form(entered)
     if KEEP in posted or PREVIEW in posted:
         return _keep(request, draft, form)
     if is_sure(request) and form.is_valid():
@@ -130,7 +130,7 @@ def _show(
 ) -> HttpResponse:
     estimate = form.estimate()
     context = {
-        "form": form if is_sure(request) else _form(initial=form.data),
+        "form": form if is_sure(request) else form.as_entered(),
         "draft": draft,
         "revision": revision,
         "missing": missing_of(draft) if draft else [],
@@ -142,13 +142,13 @@ def _show(
     return render(request, "studies/new.html", context, status=status)
 
 
-def _form(**given: Any) -> StudyForm:
+def _form(data: dict[str, Any]) -> StudyForm:
     return StudyForm(
+        data,
         contestants=list(offered_contestants().select_related("endpoint").order_by("name")),
         groups=queries.by_type(),
         experts=by_pseudonym(experts()),
         jobs=list(GenerationJob.objects.all()),
-        **given,
     )
 
 
@@ -191,7 +191,7 @@ def preview_page(request: HttpRequest, code: uuid.UUID) -> HttpResponse:
         return JsonResponse({"saved": 0, "total": 0, "skipped": 0, "next": []})
     if "study" in request.GET:  # the script asks for more pairs
         return JsonResponse([], safe=False)
-    form = _form(data=draft.entered)
+    form = _form(draft.entered)
     if form.is_valid():
         with refusals_in(form), transaction.atomic():
             study = open_study(form.study_plan(), actor=user_of(request))
@@ -211,7 +211,8 @@ def _first_pairs(study: Study, draft: StudyDraft) -> dict[str, Any]:
     if context is None:
         raise NothingToPlan("No pair is shown to anybody: nobody can tell these pictures apart.")
     for shown in context["given"]["pairs"]:
-        matchup = study.matchups.select_related("left", "right").get(code=shown["matchup"])
+        rows = study.matchups.select_related("left", "right", "scenario")
+        matchup = rows.get(code=shown["matchup"])
         shown["a"] = reverse("picture", args=["augmentation", matchup.left.code])
         shown["b"] = reverse("picture", args=["augmentation", matchup.right.code])
         shown["original"] = reverse("picture", args=["original", matchup.scenario.code])
