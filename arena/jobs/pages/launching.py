@@ -62,7 +62,7 @@ class LaunchForm(ChoiceForm, OptionsForm):
             )
         return cleaned
 
-    @property
+    @cached_property
     def offers(self) -> list[Offer]:
         """For the template: contestants, with the reason where no job can run them."""
         return [Offer(row=row, obstacle=find_obstacle(row)) for row in self.offered]
@@ -114,7 +114,8 @@ class LaunchForm(ChoiceForm, OptionsForm):
 def new_job_page(request: HttpRequest) -> HttpResponse:
     """Choose contestants and scenarios, then launch."""
     form = _form(request, request.POST or None)
-    form.initial = _like(request) or form.usual()
+    if not form.is_bound:
+        form.initial = _like(request) or form.usual()
     if "estimate" in request.POST:
         return _estimated(request, form)
     if form.is_bound and form.is_valid():
