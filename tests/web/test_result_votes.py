@@ -10,7 +10,7 @@ import pytest
 from django.test import Client
 from django.urls import reverse
 
-from arena.models import Matchup, Study, Vote
+from arena.models import Matchup, Snapshot, Study, Vote
 from arena.results.pages.tabs import TABS
 from arena.results.queries.votes import Filters
 from arena.results.services.ratings import rate_now as rate
@@ -117,10 +117,20 @@ def test_a_vote_shows_the_pair_as_it_was_shown(study: Study, reader: Client) -> 
         address = reverse("shown-picture", args=[study.code, matchup.code, side])
         assert address in page
         assert b"".join(reader.get(address)) == png(shade)
+    left, right = (page.index(f"{matchup.code}/{side}.png") for side in shades)
+    assert left < page.index(vote.shown_left.contestant.name, left) < right
+    assert page.index(vote.shown_right.contestant.name, right)
     for said in (vote.matchup.scenario.instruction, "The car stands on the kerb.", "0.4 s"):
         assert said in page, said
     address = reverse("shown-picture", args=[study.code, matchup.code, "upside-down"])
     assert reader.get(address).status_code == 404
+
+
+def test_a_vote_given_after_the_rating_is_none_of_it(study: Study, reader: Client) -> None:
+    rate(study=study, rounds=10)
+    number = number_of(listed(reader, study, mark="all"))
+    Snapshot.objects.update(last_vote=Vote.objects.latest("pk").pk - 1)
+    assert number_of(listed(reader, study, mark="all")) == number - 1
 
 
 def test_an_open_study_keeps_its_votes_until_an_early_look(reader: Client) -> None:
