@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from django.contrib.auth.decorators import login_not_required
+from django.contrib.auth.models import User
 from django.db import transaction
 from django.http import Http404, HttpRequest, HttpResponse, JsonResponse
 from django.shortcuts import redirect, render
@@ -74,27 +75,29 @@ def _expert(request: HttpRequest) -> HttpResponse:
 
 
 def _researcher(request: HttpRequest) -> HttpResponse:
-    lines = studies.progress_of(studies.listed_studies())
-    context = {
-        "running": [line for line in lines if line.study.state == Study.State.OPEN],
-        "closed": [line for line in lines if line.study.state == Study.State.CLOSED],
-    }
-    return render(request, "home/researcher.html", context)
+    return render(request, "home/researcher.html", _studies_by_state())
 
 
 def _admin(request: HttpRequest) -> HttpResponse:
     steps = first_steps()
-    lines = studies.progress_of(studies.listed_studies())
     context = {
         "steps": steps,
         "following": next((step for step in steps if not step.found), None),
         "is_set_up": steps[-1].found,
         "failed": count_failed(),
         "jobs": count_each(list(GenerationJob.objects.all()[:LATEST_JOBS])),
-        "running": [line for line in lines if line.study.state == Study.State.OPEN],
-        "closed": [line for line in lines if line.study.state == Study.State.CLOSED],
+        **_studies_by_state(),
     }
     return render(request, "home/admin.html", context)
+
+
+def _studies_by_state() -> dict[str, list[studies.StudyProgress]]:
+    lines = studies.progress_of(studies.listed_studies())
+    states = {"running": Study.State.OPEN, "closed": Study.State.CLOSED}
+    return {
+        name: [line for line in lines if line.study.state == state]
+        for name, state in states.items()
+    }
 
 
 @act_for(ADMIN, back="home")
@@ -103,7 +106,9 @@ def use_demo(request: HttpRequest, name: str) -> HttpResponse | None:
     if name not in demo.ACTS:
         raise Http404
     with transaction.atomic():
-        made = demo.ACTS[name](user_of(request))
+        # Held, so that a second click waits and finds what the first one made.
+        actor = User.objects.select_for_update().get(pk=user_of(request).pk)
+        made = demo.ACTS[name](actor)
         if isinstance(made, GenerationJob):
             send_later(request, enqueue_job, made.pk)
             return redirect("job", code=made.code)
