@@ -26,7 +26,7 @@ LINK_LIVES_S = 24 * 3600
 SIGNED_IN = "_auth_user_id"
 """Where Django's sessions keep the key of the account."""
 
-OVER = "This link lets nobody in any more."
+OVER = "This link or code lets nobody in, or not any more."
 _SALT = "arena.first-start"
 
 
