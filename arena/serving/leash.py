@@ -14,18 +14,22 @@ import sys
 _PR_SET_PDEATHSIG = 1
 
 
-def die_with_parent() -> None:
-    """Have Linux kill this process when its parent ends, however it ends; survives exec."""
+def die_with(parent: int) -> None:
+    """Have Linux kill this process when its parent ends, however it ends; survives exec.
+
+    Raises:
+        SystemExit: The parent is gone already.
+    """
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+    if os.getppid() != parent:
+        raise SystemExit("the process that asked for this program is gone already")
 
 
 def main(arguments: list[str]) -> None:
     """Become the program after `--`."""
     parent, _, *program = arguments
-    die_with_parent()
-    if os.getppid() != int(parent):
-        raise SystemExit("the process that asked for this program is gone already")
+    die_with(int(parent))
     os.execvp(program[0], program)
 
 

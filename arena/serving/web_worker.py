@@ -15,7 +15,7 @@ from waitress.channel import HTTPChannel
 from waitress.server import create_server
 from waitress.wasyncore import loop
 
-from arena.serving.leash import die_with_parent
+from arena.serving.leash import die_with
 
 REQUEST_WITHIN_S = 30.0
 """So long a request may take to come in, and a second more for each BYTES_A_SECOND of it."""
@@ -62,7 +62,7 @@ class BufferingWorker(Worker):  # type: ignore[misc] # gunicorn has no types
 
     def init_process(self) -> None:
         """End with gunicorn, even where it is killed before the application is loaded."""
-        die_with_parent()
+        die_with(self.ppid)
         super().init_process()
 
     def run(self) -> None:

@@ -46,6 +46,15 @@ def serve(home: Home, port: int, log: Path) -> Iterator[subprocess.Popen[bytes]]
                 left.kill()
 
 
+def serving_workers(served: subprocess.Popen[bytes]) -> list[psutil.Process]:
+    """The web workers that have their threads."""
+    return [
+        process
+        for process in psutil.Process(served.pid).children(recursive=True)
+        if "gunicorn" in " ".join(process.cmdline()) and process.num_threads() > 4
+    ]
+
+
 def test_after_kill_9_one_serve_starts_again_and_nothing_else_is_ended(
     migrated: Path, tmp_path_factory: pytest.TempPathFactory
 ) -> None:
@@ -53,14 +62,14 @@ def test_after_kill_9_one_serve_starts_again_and_nothing_else_is_ended(
     home, port = Home.at(folder), free_port()
     copy_database(migrated, home.database)
     with serve(home, port, folder / "first.log") as first:
-        web = [
-            found
-            for found in psutil.Process(first.pid).children(recursive=True)
-            if "gunicorn" in " ".join(found.cmdline())
-        ]
+        # Gunicorn's port answers before its workers are up; one that was just forked hears of
+        # its parent's end only once it runs again.
+        wait_until(lambda: len(serving_workers(first)) == 2, what="both workers serve")
+        gunicorn = serving_workers(first)[0].parent()
+        assert gunicorn is not None
         # What hangs notices nothing, and holds the port.
-        for worker in web:
-            os.kill(worker.pid, signal.SIGSTOP)
+        for process in (gunicorn, *gunicorn.children()):
+            os.kill(process.pid, signal.SIGSTOP)
         first.kill()
         first.wait(60)
         with serve(home, port, folder / "second.log"):
