@@ -117,7 +117,7 @@ class Judged(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Entrant:
+class Competitor:
     """Who competes; `contestant` is None for names from a file."""
 
     slug: str
@@ -183,14 +183,14 @@ class VoteSet:
     """What is rated, in the order in which it was decided.
 
     Attributes:
-        entrants: By slug.
+        competitors: By slug.
         counted: The votes that count.
         repeats: Decided hidden repeats, whether they count or not.
         checks: Votes on attention checks, and `references` who should win them.
         left_out: How many votes do not count, by reason.
     """
 
-    entrants: tuple[Entrant, ...]
+    competitors: tuple[Competitor, ...]
     counted: tuple[Judged, ...]
     repeats: tuple[Judged, ...]
     checks: tuple[Judged, ...]
@@ -232,7 +232,7 @@ def vote_set(study: Study, *, filters: Filters, last: int | None) -> VoteSet:
     checks = tuple(vote for vote in votes if vote.mark == LeftOut.CHECK)
     references = Contestant.objects.filter(kind=Contestant.Kind.REFERENCE)
     return VoteSet(
-        entrants=_entrants(study, votes),
+        competitors=_competitors(study, votes),
         counted=tuple(vote for vote in votes if vote.mark == COUNTED),
         repeats=tuple(vote for vote in votes if vote.kind == REPEAT and vote.outcome in RATED),
         checks=checks,
@@ -381,13 +381,13 @@ def users_of(codes: Collection[str]) -> dict[str, int]:
 # --- Private -----------------------------------------------------------------------------------
 
 
-def _entrants(study: Study, votes: Iterable[Judged]) -> tuple[Entrant, ...]:
+def _competitors(study: Study, votes: Iterable[Judged]) -> tuple[Competitor, ...]:
     """Who competes, by slug: a study's contestants, or who occurs in the votes of a file."""
     if is_imported(study):
         names = {name for vote in votes for name in (vote.left, vote.right)}
-        return tuple(Entrant(slug=name, name=name) for name in sorted(names))
+        return tuple(Competitor(slug=name, name=name) for name in sorted(names))
     return tuple(
-        Entrant(
+        Competitor(
             slug=row.slug,
             name=row.name,
             variant=row.variant,

@@ -29,7 +29,7 @@ from arena.rating.snapshot_document import (
     TypeRating,
     TypeStanding,
 )
-from arena.results.queries.votes import Entrant, Filters, Judged, is_imported
+from arena.results.queries.votes import Competitor, Filters, Judged, is_imported
 from augment.services.judging.displacement import of_rows, summarise
 from augment.services.scenarios.scenes import in_type_order, type_label
 
@@ -59,22 +59,22 @@ class VoteArrays:
     ms: FloatArray
 
 
-def vote_arrays(entrants: Sequence[Entrant], votes: Sequence[Judged]) -> VoteArrays:
+def vote_arrays(competitors: Sequence[Competitor], votes: Sequence[Judged]) -> VoteArrays:
     """Number everything, in the order in which it occurs.
 
     Args:
-        entrants: The contestants, also those without votes.
+        competitors: The contestants, also those without votes.
         votes: Each compares two of them.
     """
-    number = {entrant.slug: index for index, entrant in enumerate(entrants)}
+    number = {competitor.slug: index for index, competitor in enumerate(competitors)}
     judges: dict[str, int] = {}
     items: dict[str, int] = {}
     types: dict[str, int] = {}
     whole = partial(np.array, dtype=np.int64)
     type_of = whole([types.setdefault(vote.type, len(types)) for vote in votes])
     comparisons = Comparisons(
-        names=tuple(entrant.slug for entrant in entrants),
-        shown=tuple(entrant.name for entrant in entrants),
+        names=tuple(competitor.slug for competitor in competitors),
+        shown=tuple(competitor.name for competitor in competitors),
         first=whole([number[vote.left] for vote in votes]),
         second=whole([number[vote.right] for vote in votes]),
         score=np.array([SCORES[vote.outcome] for vote in votes], dtype=np.float64),
@@ -205,9 +205,11 @@ def displacement(study: Study) -> tuple[DisplacementSummary, ...]:
     )
 
 
-def cost(study: Study, entrants: Sequence[Entrant]) -> tuple[ScenarioCost, ...]:
+def cost(study: Study, competitors: Sequence[Competitor]) -> tuple[ScenarioCost, ...]:
     """What each contestant that asks a language model takes per scenario."""
-    rows = [entrant.contestant for entrant in entrants if entrant.contestant is not None]
+    rows = [
+        competitor.contestant for competitor in competitors if competitor.contestant is not None
+    ]
     spent = spent_on(shown_augmentations(study))
     classes = model_classes(rows)
     return tuple(

@@ -23,7 +23,7 @@ from arena.rating.snapshot_document import Results
 from arena.results.queries.access import votes_in
 from arena.results.queries.votes import (
     AUTOMATIC,
-    Entrant,
+    Competitor,
     Filters,
     VoteSet,
     is_imported,
@@ -69,7 +69,7 @@ class Computed:
     """What came out beside that which the snapshot itself has: its lines."""
 
     board: Leaderboard
-    entrants: tuple[Entrant, ...]
+    competitors: tuple[Competitor, ...]
 
 
 # --- Doors -------------------------------------------------------------------------------------
@@ -187,7 +187,7 @@ def compute(snapshot: Snapshot, report: Callable[[int], None]) -> Computed:
     """
     report(5)
     votes = _vote_set(snapshot)
-    arrays = vote_arrays(votes.entrants, votes.counted)
+    arrays = vote_arrays(votes.competitors, votes.counted)
     report(20)
     board = _rate(snapshot, arrays.comparisons)
     report(60)
@@ -206,8 +206,10 @@ def compute(snapshot: Snapshot, report: Callable[[int], None]) -> Computed:
     snapshot.reason = board.explanation
     snapshot.degenerate_rounds = board.degenerate_rounds
     # Whether something in the table is simulated, be it a line without votes.
-    snapshot.includes_simulated = any(one.is_simulated for one in votes.entrants + votes.counted)
-    return Computed(board=board, entrants=votes.entrants)
+    snapshot.includes_simulated = any(
+        one.is_simulated for one in votes.competitors + votes.counted
+    )
+    return Computed(board=board, competitors=votes.competitors)
 
 
 @transaction.atomic
@@ -221,15 +223,15 @@ def keep(snapshot: Snapshot, computed: Computed) -> Snapshot:
     Standing.objects.bulk_create(
         Standing(
             snapshot=snapshot,
-            contestant=entrant.contestant,
-            slug=entrant.slug,
-            name=entrant.name,
-            variant=entrant.variant,
-            kind=entrant.kind,
-            is_simulated=entrant.is_simulated,
+            contestant=competitor.contestant,
+            slug=competitor.slug,
+            name=competitor.name,
+            variant=competitor.variant,
+            kind=competitor.kind,
+            is_simulated=competitor.is_simulated,
             **stored_values(line),
         )
-        for entrant, line in zip(computed.entrants, computed.board.lines, strict=True)
+        for competitor, line in zip(computed.competitors, computed.board.lines, strict=True)
     )
     return snapshot
 
@@ -375,11 +377,11 @@ def _results(
         pairs=analysis.pairs(arrays.comparisons, votes.counted, planned),
         types=analysis.by_type(arrays, board),
         displacement=() if from_file else analysis.displacement(study),
-        cost=() if from_file else analysis.cost(study, votes.entrants),
+        cost=() if from_file else analysis.cost(study, votes.competitors),
         models={
-            entrant.slug: entrant.contestant.model
-            for entrant in votes.entrants
-            if entrant.contestant is not None
+            competitor.slug: competitor.contestant.model
+            for competitor in votes.competitors
+            if competitor.contestant is not None
         },
         judges={vote.judge: vote.judge_name for vote in votes.counted},
     )
