@@ -37,7 +37,7 @@ from augment.variants.respondents import (
     Sampling,
     Transcript,
 )
-from augment.variants.reviews import Limits, Submission, Verdict
+from augment.variants.reviews import Limits, ReviewedAnswer, Verdict
 
 LEFT_ALONE = "The modifier left the scene as it is and did not say why."
 READER_TOKENS = 4096
@@ -277,7 +277,7 @@ class _Work:
         """Return the verdict, or None and why there is none."""
         review = self.recipe.review
         assert review is not None
-        submission = Submission(
+        answer = ReviewedAnswer(
             ground=self.ground,
             instruction=self.instruction,
             modification=read.modification,
@@ -290,7 +290,7 @@ class _Work:
         head: dict[str, object] = {"round": len(rounds) + 1, "review": review.name}
         note = partial(self.respondents.transcript.note, NoteKind.REVIEW)
         try:
-            verdict = review.judge(submission)
+            verdict = review.judge(answer)
         except ReviewUnusable as unusable:
             note(head | {"unusable": unusable.reason})
             return None, str(unusable)

@@ -52,7 +52,7 @@ class Limits:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Submission:
+class ReviewedAnswer:
     """What is reviewed, and whom a review may ask.
 
     Attributes:
@@ -104,29 +104,29 @@ class Review:
 
     Attributes:
         name: As transcripts and the page on the method call it.
-        judge: From a submission to its verdict; raises ReviewUnusable where there is none.
+        judge: From a reviewed answer to its verdict; raises ReviewUnusable where there is none.
         asks: The roles of models in the order in which one review asks them.
         options: Names of the contestant's options that this review alone has a use for.
     """
 
     name: str
-    judge: Callable[[Submission], Verdict]
+    judge: Callable[[ReviewedAnswer], Verdict]
     asks: tuple[ModelRole, ...] = ()
     options: tuple[str, ...] = ()
 
 
-def review_text(submission: Submission) -> Verdict:
+def review_text(answer: ReviewedAnswer) -> Verdict:
     """Return the text reviewer's verdict; the mean of its ratings is computed here.
 
     Raises:
         ReviewUnusable: He declined, or neither his first nor his re-asked ratings can be read.
         ModelFault: The wire broke for good.
     """
-    accepted_from = submission.limits.accepted_from
-    messages = _review_messages(ModelRole.REVIEWER, submission)
+    accepted_from = answer.limits.accepted_from
+    messages = _review_messages(ModelRole.REVIEWER, answer)
     reader = partial(read_ratings, accepted_from=accepted_from)
     with _unusable("the reviewer"):
-        review, _, _ = submission.respondents.read(ModelRole.REVIEWER, messages, reader)
+        review, _, _ = answer.respondents.read(ModelRole.REVIEWER, messages, reader)
     ratings = review.ratings
     accepted = ratings.mean >= accepted_from
     return Verdict(
@@ -149,20 +149,18 @@ def review_text(submission: Submission) -> Verdict:
     )
 
 
-def review_picture(submission: Submission) -> Verdict:
+def review_picture(answer: ReviewedAnswer) -> Verdict:
     """Return the engineer's verdict on what the viewer sees.
 
     Raises:
         ReviewUnusable: One of the two declined or can't be read, not even asked once more.
         ModelFault: The wire broke for good.
     """
-    read = submission.respondents.read
-    messages = _review_messages(ModelRole.ENGINEER, submission)
+    read = answer.respondents.read
+    messages = _review_messages(ModelRole.ENGINEER, answer)
     with _unusable("a reviewer"):
         questions, asked, reply = read(ModelRole.ENGINEER, messages, read_questions)
-        shown = pictures(
-            submission.scene, submission.modification, width_px=submission.limits.picture_px
-        )
+        shown = pictures(answer.scene, answer.modification, width_px=answer.limits.picture_px)
         seen, _, _ = read(
             ModelRole.VIEWER,
             fill.viewer_messages(questions, shown),
@@ -188,18 +186,18 @@ def review_picture(submission: Submission) -> Verdict:
     )
 
 
-def review_geometry(submission: Submission) -> Verdict:
+def review_geometry(answer: ReviewedAnswer) -> Verdict:
     """Return what the checks make of a modification.
 
     Without an intent a doubtful finding may be just what was asked for: a modifier that keeps
     its modification in spite of doubts has the last word, in spite of what is wrong it has not.
     """
-    findings = check_against_intent(submission.ground, submission.modification, submission.intent)
+    findings = check_against_intent(answer.ground, answer.modification, answer.intent)
     wrong = [finding for finding in findings if finding.severity is Severity.WRONG]
     doubtful = [finding for finding in findings if finding.severity is Severity.DOUBTFUL]
-    insists = submission.modification == submission.earlier
+    insists = answer.modification == answer.earlier
     accepted = not wrong and (not doubtful or insists)
-    names = short_names(submission.scene)
+    names = short_names(answer.scene)
     known = names.agents | names.lanes
     return Verdict(
         is_accepted=accepted,
@@ -255,14 +253,14 @@ GEOMETRIC_REVIEW = Review(name="geometric", judge=review_geometry)
 # Private
 
 
-def _review_messages(role: ModelRole, submission: Submission) -> fill.Messages:
+def _review_messages(role: ModelRole, answer: ReviewedAnswer) -> fill.Messages:
     return fill.review_messages(
         role,
-        submission.scene,
-        submission.instruction,
-        submission.modification,
-        radius_m=submission.limits.radius_m,
-        earlier=submission.told,
+        answer.scene,
+        answer.instruction,
+        answer.modification,
+        radius_m=answer.limits.radius_m,
+        earlier=answer.told,
     )
 
 
