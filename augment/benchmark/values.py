@@ -1,0 +1,139 @@
+"""What a benchmark set and a submission are, as values."""
+
+from dataclasses import dataclass
+from datetime import date
+from enum import StrEnum
+
+from augment.metrics.displacement import Displacement
+from augment.scene.entities import Modification, Scene
+from augment.scene.recording import Recording
+
+
+class Split(StrEnum):
+    """Whether the reference of a task is handed out with it."""
+
+    PRACTICE = "practice"
+    TEST = "test"
+
+
+class Stratum(StrEnum):
+    """How much an instruction asks for; `strata.py` says where the limits lie."""
+
+    EASY = "easy"
+    MEDIUM = "medium"
+    HARD = "hard"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BenchmarkTask:
+    """One scenario as entrants get it. Frame: the ego frame of its scene.
+
+    Attributes:
+        name: The slug of the scenario.
+        type: The scenario's type, as a slug.
+        language: Of the instruction.
+        scene: Before the change, with the traffic that stays.
+        recording: What was recorded after t0, None where nothing was.
+        keeps_traffic: Whether the recorded vehicles stay.
+        paraphrase_of: The task that asks for the same in other words, empty for none.
+        reference: None where it is not known here: in a folder that was handed out, of all tasks
+            of the test split. An empty one says that the wish can't be met.
+    """
+
+    name: str
+    type: str
+    instruction: str
+    language: str
+    split: Split
+    stratum: Stratum
+    scene: Scene
+    recording: Recording | None = None
+    keeps_traffic: bool = True
+    paraphrase_of: str = ""
+    reference: Modification | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BenchmarkSet:
+    """Tasks of one version of a benchmark.
+
+    Attributes:
+        name: A slug; a version is a number from 1, and the two together never change.
+    """
+
+    name: str
+    title: str
+    version: int
+    made_on: date
+    tasks: tuple[BenchmarkTask, ...]
+
+
+class EntryStatus(StrEnum):
+    """What became of one task in a submission; all but READ count as a miss."""
+
+    READ = "read"
+    REFUSED = "refused"
+    UNREADABLE = "unreadable"
+    MISSING = "missing"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SubmissionCard:
+    """Who submits what: `card.json` of a submission.
+
+    Attributes:
+        models: Names of language or other models that were used, empty for none.
+        is_open: Whether code and weights are public.
+        samples: Per scenario.
+        cost_usd: Of the whole run, None where nobody knows.
+        made_on: When it was made.
+    """
+
+    name: str
+    authors: tuple[str, ...]
+    method: str
+    models: tuple[str, ...]
+    is_open: bool
+    samples: int
+    cost_usd: float | None
+    made_on: date
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SubmittedEntry:
+    """One task in one sample of a submission.
+
+    Attributes:
+        file: Its name in the folder, empty where it is missing.
+        reason: Why there is no modification, empty where it was read.
+        notes: What was lost or assumed in reading it; what could not be matched.
+        modification: In the frame of the task's scene.
+        displacement: From the reference, where that is known here and the entry counts.
+    """
+
+    task: str
+    sample: int
+    status: EntryStatus
+    file: str = ""
+    reason: str = ""
+    notes: tuple[str, ...] = ()
+    modification: Modification | None = None
+    displacement: Displacement | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SubmissionReport:
+    """All that is said of a submission; offline and by the server the same.
+
+    Attributes:
+        benchmark, version, checksum: Against which it was read.
+        entries: One for each task and sample, in the order of the tasks.
+        remarks: On the folder as a whole, such as files that belong to no task.
+    """
+
+    benchmark: str
+    version: int
+    checksum: str
+    card: SubmissionCard
+    entries: tuple[SubmittedEntry, ...]
+    remarks: tuple[str, ...] = ()
