@@ -72,24 +72,24 @@ def _draw_scenario(page: Page) -> None:
         "svg.getScreenCTM()); return [p.x, p.y]; }"
     )
     page.mouse.click(*at)
-    assert float(page.input_value("#n-x")) == pytest.approx(15.0, abs=0.1)
-    assert float(page.input_value("#n-y")) == pytest.approx(-0.5, abs=0.1)
+    assert float(page.input_value("#n-x_m")) == pytest.approx(15.0, abs=0.1)
+    assert float(page.input_value("#n-y_m")) == pytest.approx(-0.5, abs=0.1)
     # By keys and by the server's lane.
     stage.press("Shift+ArrowRight")
-    assert float(page.input_value("#n-x")) == pytest.approx(16.0, abs=0.1)
+    assert float(page.input_value("#n-x_m")) == pytest.approx(16.0, abs=0.1)
     page.get_by_role("button", name="Undo").click()
-    assert float(page.input_value("#n-x")) == pytest.approx(15.0, abs=0.1)
+    assert float(page.input_value("#n-x_m")) == pytest.approx(15.0, abs=0.1)
     page.get_by_role("button", name="Onto the centreline").click()
-    expect(page.locator("#n-y")).to_have_value(re.compile(r"^-?0(\.0\d*)?$"))
+    expect(page.locator("#n-y_m")).to_have_value(re.compile(r"^-?0(\.0\d*)?$"))
     # By dragging, and by its handle.
     car = stage.locator("[data-agent=Added1]")
     _drag(page, car, dx=40)
-    moved = float(page.input_value("#n-x"))
+    moved = float(page.input_value("#n-x_m"))
     assert moved > 16.0
     _drag(page, stage.locator("[data-handle=turn]"), dy=-60)
-    assert float(page.input_value("#n-h")) > 20.0
-    page.fill("#n-h", "0")
-    page.press("#n-h", "Enter")
+    assert float(page.input_value("#n-heading_deg")) > 20.0
+    page.fill("#n-heading_deg", "0")
+    page.press("#n-heading_deg", "Enter")
     expect(page.locator("[data-findings] li").first).to_be_visible()
     expect(page.locator("[data-statements]")).to_contain_text("in the own lane")
     page.locator("summary", has_text="Advanced").click()
@@ -159,7 +159,7 @@ def _correct(page: Page) -> None:
     page.wait_for_load_state("networkidle")
     page.locator("[data-pick=Added1]").click()
     stage.press("Shift+ArrowUp")
-    left = float(page.input_value("#n-y"))
+    left = float(page.input_value("#n-y_m"))
     page.fill("#notes", "too far right")
     page.get_by_role("button", name="Keep the correction").click()
     expect(page.get_by_text("Corrected by hand by ada")).to_be_visible()

@@ -61,7 +61,7 @@ class Desk:
 
     @property
     def y_m(self) -> float:
-        return float(self.page.input_value("#n-y"))
+        return float(self.page.input_value("#n-y_m"))
 
 
 @pytest.fixture
