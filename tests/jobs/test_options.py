@@ -96,7 +96,8 @@ TABLE: list[tuple[str, str, object, Callable[[Bodies], bool], Callable[[Bodies],
         "picture_px",
         "vqa",
         600,
-        lambda bodies: png_widths(bodies) == [600, 600],  # too small in the first: enlarged in another
+        # Too small in the first picture, what was changed is enlarged in another.
+        lambda bodies: png_widths(bodies) == [600, 600],
         lambda bodies: png_widths(bodies) == [1200],
     ),
 ]
