@@ -30,16 +30,9 @@ class Study(Coded):
     ask_strength = models.BooleanField(
         default=False, help_text="experts say whether a preference is slight or clear"
     )
-    allow_text = models.BooleanField(
-        default=False, help_text="experts may read what was changed, beside looking at it"
-    )
     allow_replay = models.BooleanField(
         default=False,
         help_text="experts may play drives under the pictures; `rules` says of which scenarios",
-    )
-    allow_measures = models.BooleanField(
-        default=False,
-        help_text="experts may lay lines of the instruction and distances to lane edges over both",
     )
     practice = models.BooleanField(
         default=False, help_text="experts practise on up to five pairs before their first one"
@@ -79,8 +72,8 @@ class Study(Coded):
 class Matchup(Coded):
     """One planned showing of two augmentations of one scenario to one expert.
 
-    Camera, pictures and descriptions are kept as they were when it was planned: a
-    scenario that is edited later does not change what was judged.
+    Camera and pictures are kept as they were when it was planned: a scenario that is edited later
+    does not change what was judged.
     """
 
     class Kind(models.TextChoices):
@@ -106,11 +99,6 @@ class Matchup(Coded):
     right_image = models.CharField(max_length=120, blank=True, help_text="name, as it was shown")
     view = models.JSONField(
         null=True, help_text="where metres lie in its pictures: px_per_m, ego_px, width, height"
-    )
-    descriptions = models.JSONField(
-        null=True,
-        help_text="what its pictures show, left and right, as augment.render.legend gives "
-        "it; null where the study has no text description",
     )
     kind = models.CharField(max_length=10, choices=Kind.choices, default=Kind.MAIN)
     repeat_of = models.OneToOneField(

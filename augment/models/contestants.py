@@ -62,7 +62,6 @@ class EndpointModel(models.Model):
     model_class = models.CharField(max_length=20, choices=ModelClass.choices, blank=True)
     native_tools = models.BooleanField(null=True, blank=True)
     vision = models.BooleanField(null=True, blank=True)
-    json_schema = models.BooleanField(null=True, blank=True)  # of earlier probes; unused
     temperature = models.BooleanField(null=True, blank=True, help_text="may be chosen")
     refused_parameters = models.JSONField(
         default=list, blank=True, help_text="what it answered 400 to and is not sent again"

@@ -104,7 +104,7 @@ def _list_votes(
         *("shown_left__contestant", "shown_right__contestant"),
     )
     unread = (
-        *("matchup__view", "matchup__descriptions", "matchup__scenario__reference"),
+        *("matchup__view", "matchup__scenario__reference"),
         *("matchup__scenario__intent", "shown_left__modification", "shown_right__modification"),
     )
     ties = [one for one in found if isinstance(one, Judged)]

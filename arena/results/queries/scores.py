@@ -78,7 +78,7 @@ def pictures_by_scenario(
             scores[key] = count.add_to(scores[key], contestant)
             shown[key] = max(shown[key], count.matchup)
     related = Matchup.objects.select_related("left__contestant", "right__contestant")
-    unread = ("left__modification", "right__modification", "descriptions")
+    unread = ("left__modification", "right__modification")
     matchups = related.defer(*unread).in_bulk(list(set(shown.values())))
     pictures: dict[int, dict[str, PictureShown]] = {scenario: {} for scenario in scenarios}
     for (scenario, contestant), pk in shown.items():

@@ -93,7 +93,7 @@ def _find_shown(token: str) -> tuple[Matchup | LabelTask | PracticePair | None, 
     """Return what a token belongs to, and the picture that it stands for."""
     is_token = Q(left_token=token) | Q(right_token=token)
     matchups = Matchup.objects.select_related("left", "right").defer(
-        "left__modification", "right__modification", "descriptions"
+        "left__modification", "right__modification"
     )
     if matchup := matchups.filter(is_token | Q(original_token=token)).first():
         sides = {matchup.original_token: "original", matchup.left_token: "left"}
