@@ -3,10 +3,16 @@
 from dataclasses import dataclass
 from datetime import date
 from enum import StrEnum
+from typing import Annotated
+
+from pydantic import BeforeValidator, Field
 
 from augment.metrics.displacement import Displacement
 from augment.scene.entities import Modification, Scene
 from augment.scene.recording import Recording
+from augment.scene.schema import CLOSED, Real, Text, Whole, Yes
+
+MOST_SAMPLES = 20
 
 
 class Split(StrEnum):
@@ -68,6 +74,16 @@ class BenchmarkSet:
     tasks: tuple[BenchmarkTask, ...]
 
 
+def _read_date(given: object) -> object:
+    if isinstance(given, str):
+        return date.fromisoformat(given)
+    raise ValueError("Input should be a date such as 2026-11-20")
+
+
+_Date = Annotated[date, BeforeValidator(_read_date)]
+_Name = Annotated[Text, Field(min_length=1, max_length=100, pattern=r"\S")]
+
+
 class EntryStatus(StrEnum):
     """What became of one task in a submission; all but READ count as a miss."""
 
@@ -89,14 +105,16 @@ class SubmissionCard:
         made_on: When it was made.
     """
 
-    name: str
-    authors: tuple[str, ...]
-    method: str
-    models: tuple[str, ...]
-    is_open: bool
-    samples: int
-    cost_usd: float | None
-    made_on: date
+    __pydantic_config__ = CLOSED
+
+    name: _Name
+    authors: Annotated[tuple[_Name, ...], Field(min_length=1, max_length=100)]
+    method: Annotated[Text, Field(min_length=1, max_length=4_000, pattern=r"\S")]
+    models: Annotated[tuple[_Name, ...], Field(max_length=100)]
+    is_open: Yes
+    samples: Annotated[Whole, Field(ge=1, le=MOST_SAMPLES)]
+    cost_usd: Annotated[Real, Field(ge=0.0, le=1e9)] | None = None
+    made_on: _Date
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -108,7 +126,8 @@ class SubmittedEntry:
         reason: Why there is no modification, empty where it was read.
         notes: What was lost or assumed in reading it; what could not be matched.
         modification: In the frame of the task's scene.
-        displacement: From the reference, where that is known here and the entry counts.
+        displacement: From the reference of a practice task; all of it is missing where nothing
+            was read. None for tasks of the test split, also where their references are known.
     """
 
     task: str
@@ -132,7 +151,7 @@ class SubmissionReport:
     """
 
     benchmark: str
-    version: int
+    version: Annotated[int, Field(alias="benchmark_version")]
     checksum: str
     card: SubmissionCard
     entries: tuple[SubmittedEntry, ...]
