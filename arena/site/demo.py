@@ -24,9 +24,10 @@ from augment.services.endpoints.contestants import (
     ensure_builtin,
 )
 from augment.services.endpoints.known_endpoints import EndpointRequest, ensure_endpoint
-from augment.services.running.choosing import ALL, resolve_contestants, resolve_scenarios
+from augment.services.running.choosing import resolve_contestants
 from augment.services.running.jobs import JobRequest, launch
 from augment.services.scenarios.catalogue import load_catalogue
+from augment.services.scenarios.choosing import ALL, resolve_scenarios
 
 STAND_IN = "stand-in"
 SIMULATED = (

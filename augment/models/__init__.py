@@ -4,6 +4,7 @@ Rows are the truth; a Celery message carries the key of a row. Every row that a 
 a URL has a random `code`; primary keys stay inside.
 """
 
+from augment.models.benchmarks import Benchmark, BenchmarkItem
 from augment.models.contestants import CallLease, Contestant, Endpoint, EndpointModel, Probe
 from augment.models.jobs import (
     Attempt,
@@ -33,6 +34,8 @@ __all__ = [
     "Attempt",
     "Augmentation",
     "BaseScene",
+    "Benchmark",
+    "BenchmarkItem",
     "CallLease",
     "Contestant",
     "Endpoint",

@@ -15,8 +15,8 @@ from augment.errors import Conflict, InvalidDocument, UnknownName
 from augment.models import Augmentation, BaseScene, Contestant, Event, GenerationJob, Scenario
 from augment.scene.codec import CatalogueEntry, entry_to_document, scene_to_document
 from augment.scene.entities import Modification, ScenarioType
-from augment.services.running.choosing import resolve_scenarios
 from augment.services.scenarios.catalogue import CatalogueReport, CatalogueStep, load_catalogue
+from augment.services.scenarios.choosing import resolve_scenarios
 from augment.services.scenarios.scene_imports import import_scene
 from augment.services.scenarios.scenes import add_scenario, reference_of
 from tests.fixtures.shelf import HARD

@@ -12,7 +12,7 @@ from arena.scenarios.queries import by_type
 from augment.models import BaseScene, GenerationJob, Scenario
 from augment.scene.codec import modification_to_document
 from augment.scene.entities import Modification
-from augment.services.running.choosing import resolve_scenarios
+from augment.services.scenarios.choosing import resolve_scenarios
 from augment.services.scenarios.pictures import draw_scenario, draw_scene
 from tests.jobs.rows import add_scenario
 from tests.scenes import cone

@@ -9,7 +9,8 @@ from arena.site.queries import usual_checks
 from arena.studies.services.opening import open_study, preregistration_sha256
 from arena.studies.services.plan import PLAN_INPUTS, SAMPLES, StudyPlan
 from augment.services.inputs import add_options
-from augment.services.running.choosing import resolve_contestants, resolve_scenarios
+from augment.services.running.choosing import resolve_contestants
+from augment.services.scenarios.choosing import resolve_scenarios
 from augment.services.terminal import TerminalCommand
 
 

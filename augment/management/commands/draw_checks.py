@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from augment.services.running.choosing import resolve_scenarios
+from augment.services.scenarios.choosing import resolve_scenarios
 from augment.services.scenarios.pictures import draw_checks
 from augment.services.terminal import TerminalCommand
 

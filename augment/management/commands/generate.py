@@ -13,11 +13,12 @@ from augment.services.endpoints.contestants import ensure_builtin
 from augment.services.inputs import add_options, inputs_of, read_request
 from augment.services.running import jobs
 from augment.services.running.budget import limit_of
-from augment.services.running.choosing import resolve_contestants, resolve_scenarios
+from augment.services.running.choosing import resolve_contestants
 from augment.services.running.estimates import ContestantEstimate, JobEstimate, estimate
 from augment.services.running.jobs import JobRequest
 from augment.services.running.progress import count_rows, failure_groups
 from augment.services.running.workers import workforce
+from augment.services.scenarios.choosing import resolve_scenarios
 from augment.services.terminal import TerminalCommand
 from augment.tasks import check_broker, enqueue_job
 

@@ -1,24 +1,21 @@
-"""What people mean when they name contestants, scenarios and jobs, and what no job can do."""
+"""What people mean when they name contestants and jobs, and what no job can do."""
 
-import fnmatch
 from collections.abc import Sequence
 from contextlib import suppress
 from uuid import UUID
 
-from django.db.models import Q, QuerySet
+from django.db.models import Q
 
 from augment.baselines.registry import PLACERS
 from augment.errors import AugmentError, Conflict, UnknownName
 from augment.models import Contestant, GenerationJob, Scenario
-from augment.scene.entities import CatalogueSet
 from augment.services.endpoints.known_endpoints import KEY_RULE, may_hold_key
 from augment.services.endpoints.treatments import options_of, other_prompts, respondents_of
+from augment.services.scenarios.choosing import ALL
 from augment.variants.options import ToolProtocol
 from augment.variants.respondents import ModelRole
 
 Kind = Contestant.Kind
-
-ALL, SET = "all", "set:"
 
 _KINDS = (Kind.REFERENCE, Kind.RULE, Kind.LLM, Kind.SIMULATED)
 
@@ -99,31 +96,6 @@ def resolve_contestants(given: Sequence[str]) -> list[str]:
     return list(given)
 
 
-def resolve_scenarios(given: Sequence[str]) -> list[str]:
-    """Return the slugs, each once; words that are no slugs stand for several.
-
-    `all`: every scenario; `catalogue`: the authored ones, `set:paper` or `set:hard` (or the name
-    alone): those of one set, all three without paraphrases; `paraphrases`: those of the
-    catalogue; with *, ? or [...]: every slug of that pattern. Only a slug or a pattern names
-    retired ones.
-
-    Raises:
-        UnknownName: There is no such scenario or set, or none of that pattern.
-    """
-    known = list(Scenario.objects.values_list("slug", flat=True))
-    slugs: list[str] = []
-    for word in given:
-        several = _several(word)
-        if several is None:
-            matching = fnmatch.filter(known, word)
-            if not matching:
-                raise UnknownName("scenario", word, sorted(known))
-            slugs += matching
-        else:
-            slugs += several.values_list("slug", flat=True)
-    return list(dict.fromkeys(slugs))
-
-
 def find_job(name_or_code: str) -> GenerationJob:
     """Return a job by its name or its code.
 
@@ -142,20 +114,3 @@ def find_job(name_or_code: str) -> GenerationJob:
         codes = ", ".join(str(job.code) for job in jobs)
         raise Conflict(f"{len(jobs)} jobs are called {name_or_code!r}; name one code: {codes}.")
     return jobs[0]
-
-
-def _several(word: str) -> QuerySet[Scenario] | None:
-    """Return the scenarios that a word other than a slug stands for."""
-    offered = Scenario.objects.filter(retired_at=None)
-    authored = offered.exclude(catalogue_set="")
-    name = word.removeprefix(SET)
-    if name in list(CatalogueSet):
-        return authored.filter(paraphrase_of=None, catalogue_set=name)
-    if word.startswith(SET):
-        raise UnknownName("set", name, [one.value for one in CatalogueSet])
-    meanings = {
-        ALL: offered,
-        "paraphrases": authored.exclude(paraphrase_of=None),
-        "catalogue": authored.filter(paraphrase_of=None),
-    }
-    return meanings.get(word)

@@ -1,0 +1,377 @@
+"""A benchmark set as a folder: what entrants get, and nothing more.
+
+In: a `BenchmarkSet`. Out: its files by name; and back from a folder on disk. References of the
+test split are in no file, and the checksum is that of what is handed out.
+"""
+
+import hashlib
+import json
+import stat
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import asdict, dataclass, replace
+from datetime import date
+from importlib import resources
+from pathlib import Path, PurePath
+from typing import Annotated, Any
+
+from pydantic import BeforeValidator, Field, TypeAdapter
+
+from augment.benchmark.values import BenchmarkSet, BenchmarkTask, Split, Stratum
+from augment.errors import InvalidDocument, InvalidModification
+from augment.formats.documents import MAX_BYTES, read_json
+from augment.formats.writers import WRITERS, writer_named
+from augment.formats.writing import Cell, Loss
+from augment.scene.codec import (
+    modification_from_document,
+    modification_to_document,
+    recording_from_document,
+    recording_to_document,
+    scene_from_document,
+    scene_to_document,
+)
+from augment.scene.entities import Modification, ScenarioType, check_fits
+from augment.scene.schema import CLOSED, Codec, Text, Whole, Yes, path
+
+WHAT = "benchmark"
+MANIFEST, LOSSES, README = "benchmark.json", "losses.json", "README.txt"
+SCENE, RECORDING, REFERENCE = "scene", "recording", "reference"
+OWN_PARTS = (SCENE, RECORDING, REFERENCE)
+"""The kinds of our own documents: `scenes/NAME.json`, `recordings/...`, `references/...`."""
+
+FORMATS = tuple(name for name in WRITERS if name != "json")
+"""What a scene is written in besides; each has a folder of that name."""
+
+MOST_TASKS = 2_000
+MOST_BYTES = 8 * MAX_BYTES
+"""Of all documents of a folder together."""
+
+
+def read_day(given: object) -> object:
+    """Return the day of a text such as 2026-11-26; what is a day already stays.
+
+    Raises:
+        ValueError: It is neither.
+    """
+    if isinstance(given, date):
+        return given
+    if not isinstance(given, str) or len(given) != len("2026-11-26"):
+        raise ValueError(f"expected a day such as 2026-11-26, got {str(given)[:40]!r}")
+    return date.fromisoformat(given)
+
+
+Day = Annotated[date, BeforeValidator(read_day)]
+_Slug = Annotated[Text, Field(max_length=80, pattern=r"^[a-z0-9]+(-[a-z0-9]+)*$")]
+_Line = Annotated[Text, Field(min_length=1, max_length=200)]
+_Type = Annotated[Text, Field(max_length=40, pattern=r"^[a-z0-9]+([_-][a-z0-9]+)*$")]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _TaskLine:
+    """A task as `benchmark.json` tells of it.
+
+    Attributes:
+        provenance: Of its scene.
+        files: Names in the folder, by kind of document and by format.
+    """
+
+    name: _Slug
+    instruction: Annotated[Text, Field(min_length=1, max_length=2_000)]
+    type: _Type
+    language: Annotated[Text, Field(pattern=r"^[a-z]{2}$")]
+    split: Split
+    stratum: Stratum
+    keeps_traffic: Yes
+    paraphrase_of: Annotated[Text, Field(max_length=80)] = ""
+    provenance: Text
+    files: dict[Text, tuple[Text, ...]]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Manifest:
+    """`benchmark.json`; `version` of its format, `set_version` of the benchmark."""
+
+    __pydantic_config__ = CLOSED
+
+    name: _Slug
+    title: _Line
+    set_version: Annotated[Whole, Field(ge=1)]
+    made_on: Day
+    checksum: Annotated[Text, Field(pattern=r"^([0-9a-f]{64})?$")]
+    tasks: Annotated[tuple[_TaskLine, ...], Field(min_length=1, max_length=MOST_TASKS)]
+
+
+def _manifest_problems(given: _Manifest) -> Iterator[tuple[str, str]]:
+    names = [task.name for task in given.tasks]
+    for place, task in enumerate(given.tasks):
+        if task.name in names[:place]:
+            yield path("tasks", place, "name"), f"{task.name!r} is there twice"
+        if task.paraphrase_of and task.paraphrase_of not in names:
+            where = path("tasks", place, "paraphrase_of")
+            yield where, f"{task.paraphrase_of!r} is no task of this benchmark"
+
+
+_CODEC = Codec(WHAT, TypeAdapter(_Manifest), _manifest_problems)
+
+
+# Out
+
+
+def checksum(benchmark: BenchmarkSet) -> str:
+    """Return the SHA-256 of what entrants get: all of `BenchmarkSet` but references of the test.
+
+    Files of other tools' formats are made of that and count no further.
+    """
+    digest = hashlib.sha256(_canonical(_CODEC.dump(_manifest_of(benchmark))))
+    for task in benchmark.tasks:
+        for kind, document in _documents_of(task).items():
+            digest.update(_canonical([task.name, kind, document]))
+    return digest.hexdigest()
+
+
+def write_folder(benchmark: BenchmarkSet) -> dict[str, bytes]:
+    """Return the files by their names in the folder; the same set gives the same bytes.
+
+    Raises:
+        InvalidDocument: A task breaks a rule of the format, or a practice task has no reference.
+    """
+    _check_practice(benchmark)
+    files: dict[str, bytes] = {}
+    named: dict[str, dict[str, tuple[str, ...]]] = {}
+    for task in benchmark.tasks:
+        documents = _documents_of(task)
+        files |= {_file_of(kind, task.name): _text(one) for kind, one in documents.items()}
+        named[task.name] = {kind: (_file_of(kind, task.name),) for kind in documents}
+    losses: list[dict[str, Any]] = []
+    cells = [_cell_of(benchmark, task) for task in benchmark.tasks]
+    for form in FORMATS:
+        written = writer_named(form)(cells)
+        files |= {f"{form}/{name}": content for name, content in written.files.items()}
+        refused = {loss.cell for loss in written.refused}
+        for name, own in _share_out(written.files, [*named.keys() - refused]).items():
+            named[name][form] = tuple(f"{form}/{one}" for one in own)
+        losses += _lines_of(form, written.losses, is_refused=False)
+        losses += _lines_of(form, written.refused, is_refused=True)
+    manifest = _manifest_of(benchmark)
+    lines = tuple(replace(line, files=named[line.name]) for line in manifest.tasks)
+    manifest = replace(manifest, checksum=checksum(benchmark), tasks=lines)
+    files[MANIFEST] = _text(_CODEC.to_document(manifest), indent=1)
+    files[LOSSES] = _text(losses, indent=1)
+    files[README] = _readme(benchmark, manifest.checksum)
+    return files
+
+
+# Back
+
+
+def read_folder(folder: Path) -> BenchmarkSet:
+    """Return the set that a folder holds, without references of its test split.
+
+    Raises:
+        InvalidDocument: A file is missing, a link, too large or breaks its format, a document
+            does not fit the others, or the checksum does not; each problem names file and place.
+    """
+    manifest = _CODEC.from_document(_read(folder, MANIFEST))
+    _check_size(folder, manifest)
+    tasks = tuple(_read_task(folder, line) for line in manifest.tasks)
+    benchmark = BenchmarkSet(
+        name=manifest.name,
+        title=manifest.title,
+        version=manifest.set_version,
+        made_on=manifest.made_on,
+        tasks=tasks,
+    )
+    found = checksum(benchmark)
+    if found != manifest.checksum:
+        text = f"{manifest.checksum!r} is not that of the folder, {found!r}: get it once more"
+        raise InvalidDocument(WHAT, [(f"{MANIFEST}: checksum", text)])
+    return benchmark
+
+
+def _read_task(folder: Path, line: _TaskLine) -> BenchmarkTask:
+    at = f"{MANIFEST}: tasks {line.name!r}"
+    needed = {SCENE} | ({REFERENCE} if line.split is Split.PRACTICE else set())
+    given = {kind for kind in OWN_PARTS if kind in line.files}
+    if given - {RECORDING} != needed:
+        text = f"of a {line.split} task expected {', '.join(sorted(needed))}, and a recording"
+        raise InvalidDocument(WHAT, [(f"{at}: files", f"{text} if there is one")])
+    documents: dict[str, Any] = {}
+    for kind in given:
+        name = _file_of(kind, line.name)
+        if line.files[kind] != (name,):
+            raise InvalidDocument(WHAT, [(f"{at}: files.{kind}", f"expected {name!r} alone")])
+        documents[kind] = _parse(_PARSERS[kind], _read(folder, name), name)
+    scene, reference = documents[SCENE], documents.get(REFERENCE)
+    if scene.provenance != line.provenance:
+        raise InvalidDocument(WHAT, [(f"{at}: provenance", "is not that of its scene")])
+    if reference is not None:
+        try:
+            check_fits(scene, reference)
+        except InvalidModification as fault:
+            place = _file_of(REFERENCE, line.name)
+            raise InvalidDocument(WHAT, [(place, str(fault))]) from None
+    return BenchmarkTask(
+        name=line.name,
+        type=line.type,
+        instruction=line.instruction,
+        language=line.language,
+        split=line.split,
+        stratum=line.stratum,
+        scene=scene,
+        recording=documents.get(RECORDING),
+        keeps_traffic=line.keeps_traffic,
+        paraphrase_of=line.paraphrase_of,
+        reference=reference,
+    )
+
+
+_PARSERS: dict[str, Any] = {
+    SCENE: scene_from_document,
+    RECORDING: recording_from_document,
+    REFERENCE: modification_from_document,
+}
+
+
+def _parse(parse: Any, document: object, name: str) -> Any:
+    try:
+        return parse(document)
+    except InvalidDocument as fault:
+        problems = [(f"{name}: {place}", text) for place, text in fault.problems]
+        raise InvalidDocument(WHAT, problems) from None
+
+
+def _read(folder: Path, name: str) -> object:
+    _size_of(folder, name)
+    return read_json(folder / name, what=WHAT)
+
+
+def _check_size(folder: Path, manifest: _Manifest) -> None:
+    kinds = [(kind, line.name) for line in manifest.tasks for kind in OWN_PARTS]
+    names = [_file_of(kind, name) for kind, name in kinds]
+    total = sum(_size_of(folder, name) for name in names if (folder / name).exists())
+    if total > MOST_BYTES:
+        raise InvalidDocument(WHAT, [("", f"{total} bytes; at most {MOST_BYTES} are read")])
+
+
+def _size_of(folder: Path, name: str) -> int:
+    """Return the size of a plain file that lies in the folder itself.
+
+    Raises:
+        InvalidDocument: It is missing, a link or special, or lies behind a link.
+    """
+    try:
+        if (folder / name).parent.resolve() != folder.resolve() / Path(name).parent:
+            raise InvalidDocument(WHAT, [(name, "lies behind a link; only plain files are read")])
+        found = (folder / name).lstat()
+    except OSError as fault:
+        raise InvalidDocument(WHAT, [(name, fault.strerror or "can't be read")]) from None
+    if not stat.S_ISREG(found.st_mode):
+        raise InvalidDocument(WHAT, [(name, "is a link or special; only plain files are read")])
+    return found.st_size
+
+
+# What both share
+
+
+def _file_of(kind: str, name: str) -> str:
+    return f"{kind}s/{name}.json"
+
+
+def _documents_of(task: BenchmarkTask) -> dict[str, Any]:
+    """Return the own documents of a task that are handed out, by their kinds."""
+    documents = {SCENE: scene_to_document(task.scene)}
+    if task.recording is not None:
+        documents[RECORDING] = recording_to_document(task.recording)
+    if task.split is Split.PRACTICE and task.reference is not None:
+        documents[REFERENCE] = modification_to_document(task.reference)
+    return documents
+
+
+def _manifest_of(benchmark: BenchmarkSet) -> _Manifest:
+    """Return `benchmark.json` without the names of files and without the checksum."""
+    return _Manifest(
+        name=benchmark.name,
+        title=benchmark.title,
+        set_version=benchmark.version,
+        made_on=benchmark.made_on,
+        checksum="",
+        tasks=tuple(
+            _TaskLine(
+                name=task.name,
+                instruction=task.instruction,
+                type=task.type,
+                language=task.language,
+                split=task.split,
+                stratum=task.stratum,
+                keeps_traffic=task.keeps_traffic,
+                paraphrase_of=task.paraphrase_of,
+                provenance=task.scene.provenance,
+                files={},
+            )
+            for task in benchmark.tasks
+        ),
+    )
+
+
+def _check_practice(benchmark: BenchmarkSet) -> None:
+    problems = [
+        (task.name, "is for practice and has no reference to hand out")
+        for task in benchmark.tasks
+        if task.split is Split.PRACTICE and task.reference is None
+    ]
+    if problems:
+        raise InvalidDocument(WHAT, problems)
+
+
+def _cell_of(benchmark: BenchmarkSet, task: BenchmarkTask) -> Cell:
+    """Return the scene as it is, before anybody changes it."""
+    return Cell(
+        name=task.name,
+        stem=task.name,
+        scene=task.scene,
+        type=ScenarioType(task.type) if task.type in list(ScenarioType) else None,
+        modification=Modification(),
+        keeps_traffic=task.keeps_traffic,
+        made_on=benchmark.made_on,
+        recording=task.recording,
+    )
+
+
+def _share_out(files: Iterable[str], tasks: Sequence[str]) -> dict[str, list[str]]:
+    """Return the files of each task: those that end with its name, and those of all tasks."""
+    by_length = sorted(tasks, key=len, reverse=True)
+    shared: dict[str, list[str]] = {name: [] for name in tasks}
+    for file in sorted(files):
+        stem = PurePath(file).stem
+        owner = next((name for name in by_length if stem.endswith(name)), None)
+        for name in tasks if owner is None else [owner]:
+            shared[name].append(file)
+    return shared
+
+
+def _lines_of(form: str, losses: tuple[Loss, ...], *, is_refused: bool) -> list[dict[str, Any]]:
+    return [{"format": form, "is_refused": is_refused} | asdict(loss) for loss in losses]
+
+
+def _readme(benchmark: BenchmarkSet, digest: str) -> bytes:
+    text = resources.files(__package__).joinpath("readme.txt").read_text("utf-8")
+    splits = [task.split for task in benchmark.tasks]
+    return text.format(
+        title=benchmark.title,
+        name=benchmark.name,
+        version=benchmark.version,
+        checksum=digest,
+        tasks=len(splits),
+        practice=splits.count(Split.PRACTICE),
+        test=splits.count(Split.TEST),
+        formats=", ".join(FORMATS),
+    ).encode()
+
+
+def _canonical(document: Any) -> bytes:
+    text = json.dumps(document, sort_keys=True, separators=(",", ":"), allow_nan=False)
+    return text.encode() + b"\n"
+
+
+def _text(document: Any, indent: int | None = None) -> bytes:
+    text = json.dumps(document, indent=indent, ensure_ascii=False, allow_nan=False)
+    return f"{text}\n".encode()

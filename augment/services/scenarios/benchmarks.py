@@ -1,0 +1,253 @@
+"""Benchmark sets: made of scenarios, version by version, and read as values.
+
+A version is what its scenarios were when it was made. While it is not retired, what it hands out
+of them stays; rows that changed nevertheless no longer fit its checksum, and whoever asks is told.
+"""
+
+import json
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import Any
+from uuid import UUID
+
+import numpy as np
+from django.contrib.auth.models import User
+from django.db import transaction
+from django.db.models import Max, prefetch_related_objects
+from django.utils import timezone
+
+from augment.benchmark.folder import MOST_TASKS, checksum
+from augment.benchmark.folder import write_folder as write_folder
+from augment.benchmark.strata import SplitCandidate, choose_strata, measure_task, split_tasks
+from augment.benchmark.values import BenchmarkSet, BenchmarkTask
+from augment.benchmark.values import Split as Split
+from augment.benchmark.values import Stratum as Stratum
+from augment.errors import Conflict, UnknownName
+from augment.models import Benchmark, BenchmarkItem, Scenario
+from augment.scene.codec import recording_from_document
+from augment.services.events import log_change
+from augment.services.inputs import InputKind, check_bounds, input_field
+from augment.services.scenarios import scenes
+from augment.services.scenarios.choosing import resolve_scenarios
+from augment.services.texts import one_line
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BenchmarkRequest:
+    """A new version of a benchmark, the first one where its name is new."""
+
+    slug: str = input_field(
+        InputKind.TEXT,
+        "Name",
+        "Lower-case letters, digits and hyphens; a name that is there gets its next version.",
+        most=scenes.SLUG_LENGTH,
+    )
+    title: str = input_field(InputKind.TEXT, "Title", "In words, for a table's head.", most=120)
+    scenarios: Sequence[str] = input_field(
+        InputKind.NAMES,
+        "Scenarios",
+        "Slugs, patterns such as interplan-*, or set:paper, set:hard, paraphrases, all.",
+    )
+    practice: float = input_field(
+        InputKind.NUMBER,
+        "Practice",
+        "The share of tasks whose references are handed out.",
+        default=20.0,
+        unit="%",
+        least=0,
+        most=90,
+    )
+    seed: int = input_field(
+        InputKind.WHOLE,
+        "Seed",
+        "Which tasks are for practice.",
+        default=1,
+        least=0,
+        most=2**31 - 1,
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PlannedItem:
+    """A scenario with its place in a benchmark."""
+
+    scenario: Scenario
+    split: Split
+    stratum: Stratum
+
+
+def plan_benchmark(request: BenchmarkRequest) -> list[PlannedItem]:
+    """Return the tasks of a benchmark that would be made now, in their order.
+
+    Raises:
+        UnknownName: There is no such scenario or set.
+        InvalidDocument: A number is out of its bounds.
+        Conflict: There are none, or too many.
+    """
+    check_bounds(request)
+    slugs = resolve_scenarios(request.scenarios)
+    if not 1 <= len(slugs) <= MOST_TASKS:
+        text = f"A benchmark holds 1 to {MOST_TASKS} scenarios, and these are {len(slugs)}."
+        raise Conflict(text)
+    found = Scenario.objects.select_related("paraphrase_of").in_bulk(slugs, field_name="slug")
+    rows = [found[slug] for slug in slugs]
+    sizes = {
+        row.slug: measure_task(scenes.intent_of(row), scenes.reference_of(row)) for row in rows
+    }
+    strata = choose_strata(sizes)
+    splits = split_tasks(
+        [_candidate(row, strata[row.slug]) for row in rows],
+        share=request.practice / 100.0,
+        rng=np.random.default_rng(request.seed),
+    )
+    return [
+        PlannedItem(scenario=row, split=splits[row.slug], stratum=strata[row.slug]) for row in rows
+    ]
+
+
+def _candidate(row: Scenario, stratum: Stratum) -> SplitCandidate:
+    """Return a scenario with all that would give its reference away if another one were known."""
+    shared = [f"original {row.paraphrase_of_id or row.pk}"]
+    if row.intent is not None:
+        shared.append(json.dumps(["intent", row.intent], sort_keys=True))
+    reference = scenes.reference_of(row)
+    if reference is not None and not reference.is_empty:
+        shared.append(json.dumps([row.base_scene_id, row.reference], sort_keys=True))
+    return SplitCandidate(
+        name=row.slug,
+        stratum=stratum,
+        type=row.type,
+        shared=shared,
+        has_reference=reference is not None,
+    )
+
+
+@transaction.atomic
+def make_benchmark(request: BenchmarkRequest, actor: User | None = None) -> Benchmark:
+    """Keep a benchmark as its next version.
+
+    Raises:
+        UnknownName: There is no such scenario or set.
+        InvalidDocument: Name, title or a number break their rules.
+        Conflict: There are no scenarios, or too many.
+    """
+    scenes.check_slug(request.slug, what="benchmark")
+    title = one_line("title", request.title, what="benchmark")
+    # Locked as whoever changes a scenario locks it: none changes until the checksum is kept.
+    chosen = Scenario.objects.filter(slug__in=resolve_scenarios(request.scenarios))
+    list(chosen.order_by("pk").select_for_update(of=("self",)).only("pk"))
+    planned = plan_benchmark(request)
+    prefetch_related_objects([one.scenario for one in planned], "base_scene")
+    last = Benchmark.objects.filter(slug=request.slug).aggregate(last=Max("version"))["last"]
+    row = Benchmark(
+        slug=request.slug,
+        title=title,
+        version=(last or 0) + 1,
+        made_on=timezone.now().date(),
+        made_by=actor,
+    )
+    row.checksum = checksum(_set_of(row, planned))
+    row.save()
+    BenchmarkItem.objects.bulk_create(
+        BenchmarkItem(
+            benchmark=row,
+            scenario=one.scenario,
+            position=position,
+            split=one.split,
+            stratum=one.stratum,
+        )
+        for position, one in enumerate(planned, start=1)
+    )
+    after = {"benchmark": str(row), "tasks": len(planned), "checksum": row.checksum}
+    log_change(row, "make", actor, after=after)
+    return row
+
+
+def benchmark_set(row: Benchmark) -> BenchmarkSet:
+    """Return all of a benchmark, with every reference that is known: for the server alone.
+
+    Raises:
+        Conflict: Scenarios have changed since it was made.
+    """
+    items = row.items.select_related("scenario__base_scene", "scenario__paraphrase_of")
+    found = _set_of(
+        row,
+        [
+            PlannedItem(
+                scenario=item.scenario, split=Split(item.split), stratum=Stratum(item.stratum)
+            )
+            for item in items
+        ],
+    )
+    if checksum(found) != row.checksum:
+        raise Conflict(
+            f"Scenarios of the benchmark {row} have changed since it was made, so that its "
+            "checksum no longer fits. Bring them back as they were, or make a new version."
+        )
+    return found
+
+
+def find_benchmark(name_or_code: str) -> Benchmark:
+    """Return a benchmark by `hard` (its newest version that is not retired), `hard@2` or a code.
+
+    Raises:
+        UnknownName: There is none.
+    """
+    slug, _, version = name_or_code.partition("@")
+    wanted: dict[str, Any] = {"slug": slug}
+    if version.isdecimal():
+        wanted["version"] = int(version)
+    elif version:
+        wanted = {"pk": None}
+    else:
+        wanted["retired_at"] = None
+    with suppress(ValueError):  # most names are not codes
+        wanted = {"code": UUID(name_or_code)}
+    row = Benchmark.objects.filter(**wanted).order_by("-version").first()
+    if row is None:
+        raise UnknownName("benchmark", name_or_code, list(map(str, Benchmark.objects.all())))
+    return row
+
+
+def refuse_handed_out(scenario: Scenario) -> None:
+    """Do nothing for a scenario that no benchmark hands out.
+
+    Raises:
+        Conflict: One that is not retired does.
+    """
+    row = Benchmark.objects.filter(items__scenario=scenario, retired_at=None).first()
+    if row is not None:
+        raise Conflict(
+            f"“{scenario.slug}” is handed out in the benchmark {row} and stays as it is: "
+            "add another scenario with what you want to change, or retire the benchmark first."
+        )
+
+
+def _set_of(row: Benchmark, planned: Sequence[PlannedItem]) -> BenchmarkSet:
+    names = {one.scenario.slug for one in planned}
+    return BenchmarkSet(
+        name=row.slug,
+        title=row.title,
+        version=row.version,
+        made_on=row.made_on,
+        tasks=tuple(_task_of(one, names) for one in planned),
+    )
+
+
+def _task_of(one: PlannedItem, names: set[str]) -> BenchmarkTask:
+    row, recording = one.scenario, one.scenario.base_scene.recording
+    original = "" if row.paraphrase_of is None else row.paraphrase_of.slug
+    return BenchmarkTask(
+        name=row.slug,
+        type=row.type,
+        instruction=row.instruction,
+        language=row.language,
+        split=one.split,
+        stratum=one.stratum,
+        scene=scenes.scene_of(row),
+        recording=None if recording is None else recording_from_document(recording),
+        keeps_traffic=row.keep_traffic,
+        paraphrase_of=original if original in names else "",
+        reference=scenes.reference_of(row),
+    )

@@ -1,0 +1,54 @@
+"""What people mean when they name scenarios."""
+
+import fnmatch
+from collections.abc import Sequence
+
+from django.db.models import QuerySet
+
+from augment.errors import UnknownName
+from augment.models import Scenario
+from augment.scene.entities import CatalogueSet
+
+ALL, SET = "all", "set:"
+
+
+def resolve_scenarios(given: Sequence[str]) -> list[str]:
+    """Return the slugs, each once; words that are no slugs stand for several.
+
+    `all`: every scenario; `catalogue`: the authored ones, `set:paper` or `set:hard` (or the name
+    alone): those of one set, all three without paraphrases; `paraphrases`: those of the
+    catalogue; with *, ? or [...]: every slug of that pattern. Only a slug or a pattern names
+    retired ones.
+
+    Raises:
+        UnknownName: There is no such scenario or set, or none of that pattern.
+    """
+    known = list(Scenario.objects.values_list("slug", flat=True))
+    slugs: list[str] = []
+    for word in given:
+        several = _several(word)
+        if several is None:
+            matching = fnmatch.filter(known, word)
+            if not matching:
+                raise UnknownName("scenario", word, sorted(known))
+            slugs += matching
+        else:
+            slugs += several.values_list("slug", flat=True)
+    return list(dict.fromkeys(slugs))
+
+
+def _several(word: str) -> QuerySet[Scenario] | None:
+    """Return the scenarios that a word other than a slug stands for."""
+    offered = Scenario.objects.filter(retired_at=None)
+    authored = offered.exclude(catalogue_set="")
+    name = word.removeprefix(SET)
+    if name in list(CatalogueSet):
+        return authored.filter(paraphrase_of=None, catalogue_set=name)
+    if word.startswith(SET):
+        raise UnknownName("set", name, [one.value for one in CatalogueSet])
+    meanings = {
+        ALL: offered,
+        "paraphrases": authored.exclude(paraphrase_of=None),
+        "catalogue": authored.filter(paraphrase_of=None),
+    }
+    return meanings.get(word)
