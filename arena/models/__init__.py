@@ -26,6 +26,7 @@ from arena.models.votes import (
     FaultLabel,
     LabellingRound,
     LabelTask,
+    Question,
     Report,
     Vote,
 )
@@ -46,6 +47,7 @@ __all__ = [
     "Matchup",
     "Person",
     "PracticePair",
+    "Question",
     "Report",
     "ScenarioFile",
     "SharedRating",

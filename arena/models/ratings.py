@@ -11,6 +11,7 @@ from django.db.models import F, Q
 
 from arena.models.people import fresh_token
 from arena.models.studies import Study
+from arena.models.votes import Question
 from arena.rating.lines import Line
 from arena.rating.snapshot_document import Results, read_results, results_document
 from augment.models import AppendOnly, Contestant, Work, account_column
@@ -100,6 +101,11 @@ class Snapshot(Work):
                 name="snapshot_progress_is_percent", condition=Q(progress__lte=100)
             ),
         )
+
+    @property
+    def question(self) -> str:
+        """What was asked in the votes that it rates; older ones know of one question."""
+        return str(self.filters.get("question", Question.INSTRUCTION))
 
 
 class Standing(models.Model):

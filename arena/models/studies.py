@@ -9,6 +9,11 @@ from arena.pairing import order
 from augment.models import Augmentation, Contestant, Scenario
 
 
+def one_question() -> list[str]:
+    """Return what a study asks about each pair unless it says otherwise."""
+    return ["instruction"]
+
+
 class Study(Coded):
     """What experts vote on; its rules are fixed when it opens. A StudyDraft comes before it."""
 
@@ -24,6 +29,11 @@ class Study(Coded):
     experts = models.ManyToManyField(settings.AUTH_USER_MODEL, related_name="studies")
     votes_per_expert = models.PositiveIntegerField()
     seed = models.BigIntegerField()
+    questions = models.JSONField(
+        default=one_question,
+        help_text="what is asked about each pair: one to three keys of Question in their order, "
+        "the primary one first",
+    )
     allow_both_miss = models.BooleanField(
         default=False, help_text="experts may add to Equal that both miss the instruction"
     )

@@ -34,10 +34,21 @@ OUTCOME_LETTERS = {"left": "A", "equal": "E", "right": "B", "skip": "skip"}
 """What an expert presses and the wire says: the left picture is A."""
 
 
+class Question(models.TextChoices):
+    """What may be asked about a pair; a study asks one to three of them, the primary one first."""
+
+    INSTRUCTION = "instruction", _("Which image carries out the instruction better?")
+    REALISM = "realism", _("Which image is more realistic?")
+    DIFFICULTY = "difficulty", _("Which image is harder for a planner?")
+
+
 class Vote(AppendOnly):
     """What the expert decided. Append-only: a change is a new row that supersedes the old one.
 
-    A skip is a decision as well: it says why there is none, and is never rated.
+    Each question of a study has a vote of its own, given in their order.
+
+    A skip is a decision as well: it says why there is none, and is never rated. It is of the
+    primary question, ends the pair, and leaves out what was answered to the others.
 
     What was shown on which side is copied here, so that the database itself can check that the
     winner was shown.
@@ -67,6 +78,9 @@ class Vote(AppendOnly):
     )
     shown_left = models.ForeignKey(Augmentation, on_delete=models.PROTECT, related_name="+")
     shown_right = models.ForeignKey(Augmentation, on_delete=models.PROTECT, related_name="+")
+    question = models.CharField(
+        max_length=20, choices=Question.choices, default=Question.INSTRUCTION
+    )
     outcome = models.CharField(max_length=10, choices=Outcome.choices)
     both_miss = models.BooleanField(
         default=False, help_text="equal, and both miss the instruction; counts as a tie"
@@ -92,7 +106,9 @@ class Vote(AppendOnly):
     )
     is_simulated = models.BooleanField(default=False)
     ms_visible = models.PositiveIntegerField(
-        null=True, blank=True, help_text="how long the pair was on screen, null if not measured"
+        null=True,
+        blank=True,
+        help_text="how long the pair was on screen until the answer, null if not measured",
     )
     at = models.DateTimeField(auto_now_add=True)
 
@@ -100,8 +116,8 @@ class Vote(AppendOnly):
         ordering = ("at", "pk")
         constraints = (
             models.UniqueConstraint(
-                name="one_first_vote_per_matchup",
-                fields=("matchup",),
+                name="one_first_vote_per_question",
+                fields=("matchup", "question"),
                 condition=Q(supersedes=None),
             ),
             models.CheckConstraint(
@@ -109,6 +125,10 @@ class Vote(AppendOnly):
                 condition=Q(outcome="left", winner=F("shown_left"), winner__isnull=False)
                 | Q(outcome="right", winner=F("shown_right"), winner__isnull=False)
                 | Q(outcome__in=["equal", "skip"], winner=None),
+            ),
+            models.CheckConstraint(
+                name="vote_question_is_known",
+                condition=Q(question__in=["instruction", "realism", "difficulty"]),
             ),
             models.CheckConstraint(
                 name="vote_both_miss_only_when_equal",

@@ -13,7 +13,7 @@ from arena.jobs.services import NOTE_LENGTH
 from arena.models import FaultLabel, Matchup, Report, Snapshot, Study, Vote
 from arena.rating.rules import Intervals, Method, Unit
 from arena.studies.services.experts import Complaint, check_complaint
-from arena.studies.services.opening import check_seed
+from arena.studies.services.opening import check_questions, check_seed
 from arena.studies.services.planning import rules_of
 from arena.voting.services.casting import decision_of
 from augment.errors import AugmentError
@@ -37,6 +37,7 @@ def check_row(row: models.Model) -> None:
         case Study():
             one_line("name", row.name, what="study")
             check_seed(row.seed)
+            check_questions(row.questions)
             if row.rules:  # those of imported votes have none
                 rules_of(row)
         case Matchup():
@@ -80,7 +81,9 @@ def check_votes() -> None:
     votes = Vote.objects.order_by("pk")
     strangers = votes.exclude(
         expert=F("matchup__expert"), shown_left=F("matchup__left"), shown_right=F("matchup__right")
-    ) | votes.exclude(supersedes=None).exclude(supersedes__matchup=F("matchup"))
+    ) | votes.exclude(supersedes=None).exclude(
+        supersedes__matchup=F("matchup"), supersedes__question=F("question")
+    )
     if vote := strangers.first():
         raise ArenaError(f"arena.vote, row {vote.pk}: it is not on what its expert was shown.")
     pairs = Matchup.objects.exclude(left__scenario=F("scenario"), right__scenario=F("scenario"))

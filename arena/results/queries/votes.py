@@ -5,15 +5,15 @@ Votes of a study and votes of a file look alike from here on.
 
 from collections import Counter
 from collections.abc import Collection, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from enum import StrEnum
 from typing import Any, NamedTuple, Self, TypeVar, cast
 
-from django.db.models import Case, F, Max, Model, Q, QuerySet, Value, When
+from django.db.models import Case, Exists, F, Max, Model, OuterRef, Q, QuerySet, Value, When
 from django.db.models.fields import CharField
 
-from arena.models import ImportedVote, Person, Snapshot, Study, Vote
+from arena.models import ImportedVote, Person, Question, Snapshot, Study, Vote
 from arena.pairing.order import CHECK, MAIN, REPEAT
 from arena.pairing.rules import Entry, draw_ties, grid_of, scenario_of
 from augment.errors import UnknownName
@@ -85,6 +85,7 @@ class Judged(NamedTuple):
         aids: What the expert looked with, joined by blanks.
         left_code, right_code: The augmentations that were shown.
         strength: slightly or clearly better.
+        question: What was asked.
     """
 
     judge: str
@@ -108,6 +109,7 @@ class Judged(NamedTuple):
     left_code: str = ""
     right_code: str = ""
     strength: str = ""
+    question: str = Question.INSTRUCTION.value
 
     @property
     def winner(self) -> str | None:
@@ -141,6 +143,7 @@ class Filters:
         leave_out_own: Whether votes of authors on their own contestants do not count.
         authors: Who was marked author of what when the votes were frozen, codes of judges with
             slugs of contestants. They are known also where their votes count.
+        question: What was asked; empty is the study's primary question.
     """
 
     types: tuple[str, ...] = ()
@@ -149,6 +152,7 @@ class Filters:
     leave_out_settled: bool = False
     leave_out_own: bool = False
     authors: frozenset[tuple[str, str]] = frozenset()
+    question: str = ""
 
     def is_own(self, judge: str, left: str, right: str) -> bool:
         """Whether a judge is marked author of one of the two."""
@@ -163,11 +167,15 @@ class Filters:
             "leave_out_settled": self.leave_out_settled,
             "leave_out_own": self.leave_out_own,
             "authors": [list(pair) for pair in sorted(self.authors)],
+            "question": self.question,
         }
 
     @classmethod
     def of_document(cls, document: dict[str, Any]) -> Self:
-        """What `as_document` wrote; older snapshots left settled pairs out."""
+        """What `as_document` wrote.
+
+        Older snapshots left settled pairs out, and were made when studies asked one question.
+        """
         return cls(
             types=tuple(document.get("types", ())),
             experts=tuple(document.get("experts", ())),
@@ -175,6 +183,7 @@ class Filters:
             leave_out_settled=bool(document.get("leave_out_settled", True)),
             leave_out_own=bool(document.get("leave_out_own", False)),
             authors=frozenset((judge, slug) for judge, slug in document.get("authors", ())),
+            question=str(document.get("question", Question.INSTRUCTION)),
         )
 
 
@@ -186,7 +195,8 @@ class VoteSet:
         competitors: By slug.
         counted: The votes that count.
         repeats: Decided hidden repeats, whether they count or not.
-        checks: Votes on attention checks, and `references` who should win them.
+        checks: Votes on attention checks by the primary question, and `references` who should win
+            them.
         left_out: How many votes do not count, by reason.
     """
 
@@ -218,18 +228,21 @@ def vote_set(study: Study, *, filters: Filters, last: int | None) -> VoteSet:
     """The votes of a study up to a row, see `last_vote_of`; None for none at all.
 
     Raises:
-        UnknownName: A filter names a type, a judge or a kind that does not occur.
+        UnknownName: A filter names a type, a judge, a kind or a question that does not occur.
     """
     votes = current_votes(study, filters, last)
     given = len(votes)
     if not filters.leave_out_settled:
         votes += settled_ties(study, votes, filters)
-    _check_names(filters, votes)
+    _check_names(study, filters, votes)
     left_out = Counter(vote.mark for vote in votes if vote.mark != COUNTED)
     if not is_imported(study):
-        everything = Vote.objects.filter(matchup__study=study, pk__lte=last or 0).count()
+        everything = _votes_asked(study, filters, last).count()
         left_out[LeftOut.SUPERSEDED.value] = everything - given
-    checks = tuple(vote for vote in votes if vote.mark == LeftOut.CHECK)
+    primary = votes
+    if question_of(study, filters) != study.questions[0]:
+        primary = current_votes(study, replace(filters, question=""), last)
+    checks = tuple(vote for vote in primary if vote.mark == LeftOut.CHECK)
     references = Contestant.objects.filter(kind=Contestant.Kind.REFERENCE)
     return VoteSet(
         competitors=_competitors(study, votes),
@@ -239,6 +252,11 @@ def vote_set(study: Study, *, filters: Filters, last: int | None) -> VoteSet:
         references=frozenset(references.values_list("slug", flat=True) if checks else ()),
         left_out={reason: number for reason, number in sorted(left_out.items()) if number},
     )
+
+
+def question_of(study: Study, filters: Filters) -> str:
+    """The question whose votes are asked for."""
+    return filters.question or str(study.questions[0])
 
 
 def current_votes(study: Study, filters: Filters, last: int | None) -> list[Judged]:
@@ -269,7 +287,7 @@ def current_votes(study: Study, filters: Filters, last: int | None) -> list[Judg
         *("shown_left__contestant__slug", "shown_right__contestant__slug"),
         *("outcome", "both_miss", "is_simulated", F("mark"), "ms_visible"),
         *("matchup", "matchup__repeat_of", "at", "matchup__position", "aids", "comment"),
-        *("shown_left__code", "shown_right__code", "strength"),
+        *("shown_left__code", "shown_right__code", "strength", "question"),
     )
     current = rows.exclude(Q(mark=LeftOut.SUPERSEDED.value)).order_by("pk")
     return [
@@ -322,6 +340,7 @@ def settled_ties(study: Study, votes: Iterable[Judged], filters: Filters) -> lis
             outcome=Vote.Outcome.EQUAL.value,
             both_miss=False,
             is_simulated=first.is_simulated,
+            question=question_of(study, filters),
         )
         is_asked_for = (
             MAIN in filters.kinds
@@ -399,11 +418,12 @@ def _competitors(study: Study, votes: Iterable[Judged]) -> tuple[Competitor, ...
     )
 
 
-def _check_names(filters: Filters, votes: Sequence[Judged]) -> None:
+def _check_names(study: Study, filters: Filters, votes: Sequence[Judged]) -> None:
     judges = {vote.judge for vote in votes}
     types = {*(one.value for one in ScenarioType), *(vote.type for vote in votes)}
     for what, names, known in (
         ("kind of vote", filters.kinds, list(KINDS)),
+        ("question of this study", (question_of(study, filters),), study.questions),
         ("scenario type", filters.types, sorted(types)),
         ("expert", filters.experts, sorted(judges)),
     ):
@@ -420,6 +440,8 @@ def _mark_votes(study: Study, filters: Filters, last: int | None) -> QuerySet[Vo
     if REPEAT not in filters.kinds:
         reasons.append((LeftOut.REPEAT, Q(matchup__kind=REPEAT)))
     reasons.append((LeftOut.SKIP, ~Q(outcome__in=RATED)))
+    if question_of(study, filters) != study.questions[0]:
+        reasons.append((LeftOut.SKIP, Q(_skip_of_pair(last))))
     if not study.allow_simulated:
         reasons.append((LeftOut.SIMULATED, Q(is_simulated=True)))
         simulated = study.contestants.filter(kind=Contestant.Kind.SIMULATED)
@@ -435,8 +457,20 @@ def _mark_votes(study: Study, filters: Filters, last: int | None) -> QuerySet[Vo
         reasons.append((LeftOut.FILTERED, Q(matchup__kind=MAIN)))
     if filters.leave_out_own and filters.authors:
         reasons.append((LeftOut.OWN, own_votes(filters)))
+    return _with_mark(_votes_asked(study, filters, last), reasons)
+
+
+def _votes_asked(study: Study, filters: Filters, last: int | None) -> QuerySet[Vote]:
     rows = Vote.objects.filter(matchup__study=study, pk__lte=last or 0)
-    return _with_mark(rows, reasons)
+    return rows.filter(question=question_of(study, filters))
+
+
+def _skip_of_pair(last: int | None) -> Exists:
+    """Whether the pair was skipped whole after an answer to another question."""
+    skips = Vote.objects.filter(
+        matchup=OuterRef("matchup"), outcome=Vote.Outcome.SKIP, pk__lte=last or 0
+    )
+    return Exists(skips.exclude(superseded_by__pk__lte=last or 0))
 
 
 def _with_mark(rows: QuerySet[Row], reasons: Sequence[tuple[LeftOut, Q]]) -> QuerySet[Row]:

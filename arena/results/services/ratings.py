@@ -28,6 +28,7 @@ from arena.results.queries.votes import (
     VoteSet,
     is_imported,
     last_vote_of,
+    question_of,
     vote_set,
 )
 from arena.results.services import analysis
@@ -281,6 +282,7 @@ def _planned(
         raise Conflict(f"Bootstrap rounds go from 1 to {MOST_ROUNDS}, not {rounds}.")
     if not 0 <= seed < 2**63:
         raise Conflict(f"A seed goes from 0 to 2^63 - 1, not {seed}.")
+    filters = filters or Filters()
     chosen = _read_word(Method, method, "method")
     wanted = _read_word(Intervals, intervals, "kind of intervals") if intervals else None
     try:
@@ -302,7 +304,9 @@ def _planned(
         resampling_unit=rules.unit,
         intervals=rules.intervals,
         seed=seed,
-        filters=replace(filters or Filters(), authors=authors_of(study)).as_document(),
+        filters=replace(
+            filters, authors=authors_of(study), question=question_of(study, filters)
+        ).as_document(),
         last_vote=last_vote_of(study),
         votes_counted=0,
         is_early=is_early,

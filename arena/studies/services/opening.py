@@ -7,7 +7,7 @@ in the order of their names. Its SHA-256 stands in every export of the study.
 import hashlib
 import json
 import tomllib
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import asdict
 from typing import Any
 
@@ -17,7 +17,7 @@ from django.db import IntegrityError, transaction
 from django.utils import timezone
 
 from arena.errors import StudyNotOpen
-from arena.models import Study
+from arena.models import Question, Study
 from arena.pairing.plan import Check, Entry, MatchupPlan, PlanRules, plan
 from arena.pairing.rules import ATTENTION_CHECKS, MOST_CHECKS, Triple, check_share, draw_shown
 from arena.people.queries import experts as expert_accounts
@@ -109,6 +109,16 @@ def check_seed(seed: int) -> None:
     """Raise Conflict for a seed that no column takes."""
     if not 0 <= seed < 2**63:
         raise Conflict(f"A seed goes from 0 to 2^63 - 1, not {seed}.")
+
+
+def check_questions(questions: Sequence[str]) -> None:
+    """Raise Conflict for what is not one to all of the known questions, each once."""
+    asked = list(questions)
+    if not asked or len(set(asked)) < len(asked) or not set(asked) <= set(Question.values):
+        raise Conflict(
+            f"Questions are one or more of {', '.join(Question.values)}, each once and the "
+            f"primary one first, not {', '.join(map(str, asked)) or 'none'}."
+        )
 
 
 def _contestants(study_plan: StudyPlan) -> list[Contestant]:
