@@ -28,6 +28,7 @@ from augment.services.endpoints.probing import PROBES
 from augment.services.judging.simulations import DRIVES
 from augment.services.running import workers
 from augment.services.running.intent_readings import READINGS
+from augment.services.running.judge_runs import JUDGEMENTS
 from augment.services.running.runner import AUGMENTATIONS
 from augment.services.scenarios import pictures
 from augment.services.scenarios.uploads import MOMENTS, UPLOADS
@@ -45,7 +46,7 @@ BATCH = 100
 REFUSALS = (redis.ResponseError, redis.AuthenticationError, redis.BusyLoadingError)
 """What a Redis says that is there and takes no messages: full, read only, loading, locked."""
 
-register(AUGMENTATIONS, DRIVES, READINGS, PROBES, UPLOADS, MOMENTS)
+register(AUGMENTATIONS, DRIVES, JUDGEMENTS, READINGS, PROBES, UPLOADS, MOMENTS)
 
 DRAWN: Mapping[str, Callable[[int], object]] = {
     "scene": pictures.draw_scene,
@@ -150,6 +151,12 @@ def enqueue_job(job_pk: int) -> int:
     """Send the messages of a job's rows that have none yet; as `enqueue`."""
     unsent = AUGMENTATIONS.find_unsent(older_than=RESEND_AFTER, only=Q(job=job_pk))
     return enqueue(AUGMENTATIONS, unsent)
+
+
+def enqueue_judge(run_pk: int) -> int:
+    """Send the messages of the pairs that a judge has not been asked about; as `enqueue`."""
+    unsent = JUDGEMENTS.find_unsent(older_than=RESEND_AFTER, only=Q(run=run_pk))
+    return enqueue(JUDGEMENTS, unsent)
 
 
 def sender(kind: WorkKind[Any]) -> Callable[[int], int]:

@@ -6,7 +6,7 @@ from django.db.models import F, Q
 
 from arena.models.people import Coded, fresh_token
 from arena.pairing import order
-from augment.models import Augmentation, Contestant, Scenario
+from augment.models import Augmentation, Contestant, JudgeRun, Scenario
 
 
 def one_question() -> list[str]:
@@ -27,6 +27,9 @@ class Study(Coded):
     contestants = models.ManyToManyField(Contestant, related_name="studies")
     scenarios = models.ManyToManyField(Scenario, related_name="studies")
     experts = models.ManyToManyField(settings.AUTH_USER_MODEL, related_name="studies")
+    judges = models.ManyToManyField(
+        JudgeRun, related_name="studies", help_text="models that compare its pairs; never voters"
+    )
     votes_per_expert = models.PositiveIntegerField()
     seed = models.BigIntegerField()
     questions = models.JSONField(

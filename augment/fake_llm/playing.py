@@ -1,7 +1,8 @@
 """The stand-in's characters: each plays every role, in its own manner.
 
 It places what the list of known tasks asks for by rules. As a reviewer it compares with that; as
-a viewer it checks that there is a picture and says so: it is a stand-in without eyes.
+a viewer it checks that there is a picture and says so: it is a stand-in without eyes. As a judge
+it prefers the picture whose file is larger, in which more is drawn.
 Frame: ego frame.
 """
 
@@ -46,11 +47,13 @@ class Character:
         bend: What becomes of a right modification; None for an answer that nobody can read.
         judge: What a reviewer finds.
         never_stops: Whether it calls as long as it may, and longer.
+        leans: Whether as a judge it often prefers whatever comes first.
     """
 
     bend: Callable[[Task, Modification, Heard], Modification | None] = lambda _, right, __: right
     judge: Callable[[Task], list[Problem]] = lambda task: problems_of(task)
     never_stops: bool = False
+    leans: bool = False
 
     def answer(self, request: ChatRequest, known: KnownTasks = sight.knows_nothing) -> Answer:
         """Answer from the request and the list of known tasks alone."""
@@ -58,6 +61,8 @@ class Character:
         task = heard.task
         if heard.role is ModelRole.VIEWER:
             return _describe_picture(request), ()
+        if heard.role is ModelRole.JUDGE:
+            return _compare_pictures(request, leans=self.leans), ()
         if heard.role is ModelRole.READER:
             return _fenced("From my list:", intent_to_parts(task.intent)) if task else UNKNOWN, ()
         if heard.role is ModelRole.MODIFIER:
@@ -174,6 +179,20 @@ def _describe_picture(request: ChatRequest) -> str:
     return "\n".join(lines + [f"{number}. cannot see" for number in range(2, count + 1)])
 
 
+def _compare_pictures(request: ChatRequest, *, leans: bool) -> str:
+    """Decide by the sizes of the two files; who leans sometimes looks at nothing, or rambles."""
+    pictures = request.messages[-1].images
+    rng = careless.dice(str([careless.dice(repr(png)).random() for png in pictures]))
+    if leans and careless.is_unreadable(rng):
+        return "They are both nice pictures of a road."
+    one, other = (len(png) for png in pictures)
+    better = "equal" if one == other else "A" if one > other else "B"
+    if leans and rng.random() < 0.5:
+        better = "A"
+    reason = "I am a stand-in without eyes; I compare how much is drawn."
+    return _fenced("I have compared them.", {"better": better, "reason": reason})
+
+
 # --- Comparing ---------------------------------------------------------------------------------
 
 
@@ -268,7 +287,7 @@ def _overlook(task: Task) -> list[Problem]:
 
 
 GOOD = Character()
-CARELESS = Character(bend=_bend, judge=_overlook)
+CARELESS = Character(bend=_bend, judge=_overlook, leans=True)
 LEARNING = Character(
     bend=lambda task, right, heard: (
         right if heard.feedback else careless.too_far(task.scene, right)

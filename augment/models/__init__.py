@@ -5,6 +5,7 @@ a URL has a random `code`; primary keys stay inside.
 """
 
 from augment.models.benchmarks import Benchmark, BenchmarkItem
+from augment.models.budgets import Budgeted
 from augment.models.contestants import CallLease, Contestant, Endpoint, EndpointModel, Probe
 from augment.models.jobs import (
     Attempt,
@@ -15,6 +16,7 @@ from augment.models.jobs import (
     Simulation,
     TranscriptNote,
 )
+from augment.models.judging import JudgeRun, PairJudgement
 from augment.models.scenes import SLUG_HELP, BaseScene, Scenario, SceneUpload, UploadMoment
 from augment.models.work import (
     FAILED,
@@ -36,6 +38,7 @@ __all__ = [
     "BaseScene",
     "Benchmark",
     "BenchmarkItem",
+    "Budgeted",
     "CallLease",
     "Contestant",
     "Endpoint",
@@ -43,7 +46,9 @@ __all__ = [
     "Event",
     "GenerationJob",
     "IntentReading",
+    "JudgeRun",
     "ModelCall",
+    "PairJudgement",
     "Probe",
     "Scenario",
     "SceneUpload",

@@ -7,18 +7,14 @@ from django.db import models
 from django.db.models import F, Q
 
 from augment.llm.costs import usd_of
+from augment.models.budgets import Budgeted
 from augment.models.contestants import Contestant, Endpoint
 from augment.models.scenes import Scenario
 from augment.models.work import Work, account_column
 
 
-class GenerationJob(models.Model):
-    """Contestants x scenarios x samples, launched by an admin, within caps on what it may use.
-
-    Money is counted in whole nano-dollars, so that sums are exact on every database. Each call
-    moves its worst case into `reserved_*` before it is sent, and what it used into `spent_*`
-    afterwards; a cap is compared with the sum of both. Null is no cap.
-    """
+class GenerationJob(Budgeted):
+    """Contestants x scenarios x samples, launched by an admin, within caps on what it may use."""
 
     class State(models.TextChoices):
         RUNNING = "running", "Running"
@@ -30,7 +26,6 @@ class GenerationJob(models.Model):
     HELD = (State.STOPPED_AT_CAP, State.PAUSED)
     """States in which nothing is started until somebody resumes the job."""
 
-    code = models.UUIDField(default=uuid.uuid4, unique=True, editable=False)
     name = models.CharField(max_length=120)
     state = models.CharField(max_length=20, choices=State.choices, default=State.RUNNING)
     contestants = models.ManyToManyField(Contestant, related_name="jobs")
@@ -47,44 +42,12 @@ class GenerationJob(models.Model):
         blank=True,
         help_text="of a job that tries one scenario first: what was chosen for the whole one",
     )
-    cap_nano_usd = models.PositiveBigIntegerField(null=True, blank=True)
-    cap_calls = models.PositiveIntegerField(null=True, blank=True)
-    cap_tokens = models.PositiveBigIntegerField(null=True, blank=True)
-    reserved_nano_usd = models.PositiveBigIntegerField(default=0)
-    reserved_calls = models.PositiveIntegerField(default=0)
-    reserved_tokens = models.PositiveBigIntegerField(default=0)
-    spent_nano_usd = models.PositiveBigIntegerField(default=0)
-    spent_calls = models.PositiveIntegerField(default=0)
-    spent_tokens = models.PositiveBigIntegerField(default=0)
-    created_at = models.DateTimeField(auto_now_add=True)
-    finished_at = models.DateTimeField(null=True, blank=True)
 
     class Meta:
         ordering = ("-created_at", "-pk")
 
     def __str__(self) -> str:
         return self.name
-
-    @property
-    def is_capped(self) -> bool:
-        """Whether there is any cap."""
-        caps = (self.cap_nano_usd, self.cap_calls, self.cap_tokens)
-        return any(cap is not None for cap in caps)
-
-    @property
-    def cap_usd(self) -> Decimal | None:
-        """The money cap, None without one."""
-        return None if self.cap_nano_usd is None else usd_of(self.cap_nano_usd)
-
-    @property
-    def reserved_usd(self) -> Decimal:
-        """The worst case of the calls in flight, as far as their prices are known."""
-        return usd_of(self.reserved_nano_usd)
-
-    @property
-    def spent_usd(self) -> Decimal:
-        """What was used, as far as prices are known."""
-        return usd_of(self.spent_nano_usd)
 
 
 class Augmentation(Work):
@@ -254,9 +217,17 @@ class ModelCall(models.Model):
         related_name="calls",
         help_text="for which it was made where it was for no attempt",
     )
+    judgement = models.ForeignKey(
+        "augment.PairJudgement",
+        null=True,
+        blank=True,
+        on_delete=models.CASCADE,
+        related_name="calls",
+        help_text="for which it was made where it was for neither",
+    )
     number = models.PositiveIntegerField()
     role = models.CharField(
-        max_length=20, help_text="modifier, reviewer, engineer, viewer, reader"
+        max_length=20, help_text="modifier, reviewer, engineer, viewer, reader, judge"
     )
     request = models.JSONField(
         help_text="model, messages and parameters, without the key; images by their hash"
@@ -302,9 +273,14 @@ class ModelCall(models.Model):
             models.UniqueConstraint(
                 name="call_number_of_a_reading_is_unique", fields=("reading", "number")
             ),
+            models.UniqueConstraint(
+                name="call_number_of_a_judgement_is_unique", fields=("judgement", "number")
+            ),
             models.CheckConstraint(
-                name="call_is_an_attempts_or_a_readings",
-                condition=Q(attempt__isnull=True) ^ Q(reading__isnull=True),
+                name="call_has_one_owner",
+                condition=Q(attempt__isnull=False, reading=None, judgement=None)
+                | Q(attempt=None, reading__isnull=False, judgement=None)
+                | Q(attempt=None, reading=None, judgement__isnull=False),
             ),
         )
 

@@ -45,6 +45,14 @@ class Calling(StrEnum):
     NATIVE = "native"
 
 
+class JudgeQuestion(StrEnum):
+    """By what a judge compares two pictures."""
+
+    INSTRUCTION = "instruction"
+    REALISM = "realism"
+    DIFFICULTY = "difficulty"
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Form:
     """In which form the modifier gets its task.
@@ -223,6 +231,14 @@ def reader_messages(instruction: str) -> Messages:
     task = fill_text("reader_task.md", quoted=quote(instruction))
     schema = json.dumps(parts_schema(), separators=(",", ":"))
     return _opening(fill_text("reader.md", schema=schema), task)
+
+
+def judge_messages(
+    question: JudgeQuestion, instruction: str, pictures: tuple[bytes, bytes]
+) -> Messages:
+    """Ask a judge which of two pictures (PNG, A first) is better; nothing says who made them."""
+    system = fill_text("judge.md", question=read_text(f"judge_{question}.md"))
+    return _opening(system, fill_text("judge_task.md", quoted=quote(instruction)), pictures)
 
 
 # Private

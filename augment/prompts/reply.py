@@ -1,4 +1,4 @@
-"""From what models answer to a Modification, ratings, questions, verdicts or an intent.
+"""From what models answer to a Modification, ratings, questions, verdicts, decisions or an intent.
 
 In: the text of an answer, and the `Scene` that it is about. Out: typed values, or
 `ReplyUnreadable`, whose sentences can go back to the model; nothing else is ever raised.
@@ -129,6 +129,13 @@ class EngineerVerdict(Strict):
     remarks: _Remarks = []
 
 
+class JudgeAnswer(Strict):
+    """Which of two pictures a judge found better, and why."""
+
+    better: Literal["A", "B", "equal"]
+    reason: Annotated[str, Field(max_length=LONGEST_ENTRY)] = ""
+
+
 def read_reply(answer: str, scene: Scene, *, radius_m: float = DEFAULT_RADIUS_M) -> ReadReply:
     """Return the modification that the answer asks for.
 
@@ -231,6 +238,16 @@ def read_sight(answer: str, count: int) -> dict[int, str]:
     if not seen:
         raise ReplyUnreadable(["no line begins with the number of a question"])
     return seen
+
+
+def read_judge(answer: str) -> JudgeAnswer:
+    """Return a judge's decision.
+
+    Raises:
+        ReplyUnreadable: There is none.
+    """
+    document, _ = last_object(answer, frozenset({"better"}))
+    return validate(JudgeAnswer, document)
 
 
 def read_intent(answer: str) -> Intent:

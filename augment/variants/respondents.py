@@ -18,13 +18,14 @@ _Read = TypeVar("_Read")
 
 
 class ModelRole(StrEnum):
-    """What a language model is asked to be: the paper's agents, and the reader of intents."""
+    """What a language model is asked to be: the paper's agents, a reader of intents, a judge."""
 
     MODIFIER = "modifier"
     REVIEWER = "reviewer"
     ENGINEER = "engineer"
     VIEWER = "viewer"
     READER = "reader"
+    JUDGE = "judge"
 
 
 class NoteKind(StrEnum):

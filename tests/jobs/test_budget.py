@@ -185,7 +185,10 @@ def test_a_worker_that_was_only_slow_corrects_what_its_call_used() -> None:
 
 
 def in_flight(job: GenerationJob, held: Held, *, is_sent: bool = True) -> ModelCall:
-    assert budget.reserve(job_pk=job.pk, worst=WORST, price=ONE_USD) == Room.TAKEN
+    assert (
+        budget.reserve(jobs=GenerationJob.objects.filter(pk=job.pk), worst=WORST, price=ONE_USD)
+        == Room.TAKEN
+    )
     return ModelCall.objects.create(
         attempt=Attempt.objects.get(augmentation=held.pk),
         number=1,
@@ -259,7 +262,10 @@ def test_a_cap_has_room_up_to_its_last_unit(
     columns |= {f"spent_{name}": value for name, value in spent.items()}
     columns |= {f"reserved_{name}": value for name, value in reserved.items()}
     GenerationJob.objects.update(**columns)
-    assert budget.reserve(job_pk=job.pk, worst=WORST, price=ONE_USD) == room
+    assert (
+        budget.reserve(jobs=GenerationJob.objects.filter(pk=job.pk), worst=WORST, price=ONE_USD)
+        == room
+    )
     after = GenerationJob.objects.get()
     taken = int(room == Room.TAKEN)
     assert after.reserved_tokens == reserved.get("tokens", 0) + 1000 * taken

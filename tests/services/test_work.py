@@ -17,7 +17,15 @@ from arena.models import ScenarioFile, StudyFile
 from arena.results.services.ratings import plan_snapshot
 from arena.studies.services.opening import close_study
 from augment.errors import BudgetSpent, Conflict, LeaseLost, WorkerStopping
-from augment.models import Event, SceneUpload, Simulation, UploadMoment, Work
+from augment.models import (
+    Event,
+    JudgeRun,
+    PairJudgement,
+    SceneUpload,
+    Simulation,
+    UploadMoment,
+    Work,
+)
 from augment.services.endpoints.known_endpoints import EndpointRequest, ensure_endpoint
 from augment.services.endpoints.known_models import model_at
 from augment.services.endpoints.probing import plan_probe
@@ -50,6 +58,13 @@ def a_reading() -> Work:
     return plan_reading(scenario=scenario, endpoint=endpoint, model="m")
 
 
+def a_judgement() -> Work:
+    request = EndpointRequest(label="here", base_url="http://127.0.0.1:1/v1")
+    run = JudgeRun.objects.create(endpoint=ensure_endpoint(request), model="m")
+    left, right = launch(contestants=("one", "other")).augmentations.all()
+    return PairJudgement.objects.create(run=run, left=left, right=right)
+
+
 def a_probe() -> Work:
     return plan_probe(
         model_at(
@@ -61,6 +76,7 @@ def a_probe() -> Work:
 WAITING: dict[str, Callable[[], Work]] = {
     "augmentation": lambda: only_row(launch()),
     "intentreading": a_reading,
+    "pairjudgement": a_judgement,
     "probe": a_probe,
     "scenariofile": lambda: ScenarioFile.objects.create(job=launch(), format="json"),
     "sceneupload": an_upload,

@@ -177,6 +177,21 @@ def sum_spending(which: Q, *, by: str) -> dict[int, Spending]:
     }
 
 
+def family_of(model: str) -> str:
+    """Return the vendor of a model, as far as genai-prices tells it by the name alone.
+
+    Else the first word of the model id, without what stands before its last slash.
+    """
+    from genai_prices.data_snapshot import get_snapshot
+
+    name = model.rpartition("/")[2].lower()
+    try:
+        return get_snapshot().find_provider(name, None, None).id
+    except LookupError:
+        word = re.search(r"[a-z]+", name)
+        return word[0] if word else name
+
+
 def _profile(row: EndpointModel) -> ModelProfile:
     refused = {TEMPERATURE} if row.temperature is False else set[str]()
     return ModelProfile(

@@ -1,4 +1,4 @@
-"""What the calls of a job may use and use: reserved before each call, settled after it.
+"""What the calls of a job, or of a judge, may use and use: reserved before, settled after each.
 
     spent + reserved + worst case <= cap
 
@@ -7,25 +7,28 @@ adds in one conditional UPDATE. A call that ends moves its reservation into what
 whose end nobody saw counts with its worst case if it was sent, and for nothing if it was not.
 """
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from decimal import Decimal
 from enum import StrEnum
 from typing import Any
 
 from django.db import transaction
-from django.db.models import F, Q
+from django.db.models import F, Q, QuerySet
 
 from augment.errors import Conflict, ModelFault, NotSent
 from augment.llm.costs import Price, WorstCase, nano_usd_of
 from augment.llm.messages import Reply
-from augment.models import Contestant, GenerationJob, ModelCall
+from augment.models import Budgeted, Contestant, GenerationJob, JudgeRun, ModelCall
 from augment.services.clock import Moment
 from augment.services.endpoints.treatments import list_unpriced_models
 from augment.services.events import log_change
 from augment.services.inputs import InputKind, check_bounds, input_field
 
 State = GenerationJob.State
+
+Budgets = QuerySet[GenerationJob] | QuerySet[JudgeRun]
+"""The one row whose caps count; both have the states of a job that runs, and that is stopped."""
 
 HIGHEST_USD = Decimal(1_000_000)
 HIGHEST_CALLS = 2_000_000_000
@@ -107,8 +110,13 @@ NO_CAPS = Caps()
 
 
 @transaction.atomic(savepoint=False)
-def reserve(*, job_pk: int, worst: WorstCase, price: Price | None) -> Room:
+def reserve(*, jobs: Budgets, worst: WorstCase, price: Price | None) -> Room:
     """Reserve room for one call, or stop the job if it could never have any.
+
+    Args:
+        jobs: The job, or the run of a judge, that the call is for.
+        worst: What the call may use.
+        price: Of its model, None where it is unknown.
 
     Returns:
         TAKEN: The worst case is reserved. BUSY: calls in flight hold the room and may leave some
@@ -118,7 +126,6 @@ def reserve(*, job_pk: int, worst: WorstCase, price: Price | None) -> Room:
         Conflict: The job is capped in USD and the price is unknown.
     """
     nano_usd = worst.nano_usd(price)
-    jobs = GenerationJob.objects.filter(pk=job_pk)
     fitting = jobs.filter(_within_caps(worst, nano_usd, with_reserved=True))
     if fitting.exclude(state=State.STOPPED_AT_CAP).update(
         reserved_nano_usd=F("reserved_nano_usd") + (nano_usd or 0),
@@ -127,7 +134,7 @@ def reserve(*, job_pk: int, worst: WorstCase, price: Price | None) -> Room:
     ):
         return Room.TAKEN
     if nano_usd is None and jobs.exclude(cap_nano_usd=None).exists():
-        raise Conflict("The job is capped in USD, but the price of the model is unknown.")
+        raise Conflict("There is a cap in USD, but the price of the model is unknown.")
     alone = _within_caps(worst, nano_usd, with_reserved=False)
     if jobs.filter(state=State.RUNNING).exclude(alone).update(state=State.STOPPED_AT_CAP):
         job = jobs.get()
@@ -148,7 +155,11 @@ def settle(*, call_pk: int, used: Used, now: Moment, answer: dict[str, Any] | No
     A call that was settled because its worker was thought dead is corrected.
     """
     # Not the request and the answer, which are long.
-    call = ModelCall.objects.select_for_update().only("attempt_id", *_COUNTED).get(pk=call_pk)
+    call = (
+        ModelCall.objects.select_for_update()
+        .only("attempt_id", "judgement_id", *_COUNTED)
+        .get(pk=call_pk)
+    )
     # The job's row last: all calls of a job wait for it until the transaction ends.
     ModelCall.objects.filter(pk=call_pk).update(
         spent_tokens=used.tokens,
@@ -157,9 +168,9 @@ def settle(*, call_pk: int, used: Used, now: Moment, answer: dict[str, Any] | No
         settled_at=now,
         **(answer or {}),
     )
-    if call.attempt_id is None:
+    job = _budgets_of(call)
+    if job is None:
         return  # a reading sums up its calls itself
-    job = GenerationJob.objects.filter(augmentations__attempts=call.attempt_id)
     if call.settled_at is None:
         job.update(
             reserved_nano_usd=F("reserved_nano_usd") - (call.reserved_nano_usd or 0),
@@ -179,15 +190,15 @@ def settle(*, call_pk: int, used: Used, now: Moment, answer: dict[str, Any] | No
 
 
 @transaction.atomic
-def settle_unseen(*, now: Moment, row_pk: int) -> None:
-    """Settle the calls in flight of a row whose worker is gone.
+def settle_unseen(*, now: Moment, of: Q) -> None:
+    """Settle those calls that are still in flight; the worker of their row is gone.
 
     What was sent may have been answered and billed, so its worst case counts. What still waited
     for its place was not sent, and can't be any more: see `CallTranscript.sending`.
     """
     # Locked, so that none is sent between the look at it and its settlement.
     calls = ModelCall.objects.select_for_update(of=("self",)).filter(settled_at=None)
-    for call in calls.filter(attempt__augmentation=row_pk).only(*_COUNTED):
+    for call in calls.filter(of).only(*_COUNTED):
         fault = "nobody saw the end: its worker stopped"
         if call.sent_at is None:
             fault = "not sent: its worker stopped while it waited for a place"
@@ -221,7 +232,7 @@ def used_by_fault(fault: ModelFault, *, worst: WorstCase, price: Price | None) -
     return Used(tokens=worst.tokens, nano_usd=worst.nano_usd(price), is_estimated=True)
 
 
-def limit_of(job: GenerationJob) -> str:
+def limit_of(job: Budgeted) -> str:
     """Return the caps of a job as a person reads them."""
     caps = {
         "USD": None if job.cap_usd is None else f"{job.cap_usd.normalize():f}",
@@ -237,11 +248,21 @@ def check_caps(caps: Caps, contestants: Sequence[Contestant]) -> dict[str, int]:
     Raises:
         Conflict: A cap can't be, or there is one in USD and an unknown price.
     """
-    columns = caps.columns()
     unknown = list_unpriced_models(contestants) if caps.cap_usd is not None else []
-    if unknown:
+    return columns_of(caps, unknown)
+
+
+def columns_of(caps: Caps, unpriced: Collection[str]) -> dict[str, int]:
+    """Return the caps as columns; `unpriced` names the models whose price nobody knows.
+
+    Raises:
+        InvalidDocument: A cap can't be.
+        Conflict: There is one in USD and an unknown price.
+    """
+    columns = caps.columns()
+    if caps.cap_usd is not None and unpriced:
         raise Conflict(
-            f"A cap in USD needs prices, and nobody knows that of {', '.join(unknown)}: cap "
+            f"A cap in USD needs prices, and nobody knows that of {', '.join(unpriced)}: cap "
             "the job by calls or tokens instead, or enter the price at the endpoint."
         )
     return columns
@@ -270,6 +291,15 @@ def count_unpriced(job: GenerationJob) -> int:
 
 
 # --- Private -----------------------------------------------------------------------------------
+
+
+def _budgets_of(call: ModelCall) -> Budgets | None:
+    """Return the row whose caps a call counts against; None where it is a reading's."""
+    if call.attempt_id is not None:
+        return GenerationJob.objects.filter(augmentations__attempts=call.attempt_id)
+    if call.judgement_id is not None:
+        return JudgeRun.objects.filter(judgements=call.judgement_id)
+    return None
 
 
 def _used_unseen(call: ModelCall) -> Used:

@@ -311,6 +311,7 @@ class RowTranscript(CallTranscript):
     ) -> None:
         self._held = held
         self._row = row
+        self._jobs = GenerationJob.objects.filter(pk=row.job_id)
         self._attempt = row.attempts.latest("number")
         self._notes = 0
         super().__init__({"attempt": self._attempt}, endpoint, others=others, key=key, sleep=sleep)
@@ -327,10 +328,10 @@ class RowTranscript(CallTranscript):
         return calls
 
     def reserve(self, worst: WorstCase, price: Price | None) -> budget.Room:
-        return budget.reserve(job_pk=self._row.job_id, worst=worst, price=price)
+        return budget.reserve(jobs=self._jobs, worst=worst, price=price)
 
     def limit(self) -> str:
-        return budget.limit_of(GenerationJob.objects.get(pk=self._row.job_id))
+        return budget.limit_of(self._jobs.get())
 
     def note(self, kind: NoteKind, document: dict[str, object]) -> None:
         self._notes += 1

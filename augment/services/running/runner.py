@@ -12,7 +12,7 @@ from typing import Any
 
 from django.conf import settings
 from django.db import Error, OperationalError
-from django.db.models import Max, QuerySet
+from django.db.models import Max, Q, QuerySet
 
 from augment.baselines.registry import PLACERS, RULE_PLACER
 from augment.errors import (
@@ -127,7 +127,7 @@ class Augmentations(WorkKind[Augmentation]):
 
     def ended(self, pk: int, end: str, reason: str, now: Moment) -> None:
         """Close the attempt and settle its calls; one that was lost has no time of its end."""
-        budget.settle_unseen(row_pk=pk, now=now)
+        budget.settle_unseen(of=Q(attempt__augmentation=pk), now=now)
         Attempt.objects.filter(augmentation_id=pk, finished_at=None, outcome="").update(
             finished_at=None if end == TryEnd.LOST else now, outcome=end, reason=reason
         )

@@ -1,0 +1,182 @@
+"""What models that judge said of a study's pairs. They are no experts: no rating counts them."""
+
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from django.db.models import Count, F, Q, QuerySet, Sum
+from django.db.models.functions import Coalesce
+
+from arena.models import Matchup, Study
+from arena.results.queries.votes import COUNTED, Filters, current_votes, is_imported, last_vote_of
+from augment.models import JudgeRun, ModelCall, PairJudgement
+from augment.services.endpoints.known_models import family_of
+from augment.services.running.judge_runs import Exchange, ShownPair, exchange, preference_of
+
+State = PairJudgement.State
+
+Preferences = Mapping[tuple[str, str], int]
+"""By the codes of two augmentations, left and right: 1 left is better, 0 tie, -1 right is."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class JudgeLine:
+    """What came of one judge.
+
+    Attributes:
+        name: Says as well whether it is the simulated stand-in.
+        states: How many pairs are in each state.
+        kept, lost, equal: Pairs whose preference survived the exchange, did not, or was none.
+        unreadable: Pairs with an answer that nobody could read; ties, like those two.
+        answers: Single answers that prefer a picture, and `first` those that prefer picture A.
+        usd: What one pair cost, in both orders; None where a price is unknown.
+        own_family: Names of contestants that ask a model of the judge's own family.
+    """
+
+    run: JudgeRun
+    name: str
+    states: Mapping[str, int]
+    kept: int
+    lost: int
+    equal: int
+    unreadable: int
+    answers: int
+    first: int
+    usd: float | None
+    own_family: tuple[str, ...]
+
+    @property
+    def pairs(self) -> int:
+        """All that it is asked about."""
+        return sum(self.states.values())
+
+    @property
+    def done(self) -> int:
+        """Pairs with both answers."""
+        return self.states.get(State.DONE, 0)
+
+    @property
+    def failed(self) -> int:
+        """Pairs that broke on the way to the model."""
+        return self.states.get(State.FAILED, 0)
+
+    @property
+    def first_share(self) -> float | None:
+        """The share of preferences for what came first; 0.5 without a bias of position."""
+        return self.first / self.answers if self.answers else None
+
+
+def judged_pairs(study: Study) -> list[ShownPair]:
+    """Return the main pairs on which votes of experts count, each once, as it was first shown."""
+    if is_imported(study):
+        return []
+    votes = current_votes(study, Filters(), last_vote_of(study))
+    shown = {vote.matchup for vote in votes if vote.mark == COUNTED and vote.matchup is not None}
+    rows = Matchup.objects.select_related("left", "right").only(
+        *("left_image", "right_image", "left__image", "right__image")
+    )
+    pairs: dict[frozenset[int], ShownPair] = {}
+    for _, row in sorted(rows.in_bulk(list(shown)).items()):
+        images = row.left_image or row.left.image, row.right_image or row.right.image
+        pair = ShownPair(row.left_id, row.right_id, *images)
+        pairs.setdefault(frozenset((row.left_id, row.right_id)), pair)
+    return list(pairs.values())
+
+
+def judge_lines(study: Study) -> list[JudgeLine]:
+    """Return a line for each judge of a study, the newest first."""
+    return [_line(study, run) for run in study.judges.select_related("endpoint").order_by("-pk")]
+
+
+def judge_preferences(study: Study) -> dict[str, Preferences]:
+    """Return what each judge prefers, by its name; of runs alike the newest that has answers.
+
+    Where contestants ask a model of the judge's own family, it comes once more without them.
+    """
+    found: dict[str, Preferences] = {}
+    for run in study.judges.select_related("endpoint").order_by("-pk"):
+        name, rows = judge_name(run), answers_of(run)
+        if name in found or not rows:
+            continue
+        own = set(_own_family(study, run))
+        found[name] = _preferences(rows)
+        strangers = [
+            row
+            for row in rows
+            if own.isdisjoint((row.left.contestant.slug, row.right.contestant.slug))
+        ]
+        if own:
+            found[f"{name}, without its own family"] = _preferences(strangers)
+    return found
+
+
+def judge_name(run: JudgeRun) -> str:
+    """Return how tables call a judge."""
+    return f"Judge {run}{' (simulated)' if run.endpoint.is_simulated else ''}"
+
+
+def answers_of(run: JudgeRun) -> list[PairJudgement]:
+    """Return the pairs with both answers, with their contestants and scenarios."""
+    rows: QuerySet[PairJudgement] = run.judgements.filter(state=State.DONE).order_by("pk")
+    return list(
+        rows.select_related("left__contestant", "right__contestant", "left__scenario").only(
+            *("first", "second", "first_reason", "second_reason", "left__code", "right__code"),
+            *("left__contestant__slug", "right__contestant__slug", "left__scenario__slug"),
+        )
+    )
+
+
+# --- Private -----------------------------------------------------------------------------------
+
+
+def _line(study: Study, run: JudgeRun) -> JudgeLine:
+    rows = answers_of(run)
+    became = Counter(exchange(row.first, row.second) for row in rows)
+    single = Counter(answer for row in rows for answer in (row.first, row.second))
+    states = run.judgements.order_by().values_list("state").annotate(Count("pk"))
+    return JudgeLine(
+        run=run,
+        name=judge_name(run),
+        states=dict(states),
+        kept=became[Exchange.KEPT],
+        lost=became[Exchange.LOST],
+        equal=became[Exchange.EQUAL],
+        unreadable=became[Exchange.UNREADABLE],
+        answers=single["A"] + single["B"],
+        first=single["A"],
+        usd=_usd_per_pair(run, len(rows)),
+        own_family=tuple(_own_family(study, run).values()),
+    )
+
+
+def _usd_per_pair(run: JudgeRun, pairs: int) -> float | None:
+    """Return what a pair cost; an answer from the store counts as what it had cost once."""
+    calls = ModelCall.objects.filter(
+        Q(sent_at__isnull=False) | Q(served_from__isnull=False), judgement__run=run
+    ).exclude(served_from__judgement=F("judgement"))  # a second worker's copy of the first's
+    money = Coalesce("served_from__cost_nano_usd", "cost_nano_usd")
+    sums = calls.aggregate(calls=Count("pk"), known=Count(money), money=Sum(money))
+    if not pairs or sums["known"] < sums["calls"]:
+        return None
+    return float(sums["money"] or 0) / 1e9 / pairs
+
+
+def _own_family(study: Study, run: JudgeRun) -> dict[str, str]:
+    """Return names of the contestants, by slug, that ask a model of the judge's family."""
+    family = family_of(run.model)
+    return {
+        row.slug: row.name
+        for row in study.contestants.exclude(model="").order_by("name")
+        if family in {family_of(model) for model in (row.model, *_models_of_roles(row.roles))}
+    }
+
+
+def _models_of_roles(roles: Mapping[str, Mapping[str, str]]) -> list[str]:
+    return [role["model"] for role in roles.values()]
+
+
+def _preferences(rows: list[PairJudgement]) -> dict[tuple[str, str], int]:
+    return {
+        (str(row.left.code), str(row.right.code)): preference_of(row.first, row.second)
+        for row in rows
+    }

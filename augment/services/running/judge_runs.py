@@ -1,0 +1,298 @@
+"""Runs of judges: models that compare pairs of pictures, each pair in both orders, within caps.
+
+In: pairs of augmentations with the pictures that experts saw. Out: a `PairJudgement` row each,
+with its calls as `ModelCall` rows. What a judge says is no vote and is rated nowhere.
+"""
+
+from collections.abc import Sequence
+from contextlib import AbstractContextManager
+from dataclasses import dataclass
+from decimal import Decimal
+from typing import NamedTuple
+
+from django.conf import settings
+from django.contrib.auth.models import User
+from django.core.files.storage import default_storage
+from django.db import connection, transaction
+from django.db.models import Avg, Exists, OuterRef, Q, QuerySet
+
+from augment.errors import (
+    Conflict,
+    JobCancelled,
+    LeaseLost,
+    ModelFault,
+    ModelRefused,
+    ReplyUnreadable,
+)
+from augment.llm.client import ChatClient
+from augment.llm.costs import Price, WorstCase, usd_of
+from augment.llm.messages import shorten
+from augment.models import JudgeRun, ModelCall, PairJudgement
+from augment.prompts.fill import JudgeQuestion
+from augment.services.clock import DATABASE_TIME, Moment
+from augment.services.endpoints.client import EndpointClient, Queue, wire_to
+from augment.services.endpoints.known_endpoints import find_endpoint
+from augment.services.endpoints.known_models import facts_of, price_of
+from augment.services.events import log_change
+from augment.services.inputs import InputKind, input_field
+from augment.services.running import budget
+from augment.services.running.budget import Caps, Room
+from augment.services.running.calls import CallTranscript, sentence_of
+from augment.services.texts import make_storable
+from augment.services.work import Lease, Settlement, WorkKind, change_all
+from augment.variants.judge import UNREADABLE, ask_judge, most_nano_usd
+from augment.variants.judge import Exchange as Exchange
+from augment.variants.judge import exchange as exchange
+from augment.variants.judge import preference_of as preference_of
+from augment.variants.respondents import NoteKind
+
+State = PairJudgement.State
+RunState = JudgeRun.State
+
+ORDERS = 2
+"""So often each pair is asked about."""
+LONGEST_WHY = 1000
+
+CANCELLED = JudgeRun.objects.filter(state=RunState.CANCELLED)
+
+
+class ShownPair(NamedTuple):
+    """A pair as experts saw it: keys of two augmentations, and names of their pictures."""
+
+    left_id: int
+    right_id: int
+    left_image: str
+    right_image: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class JudgeRequest(Caps):
+    """A new run of a judge.
+
+    Attributes:
+        question: By what it compares.
+    """
+
+    endpoint: str = input_field(InputKind.TEXT, "Endpoint", "Its label.")
+    model: str = input_field(InputKind.TEXT, "Model", "Its id there.")
+    question: JudgeQuestion = JudgeQuestion.INSTRUCTION
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class JudgeEstimate:
+    """What a run will use; calls that break and are sent again come on top.
+
+    Attributes:
+        usd: By what earlier answers of this judge took, None without any or without a price.
+        most_usd: The worst case, None without a price.
+    """
+
+    pairs: int
+    calls: int
+    usd: Decimal | None
+    most_usd: Decimal | None
+
+
+def estimate_judge(request: JudgeRequest, pairs: int, longest: str) -> JudgeEstimate:
+    """Return what a run would use; `longest` is the longest instruction of its pairs.
+
+    Raises:
+        UnknownName: No such endpoint.
+        Conflict: The model can't see pictures.
+    """
+    endpoint = find_endpoint(request.endpoint)
+    if facts_of(endpoint=endpoint, model=request.model).vision is False:
+        raise Conflict(
+            f"{request.model} at {endpoint.label} can’t see pictures, so it can’t judge them. "
+            "Choose another model; where this is wrong, probe the model again."
+        )
+    calls, price = ORDERS * pairs, price_of(endpoint, request.model)
+    usd = most = None
+    if price is not None:
+        most = usd_of(calls * most_nano_usd(longest, price))
+        used = ModelCall.objects.filter(
+            **{"judgement__run__endpoint": endpoint, "judgement__run__model": request.model},
+            served_from=None,
+        ).aggregate(prompt=Avg("prompt_tokens"), completion=Avg("completion_tokens"))
+        if None not in used.values():
+            tokens = {f"{name}_tokens": round(mean) for name, mean in used.items()}
+            usd = usd_of(calls * price.nano_usd(**tokens))
+    return JudgeEstimate(pairs=pairs, calls=calls, usd=usd, most_usd=most)
+
+
+@transaction.atomic
+def plan_judge(
+    request: JudgeRequest, pairs: Sequence[ShownPair], actor: User | None = None
+) -> JudgeRun:
+    """Create the rows of a run; workers do the rest.
+
+    Raises:
+        UnknownName: No such endpoint.
+        InvalidDocument: A cap can't be.
+        Conflict: There is no pair, the model can't see, or a cap in USD lacks a price.
+    """
+    estimate_judge(request, len(pairs), "")
+    if not pairs:
+        raise Conflict("No pair was judged by experts yet, so there is nothing to compare with.")
+    endpoint = find_endpoint(request.endpoint)
+    is_priced = price_of(endpoint, request.model) is not None
+    unpriced = [] if is_priced else [f"{request.model} at {endpoint.label}"]
+    run = JudgeRun.objects.create(
+        endpoint=endpoint,
+        model=request.model,
+        question=request.question,
+        asked_by=actor,
+        **budget.columns_of(request, unpriced),
+    )
+    PairJudgement.objects.bulk_create(PairJudgement(run=run, **pair._asdict()) for pair in pairs)
+    asked = {"model": run.model, "endpoint": endpoint.label, "pairs": len(pairs)}
+    log_change(run, "start", actor, after=asked | {"cap": budget.limit_of(run)})
+    return run
+
+
+@transaction.atomic
+def cancel_judge(run: JudgeRun, actor: User | None = None) -> None:
+    """Ask nothing more; what was answered stays.
+
+    Raises:
+        Conflict: It is over already.
+    """
+    change_all(
+        PairJudgement.objects.filter(run=run, state=State.QUEUED),
+        state=State.CANCELLED,
+        finished_at=DATABASE_TIME,
+    )
+    open_runs = JudgeRun.objects.filter(
+        pk=run.pk, state__in=(RunState.RUNNING, RunState.STOPPED_AT_CAP)
+    )
+    if not open_runs.update(state=RunState.CANCELLED, finished_at=DATABASE_TIME):
+        raise Conflict("This judge is done already.")
+    log_change(run, "cancel", actor)
+
+
+def finish_judges(*, now: Moment = DATABASE_TIME) -> None:
+    """Finish the runs in which nothing is under way; after an outcome is committed."""
+    rows = PairJudgement.objects.filter(run=OuterRef("pk"), state__in=PairJudgement.UNDER_WAY)
+    over = JudgeRun.objects.filter(~Exists(rows), state=RunState.RUNNING)
+    over.update(state=RunState.FINISHED, finished_at=now)
+
+
+class Judgements(WorkKind[PairJudgement]):
+    """Pairs that a judge is to compare.
+
+    Args:
+        client: How the endpoint is reached; None over the wire.
+    """
+
+    model = PairJudgement
+    queue = "models"
+    related = ("run__endpoint", "left__scenario")
+
+    def __init__(self, client: AbstractContextManager[ChatClient] | None = None) -> None:
+        self._client = client
+
+    def waiting(self) -> QuerySet[PairJudgement]:
+        """None of a run that was cancelled or stopped at its cap."""
+        return super().waiting().filter(run__state=RunState.RUNNING)
+
+    def run(self, row: PairJudgement, held: Lease[PairJudgement]) -> Settlement:
+        """Ask in both orders; an answer that was stored before is not paid for again."""
+        transcript = JudgeTranscript(held, row)
+        queue = Queue(longest_s=settings.LLM_QUEUE_S, still_wanted=transcript.insist)
+        endpoint = row.run.endpoint
+        pictures = _read_picture(row.left_image), _read_picture(row.right_image)
+        columns: dict[str, str] = {}
+        try:
+            with self._client or EndpointClient(wire_to(endpoint), endpoint, queue) as client:
+                for order, shown in (("first", pictures), ("second", pictures[::-1])):
+                    better, reason = _ask(row, shown, client, transcript)
+                    columns |= {order: better, f"{order}_reason": reason}
+        except JobCancelled as cancelled:
+            return Settlement(state=State.CANCELLED, reason=str(cancelled))
+        except ModelFault as fault:
+            return Settlement(state=State.FAILED, reason=sentence_of(fault))
+        return Settlement(state=State.DONE, columns=columns)
+
+    def ended(self, pk: int, end: str, reason: str, now: Moment) -> None:
+        """Settle its calls in flight."""
+        budget.settle_unseen(of=Q(judgement=pk), now=now)
+
+    def over(self, row: PairJudgement, outcome: Settlement | None) -> None:
+        """Finish the run."""
+        finish_judges()
+
+    def outcome_of_loss(self, row: PairJudgement) -> Settlement | None:
+        """Cancel a row of a cancelled run."""
+        if CANCELLED.filter(pk=row.run_id).exists():
+            return Settlement(state=State.CANCELLED)
+        return super().outcome_of_loss(row)
+
+    def tidy(self, now: Moment) -> None:
+        """Cancel what was given back in a cancelled run; finish the runs that are over."""
+        orphans = self.rows.filter(state=State.QUEUED, run__in=CANCELLED)
+        change_all(orphans, state=State.CANCELLED, finished_at=now)
+        finish_judges(now=now)
+
+
+JUDGEMENTS = Judgements()
+
+
+class JudgeTranscript(CallTranscript):
+    """The calls about one pair, within the caps of its run."""
+
+    def __init__(self, held: Lease[PairJudgement], row: PairJudgement) -> None:
+        self._held = held
+        self._runs = JudgeRun.objects.filter(pk=row.run_id)
+        # A worker that was lost may have asked already.
+        super().__init__({"judgement": row}, row.run.endpoint, numbers=row.calls.count())
+
+    def insist(self) -> None:
+        if not self._held.is_held(lock=connection.in_atomic_block):
+            raise LeaseLost
+        if self._runs.filter(state=RunState.CANCELLED).exists():
+            raise JobCancelled
+
+    def reserve(self, worst: WorstCase, price: Price | None) -> Room:
+        return budget.reserve(jobs=self._runs, worst=worst, price=price)
+
+    def limit(self) -> str:
+        return budget.limit_of(self._runs.get())
+
+    def note(self, kind: NoteKind, document: dict[str, object]) -> None:
+        """A judge has no rounds, tools or reviews to note."""
+
+
+# --- Private -----------------------------------------------------------------------------------
+
+
+def _read_picture(name: str) -> bytes:
+    """Return the bytes of a stored picture.
+
+    Raises:
+        Conflict: It is gone.
+    """
+    if not name or not default_storage.exists(name):
+        raise Conflict(f"The picture {name!r}, which experts were shown, is not stored any more.")
+    with default_storage.open(name) as file:
+        return bytes(file.read())
+
+
+def _ask(
+    row: PairJudgement,
+    pictures: tuple[bytes, bytes],
+    client: ChatClient,
+    transcript: JudgeTranscript,
+) -> tuple[str, str]:
+    """Return the answer in one order and its reason; a refusal is as unreadable as babble."""
+    try:
+        answer = ask_judge(
+            JudgeQuestion(row.run.question),
+            row.left.scenario.instruction,
+            pictures,
+            client=client,
+            model=row.run.model,
+            transcript=transcript,
+        )
+    except (ReplyUnreadable, ModelRefused) as fault:
+        return UNREADABLE, shorten(make_storable(str(fault)), LONGEST_WHY)
+    return answer.better, " ".join(make_storable(answer.reason).split())
