@@ -67,6 +67,21 @@ class Surface:
         _, distances = self._tree.query_nearest(point, return_distance=True, all_matches=False)
         return float(distances[0])
 
+    def edge_m(self, x_m: float, y_m: float) -> float | None:
+        """Return the way from a point to the edge, negative off the surface; None without one."""
+        if self.is_empty:
+            return None
+        point = shapely.Point(x_m, y_m)
+        apart_m = float(shapely.distance(shapely.boundary(self._joined), point))
+        return apart_m if shapely.covers(self._joined, point) else -apart_m
+
+    @cached_property
+    def _joined(self) -> shapely.Geometry:
+        """All pieces as one, without the seams between them."""
+        half_m = SEAM_M / 2.0
+        grown = shapely.buffer(self._pieces, half_m, quad_segs=2)
+        return shapely.buffer(shapely.union_all(grown), -half_m, quad_segs=2)
+
     def reach_m(self, x_m: float, y_m: float, heading_rad: float, most_m: float) -> float | None:
         """Return how far the surface goes on from a point in a direction, up to `most_m`.
 

@@ -16,7 +16,7 @@ from arena.exports.formats import (
     Sheet,
     sheet_of,
 )
-from arena.jobs.exports import displacement, driving, faults
+from arena.jobs.exports import displacement, driving, faults, realism
 from arena.jobs.exports.files import TRANSCRIPT_FORMATS
 from augment.models import GenerationJob
 from augment.services.judging.analyses import (
@@ -28,6 +28,7 @@ from augment.services.judging.analyses import (
 )
 from augment.services.judging.displacement import By
 from augment.services.judging.driving_scores import scores_of_job
+from augment.services.judging.realism import realism_of_job
 from augment.services.judging.simulations import SCORES
 from augment.services.running.progress import tool_calls
 
@@ -58,6 +59,7 @@ AUGMENTATIONS: Columns = {
     "displacement_mean_m": ("displacement.mean_m", NUMBER),
     "wrong": ("wrong", WHOLE),
     "doubtful": ("doubtful", WHOLE),
+    "realism": ("realism", NUMBER),
     "calls": ("spending.calls", WHOLE),
     "tokens": ("spending.tokens", WHOLE),
     "cost_usd": ("spending.usd", NUMBER),
@@ -141,6 +143,11 @@ JOB_TABLES = {
         TABLE_FORMATS, augmentation_sheet, "one row for each augmentation of a job"
     ),
     "repeats": Export(TABLE_FORMATS, repeat_sheet, "what varies between the samples of a job"),
+    "realism": Export(
+        realism.FORMATS,
+        realism_of_job,
+        "how realistic, between recorded traffic and random places",
+    ),
     "displacement-objects": Export(TABLE_FORMATS, displacement.object_sheet),
     **{
         f"displacement-by-{by.value}": Export(

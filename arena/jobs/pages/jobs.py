@@ -9,6 +9,7 @@ from django.http import Http404, HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, redirect, render
 from django.urls import reverse
 
+from arena.jobs.exports.realism import shown_realism
 from arena.jobs.pages.measures import displacement_section, driving_section
 from arena.jobs.queries import PICTURES, VIEWS, Part, grid_part
 from arena.models import ScenarioFile
@@ -81,7 +82,7 @@ def _tabs_of(counts: JobCounts) -> list[str]:
     if not (job.spent_calls or job.reserved_calls or job.is_capped):
         left_out.add("money")
     if counts.is_moving or not counts.settled:  # a page that reloads itself measures nothing
-        left_out |= {"displacement", "driving", "files"}
+        left_out |= {"displacement", "realism", "driving", "files"}
     return [name for name in TABS if name not in left_out]
 
 
@@ -128,6 +129,7 @@ TABS: dict[str, tuple[str, Callable[[HttpRequest, JobCounts], Context]]] = {
     "failures": ("Failures", _show_failures),
     "money": ("Money", lambda _request, counts: {"unpriced": count_unpriced(counts.job)}),
     "displacement": ("Displacement", _show_displacement),
+    "realism": ("Realism", lambda _asked, of: {"realism": shown_realism(of.job)}),
     "driving": ("Driving", lambda asked, of: {"driving": driving_section(asked, of.job)}),
     "files": ("Files", _show_files),
 }

@@ -19,6 +19,7 @@ from augment.models import Augmentation, Contestant, GenerationJob
 from augment.services.endpoints.known_models import AUGMENTATION, Spending, sum_spending
 from augment.services.judging.displacement import Measured, of_job
 from augment.services.judging.findings import find_readable
+from augment.services.judging.realism import realism_of_rows
 
 State = Augmentation.State
 Row = dict[str, Any]
@@ -38,6 +39,7 @@ class AugmentationLine:
         displacement: None where nothing can be measured.
         spending: None where no model was asked.
         wrong, doubtful: Findings of the checks, None where nothing was checked.
+        realism: None where it can't be judged.
     """
 
     row: Augmentation
@@ -45,13 +47,17 @@ class AugmentationLine:
     spending: Spending | None
     wrong: int | None = None
     doubtful: int | None = None
+    realism: float | None = None
 
 
 def augmentation_lines(job: GenerationJob) -> Iterator[AugmentationLine]:
-    """Yield every row of a job, by scenario, contestant and sample; three queries."""
+    """Yield every row of a job, by scenario, contestant and sample."""
     rows = job.augmentations.select_related("scenario__base_scene")
     scenes = {row.pk: row for row in rows.defer("scenario__base_scene__recording")}
+    realism = realism_of_rows(list(scenes))
     for line in _lines(job):
+        if line.row.pk in realism:
+            line = replace(line, realism=realism[line.row.pk].mean)
         findings = find_readable(scenes[line.row.pk])
         if findings is not None:
             counts = Counter(finding.severity for finding in findings)

@@ -1,0 +1,145 @@
+"""The realism of a job's contestants between floor and ceiling: what its files and page show."""
+
+from functools import partial
+from typing import Any
+
+from arena.exports.formats import (
+    NUMBER,
+    TEXT,
+    WHOLE,
+    YES_NO,
+    Columns,
+    Sheet,
+    formats,
+    sheet_of,
+    table_formats,
+)
+from arena.jobs.exports.displacement import SIMULATED_NOTE
+from arena.rating.lines import escape, latex_table
+from arena.results.exports.tables import shown_name
+from augment.models import GenerationJob
+from augment.services.judging.realism import (
+    RANDOM_DRAWS,
+    SCORES,
+    RealismLine,
+    RealismTable,
+    Subject,
+    realism_of_job,
+)
+
+
+def realism_notes(table: RealismTable) -> list[str]:
+    """Return the sentences that belong beneath every form of the table."""
+    notes = {
+        f"Realism, version {table.version}: how likely speed, heading to the lane, gap to the "
+        "nearest, distance to the road's edge of what was placed are among recorded objects of "
+        "the class, and which share collides with nobody; 0 to 1, the mean of the five.": True,
+        "Recorded there: recorded traffic in the scenes in which this line could be judged.": True,
+        f"Learned from {table.scenes} scenes of this installation, never from the scene itself; "
+        f"objects at random are placed {RANDOM_DRAWS} times in the picture's window.": True,
+        "Recorded traffic is the ceiling and random placement the floor of a fair comparison; "
+        "objects that all stand in the most usual way can lie above.": True,
+        "Not judged: answers without an object, and classes that were hardly recorded.": any(
+            line.left_out or line.unjudged for line in table.lines
+        ),
+        SIMULATED_NOTE: any(line.is_simulated for line in table.lines),
+    }
+    return [note for note, holds in notes.items() if holds]
+
+
+def shown_realism(job: GenerationJob) -> dict[str, Any]:
+    """Return what the job's page needs: the answer in a sentence, and the table."""
+    table = realism_of_job(job)
+    return {
+        "answer": answer_in_words(table),
+        "lines": [(line, [line.scores.get(name) for name in SCORES]) for line in table.lines],
+        "scores": SCORES,
+        "notes": realism_notes(table),
+        "forms": FORMATS,
+    }
+
+
+def answer_in_words(table: RealismTable) -> str:
+    """Return who is most realistic and where that lies, as a sentence."""
+    means = {line.subject: line.mean for line in table.lines if line.mean is not None}
+    best = next((one for one in table.lines if one.subject is Subject.CONTESTANT), None)
+    if best is None or best.mean is None:
+        return "No contestant placed anything that could be judged."
+    also = ", ".join(
+        f"{words} {means[subject]:.2f}"
+        for subject, words in (
+            (Subject.REFERENCE, "The reference has"),
+            (Subject.RANDOM, "random placement"),
+        )
+        if subject in means
+    )
+    name = shown_name(best.name, best.is_simulated)
+    there = "none" if best.recorded is None else f"{best.recorded:.2f}"
+    return (
+        f"The most realistic is {name} with {best.mean:.2f} over {best.changes} changes; recorded "
+        f"traffic has {there} in the same scenes. {also}."
+    )
+
+
+def _score(name: str, line: RealismLine) -> float | None:
+    return line.scores.get(name)
+
+
+COLUMNS: Columns = {
+    "row": ("subject", TEXT),
+    "name": (lambda line: shown_name(line.name, line.is_simulated), TEXT),
+    **{name: (f"contestant.{name}", TEXT) for name in ("slug", "model", "variant")},
+    "simulated": ("is_simulated", YES_NO),
+    "realism": ("mean", NUMBER),
+    "recorded_there": ("recorded", NUMBER),
+    **{name: (partial(_score, name), NUMBER) for name in SCORES},
+    **{name: (name, WHOLE) for name in ("changes", "left_out", "objects", "unjudged")},
+}
+
+
+def realism_sheet(table: RealismTable) -> Sheet:
+    """Return the recorded traffic, the reference, each contestant and random placement."""
+    facts = {
+        "job": table.job,
+        "realism_version": table.version,
+        "scenes": table.scenes,
+        "notes": realism_notes(table),
+    }
+    columns: Columns = {**COLUMNS, "version": (lambda line: table.version, WHOLE)}
+    return sheet_of(table.lines, columns, name="realism", key="lines", number=".4f", facts=facts)
+
+
+def realism_latex(table: RealismTable) -> bytes:
+    """Return the same as a LaTeX table."""
+    rows = (
+        (
+            escape(shown_name(line.name, line.is_simulated)),
+            *(
+                _printed(value)
+                for value in (line.mean, line.recorded, *map(line.scores.get, SCORES))
+            ),
+            str(line.changes),
+        )
+        for line in table.lines
+    )
+    text = latex_table(
+        rows,
+        heads=(
+            "Changes",
+            "Realism",
+            "Recorded there",
+            *(name.capitalize() for name in SCORES),
+            "n",
+        ),
+        comments=realism_notes(table),
+        caption=f"Realism (version {table.version}), 0 to 1; n: changes.",
+        label="tab:realism",
+    )
+    return text.encode()
+
+
+FORMATS = table_formats(realism_sheet) | formats(latex=realism_latex)
+
+
+def _printed(value: float | None) -> str:
+    return "--" if value is None else f"{value:.2f}"
